@@ -1,0 +1,112 @@
+"""The activity-on-vertex (AOV) graph of a scene: a vertex is a block, an edge a support.
+
+Vertices are 0-based positions in the scene's file order. Sets of vertices are passed as integer
+bit masks (bit v set: vertex v is in the set), which keeps the matchers small and quick.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["AOVGraph", "CycleError"]
+
+
+class CycleError(ValueError):
+    """The dependencies hold a cycle; `vertices` are those on it, in order."""
+
+    def __init__(self, vertices: tuple[int, ...]) -> None:
+        self.vertices = vertices
+        super().__init__("cycle " + " -> ".join(str(v) for v in (*vertices, vertices[0])))
+
+
+@dataclass(frozen=True)
+class AOVGraph:
+    """Dependencies of n blocks (paper section 3.2).
+
+    `depends_on[v]` holds the vertices that must be placed before v. Raises ValueError when a
+    vertex is outside 0..n-1 and CycleError when no order of placing exists.
+    """
+
+    depends_on: tuple[frozenset[int], ...]
+
+    def __post_init__(self) -> None:
+        n = len(self.depends_on)
+        for vertex, needed in enumerate(self.depends_on):
+            for other in needed:
+                if not 0 <= other < n:
+                    raise ValueError(f"vertex {vertex} depends on {other}, outside 0..{n - 1}")
+        _check_acyclic(self.depends_on)
+
+    def __len__(self) -> int:
+        return len(self.depends_on)
+
+    @functools.cached_property
+    def needed_masks(self) -> tuple[int, ...]:
+        """For each vertex, the bit mask of what it directly depends on."""
+        return tuple(sum(1 << other for other in needed) for needed in self.depends_on)
+
+    @functools.cached_property
+    def layers(self) -> tuple[int, ...]:
+        """Layer of each vertex: 1 on the ground, else 1 + the highest layer it depends on."""
+        found: dict[int, int] = {}
+        for vertex in self._first_order():
+            found[vertex] = 1 + max((found[other] for other in self.depends_on[vertex]), default=0)
+        return tuple(found[vertex] for vertex in range(len(self)))
+
+    def is_ready(self, vertex: int, placed: int) -> bool:
+        """Whether `vertex` is unplaced and all it depends on is in the bit mask `placed`."""
+        needed = self.needed_masks[vertex]
+        return not placed >> vertex & 1 and needed & placed == needed
+
+    def ready(self, placed: int = 0) -> tuple[int, ...]:
+        """The vertices that can be placed next, in file order."""
+        return tuple(v for v in range(len(self)) if self.is_ready(v, placed))
+
+    def is_valid(self, order: Sequence[int]) -> bool:
+        """Whether `order` places every vertex exactly once, each only when it is ready."""
+        placed = 0
+        for vertex in order:
+            if not 0 <= vertex < len(self) or not self.is_ready(vertex, placed):
+                return False
+            placed |= 1 << vertex
+        return placed == (1 << len(self)) - 1
+
+    def random_order(self, rng: np.random.Generator) -> tuple[int, ...]:
+        """A topological order in which each step is drawn evenly from the ready vertices."""
+        order: list[int] = []
+        placed = 0
+        while len(order) < len(self):
+            choices = self.ready(placed)
+            vertex = choices[int(rng.integers(len(choices)))]
+            order.append(vertex)
+            placed |= 1 << vertex
+        return tuple(order)
+
+    def _first_order(self) -> Iterator[int]:
+        placed = 0
+        while choices := self.ready(placed):
+            yield choices[0]
+            placed |= 1 << choices[0]
+
+
+def _check_acyclic(depends_on: tuple[frozenset[int], ...]) -> None:
+    """Raise CycleError naming one cycle, if there is one."""
+    done: set[int] = set()
+    for start in range(len(depends_on)):
+        path: list[int] = []
+        stack: list[tuple[int, bool]] = [(start, False)]
+        while stack:
+            vertex, leaving = stack.pop()
+            if leaving:
+                path.pop()
+                done.add(vertex)
+            elif vertex in path:
+                raise CycleError(tuple(path[path.index(vertex) :]))
+            elif vertex not in done:
+                path.append(vertex)
+                stack.append((vertex, True))
+                stack.extend((other, False) for other in sorted(depends_on[vertex]))

@@ -1,0 +1,228 @@
+"""The block library: types, colours, sizes, symmetries, mass, and the one Euler conversion.
+
+Eight types in five colours (paper, appendix A.1), base unit 5 cm. Body frames are fixed here and
+used by the geometry in `phyblock.sim`: boxes and the cylinder are centred, the semi-cylinder and
+the triangle have their origin at the centre of the flat (hypotenuse) face, the arch at the centre
+of its bounding box.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "BLOCK_TYPES",
+    "COLORS",
+    "DENSITY_KG_M3",
+    "FRICTION",
+    "KIT_PALETTE",
+    "SHAPES",
+    "BlockType",
+    "Color",
+    "Euler",
+    "Shape",
+    "euler_deg_to_quat_xyzw",
+    "orientation_class",
+    "quat_xyzw_to_matrix",
+]
+
+BlockType = Literal[
+    "arch", "cube", "cuboid1", "cuboid2", "cuboid3", "cylinder", "semi_cylinder", "triangle"
+]
+Color = Literal["red", "yellow", "blue", "green", "orange"]
+Euler = tuple[float, float, float]
+
+BLOCK_TYPES: tuple[BlockType, ...] = get_args(BlockType)
+COLORS: tuple[Color, ...] = get_args(Color)
+
+DENSITY_KG_M3 = 1040.0
+"""ABS plastic, paper appendix A.1."""
+FRICTION = 0.35
+"""Coulomb coefficient of a pair of blocks, paper appendix A.1."""
+
+KIT_PALETTE: tuple[tuple[BlockType, Color], ...] = (
+    ("arch", "red"),
+    ("cube", "blue"),
+    ("cube", "green"),
+    ("cube", "orange"),
+    ("cube", "red"),
+    ("cube", "yellow"),
+    ("cuboid1", "blue"),
+    ("cuboid2", "green"),
+    ("cuboid3", "yellow"),
+    ("cylinder", "orange"),
+    ("semi_cylinder", "yellow"),
+    ("triangle", "orange"),
+)
+"""The twelve type-colour pairs of the official kit."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Size of a block type in its body frame.
+
+    `low_m` and `high_m` are the corners of the bounding box [m]; `volume_m3` the solid's volume;
+    `center_of_mass_m` its centroid [m]; `fold` the order of the rotational symmetry about the
+    body z axis, and `flips` whether half turns about axes in the x-y plane map it to itself.
+    """
+
+    low_m: tuple[float, float, float]
+    high_m: tuple[float, float, float]
+    volume_m3: float
+    center_of_mass_m: tuple[float, float, float]
+    fold: int
+    flips: bool
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass in ABS plastic [kg]."""
+        return self.volume_m3 * DENSITY_KG_M3
+
+
+_FACETS = 18
+_CYLINDER_RADIUS_M = 0.025
+_CYLINDER_AREA_M2 = 0.5 * _FACETS * _CYLINDER_RADIUS_M**2 * math.sin(2 * math.pi / _FACETS)
+
+
+def _half_disc(radius_m: float, segments: int) -> tuple[float, float]:
+    """Area [m2] and centroid height above the diameter [m] of a half disc of `segments` chords."""
+    step = math.pi / segments
+    area = 0.5 * segments * radius_m**2 * math.sin(step)
+    moment = sum(
+        (math.sin(i * step) + math.sin((i + 1) * step)) * radius_m / 3 for i in range(segments)
+    ) * (0.5 * radius_m**2 * math.sin(step))
+    return area, moment / area
+
+
+def _box(x_m: float, y_m: float, z_m: float, fold: int) -> Shape:
+    half = (x_m / 2, y_m / 2, z_m / 2)
+    low = (-half[0], -half[1], -half[2])
+    return Shape(low, half, x_m * y_m * z_m, (0.0, 0.0, 0.0), fold, True)
+
+
+def _arch() -> Shape:
+    hole_m2, hole_z_m = _half_disc(0.0375, 10)
+    solid_m2 = 0.1 * 0.05
+    area_m2 = solid_m2 - hole_m2
+    center_z_m = -hole_m2 * (hole_z_m - 0.025) / area_m2
+    return Shape(
+        (-0.025, -0.05, -0.025), (0.025, 0.05, 0.025), area_m2 * 0.05, (0, 0, center_z_m), 2, False
+    )
+
+
+def _semi_cylinder() -> Shape:
+    area_m2, center_z_m = _half_disc(0.025, 10)
+    return Shape(
+        (-0.025, -0.025, 0.0), (0.025, 0.025, 0.025), area_m2 * 0.05, (0, 0, center_z_m), 2, False
+    )
+
+
+def _triangle() -> Shape:
+    leg_m = 0.05
+    half_m = leg_m / math.sqrt(2)
+    volume_m3 = 0.5 * leg_m**2 * 0.05
+    center = (0.0, 0.0, half_m / 3)
+    return Shape((-0.025, -half_m, 0.0), (0.025, half_m, half_m), volume_m3, center, 2, False)
+
+
+def _cylinder() -> Shape:
+    y_m = _CYLINDER_RADIUS_M * math.sin(math.radians(80))
+    return Shape(
+        (-_CYLINDER_RADIUS_M, -y_m, -0.05),
+        (_CYLINDER_RADIUS_M, y_m, 0.05),
+        _CYLINDER_AREA_M2 * 0.1,
+        (0.0, 0.0, 0.0),
+        _FACETS,
+        True,
+    )
+
+
+SHAPES: dict[BlockType, Shape] = {
+    "arch": _arch(),
+    "cube": _box(0.05, 0.05, 0.05, 4),
+    "cuboid1": _box(0.05, 0.05, 0.025, 4),
+    "cuboid2": _box(0.1, 0.05, 0.025, 2),
+    "cuboid3": _box(0.15, 0.05, 0.025, 2),
+    "cylinder": _cylinder(),
+    "semi_cylinder": _semi_cylinder(),
+    "triangle": _triangle(),
+}
+"""Shape of every block type; for the cube, `fold` and `flips` are completed to all 24 rotations."""
+
+
+def euler_deg_to_quat_xyzw(euler_deg: Euler) -> NDArray[np.float64]:
+    """Quaternion (x, y, z, w), shape (4,), of extrinsic x-y-z Euler angles in degrees.
+
+    R = Rz @ Ry @ Rx, scipy's `'xyz'`: the order under which the official scenes fit together.
+    """
+    roll, pitch, yaw = (math.radians(angle) / 2 for angle in euler_deg)
+    sr, cr = math.sin(roll), math.cos(roll)
+    sp, cp = math.sin(pitch), math.cos(pitch)
+    sy, cy = math.sin(yaw), math.cos(yaw)
+    return np.array(
+        [
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        ]
+    )
+
+
+def quat_xyzw_to_matrix(quat_xyzw: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation matrix, shape (3, 3), body to world, of a unit quaternion (x, y, z, w)."""
+    x, y, z, w = quat_xyzw
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+@functools.cache
+def _symmetries(block_type: BlockType) -> NDArray[np.float64]:
+    """Rotations that map the block onto itself, body frame, shape (k, 3, 3)."""
+    if block_type == "cube":
+        return _cube_rotations()
+    shape = SHAPES[block_type]
+    turns = [_turn_z(360.0 * i / shape.fold) for i in range(shape.fold)]
+    if shape.flips:
+        half_turn_x = np.diag([1.0, -1.0, -1.0])
+        turns += [turn @ half_turn_x for turn in turns]
+    return np.stack(turns)
+
+
+def _turn_z(angle_deg: float) -> NDArray[np.float64]:
+    return quat_xyzw_to_matrix(euler_deg_to_quat_xyzw((0.0, 0.0, angle_deg)))
+
+
+def _cube_rotations() -> NDArray[np.float64]:
+    rotations = []
+    for axes in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            matrix = np.zeros((3, 3))
+            matrix[range(3), axes] = signs
+            if np.linalg.det(matrix) > 0:
+                rotations.append(matrix)
+    return np.stack(rotations)
+
+
+@functools.cache
+def orientation_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, ...]:
+    """Canonical name of an orientation up to the block's own symmetry: equal if they look equal.
+
+    The least, in lexicographic order, of the nine matrix entries (rounded to 1e-4) over all
+    rotations that are indistinguishable from the given one.
+    """
+    rotation = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(euler_deg))
+    alike = np.round(rotation @ _symmetries(block_type), 4) + 0.0
+    return min(tuple(float(entry) for entry in matrix.ravel()) for matrix in alike)

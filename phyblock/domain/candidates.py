@@ -1,0 +1,56 @@
+"""Candidate sets: the numbered dictionary of blocks a model chooses from."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+from phyblock.domain.blocks import BlockType, Color, Euler, orientation_class
+from phyblock.domain.scene import Kind, Look, Scene
+
+__all__ = ["MAX_CANDIDATES", "Candidate", "CandidateSet"]
+
+MAX_CANDIDATES = 16
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One block of the dictionary: a type, a colour and an orientation [degrees]."""
+
+    type: BlockType
+    color: Color
+    euler_deg: Euler
+
+    @property
+    def kind(self) -> Kind:
+        """Type and colour."""
+        return (self.type, self.color)
+
+    @functools.cached_property
+    def look(self) -> Look:
+        """Type, colour and orientation class."""
+        return (self.type, self.color, orientation_class(self.type, self.euler_deg))
+
+
+@dataclass(frozen=True)
+class CandidateSet:
+    """At most 16 distinct candidates, numbered from 1 in the order given."""
+
+    candidates: tuple[Candidate, ...]
+
+    def __len__(self) -> int:
+        return len(self.candidates)
+
+    def __getitem__(self, index: int) -> Candidate:
+        """The candidate with the 1-based number `index`; IndexError outside 1..n."""
+        if not 1 <= index <= len(self.candidates):
+            raise IndexError(f"candidate {index} is outside 1..{len(self.candidates)}")
+        return self.candidates[index - 1]
+
+    def index_of(self, look: Look) -> int | None:
+        """The 1-based number of the first candidate that looks like `look`, or None."""
+        return next((i for i, c in enumerate(self.candidates, 1) if c.look == look), None)
+
+    def missing(self, scene: Scene) -> tuple[int, ...]:
+        """Orders of the scene's blocks that no candidate can stand for in setting A."""
+        return tuple(b.order for b in scene.blocks if self.index_of(b.look) is None)

@@ -1,0 +1,76 @@
+"""Scenes: goal structures, their blocks, and the graph that orders them."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+from phyblock.domain.aov import AOVGraph
+from phyblock.domain.blocks import BlockType, Color, Euler, orientation_class
+
+__all__ = ["Block", "Kind", "Look", "Scene"]
+
+Kind = tuple[BlockType, Color]
+"""What setting B compares: type and colour."""
+Look = tuple[BlockType, Color, tuple[float, ...]]
+"""What setting A compares: type, colour, and orientation up to the block's own symmetry."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """One block of a goal structure, at its goal pose.
+
+    `order` is its 1-based number in the scene; `position_m` the origin of its body frame in the
+    world [m], z up; `euler_deg` extrinsic x-y-z angles [degrees]; `depend` the orders of the
+    blocks it rests on, empty when it rests on the ground alone; `layer` as declared in the file.
+    """
+
+    order: int
+    type: BlockType
+    color: Color
+    position_m: tuple[float, float, float]
+    euler_deg: Euler
+    depend: tuple[int, ...]
+    layer: int
+
+    @property
+    def kind(self) -> Kind:
+        """Type and colour."""
+        return (self.type, self.color)
+
+    @functools.cached_property
+    def look(self) -> Look:
+        """Type, colour and orientation class."""
+        return (self.type, self.color, orientation_class(self.type, self.euler_deg))
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A goal structure.
+
+    `levels` are the difficulty levels the scene is counted in (one, or 1 and 2); `parents` the
+    base scenes it was made from, by which statistics cluster (its own id when it is a base scene);
+    `look_at_m` the point the goal camera looks at [m], None when framing is automatic.
+    """
+
+    id: str
+    levels: tuple[int, ...]
+    blocks: tuple[Block, ...]
+    parents: tuple[str, ...]
+    look_at_m: tuple[float, float, float] | None = None
+
+    def __len__(self) -> int:
+        return len(self.blocks)
+
+    @property
+    def level(self) -> int:
+        """The highest level the scene is counted in: the one whose AOV score it enters."""
+        return max(self.levels)
+
+    @functools.cached_property
+    def graph(self) -> AOVGraph:
+        """The scene's AOV graph; vertex v is `blocks[v]`."""
+        vertex_of = {block.order: vertex for vertex, block in enumerate(self.blocks)}
+        return AOVGraph(
+            tuple(frozenset(vertex_of[order] for order in block.depend) for block in self.blocks)
+        )

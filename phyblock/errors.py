@@ -1,0 +1,123 @@
+"""Every exception that phyblock raises on purpose.
+
+    PhyblockError
+    ├── InputError              what the user gave is wrong (exit code 2)
+    │   ├── SpecError           a suite, a models file or a --set override
+    │   ├── DataError           a data set, a scene, a candidate set, a recorded reply
+    │   ├── PromptError         a prompt template, or an official prompt that cannot be read
+    │   └── StoreError          a run folder, a record, the reply cache, a disk that refuses
+    ├── ModelError              a call to a model failed
+    │   ├── RetryableError      429, 5xx, connection, timeout, malformed body: ask again
+    │   ├── SampleError         this request will never succeed (400): go on with the next
+    │   │   └── RefusedError    the provider's content policy refused it
+    │   └── UnavailableError    this model will never answer (401, 403, unknown): stop the model
+    └── SimulationError         the physics engine could not do what was asked
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+__all__ = [
+    "DataError",
+    "InputError",
+    "ModelError",
+    "PhyblockError",
+    "Problem",
+    "PromptError",
+    "RefusedError",
+    "RetryableError",
+    "SampleError",
+    "SimulationError",
+    "SpecError",
+    "StoreError",
+    "UnavailableError",
+]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong with an input, said so that it can be mended.
+
+    `where` names the file and, where known, line and column (`suite.yaml:3:5`); `field` the
+    dotted field; `found` and `allowed` are shown as given.
+    """
+
+    where: str
+    message: str
+    field: str = ""
+    found: str = ""
+    allowed: str = ""
+    hint: str = ""
+
+    def __str__(self) -> str:
+        head = f"{self.where}: {self.field}: " if self.field else f"{self.where}: "
+        lines = [head + self.message]
+        lines += [f"    {name}: {text}" for name, text in self._details() if text]
+        return "\n".join(lines)
+
+    def _details(self) -> tuple[tuple[str, str], ...]:
+        return (("found", self.found), ("allowed", self.allowed), ("hint", self.hint))
+
+
+class PhyblockError(Exception):
+    """Base of every error that phyblock raises on purpose."""
+
+
+class InputError(PhyblockError):
+    """Something the user gave is wrong; `problems` holds all that was found, at least one."""
+
+    def __init__(self, problems: Problem | Iterable[Problem]) -> None:
+        self.problems = (problems,) if isinstance(problems, Problem) else tuple(problems)
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+
+class SpecError(InputError):
+    """A suite, a models file or an override is not valid."""
+
+
+class DataError(InputError):
+    """A data set, scene, candidate set or recorded reply is broken or missing."""
+
+
+class PromptError(InputError):
+    """A prompt template is broken or an official prompt cannot be read."""
+
+
+class StoreError(InputError):
+    """A run folder or the reply cache cannot be read or written."""
+
+
+class ModelError(PhyblockError):
+    """A call to a model failed; the message is safe to store (it holds no key)."""
+
+    def __init__(self, message: str, *, status: int | None = None) -> None:
+        self.status = status
+        super().__init__(message)
+
+
+class RetryableError(ModelError):
+    """The call may succeed when it is sent again; `retry_after_s` is the server's wish."""
+
+    def __init__(
+        self, message: str, *, status: int | None = None, retry_after_s: float | None = None
+    ) -> None:
+        self.retry_after_s = retry_after_s
+        super().__init__(message, status=status)
+
+
+class SampleError(ModelError):
+    """This request can never succeed; other requests to the model may."""
+
+
+class RefusedError(SampleError):
+    """The provider's content policy refused this request."""
+
+
+class UnavailableError(ModelError):
+    """This model cannot answer at all: bad key, no permission, unknown name."""
+
+
+class SimulationError(PhyblockError):
+    """The physics engine could not do what was asked of it."""

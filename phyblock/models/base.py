@@ -1,0 +1,110 @@
+"""The model seam: what a request, a reply and a model are, whatever answers behind it."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+from phyblock.domain import CandidateSet, Scene
+
+__all__ = ["Finish", "Image", "Message", "Model", "Reply", "Request", "Usage"]
+
+Finish = Literal["stop", "length", "refusal", "unknown"]
+"""Why a reply ended: by itself, at the token limit, by a content filter, or not said."""
+
+
+@dataclass(frozen=True)
+class Image:
+    """An encoded picture as sent; `label` says what it shows ("goal", "candidates", ...)."""
+
+    data: bytes = field(repr=False)
+    label: str
+    width_px: int
+    height_px: int
+
+    @functools.cached_property
+    def sha256(self) -> str:
+        """Hex digest of the encoded bytes."""
+        return hashlib.sha256(self.data).hexdigest()
+
+
+@dataclass(frozen=True)
+class Message:
+    """One chat message: text and pictures in the order in which they are sent."""
+
+    role: Literal["system", "user", "assistant"]
+    parts: tuple[str | Image, ...]
+
+
+@dataclass(frozen=True)
+class Request:
+    """One question to a model.
+
+    `key` names the question inside its track (a scene id for full planning) and is what a
+    recording is looked up by; `seed` is the sample's seed, which also tells repeats apart;
+    `params` are sampling parameters by their OpenAI names; `prompt_version` hashes the template.
+    `scene` and `candidates` are what the question is about: only baselines look at them.
+    """
+
+    key: str
+    seed: int
+    messages: tuple[Message, ...]
+    params: Mapping[str, object]
+    prompt_version: str
+    scene: Scene
+    candidates: CandidateSet
+
+
+@dataclass(frozen=True)
+class Usage:
+    """Tokens as the provider counted them; None where it did not say."""
+
+    prompt_tokens: int | None = None
+    completion_tokens: int | None = None
+    reasoning_tokens: int | None = None
+
+
+@dataclass(frozen=True)
+class Reply:
+    """An answer that was read.
+
+    `cost_usd` is None when the price is unknown (never 0 for that); `attempts` counts requests
+    sent for it, 0 when `cached`; `seed_sent` is False where the provider takes no seed, so that
+    seeds are independent repeats; `latency_s` is the time of the successful request alone.
+    """
+
+    text: str
+    reasoning: str = ""
+    finish: Finish = "stop"
+    usage: Usage = Usage()
+    cost_usd: float | None = None
+    latency_s: float = 0.0
+    provider_model: str = ""
+    attempts: int = 1
+    cached: bool = False
+    seed_sent: bool = True
+
+
+class Model(Protocol):
+    """Anything that answers requests: a provider, a recording, a baseline."""
+
+    @property
+    def name(self) -> str:
+        """The name the tables use."""
+
+    @property
+    def needs_messages(self) -> bool:
+        """Whether prompts and pictures must be made for it (False for recordings)."""
+
+    async def ask(self, request: Request) -> Reply | None:
+        """Answer, or None when a recording holds no reply for the request.
+
+        Raises RetryableError when all attempts failed, SampleError or RefusedError when this
+        request cannot succeed, UnavailableError when the model cannot answer at all.
+        """
+
+    async def aclose(self) -> None:
+        """Release connections; the model is not used afterwards."""
