@@ -1,0 +1,35 @@
+"""Shared fixtures: where the official data is, if it is here."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+OFFICIAL_MISSING = (
+    "official PhyBlock data not found: put it at ../shared or set PHYBLOCK_OFFICIAL to the folder "
+    "that holds PhyBlock/ and expected/"
+)
+
+
+def official_root() -> Path | None:
+    """The folder that holds `PhyBlock/` and `expected/`, or None."""
+    named = os.environ.get("PHYBLOCK_OFFICIAL")
+    root = Path(named) if named else Path(__file__).parents[2] / "shared"
+    return root if (root / "PhyBlock" / "data").is_dir() else None
+
+
+@pytest.fixture(scope="session")
+def official_dir() -> Path:
+    """The folder that holds `PhyBlock/` and `expected/`; skips where it is not there."""
+    root = official_root()
+    if root is None:
+        pytest.skip(OFFICIAL_MISSING)
+    return root
+
+
+@pytest.fixture(scope="session")
+def official_checkout(official_dir: Path) -> Path:
+    """The (partial) checkout of the official repository."""
+    return official_dir / "PhyBlock"
