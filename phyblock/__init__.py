@@ -1,0 +1,1 @@
+"""phyblock: declarative runner for PhyBlock, 3D block assembly for vision-language models."""

@@ -1,0 +1,15 @@
+"""Readers of the data formats: the project's own and the official PhyBlock layout."""
+
+from phyblock.datasets.base import AssemblyTask, Dataset
+from phyblock.datasets.builtin import SCENES_FILE, read_builtin
+from phyblock.datasets.official import official_prompt, read_official, recorded_models
+
+__all__ = [
+    "SCENES_FILE",
+    "AssemblyTask",
+    "Dataset",
+    "official_prompt",
+    "read_builtin",
+    "read_official",
+    "recorded_models",
+]

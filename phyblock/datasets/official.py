@@ -1,0 +1,123 @@
+"""Reader of the official layout: a checkout of the PhyBlock repository, whole or partial.
+
+    data/SCENEs_400_Goal_Jsons/NNN.json                 goal scenes
+    data/SCENEs_400_Cand_Jsons/NNN_16_cand_blocks.json  candidate sets
+    data/SCENEs_400_Goal_and_Cand_Imgs_resized/NNN.png  pictures of both (optional)
+    outputs/<model>/NNN.json                            recorded raw replies (optional)
+
+No released file is labelled level 1; the paper's Level-1 columns score the level-2 scenes without
+order, so a level-2 scene is read as a scene of levels 1 and 2.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from phyblock.datasets.base import AssemblyTask, Dataset
+from phyblock.datasets.checks import RawReader, check_solvable, read_json
+from phyblock.domain import CandidateSet, Scene
+from phyblock.errors import DataError, Problem
+
+__all__ = ["official_prompt", "read_official", "recorded_models"]
+
+_GOALS = Path("data", "SCENEs_400_Goal_Jsons")
+_CANDIDATES = Path("data", "SCENEs_400_Cand_Jsons")
+_PICTURES = Path("data", "SCENEs_400_Goal_and_Cand_Imgs_resized")
+_OUTPUTS = Path("outputs")
+_PICTURE_MARK = "<IMG_CONTEXT>"
+
+
+def read_official(root: Path) -> Dataset:
+    """All scenes of a checkout; raises DataError with everything that is wrong in it."""
+    goals = sorted((root / _GOALS).glob("*.json"))
+    if not goals:
+        allowed = f"a checkout of the official PhyBlock repository, with {_GOALS.as_posix()}/*.json"
+        raise DataError(Problem(str(root), "holds no official scenes", allowed=allowed))
+    tasks, problems = [], []
+    for path in goals:
+        try:
+            tasks.append(_read_task(root, path))
+        except DataError as error:
+            problems += error.problems
+    if problems:
+        raise DataError(problems)
+    return Dataset("official", root, tuple(tasks))
+
+
+def recorded_models(root: Path) -> dict[str, Path]:
+    """Folders of recorded replies in a checkout, by name, in name order."""
+    outputs = root / _OUTPUTS
+    found = sorted(outputs.iterdir()) if outputs.is_dir() else []
+    folders = {path.name: path for path in found if path.is_dir() and any(path.glob("*.json"))}
+    if not folders:
+        allowed = "a checkout with outputs/<model>/NNN.json"
+        raise DataError(Problem(str(outputs), "holds no recorded replies", allowed=allowed))
+    return folders
+
+
+def official_prompt(root: Path) -> str:
+    """The exact official text prompt, read out of the recordings that carry it.
+
+    Those recordings show the goal picture and the candidate picture apart, before the text.
+    Raises DataError when no recording carries an instruction or when they differ.
+    """
+    found: dict[str, Path] = {}
+    for folder in recorded_models(root).values():
+        for path in sorted(folder.glob("*.json")):
+            raw = read_json(path)
+            instruction = raw.get("instruction") if isinstance(raw, dict) else None
+            if not isinstance(instruction, str):
+                break
+            found.setdefault(instruction.replace(_PICTURE_MARK, ""), path)
+    if len(found) == 1:
+        return next(iter(found))
+    where = str(root / _OUTPUTS)
+    if not found:
+        message = "no recording carries the official prompt"
+        allowed = "recordings with a field 'instruction', such as those of the InternVL models"
+        raise DataError(Problem(where, message, "instruction", allowed=allowed))
+    files = ", ".join(str(path) for path in found.values())
+    raise DataError(Problem(where, "the recordings carry different prompts", "instruction", files))
+
+
+def _read_task(root: Path, path: Path) -> AssemblyTask:
+    scene = _read_scene(path)
+    candidates_path = root / _CANDIDATES / f"{path.stem}_16_cand_blocks.json"
+    candidates = _read_candidates(candidates_path)
+    reader = RawReader(str(candidates_path))
+    check_solvable(reader, scene, candidates)
+    reader.raise_if_broken()
+    picture = root / _PICTURES / f"{path.stem}.png"
+    return AssemblyTask(scene, candidates, picture if picture.is_file() else None)
+
+
+def _read_scene(path: Path) -> Scene:
+    raw = read_json(path)
+    reader = RawReader(str(path))
+    level = reader.integer(reader.get(raw, "level"), "level", 1, 4)
+    look_at = raw.get("lookat_pos") if isinstance(raw, dict) else None
+    look_at_m = None if look_at is None else reader.vector(look_at, "lookat_pos")
+    # Declared layers differ from the longest path in 70 of the 400 released scenes.
+    blocks = reader.blocks(reader.get(raw, "blocks"), strict_layers=False)
+    combined = raw.get("combined") if isinstance(raw, dict) else None
+    if combined is not None and not (isinstance(combined, str) and combined):
+        reader.complain("combined", "is not allowed", combined, "base scenes joined by '_'")
+    reader.raise_if_broken()
+    assert level is not None
+    parents = tuple(combined.split("_")) if combined else (path.stem,)
+    return Scene(path.stem, (1, 2) if level == 2 else (level,), blocks, parents, look_at_m)
+
+
+def _read_candidates(path: Path) -> CandidateSet:
+    raw = read_json(path)
+    reader = RawReader(str(path))
+    candidates = reader.candidates(raw)
+    if isinstance(raw, list):
+        for i, entry in enumerate(raw):
+            # In candidate files `position` is the 1-based number that the picture shows.
+            number = entry.get("position") if isinstance(entry, dict) else None
+            if number != i + 1:
+                allowed = f"{i + 1}: candidates are numbered from 1 in file order"
+                reader.complain(f"candidates[{i}].position", "is wrong", number, allowed)
+    reader.raise_if_broken()
+    return candidates

@@ -1,0 +1,5 @@
+"""Reply text -> what the model meant, with the rule that matched, or a named failure. Pure."""
+
+from phyblock.parsing.plan import PLAN_PARSERS, ParsedPlan, PlanParser, parse_plan
+
+__all__ = ["PLAN_PARSERS", "ParsedPlan", "PlanParser", "parse_plan"]

@@ -1,0 +1,64 @@
+"""Everything one plan is worth: every setting, matcher and criterion in one pass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from phyblock.domain import CandidateSet, Plan, Scene
+from phyblock.scoring.error_types import ErrorType, count_errors, step_errors
+from phyblock.scoring.level1 import Level1Criterion, level1_counts
+from phyblock.scoring.match import Goal, Matcher, Setting, match_plan
+from phyblock.scoring.metrics import Counts
+
+__all__ = ["AssemblyScorer", "Criterion", "Score"]
+
+Criterion = Literal["aov", "selection", "membership"]
+
+
+@dataclass(frozen=True)
+class Score:
+    """Counts of one plan under one criterion and setting.
+
+    `matcher`, `errors` (wrong steps by type), `vertices` (the goal vertex each step placed) and
+    `step_errors` belong to criterion `aov` and are None for the Level-1 criteria.
+    """
+
+    criterion: Criterion
+    setting: Setting
+    counts: Counts
+    matcher: Matcher | None = None
+    errors: dict[ErrorType, int] | None = None
+    vertices: tuple[int | None, ...] | None = None
+    step_errors: tuple[ErrorType | None, ...] | None = None
+
+
+class AssemblyScorer:
+    """Scores plans for one scene; build once, use for every model and seed."""
+
+    def __init__(self, scene: Scene, candidates: CandidateSet, settings: Sequence[Setting]) -> None:
+        self._scene = scene
+        self._candidates = candidates
+        self._goals = {setting: Goal(scene, candidates, setting) for setting in settings}
+
+    def score(
+        self, plan: Plan, matchers: Sequence[Matcher], level1: Level1Criterion | None
+    ) -> tuple[Score, ...]:
+        """Scores by setting, then matcher; the Level-1 criterion only for scenes of level 1.
+
+        Raises KeyError for a step that is no candidate.
+        """
+        scores: list[Score] = []
+        for setting, goal in self._goals.items():
+            scores += [self._aov(goal, plan, setting, matcher) for matcher in matchers]
+            if level1 is not None and 1 in self._scene.levels:
+                scores.append(Score(level1, setting, level1_counts(goal, plan, level1)))
+        return tuple(scores)
+
+    def _aov(self, goal: Goal, plan: Plan, setting: Setting, matcher: Matcher) -> Score:
+        match = match_plan(goal, plan, matcher)
+        errors = step_errors(self._scene, self._candidates, goal, plan, match)
+        return Score(
+            "aov", setting, match.counts, matcher, count_errors(errors), match.vertices, errors
+        )
