@@ -135,7 +135,8 @@ class RawReader:
         depend = self._depend(self.get(raw, "depend", f"{at}."), f"{at}.depend")
         if len(self.problems) > before:
             return None
-        assert order and layer and position and euler and depend is not None
+        assert order and layer and position and euler
+        assert depend is not None
         return Block(order, kind, color, position, euler, depend, layer)
 
     def _candidate(self, raw: object, at: str) -> Candidate | None:

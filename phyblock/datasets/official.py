@@ -33,7 +33,8 @@ def read_official(root: Path) -> Dataset:
     if not goals:
         allowed = f"a checkout of the official PhyBlock repository, with {_GOALS.as_posix()}/*.json"
         raise DataError(Problem(str(root), "holds no official scenes", allowed=allowed))
-    tasks, problems = [], []
+    tasks: list[AssemblyTask] = []
+    problems: list[Problem] = []
     for path in goals:
         try:
             tasks.append(_read_task(root, path))

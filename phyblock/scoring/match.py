@@ -114,12 +114,12 @@ def _best_choices(goal: Goal, plan: Plan) -> list[int | None]:
                 reached.setdefault(placed | 1 << vertex, vertex)
         frontier = reached
         history.append(reached)
-    placed = max(frontier, key=lambda mask: mask.bit_count())
+    best = max(frontier, key=lambda mask: mask.bit_count())
     vertices: list[int | None] = []
     for reached in reversed(history):
-        vertex = reached[placed]
+        vertex = reached[best]
         vertices.append(vertex)
-        placed &= ~(1 << vertex) if vertex is not None else ~0
+        best &= ~(1 << vertex) if vertex is not None else ~0
     return vertices[::-1]
 
 
