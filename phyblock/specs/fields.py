@@ -1,0 +1,60 @@
+"""Field types that suites and models files share, and the errors they raise."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import Annotated, Any, TypeVar
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+__all__ = [
+    "Count",
+    "MaxTokens",
+    "ModelName",
+    "Section",
+    "Temperature",
+    "TopP",
+    "Unique",
+    "refuse",
+]
+
+ItemT = TypeVar("ItemT", bound=Hashable)
+
+
+class Section(BaseModel):
+    """Base of all that is written in YAML: no unknown keys, no changes after reading."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def refuse(message: str, **context: Any) -> PydanticCustomError:
+    """A validation error in plain words.
+
+    `context` may hold `allowed`, `hint` and `words` (close ones are proposed), and `at`, the
+    path below the validated value where the fault stands.
+    """
+    return PydanticCustomError("refused", "{message}", {"message": message, **context})
+
+
+def _unique(items: tuple[ItemT, ...]) -> tuple[ItemT, ...]:
+    seen: set[ItemT] = set()
+    for index, item in enumerate(items):
+        if item in seen:
+            raise refuse("stands twice in this list", at=(index,), hint="keep one of them")
+        seen.add(item)
+    return items
+
+
+Unique = Annotated[
+    tuple[ItemT, ...], AfterValidator(_unique), Field(json_schema_extra={"uniqueItems": True})
+]
+"""A list whose items all differ."""
+
+Count = Annotated[int, Field(strict=True, ge=1)]
+Temperature = Annotated[float, Field(strict=True, ge=0, le=2, allow_inf_nan=False)]
+TopP = Annotated[float, Field(strict=True, gt=0, le=1, allow_inf_nan=False)]
+MaxTokens = Count
+
+ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._:+-]{0,79}$")]
+"""Names of models become names of folders and rows of tables, hence the narrow alphabet."""

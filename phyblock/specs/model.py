@@ -1,0 +1,165 @@
+"""What a person may write about one model in a models file."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, JsonValue, model_validator
+
+from phyblock.specs.fields import Count, MaxTokens, Section, Temperature, TopP, refuse
+from phyblock.specs.suite import SamplingSpec
+
+__all__ = ["ModelSpec", "PriceSpec"]
+
+Effort = Literal["none", "minimal", "low", "medium", "high", "xhigh", "max"]
+UsdPerMillion = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
+
+_ID_PATTERN = r"^[A-Za-z0-9_.-]+/\S+$"
+_OWNERS = (("gpt", "openai"), ("o1", "openai"), ("o3", "openai"), ("claude", "anthropic"),
+           ("gemini", "gemini"), ("qwen-vl", "dashscope"))  # fmt: skip
+_WITH_REPLAY = {"replay", "published", "size_b"}
+
+
+def _check_id(model_id: str) -> str:
+    provider, slash, rest = model_id.partition("/")
+    if slash and provider and rest and " " not in model_id:
+        return model_id
+    owner = next((who for start, who in _OWNERS if model_id.lower().startswith(start)), None)
+    hint = f"did you mean {owner}/{model_id}?" if owner else "for example openai/gpt-4o-2024-08-06"
+    raise refuse("is not a litellm id", allowed="provider/model", hint=hint)
+
+
+def _check_api_base(url: str) -> str:
+    if url.startswith(("http://", "https://")):
+        return url
+    raise refuse(
+        "is not the address of a server",
+        allowed="http://... or https://...",
+        hint="for example http://localhost:8000/v1",
+    )
+
+
+def _check_finite(body: dict[str, JsonValue]) -> dict[str, JsonValue]:
+    stack: list[tuple[tuple[str | int, ...], JsonValue]] = [((), body)]
+    while stack:
+        path, value = stack.pop()
+        if isinstance(value, float) and not math.isfinite(value):
+            raise refuse("is not a number that JSON can carry", at=path)
+        if isinstance(value, dict):
+            stack.extend(((*path, key), item) for key, item in value.items())
+        elif isinstance(value, list):
+            stack.extend(((*path, index), item) for index, item in enumerate(value))
+    return body
+
+
+class PriceSpec(Section):
+    """What a model costs, where litellm's price map does not know it or is wrong."""
+
+    input: UsdPerMillion = Field(description="Prompt tokens [USD per million].")
+    output: UsdPerMillion = Field(description="Reply tokens [USD per million].")
+
+
+class ModelSpec(Section):
+    """One model: where it is and how it is asked.
+
+    Exactly one of `id` and `replay` is given. A sampling parameter that is left out takes the
+    suite's value; one that is written as null is not sent (`params` tells the two apart).
+    """
+
+    id: (
+        Annotated[str, AfterValidator(_check_id), Field(json_schema_extra={"pattern": _ID_PATTERN})]
+        | None
+    ) = Field(default=None, description="litellm id with its provider: openai/gpt-4o-2024-08-06.")
+    api_base: (
+        Annotated[
+            str,
+            AfterValidator(_check_api_base),
+            Field(json_schema_extra={"pattern": "^https?://"}),
+        ]
+        | None
+    ) = Field(
+        default=None,
+        description="Address of an OpenAI-compatible server (vLLM, Ollama, LM Studio), such as "
+        "http://localhost:8000/v1.",
+    )
+    api_key_env: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] | None = Field(
+        default=None,
+        description="Name of the environment variable that holds the key, where it is not the "
+        "provider's usual one. Never the key itself.",
+    )
+    transport: Literal["auto", "litellm", "direct"] = Field(
+        default="auto",
+        description="litellm: through the library. direct: straight HTTP, for servers that speak "
+        "the OpenAI chat protocol. auto: direct where it can.",
+    )
+    max_concurrency: Count | None = Field(
+        default=None, description="Calls to this model under way at once; null: the suite's limit."
+    )
+    rpm: Count | None = Field(default=None, description="Requests a minute at most.")
+    tpm: Count | None = Field(default=None, description="Tokens a minute at most.")
+    temperature: Temperature | None = Field(
+        default=None, description="0 to 2. Left out: the suite's; null: not sent."
+    )
+    top_p: TopP | None = Field(
+        default=None, description="Above 0, at most 1. Left out: the suite's; null: not sent."
+    )
+    max_tokens: MaxTokens | None = Field(
+        default=None,
+        description="Limit of a reply [tokens]. Left out: the suite's; null: not sent.",
+    )
+    reasoning_effort: Effort | None = Field(
+        default=None, description="How much a reasoning model thinks; null: not sent."
+    )
+    extra_body: Annotated[dict[str, JsonValue], AfterValidator(_check_finite)] = Field(
+        default_factory=dict, description="Further fields of the request body, sent as they are."
+    )
+    price: PriceSpec | None = Field(
+        default=None, description="Price; null: litellm's price map, or unknown."
+    )
+    seed: Literal["auto", "always", "never"] = Field(
+        default="auto",
+        description="auto: seeds are sent where the provider is known to take them. always, "
+        "never: whatever is known.",
+    )
+    timeout_s: Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] | None = Field(
+        default=None, description="Longest wait for one reply [s]; null: the suite's."
+    )
+    published: Annotated[str, Field(min_length=1)] | None = Field(
+        default=None, description="Name of its row in the paper's tables."
+    )
+    size_b: Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] | None = Field(
+        default=None, description="Parameters [billions], where known."
+    )
+    replay: Annotated[str, Field(min_length=1)] | None = Field(
+        default=None,
+        description="Folder of recorded replies that stands in for the model (then no id), "
+        "relative to this file.",
+    )
+
+    @model_validator(mode="after")
+    def _check_kind(self) -> ModelSpec:
+        if self.replay is None:
+            if self.id is None:
+                raise refuse(
+                    "needs an id (or a replay folder)", hint="for example id: openai/gpt-4o"
+                )
+            return self
+        for key in sorted(self.model_fields_set - _WITH_REPLAY):
+            raise refuse(
+                "has no meaning for a replay",
+                at=(key,),
+                key=True,
+                allowed=", ".join(sorted(_WITH_REPLAY)),
+                hint="keep either id or replay",
+            )
+        return self
+
+    def params(self, defaults: SamplingSpec) -> dict[str, Any]:
+        """Sampling parameters to send, by their OpenAI names: its own, else the suite's."""
+        chosen = {
+            key: getattr(self if key in self.model_fields_set else defaults, key)
+            for key in ("temperature", "top_p", "max_tokens")
+        }
+        chosen["reasoning_effort"] = self.reasoning_effort
+        return {key: value for key, value in chosen.items() if value is not None}
