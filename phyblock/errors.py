@@ -1,17 +1,17 @@
 """Every exception that phyblock raises on purpose.
 
-    PhyblockError
-    ├── InputError              what the user gave is wrong (exit code 2)
-    │   ├── SpecError           a suite, a models file or a --set override
-    │   ├── DataError           a data set, a scene, a candidate set, a recorded reply
-    │   ├── PromptError         a prompt template, or an official prompt that cannot be read
-    │   └── StoreError          a run folder, a record, the reply cache, a disk that refuses
-    ├── ModelError              a call to a model failed
-    │   ├── RetryableError      429, 5xx, connection, timeout, malformed body: ask again
-    │   ├── SampleError         this request will never succeed (400): go on with the next
-    │   │   └── RefusedError    the provider's content policy refused it
-    │   └── UnavailableError    this model will never answer (401, 403, unknown): stop the model
-    └── SimulationError         the physics engine could not do what was asked
+PhyblockError
+├── InputError              what the user gave is wrong (exit code 2)
+│   ├── SpecError           a suite, a models file or a --set override
+│   ├── DataError           a data set, a scene, a candidate set, a recorded reply
+│   ├── PromptError         a prompt template, or an official prompt that cannot be read
+│   └── StoreError          a run folder, a record, the reply cache, a disk that refuses
+├── ModelError              a call to a model failed
+│   ├── RetryableError      429, 5xx, connection, timeout, malformed body: ask again
+│   ├── SampleError         this request will never succeed (400): go on with the next
+│   │   └── RefusedError    the provider's content policy refused it
+│   └── UnavailableError    this model will never answer (401, 403, unknown): stop the model
+└── SimulationError         the physics engine could not do what was asked
 """
 
 from __future__ import annotations

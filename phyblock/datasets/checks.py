@@ -133,19 +133,18 @@ class RawReader:
         position = self.vector(self.get(raw, "position", f"{at}."), f"{at}.position")
         euler = self._euler(raw, at)
         depend = self._depend(self.get(raw, "depend", f"{at}."), f"{at}.depend")
-        if len(self.problems) > before:
+        if len(self.problems) > before or not (order and layer and position and euler):
             return None
-        assert order and layer and position and euler
-        assert depend is not None
+        if depend is None:
+            return None
         return Block(order, kind, color, position, euler, depend, layer)
 
     def _candidate(self, raw: object, at: str) -> Candidate | None:
         before = len(self.problems)
         kind, color = self._kind(raw, at)
         euler = self._euler(raw, at)
-        if len(self.problems) > before:
+        if len(self.problems) > before or euler is None:
             return None
-        assert euler
         return Candidate(kind, color, euler)
 
     def _kind(self, raw: object, at: str) -> tuple[BlockType, Color]:

@@ -117,9 +117,9 @@ def _best_choices(goal: Goal, plan: Plan) -> list[int | None]:
     best = max(frontier, key=lambda mask: mask.bit_count())
     vertices: list[int | None] = []
     for reached in reversed(history):
-        vertex = reached[best]
-        vertices.append(vertex)
-        best &= ~(1 << vertex) if vertex is not None else ~0
+        taken = reached[best]
+        vertices.append(taken)
+        best &= ~(1 << taken) if taken is not None else ~0
     return vertices[::-1]
 
 

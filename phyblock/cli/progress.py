@@ -1,0 +1,151 @@
+"""Showing a run while it goes on: a live panel in a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.panel import Panel
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+
+from phyblock.cli.tally import Tally
+from phyblock.run.events import (
+    ModelNotice,
+    ModelStopped,
+    RunEvent,
+    RunStarted,
+    SampleDone,
+    Stopping,
+)
+
+__all__ = ["ProgressView"]
+
+_LINE_EVERY_S = 10.0
+
+
+class ProgressView:
+    """Watches a run; use as a context manager and pass it as the run's watcher."""
+
+    def __init__(self, console: Console, title: str) -> None:
+        self._console = console
+        self._title = title
+        self._tallies: dict[str, Tally] = {}
+        self._started = time.monotonic()
+        self._last_line = self._started
+        self._status = ""
+        self._live = (
+            Live(console=console, refresh_per_second=4, get_renderable=self._panel, transient=True)
+            if console.is_terminal
+            else None
+        )
+
+    def __enter__(self) -> ProgressView:
+        if self._live is not None:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def __call__(self, event: RunEvent) -> None:
+        """Take note of an event."""
+        if isinstance(event, SampleDone):
+            self._tallies[event.record["model"]].add(event.record, fresh=True)
+            self._plain_line()
+        elif isinstance(event, RunStarted):
+            self._tallies = {name: Tally(n) for name, n in event.expected.items()}
+            for name, records in event.earlier.items():
+                for record in records:
+                    self._tallies[name].add(record, fresh=False)
+        elif isinstance(event, ModelNotice):
+            tally = self._tallies[event.model]
+            tally.retries += event.kind == "retry"
+            tally.notice = event.text
+        elif isinstance(event, ModelStopped):
+            self._tallies[event.model].notice = "stopped"
+            self._console.print(f"[red]{event.model} stopped:[/red] ", end="")
+            self._console.print(event.reason, markup=False, highlight=False)
+        elif isinstance(event, Stopping):
+            self._status = self._stopping_text(event)
+            if self._live is None:
+                self._console.print(self._status, markup=False)
+
+    @property
+    def spent_usd(self) -> float:
+        """Dollars spent by this command, as far as prices are known."""
+        return sum(tally.cost_usd for tally in self._tallies.values())
+
+    def _stopping_text(self, event: Stopping) -> str:
+        if not event.in_flight:
+            return f"Stopping: {event.reason}."
+        calls = f"{event.in_flight} call{'s' if event.in_flight > 1 else ''} under way"
+        return f"Stopping: {event.reason}; waiting for {calls} (Ctrl-C again to give them up)."
+
+    def _plain_line(self) -> None:
+        now = time.monotonic()
+        if self._live is None and now - self._last_line >= _LINE_EVERY_S:
+            self._last_line = now
+            self._console.print(self._summary(), markup=False, highlight=False)
+
+    def _summary(self) -> str:
+        done = sum(tally.done for tally in self._tallies.values())
+        total = sum(tally.expected for tally in self._tallies.values())
+        fresh = sum(tally.fresh for tally in self._tallies.values())
+        elapsed = time.monotonic() - self._started
+        text = f"{done:,} of {total:,} samples"
+        if fresh and elapsed > 0:
+            rate = fresh / elapsed
+            text += f" · {rate:.1f} a second"
+            if done < total:
+                text += f" · {_duration((total - done) / rate)} left"
+        return text
+
+    def _panel(self) -> RenderableType:
+        done = sum(tally.done for tally in self._tallies.values())
+        total = sum(tally.expected for tally in self._tallies.values()) or 1
+        parts: list[RenderableType] = [
+            ProgressBar(total=total, completed=done, width=None),
+            self._summary(),
+            self._table(),
+        ]
+        if self._status:
+            parts.append(f"[yellow]{self._status}[/yellow]")
+        return Panel(Group(*parts), title=self._title, title_align="left", border_style="dim")
+
+    def _table(self) -> Table:
+        table = Table(box=None, pad_edge=False, header_style="dim", padding=(0, 2, 0, 0))
+        table.add_column("model", no_wrap=True)
+        for name in ("done", "F1 %", "tokens", "cost", "cached", "retries"):
+            table.add_column(name, justify="right", no_wrap=True)
+        table.add_column("failures")
+        table.add_column("", style="yellow")
+        for name, tally in self._tallies.items():
+            table.add_row(
+                name,
+                f"{tally.done:,}/{tally.expected:,}",
+                tally.f1_text,
+                f"{tally.tokens:,}",
+                tally.cost_text,
+                f"{tally.cached:,}",
+                f"{tally.retries:,}",
+                tally.failure_text,
+                tally.notice if tally.done < tally.expected else "",
+            )
+        return table
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes:02d} min"
+    return f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"

@@ -1,0 +1,69 @@
+"""Running figures of each model while a run goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from phyblock.scoring import Counts
+
+__all__ = ["Tally"]
+
+_FAILED = ("parse_failure", "refusal", "truncated", "api_error", "missing")
+
+
+@dataclass
+class Tally:
+    """What a model's records add up to; `counts` are of the headline matcher and setting."""
+
+    expected: int
+    done: int = 0
+    fresh: int = 0
+    counts: Counts = Counts()
+    tokens: int = 0
+    cost_usd: float = 0.0
+    unpriced: int = 0
+    retries: int = 0
+    cached: int = 0
+    failures: dict[str, int] = field(default_factory=dict)
+    notice: str = ""
+
+    def add(self, record: Mapping[str, Any], *, fresh: bool) -> None:
+        """Count one record; `fresh` ones were written by this command."""
+        self.done += 1
+        self.fresh += fresh
+        outcome = record["outcome"]
+        if outcome in _FAILED:
+            self.failures[outcome] = self.failures.get(outcome, 0) + 1
+        headline = next((s for s in record["scores"] if s["criterion"] == "aov"), None)
+        if headline is not None:
+            self.counts += Counts(headline["tp"], headline["fp"], headline["fn"])
+        reply = record["reply"]
+        if reply is None:
+            return
+        self.cached += reply["cached"]
+        usage = reply["usage"]
+        self.tokens += (usage["prompt_tokens"] or 0) + (usage["completion_tokens"] or 0)
+        if reply["cost_usd"] is None:
+            self.unpriced += 1
+        elif fresh and not reply["cached"]:
+            self.cost_usd += reply["cost_usd"]
+
+    @property
+    def cost_text(self) -> str:
+        """Dollars spent by this command, or that the price is not known."""
+        if self.unpriced and self.unpriced == self.done:
+            return "unknown"
+        return f"${self.cost_usd:.2f}" + (" + unknown" if self.unpriced else "")
+
+    @property
+    def f1_text(self) -> str:
+        """Running micro-F1 in percent, or a dash."""
+        return "–" if self.counts.f1 is None else f"{100 * self.counts.f1:.1f}"
+
+    @property
+    def failure_text(self) -> str:
+        """Failures by outcome, or a dash."""
+        words = [f"{n} {name.replace('_', ' ')}" for name, n in sorted(self.failures.items())]
+        return ", ".join(words) or "–"

@@ -1,0 +1,27 @@
+"""Where the suites, prompts, data sets and models file that come with the project are."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+__all__ = ["bundled", "cache_dir"]
+
+_PACKAGE = Path(__file__).parent
+
+
+def bundled(*parts: str) -> Path:
+    """A path inside what comes with the project: `benchmarks/`, `prompts/` or `models.yaml`.
+
+    In an installed wheel they lie in the package, in a checkout beside it.
+    """
+    inside = _PACKAGE / "bundled"
+    return (inside if inside.is_dir() else _PACKAGE.parent).joinpath(*parts)
+
+
+def cache_dir() -> Path:
+    """The user's cache folder: `$PHYBLOCK_CACHE`, else the platform's place for caches."""
+    named = os.environ.get("PHYBLOCK_CACHE")
+    if named:
+        return Path(named).expanduser()
+    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "phyblock"

@@ -1,0 +1,61 @@
+"""What happens in a run, told to whoever watches; the run itself prints nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = [
+    "ModelNotice",
+    "ModelStopped",
+    "RunEvent",
+    "RunStarted",
+    "SampleDone",
+    "Stopping",
+    "Watcher",
+]
+
+
+@dataclass(frozen=True)
+class RunStarted:
+    """Samples in all and already on disk, by model; `earlier` are the records found."""
+
+    expected: Mapping[str, int]
+    earlier: Mapping[str, tuple[Mapping[str, Any], ...]]
+
+
+@dataclass(frozen=True)
+class SampleDone:
+    """A record was written."""
+
+    record: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class ModelNotice:
+    """A model's call is repeated or its concurrency changed; `text` says so in a few words."""
+
+    model: str
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True)
+class ModelStopped:
+    """A model is asked no more: it is not available."""
+
+    model: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Stopping:
+    """The run takes no new samples: interrupted, or its cost limit is reached."""
+
+    reason: str
+    in_flight: int
+
+
+RunEvent = RunStarted | SampleDone | ModelNotice | ModelStopped | Stopping
+Watcher = Callable[[RunEvent], None]

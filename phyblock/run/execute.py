@@ -1,0 +1,144 @@
+"""Executing a plan: bounded concurrency, every answer on disk before the next is judged.
+
+The executor emits events and prints nothing. It stops cleanly: no new sample is started, calls
+that are under way are waited for, because they are paid for.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from phyblock.datasets import AssemblyTask
+from phyblock.errors import ModelError, PhyblockError, UnavailableError
+from phyblock.models import BudgetReachedError, Model
+from phyblock.models.base import Reply
+from phyblock.run.events import ModelStopped, SampleDone, Stopping, Watcher
+from phyblock.run.plan import PlannedModel, RunPlan, sample_id
+from phyblock.run.records import is_final, judged, to_record
+from phyblock.run.store import RunStore
+
+__all__ = ["Executor", "RunResult"]
+
+
+@dataclass
+class RunResult:
+    """How a run ended: `left` samples have no final record; `stopped` models and why."""
+
+    written: int = 0
+    left: int = 0
+    stopped: dict[str, str] = field(default_factory=dict)
+    reason: str | None = None
+
+
+class Executor:
+    """Asks every model about every sample that has no final record yet."""
+
+    def __init__(
+        self, plan: RunPlan, store: RunStore, models: Mapping[str, Model], watch: Watcher
+    ) -> None:
+        self._plan = plan
+        self._store = store
+        self._models = models
+        self._watch = watch
+        self._result = RunResult()
+        self._in_flight = 0
+        self._failure: PhyblockError | None = None
+
+    def stop(self, reason: str) -> None:
+        """Start no new sample; safe to call from a signal handler in the loop's thread."""
+        if self._result.reason is None:
+            self._result.reason = reason
+            self._watch(Stopping(reason, self._in_flight))
+
+    async def run(self, earlier: Mapping[str, Mapping[str, Any]]) -> RunResult:
+        """Run what `earlier` records have not settled.
+
+        Raises the first StoreError, DataError or PromptError that a sample met, once calls under
+        way have ended.
+        """
+        workers: list[asyncio.Task[None]] = []
+        pending: dict[str, deque[tuple[AssemblyTask, int]]] = {}
+        for planned in self._plan.models:
+            queue = deque(
+                (task, seed)
+                for seed in self._plan.suite.seeds
+                for task in self._plan.dataset.tasks
+                if not self._settled(earlier, planned, task, seed)
+            )
+            pending[planned.name] = queue
+            count = min(planned.config.max_concurrency, len(queue))
+            workers += [asyncio.create_task(self._work(planned, queue)) for _ in range(count)]
+        try:
+            await asyncio.gather(*workers)
+        finally:
+            for worker in workers:
+                worker.cancel()
+            await asyncio.gather(*workers, return_exceptions=True)
+        if self._failure is not None:
+            raise self._failure
+        self._result.left += sum(len(queue) for queue in pending.values())
+        return self._result
+
+    def _settled(
+        self,
+        earlier: Mapping[str, Mapping[str, Any]],
+        planned: PlannedModel,
+        task: AssemblyTask,
+        seed: int,
+    ) -> bool:
+        record = earlier.get(sample_id(self._plan.track.name, planned.name, task.scene.id, seed))
+        return record is not None and is_final(dict(record))
+
+    async def _work(
+        self, planned: PlannedModel, queue: deque[tuple[AssemblyTask, int]]
+    ) -> None:
+        while queue and self._result.reason is None and planned.name not in self._result.stopped:
+            task, seed = queue.popleft()
+            self._in_flight += 1
+            try:
+                await self._one(planned, task, seed)
+            except UnavailableError as error:
+                self._result.left += 1
+                self._stop_model(planned.name, str(error))
+            except BudgetReachedError as error:
+                self._result.left += 1
+                self.stop(str(error))
+            except PhyblockError as error:
+                self._failure = self._failure or error
+                self.stop("an error that the run cannot go on with")
+            finally:
+                self._in_flight -= 1
+
+    async def _one(self, planned: PlannedModel, task: AssemblyTask, seed: int) -> None:
+        model = self._models[planned.name]
+        track = self._plan.track
+        request = await track.request(
+            task, seed, planned.config.params, with_messages=model.needs_messages
+        )
+        answer: Reply | ModelError | None
+        try:
+            answer = await model.ask(request)
+        except (UnavailableError, BudgetReachedError):
+            raise
+        except ModelError as error:
+            answer = error
+        sample = sample_id(track.name, planned.name, task.scene.id, seed)
+        text = answer.text if isinstance(answer, Reply) else None
+        record = judged(
+            to_record(sample, track.name, planned.name, task, request, answer, self._plan.prompt),
+            track.judge(task, text),
+            track.rules.parser,
+        )
+        self._store.append(record)
+        self._result.written += 1
+        self._result.left += not is_final(record)
+        self._watch(SampleDone(record))
+
+    def _stop_model(self, name: str, reason: str) -> None:
+        if name not in self._result.stopped:
+            self._result.stopped[name] = reason
+            self._watch(ModelStopped(name, reason))

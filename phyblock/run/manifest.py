@@ -1,0 +1,67 @@
+"""`run.yaml`: what a run is, written before anything is asked and never changed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Sequence
+from datetime import datetime, timezone
+from importlib.metadata import version
+from typing import Any
+
+from phyblock.datasets import Dataset
+from phyblock.run.models import PlannedModel
+from phyblock.specs import SuiteSpec
+from phyblock.tasks import Pictures, Prompt
+
+__all__ = ["make_manifest"]
+
+_FORMAT = 1
+_LIBRARIES = ("phyblock", "litellm", "pybullet", "numpy", "pillow", "jinja2")
+
+
+def make_manifest(
+    suite: SuiteSpec,
+    models: Sequence[PlannedModel],
+    dataset: Dataset,
+    prompt: Prompt | None,
+    pictures: Pictures | None,
+    limit: int | None,
+) -> dict[str, Any]:
+    """The manifest; `identity` digests what decides the results, so that only the same run goes
+    on in a folder. Limits, prices, tables and paths are no part of it.
+
+    `prompt` and `pictures` are None when every model is a recording.
+    """
+    inputs = {
+        "format": _FORMAT,
+        "suite": suite.identity(),
+        "models": [
+            {"name": m.name, "published": m.published, "size_b": m.size_b, **m.config.identity()}
+            for m in models
+        ],
+        "dataset": {"name": dataset.name, "sha256": dataset.sha256},
+        "prompt": prompt and {"name": prompt.name, "version": prompt.version},
+        "pictures": pictures and _pictures_digest(pictures, dataset),
+        "limit": limit,
+    }
+    canonical = json.dumps(inputs, sort_keys=True, separators=(",", ":"))
+    scenes = [task.scene for task in dataset.tasks]
+    return {
+        "identity": hashlib.sha256(canonical.encode()).hexdigest(),
+        "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        **inputs,
+        "suite": suite.model_dump(mode="json"),
+        "dataset": {**inputs["dataset"], "format": suite.dataset.format, "root": str(dataset.root)},
+        "scenes": len(scenes),
+        "scenes_by_level": {
+            level: sum(level in scene.levels for scene in scenes) for level in suite.levels
+        },
+        "versions": {"python": platform.python_version(), **{n: version(n) for n in _LIBRARIES}},
+    }
+
+
+def _pictures_digest(pictures: Pictures, dataset: Dataset) -> str:
+    keys = [pictures.keys(task) for task in dataset.tasks]
+    return hashlib.sha256(json.dumps(keys).encode()).hexdigest()

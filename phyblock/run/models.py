@@ -1,0 +1,89 @@
+"""The models of a run: from names in a suite to configurations that can be called."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from phyblock.datasets import recorded_models
+from phyblock.datasets.published_names import match_published
+from phyblock.errors import Problem, SpecError
+from phyblock.models import ModelConfig, Price
+from phyblock.specs import BASELINES, RECORDED, LoadedSuite, ModelSpec, SuiteSpec, resolve_models
+
+__all__ = ["PlannedModel", "plan_models", "to_config"]
+
+
+@dataclass(frozen=True)
+class PlannedModel:
+    """A model of a run: how to call it, its row in the paper's tables, its size if known."""
+
+    name: str
+    config: ModelConfig
+    published: str | None = None
+    size_b: float | None = None
+
+
+def plan_models(
+    loaded: LoadedSuite, known: Mapping[str, ModelSpec], only: Sequence[str]
+) -> tuple[PlannedModel, ...]:
+    """The suite's models in its order; `only` keeps some of them.
+
+    Raises SpecError for a name that is not known, DataError where no recordings are found.
+    """
+    if loaded.suite.models == RECORDED:
+        planned = tuple(
+            PlannedModel(name, _replay(name, folder), match_published(name))
+            for name, folder in recorded_models(loaded.dataset_path).items()
+        )
+    else:
+        specs = resolve_models(loaded, known)
+        planned = tuple(
+            PlannedModel(
+                name,
+                to_config(name, spec, loaded.suite),
+                match_published(name) if spec is None else spec.published or match_published(name),
+                None if spec is None else spec.size_b,
+            )
+            for name, spec in specs.items()
+        )
+    names = [model.name for model in planned]
+    unknown = ", ".join(name for name in only if name not in names)
+    if unknown:
+        problem = Problem("--models", "is not in the suite", "", unknown, ", ".join(names))
+        raise SpecError(problem)
+    return tuple(model for model in planned if not only or model.name in only)
+
+
+def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfig:
+    """How to call one model; None as spec is a built-in baseline."""
+    if spec is None:
+        assert name in BASELINES, name
+        return ModelConfig(name=name, kind="baseline", id=name)
+    if spec.replay is not None:
+        return _replay(name, Path(spec.replay))
+    assert spec.id is not None
+    price = spec.price and Price(spec.price.input, spec.price.output)
+    params = spec.params(suite.sampling)
+    if spec.extra_body:
+        params["extra_body"] = spec.extra_body
+    return ModelConfig(
+        name=name,
+        kind="litellm",
+        id=spec.id,
+        api_base=spec.api_base,
+        api_key_env=spec.api_key_env,
+        transport=spec.transport,
+        params=params,
+        max_concurrency=spec.max_concurrency or suite.limits.max_concurrency,
+        rpm=spec.rpm,
+        tpm=spec.tpm,
+        price=price,
+        sends_seed=spec.seed,
+        timeout_s=spec.timeout_s or suite.limits.timeout_s,
+    )
+
+
+def _replay(name: str, folder: Path) -> ModelConfig:
+    return ModelConfig(name=name, kind="replay", id=name, recording=folder)

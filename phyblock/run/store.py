@@ -1,0 +1,186 @@
+"""A run on disk: `run.yaml`, written first and never changed, and `records.jsonl`.
+
+Records are appended and synced one at a time, so a kill at any moment loses nothing that was
+written; a line that a kill cut short is dropped when the run is opened again. A later record of a
+sample replaces an earlier one.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Mapping
+from io import FileIO
+from pathlib import Path
+from typing import IO, Any
+
+import yaml
+
+from phyblock.errors import Problem, StoreError
+
+__all__ = ["MANIFEST", "RECORDS", "RunStore", "read_manifest", "read_records"]
+
+MANIFEST = "run.yaml"
+RECORDS = "records.jsonl"
+_LOCK = ".lock"
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """The run's manifest; StoreError when there is none or it cannot be read."""
+    path = folder / MANIFEST
+    try:
+        manifest = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        allowed = "a folder that phyblock run wrote"
+        raise StoreError(Problem(str(folder), f"holds no {MANIFEST}", allowed=allowed)) from error
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise StoreError(Problem(str(path), f"cannot be read: {error}")) from error
+    if not isinstance(manifest, dict) or "identity" not in manifest:
+        raise StoreError(Problem(str(path), "is not a run manifest", "identity"))
+    return manifest
+
+
+def read_records(folder: Path) -> dict[str, dict[str, Any]]:
+    """The newest record of every sample, by sample id, in order of first appearance.
+
+    An unfinished last line, which a kill leaves behind, is passed over; any other line that is
+    not a record is a StoreError naming file and line.
+    """
+    return {record["sample"]: record for record, _ in _lines(folder / RECORDS)}
+
+
+class RunStore:
+    """A run folder opened for writing; one process at a time."""
+
+    def __init__(self, folder: Path, manifest: Mapping[str, Any]) -> None:
+        """Open `folder` for the run that `manifest` describes, creating it when it is new.
+
+        Raises StoreError when the folder cannot be written, holds another run (its identity
+        differs), or is being written by another process.
+        """
+        self.folder = folder
+        self._lock: IO[str] | None = None
+        self._file: FileIO | None = None
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._lock = (folder / _LOCK).open("w")
+            self._acquire()
+            self._claim(manifest)
+            # Unbuffered: a write that failed must not be tried again behind our back.
+            self._file = FileIO(folder / RECORDS, "a")
+            self._drop_cut_line()
+        except OSError as error:
+            self.close()
+            hint = "choose another folder with --out"
+            problem = Problem(str(folder), f"cannot be written: {error.strerror}", hint=hint)
+            raise StoreError(problem) from error
+        except StoreError:
+            self.close()
+            raise
+
+    def __enter__(self) -> RunStore:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def append(self, record: Mapping[str, Any]) -> None:
+        """Write one record and wait until it is on disk.
+
+        Raises StoreError when the disk refuses; what was written before stays whole.
+        """
+        line = json.dumps(record, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+        data = line.encode("utf-8", "replace") + b"\n"
+        assert self._file is not None, "the store is closed"
+        size = self._file.seek(0, os.SEEK_END)
+        try:
+            written = 0
+            while written < len(data):
+                written += self._file.write(data[written:])
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            self._file.truncate(size)
+            hint = "free some space and give the same command again: nothing is asked twice"
+            path = self.folder / RECORDS
+            problem = Problem(str(path), f"cannot be written: {error.strerror}", hint=hint)
+            raise StoreError(problem) from error
+
+    def close(self) -> None:
+        """Release the files and the lock."""
+        for handle in (self._file, self._lock):
+            if handle is not None:
+                handle.close()
+        self._file = self._lock = None
+
+    def _acquire(self) -> None:
+        assert self._lock is not None
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            hint = "wait for it to end, or choose another folder with --out"
+            message = "is being written by another phyblock run"
+            raise StoreError(Problem(str(self.folder), message, hint=hint)) from error
+
+    def _claim(self, manifest: Mapping[str, Any]) -> None:
+        path = self.folder / MANIFEST
+        if path.exists():
+            found = read_manifest(self.folder)
+            if found["identity"] != manifest["identity"]:
+                hint = "choose another folder with --out"
+                changed = ", ".join(_changed(found, manifest)) or "the versions of its inputs"
+                message = "holds another run"
+                raise StoreError(
+                    Problem(str(self.folder), message, found=f"different: {changed}", hint=hint)
+                )
+            return
+        text = yaml.safe_dump(dict(manifest), sort_keys=False, allow_unicode=True, width=100)
+        partial = path.with_suffix(".part")
+        partial.write_text(text, encoding="utf-8")
+        os.replace(partial, path)
+
+    def _drop_cut_line(self) -> None:
+        path = self.folder / RECORDS
+        whole = sum(size for _, size in _lines(path))
+        if whole < path.stat().st_size:
+            os.truncate(path, whole)
+
+
+def _lines(path: Path) -> Iterator[tuple[dict[str, Any], int]]:
+    """Whole records with the bytes they take; stops before an unfinished last line."""
+    try:
+        handle = path.open("rb")
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise StoreError(Problem(str(path), f"cannot be read: {error.strerror}")) from error
+    with handle:
+        for number, line in enumerate(handle, 1):
+            if not line.endswith(b"\n"):
+                return
+            yield _parse(path, number, line), len(line)
+
+
+def _parse(path: Path, number: int, line: bytes) -> dict[str, Any]:
+    hint = "restore the file from a copy, or remove this line: its sample is then run again"
+    try:
+        record = json.loads(line)
+    except ValueError as error:
+        where = f"{path}:{number}"
+        raise StoreError(Problem(where, f"is not a record: {error}", hint=hint)) from error
+    if not isinstance(record, dict) or not isinstance(record.get("sample"), str):
+        where = f"{path}:{number}"
+        raise StoreError(Problem(where, "is not a record", "sample", hint=hint))
+    return record
+
+
+def _changed(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
+    """Dotted names of the parts in which two manifests differ."""
+    names: list[str] = []
+    for part in ("suite", "models", "dataset", "prompt", "limit"):
+        old, new = found.get(part), wanted.get(part)
+        if isinstance(old, dict) and isinstance(new, dict):
+            names += [f"{part}.{key}" for key in new if old.get(key) != new[key]]
+        elif old != new:
+            names.append(part)
+    return names

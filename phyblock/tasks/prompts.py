@@ -1,0 +1,103 @@
+"""Prompts: Jinja templates of the project or the user, and the exact official text."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import jinja2
+from jinja2.sandbox import SandboxedEnvironment
+
+from phyblock.errors import Problem, PromptError
+from phyblock.models.base import Image, Message
+
+__all__ = ["OfficialPrompt", "Prompt", "TemplatePrompt"]
+
+_BLOCKS = ("system", "user")
+
+
+class Prompt(Protocol):
+    """Turns pictures and facts about a sample into chat messages."""
+
+    @property
+    def name(self) -> str:
+        """What records call it."""
+
+    @property
+    def version(self) -> str:
+        """Hex digest of the text it is made from."""
+
+    def messages(self, pictures: Sequence[Image], facts: Mapping[str, object]) -> tuple[Message, ...]:
+        """The messages to send; pictures stand before the text, in the order given."""
+
+
+@dataclass(frozen=True)
+class OfficialPrompt:
+    """The official prompt, read out of the user's own checkout; it has no system part."""
+
+    text: str
+    name: str = "official"
+
+    @property
+    def version(self) -> str:
+        """Hex digest of the text."""
+        return _digest(self.text)
+
+    def messages(self, pictures: Sequence[Image], facts: Mapping[str, object]) -> tuple[Message, ...]:
+        """One user message; `facts` are not used, the text is fixed."""
+        del facts
+        return (Message("user", (*pictures, self.text)),)
+
+
+class TemplatePrompt:
+    """A Jinja template with a block `user` and, if wanted, a block `system`.
+
+    Raises PromptError, naming file and line, when the template cannot be read, is not valid,
+    has no user block, or uses a name that is not there.
+    """
+
+    def __init__(self, path: Path, name: str) -> None:
+        self.name = name
+        self._path = path
+        try:
+            source = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) else error.reason
+            raise PromptError(Problem(str(path), f"cannot be read: {reason}")) from error
+        self.version = _digest(source)
+        environment = SandboxedEnvironment(
+            undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        )
+        try:
+            self._template = environment.from_string(source)
+        except jinja2.TemplateSyntaxError as error:
+            where = f"{path}:{error.lineno}"
+            raise PromptError(Problem(where, f"is not valid Jinja: {error.message}")) from error
+        if "user" not in self._template.blocks:
+            found = ", ".join(sorted(self._template.blocks)) or "no block"
+            allowed = "{% block user %} ... {% endblock %} and, if wanted, a block system"
+            raise PromptError(Problem(str(path), "has no user block", "", found, allowed))
+
+    def messages(self, pictures: Sequence[Image], facts: Mapping[str, object]) -> tuple[Message, ...]:
+        """A system message, when that block gives text, and a user message with the pictures."""
+        texts = {name: self._render(name, facts) for name in _BLOCKS}
+        system = (Message("system", (texts["system"],)),) if texts["system"] else ()
+        return (*system, Message("user", (*pictures, texts["user"])))
+
+    def _render(self, block: str, facts: Mapping[str, object]) -> str:
+        if block not in self._template.blocks:
+            return ""
+        context = self._template.new_context(dict(facts))
+        try:
+            return "".join(self._template.blocks[block](context)).strip()
+        except jinja2.TemplateError as error:
+            known = "names that are there: " + ", ".join(sorted(facts))
+            problem = Problem(str(self._path), f"cannot be rendered: {error}", block, "", known)
+            raise PromptError(problem) from error
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
