@@ -1,0 +1,131 @@
+"""The long table of assembly results, one row a cell, and the paper's Table 1 out of it."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from phyblock.report.cells import METRICS, cell_scores, micro_averages, with_levels
+from phyblock.report.design import OVERALL, Design
+from phyblock.report.load import Run
+
+__all__ = ["ASSEMBLY_COLUMNS", "assembly_frame", "headline_cells", "level_column", "table1_frame"]
+
+_CELL = ("model", "track", "setting", "matcher", "criterion", "level")
+_GROUP = ("model", "track", "level")
+_OUTCOMES = {
+    "missing": "missing",
+    "parse_failure": "parse_failures",
+    "api_error": "api_errors",
+    "refusal": "refusals",
+    "truncated": "truncated",
+}
+_SPREAD = tuple(f"{metric}_{what}" for metric in METRICS for what in ("mean", "sd"))
+_COUNTS = ("n", *_OUTCOMES.values(), "tp", "fp", "fn", "seeds")
+
+ASSEMBLY_COLUMNS = (
+    *_CELL,
+    "n",
+    "expected",
+    *_OUTCOMES.values(),
+    "tp",
+    "fp",
+    "fn",
+    *METRICS,
+    "seeds",
+    *_SPREAD,
+    "seed_note",
+)
+"""Columns of `assembly.csv`."""
+
+
+def assembly_frame(run: Run) -> pd.DataFrame:
+    """Every model, track, setting, matcher and level, in the suite's order, in `ASSEMBLY_COLUMNS`.
+
+    `n` samples are scored of `expected`; tp, fp, fn are sums over them and precision, recall, f1
+    the micro averages in [0, 1], NaN where undefined. `*_mean` and `*_sd` (ddof = 1) are taken
+    over the micro averages of the `seeds` single seeds. `matcher` is "" for a Level-1 criterion
+    that knows none.
+    """
+    scores = cell_scores(run)
+    frame = (
+        _cells(run.design)
+        .join(micro_averages(scores, _CELL), on=list(_CELL))
+        .join(_over_seeds(scores), on=list(_CELL))
+        .join(_outcomes(run), on=list(_GROUP))
+    )
+    frame[list(_COUNTS)] = frame[list(_COUNTS)].fillna(0).astype("int64")
+    notes = _seed_notes(run)
+    frame["seed_note"] = [notes.get(model, "") for model in frame["model"]]
+    return frame[list(ASSEMBLY_COLUMNS)]
+
+
+def _cells(design: Design) -> pd.DataFrame:
+    rows = [
+        (model, track, setting, matcher, criterion, level, design.expected(level))
+        for model in design.model_names
+        for track in design.tracks
+        for setting in design.suite.settings
+        for level, criterion in ((level, design.criterion(level)) for level in design.levels)
+        for matcher in design.matchers(criterion)
+    ]
+    return pd.DataFrame(rows, columns=[*_CELL, "expected"])
+
+
+def _over_seeds(scores: pd.DataFrame) -> pd.DataFrame:
+    """Mean and sample standard deviation over seeds, and the number of seeds, by cell."""
+    by_seed = micro_averages(scores, [*_CELL, "seed"])
+    groups = by_seed.groupby(list(_CELL), sort=False)
+    parts: dict[str, pd.Series[float]] = {"seeds": groups.size().astype("float64")}
+    for metric in METRICS:
+        parts[f"{metric}_mean"] = groups[metric].mean()
+        parts[f"{metric}_sd"] = groups[metric].std(ddof=1)
+    return pd.DataFrame(parts)
+
+
+def _outcomes(run: Run) -> pd.DataFrame:
+    """How many samples ended other than well, by model, track and level."""
+    samples = run.records[["sample", "model", "track"]]
+    for outcome, column in _OUTCOMES.items():
+        samples = samples.assign(**{column: (run.records["outcome"] == outcome).astype("int64")})
+    return with_levels(samples, run).groupby(list(_GROUP))[list(_OUTCOMES.values())].sum()
+
+
+def _seed_notes(run: Run) -> dict[str, str]:
+    refused = run.records.loc[~run.records["seed_sent"].fillna(True).astype(bool), "model"]
+    repeats = len(run.design.suite.seeds)
+    note = f"seed unsupported: {repeats} independent repeat{'s' if repeats != 1 else ''}"
+    return dict.fromkeys(refused.unique(), note)
+
+
+def table1_frame(run: Run) -> pd.DataFrame:
+    """The paper's Table 1: one row a model, in percent, unrounded, NaN where undefined.
+
+    Columns are `model`, then for each level `level1_precision`, `level1_recall`, `level1_f1`, ...
+    to `overall_f1`, from the headline matcher and setting on the first assembly track. With more
+    than one seed the values are means over seeds and `level1_precision_sd` etc. stand beside them.
+    """
+    design = run.design
+    kinds = ("_mean", "_sd") if len(design.suite.seeds) > 1 else ("",)
+    cells = headline_cells(assembly_frame(run), design).set_index(["model", "level"])
+    table = pd.DataFrame({"model": list(design.model_names)})
+    for level in design.levels:
+        for metric in METRICS:
+            for kind in kinds:
+                values = cells[f"{metric}{kind}"].xs(level, level="level")
+                name = level_column(level, metric) + ("_sd" if kind == "_sd" else "")
+                table[name] = 100 * table["model"].map(values)
+    return table
+
+
+def headline_cells(assembly: pd.DataFrame, design: Design, matcher: str = "") -> pd.DataFrame:
+    """One row a model and level: first track, first setting, and one matcher (the headline)."""
+    return assembly[
+        assembly["track"].isin(design.tracks[:1])
+        & (assembly["setting"] == design.setting)
+        & assembly["matcher"].isin(["", matcher or design.matcher])
+    ]
+
+
+def level_column(level: str, metric: str) -> str:
+    """Column of `table1_frame` for a level and metric."""
+    return f"{level if level == OVERALL else f'level{level}'}_{metric}"

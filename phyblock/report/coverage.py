@@ -1,0 +1,64 @@
+"""What became of every sample, and what the replies took: tokens, dollars, seconds."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from phyblock.report.design import OVERALL
+from phyblock.report.load import Run
+
+__all__ = ["OUTCOMES", "coverage_frame"]
+
+OUTCOMES = ("ok", "parse_failure", "refusal", "truncated", "api_error", "missing")
+_TOKENS = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
+_COUNTS = ("recorded", *OUTCOMES, "replies", "tokens_unknown", "cost_unknown", "cached", "attempts")
+
+_COLUMNS = (
+    "model",
+    "expected",
+    "recorded",
+    "not_run",
+    *OUTCOMES,
+    "replies",
+    *_TOKENS,
+    "tokens_unknown",
+    "cost_usd",
+    "cost_unknown",
+    "latency_s",
+    "cached",
+    "attempts",
+)
+
+
+def coverage_frame(run: Run) -> pd.DataFrame:
+    """One row a model, over all assembly tracks.
+
+    `expected` samples are `recorded` + `not_run`; the outcomes split `recorded`. Of the `replies`
+    (samples that hold one): token sums of those that tell, with `tokens_unknown` that do not;
+    `cost_usd` the sum of the known prices, NaN where none is, with `cost_unknown` without one;
+    `latency_s` the mean over replies that were asked for now, not `cached`; `attempts` the sum of
+    requests sent.
+    """
+    records = run.records[run.records["track"].isin(run.design.tracks)]
+    replied = records["finish"].notna()
+    cached = records["cached"].fillna(False).astype(bool)
+    facts = records[["model", *_TOKENS, "cost_usd"]].assign(
+        recorded=1,
+        **{name: (records["outcome"] == name).astype("int64") for name in OUTCOMES},
+        replies=replied.astype("int64"),
+        tokens_unknown=(replied & records["completion_tokens"].isna()).astype("int64"),
+        cost_unknown=(replied & records["cost_usd"].isna()).astype("int64"),
+        cached=cached.astype("int64"),
+        attempts=records["attempts"].fillna(0).astype("int64"),
+        latency_s=records["latency_s"].mask(cached),
+    )
+    groups = facts.groupby("model")
+    sums = groups[list(_COUNTS)].sum()
+    known = groups[[*_TOKENS, "cost_usd"]].sum(min_count=1)
+    table = pd.DataFrame({"model": list(run.design.model_names)})
+    table["expected"] = run.design.expected(OVERALL) * len(run.design.tracks)
+    table = table.join(sums, on="model").join(known, on="model")
+    table[list(_COUNTS)] = table[list(_COUNTS)].fillna(0).astype("int64")
+    table["not_run"] = table["expected"] - table["recorded"]
+    table["latency_s"] = table["model"].map(groups["latency_s"].mean())
+    return table[list(_COLUMNS)]

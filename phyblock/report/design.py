@@ -1,0 +1,131 @@
+"""What a run was meant to be: models x scenes x seeds, settings, matchers, criteria."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from phyblock.errors import Problem, StoreError
+
+__all__ = ["OVERALL", "Design", "read_design"]
+
+OVERALL = "overall"
+"""Name of the row that pools the scenes of all levels."""
+
+ASSEMBLY_TRACKS = ("full_planning", "step_planning")
+_SCORELESS = frozenset({"missing", "api_error"})
+
+
+class _Part(BaseModel):
+    """A part of run.yaml of which only some keys are read here."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+
+class _Scoring(_Part):
+    matchers: tuple[str, ...] = Field(min_length=1)
+    level1: Literal["selection", "membership", "aov"]
+    missing: Literal["skip", "count"]
+
+
+class _Suite(_Part):
+    name: str = ""
+    tracks: tuple[str, ...] = ("full_planning",)
+    levels: tuple[int, ...] = Field(min_length=1)
+    settings: tuple[str, ...] = Field(min_length=1)
+    seeds: tuple[int, ...] = Field(min_length=1)
+    scoring: _Scoring
+
+
+class _Model(_Part):
+    name: str
+    published: str | None = None
+
+
+class Design(_Part):
+    """The plan of a run as its `run.yaml` states it; the rows and columns of every table.
+
+    `scenes_by_level` counts the scenes of each level (one scene may be of several), `scenes` all
+    distinct ones. The first matcher and the first setting are the headline.
+    """
+
+    suite: _Suite
+    models: tuple[_Model, ...]
+    scenes_by_level: dict[int, int]
+    scenes: int
+
+    @property
+    def model_names(self) -> tuple[str, ...]:
+        """Names of the models in the order of the suite."""
+        return tuple(model.name for model in self.models)
+
+    @property
+    def published(self) -> dict[str, str]:
+        """Row of the paper's Table 1 for each model that has one."""
+        return {model.name: model.published for model in self.models if model.published}
+
+    @property
+    def tracks(self) -> tuple[str, ...]:
+        """The assembly tracks of the suite."""
+        return tuple(track for track in self.suite.tracks if track in ASSEMBLY_TRACKS)
+
+    @property
+    def levels(self) -> tuple[str, ...]:
+        """Level names in ascending order, then `overall`."""
+        return (*(str(level) for level in sorted(self.suite.levels)), OVERALL)
+
+    @property
+    def matcher(self) -> str:
+        """The headline matcher."""
+        return self.suite.scoring.matchers[0]
+
+    @property
+    def setting(self) -> str:
+        """The headline setting."""
+        return self.suite.settings[0]
+
+    @property
+    def outcomes_left_out(self) -> frozenset[str]:
+        """Outcomes whose samples enter no score under the policy on missing replies."""
+        return _SCORELESS if self.suite.scoring.missing == "skip" else frozenset()
+
+    def criterion(self, level: str) -> str:
+        """The criterion that scores a level.
+
+        Level 1 has its own. `overall` counts every scene once by `aov`, or by the Level-1
+        criterion where no other level was run.
+        """
+        only_level1 = set(self.suite.levels) == {1}
+        if level == "1" or (level == OVERALL and only_level1):
+            return self.suite.scoring.level1
+        return "aov"
+
+    def matchers(self, criterion: str) -> tuple[str, ...]:
+        """Matchers that a criterion distinguishes; `("",)` for those that know none."""
+        return self.suite.scoring.matchers if criterion == "aov" else ("",)
+
+    def expected(self, level: str) -> int:
+        """Samples that a complete run holds of one model at a level."""
+        scenes = self.scenes if level == OVERALL else self.scenes_by_level.get(int(level), 0)
+        return scenes * len(self.suite.seeds)
+
+
+def read_design(manifest: Mapping[str, Any], where: str = "run.yaml") -> Design:
+    """Read the parts of a run's manifest that tables need.
+
+    Raises StoreError naming `where` and every field that is missing or wrong.
+    """
+    try:
+        return Design.model_validate(dict(manifest))
+    except ValidationError as error:
+        raise StoreError(
+            Problem(
+                where=where,
+                field=".".join(str(part) for part in found["loc"]),
+                message=found["msg"],
+                hint="run.yaml is written by `phyblock run` and is never edited",
+            )
+            for found in error.errors()
+        ) from error

@@ -1,0 +1,156 @@
+"""A finished or unfinished run as data frames: one row a sample, one row a score."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pandas as pd
+import yaml
+
+from phyblock.errors import Problem, StoreError
+from phyblock.report.design import Design, read_design
+from phyblock.report.flat import TEXTS, flat_record, flat_scores, frame_of
+
+__all__ = ["Frames", "Run", "frames_from", "load_run"]
+
+
+class Frames(NamedTuple):
+    """The two frames of a run; `Run` says what they hold."""
+
+    records: pd.DataFrame
+    scores: pd.DataFrame
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run folder, read.
+
+    `records` has one row a sample: track, model, scene, levels, parents, n_blocks, seed, outcome,
+    the reply's text, tokens, cost_usd, latency_s and so on, error, prompt, parsed plan. `scores`
+    has one row a sample, criterion, matcher ("" where a criterion knows none) and setting with the
+    counts tp, fp, fn and the four error types (missing where there are none). `cut_lines` is 1
+    where the last line was cut off by a kill and therefore ignored.
+    """
+
+    path: Path
+    manifest: dict[str, Any] = field(repr=False)
+    design: Design = field(repr=False)
+    records: pd.DataFrame = field(repr=False)
+    scores: pd.DataFrame = field(repr=False)
+    cut_lines: int = 0
+
+
+def load_run(path: str | Path, *, texts: bool = True) -> Run:
+    """Read a run folder; without `texts` the replies' texts are left on disk.
+
+    Raises StoreError for a folder that is no run, a broken `run.yaml`, or a corrupt line of
+    `records.jsonl` other than an unfinished last one.
+    """
+    folder = Path(path)
+    manifest = _read_manifest(folder / "run.yaml")
+    design = read_design(manifest, str(folder / "run.yaml"))
+    lines = _Lines(folder / "records.jsonl")
+    records, scores = _frames(lines, design, texts=texts)
+    return Run(folder, manifest, design, records, scores, lines.cut)
+
+
+def frames_from(records: Iterable[Mapping[str, Any]], manifest: Mapping[str, Any]) -> Frames:
+    """Frames of records that are already in memory; a later record of a sample replaces it.
+
+    Raises StoreError for a manifest or a record that lacks what tables need.
+    """
+    numbered = ((f"record {number}", record) for number, record in enumerate(records, 1))
+    return _frames(numbered, read_design(manifest), texts=True)
+
+
+def _frames(
+    records: Iterable[tuple[str, Mapping[str, Any]]], design: Design, *, texts: bool
+) -> Frames:
+    samples: dict[str, tuple[dict[str, Any], list[dict[str, Any]]]] = {}
+    for where, record in records:
+        row, scores = _flatten(where, record)
+        if not texts:
+            row.update(dict.fromkeys(TEXTS))
+        samples[row["sample"]] = (row, scores)
+    order = {name: place for place, name in enumerate(design.model_names)}
+    rows = sorted(
+        samples.values(),
+        key=lambda sample: (
+            sample[0]["track"],
+            order.get(sample[0]["model"], len(order)),
+            sample[0]["model"],
+            sample[0]["scene"],
+            sample[0]["seed"],
+            sample[0]["sample"],
+        ),
+    )
+    return Frames(
+        frame_of("records", [row for row, _ in rows]),
+        frame_of("scores", [score for _, scores in rows for score in scores]),
+    )
+
+
+def _flatten(where: str, record: Mapping[str, Any]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    try:
+        return flat_record(record), flat_scores(record)
+    except KeyError as error:
+        problem = Problem(where, f"the record has no {error}", hint=_HINT)
+    except (TypeError, ValueError, AttributeError) as error:
+        problem = Problem(where, f"the record is not in the run format: {error}", hint=_HINT)
+    raise StoreError(problem)
+
+
+_HINT = "remove this line; the next `phyblock run` asks for the sample again"
+
+
+class _Lines:
+    """Records of a file with where they stand; `cut` counts an unfinished last line."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.cut = 0
+
+    def __iter__(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
+        try:
+            with self.path.open("rb") as file:
+                yield from self._parse(file)
+        except FileNotFoundError:
+            return
+        except OSError as error:
+            raise StoreError(Problem(str(self.path), f"cannot be read: {error}")) from error
+
+    def _parse(self, lines: Iterable[bytes]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+        broken: StoreError | None = None
+        for number, line in enumerate(lines, 1):
+            if broken is not None:
+                raise broken
+            where = f"{self.path}:{number}"
+            if not line.endswith(b"\n"):
+                self.cut = 1
+                return
+            try:
+                record = json.loads(line)
+            except ValueError as error:
+                broken = StoreError(Problem(where, f"not JSON: {error}", hint=_HINT))
+                continue
+            if not isinstance(record, dict):
+                raise StoreError(Problem(where, "not a record", found=str(record)[:80], hint=_HINT))
+            yield where, record
+        self.cut = int(broken is not None)
+
+
+def _read_manifest(path: Path) -> dict[str, Any]:
+    try:
+        manifest = yaml.safe_load(path.read_text("utf-8"))
+    except FileNotFoundError as error:
+        hint = "give the folder that `phyblock run` wrote"
+        raise StoreError(Problem(str(path), "not found, so no run is here", hint=hint)) from error
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise StoreError(Problem(str(path), f"cannot be read: {error}")) from error
+    if not isinstance(manifest, dict):
+        raise StoreError(Problem(str(path), "must hold a mapping", found=str(manifest)[:80]))
+    return manifest

@@ -1,0 +1,204 @@
+"""The frames as tables a person reads: captions, headings, rounded cells, notes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping
+
+import pandas as pd
+
+from phyblock.report.assembly import assembly_frame, headline_cells, level_column
+from phyblock.report.cells import METRICS
+from phyblock.report.comparison import largest_differences
+from phyblock.report.coverage import OUTCOMES
+from phyblock.report.design import OVERALL, Design
+from phyblock.report.load import Run
+from phyblock.report.text_table import NO_VALUE, Column, TextTable, number, spread
+from phyblock.scoring import ERROR_TYPES, ErrorType
+
+__all__ = ["coverage_view", "errors_view", "published_view", "table1_view"]
+
+_MODEL = Column("Model", is_text=True)
+_METRIC_NAMES = dict(zip(METRICS, ("Prec", "Rec", "F1"), strict=True))
+_ERROR_NAMES: dict[ErrorType, str] = {
+    "shape_not_in_gt": "Shape not in GT",
+    "overflow": "Overflow",
+    "incorrect_orientation": "Incorrect orientation",
+    "dependency_not_met": "Dependency not met",
+}
+_LABELS_NOTE = (
+    "Prec, Rec, F1 are labeled by what they are. The paper prints its model rows as precision, "
+    'recall, F1 under the header "Rec, Prec, F1"; only its Random row is as that header says.'
+)
+
+
+def table1_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Table 1 in the paper's layout out of `table1_frame`."""
+    design = run.design
+    cells = [level_column(level, metric) for level in design.levels for metric in METRICS]
+    columns = [
+        Column(_METRIC_NAMES[metric], _level_name(level))
+        for level in design.levels
+        for metric in METRICS
+    ]
+    rows = [
+        (row["model"], *(_percent(row, cell) for cell in cells)) for row in table.to_dict("records")
+    ]
+    return TextTable(
+        f"Assembly planning{_of_suite(design)}: precision, recall and F1 (%) by level",
+        (_MODEL, *columns),
+        tuple(rows),
+        (_how(design), *_table1_notes(run), _LABELS_NOTE),
+    )
+
+
+def _percent(row: Mapping[Hashable, object], cell: str) -> str:
+    return spread(row[cell], row[f"{cell}_sd"]) if f"{cell}_sd" in row else number(row[cell])
+
+
+def _table1_notes(run: Run) -> list[str]:
+    cells = headline_cells(assembly_frame(run), run.design)
+    overall = cells[cells["level"] == OVERALL]
+    notes = []
+    if len(run.design.suite.seeds) > 1:
+        notes.append(f"Mean ± standard deviation over {len(run.design.suite.seeds)} seeds.")
+    for row in overall[overall["n"] < overall["expected"]].to_dict("records"):
+        notes.append(f"{row['model']}: {row['n']} of {row['expected']} samples are scored.")
+    for row in overall[overall["seed_note"] != ""].to_dict("records"):
+        notes.append(f"{row['model']}: {row['seed_note']}.")
+    return notes
+
+
+def _how(design: Design) -> str:
+    scoring = design.suite.scoring
+    level1 = f", Level-1 by {scoring.level1}" if 1 in design.suite.levels else ""
+    missing = "left out" if scoring.missing == "skip" else "counted as empty plans"
+    return (
+        f"Setting {design.setting}, matcher {design.matcher}{level1}; micro averages; "
+        f"missing replies and API errors are {missing}."
+    )
+
+
+def _level_name(level: str) -> str:
+    return "Overall" if level == OVERALL else f"Level-{level}"
+
+
+def _of_suite(design: Design) -> str:
+    return f", suite {design.suite.name}" if design.suite.name else ""
+
+
+def errors_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Error types out of `errors_frame`: a count and a share (%) a type."""
+    design = run.design
+    pairs = [Column(kind, _ERROR_NAMES[name]) for name in ERROR_TYPES for kind in ("n", "%")]
+    rows = [
+        (
+            row["model"],
+            _level_name(row["level"]),
+            str(row["n"]),
+            str(row["wrong_steps"]),
+            *(
+                cell
+                for name in ERROR_TYPES
+                for cell in (str(row[name]), number(100 * row[f"{name}_share"]))
+            ),
+        )
+        for row in table.to_dict("records")
+    ]
+    return TextTable(
+        f"Wrong steps by type{_of_suite(design)}",
+        (_MODEL, Column("Level", is_text=True), Column("Plans"), Column("Wrong steps"), *pairs),
+        tuple(rows),
+        (f"Setting {design.setting}, matcher {design.matcher}; shares are of all wrong steps.",),
+    )
+
+
+def published_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Published, ours and difference out of `published_frame`, a row a model, level and metric."""
+    columns = (
+        _MODEL,
+        Column("Published as", is_text=True),
+        Column("Level", is_text=True),
+        Column("Metric", is_text=True),
+        Column("Published"),
+        Column("Ours"),
+        Column("Difference"),
+    )
+    rows = [
+        (
+            row["model"],
+            row["published_name"],
+            _level_name(row["level"]),
+            _METRIC_NAMES[row["metric"]],
+            number(row["published"]),
+            number(row["ours"], 2),
+            number(row["difference"], 2, signed=True),
+        )
+        for row in table.to_dict("records")
+    ]
+    return TextTable(
+        f"Our numbers beside the paper's Table 1{_of_suite(run.design)} (%)",
+        columns,
+        tuple(rows),
+        tuple(_difference_notes(table, run.design)),
+    )
+
+
+def _difference_notes(table: pd.DataFrame, design: Design) -> list[str]:
+    largest = largest_differences(table)
+    notes = [f"Largest absolute difference of all cells: {number(largest.max(), 3)}."]
+    notes += [f"{model}: {number(value, 3)} at most." for model, value in largest.items()]
+    matchers = "/".join(sorted(set(table["matcher"]) - {""})) or NO_VALUE
+    level1 = f", Level-1 by {design.suite.scoring.level1}" if 1 in design.suite.levels else ""
+    notes.append(f"Ours: setting {design.setting}, matcher {matchers}{level1}.")
+    return notes
+
+
+def coverage_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Outcomes, tokens, cost and time out of `coverage_frame`."""
+    names = ("Expected", "Not run", "OK", "Parse failure", "Refusal", "Truncated", "API error")
+    usage = ("Prompt tokens", "Completion tokens", "Reasoning tokens", "Cost", "Latency (s)")
+    columns = (*names, "Missing", *usage, "Cached", "Attempts")
+    rows = [
+        (
+            row["model"],
+            *(str(row[name]) for name in ("expected", "not_run", *OUTCOMES)),
+            *(_tokens(row[f"{kind}_tokens"]) for kind in ("prompt", "completion", "reasoning")),
+            _cost(row["cost_usd"], row["cost_unknown"], row["replies"]),
+            number(row["latency_s"], 2),
+            str(row["cached"]),
+            str(row["attempts"]),
+        )
+        for row in table.to_dict("records")
+    ]
+    return TextTable(
+        f"Coverage{_of_suite(run.design)}: what became of every sample",
+        (_MODEL, *(Column(name) for name in columns)),
+        tuple(rows),
+        tuple(_coverage_notes(table, run)),
+    )
+
+
+def _tokens(total: object) -> str:
+    return NO_VALUE if total is pd.NA else f"{int(str(total)):,}"
+
+
+def _cost(known: float, unknown: int, replies: int) -> str:
+    if not replies:
+        return NO_VALUE
+    if math.isnan(known):
+        return "unknown"
+    return f"${known:.4f}" + (f" + {unknown} unknown" if unknown else "")
+
+
+def _coverage_notes(table: pd.DataFrame, run: Run) -> list[str]:
+    notes = [
+        f"{row['model']}: {row['tokens_unknown']} of {row['replies']} replies tell no tokens."
+        for row in table[table["tokens_unknown"].between(1, table["replies"] - 1)].to_dict(
+            "records"
+        )
+    ]
+    notes.append("Latency is the mean over replies that were not cached.")
+    if run.cut_lines:
+        notes.append("The last line of records.jsonl was cut off and is ignored.")
+    return notes

@@ -1,0 +1,102 @@
+"""All tables of a run, as files in its folder."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from phyblock.errors import Problem, StoreError
+from phyblock.report.assembly import assembly_frame, table1_frame
+from phyblock.report.comparison import published_frame
+from phyblock.report.coverage import coverage_frame
+from phyblock.report.errors import errors_frame
+from phyblock.report.latex import to_latex
+from phyblock.report.load import Run, load_run
+from phyblock.report.markdown import to_markdown
+from phyblock.report.text_table import TextTable
+from phyblock.report.views import coverage_view, errors_view, published_view, table1_view
+
+__all__ = ["TablesWritten", "write_tables"]
+
+_IN_LATEX = ("table1", "errors")
+
+
+@dataclass(frozen=True, eq=False)
+class TablesWritten:
+    """What `write_tables` made.
+
+    `frames` and `views` (as text, ready to print) go by table name: assembly (frame only), table1,
+    errors, coverage and, where a model has published numbers, published.
+    """
+
+    folder: Path
+    files: tuple[Path, ...]
+    frames: Mapping[str, pd.DataFrame]
+    views: Mapping[str, TextTable]
+    run: Run
+
+
+def write_tables(path: str | Path) -> TablesWritten:
+    """Rebuild `tables/` of a run folder from its records; each file appears whole or not at all.
+
+    Raises StoreError for a broken run (see `load_run`) or a folder that cannot be written.
+    """
+    run = load_run(path, texts=False)
+    frames, views = _tables(run)
+    texts = {f"{name}.csv": _csv(frame, name) for name, frame in frames.items()}
+    texts |= {f"{name}.md": to_markdown(view) for name, view in views.items()}
+    texts |= {f"{name}.tex": to_latex(views[name], f"phyblock-{name}") for name in _IN_LATEX}
+    folder = run.path / "tables"
+    with _as_store_error(folder):
+        folder.mkdir(exist_ok=True)
+        for name, text in texts.items():
+            _replace(folder / name, text)
+    return TablesWritten(folder, tuple(folder / name for name in texts), frames, views, run)
+
+
+def _tables(run: Run) -> tuple[dict[str, pd.DataFrame], dict[str, TextTable]]:
+    frames = {
+        "assembly": assembly_frame(run),
+        "table1": table1_frame(run),
+        "errors": errors_frame(run),
+        "coverage": coverage_frame(run),
+    }
+    views = {
+        "table1": table1_view(frames["table1"], run),
+        "errors": errors_view(frames["errors"], run),
+        "coverage": coverage_view(frames["coverage"], run),
+    }
+    if run.design.published:
+        frames["published"] = published_frame(run)
+        views["published"] = published_view(frames["published"], run)
+    return frames, views
+
+
+def _csv(frame: pd.DataFrame, name: str) -> str:
+    decimals = "%.1f" if name == "table1" else "%.6f"
+    return frame.to_csv(index=False, float_format=decimals, lineterminator="\n")
+
+
+def _replace(target: Path, text: str) -> None:
+    descriptor, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    try:
+        with os.fdopen(descriptor, "w", encoding="utf-8", newline="") as file:
+            file.write(text)
+        Path(temporary).replace(target)
+    except BaseException:
+        Path(temporary).unlink()
+        raise
+
+
+@contextlib.contextmanager
+def _as_store_error(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise StoreError(Problem(str(folder), f"cannot be written: {error}")) from error
