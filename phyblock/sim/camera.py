@@ -1,0 +1,139 @@
+"""Cameras: views by name or angle, and framing that never cuts anything off.
+
+A view direction fixes three axes (right, up, forward). For them, "every point lies inside this
+window of the picture" is a set of linear inequalities in the camera's position, so the closest
+camera that sees everything follows in closed form; no search, no bounding sphere.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["FIELD_OF_VIEW_DEG", "FULL_WINDOW", "VIEWS", "Camera", "Window", "frame", "view_axes"]
+
+FIELD_OF_VIEW_DEG = 30.0
+"""Vertical and horizontal field of view; pictures are square."""
+_HALF_TANGENT = math.tan(math.radians(FIELD_OF_VIEW_DEG / 2))
+_DEPTH_MARGIN_M = 0.02
+
+VIEWS: dict[str, tuple[float, float]] = {
+    "oblique": (45.0, 22.0),
+    "front": (0.0, 18.0),
+    "side": (90.0, 18.0),
+    "top": (0.0, 90.0),
+}
+"""Azimuth (0 looks from +x, 90 from +y) and elevation of the named views [degrees]."""
+
+
+class Window(NamedTuple):
+    """Part of a picture in normalized coordinates: -1..1 from left to right, bottom to top."""
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
+    def scaled(self, factor: float) -> Window:
+        """The window shrunk or grown about its center."""
+        x, y = (self.left + self.right) / 2, (self.bottom + self.top) / 2
+        half_x, half_y = (self.right - self.left) / 2, (self.top - self.bottom) / 2
+        half_x, half_y = half_x * factor, half_y * factor
+        return Window(x - half_x, x + half_x, y - half_y, y + half_y)
+
+
+FULL_WINDOW = Window(-1.0, 1.0, -1.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A perspective camera: `eye_m` shape (3,) [m]; `axes` rows right, up, forward (world).
+
+    `near_m` and `far_m` bound the depths that are drawn [m].
+    """
+
+    eye_m: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    near_m: float
+    far_m: float
+
+    def project(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Normalized picture coordinates of world points (n, 3), shape (n, 2)."""
+        right, up, depth = self.axes @ (points_m - self.eye_m).T
+        seen: NDArray[np.float64] = np.stack([right, up], axis=1) / depth[:, None]
+        seen /= _HALF_TANGENT
+        return seen
+
+    def to_pixels(self, points_m: NDArray[np.float64], size_px: int) -> NDArray[np.float64]:
+        """Pixel coordinates (column, row), row 0 on top, of world points (n, 3), shape (n, 2)."""
+        return (self.project(points_m) * [1.0, -1.0] + 1.0) * (size_px / 2)
+
+    def rays(self, size_px: int) -> NDArray[np.float64]:
+        """World direction through each pixel's center, shape (size, size, 3), row 0 on top."""
+        steps = ((np.arange(size_px) + 0.5) / size_px * 2 - 1) * _HALF_TANGENT
+        right, up, forward = self.axes
+        rays: NDArray[np.float64] = steps[None, :, None] * right - steps[:, None, None] * up
+        rays += forward
+        return rays
+
+    def view_matrix(self) -> list[float]:
+        """OpenGL view matrix, column-major, 16 numbers."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.axes * [[1.0], [1.0], [-1.0]]
+        matrix[:3, 3] = -matrix[:3, :3] @ self.eye_m
+        return [float(entry) for entry in matrix.T.ravel()]
+
+    def projection_matrix(self) -> list[float]:
+        """OpenGL projection matrix, column-major, 16 numbers."""
+        near, far = self.near_m, self.far_m
+        matrix = np.zeros((4, 4))
+        matrix[0, 0] = matrix[1, 1] = 1 / _HALF_TANGENT
+        matrix[2, 2] = (far + near) / (near - far)
+        matrix[2, 3] = 2 * far * near / (near - far)
+        matrix[3, 2] = -1.0
+        return [float(entry) for entry in matrix.T.ravel()]
+
+
+def view_axes(azimuth_deg: float, elevation_deg: float) -> NDArray[np.float64]:
+    """Right, up and forward of a view from that direction, rows of a (3, 3) array."""
+    azimuth, elevation = math.radians(azimuth_deg), math.radians(elevation_deg)
+    towards = np.array(
+        [
+            math.cos(elevation) * math.cos(azimuth),
+            math.cos(elevation) * math.sin(azimuth),
+            math.sin(elevation),
+        ]
+    )
+    right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
+    return np.stack([right, np.cross(towards, right), -towards])
+
+
+def frame(
+    points_m: NDArray[np.float64],
+    axes: NDArray[np.float64],
+    window: Window = FULL_WINDOW,
+    min_distance_m: float = 0.0,
+) -> Camera:
+    """The closest camera with these axes that sees all points (n, 3) inside the window.
+
+    It stays at least `min_distance_m` [m] from the nearest point, and centers the points in the
+    window. `points_m` must hold a point.
+    """
+    right, up, forward = axes @ points_m.T
+    spans = []
+    for across, low, high in ((right, window.left, window.right), (up, window.bottom, window.top)):
+        low_slope, high_slope = low * _HALF_TANGENT, high * _HALF_TANGENT
+        most = float(np.max(across - high_slope * forward))
+        least = float(np.min(across - low_slope * forward))
+        spans.append((most, least, low_slope, high_slope))
+    limits = [(least - most) / (high - low) for most, least, low, high in spans]
+    depth = min(*limits, float(forward.min()) - min_distance_m)
+    center = [(most + least + (high + low) * depth) / 2 for most, least, low, high in spans]
+    depths = forward - depth
+    near = max(float(depths.min()) - _DEPTH_MARGIN_M, 0.01)
+    eye = np.array([*center, depth]) @ axes
+    return Camera(eye, axes, near, float(depths.max()) + _DEPTH_MARGIN_M)

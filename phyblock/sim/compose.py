@@ -1,0 +1,70 @@
+"""Putting pictures together: PNG bytes, the numbered grid, the composite of goal and grid."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+
+from PIL import Image, ImageDraw, ImageFont
+
+from phyblock.sim.textures import Background
+
+__all__ = ["GRID_COLUMNS", "LABEL_STRIP", "numbered_grid", "side_by_side", "to_png"]
+
+GRID_COLUMNS = 4
+LABEL_STRIP = 0.23
+"""Share of a cell's height, at its foot, that is kept free for the number."""
+_LABEL_SIZE = 0.17
+_LABEL_MARGIN = 0.05
+_GAP = 0.016
+_INK: dict[Background, tuple[int, int, int]] = {
+    "white": (20, 24, 32),
+    "checkerboard": (255, 255, 255),
+}
+_LINE: dict[Background, tuple[int, int, int]] = {
+    "white": (205, 208, 214),
+    "checkerboard": (62, 80, 100),
+}
+
+
+def to_png(image: Image.Image) -> bytes:
+    """The image as PNG; the same pixels always give the same bytes (no time, no metadata)."""
+    buffer = io.BytesIO()
+    image.save(buffer, format="PNG", optimize=False, compress_level=6)
+    return buffer.getvalue()
+
+
+def numbered_grid(
+    cells: Sequence[Image.Image], empty: Image.Image, background: Background, size_px: int
+) -> Image.Image:
+    """Cells in a 4 by 4 grid from the top left, numbered from 1; the rest shows `empty`."""
+    grid = Image.new("RGB", (size_px, size_px))
+    edges = [round(i * size_px / GRID_COLUMNS) for i in range(GRID_COLUMNS + 1)]
+    for place in range(GRID_COLUMNS**2):
+        row, column = divmod(place, GRID_COLUMNS)
+        box = (edges[column], edges[row], edges[column + 1], edges[row + 1])
+        cell = cells[place].copy() if place < len(cells) else empty.copy()
+        if place < len(cells):
+            _write_number(cell, place + 1, _INK[background])
+        grid.paste(cell.resize((box[2] - box[0], box[3] - box[1])), box[:2])
+    draw = ImageDraw.Draw(grid)
+    for edge in edges[1:-1]:
+        draw.line([(edge, 0), (edge, size_px)], fill=_LINE[background])
+        draw.line([(0, edge), (size_px, edge)], fill=_LINE[background])
+    return grid
+
+
+def side_by_side(left: Image.Image, right: Image.Image) -> Image.Image:
+    """Two pictures of one height with a narrow white gap between them."""
+    gap = max(2, round(left.height * _GAP))
+    joined = Image.new("RGB", (left.width + gap + right.width, left.height), "white")
+    joined.paste(left, (0, 0))
+    joined.paste(right, (left.width + gap, 0))
+    return joined
+
+
+def _write_number(cell: Image.Image, number: int, ink: tuple[int, int, int]) -> None:
+    side = cell.height
+    font = ImageFont.load_default(size=_LABEL_SIZE * side)
+    place = (side * (1 - _LABEL_MARGIN), side * (1 - _LABEL_MARGIN))
+    ImageDraw.Draw(cell).text(place, str(number), fill=ink, font=font, anchor="rs")

@@ -1,0 +1,178 @@
+"""The pictures a model sees: goal, numbered candidates, composite; and the keys they cache under.
+
+All functions here are pure in what they return: the same input gives the same bytes in every
+process of one machine. Keys name everything that the bytes depend on, and nothing else.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.metadata
+import io
+import json
+import math
+from collections.abc import Iterable
+from dataclasses import astuple, dataclass
+
+import numpy as np
+from PIL import Image
+
+from phyblock.domain.blocks import SHAPES, BlockType, Color, Euler
+from phyblock.domain.candidates import CandidateSet
+from phyblock.domain.scene import Scene
+from phyblock.errors import DataError, Problem
+from phyblock.sim import engine
+from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
+from phyblock.sim.compose import GRID_COLUMNS, LABEL_STRIP, numbered_grid, side_by_side, to_png
+from phyblock.sim.render import RENDERER, DrawnBlock, picture
+from phyblock.sim.textures import BACKGROUNDS, Background
+
+__all__ = [
+    "RENDER_VERSION",
+    "PictureStyle",
+    "candidate_camera",
+    "candidates_key",
+    "candidates_png",
+    "composite_png",
+    "goal_camera",
+    "goal_key",
+    "goal_png",
+]
+
+RENDER_VERSION = 1
+"""Raised whenever the same input gives other pixels, so that stored pictures are made again."""
+
+_GOAL_WINDOW = Window(-0.84, 0.84, -0.84, 0.84)
+_GOAL_MIN_DISTANCE_M = 0.6
+_CELL_WINDOW = Window(-0.86, 0.86, 2 * LABEL_STRIP - 1.0, 0.86)
+_LARGEST_DIAGONAL_M = 0.16
+_SIZE_CUE = 0.25
+
+
+@dataclass(frozen=True)
+class PictureStyle:
+    """How pictures look: side length [pixels], background, and where they are seen from.
+
+    Azimuth 0 looks from +x and 90 from +y; elevation 90 looks straight down [degrees]. Raises
+    ValueError for a size under 64 or over 2048, an elevation outside 1..90, an azimuth that is
+    no number, or an unknown background.
+    """
+
+    size_px: int = 512
+    background: Background = "checkerboard"
+    azimuth_deg: float = VIEWS["oblique"][0]
+    elevation_deg: float = VIEWS["oblique"][1]
+
+    def __post_init__(self) -> None:
+        if not 64 <= self.size_px <= 2048:
+            raise ValueError(f"size_px is {self.size_px}, allowed 64..2048")
+        if self.background not in BACKGROUNDS:
+            raise ValueError(f"background is {self.background!r}, allowed {', '.join(BACKGROUNDS)}")
+        if not 1 <= self.elevation_deg <= 90:
+            raise ValueError(f"elevation_deg is {self.elevation_deg}, allowed 1..90")
+        if not math.isfinite(self.azimuth_deg):
+            raise ValueError(f"azimuth_deg is {self.azimuth_deg}, allowed any finite number")
+
+    @classmethod
+    def from_view(
+        cls, view: str, size_px: int = 512, background: Background = "checkerboard"
+    ) -> PictureStyle:
+        """The style of a named view (front, side, top, oblique); ValueError for another name."""
+        if view not in VIEWS:
+            raise ValueError(f"view is {view!r}, allowed {', '.join(sorted(VIEWS))}")
+        return cls(size_px, background, *VIEWS[view])
+
+
+def goal_png(scene: Scene, style: PictureStyle) -> bytes:
+    """PNG of the finished structure, square, framed so that no block is cut off."""
+    blocks = _drawn(scene)
+    image = picture(blocks, goal_camera(scene, style), style.background, style.size_px)
+    return to_png(image)
+
+
+def candidates_png(candidates: CandidateSet, style: PictureStyle) -> bytes:
+    """PNG of the numbered candidates, square, 4 by 4 cells, seen from where the goal is seen."""
+    cell_px = math.ceil(style.size_px / GRID_COLUMNS)
+    cells = [
+        _thumbnail(candidate.type, candidate.color, candidate.euler_deg, style, cell_px)
+        for candidate in candidates.candidates
+    ]
+    empty = _empty_cell(style, cell_px)
+    return to_png(numbered_grid(cells, empty, style.background, style.size_px))
+
+
+def composite_png(goal: bytes, candidates: bytes) -> bytes:
+    """PNG with the goal on the left and the candidates on the right of a narrow white gap."""
+    with Image.open(io.BytesIO(goal)) as left, Image.open(io.BytesIO(candidates)) as right:
+        return to_png(side_by_side(left.convert("RGB"), right.convert("RGB")))
+
+
+def goal_key(scene: Scene, style: PictureStyle) -> str:
+    """SHA-256 [hex] of all that the goal picture depends on; the scene's id is not part of it."""
+    return _key("goal", style, [astuple(block) for block in _drawn(scene)])
+
+
+def candidates_key(candidates: CandidateSet, style: PictureStyle) -> str:
+    """SHA-256 [hex] of all that the candidate grid depends on."""
+    return _key("candidates", style, [astuple(candidate) for candidate in candidates.candidates])
+
+
+def goal_camera(scene: Scene, style: PictureStyle) -> Camera:
+    """The camera of the goal picture; raises DataError for a scene without blocks."""
+    if not scene.blocks:
+        raise DataError(Problem(where=scene.id, field="blocks", message="there is none to draw"))
+    points = np.vstack([block.vertices_m for block in _drawn(scene)])
+    axes = view_axes(style.azimuth_deg, style.elevation_deg)
+    return frame(points, axes, _GOAL_WINDOW, _GOAL_MIN_DISTANCE_M)
+
+
+def candidate_camera(block: DrawnBlock, style: PictureStyle) -> Camera:
+    """The camera of one cell: the block fills it above the number's strip.
+
+    Every block fills a like share; longer ones a little more (fourth root of the diagonal), so
+    that a picture still tells which of two blocks is the larger.
+    """
+    shape = SHAPES[block.type]
+    diagonal_m = math.dist(shape.low_m, shape.high_m)
+    window = _CELL_WINDOW.scaled((diagonal_m / _LARGEST_DIAGONAL_M) ** _SIZE_CUE)
+    return frame(block.vertices_m, view_axes(style.azimuth_deg, style.elevation_deg), window)
+
+
+def on_the_floor(block_type: BlockType, color: Color, euler_deg: Euler) -> DrawnBlock:
+    """A single block in its orientation, its lowest point on the floor."""
+    lifted = DrawnBlock(block_type, color, (0.0, 0.0, 0.0), euler_deg)
+    return DrawnBlock(
+        block_type, color, (0.0, 0.0, -float(lifted.vertices_m[:, 2].min())), euler_deg
+    )
+
+
+@functools.lru_cache(maxsize=512)
+def _thumbnail(
+    block_type: BlockType, color: Color, euler_deg: Euler, style: PictureStyle, cell_px: int
+) -> Image.Image:
+    block = on_the_floor(block_type, color, euler_deg)
+    return picture([block], candidate_camera(block, style), style.background, cell_px)
+
+
+def _empty_cell(style: PictureStyle, cell_px: int) -> Image.Image:
+    block = on_the_floor("cube", "red", (0.0, 0.0, 0.0))
+    return picture([], candidate_camera(block, style), style.background, cell_px)
+
+
+def _drawn(scene: Scene) -> list[DrawnBlock]:
+    return [DrawnBlock(b.type, b.color, b.position_m, b.euler_deg) for b in scene.blocks]
+
+
+def _key(kind: str, style: PictureStyle, content: Iterable[object]) -> str:
+    parts = {
+        "kind": kind,
+        "render_version": RENDER_VERSION,
+        "renderer": RENDERER,
+        "pybullet": engine.version(),
+        "pillow": importlib.metadata.version("pillow"),
+        "style": [style.size_px, style.background, style.azimuth_deg, style.elevation_deg],
+        "content": list(content),
+    }
+    text = json.dumps(parts, sort_keys=True, allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()

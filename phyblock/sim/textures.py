@@ -1,0 +1,71 @@
+"""What stands behind the blocks: procedural floors, and the shadow that falls on them.
+
+The floor is the plane z = 0, colored by casting a ray through every pixel. It needs no image
+file, has no far edge, and costs less than drawing a textured plane in the software renderer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFilter
+
+from phyblock.sim.camera import Camera
+
+__all__ = ["BACKGROUNDS", "Background", "floor", "shadow"]
+
+Background = Literal["white", "checkerboard"]
+BACKGROUNDS: tuple[Background, ...] = ("white", "checkerboard")
+
+_TILE_M = 0.4
+_LIGHT_TILE = np.array([39.0, 56.0, 75.0])
+_DARK_TILE = np.array([21.0, 37.0, 53.0])
+_FADE_FROM_M = 4.0
+_SHADOW_STRENGTH: dict[Background, float] = {"white": 0.16, "checkerboard": 0.5}
+
+
+def floor(background: Background, camera: Camera, size_px: int) -> NDArray[np.float64]:
+    """Color of every pixel's floor, shape (size, size, 3), 0..255, before any shadow."""
+    if background == "white":
+        return np.full((size_px, size_px, 3), 255.0)
+    rays = camera.rays(size_px)
+    down = -rays[..., 2]
+    distance = camera.eye_m[2] / np.where(down > 1e-6, down, np.inf)
+    hit = camera.eye_m[:2] + distance[..., None] * rays[..., :2]
+    parity = np.floor(hit / _TILE_M).astype(np.int64).sum(axis=-1) % 2
+    tiles = np.where(parity[..., None] == 0, _LIGHT_TILE, _DARK_TILE)
+    return _fade(tiles, np.where(down > 1e-6, distance, np.inf)[..., None])
+
+
+def shadow(
+    background: Background,
+    camera: Camera,
+    size_px: int,
+    triangles_m: Iterable[NDArray[np.float64]],
+    light: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Share of light that is left on each pixel's floor, shape (size, size, 1), 0..1.
+
+    `triangles_m` are arrays of world triangles (m, 3, 3) [m]; `light` points to the light.
+    """
+    mask = Image.new("L", (size_px, size_px))
+    draw = ImageDraw.Draw(mask)
+    for corners in triangles_m:
+        fallen = corners - corners[..., 2:] * (light / light[2])
+        pixels = camera.to_pixels(fallen.reshape(-1, 3), size_px).reshape(-1, 6)
+        for polygon in pixels:
+            draw.polygon([float(number) for number in polygon], fill=255)
+    soft = mask.filter(ImageFilter.GaussianBlur(size_px / 340))
+    share = np.asarray(soft, dtype=np.float64)[..., None] / 255.0
+    return 1.0 - _SHADOW_STRENGTH[background] * share
+
+
+def _fade(tiles: NDArray[np.float64], distance_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Tiles that blend into their mean color far away, where they are finer than a pixel."""
+    mean = (_LIGHT_TILE + _DARK_TILE) / 2
+    share = np.clip(_FADE_FROM_M / np.maximum(distance_m, 1e-9), 0.0, 1.0)
+    faded: NDArray[np.float64] = mean + (tiles - mean) * share
+    return faded
