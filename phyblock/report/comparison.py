@@ -10,9 +10,11 @@ from phyblock.report.assembly import assembly_frame, headline_cells
 from phyblock.report.cells import METRICS
 from phyblock.report.load import Run
 
-__all__ = ["largest_differences", "published_frame", "published_table"]
+__all__ = ["PUBLISHED_LEVELS", "largest_differences", "published_frame", "published_table"]
 
-_LEVELS = ("1", "2", "3", "4", "overall")
+PUBLISHED_LEVELS = ("1", "2", "3", "4", "overall")
+"""Levels of the paper's Table 1, in its order."""
+
 _COLUMNS = (
     "model",
     "published_name",
@@ -53,7 +55,7 @@ def published_frame(run: Run) -> pd.DataFrame:
         [
             (model, name, level, metric)
             for model, name in run.design.published.items()
-            for level in _LEVELS
+            for level in PUBLISHED_LEVELS
             for metric in METRICS
         ],
         columns=["model", "published_name", "level", "metric"],

@@ -37,6 +37,7 @@ class _Suite(_Part):
     settings: tuple[str, ...] = Field(min_length=1)
     seeds: tuple[int, ...] = Field(min_length=1)
     scoring: _Scoring
+    tables: tuple[str, ...] = ("assembly", "table1", "errors", "published")
 
 
 class _Model(_Part):

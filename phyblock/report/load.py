@@ -124,23 +124,18 @@ class _Lines:
             raise StoreError(Problem(str(self.path), f"cannot be read: {error}")) from error
 
     def _parse(self, lines: Iterable[bytes]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-        broken: StoreError | None = None
         for number, line in enumerate(lines, 1):
-            if broken is not None:
-                raise broken
-            where = f"{self.path}:{number}"
             if not line.endswith(b"\n"):
                 self.cut = 1
                 return
+            where = f"{self.path}:{number}"
             try:
                 record = json.loads(line)
             except ValueError as error:
-                broken = StoreError(Problem(where, f"not JSON: {error}", hint=_HINT))
-                continue
+                raise StoreError(Problem(where, f"not JSON: {error}", hint=_HINT)) from error
             if not isinstance(record, dict):
                 raise StoreError(Problem(where, "not a record", found=str(record)[:80], hint=_HINT))
             yield where, record
-        self.cut = int(broken is not None)
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:

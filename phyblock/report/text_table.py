@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-__all__ = ["NO_VALUE", "Column", "TextTable", "number", "spread"]
+__all__ = ["NO_VALUE", "SPREAD", "Column", "TextTable", "number", "spread"]
 
 NO_VALUE = "–"  # noqa: RUF001
 """What stands in a cell that has no value; it is not a zero."""
+SPREAD = " ± "
+"""What stands between a mean and its standard deviation."""
 
 
 @dataclass(frozen=True)
@@ -41,4 +43,4 @@ def number(value: object, digits: int = 1, *, signed: bool = False) -> str:
 
 def spread(mean: object, sd: object) -> str:
     """`47.1 ± 1.2`; the mean alone where there is no standard deviation."""
-    return number(mean) if math.isnan(float(str(sd))) else f"{number(mean)} ± {number(sd)}"
+    return number(mean) if math.isnan(float(str(sd))) else f"{number(mean)}{SPREAD}{number(sd)}"

@@ -9,7 +9,7 @@ import pandas as pd
 
 from phyblock.report.assembly import assembly_frame, headline_cells, level_column
 from phyblock.report.cells import METRICS
-from phyblock.report.comparison import largest_differences
+from phyblock.report.comparison import PUBLISHED_LEVELS, largest_differences
 from phyblock.report.coverage import OUTCOMES
 from phyblock.report.design import OVERALL, Design
 from phyblock.report.load import Run
@@ -28,7 +28,7 @@ _ERROR_NAMES: dict[ErrorType, str] = {
 }
 _LABELS_NOTE = (
     "Prec, Rec, F1 are labeled by what they are. The paper prints its model rows as precision, "
-    'recall, F1 under the header "Rec, Prec, F1"; only its Random row is as that header says.'
+    "recall, F1 under the header “Rec, Prec, F1”; only its Random row is as that header says."
 )
 
 
@@ -59,13 +59,15 @@ def _percent(row: Mapping[Hashable, object], cell: str) -> str:
 def _table1_notes(run: Run) -> list[str]:
     cells = headline_cells(assembly_frame(run), run.design)
     overall = cells[cells["level"] == OVERALL]
-    notes = []
-    if len(run.design.suite.seeds) > 1:
-        notes.append(f"Mean ± standard deviation over {len(run.design.suite.seeds)} seeds.")
-    for row in overall[overall["n"] < overall["expected"]].to_dict("records"):
-        notes.append(f"{row['model']}: {row['n']} of {row['expected']} samples are scored.")
-    for row in overall[overall["seed_note"] != ""].to_dict("records"):
-        notes.append(f"{row['model']}: {row['seed_note']}.")
+    seeds = len(run.design.suite.seeds)
+    short = overall[overall["n"] < overall["expected"]]
+    notes = [f"Mean ± standard deviation over {seeds} seeds."] if seeds > 1 else []
+    if len(short):
+        counts = zip(short["model"], short["n"], strict=True)
+        listed = ", ".join(f"{model} {n}" for model, n in counts)
+        notes.append(f"Scored of {run.design.expected(OVERALL)} samples: {listed}.")
+    for note, rows in overall[overall["seed_note"] != ""].groupby("seed_note", sort=False):
+        notes.append(f"{', '.join(rows['model'])}: {note}.")
     return notes
 
 
@@ -93,7 +95,7 @@ def errors_view(table: pd.DataFrame, run: Run) -> TextTable:
     pairs = [Column(kind, _ERROR_NAMES[name]) for name in ERROR_TYPES for kind in ("n", "%")]
     rows = [
         (
-            row["model"],
+            row["model"] if row["level"] == design.levels[0] else "",
             _level_name(row["level"]),
             str(row["n"]),
             str(row["wrong_steps"]),
@@ -114,27 +116,36 @@ def errors_view(table: pd.DataFrame, run: Run) -> TextTable:
 
 
 def published_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """Published, ours and difference out of `published_frame`, a row a model, level and metric."""
+    """Published, ours and difference out of `published_frame`: a row a model and metric."""
     columns = (
         _MODEL,
         Column("Published as", is_text=True),
-        Column("Level", is_text=True),
         Column("Metric", is_text=True),
-        Column("Published"),
-        Column("Ours"),
-        Column("Difference"),
+        *(
+            Column(name, _level_name(level))
+            for level in PUBLISHED_LEVELS
+            for name in ("Paper", "Ours", "Diff")
+        ),
+        Column("Largest"),
     )
-    rows = [
-        (
-            row["model"],
-            row["published_name"],
-            _level_name(row["level"]),
-            _METRIC_NAMES[row["metric"]],
+    cells = {
+        (row["model"], row["level"], row["metric"]): (
             number(row["published"]),
             number(row["ours"], 2),
             number(row["difference"], 2, signed=True),
         )
         for row in table.to_dict("records")
+    }
+    largest = largest_differences(table)
+    rows = [
+        (
+            *((model, name) if metric == METRICS[0] else ("", "")),
+            _METRIC_NAMES[metric],
+            *(cell for level in PUBLISHED_LEVELS for cell in cells[model, level, metric]),
+            number(largest[model], 3) if metric == METRICS[0] else "",
+        )
+        for model, name in run.design.published.items()
+        for metric in METRICS
     ]
     return TextTable(
         f"Our numbers beside the paper's Table 1{_of_suite(run.design)} (%)",
@@ -145,9 +156,11 @@ def published_view(table: pd.DataFrame, run: Run) -> TextTable:
 
 
 def _difference_notes(table: pd.DataFrame, design: Design) -> list[str]:
-    largest = largest_differences(table)
-    notes = [f"Largest absolute difference of all cells: {number(largest.max(), 3)}."]
-    notes += [f"{model}: {number(value, 3)} at most." for model, value in largest.items()]
+    compared = int(table["difference"].notna().sum())
+    notes = [
+        f"Largest absolute difference of {compared} cells: "
+        f"{number(largest_differences(table).max(), 3)}; the last column has it by model."
+    ]
     matchers = "/".join(sorted(set(table["matcher"]) - {""})) or NO_VALUE
     level1 = f", Level-1 by {design.suite.scoring.level1}" if 1 in design.suite.levels else ""
     notes.append(f"Ours: setting {design.setting}, matcher {matchers}{level1}.")
@@ -179,8 +192,8 @@ def coverage_view(table: pd.DataFrame, run: Run) -> TextTable:
     )
 
 
-def _tokens(total: object) -> str:
-    return NO_VALUE if total is pd.NA else f"{int(str(total)):,}"
+def _tokens(total: int | None) -> str:
+    return NO_VALUE if total is None or pd.isna(total) else f"{total:,}"
 
 
 def _cost(known: float, unknown: int, replies: int) -> str:
@@ -188,17 +201,17 @@ def _cost(known: float, unknown: int, replies: int) -> str:
         return NO_VALUE
     if math.isnan(known):
         return "unknown"
-    return f"${known:.4f}" + (f" + {unknown} unknown" if unknown else "")
+    dollars = f"${known:,.2f}" if known >= 1 else f"${known:.4f}"
+    return dollars + (f" + {unknown} unknown" if unknown else "")
 
 
 def _coverage_notes(table: pd.DataFrame, run: Run) -> list[str]:
-    notes = [
-        f"{row['model']}: {row['tokens_unknown']} of {row['replies']} replies tell no tokens."
-        for row in table[table["tokens_unknown"].between(1, table["replies"] - 1)].to_dict(
-            "records"
-        )
-    ]
-    notes.append("Latency is the mean over replies that were not cached.")
+    notes = ["Latency is the mean over replies that were not cached."]
+    partly = table[table["tokens_unknown"].between(1, table["replies"] - 1)]
+    if len(partly):
+        counts = zip(partly["model"], partly["tokens_unknown"], partly["replies"], strict=True)
+        listed = ", ".join(f"{model} {unknown} of {replies}" for model, unknown, replies in counts)
+        notes.append(f"Tokens are sums over the replies that tell them; these do not: {listed}.")
     if run.cut_lines:
         notes.append("The last line of records.jsonl was cut off and is ignored.")
     return notes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,14 +25,16 @@ from phyblock.report.views import coverage_view, errors_view, published_view, ta
 __all__ = ["TablesWritten", "write_tables"]
 
 _IN_LATEX = ("table1", "errors")
+_View = Callable[[pd.DataFrame, Run], TextTable]
 
 
 @dataclass(frozen=True, eq=False)
 class TablesWritten:
     """What `write_tables` made.
 
-    `frames` and `views` (as text, ready to print) go by table name: assembly (frame only), table1,
-    errors, coverage and, where a model has published numbers, published.
+    `frames` and `views` (as text, ready to print) go by table name: those of assembly (frame
+    only), table1, errors and published that the suite asks for, the last one only where a model
+    has published numbers, and coverage in any case.
     """
 
     folder: Path
@@ -51,7 +53,11 @@ def write_tables(path: str | Path) -> TablesWritten:
     frames, views = _tables(run)
     texts = {f"{name}.csv": _csv(frame, name) for name, frame in frames.items()}
     texts |= {f"{name}.md": to_markdown(view) for name, view in views.items()}
-    texts |= {f"{name}.tex": to_latex(views[name], f"phyblock-{name}") for name in _IN_LATEX}
+    texts |= {
+        f"{name}.tex": to_latex(view, f"phyblock-{name}")
+        for name, view in views.items()
+        if name in _IN_LATEX
+    }
     folder = run.path / "tables"
     with _as_store_error(folder):
         folder.mkdir(exist_ok=True)
@@ -60,21 +66,22 @@ def write_tables(path: str | Path) -> TablesWritten:
     return TablesWritten(folder, tuple(folder / name for name in texts), frames, views, run)
 
 
+_MAKERS: dict[str, tuple[Callable[[Run], pd.DataFrame], _View | None]] = {
+    "assembly": (assembly_frame, None),
+    "table1": (table1_frame, table1_view),
+    "errors": (errors_frame, errors_view),
+    "coverage": (coverage_frame, coverage_view),
+    "published": (published_frame, published_view),
+}
+
+
 def _tables(run: Run) -> tuple[dict[str, pd.DataFrame], dict[str, TextTable]]:
-    frames = {
-        "assembly": assembly_frame(run),
-        "table1": table1_frame(run),
-        "errors": errors_frame(run),
-        "coverage": coverage_frame(run),
-    }
-    views = {
-        "table1": table1_view(frames["table1"], run),
-        "errors": errors_view(frames["errors"], run),
-        "coverage": coverage_view(frames["coverage"], run),
-    }
-    if run.design.published:
-        frames["published"] = published_frame(run)
-        views["published"] = published_view(frames["published"], run)
+    wanted = {"coverage", *run.design.suite.tables}
+    if not run.design.published:
+        wanted.discard("published")
+    makers = {name: maker for name, maker in _MAKERS.items() if name in wanted}
+    frames = {name: frame(run) for name, (frame, _) in makers.items()}
+    views = {name: view(frames[name], run) for name, (_, view) in makers.items() if view}
     return frames, views
 
 
