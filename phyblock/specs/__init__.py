@@ -1,6 +1,9 @@
 """What a person may write in YAML: suites, models files and --set overrides."""
 
+from phyblock.specs.loading import LoadedSuite, load_suite, resolve_models
 from phyblock.specs.model import ModelSpec, PriceSpec
+from phyblock.specs.models_file import load_models
+from phyblock.specs.schema import models_schema, suite_schema
 from phyblock.specs.suite import (
     BASELINES,
     BUILTIN_DATASET,
@@ -20,9 +23,15 @@ __all__ = [
     "DatasetSpec",
     "ImagesSpec",
     "LimitsSpec",
+    "LoadedSuite",
     "ModelSpec",
     "PriceSpec",
     "SamplingSpec",
     "ScoringSpec",
     "SuiteSpec",
+    "load_models",
+    "load_suite",
+    "models_schema",
+    "resolve_models",
+    "suite_schema",
 ]

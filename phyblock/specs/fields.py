@@ -16,6 +16,8 @@ __all__ = [
     "Temperature",
     "TopP",
     "Unique",
+    "UniqueSome",
+    "check_unique",
     "refuse",
 ]
 
@@ -37,7 +39,8 @@ def refuse(message: str, **context: Any) -> PydanticCustomError:
     return PydanticCustomError("refused", "{message}", {"message": message, **context})
 
 
-def _unique(items: tuple[ItemT, ...]) -> tuple[ItemT, ...]:
+def check_unique(items: tuple[ItemT, ...]) -> tuple[ItemT, ...]:
+    """The items as they are; a refusal when one stands twice."""
     seen: set[ItemT] = set()
     for index, item in enumerate(items):
         if item in seen:
@@ -47,9 +50,16 @@ def _unique(items: tuple[ItemT, ...]) -> tuple[ItemT, ...]:
 
 
 Unique = Annotated[
-    tuple[ItemT, ...], AfterValidator(_unique), Field(json_schema_extra={"uniqueItems": True})
+    tuple[ItemT, ...], AfterValidator(check_unique), Field(json_schema_extra={"uniqueItems": True})
 ]
 """A list whose items all differ."""
+
+UniqueSome = Annotated[
+    tuple[ItemT, ...],
+    Field(min_length=1, json_schema_extra={"uniqueItems": True}),
+    AfterValidator(check_unique),
+]
+"""A list with at least one item, whose items all differ."""
 
 Count = Annotated[int, Field(strict=True, ge=1)]
 Temperature = Annotated[float, Field(strict=True, ge=0, le=2, allow_inf_nan=False)]

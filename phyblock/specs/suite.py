@@ -17,6 +17,8 @@ from phyblock.specs.fields import (
     Temperature,
     TopP,
     Unique,
+    UniqueSome,
+    check_unique,
     refuse,
 )
 from phyblock.specs.rules import broken_rules, read_dotted
@@ -79,8 +81,7 @@ def _models_tag(value: object) -> str:
 
 
 ModelNames = Annotated[
-    Annotated[Unique[ModelName], Field(min_length=1), Tag("list")]
-    | Annotated[Literal["recorded"], Tag("word")],
+    Annotated[UniqueSome[ModelName], Tag("list")] | Annotated[Literal["recorded"], Tag("word")],
     Discriminator(_models_tag),
 ]
 
@@ -108,14 +109,17 @@ class ImagesSpec(Section):
 
     source: Literal["render", "dataset"] = Field(
         default="render",
-        description="render: drawn from the scene. dataset: the official composite, drawn where "
-        "the data set has none.",
+        description="render: drawn from the scene. dataset: the official composites.",
     )
     layout: Literal["composite", "separate"] = Field(
         default="composite",
         description="composite: goal and candidates in one picture. separate: two pictures.",
     )
-    order: Annotated[Unique[Picture], Field(min_length=2, max_length=2)] = Field(
+    order: Annotated[
+        tuple[Picture, ...],
+        Field(min_length=2, max_length=2, json_schema_extra={"uniqueItems": True}),
+        AfterValidator(check_unique),
+    ] = Field(
         default=("goal", "candidates"), description="Order in which separate pictures are sent."
     )
     size_px: Annotated[int, Field(strict=True, ge=128, le=2048)] = Field(
@@ -129,7 +133,7 @@ class ImagesSpec(Section):
 class ScoringSpec(Section):
     """How replies are scored."""
 
-    matchers: Annotated[Unique[Matcher], Field(min_length=1)] = Field(
+    matchers: UniqueSome[Matcher] = Field(
         default=("optimal", "paper"),
         description="optimal: interchangeable blocks are matched so that most steps count. paper: "
         "greedy, the paper's Algorithm 1. The first one makes the headline numbers.",
@@ -183,21 +187,17 @@ class SuiteSpec(Section):
         description="Short name: small letters, digits and hyphens; runs are filed under it."
     )
     description: str = Field(default="", description="One line on what the suite is for.")
-    tracks: Annotated[Unique[Literal["full_planning"]], Field(min_length=1)] = Field(
+    tracks: UniqueSome[Literal["full_planning"]] = Field(
         default=("full_planning",), description="Tasks to run."
     )
     dataset: DatasetSpec = Field(default_factory=DatasetSpec, description="Which scenes are run.")
-    levels: Annotated[Unique[Level], Field(min_length=1)] = Field(
-        default=(1, 2, 3, 4), description="Difficulty levels."
-    )
-    settings: Annotated[Unique[Setting], Field(min_length=1)] = Field(
+    levels: UniqueSome[Level] = Field(default=(1, 2, 3, 4), description="Difficulty levels.")
+    settings: UniqueSome[Setting] = Field(
         default=("A", "B"),
         description="A compares type, color and orientation, B type and color. One call is "
         "scored under each.",
     )
-    seeds: Annotated[Unique[Seed], Field(min_length=1)] = Field(
-        default=(0,), description="Each seed repeats every question."
-    )
+    seeds: UniqueSome[Seed] = Field(default=(0,), description="Each seed repeats every question.")
     models: ModelNames = Field(
         description="Names from models.yaml or built-in baselines (random, all-candidates, "
         "oracle, oracle-no-orientation); or the word recorded: every folder of recorded replies "

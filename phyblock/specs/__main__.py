@@ -1,0 +1,11 @@
+"""`python -m phyblock.specs [FOLDER]`: rewrite the JSON Schemas from the models."""
+
+import sys
+from pathlib import Path
+
+from phyblock.specs.schema import write_schemas
+
+if __name__ == "__main__":
+    beside = Path(__file__).parents[2] / "benchmarks" / "schemas"
+    for written in write_schemas(Path(sys.argv[1]) if len(sys.argv) > 1 else beside):
+        sys.stdout.write(f"{written}\n")

@@ -1,0 +1,200 @@
+"""From a suite file and --set overrides to a validated suite with its paths resolved."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from phyblock.errors import Problem, SpecError
+from phyblock.specs.model import ModelSpec
+from phyblock.specs.overrides import apply_overrides
+from phyblock.specs.paths import expand, sort_problems
+from phyblock.specs.rules import broken_rules
+from phyblock.specs.suite import (
+    BASELINES,
+    BUILTIN_DATASET,
+    PROMPT_WORDS,
+    RECORDED,
+    SuiteSpec,
+)
+from phyblock.specs.validation import check, find_secrets
+from phyblock.specs.words import did_you_mean, show
+from phyblock.specs.yaml_source import FieldPath, YamlSource, dotted, read_yaml
+
+__all__ = ["LoadedSuite", "load_suite", "resolve_models"]
+
+_BARE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
+
+
+@dataclass(frozen=True)
+class LoadedSuite:
+    """A suite and the file it was read from.
+
+    `dataset_path` is the absolute folder of the data set.
+    """
+
+    suite: SuiteSpec
+    path: Path
+    dataset_path: Path
+    source: YamlSource = field(repr=False, compare=False)
+    template: Path | None = None
+
+    @property
+    def prompt_path(self) -> Path:
+        """The absolute path of the prompt template; ValueError when the prompt is a word."""
+        if self.template is None:
+            raise ValueError(f"prompt {self.suite.prompt!r} is not a template file")
+        return self.template
+
+    def where(self, *path: str | int) -> str:
+        """Place ("file:line:col" or "--set ...") of a field, for errors found later."""
+        return self.source.where(path)
+
+
+def load_suite(path: Path, overrides: Sequence[str] = (), *, data_dir: Path) -> LoadedSuite:
+    """Read, override and validate a suite.
+
+    `overrides` are "key=value" texts; `data_dir` is the folder of the bundled data sets, where
+    bare names are looked up. Raises SpecError with all that is wrong, in the order of the file.
+    """
+    source = read_yaml(path)
+    apply_overrides(source, overrides)
+    if source.data is None:
+        raise SpecError([*source.problems, Problem(str(path), "is empty", allowed="a suite")])
+    suite, problems = check(SuiteSpec, source.data, source)
+    secrets = list(find_secrets(source.data, source))
+    if suite is None and isinstance(source.data, dict):
+        problems += _broken_rules(source, problems)
+    found = _merge(source.problems, secrets, problems)
+    if suite is None or found:
+        raise SpecError(sort_problems(found))
+    return _locate(suite, path, source, data_dir)
+
+
+def resolve_models(
+    loaded: LoadedSuite, known: Mapping[str, ModelSpec]
+) -> dict[str, ModelSpec | None]:
+    """The suite's models in its order; None stands for a built-in baseline.
+
+    Raises SpecError for each unknown name, at its place in the suite, and ValueError when the
+    suite asks for recorded replies (those are listed by the data set).
+    """
+    names = loaded.suite.models
+    if names == RECORDED:
+        raise ValueError("the models of a suite of recorded replies are listed by its data set")
+    allowed = [*BASELINES, *known]
+    problems = [
+        Problem(
+            loaded.where("models", index),
+            "is neither in the models file nor a built-in baseline",
+            f"models[{index}]",
+            show(name),
+            ", ".join(allowed) if len(allowed) <= 12 else "",
+            did_you_mean(name, allowed) or "list them: phyblock models",
+        )
+        for index, name in enumerate(names)
+        if name not in allowed
+    ]
+    if problems:
+        raise SpecError(problems)
+    return {name: known.get(name) for name in names}
+
+
+def _merge(syntax: list[Problem], secrets: list[Problem], problems: list[Problem]) -> list[Problem]:
+    """All problems; of a field that holds a secret only that is said."""
+    hidden = {problem.field for problem in secrets}
+    return [*syntax, *secrets, *(p for p in problems if p.field not in hidden)]
+
+
+def _broken_rules(source: YamlSource, problems: list[Problem]) -> list[Problem]:
+    """Problems between fields, judged on the raw data where the fields themselves are sound."""
+    faulty = {re.sub(r"\[.*", "", problem.field) for problem in problems}
+    get = _raw_reader(source.data)
+    return [
+        Problem(_rule_place(source, rule.reads), rule.message, rule.field, hint=rule.hint)
+        for rule in broken_rules(get, tuple(sorted(faulty)))
+    ]
+
+
+def _raw_reader(data: Mapping[str, Any]) -> Callable[[str], Any]:
+    def get(name: str) -> Any:
+        here: Any = data
+        for key in name.split("."):
+            if not isinstance(here, Mapping) or key not in here:
+                return _default(name)
+            here = here[key]
+        return here
+
+    return get
+
+
+def _default(name: str) -> Any:
+    value: Any = SuiteSpec
+    for key in name.split("."):
+        value = (
+            value.model_fields[key].get_default(call_default_factory=True)
+            if isinstance(value, type) and issubclass(value, BaseModel)
+            else getattr(value, key)
+        )
+    return value
+
+
+def _rule_place(source: YamlSource, reads: tuple[str, ...]) -> str:
+    paths: list[FieldPath] = [tuple(name.split(".")) for name in reads]
+    written = next((path for path in paths if path in source.values), paths[0])
+    return source.where(written)
+
+
+def _locate(suite: SuiteSpec, path: Path, source: YamlSource, data_dir: Path) -> LoadedSuite:
+    problems: list[Problem] = []
+    dataset = _dataset_path(suite, path, source, data_dir, problems)
+    template = None
+    if suite.prompt not in PROMPT_WORDS:
+        template = _expand(suite.prompt, ("prompt",), path, source, problems)
+        if template is not None and not template.is_file():
+            problems.append(_absent(source, ("prompt",), template, "no such file"))
+    if dataset is None or problems:
+        raise SpecError(sort_problems(problems))
+    return LoadedSuite(suite, path, dataset, source, template)
+
+
+def _dataset_path(
+    suite: SuiteSpec, path: Path, source: YamlSource, data_dir: Path, problems: list[Problem]
+) -> Path | None:
+    at = ("dataset", "path")
+    text = suite.dataset.path or BUILTIN_DATASET
+    if suite.dataset.format == "builtin" and _BARE_NAME.match(text):
+        folder = data_dir.absolute() / text
+        if not folder.is_dir():
+            names = sorted(p.name for p in data_dir.glob("*/"))
+            allowed = f"a bundled data set ({', '.join(names)}), or the path of a folder"
+            hint = did_you_mean(text, names) or f"for a folder beside the suite write ./{text}"
+            problems.append(
+                Problem(source.where(at), "is not a bundled data set", dotted(at), show(text),
+                        allowed, hint)
+            )  # fmt: skip
+        return folder
+    found = _expand(text, at, path, source, problems)
+    if found is not None and not found.is_dir():
+        problems.append(_absent(source, at, found, "no such folder"))
+    return found
+
+
+def _expand(
+    text: str, at: FieldPath, path: Path, source: YamlSource, problems: list[Problem]
+) -> Path | None:
+    base = Path.cwd() if source.is_overridden(at) else path.parent
+    try:
+        return expand(text, base)
+    except ValueError as error:
+        problems.append(Problem(source.where(at), str(error), dotted(at), show(text)))
+        return None
+
+
+def _absent(source: YamlSource, at: FieldPath, path: Path, message: str) -> Problem:
+    return Problem(source.where(at), message, dotted(at), str(path))

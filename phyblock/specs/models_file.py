@@ -1,0 +1,81 @@
+"""models.yaml: the models that suites may name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from phyblock.errors import Problem, SpecError
+from phyblock.specs.fields import ModelName
+from phyblock.specs.model import ModelSpec
+from phyblock.specs.paths import expand, sort_problems
+from phyblock.specs.suite import BASELINES, RECORDED
+from phyblock.specs.validation import check, find_secrets
+from phyblock.specs.words import show
+from phyblock.specs.yaml_source import YamlSource, read_yaml
+
+__all__ = ["load_models"]
+
+_NAME = TypeAdapter(ModelName)
+
+
+def load_models(path: Path) -> dict[str, ModelSpec]:
+    """Read a models file: each name maps to a litellm id or to a mapping.
+
+    Replay folders come out absolute. Raises SpecError with all that is wrong.
+    """
+    source = read_yaml(path)
+    data = {} if source.data is None else source.data
+    if not isinstance(data, dict):
+        wrong = Problem(source.where(()), "has the wrong type", "", show(data),
+                        "a mapping: name: provider/model")  # fmt: skip
+        raise SpecError([*source.problems, wrong])
+    models: dict[str, ModelSpec] = {}
+    secrets = list(find_secrets(data, source))
+    hidden = {problem.field for problem in secrets}
+    problems = [*source.problems, *secrets]
+    for name, entry in data.items():
+        spec, found = _read_entry(name, entry, source)
+        problems += [problem for problem in found if problem.field not in hidden]
+        if spec is not None:
+            models[name] = spec
+    if problems:
+        raise SpecError(sort_problems(problems))
+    return models
+
+
+def _read_entry(
+    name: str, entry: Any, source: YamlSource
+) -> tuple[ModelSpec | None, list[Problem]]:
+    problems = _check_name(name, source)
+    if not isinstance(entry, str | dict):
+        wrong = Problem(source.where((name,)), "has the wrong type", name, show(entry),
+                        "a litellm id (provider/model), or a mapping")  # fmt: skip
+        return None, [*problems, wrong]
+    spec, found = check(ModelSpec, {"id": entry} if isinstance(entry, str) else entry, source,
+                        (name,))  # fmt: skip
+    problems += found
+    if spec is not None and spec.replay is not None:
+        try:
+            folder = expand(spec.replay, Path(source.label).parent)
+        except ValueError as error:
+            where = source.where((name, "replay"))
+            return None, [*problems, Problem(where, str(error), f"{name}.replay", spec.replay)]
+        spec = spec.model_copy(update={"replay": str(folder)})
+    return spec, problems
+
+
+def _check_name(name: str, source: YamlSource) -> list[Problem]:
+    where = source.where((name,), key=True)
+    if name in (*BASELINES, RECORDED):
+        taken = ", ".join((*BASELINES, RECORDED))
+        return [Problem(where, "is a name of phyblock's own", name, allowed=f"not {taken}",
+                        hint="choose another name")]  # fmt: skip
+    try:
+        _NAME.validate_python(name)
+    except ValidationError:
+        allowed = "up to 80 letters, digits and . _ : + -, starting with a letter or digit"
+        return [Problem(where, "is not a usable name", name, show(name), allowed)]
+    return []

@@ -1,0 +1,46 @@
+"""Paths as people write them: relative to a file, with ~ and $VARIABLES."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from phyblock.errors import Problem
+
+__all__ = ["expand", "sort_problems"]
+
+_VARIABLE = re.compile(r"\$(?:(\w+)|\{(\w+)\})")
+_PLACE = re.compile(r":(\d+):(\d+)$")
+
+
+def expand(text: str, base: Path, environ: Mapping[str, str] | None = None) -> Path:
+    """The absolute path that `text` means, seen from the folder `base`.
+
+    Raises ValueError, with a message for the user, for a variable that is not set or a home
+    folder that is not known.
+    """
+    values = os.environ if environ is None else environ
+
+    def value_of(match: re.Match[str]) -> str:
+        name = match[1] or match[2]
+        if name not in values:
+            raise ValueError(f"the environment variable {name} is not set")
+        return values[name]
+
+    try:
+        path = Path(_VARIABLE.sub(value_of, text)).expanduser()
+    except RuntimeError as error:
+        raise ValueError("the home folder that ~ stands for is not known") from error
+    return Path(os.path.normpath(base.absolute() / path))
+
+
+def sort_problems(problems: Iterable[Problem]) -> list[Problem]:
+    """Problems in the order in which they stand in the file, those of the command line last."""
+
+    def rank(problem: Problem) -> tuple[int, int, int]:
+        place = None if problem.where.startswith("--") else _PLACE.search(problem.where)
+        return (0, int(place[1]), int(place[2])) if place else (1, 0, 0)
+
+    return sorted(problems, key=rank)

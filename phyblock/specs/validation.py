@@ -1,0 +1,220 @@
+"""Validation against a pydantic model, with every error said in plain words and at its place."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from phyblock.errors import Problem
+from phyblock.specs.words import SECRET_KEYS, did_you_mean, looks_secret, show
+from phyblock.specs.yaml_source import FieldPath, YamlSource, dotted
+
+__all__ = ["check", "find_secrets"]
+
+ModelT = TypeVar("ModelT", bound=BaseModel)
+
+KEY_HINT = "name an environment variable with api_key_env, and keep the key in it"
+
+_WANTED = {
+    "int_type": "a whole number",
+    "float_type": "a number",
+    "string_type": "text",
+    "tuple_type": "a list, such as [a, b]",
+    "dict_type": "a mapping (key: value)",
+    "model_type": "a mapping (key: value)",
+    "finite_number": "a finite number",
+}
+_BOUNDS = {
+    "greater_than": ("gt", "above"),
+    "greater_than_equal": ("ge", "at least"),
+    "less_than": ("lt", "below"),
+    "less_than_equal": ("le", "at most"),
+}
+_PATTERNS = {
+    "name": "1 to 64 small letters, digits and hyphens",
+    "models": "letters, digits and . _ : + -, starting with a letter or digit",
+    "api_key_env": "the name of an environment variable: letters, digits, underscores",
+}
+
+
+@dataclass(frozen=True)
+class _Fault:
+    """One pydantic error with what is needed to word it."""
+
+    detail: ErrorDetails
+    path: FieldPath
+    found: Any
+    root: type[BaseModel]
+    base: FieldPath
+
+    @property
+    def context(self) -> dict[str, Any]:
+        return dict(self.detail.get("ctx", {}))
+
+    @property
+    def key(self) -> str:
+        """The last named part of the path."""
+        return next((str(part) for part in reversed(self.path) if isinstance(part, str)), "")
+
+
+def check(
+    model: type[ModelT], data: object, source: YamlSource, base: FieldPath = ()
+) -> tuple[ModelT | None, list[Problem]]:
+    """Validate `data`, which stands at `base` in the source.
+
+    Returns the instance, or None and all problems found. Errors that a model raised for rules
+    across its fields (context `rules`) are left to the caller, who can judge them one by one.
+    """
+    try:
+        return model.model_validate(data), []
+    except ValidationError as error:
+        details = error.errors(include_url=False)
+    faults = (_locate(detail, data, model, base) for detail in details)
+    return None, [_word(f, source) for f in faults if not f.context.get("rules")]
+
+
+def find_secrets(data: object, source: YamlSource, base: FieldPath = ()) -> Iterator[Problem]:
+    """A problem for each value that looks like a key, so that none reaches a run folder."""
+    if isinstance(data, Mapping):
+        for key, value in data.items():
+            yield from find_secrets(value, source, (*base, key))
+            nested = isinstance(value, str) and base and str(key).lower() in SECRET_KEYS
+            if nested and not looks_secret(value):
+                yield _secret(source, (*base, key))
+    elif isinstance(data, list):
+        for index, value in enumerate(data):
+            yield from find_secrets(value, source, (*base, index))
+    elif isinstance(data, str) and looks_secret(data):
+        yield _secret(source, base)
+
+
+def _secret(source: YamlSource, path: FieldPath) -> Problem:
+    return Problem(
+        source.where(path), "looks like a key, which must not stand in a file", dotted(path),
+        hint=KEY_HINT,
+    )  # fmt: skip
+
+
+def _locate(detail: ErrorDetails, data: object, root: type[BaseModel], base: FieldPath) -> _Fault:
+    """The path of an error in the data: pydantic's, without the names it adds for unions."""
+    path: list[str | int] = []
+    here: Any = data
+    for part in (*detail["loc"], *detail.get("ctx", {}).get("at", ())):
+        is_last = detail["type"] == "missing" and part == detail["loc"][-1]
+        if isinstance(here, Mapping) and (part in here or is_last):
+            here = here.get(part)
+        elif isinstance(here, list) and isinstance(part, int):
+            here = here[part]
+        else:
+            continue
+        path.append(part)
+    return _Fault(detail, (*base, *path), here, root, base)
+
+
+def _word(fault: _Fault, source: YamlSource) -> Problem:
+    kind = fault.detail["type"]
+    if kind == "extra_forbidden":
+        return _unknown_key(fault, source)
+    if kind == "missing":
+        where = source.where(fault.path[:-1], key=True)
+        return Problem(where, "is missing", dotted(fault.path), hint=f"add {fault.key}: ...")
+    message, allowed, hint = _explain(fault)
+    where = source.where(fault.path, key=bool(fault.context.get("key")))
+    return Problem(where, message, dotted(fault.path), show(fault.found), allowed, hint)
+
+
+def _explain(fault: _Fault) -> tuple[str, str, str]:
+    """Message, what is allowed, and a hint."""
+    kind, context = fault.detail["type"], fault.context
+    if kind == "refused":
+        hint = context.get("hint") or did_you_mean(str(fault.found), context.get("words", ()))
+        return context["message"], context.get("allowed", ""), hint
+    if kind == "literal_error":
+        return _not_a_choice(fault)
+    if kind in _WANTED:
+        return "has the wrong type", _WANTED[kind], _type_hint(kind, fault)
+    if kind in _BOUNDS:
+        name, word = _BOUNDS[kind]
+        return "is out of range", f"{word} {context[name]}", ""
+    if kind == "too_short" or kind == "string_too_short":
+        least = context.get("min_length", 1)
+        return (
+            ("is empty", "at least one", "")
+            if least == 1
+            else ("is too short", f"{least} items", "")
+        )
+    if kind == "too_long":
+        return "has too many items", f"{context['max_length']} items at most", ""
+    if kind == "string_pattern_mismatch":
+        return "has characters that are not allowed", _PATTERNS.get(fault.key, ""), ""
+    return fault.detail["msg"].lower(), "", ""
+
+
+def _not_a_choice(fault: _Fault) -> tuple[str, str, str]:
+    choices = re.findall(r"[^\s',]+", fault.context["expected"].replace(" or ", " "))
+    allowed = ", ".join(choices)
+    if fault.path == (*fault.base, "models"):
+        hint = did_you_mean(str(fault.found), choices) or f"write a list: [{fault.found}]"
+        return "is one name where a list belongs", "a list of models, or the word recorded", hint
+    hint = did_you_mean(str(fault.found), choices) if isinstance(fault.found, str) else ""
+    if isinstance(fault.found, list) and len(fault.found) == 1:
+        hint = f"take the brackets off: {fault.found[0]}"
+    return "is not one of the choices", allowed, hint
+
+
+def _type_hint(kind: str, fault: _Fault) -> str:
+    found = fault.found
+    if kind in ("int_type", "float_type") and isinstance(found, str):
+        return "take the quotes off" if re.fullmatch(r"[-+\d.eE]+", found) else ""
+    if kind == "tuple_type" and isinstance(found, str | int | float):
+        return f"write a list: [{found}]"
+    if kind == "string_type" and isinstance(found, str | int | float):
+        return f'put it in quotes: "{found}"'
+    return ""
+
+
+def _unknown_key(fault: _Fault, source: YamlSource) -> Problem:
+    section = _section(fault.root, fault.path[len(fault.base) : -1])
+    known = list(section.model_fields)
+    hint = did_you_mean(fault.key, known)
+    if fault.key.lower() in SECRET_KEYS and "api_key_env" in known:
+        hint = KEY_HINT
+    elif elsewhere := [home for home in _homes(fault.root) if home[-1] == fault.key]:
+        hint = f"it belongs at {'.'.join(elsewhere[0])}"
+    where = source.where(fault.path, key=True)
+    return Problem(where, "is not a known key", dotted(fault.path), "", ", ".join(known), hint)
+
+
+def _section(root: type[BaseModel], path: FieldPath) -> type[BaseModel]:
+    """The model that describes what stands at `path`."""
+    section = root
+    for part in path:
+        inner = _inner(section, str(part))
+        section = inner or section
+    return section
+
+
+def _homes(root: type[BaseModel], above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """The paths of all fields."""
+    for name in root.model_fields:
+        yield (*above, name)
+        inner = _inner(root, name)
+        if inner is not None:
+            yield from _homes(inner, (*above, name))
+
+
+def _inner(section: type[BaseModel], name: str) -> type[BaseModel] | None:
+    """The model behind a field, if it holds one."""
+    field = section.model_fields.get(name)
+    stack: list[Any] = [] if field is None else [field.annotation]
+    while stack:
+        annotation = stack.pop()
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            return annotation
+        stack.extend(get_args(annotation))
+    return None

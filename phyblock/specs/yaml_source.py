@@ -1,0 +1,253 @@
+"""YAML read with the place of every key and value, so that errors can point at them.
+
+Scalars follow YAML 1.2's core schema, not PyYAML's 1.1: `on`, `no` and dates are text, `1e-3` is
+a number, `010` is ten. Keys are always text, as written. Only plain data is read: no tags beyond
+the standard ones, anchors and merge keys (`<<`) yes, a key written twice no.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from phyblock.errors import Problem, SpecError
+
+__all__ = ["FieldPath", "YamlSource", "dotted", "parse_yaml", "read_yaml"]
+
+FieldPath = tuple[str | int, ...]
+
+MAX_VALUES = 100_000
+"""Bound on the values of a file, anchors expanded: far above any use, far below a memory bomb."""
+
+_TAG = "tag:yaml.org,2002:"
+
+
+class _CoreLoader(yaml.SafeLoader):
+    """SafeLoader with the scalars of YAML 1.2's core schema."""
+
+
+_CoreLoader.yaml_implicit_resolvers = {}
+
+for _kind, _pattern, _first in (
+    ("null", r"^(?:~|null|Null|NULL|)$", ["~", "n", "N", ""]),
+    ("bool", r"^(?:true|True|TRUE|false|False|FALSE)$", list("tTfF")),
+    ("int", r"^(?:[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+)$", list("-+0123456789")),
+    (
+        "float",
+        r"^(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
+        r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$",
+        list("-+.0123456789"),
+    ),
+    ("merge", r"^<<$", ["<"]),
+):
+    _CoreLoader.add_implicit_resolver(_TAG + _kind, re.compile(_pattern), _first)
+
+
+def dotted(path: FieldPath) -> str:
+    """A path as people write it: `images.order[1]`."""
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    return text.removeprefix(".")
+
+
+@dataclass
+class YamlSource:
+    """A YAML document: its data and where each part stands.
+
+    `keys` and `values` give a place ("file:line:col", or "--set ...") for each path; `problems`
+    is what was wrong with the YAML itself and could be passed over.
+    """
+
+    label: str
+    data: Any = None
+    keys: dict[FieldPath, str] = field(default_factory=dict)
+    values: dict[FieldPath, str] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+    overridden: set[FieldPath] = field(default_factory=set)
+
+    def where(self, path: FieldPath, *, key: bool = False) -> str:
+        """Place of the value at `path` (or of its key), else of the nearest thing around it."""
+        if key and path in self.keys:
+            return self.keys[path]
+        if not key and path in self.values:
+            return self.values[path]
+        for end in range(len(path), 0, -1):
+            found = self.keys.get(path[:end]) or self.values.get(path[:end])
+            if found:
+                return found
+        return self.values.get((), f"{self.label}:1:1")
+
+    def is_overridden(self, path: FieldPath) -> bool:
+        """Whether the value at `path` came from the command line."""
+        return any(path[:end] in self.overridden for end in range(1, len(path) + 1))
+
+
+def read_yaml(path: Path) -> YamlSource:
+    """Read a file; SpecError where it cannot be read or is not YAML."""
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise SpecError(Problem(str(path), f"cannot be read: {reason}")) from error
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = raw[: error.start].decode("utf-8")
+        where = f"{path}:{_line_col(before)}"
+        raise SpecError(
+            Problem(where, "is not UTF-8 text", found=f"byte 0x{raw[error.start]:02x}")
+        ) from error
+    return parse_yaml(text, str(path))
+
+
+def parse_yaml(text: str, label: str, *, place: str | None = None) -> YamlSource:
+    """Read a text.
+
+    Every place is `place` where that is given, else `label:line:col`. Raises SpecError where the
+    text is not YAML.
+    """
+    source = YamlSource(label)
+    reader = _Reader(source, place)
+    try:
+        node = _compose(text)
+        if node is not None:
+            source.data = reader.build(node, (), ())
+    except yaml.MarkedYAMLError as error:
+        raise SpecError(reader.syntax_problem(error)) from error
+    except yaml.reader.ReaderError as error:
+        where = place or f"{label}:{_line_col(text[: error.position])}"
+        found = f"character U+{ord(text[error.position]):04X}"
+        raise SpecError(Problem(where, "holds a character YAML does not allow", "", found)) from (
+            error
+        )
+    except RecursionError as error:
+        raise SpecError(Problem(place or label, "is nested too deeply")) from error
+    return source
+
+
+def _compose(text: str) -> yaml.Node | None:
+    loader = _CoreLoader(text)
+    try:
+        node: yaml.Node | None = loader.get_single_node()
+        return node
+    finally:
+        loader.dispose()
+
+
+class _Reader:
+    """Turns nodes into data, noting places and problems in the source."""
+
+    def __init__(self, source: YamlSource, place: str | None) -> None:
+        self._source = source
+        self._place = place
+        self._count = 0
+
+    def build(self, node: yaml.Node, path: FieldPath, above: tuple[yaml.Node, ...]) -> Any:
+        if any(node is other for other in above):
+            self._stop(node, "an anchor holds itself")
+        self._count += 1
+        if self._count > MAX_VALUES:
+            self._stop(node, f"the file holds more than {MAX_VALUES} values")
+        self._source.values.setdefault(path, self._where(node))
+        above = (*above, node)
+        kind = node.tag.removeprefix(_TAG)
+        if isinstance(node, yaml.MappingNode) and kind == "map":
+            return self._mapping(node, path, above)
+        if isinstance(node, yaml.SequenceNode) and kind == "seq":
+            return [self.build(item, (*path, i), above) for i, item in enumerate(node.value)]
+        if isinstance(node, yaml.ScalarNode):
+            return self._scalar(node, kind, path)
+        self._note(node, path, "has a tag that is not allowed", node.tag)
+        return None
+
+    def _mapping(
+        self, node: yaml.MappingNode, path: FieldPath, above: tuple[yaml.Node, ...]
+    ) -> dict[str, Any]:
+        merged = [value for key, value in node.value if key.tag == _TAG + "merge"]
+        own: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            if key_node.tag == _TAG + "merge":
+                continue
+            if not isinstance(key_node, yaml.ScalarNode):
+                self._note(key_node, path, "has a key that is not plain text")
+                continue
+            key = str(key_node.value)
+            here = (*path, key)
+            if key in own:
+                first = self._source.keys[here]
+                self._note(key_node, here, "is written twice", hint=f"the first is at {first}")
+                continue
+            self._source.keys.setdefault(here, self._where(key_node))
+            own[key] = self.build(value_node, here, above)
+        for base in self._merged(merged, path, above):
+            own = {**base, **own}
+        return own
+
+    def _merged(
+        self, nodes: list[yaml.Node], path: FieldPath, above: tuple[yaml.Node, ...]
+    ) -> Iterator[Mapping[str, Any]]:
+        for node in nodes:
+            for part in node.value if isinstance(node, yaml.SequenceNode) else [node]:
+                if isinstance(part, yaml.MappingNode):
+                    yield self.build(part, path, above)
+                else:
+                    self._note(part, path, "merges (<<) something that is not a mapping")
+
+    def _scalar(self, node: yaml.ScalarNode, kind: str, path: FieldPath) -> Any:
+        text = str(node.value)
+        try:
+            if kind == "int":
+                digits = text.lower()
+                base = 8 if digits.startswith("0o") else 16 if digits.startswith("0x") else 10
+                return int(digits, base)
+            if kind == "float":
+                return float(re.sub(r"\.(?=inf|nan)", "", text.lower()))
+        except ValueError:
+            self._note(node, path, f"is not a number ({kind})", text)
+            return None
+        if kind == "bool":
+            return text.lower() == "true"
+        if kind in ("null", "str", "merge"):
+            return None if kind == "null" else text
+        self._note(node, path, "has a tag that is not allowed", node.tag)
+        return None
+
+    def syntax_problem(self, error: yaml.MarkedYAMLError) -> Problem:
+        """What the parser said, at the place it said it of."""
+        mark = error.problem_mark or error.context_mark
+        where = self._source.label
+        if self._place:
+            where = self._place
+        elif mark is not None:
+            where = f"{where}:{mark.line + 1}:{mark.column + 1}"
+        said = (error.problem or error.context or "unreadable").strip()
+        hint = ""
+        if "\\t" in said:
+            hint = "indent with spaces, not with tabs"
+        elif "mapping values are not allowed" in said:
+            hint = "put text that holds ': ' in quotes, or check the indentation"
+        elif "another document" in said:
+            hint = "keep one document: remove the line ---"
+        return Problem(where, f"is not YAML: {said}", hint=hint)
+
+    def _where(self, node: yaml.Node) -> str:
+        mark = node.start_mark
+        return self._place or f"{self._source.label}:{mark.line + 1}:{mark.column + 1}"
+
+    def _note(
+        self, node: yaml.Node, path: FieldPath, message: str, found: str = "", hint: str = ""
+    ) -> None:
+        problem = Problem(self._where(node), message, dotted(path), found, hint=hint)
+        self._source.problems.append(problem)
+
+    def _stop(self, node: yaml.Node, message: str) -> None:
+        raise SpecError(Problem(self._where(node), message))
+
+
+def _line_col(before: str) -> str:
+    lines = before.split("\n")
+    return f"{len(lines)}:{len(lines[-1]) + 1}"
