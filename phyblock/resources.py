@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-__all__ = ["bundled", "cache_dir"]
+__all__ = ["bundled", "cache_dir", "reply_cache_file"]
 
 _PACKAGE = Path(__file__).parent
 
@@ -25,3 +25,8 @@ def cache_dir() -> Path:
     if named:
         return Path(named).expanduser()
     return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "phyblock"
+
+
+def reply_cache_file() -> Path:
+    """The reply cache that all runs of this user share."""
+    return cache_dir() / "replies.sqlite"

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from phyblock.report import NO_VALUE
 from phyblock.scoring import Counts
 
 __all__ = ["Tally"]
@@ -20,7 +21,7 @@ class Tally:
     expected: int
     done: int = 0
     fresh: int = 0
-    counts: Counts = Counts()
+    counts: Counts = field(default_factory=Counts)
     tokens: int = 0
     cost_usd: float = 0.0
     unpriced: int = 0
@@ -60,10 +61,10 @@ class Tally:
     @property
     def f1_text(self) -> str:
         """Running micro-F1 in percent, or a dash."""
-        return "–" if self.counts.f1 is None else f"{100 * self.counts.f1:.1f}"
+        return NO_VALUE if self.counts.f1 is None else f"{100 * self.counts.f1:.1f}"
 
     @property
     def failure_text(self) -> str:
         """Failures by outcome, or a dash."""
         words = [f"{n} {name.replace('_', ' ')}" for name, n in sorted(self.failures.items())]
-        return ", ".join(words) or "–"
+        return ", ".join(words) or NO_VALUE

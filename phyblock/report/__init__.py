@@ -8,11 +8,12 @@ from phyblock.report.errors import errors_frame
 from phyblock.report.latex import to_latex
 from phyblock.report.load import Frames, Run, frames_from, load_run
 from phyblock.report.markdown import to_markdown
-from phyblock.report.text_table import Column, TextTable
+from phyblock.report.text_table import NO_VALUE, Column, TextTable
 from phyblock.report.write import TablesWritten, write_tables
 
 __all__ = [
     "ASSEMBLY_COLUMNS",
+    "NO_VALUE",
     "Column",
     "Design",
     "Frames",

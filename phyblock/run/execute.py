@@ -17,7 +17,8 @@ from phyblock.errors import ModelError, PhyblockError, UnavailableError
 from phyblock.models import BudgetReachedError, Model
 from phyblock.models.base import Reply
 from phyblock.run.events import ModelStopped, SampleDone, Stopping, Watcher
-from phyblock.run.plan import PlannedModel, RunPlan, sample_id
+from phyblock.run.models import PlannedModel
+from phyblock.run.plan import RunPlan, sample_id
 from phyblock.run.records import is_final, judged, to_record
 from phyblock.run.store import RunStore
 
@@ -37,6 +38,8 @@ class RunResult:
 class Executor:
     """Asks every model about every sample that has no final record yet."""
 
+    INTERRUPTED = "interrupted"
+
     def __init__(
         self, plan: RunPlan, store: RunStore, models: Mapping[str, Model], watch: Watcher
     ) -> None:
@@ -44,14 +47,19 @@ class Executor:
         self._store = store
         self._models = models
         self._watch = watch
-        self._result = RunResult()
+        self.result = RunResult()
         self._in_flight = 0
         self._failure: PhyblockError | None = None
 
+    @property
+    def stopping(self) -> bool:
+        """Whether no new sample is started."""
+        return self.result.reason is not None
+
     def stop(self, reason: str) -> None:
         """Start no new sample; safe to call from a signal handler in the loop's thread."""
-        if self._result.reason is None:
-            self._result.reason = reason
+        if self.result.reason is None:
+            self.result.reason = reason
             self._watch(Stopping(reason, self._in_flight))
 
     async def run(self, earlier: Mapping[str, Mapping[str, Any]]) -> RunResult:
@@ -80,8 +88,8 @@ class Executor:
             await asyncio.gather(*workers, return_exceptions=True)
         if self._failure is not None:
             raise self._failure
-        self._result.left += sum(len(queue) for queue in pending.values())
-        return self._result
+        self.result.left += sum(len(queue) for queue in pending.values())
+        return self.result
 
     def _settled(
         self,
@@ -93,19 +101,17 @@ class Executor:
         record = earlier.get(sample_id(self._plan.track.name, planned.name, task.scene.id, seed))
         return record is not None and is_final(dict(record))
 
-    async def _work(
-        self, planned: PlannedModel, queue: deque[tuple[AssemblyTask, int]]
-    ) -> None:
-        while queue and self._result.reason is None and planned.name not in self._result.stopped:
+    async def _work(self, planned: PlannedModel, queue: deque[tuple[AssemblyTask, int]]) -> None:
+        while queue and self.result.reason is None and planned.name not in self.result.stopped:
             task, seed = queue.popleft()
             self._in_flight += 1
             try:
                 await self._one(planned, task, seed)
             except UnavailableError as error:
-                self._result.left += 1
+                self.result.left += 1
                 self._stop_model(planned.name, str(error))
             except BudgetReachedError as error:
-                self._result.left += 1
+                self.result.left += 1
                 self.stop(str(error))
             except PhyblockError as error:
                 self._failure = self._failure or error
@@ -129,16 +135,16 @@ class Executor:
         sample = sample_id(track.name, planned.name, task.scene.id, seed)
         text = answer.text if isinstance(answer, Reply) else None
         record = judged(
-            to_record(sample, track.name, planned.name, task, request, answer, self._plan.prompt),
+            to_record(sample, track.name, planned.name, task, request, answer, self._plan.template),
             track.judge(task, text),
             track.rules.parser,
         )
         self._store.append(record)
-        self._result.written += 1
-        self._result.left += not is_final(record)
+        self.result.written += 1
+        self.result.left += not is_final(record)
         self._watch(SampleDone(record))
 
     def _stop_model(self, name: str, reason: str) -> None:
-        if name not in self._result.stopped:
-            self._result.stopped[name] = reason
+        if name not in self.result.stopped:
+            self.result.stopped[name] = reason
             self._watch(ModelStopped(name, reason))

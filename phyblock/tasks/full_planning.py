@@ -56,9 +56,27 @@ class FullPlanning:
         """The request of one sample; without messages for models that need none."""
         if not with_messages or self._prompt is None or self._pictures is None:
             return Request(task.scene.id, seed, (), params, "", task.scene, task.candidates)
-        pictures = await self._pictures.of(task)
-        messages = self._prompt.messages(pictures, self.facts(task, pictures))
-        version = self._prompt.version
+        return self._request(task, seed, params, self._prompt, await self._pictures.of(task))
+
+    def outline(
+        self, task: AssemblyTask, seed: int, params: Mapping[str, object]
+    ) -> tuple[Request, bool]:
+        """The request without rendering anything, and whether its pictures are the real ones."""
+        if self._prompt is None or self._pictures is None:
+            return Request(task.scene.id, seed, (), params, "", task.scene, task.candidates), True
+        pictures, real = self._pictures.outline(task)
+        return self._request(task, seed, params, self._prompt, pictures), real
+
+    def _request(
+        self,
+        task: AssemblyTask,
+        seed: int,
+        params: Mapping[str, object],
+        prompt: Prompt,
+        pictures: tuple[Image, ...],
+    ) -> Request:
+        messages = prompt.messages(pictures, self.facts(task, pictures))
+        version = prompt.version
         return Request(task.scene.id, seed, messages, params, version, task.scene, task.candidates)
 
     def facts(self, task: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
@@ -79,6 +97,4 @@ class FullPlanning:
         if scorer is None:
             scorer = AssemblyScorer(task.scene, task.candidates, self.rules.settings)
             self._scorers[task.scene.id] = scorer
-        return Judgement(
-            parsed, scorer.score(parsed.plan, self.rules.matchers, self.rules.level1)
-        )
+        return Judgement(parsed, scorer.score(parsed.plan, self.rules.matchers, self.rules.level1))

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import functools
+import hashlib
 import io
 import os
 import signal
+from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Literal
@@ -32,6 +34,10 @@ from phyblock.sim import (
 __all__ = ["PicturePolicy", "Pictures"]
 
 
+_KEPT = 128
+"""Tasks whose pictures stay in memory: more than are under way at once."""
+
+
 @dataclass(frozen=True)
 class PicturePolicy:
     """Which pictures a sample carries, in which order.
@@ -46,11 +52,20 @@ class PicturePolicy:
     style: PictureStyle
 
 
+@dataclass(frozen=True)
+class _Drawing:
+    """A picture to be made: what it shows, the digest of what decides it, and how to make it."""
+
+    label: str
+    key: str
+    make: Callable[[], bytes]
+
+
 class Pictures:
     """The pictures of assembly tasks under one policy, cached in `folder` by content.
 
     `workers` processes render; they start with the first picture that is not in the cache.
-    `rendered` counts the pictures made in this process's lifetime.
+    `rendered` counts the files made in this object's lifetime.
     """
 
     def __init__(self, folder: Path, policy: PicturePolicy, workers: int) -> None:
@@ -60,6 +75,7 @@ class Pictures:
         self._workers = workers
         self._pool: ProcessPoolExecutor | None = None
         self._making: dict[str, asyncio.Task[bytes]] = {}
+        self._recent: OrderedDict[str, tuple[Image, ...]] = OrderedDict()
 
     async def of(self, task: AssemblyTask) -> tuple[Image, ...]:
         """The pictures of one task as they are sent.
@@ -67,33 +83,62 @@ class Pictures:
         Raises DataError when the data set has no picture of it or a broken one, StoreError when
         the cache folder cannot be written.
         """
+        if task.scene.id not in self._recent:
+            made = (
+                self._from_dataset(task)
+                if self.policy.source == "dataset"
+                else tuple(
+                    await asyncio.gather(
+                        *(self._image(drawing) for drawing in self._drawings(task))
+                    )
+                )
+            )
+            self._recent[task.scene.id] = made
+            if len(self._recent) > _KEPT:
+                self._recent.popitem(last=False)
+        self._recent.move_to_end(task.scene.id)
+        return self._recent[task.scene.id]
+
+    def outline(self, task: AssemblyTask) -> tuple[tuple[Image, ...], bool]:
+        """The pictures as far as they are at hand, and whether all are; nothing is rendered.
+
+        A picture that is not made yet is stood in for by an empty one of its size.
+        """
         if self.policy.source == "dataset":
-            return self._from_dataset(task)
-        style = self.policy.style
-        goal, candidates = await asyncio.gather(
-            self._get(goal_key(task.scene, style), functools.partial(goal_png, task.scene, style)),
-            self._get(
-                candidates_key(task.candidates, style),
-                functools.partial(candidates_png, task.candidates, style),
-            ),
-        )
-        if self.policy.layout == "composite":
-            return (_image(composite_png(goal, candidates), "composite"),)
-        apart = {"goal": goal, "candidates": candidates}
-        return tuple(_image(apart[label], label) for label in self.policy.order)
+            return self._from_dataset(task), True
+        drawings = self._drawings(task)
+        if all(self._path(drawing.key).is_file() for drawing in drawings):
+            paths = [(self._path(drawing.key), drawing.label) for drawing in drawings]
+            return tuple(_image(path.read_bytes(), label) for path, label in paths), True
+        side = self.policy.style.size_px
+        wide = 2 * side if self.policy.layout == "composite" else side
+        return tuple(Image(b"", drawing.label, wide, side) for drawing in drawings), False
 
     def keys(self, task: AssemblyTask) -> tuple[str, ...]:
         """What decides the pixels of a task's pictures: digests of content, style and renderer."""
         if self.policy.source == "dataset":
             return (str(task.composite and task.composite.name),)
-        style = self.policy.style
-        return (goal_key(task.scene, style), candidates_key(task.candidates, style))
+        return tuple(drawing.key for drawing in self._drawings(task))
 
     def close(self) -> None:
         """Stop the worker processes."""
         if self._pool is not None:
             self._pool.shutdown(wait=True, cancel_futures=True)
             self._pool = None
+
+    def _drawings(self, task: AssemblyTask) -> tuple[_Drawing, ...]:
+        scene, candidates, style = task.scene, task.candidates, self.policy.style
+        goal = _Drawing("goal", goal_key(scene, style), partial(goal_png, scene, style))
+        grid = _Drawing(
+            "candidates",
+            candidates_key(candidates, style),
+            partial(candidates_png, candidates, style),
+        )
+        if self.policy.layout == "separate":
+            apart = {"goal": goal, "candidates": grid}
+            return tuple(apart[label] for label in self.policy.order)
+        key = hashlib.sha256(f"composite {goal.key} {grid.key}".encode()).hexdigest()
+        return (_Drawing("composite", key, partial(_composite, goal.make, grid.make)),)
 
     def _from_dataset(self, task: AssemblyTask) -> tuple[Image, ...]:
         if task.composite is None:
@@ -106,32 +151,41 @@ class Pictures:
         halves = dict(zip(("goal", "candidates"), _halves(data), strict=True))
         return tuple(_image(halves[label], label) for label in self.policy.order)
 
-    async def _get(self, key: str, make: Callable[[], bytes]) -> bytes:
-        path = self._folder / key[:2] / f"{key}.png"
+    async def _image(self, drawing: _Drawing) -> Image:
+        path = self._path(drawing.key)
         if path.is_file():
-            return path.read_bytes()
-        if key not in self._making:
-            self._making[key] = asyncio.create_task(self._make(path, make))
-            self._making[key].add_done_callback(lambda _: self._making.pop(key, None))
-        return await asyncio.shield(self._making[key])
+            return _image(path.read_bytes(), drawing.label)
+        if drawing.key not in self._making:
+            self._making[drawing.key] = asyncio.create_task(self._draw(path, drawing))
+        # Shielded: others may wait for the same picture when one waiter is cancelled.
+        return _image(await asyncio.shield(self._making[drawing.key]), drawing.label)
 
-    async def _make(self, path: Path, make: Callable[[], bytes]) -> bytes:
+    async def _draw(self, path: Path, drawing: _Drawing) -> bytes:
         if self._pool is None:
             self._pool = ProcessPoolExecutor(
                 self._workers, get_context("spawn"), initializer=_ignore_interrupts
             )
-        data = await asyncio.get_running_loop().run_in_executor(self._pool, make)
+        data = await asyncio.get_running_loop().run_in_executor(self._pool, drawing.make)
         self.rendered += 1
-        partial = path.with_suffix(f".{os.getpid()}.part")
+        part = path.with_suffix(f".{os.getpid()}.part")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            partial.write_bytes(data)
-            os.replace(partial, path)
+            part.write_bytes(data)
+            os.replace(part, path)
         except OSError as error:
-            hint = "choose another folder with PHYBLOCK_CACHE"
+            hint = "name another cache folder with PHYBLOCK_CACHE"
             problem = Problem(str(path), f"cannot be written: {error.strerror}", hint=hint)
             raise StoreError(problem) from error
+        finally:
+            del self._making[drawing.key]
         return data
+
+    def _path(self, key: str) -> Path:
+        return self._folder / key[:2] / f"{key}.png"
+
+
+def _composite(make_goal: Callable[[], bytes], make_grid: Callable[[], bytes]) -> bytes:
+    return composite_png(make_goal(), make_grid())
 
 
 def read_picture(path: Path) -> bytes:

@@ -30,7 +30,9 @@ class Prompt(Protocol):
     def version(self) -> str:
         """Hex digest of the text it is made from."""
 
-    def messages(self, pictures: Sequence[Image], facts: Mapping[str, object]) -> tuple[Message, ...]:
+    def messages(
+        self, pictures: Sequence[Image], facts: Mapping[str, object]
+    ) -> tuple[Message, ...]:
         """The messages to send; pictures stand before the text, in the order given."""
 
 
@@ -46,7 +48,9 @@ class OfficialPrompt:
         """Hex digest of the text."""
         return _digest(self.text)
 
-    def messages(self, pictures: Sequence[Image], facts: Mapping[str, object]) -> tuple[Message, ...]:
+    def messages(
+        self, pictures: Sequence[Image], facts: Mapping[str, object]
+    ) -> tuple[Message, ...]:
         """One user message; `facts` are not used, the text is fixed."""
         del facts
         return (Message("user", (*pictures, self.text)),)
@@ -81,7 +85,9 @@ class TemplatePrompt:
             allowed = "{% block user %} ... {% endblock %} and, if wanted, a block system"
             raise PromptError(Problem(str(path), "has no user block", "", found, allowed))
 
-    def messages(self, pictures: Sequence[Image], facts: Mapping[str, object]) -> tuple[Message, ...]:
+    def messages(
+        self, pictures: Sequence[Image], facts: Mapping[str, object]
+    ) -> tuple[Message, ...]:
         """A system message, when that block gives text, and a user message with the pictures."""
         texts = {name: self._render(name, facts) for name in _BLOCKS}
         system = (Message("system", (texts["system"],)),) if texts["system"] else ()

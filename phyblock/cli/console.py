@@ -1,0 +1,76 @@
+"""Tables and paths in the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from phyblock.report import TextTable
+
+__all__ = ["make_console", "plain_table", "print_view", "shown_path"]
+
+_PLAIN_WIDTH = 160
+
+
+def make_console(*, stderr: bool = False) -> Console:
+    """The console; wide enough for whole tables when the output is no terminal."""
+    console = Console(stderr=stderr, highlight=False)
+    if not console.is_terminal:
+        console = Console(stderr=stderr, highlight=False, width=_PLAIN_WIDTH)
+    return console
+
+
+def print_view(console: Console, view: TextTable) -> None:
+    """Print a table with its caption, group headings and notes."""
+    table = Table(
+        title=Text(view.caption, style="bold"),
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        collapse_padding=True,
+    )
+    for column in view.columns:
+        first = _is_first(view, column.group, column.name)
+        heading = Text(f"{column.group if first else ''}\n{column.name}".lstrip("\n"))
+        table.add_column(
+            heading, justify="left" if column.is_text else "right", no_wrap=not column.is_text
+        )
+    for row in view.rows:
+        table.add_row(*(Text(cell) for cell in row))
+    console.print(table)
+    for note in view.notes:
+        console.print(Text(note, style="dim"))
+    console.print()
+
+
+def plain_table(headings: Sequence[str], rows: Sequence[Sequence[str]], *, numbers: int) -> Table:
+    """A small table whose last `numbers` columns are aligned to the right."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for position, heading in enumerate(headings):
+        right = position >= len(headings) - numbers
+        table.add_column(heading, justify="right" if right else "left", overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    return table
+
+
+def shown_path(path: Path) -> str:
+    """A path as a person would type it from here."""
+    try:
+        return str(path.resolve().relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)
+
+
+def _is_first(view: TextTable, group: str, name: str) -> bool:
+    for key, columns in groupby(view.columns, key=lambda column: column.group):
+        members = list(columns)
+        if key == group and any(column.name == name for column in members):
+            return members[0].name == name
+    return False

@@ -1,0 +1,60 @@
+"""The table of `--dry-run`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.console import Console
+
+from phyblock.cli.console import plain_table
+from phyblock.report import NO_VALUE
+from phyblock.run.estimate import Estimate
+from phyblock.run.plan import RunPlan
+
+__all__ = ["show_estimate"]
+
+_HEADINGS = ("model", "kind", "samples", "done", "cached", "calls", "tokens in", "out", "cost")
+
+
+def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> None:
+    """Print what each model would take, and the sum."""
+    console.print(
+        f"{plan.suite.name}: {len(plan.dataset.tasks)} scenes of {plan.dataset.name}, "
+        f"{len(plan.suite.seeds)} seeds, {len(plan.models)} models",
+        highlight=False,
+    )
+    cells = [
+        (
+            row.model,
+            row.kind,
+            f"{row.samples:,}",
+            f"{row.done:,}",
+            f"{row.cached:,}",
+            f"{row.calls:,}" if row.kind == "litellm" else NO_VALUE,
+            f"{row.prompt_tokens:,}",
+            f"{row.completion_tokens:,}",
+            _dollars(row.cost_usd) if row.calls else NO_VALUE,
+        )
+        for row in rows
+    ]
+    console.print(plain_table(_HEADINGS, cells, numbers=7))
+    calls = sum(row.calls for row in rows)
+    known = sum(row.cost_usd or 0.0 for row in rows)
+    unknown = [row.model for row in rows if row.calls and row.cost_usd is None]
+    text = f"{calls:,} calls, about {_dollars(known)}"
+    if unknown:
+        text += f" and what {', '.join(unknown)} cost (price unknown)"
+    console.print(text + ".", soft_wrap=True, markup=False)
+    if calls:
+        console.print(
+            "Tokens are estimates: 4 characters a token, pictures by OpenAI's tile rule, replies "
+            "of usual length.",
+            style="dim",
+            soft_wrap=True,
+        )
+
+
+def _dollars(cost_usd: float | None) -> str:
+    if cost_usd is None:
+        return "unknown"
+    return f"${cost_usd:,.4f}" if 0 < cost_usd < 0.01 else f"${cost_usd:,.2f}"

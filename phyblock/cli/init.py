@@ -1,0 +1,50 @@
+"""`phyblock init`: a working folder to start from."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import click
+
+from phyblock.cli.console import make_console, shown_path
+from phyblock.errors import Problem, StoreError
+from phyblock.resources import bundled
+
+__all__ = ["command"]
+
+_FILES = (
+    ("models.yaml",),
+    ("benchmarks", "quick.yaml"),
+    ("benchmarks", "schemas", "suite.schema.json"),
+    ("benchmarks", "schemas", "models.schema.json"),
+    ("prompts", "full_planning.j2"),
+)
+
+
+@click.command("init")
+@click.argument("folder", type=click.Path(path_type=Path))
+def command(folder: Path) -> None:
+    """Lay out FOLDER with a suite, a models file and a prompt to change.
+
+    Files that are already there are never written over.
+    """
+    taken = [folder.joinpath(*parts) for parts in _FILES if folder.joinpath(*parts).exists()]
+    if taken:
+        hint = "choose another folder"
+        raise StoreError([Problem(str(path), "is already there", hint=hint) for path in taken])
+    console = make_console()
+    try:
+        for parts in _FILES:
+            target = folder.joinpath(*parts)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(bundled(*parts), target)
+            console.print(f"  {shown_path(target)}")
+    except OSError as error:
+        problem = Problem(str(folder), f"cannot be written: {error.strerror}")
+        raise StoreError(problem) from error
+    console.print(
+        f"\nNext: cd {shown_path(folder)} && phyblock run benchmarks/quick.yaml\n"
+        "Add a model with one line in models.yaml, then name it under models in the suite.",
+        markup=False,
+    )

@@ -1,0 +1,86 @@
+"""`phyblock models`: what can be asked, at what price, and whether it answers."""
+
+from __future__ import annotations
+
+import asyncio
+import difflib
+
+import click
+
+from phyblock.cli.console import make_console, plain_table, shown_path
+from phyblock.cli.files import find_models_file
+from phyblock.errors import ModelError, Problem, SpecError
+from phyblock.models import ModelConfig, api_key_status, check_model, price_of
+from phyblock.report import NO_VALUE
+from phyblock.run.models import to_config
+from phyblock.specs import BASELINES, ModelSpec, SuiteSpec, load_models
+
+__all__ = ["command"]
+
+
+@click.group("models", invoke_without_command=True)
+@click.option("--models-file", metavar="FILE", help="Models file instead of models.yaml.")
+@click.pass_context
+def command(ctx: click.Context, models_file: str | None) -> None:
+    """List the models that suites may name; `check NAME` makes one tiny call."""
+    path = find_models_file(models_file, None)
+    ctx.obj = load_models(path)
+    if ctx.invoked_subcommand is not None:
+        return
+    console = make_console()
+    names = [*BASELINES, *ctx.obj]
+    rows = [_row(name, _config(name, ctx.obj)) for name in names]
+    headings = ("model", "kind", "id", "key", "$/M in", "$/M out")
+    console.print(plain_table(headings, rows, numbers=2))
+    console.print(f"{len(ctx.obj)} models in {shown_path(path)}", soft_wrap=True, markup=False)
+
+
+@command.command("check")
+@click.argument("name")
+@click.pass_obj
+def check(known: dict[str, ModelSpec], name: str) -> int:
+    """Make one tiny call to the model NAME and say what came back."""
+    names = [*BASELINES, *known]
+    if name not in names:
+        near = difflib.get_close_matches(name, names, 1)
+        hint = f"did you mean {near[0]}?" if near else "list them: phyblock models"
+        raise SpecError(Problem("models check", "is not in the models file", "", name, hint=hint))
+    console = make_console()
+    config = _config(name, known)
+    try:
+        reply = asyncio.run(check_model(config))
+    except ModelError as error:
+        console.print(f"[red]{name} does not answer:[/red] ", end="")
+        console.print(str(error), markup=False)
+        return 1
+    tokens = f"{reply.usage.prompt_tokens or '?'} + {reply.usage.completion_tokens or '?'} tokens"
+    cost = "price unknown" if reply.cost_usd is None else f"${reply.cost_usd:.6f}"
+    told = (
+        f"{name} answers: {reply.text.strip()[:80]!r} in {reply.latency_s:.1f} s, {tokens}, {cost}"
+    )
+    console.print(told, markup=False, soft_wrap=True)
+    return 0
+
+
+def _config(name: str, known: dict[str, ModelSpec]) -> ModelConfig:
+    return to_config(name, known.get(name), SuiteSpec(name="models", models=(name,)))
+
+
+def _row(name: str, config: ModelConfig) -> tuple[str, ...]:
+    if config.kind != "litellm":
+        return (name, config.kind, str(config.recording or "built in"), NO_VALUE, "0", "0")
+    status = api_key_status(config)
+    if status.is_set:
+        key = "set"
+    else:
+        key = f"needs {status.variables[0]}" if status.is_needed else "not needed"
+    price = price_of(config)
+    prices = (
+        ("unknown", "unknown") if price is None else (_usd(price.input_usd), _usd(price.output_usd))
+    )
+    kind = "direct" if config.is_direct else "litellm"
+    return (name, kind, config.id, key, *prices)
+
+
+def _usd(dollars: float) -> str:
+    return f"{dollars:.3f}".rstrip("0").rstrip(".")

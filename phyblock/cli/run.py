@@ -1,0 +1,133 @@
+"""`phyblock run`: a suite from start to tables, or on from where it stopped."""
+
+from __future__ import annotations
+
+import asyncio
+import shlex
+import signal
+import sys
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from phyblock.cli.console import make_console, print_view, shown_path
+from phyblock.cli.estimate_view import show_estimate
+from phyblock.cli.files import find_models_file, find_suite
+from phyblock.cli.progress import ProgressView
+from phyblock.report import write_tables
+from phyblock.resources import bundled
+from phyblock.run.estimate import Estimate, estimate
+from phyblock.run.execute import Executor, RunResult
+from phyblock.run.plan import RunPlan, make_plan
+from phyblock.run.session import Session, check_ready
+from phyblock.specs import load_models, load_suite
+
+__all__ = ["command"]
+
+_INTERRUPTED = 130
+
+
+@click.command("run")
+@click.argument("suite")
+@click.option(
+    "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Override a value of the suite."
+)
+@click.option("--models", metavar="A,B", help="Run only these models of the suite.")
+@click.option(
+    "--limit", type=click.IntRange(min=1), metavar="N", help="Run N scenes, spread over levels."
+)
+@click.option("--out", type=click.Path(path_type=Path), help="Folder of the run.")
+@click.option("--models-file", metavar="FILE", help="Models file instead of models.yaml.")
+@click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
+@click.option("--dry-run", is_flag=True, help="Print calls, tokens and dollars; call nothing.")
+@click.option("--yes", is_flag=True, help="Do not ask before spending money.")
+def command(
+    suite: str,
+    sets: tuple[str, ...],
+    models: str | None,
+    limit: int | None,
+    out: Path | None,
+    models_file: str | None,
+    no_cache: bool,
+    dry_run: bool,
+    yes: bool,
+) -> int:
+    """Run SUITE, a YAML file or the name of a bundled suite (quick, full, paper-table1).
+
+    Records are kept as they come; the same command again goes on where it stopped and asks
+    nothing twice.
+    """
+    console = make_console()
+    path = find_suite(suite)
+    only = [name.strip() for name in models.split(",") if name.strip()] if models else []
+    loaded = load_suite(path, sets, data_dir=bundled("benchmarks", "data"))
+    known = load_models(find_models_file(models_file, path))
+    plan = make_plan(loaded, known, only=only, limit=limit)
+    folder = out or Path("results") / plan.folder_name
+    if dry_run:
+        show_estimate(console, plan, estimate(plan, folder, use_cache=not no_cache))
+        return 0
+    check_ready(plan)
+    if not yes and sys.stdin.isatty() and not _agreed(console, plan, folder, not no_cache):
+        return 1
+    result = asyncio.run(_run(console, plan, folder, use_cache=not no_cache))
+    written = write_tables(folder)
+    for view in written.views.values():
+        print_view(console, view)
+    return _conclude(console, plan, folder, result)
+
+
+async def _run(console: Console, plan: RunPlan, folder: Path, *, use_cache: bool) -> RunResult:
+    loop = asyncio.get_running_loop()
+    whole = asyncio.current_task()
+    assert whole is not None
+    with ProgressView(console, plan.suite.name) as view:
+        async with Session(plan, folder, view, use_cache=use_cache) as session:
+
+            def interrupted() -> None:
+                if session.executor.stopping:
+                    whole.cancel()
+                session.executor.stop(Executor.INTERRUPTED)
+
+            for name in (signal.SIGINT, signal.SIGTERM):
+                loop.add_signal_handler(name, interrupted)
+            try:
+                return await session.run()
+            except asyncio.CancelledError:
+                return session.executor.result
+            finally:
+                for name in (signal.SIGINT, signal.SIGTERM):
+                    loop.remove_signal_handler(name)
+
+
+def _agreed(console: Console, plan: RunPlan, folder: Path, use_cache: bool) -> bool:
+    """Ask before money is spent; nothing is asked when nothing costs anything."""
+    estimated = estimate(plan, folder, use_cache=use_cache)
+    if not any(_may_cost(row) for row in estimated):
+        return True
+    show_estimate(console, plan, estimated)
+    return click.confirm("Go on?", default=True)
+
+
+def _may_cost(row: Estimate) -> bool:
+    return row.calls > 0 and (row.cost_usd is None or row.cost_usd > 0)
+
+
+def _conclude(console: Console, plan: RunPlan, folder: Path, result: RunResult) -> int:
+    total = plan.samples_per_model * len(plan.models)
+    where = shown_path(folder)
+    for name, reason in result.stopped.items():
+        console.print(f"[red]{name}[/red] was stopped: ", end="")
+        console.print(reason, markup=False)
+    if not result.left:
+        console.print(f"All {total:,} samples are done. The run is in {where}", soft_wrap=True)
+        return 0
+    reason = f" ({result.reason})" if result.reason else ""
+    console.print(
+        f"{total - result.left:,} of {total:,} samples are done{reason}. The run is in {where}",
+        soft_wrap=True,
+    )
+    again = shlex.join(["phyblock", *sys.argv[1:]])
+    console.print(f"To go on, give the same command again: {again}", soft_wrap=True, markup=False)
+    return _INTERRUPTED if result.reason == Executor.INTERRUPTED else 1

@@ -1,0 +1,30 @@
+"""`phyblock score`: stored replies read and scored again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import cast
+
+import click
+
+from phyblock.cli.report import show_tables
+from phyblock.parsing import PLAN_PARSERS, PlanParser
+from phyblock.run.rescore import rescore
+from phyblock.scoring import MATCHERS, Matcher
+
+__all__ = ["command"]
+
+
+@click.command("score")
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option("--parser", type=click.Choice(PLAN_PARSERS), help="Parser to read replies with.")
+@click.option("--matcher", type=click.Choice(MATCHERS), help="Matcher of the headline numbers.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the new scores.")
+def command(run: Path, parser: str | None, matcher: str | None, out: Path | None) -> None:
+    """Read and score the stored replies of the folder RUN again; no model is called.
+
+    The new scores go to RUN/scores/PARSER-MATCHER (or --out); RUN itself stays as it is.
+    """
+    show_tables(
+        rescore(run, cast("PlanParser | None", parser), cast("Matcher | None", matcher), out)
+    )

@@ -1,0 +1,110 @@
+"""A plan opened in a folder: cache, limits, models and store, closed whatever happens."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+
+from phyblock.errors import Problem, SpecError
+from phyblock.models import (
+    Budget,
+    Model,
+    ModelEvent,
+    OverallLimit,
+    ReplyCache,
+    api_key_status,
+    build_model,
+)
+from phyblock.resources import reply_cache_file
+from phyblock.run.events import ModelNotice, RunStarted, Watcher
+from phyblock.run.execute import Executor, RunResult
+from phyblock.run.plan import RunPlan
+from phyblock.run.store import RunStore, read_records
+
+__all__ = ["Session", "check_ready"]
+
+
+def check_ready(plan: RunPlan) -> None:
+    """Raise SpecError naming every model whose key is not set."""
+    problems = []
+    for model in plan.models:
+        status = api_key_status(model.config)
+        if status.is_needed and not status.is_set:
+            message = "needs an API key, and none is set"
+            names = " or ".join(status.variables)
+            hint = f"set {names} in the environment, or leave the model out with --models"
+            problems.append(Problem(f"model {model.name}", message, "", model.config.id, hint=hint))
+    if problems:
+        raise SpecError(problems)
+
+
+class Session:
+    """Runs one plan in one folder; an async context manager."""
+
+    def __init__(self, plan: RunPlan, folder: Path, watch: Watcher, *, use_cache: bool) -> None:
+        self._plan = plan
+        self._folder = folder
+        self._watch = watch
+        self._use_cache = use_cache
+        self._cache: ReplyCache | None = None
+        self._store: RunStore | None = None
+        self._models: dict[str, Model] = {}
+        self.executor: Executor
+
+    async def __aenter__(self) -> Session:
+        plan = self._plan
+        try:
+            self._store = RunStore(self._folder, plan.manifest)
+            if self._use_cache:
+                self._cache = ReplyCache(reply_cache_file())
+            limits = plan.suite.limits
+            overall = OverallLimit(limits.max_concurrency)
+            budget = Budget(limits.max_cost_usd)
+            for model in plan.models:
+                self._models[model.name] = build_model(
+                    model.config,
+                    cache=self._cache,
+                    overall=overall,
+                    budget=budget,
+                    observer=self._notice,
+                    max_attempts=limits.max_attempts,
+                )
+            self.executor = Executor(plan, self._store, self._models, self._watch)
+        except BaseException:
+            await self._close()
+            raise
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        await self._close()
+
+    async def run(self) -> RunResult:
+        """Ask what is left to ask; see `Executor.run`."""
+        earlier = read_records(self._folder)
+        self._watch(
+            RunStarted(
+                {model.name: self._plan.samples_per_model for model in self._plan.models},
+                {
+                    model.name: tuple(r for r in earlier.values() if r["model"] == model.name)
+                    for model in self._plan.models
+                },
+            )
+        )
+        return await self.executor.run(earlier)
+
+    def _notice(self, event: ModelEvent) -> None:
+        self._watch(ModelNotice(event.model, event.kind, event.message))
+
+    async def _close(self) -> None:
+        for model in self._models.values():
+            await model.aclose()
+        if self._plan.pictures is not None:
+            self._plan.pictures.close()
+        for resource in (self._cache, self._store):
+            if resource is not None:
+                resource.close()
