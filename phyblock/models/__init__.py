@@ -1,0 +1,55 @@
+"""The network seam: calls with retries, limits, cache and cost; recordings; baselines.
+
+Importing this package imports neither litellm nor aiohttp: the first call through one of them does.
+"""
+
+from phyblock.models.base import Finish, Image, Message, Model, Reply, Request, Usage
+from phyblock.models.baselines import BASELINES
+from phyblock.models.build import build_model
+from phyblock.models.cache import CacheStats, ReplyCache, reply_key
+from phyblock.models.config import Kind, ModelConfig, Price
+from phyblock.models.cost import (
+    Budget,
+    BudgetReachedError,
+    Estimate,
+    cost_usd,
+    estimate,
+    price_of,
+)
+from phyblock.models.events import ModelEvent, Observer
+from phyblock.models.keys import KeyStatus, api_key_status
+from phyblock.models.limits import Gate
+from phyblock.models.raw_replies import RawReply, read_raw_reply
+from phyblock.models.retry import RetryPolicy
+
+__all__ = [
+    "BASELINES",
+    "Budget",
+    "BudgetReachedError",
+    "CacheStats",
+    "Estimate",
+    "Finish",
+    "Gate",
+    "Image",
+    "KeyStatus",
+    "Kind",
+    "Message",
+    "Model",
+    "ModelConfig",
+    "ModelEvent",
+    "Observer",
+    "Price",
+    "RawReply",
+    "Reply",
+    "ReplyCache",
+    "Request",
+    "RetryPolicy",
+    "Usage",
+    "api_key_status",
+    "build_model",
+    "cost_usd",
+    "estimate",
+    "price_of",
+    "read_raw_reply",
+    "reply_key",
+]

@@ -1,0 +1,65 @@
+"""Putting a model together from its configuration."""
+
+from __future__ import annotations
+
+from phyblock.errors import Problem, SpecError
+from phyblock.models.base import Model
+from phyblock.models.baselines import BaselineModel
+from phyblock.models.cache import ReplyCache
+from phyblock.models.chat import ChatModel, ChatParts
+from phyblock.models.config import ModelConfig
+from phyblock.models.cost import Budget, price_of, require_price
+from phyblock.models.direct_call import DirectTransport
+from phyblock.models.events import Observer, ignore_event
+from phyblock.models.keys import secrets_of
+from phyblock.models.limits import Gate, ModelLimiter
+from phyblock.models.litellm_call import LitellmTransport
+from phyblock.models.replay import open_replay
+from phyblock.models.retry import RetryPolicy
+from phyblock.models.transport import Transport
+
+__all__ = ["build_model"]
+
+
+def build_model(
+    config: ModelConfig,
+    *,
+    cache: ReplyCache | None,
+    overall: Gate,
+    budget: Budget | None = None,
+    observer: Observer = ignore_event,
+    policy: RetryPolicy | None = None,
+) -> Model:
+    """The model that a configuration describes; nothing is imported or sent before it is asked.
+
+    `overall` bounds what all models of a run have under way together. Raises SpecError for an
+    unknown baseline or a model without a price under a budget, DataError for missing recordings.
+    """
+    if config.kind == "baseline":
+        return BaselineModel(config)
+    if config.kind == "replay":
+        return open_replay(config)
+    _check(config)
+    secrets = secrets_of(config)
+    transport: Transport = (
+        DirectTransport(config, secrets) if config.is_direct else LitellmTransport(config, secrets)
+    )
+    parts = ChatParts(
+        transport=transport,
+        limiter=ModelLimiter(config.max_concurrency, overall, config.rpm, config.tpm),
+        cache=cache,
+        budget=budget,
+        price=price_of(config) if budget is None else require_price(config),
+        policy=policy or RetryPolicy(),
+        secrets=secrets,
+        observer=observer,
+    )
+    return ChatModel(config, parts)
+
+
+def _check(config: ModelConfig) -> None:
+    if not config.provider:
+        hint = "for example openai/gpt-4o-2024-08-06"
+        raise SpecError(
+            Problem(f"model {config.name}", "needs a provider", "id", config.id, hint=hint)
+        )

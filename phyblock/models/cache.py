@@ -1,0 +1,189 @@
+"""The reply cache: content-addressed, in one SQLite file that processes may share.
+
+A reply is found again when everything that decided it is the same: model, server, parameters,
+messages with their pictures, seed and prompt version. Only whole answers are kept: no error, no
+empty, truncated or refused reply, no picture, no key.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import sqlite3
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from phyblock.errors import Problem, StoreError
+from phyblock.models.base import Image, Message, Reply, Request, Usage
+from phyblock.models.config import ModelConfig
+from phyblock.models.payload import wire_params
+
+__all__ = ["CacheStats", "ReplyCache", "reply_key"]
+
+SCHEMA = 1
+"""Version of the file's layout and of what enters a key."""
+
+_BUSY_TIMEOUT_S = 30.0
+_FOREIGN = "belongs to another version of phyblock, or is no reply cache"
+_HINT = (
+    "delete the file, or name another cache folder; answered samples of a run stay in its records"
+)
+_CREATE = """
+CREATE TABLE IF NOT EXISTS replies (
+    key TEXT PRIMARY KEY,
+    model TEXT NOT NULL,
+    stored_at REAL NOT NULL,
+    reply TEXT NOT NULL
+) WITHOUT ROWID
+"""
+
+
+@dataclass(frozen=True)
+class CacheStats:
+    """Number of replies, by model id too; size of the file; when the first and last came [s]."""
+
+    path: Path
+    replies: int
+    by_model: dict[str, int]
+    size_bytes: int
+    oldest_s: float | None
+    newest_s: float | None
+
+
+def reply_key(config: ModelConfig, request: Request) -> str:
+    """Hex digest of everything that decides the reply."""
+    content = {
+        "schema": SCHEMA,
+        "model": {**config.identity(), "params": wire_params(config, request)},
+        "messages": [_message(message) for message in request.messages],
+        "seed": request.seed,
+        "prompt_version": request.prompt_version,
+    }
+    canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(canonical.encode()).hexdigest()
+
+
+def _message(message: Message) -> list[object]:
+    parts = [{"image": p.sha256} if isinstance(p, Image) else p for p in message.parts]
+    return [message.role, parts]
+
+
+class ReplyCache:
+    """Replies by key. Every method raises StoreError when the file is broken or cannot be used."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with self._explained():
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise self._problem(f"cannot be made: {error.strerror}") from error
+            self._db = sqlite3.connect(path, timeout=_BUSY_TIMEOUT_S, isolation_level=None)
+            try:
+                self._prepare()
+            except BaseException:
+                self._db.close()
+                raise
+
+    def __enter__(self) -> ReplyCache:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def get(self, key: str) -> Reply | None:
+        """The reply kept under `key`, marked as cached, or None."""
+        with self._explained():
+            row = self._db.execute("SELECT reply FROM replies WHERE key = ?", (key,)).fetchone()
+            return None if row is None else _reply(json.loads(row[0]))
+
+    def __contains__(self, key: object) -> bool:
+        with self._explained():
+            row = self._db.execute("SELECT 1 FROM replies WHERE key = ?", (key,)).fetchone()
+        return row is not None
+
+    def put(self, key: str, model_id: str, reply: Reply) -> bool:
+        """Keep a reply, unless it is empty, truncated or refused; whether it was kept."""
+        if reply.finish in ("length", "refusal") or not reply.text.strip():
+            return False
+        text = json.dumps(asdict(reply), ensure_ascii=True, separators=(",", ":"))
+        with self._explained():
+            self._db.execute(
+                "INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?)",
+                (key, model_id, time.time(), text),
+            )
+        return True
+
+    def stats(self) -> CacheStats:
+        """What the cache holds."""
+        with self._explained():
+            rows = self._db.execute(
+                "SELECT model, count(*), min(stored_at), max(stored_at) FROM replies "
+                "GROUP BY model ORDER BY model"
+            ).fetchall()
+        files = (self.path.with_name(self.path.name + end) for end in ("", "-wal"))
+        return CacheStats(
+            self.path,
+            sum(row[1] for row in rows),
+            {row[0]: row[1] for row in rows},
+            sum(file.stat().st_size for file in files if file.exists()),
+            min((row[2] for row in rows), default=None),
+            max((row[3] for row in rows), default=None),
+        )
+
+    def clear(self, model_id: str | None = None) -> int:
+        """Drop all replies, or those of one model id; returns how many."""
+        with self._explained():
+            if model_id is None:
+                dropped = self._db.execute("DELETE FROM replies").rowcount
+            else:
+                sql = "DELETE FROM replies WHERE model = ?"
+                dropped = self._db.execute(sql, (model_id,)).rowcount
+            self._db.execute("VACUUM")
+        return dropped
+
+    def close(self) -> None:
+        """Release the file; the cache is not used afterwards."""
+        self._db.close()
+
+    def _prepare(self) -> None:
+        """Open the file, or make it.
+
+        In WAL mode a committed reply survives the death of the process, and readers do not wait
+        for a writer.
+        """
+        self._db.execute("BEGIN")
+        version = self._db.execute("PRAGMA user_version").fetchone()[0]
+        tables = self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+        self._db.execute("COMMIT")
+        if version != SCHEMA and (version != 0 or tables != 0):
+            raise self._problem(_FOREIGN, found=f"schema {version}", allowed=f"schema {SCHEMA}")
+        self._db.execute("PRAGMA journal_mode = WAL")
+        self._db.execute("PRAGMA synchronous = NORMAL")
+        if version != SCHEMA:
+            self._db.execute("BEGIN IMMEDIATE")
+            self._db.execute(_CREATE)
+            self._db.execute(f"PRAGMA user_version = {SCHEMA}")
+            self._db.execute("COMMIT")
+
+    @contextlib.contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.Error as error:
+            raise self._problem(f"cannot be used: {error}") from error
+        except (ValueError, KeyError, TypeError) as error:
+            raise self._problem(f"holds a broken reply: {error}") from error
+
+    def _problem(self, message: str, found: str = "", allowed: str = "") -> StoreError:
+        where = f"reply cache {self.path}"
+        return StoreError(Problem(where, message, found=found, allowed=allowed, hint=_HINT))
+
+
+def _reply(stored: dict[str, Any]) -> Reply:
+    reply = Reply(**{**stored, "usage": Usage(**stored["usage"])})
+    return replace(reply, cached=True, attempts=0)

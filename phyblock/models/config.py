@@ -1,0 +1,93 @@
+"""What the run layer says of a model: the runtime counterpart of an entry in models.yaml."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+__all__ = ["DIRECT_PROVIDERS", "Kind", "ModelConfig", "Price", "SeedMode", "Transport"]
+
+Kind = Literal["litellm", "replay", "baseline"]
+Transport = Literal["auto", "litellm", "direct"]
+SeedMode = Literal["auto", "always", "never"]
+
+DIRECT_PROVIDERS = ("openai", "hosted_vllm", "lm_studio")
+"""Provider prefixes that mean the plain OpenAI protocol: litellm has nothing to translate."""
+
+_RENAMES_PARAMETERS = re.compile(r"o\d|gpt-5")
+
+
+@dataclass(frozen=True)
+class Price:
+    """US dollars per million tokens."""
+
+    input_usd: float
+    output_usd: float
+
+
+@dataclass(frozen=True)
+class ModelConfig:
+    """One model.
+
+    `name` is what the tables show; `id` the litellm id (`openai/gpt-4o-2024-08-06`), a baseline's
+    name, or the model to read out of a recorded run. `api_key_env` names the environment variable
+    that holds the key; None means the provider's usual one. `params` are sampling parameters by
+    their OpenAI names; they win over a request's, and None there means "do not send". `rpm` and
+    `tpm` are limits a minute, None for none. `price` None means litellm's price map is asked.
+    `sends_seed`: `auto` sends seeds until the provider refuses, `always` takes a refusal as an
+    error, `never` sends none.
+    """
+
+    name: str
+    kind: Kind
+    id: str = ""
+    api_base: str | None = None
+    api_key_env: str | None = None
+    transport: Transport = "auto"
+    params: Mapping[str, object] = field(default_factory=dict)
+    max_concurrency: int = 32
+    rpm: int | None = None
+    tpm: int | None = None
+    price: Price | None = None
+    recording: Path | None = None
+    sends_seed: SeedMode = "auto"
+    timeout_s: float = 600.0
+
+    @property
+    def provider(self) -> str:
+        """The part of the id before the first slash, "" when there is none."""
+        return self.id.partition("/")[0] if "/" in self.id else ""
+
+    @property
+    def provider_model(self) -> str:
+        """The id without the provider: the model's name as the provider knows it."""
+        return self.id.partition("/")[2] if "/" in self.id else self.id
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether calls go straight to the server instead of through litellm.
+
+        With `auto`: an OpenAI-compatible server that is named by `api_base`, unless the model is
+        one of those for which litellm renames parameters.
+        """
+        if self.transport != "auto":
+            return self.transport == "direct"
+        return (
+            self.api_base is not None
+            and self.provider in DIRECT_PROVIDERS
+            and _RENAMES_PARAMETERS.match(self.provider_model) is None
+        )
+
+    def identity(self) -> dict[str, object]:
+        """The part that changes replies, JSON-able: not the limits, the price, the transport."""
+        return {
+            "kind": self.kind,
+            "id": self.id,
+            "api_base": self.api_base.rstrip("/") if self.api_base else None,
+            "params": dict(self.params),
+            "sends_seed": self.sends_seed != "never",
+            "recording": str(self.recording) if self.recording else None,
+        }

@@ -1,0 +1,201 @@
+"""What calls cost: prices, estimates before a call, and a budget that is not passed.
+
+Prices come from models.yaml, else from the price map inside the installed litellm, read as a file
+so that nothing heavy is imported. Where neither knows a model its cost is None, "unknown".
+"""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import importlib.util
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from phyblock.errors import PhyblockError, Problem, SpecError
+from phyblock.models.base import Image, Request, Usage
+from phyblock.models.config import ModelConfig, Price
+from phyblock.models.payload import wire_params
+
+__all__ = [
+    "Budget",
+    "BudgetReachedError",
+    "Estimate",
+    "cost_usd",
+    "estimate",
+    "price_of",
+    "require_price",
+]
+
+_PRICE_MAP = "model_prices_and_context_window_backup.json"
+_CHARS_PER_TOKEN = 4
+_TYPICAL_REPLY_TOKENS = 500
+_LONGEST_REPLY_TOKENS = 32_768
+_PROMPT_MARGIN = 1.5
+_PER_MILLION = 1_000_000
+
+
+class BudgetReachedError(PhyblockError):
+    """The next call could bring the cost above the limit; it was not made."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Tokens of a call that was not made yet.
+
+    `prompt_tokens`: a token per four characters, and pictures by OpenAI's rule for detailed
+    pictures; `completion_tokens`: a usual reply, `most_completion_tokens` the longest possible.
+    """
+
+    prompt_tokens: int
+    completion_tokens: int
+    most_completion_tokens: int
+
+    @property
+    def usage(self) -> Usage:
+        """The usual case."""
+        return Usage(self.prompt_tokens, self.completion_tokens)
+
+
+def price_of(config: ModelConfig) -> Price | None:
+    """Price of a model; None when it is not known. Baselines and recordings cost nothing."""
+    if config.kind != "litellm":
+        return Price(0.0, 0.0)
+    if config.price is not None:
+        return config.price
+    entry = _map_entry(config)
+    if "input_cost_per_token" not in entry or "output_cost_per_token" not in entry:
+        return None
+    return Price(
+        float(entry["input_cost_per_token"]) * _PER_MILLION,
+        float(entry["output_cost_per_token"]) * _PER_MILLION,
+    )
+
+
+def require_price(config: ModelConfig) -> Price:
+    """Price of a model under a cost limit; SpecError when it is not known."""
+    price = price_of(config)
+    if price is None:
+        hint = "give it a price in models.yaml, or run without max_cost_usd"
+        message = "has no known price, so that max_cost_usd cannot be kept"
+        raise SpecError(Problem(f"model {config.name}", message, "price", config.id, hint=hint))
+    return price
+
+
+def cost_usd(price: Price | None, usage: Usage) -> float | None:
+    """US dollars of a call; None when the price or the tokens are not known."""
+    if price is None:
+        return None
+    if price == Price(0.0, 0.0):
+        return 0.0
+    if usage.prompt_tokens is None or usage.completion_tokens is None:
+        return None
+    spent = usage.prompt_tokens * price.input_usd + usage.completion_tokens * price.output_usd
+    return spent / _PER_MILLION
+
+
+def estimate(config: ModelConfig, request: Request) -> Estimate:
+    """Tokens that the request would take."""
+    parts = [part for message in request.messages for part in message.parts]
+    text = sum(len(part) for part in parts if isinstance(part, str))
+    pictures = sum(_picture_tokens(part) for part in parts if isinstance(part, Image))
+    params = wire_params(config, request)
+    given = params.get("max_completion_tokens", params.get("max_tokens"))
+    known = _map_entry(config).get("max_output_tokens")
+    most = next((n for n in (given, known) if isinstance(n, int)), _LONGEST_REPLY_TOKENS)
+    prompt = math.ceil(text / _CHARS_PER_TOKEN) + pictures
+    return Estimate(prompt, min(_TYPICAL_REPLY_TOKENS, most), most)
+
+
+def _picture_tokens(image: Image) -> int:
+    """OpenAI's rule: fit into 2048 x 2048, short side to 768, 85 and 170 a tile of 512."""
+    width, height = float(image.width_px), float(image.height_px)
+    scale = min(1.0, 2048 / max(width, height), 768 / min(width, height))
+    tiles = math.ceil(width * scale / 512) * math.ceil(height * scale / 512)
+    return 85 + 170 * tiles
+
+
+@functools.cache
+def _price_map() -> dict[str, dict[str, Any]]:
+    spec = importlib.util.find_spec("litellm")
+    if spec is None or spec.origin is None:
+        return {}
+    path = Path(spec.origin).with_name(_PRICE_MAP)
+    if not path.is_file():
+        return {}
+    entries: dict[str, dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))
+    return entries
+
+
+def _map_entry(config: ModelConfig) -> dict[str, Any]:
+    """The map's entry by full id, or by bare name where the provider is the same."""
+    entries = _price_map()
+    if config.id in entries:
+        return entries[config.id]
+    entry = entries.get(config.provider_model, {})
+    owner = str(entry.get("litellm_provider", ""))
+    return entry if config.provider and owner.startswith(config.provider) else {}
+
+
+class Budget:
+    """A cost limit for a whole run: room is reserved before a call and settled after it.
+
+    Of each model the largest ratio of real to estimated prompt tokens is remembered, so that
+    pictures which a provider counts higher than the estimate soon are reserved for.
+    """
+
+    def __init__(self, max_cost_usd: float, spent_usd: float = 0.0) -> None:
+        self._max_usd = max_cost_usd
+        self._spent_usd = spent_usd
+        self._held: dict[int, float] = {}
+        self._next = 0
+        self._changed = asyncio.Event()
+        self._ratio: dict[str, float] = {}
+
+    @property
+    def spent_usd(self) -> float:
+        """What settled calls cost, what was `spent_usd` at the start included."""
+        return self._spent_usd
+
+    @property
+    def max_cost_usd(self) -> float:
+        """The limit."""
+        return self._max_usd
+
+    def most_usd(self, model: str, price: Price, expected: Estimate) -> float:
+        """The most that a call can cost, with a margin on its prompt."""
+        prompt = expected.prompt_tokens * _PROMPT_MARGIN * self._ratio.get(model, 1.0)
+        spent = prompt * price.input_usd + expected.most_completion_tokens * price.output_usd
+        return spent / _PER_MILLION
+
+    async def reserve(self, usd: float) -> int:
+        """Hold `usd`, waiting for calls under way to settle; returns the reservation's number.
+
+        Raises BudgetReachedError when it does not fit although nothing is under way.
+        """
+        while self._spent_usd + sum(self._held.values()) + usd > self._max_usd:
+            if not self._held:
+                raise BudgetReachedError(
+                    f"max_cost_usd {self._max_usd:g} is reached: {self._spent_usd:.4f} spent, "
+                    f"the next call can cost {usd:.4f}"
+                )
+            self._changed.clear()
+            await self._changed.wait()
+        self._next += 1
+        self._held[self._next] = usd
+        return self._next
+
+    def settle(self, reservation: int, usd: float | None) -> None:
+        """Put the real cost in the place of a reservation; None counts all that was held."""
+        held = self._held.pop(reservation)
+        self._spent_usd += held if usd is None else usd
+        self._changed.set()
+
+    def learn(self, model: str, expected: Estimate, usage: Usage) -> None:
+        """Compare an estimate with what the provider counted."""
+        if usage.prompt_tokens and expected.prompt_tokens:
+            ratio = usage.prompt_tokens / expected.prompt_tokens
+            self._ratio[model] = max(self._ratio.get(model, 1.0), ratio)

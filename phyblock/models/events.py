@@ -1,0 +1,34 @@
+"""What a model tells while it works, for a progress display."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+__all__ = ["EventKind", "ModelEvent", "Observer", "ignore_event"]
+
+EventKind = Literal["retry", "slow_down", "seed_unsupported", "unavailable"]
+
+
+@dataclass(frozen=True)
+class ModelEvent:
+    """Something a user may want to see.
+
+    `retry`: a request failed and is sent again after `wait_s`; `slow_down`: a 429 brought the
+    concurrency down to `limit`; `seed_unsupported`: from now on no seed is sent; `unavailable`:
+    nothing more is sent. `message` is safe to show and store.
+    """
+
+    model: str
+    kind: EventKind
+    message: str
+    wait_s: float = 0.0
+    limit: int = 0
+
+
+Observer = Callable[[ModelEvent], None]
+
+
+def ignore_event(event: ModelEvent) -> None:
+    """The observer of those who do not care."""

@@ -1,0 +1,103 @@
+"""API keys: which variable of the environment holds one, and keeping keys out of all text."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from phyblock.errors import UnavailableError
+from phyblock.models.config import ModelConfig
+
+__all__ = ["KeyStatus", "api_key", "api_key_status", "hidden", "secrets_of"]
+
+_KEY_VARIABLES: Mapping[str, tuple[str, ...]] = {
+    "cloudflare": ("CLOUDFLARE_API_KEY",),
+    "fireworks_ai": ("FIREWORKS_AI_API_KEY", "FIREWORKS_API_KEY"),
+    "gemini": ("GEMINI_API_KEY", "GOOGLE_API_KEY"),
+    "perplexity": ("PERPLEXITYAI_API_KEY", "PERPLEXITY_API_KEY"),
+    "qwencloud": ("QWENCLOUD_API_KEY", "DASHSCOPE_API_KEY"),
+    "together_ai": ("TOGETHERAI_API_KEY", "TOGETHER_API_KEY", "TOGETHER_AI_API_KEY"),
+}
+"""Where the name is not `<PROVIDER>_API_KEY`, in the order in which they are looked for."""
+
+_OWN_CREDENTIALS = (
+    "azure",
+    "bedrock",
+    "github_copilot",
+    "oci",
+    "sagemaker",
+    "vertex_ai",
+    "watsonx",
+)
+"""Providers that can sign in without an API key: litellm finds out by itself."""
+
+_KEYLESS = ("hosted_vllm", "lm_studio", "llamafile", "ollama", "ollama_chat")
+"""Local servers, which take a key but need none."""
+
+_PLACEHOLDER = "no-key"
+_SHORTEST_SECRET = 8
+_LOOKS_SECRET = re.compile(
+    r"(?:\bsk-[\w-]{6,}|\bAIza[\w-]{10,}|(?<=Bearer )[\w.~+/-]{6,}|(?<=[?&]key=)[^&\s'\"]+)"
+)
+
+
+@dataclass(frozen=True)
+class KeyStatus:
+    """Whether a model can be called as far as keys go.
+
+    `variables` are the environment variables looked at, in order; `is_set` whether one holds a
+    key; `is_needed` whether calls fail without.
+    """
+
+    variables: tuple[str, ...]
+    is_set: bool
+    is_needed: bool
+
+
+def api_key_status(config: ModelConfig) -> KeyStatus:
+    """Whether the model's key is set; looks at the environment alone."""
+    if config.kind != "litellm":
+        return KeyStatus((), is_set=False, is_needed=False)
+    variables = _variables(config)
+    is_needed = config.api_key_env is not None or not (
+        config.api_base or config.provider in _KEYLESS + _OWN_CREDENTIALS
+    )
+    return KeyStatus(variables, any(os.environ.get(name) for name in variables), is_needed)
+
+
+def api_key(config: ModelConfig) -> str | None:
+    """The key to send; None leaves it to litellm (providers with credentials of their own).
+
+    A server named by `api_base` gets a placeholder when no key is set, as clients insist on one.
+    Raises UnavailableError when a key is needed and not set.
+    """
+    for name in _variables(config):
+        if value := os.environ.get(name):
+            return value
+    status = api_key_status(config)
+    if status.is_needed:
+        names = " or ".join(status.variables)
+        raise UnavailableError(f"no API key for {config.name}: set {names} in the environment")
+    return None if config.provider in _OWN_CREDENTIALS else _PLACEHOLDER
+
+
+def secrets_of(config: ModelConfig) -> tuple[str, ...]:
+    """Values that no stored text may hold: the keys that calls to this model could carry."""
+    values = {os.environ.get(name, "") for name in _variables(config)}
+    return tuple(sorted(value for value in values if len(value) >= _SHORTEST_SECRET))
+
+
+def hidden(text: str, secrets: Iterable[str], *, guess: bool = True) -> str:
+    """`text` with every secret replaced; with `guess`, also what looks like a key."""
+    for secret in secrets:
+        text = text.replace(secret, "[key]")
+    return _LOOKS_SECRET.sub("[key]", text) if guess else text
+
+
+def _variables(config: ModelConfig) -> tuple[str, ...]:
+    if config.api_key_env is not None:
+        return (config.api_key_env,)
+    usual = f"{config.provider.upper().replace('-', '_')}_API_KEY"
+    return _KEY_VARIABLES.get(config.provider, (usual,))
