@@ -12,13 +12,29 @@ from phyblock.sim.pictures import (
     goal_key,
     goal_png,
 )
+from phyblock.sim.stability import Stability, Trial, check, check_prefixes, check_removal
+from phyblock.sim.support import Gap, Overlap, find_gaps, find_overlaps, support_graph
+from phyblock.sim.world import Physics, Pose, World
 
 __all__ = [
     "RENDER_VERSION",
+    "Gap",
+    "Overlap",
+    "Physics",
     "PictureStyle",
+    "Pose",
+    "Stability",
+    "Trial",
+    "World",
     "candidates_key",
     "candidates_png",
+    "check",
+    "check_prefixes",
+    "check_removal",
     "composite_png",
+    "find_gaps",
+    "find_overlaps",
     "goal_key",
     "goal_png",
+    "support_graph",
 ]

@@ -1,0 +1,181 @@
+"""What touches what, from geometry alone: overlaps, floating blocks, and who rests on whom."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.domain.blocks import euler_deg_to_quat_xyzw, quat_xyzw_to_matrix
+from phyblock.domain.scene import Block
+from phyblock.sim.convex import Axes, contact_extent, drop_m, moved, separating_axes
+from phyblock.sim.geometry import ConvexPiece, collision_pieces
+
+__all__ = [
+    "CONTACT_TOLERANCE_M",
+    "FIT_TOLERANCE_M",
+    "GROUND",
+    "Gap",
+    "Overlap",
+    "drop_height_m",
+    "find_gaps",
+    "find_overlaps",
+    "support_graph",
+]
+
+GROUND = 0
+"""Stands for the ground where orders of blocks are named, as in the files."""
+FIT_TOLERANCE_M = 0.0005
+"""Overlaps and gaps up to this are not worth a word [m]."""
+CONTACT_TOLERANCE_M = 0.0015
+"""Blocks closer than this touch [m]."""
+_MAX_CONTACT_OVERLAP_M = 0.003
+_MIN_VERTICAL = 0.7
+_MIN_AREA_M2 = 4e-6
+_MIN_LENGTH_M = 0.005
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """Two blocks (by order, the ground is 0) that share space, `depth_m` deep [m]."""
+
+    first: int
+    second: int
+    depth_m: float
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A block (by order) that hangs `height_m` [m] above whatever it would fall on."""
+
+    order: int
+    height_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Solid:
+    """A block at its place in the world, as convex pieces, with its bounding box (2, 3) [m]."""
+
+    order: int
+    pieces: tuple[ConvexPiece, ...]
+    box_m: NDArray[np.float64]
+
+    @property
+    def bottom_m(self) -> float:
+        return float(self.box_m[0, 2])
+
+
+def find_overlaps(
+    blocks: Sequence[Block], tolerance_m: float = FIT_TOLERANCE_M
+) -> tuple[Overlap, ...]:
+    """Pairs of blocks that share space deeper than `tolerance_m` [m]; blocks in the ground too."""
+    solids = [_solid(block) for block in blocks]
+    found = [
+        Overlap(GROUND, solid.order, -solid.bottom_m)
+        for solid in solids
+        if solid.bottom_m < -tolerance_m
+    ]
+    for first, second in _near_pairs(solids, 0.0):
+        depth_m = -min(axes.gap_m for _, _, axes in _piece_pairs(first, second))
+        if depth_m > tolerance_m:
+            found.append(Overlap(first.order, second.order, depth_m))
+    return tuple(found)
+
+
+def find_gaps(blocks: Sequence[Block], tolerance_m: float = FIT_TOLERANCE_M) -> tuple[Gap, ...]:
+    """Blocks that are more than `tolerance_m` [m] above the block or ground below them."""
+    solids = [_solid(block) for block in blocks]
+    heights = [(solid.order, _clearance_m(solid, solids)) for solid in solids]
+    return tuple(Gap(order, height) for order, height in heights if height > tolerance_m)
+
+
+def support_graph(
+    blocks: Sequence[Block], tolerance_m: float = CONTACT_TOLERANCE_M
+) -> dict[int, frozenset[int]]:
+    """For each block's order, the orders of the blocks it rests on; 0 is the ground.
+
+    B rests on A when they are within `tolerance_m` [m], the contact normal is within 45 degrees
+    of vertical and points up from A to B, and the contact is an area, or an edge lying on a face.
+    """
+    solids = [_solid(block) for block in blocks]
+    rests_on: dict[int, set[int]] = {solid.order: set() for solid in solids}
+    for solid in solids:
+        if abs(solid.bottom_m) <= tolerance_m:
+            rests_on[solid.order].add(GROUND)
+    for first, second in _near_pairs(solids, tolerance_m):
+        for one, other, axes in _piece_pairs(first, second):
+            rise = _contact_rise(one, other, axes, tolerance_m)
+            if rise > 0:
+                rests_on[second.order].add(first.order)
+            elif rise < 0:
+                rests_on[first.order].add(second.order)
+    return {order: frozenset(below) for order, below in rests_on.items()}
+
+
+def drop_height_m(block: Block, blocks: Sequence[Block]) -> float:
+    """How far `block` falls straight down before it meets one of `blocks` or the ground [m].
+
+    Zero when it touches or overlaps what is below it already.
+    """
+    return _clearance_m(_solid(block), [_solid(other) for other in blocks])
+
+
+def _solid(block: Block) -> _Solid:
+    rotation = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(block.euler_deg))
+    position = np.array(block.position_m)
+    pieces = tuple(moved(piece, rotation, position) for piece in collision_pieces(block.type))
+    points = np.vstack([piece.vertices_m for piece in pieces])
+    return _Solid(block.order, pieces, np.stack([points.min(axis=0), points.max(axis=0)]))
+
+
+def _near_pairs(solids: Sequence[_Solid], reach_m: float) -> Iterator[tuple[_Solid, _Solid]]:
+    """Pairs whose bounding boxes come within `reach_m` of one another."""
+    for i, first in enumerate(solids):
+        for second in solids[i + 1 :]:
+            if _boxes_near(first.box_m, second.box_m, reach_m):
+                yield first, second
+
+
+def _boxes_near(first: NDArray[np.float64], second: NDArray[np.float64], reach_m: float) -> bool:
+    apart = np.maximum(first[0] - second[1], second[0] - first[1])
+    return bool(apart.max() <= reach_m)
+
+
+def _piece_pairs(first: _Solid, second: _Solid) -> Iterator[tuple[ConvexPiece, ConvexPiece, Axes]]:
+    for one in first.pieces:
+        for other in second.pieces:
+            yield one, other, separating_axes(one, other)
+
+
+def _contact_rise(first: ConvexPiece, second: ConvexPiece, axes: Axes, tolerance_m: float) -> float:
+    """Vertical part of the contact normal from first to second; 0.0 when neither rests."""
+    if not -_MAX_CONTACT_OVERLAP_M <= axes.gap_m <= tolerance_m:
+        return 0.0
+    touching = axes.gaps_m > axes.gap_m - tolerance_m
+    for direction in axes.directions[touching & (np.abs(axes.directions[:, 2]) >= _MIN_VERTICAL)]:
+        area_m2, length_m = contact_extent(first, second, direction)
+        if area_m2 > _MIN_AREA_M2 or length_m > _MIN_LENGTH_M:
+            return float(direction[2])
+    return 0.0
+
+
+def _clearance_m(solid: _Solid, solids: Sequence[_Solid]) -> float:
+    """How far a block would fall [m]; blocks that it overlaps count as touching."""
+    clearance = max(solid.bottom_m, 0.0)
+    for other in solids:
+        reach = solid.box_m.copy()
+        reach[0, 2] -= clearance
+        if other is solid or not _boxes_near(other.box_m, reach, 0.0):
+            continue
+        for _, _, axes in _piece_pairs(other, solid):
+            fall = drop_m(axes)
+            if fall is not None and fall < clearance and _is_above(axes, fall):
+                clearance = max(fall, 0.0)
+    return clearance
+
+
+def _is_above(axes: Axes, fall_m: float) -> bool:
+    """Whether the second piece starts clear of the first, or overlaps it."""
+    return fall_m >= 0 or axes.gap_m < 0
