@@ -32,15 +32,15 @@ class TextTable:
     notes: tuple[str, ...] = ()
 
 
-def number(value: object, digits: int = 1, *, signed: bool = False) -> str:
+def number(value: float, digits: int = 1, *, signed: bool = False) -> str:
     """A number with `digits` decimals, `NO_VALUE` for NaN."""
-    shown = float(str(value))
-    if math.isnan(shown):
+    if math.isnan(value):
         return NO_VALUE
-    rounded = round(shown, digits) + 0.0
+    # Adding 0.0 turns a rounded -0.0 into 0.0.
+    rounded = round(float(value), digits) + 0.0
     return f"{rounded:{'+' if signed and rounded else ''}.{digits}f}"
 
 
-def spread(mean: object, sd: object) -> str:
+def spread(mean: float, sd: float) -> str:
     """`47.1 ± 1.2`; the mean alone where there is no standard deviation."""
-    return number(mean) if math.isnan(float(str(sd))) else f"{number(mean)}{SPREAD}{number(sd)}"
+    return number(mean) if math.isnan(sd) else f"{number(mean)}{SPREAD}{number(sd)}"

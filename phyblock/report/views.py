@@ -52,7 +52,7 @@ def table1_view(table: pd.DataFrame, run: Run) -> TextTable:
     )
 
 
-def _percent(row: Mapping[Hashable, object], cell: str) -> str:
+def _percent(row: Mapping[Hashable, float], cell: str) -> str:
     return spread(row[cell], row[f"{cell}_sd"]) if f"{cell}_sd" in row else number(row[cell])
 
 
@@ -201,7 +201,7 @@ def _cost(known: float, unknown: int, replies: int) -> str:
         return NO_VALUE
     if math.isnan(known):
         return "unknown"
-    dollars = f"${known:,.2f}" if known >= 1 else f"${known:.4f}"
+    dollars = f"${known:,.2f}" if known >= 1 or not known else f"${known:.4f}"
     return dollars + (f" + {unknown} unknown" if unknown else "")
 
 

@@ -1,0 +1,154 @@
+"""Manifests and records for the tests of tables."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from hypothesis import settings
+from hypothesis import strategies as st
+
+from phyblock.report import Run, frames_from, read_design
+from phyblock.scoring import ERROR_TYPES
+
+laws = settings(max_examples=20, deadline=None)
+"""Tables take some 50 ms each, so that fewer examples must do."""
+
+LEVELS = {"000": (1, 2), "001": (2,), "002": (3,), "003": (4,), "004": (1,)}
+OUTCOMES = ("ok", "parse_failure", "refusal", "truncated", "api_error", "missing")
+
+
+def manifest(
+    *,
+    models: Iterable[str | tuple[str, str]] = ("alpha", "beta"),
+    levels: Iterable[int] = (1, 2, 3, 4),
+    seeds: Iterable[int] = (0, 1),
+    settings: Iterable[str] = ("A", "B"),
+    matchers: Iterable[str] = ("optimal", "paper"),
+    level1: str = "selection",
+    missing: str = "skip",
+    **more: Any,
+) -> dict[str, Any]:
+    named = [(model, None) if isinstance(model, str) else model for model in models]
+    return {
+        "suite": {
+            "name": "test",
+            "levels": list(levels),
+            "settings": list(settings),
+            "seeds": list(seeds),
+            "scoring": {"matchers": list(matchers), "level1": level1, "missing": missing},
+        },
+        "models": [{"name": name, "published": published} for name, published in named],
+        "scenes_by_level": {n: sum(n in held for held in LEVELS.values()) for n in levels},
+        "scenes": len(LEVELS),
+        **more,
+    }
+
+
+def score(
+    tp: int,
+    fp: int,
+    fn: int,
+    *,
+    criterion: str = "aov",
+    matcher: str | None = "optimal",
+    setting: str = "A",
+    errors: tuple[int, int, int, int] | None = None,
+) -> dict[str, Any]:
+    counts = errors or (fp, 0, 0, 0)
+    return {
+        "criterion": criterion,
+        "matcher": matcher if criterion == "aov" else None,
+        "setting": setting,
+        "tp": tp,
+        "fp": fp,
+        "fn": fn,
+        "errors": dict(zip(ERROR_TYPES, counts, strict=True)) if criterion == "aov" else None,
+    }
+
+
+def record(
+    model: str = "alpha",
+    scene: str = "000",
+    seed: int = 0,
+    scores: Iterable[Mapping[str, Any]] = (),
+    outcome: str = "ok",
+    **reply: Any,
+) -> dict[str, Any]:
+    answered = outcome not in ("api_error", "missing")
+    usage = {name: reply.pop(name, None) for name in ("prompt_tokens", "completion_tokens")}
+    return {
+        "sample": f"full_planning/{model}/{scene}/s{seed}",
+        "track": "full_planning",
+        "model": model,
+        "scene": scene,
+        "levels": list(LEVELS.get(scene, (2,))),
+        "parents": [scene],
+        "n_blocks": 4,
+        "seed": seed,
+        "outcome": outcome,
+        "reply": {
+            "text": "Move block with index 1",
+            "reasoning": "",
+            "finish": "stop",
+            "usage": {**usage, "reasoning_tokens": None},
+            "cost_usd": None,
+            "latency_s": 0.5,
+            "provider_model": "",
+            "attempts": 1,
+            "cached": False,
+            "seed_sent": True,
+            **reply,
+        }
+        if answered
+        else None,
+        "error": {"kind": "retryable", "status": 429, "message": "busy"}
+        if outcome == "api_error"
+        else None,
+        "prompt": None,
+        "parse": {"parser": "steps", "rule": "last_step_list", "plan": [1], "dropped": [99]},
+        "scores": [dict(one) for one in scores],
+        "time": "2026-11-20T10:00:00Z",
+    }
+
+
+def run_of(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Run:
+    frames = frames_from(records, facts)
+    return Run(Path("run"), dict(facts), read_design(facts), frames.records, frames.scores)
+
+
+def write_run(folder: Path, records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Path:
+    folder.mkdir(exist_ok=True)
+    (folder / "run.yaml").write_text(yaml.safe_dump(dict(facts)), encoding="utf-8")
+    lines = (json.dumps(one, ensure_ascii=False) + "\n" for one in records)
+    (folder / "records.jsonl").write_text("".join(lines), encoding="utf-8")
+    return folder
+
+
+@st.composite
+def record_lists(draw: st.DrawFn) -> list[dict[str, Any]]:
+    """Records of some samples of `manifest()`, with every score that a run stores."""
+    small = st.integers(0, 5)
+    records = []
+    for model in ("alpha", "beta"):
+        for scene, levels in LEVELS.items():
+            for seed in (0, 1):
+                if not draw(st.integers(0, 4)):
+                    continue
+                scores = []
+                for setting in "AB":
+                    for matcher in ("optimal", "paper"):
+                        errors = draw(st.tuples(small, small, small, small))
+                        counts = (draw(small), sum(errors), draw(small))
+                        scores.append(
+                            score(*counts, matcher=matcher, setting=setting, errors=errors)
+                        )
+                    if 1 in levels:
+                        counts = (draw(small), draw(small), draw(small))
+                        scores.append(score(*counts, criterion="selection", setting=setting))
+                outcome = draw(st.sampled_from(OUTCOMES))
+                records.append(record(model, scene, seed, scores, outcome))
+    return records

@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+from hypothesis import given
+
+from phyblock.report import coverage_frame
+from phyblock.report.text_table import NO_VALUE
+from phyblock.report.views import coverage_view
+from tests.report.factory import OUTCOMES, laws, manifest, record, record_lists, run_of
+
+
+@laws
+@given(record_lists())
+def test_outcomes_split_what_was_expected(records: list[dict[str, Any]]) -> None:
+    table = coverage_frame(run_of(records, manifest()))
+    assert table["model"].tolist() == ["alpha", "beta"]
+    assert (table["recorded"] + table["not_run"] == table["expected"]).all()
+    assert (table[list(OUTCOMES)].sum(axis=1) == table["recorded"]).all()
+    assert (table["replies"] == table["recorded"] - table["api_error"] - table["missing"]).all()
+
+
+def test_sums_are_of_what_is_known_and_say_how_much_is_not() -> None:
+    records = [
+        record(scene="000", prompt_tokens=10, completion_tokens=5, cost_usd=0.5, latency_s=1.0),
+        record(scene="001", prompt_tokens=20, completion_tokens=7, cost_usd=0.25, latency_s=2.0),
+        record(scene="002", cached=True, latency_s=9.0, attempts=0),
+        record(scene="003", outcome="api_error"),
+        record("beta", scene="000", prompt_tokens=0, completion_tokens=0, cost_usd=0.0, attempts=3),
+    ]
+    table = coverage_frame(run_of(records, manifest())).set_index("model")
+    alpha = table.loc["alpha"]
+    assert (alpha["prompt_tokens"], alpha["completion_tokens"]) == (30, 12)
+    assert (alpha["tokens_unknown"], alpha["cost_unknown"]) == (1, 1)
+    assert alpha["cost_usd"] == 0.75
+    assert alpha["latency_s"] == 1.5
+    assert (alpha["cached"], alpha["attempts"], alpha["replies"]) == (1, 2, 3)
+    assert alpha["reasoning_tokens"] is pd.NA
+    beta = table.loc["beta"]
+    assert (beta["cost_usd"], beta["prompt_tokens"], beta["attempts"]) == (0, 0, 3)
+
+
+def test_an_unknown_cost_is_never_shown_as_zero() -> None:
+    facts = manifest(models=["partly", "unknown", "free", "dear", "unasked"])
+    records = [
+        record("partly", scene="000", cost_usd=0.0123),
+        record("partly", scene="001"),
+        record("unknown"),
+        record("free", cost_usd=0.0),
+        record("dear", cost_usd=1234.5),
+    ]
+    run = run_of(records, facts)
+    view = coverage_view(coverage_frame(run), run)
+    place = [column.name for column in view.columns].index("Cost")
+    assert {row[0]: row[place] for row in view.rows} == {
+        "partly": "$0.0123 + 1 unknown",
+        "unknown": "unknown",
+        "free": "$0.00",
+        "dear": "$1,234.50",
+        "unasked": NO_VALUE,
+    }
