@@ -106,9 +106,9 @@ def resolve_models(
 
 
 def _merge(syntax: list[Problem], secrets: list[Problem], problems: list[Problem]) -> list[Problem]:
-    """All problems; of a field that holds a secret only that is said."""
-    hidden = {problem.field for problem in secrets}
-    return [*syntax, *secrets, *(p for p in problems if p.field not in hidden)]
+    """All problems, but one of a value that YAML could not read or that is a secret."""
+    hidden = {problem.where for problem in (*syntax, *secrets) if problem.where[:2] != "--"}
+    return [*syntax, *secrets, *(p for p in problems if p.where not in hidden)]
 
 
 def _broken_rules(source: YamlSource, problems: list[Problem]) -> list[Problem]:

@@ -74,8 +74,8 @@ def check(
         return model.model_validate(data), []
     except ValidationError as error:
         details = error.errors(include_url=False)
-    faults = (_locate(detail, data, model, base) for detail in details)
-    return None, [_word(f, source) for f in faults if not f.context.get("rules")]
+    faults = [_locate(detail, data, model, base) for detail in details]
+    return None, [_word(fault, source) for fault in faults if not _is_echo(fault)]
 
 
 def find_secrets(data: object, source: YamlSource, base: FieldPath = ()) -> Iterator[Problem]:
@@ -114,6 +114,17 @@ def _locate(detail: ErrorDetails, data: object, root: type[BaseModel], base: Fie
             continue
         path.append(part)
     return _Fault(detail, (*base, *path), here, root, base)
+
+
+def _is_echo(fault: _Fault) -> bool:
+    """Whether the error says nothing new.
+
+    Rules across fields are judged by the caller; a list is called too short for items that are
+    faulty and have errors of their own.
+    """
+    least = fault.context.get("min_length", 0)
+    long_enough = isinstance(fault.found, list) and len(fault.found) >= least
+    return bool(fault.context.get("rules")) or (fault.detail["type"] == "too_short" and long_enough)
 
 
 def _word(fault: _Fault, source: YamlSource) -> Problem:

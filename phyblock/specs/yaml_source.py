@@ -175,7 +175,7 @@ class _Reader:
             if not isinstance(key_node, yaml.ScalarNode):
                 self._note(key_node, path, "has a key that is not plain text")
                 continue
-            key = str(key_node.value)
+            key = self._text(key_node, path)
             here = (*path, key)
             if key in own:
                 first = self._source.keys[here]
@@ -198,7 +198,7 @@ class _Reader:
                     self._note(part, path, "merges (<<) something that is not a mapping")
 
     def _scalar(self, node: yaml.ScalarNode, kind: str, path: FieldPath) -> Any:
-        text = str(node.value)
+        text = self._text(node, path)
         try:
             if kind == "int":
                 digits = text.lower()
@@ -215,6 +215,14 @@ class _Reader:
             return None if kind == "null" else text
         self._note(node, path, "has a tag that is not allowed", node.tag)
         return None
+
+    def _text(self, node: yaml.ScalarNode, path: FieldPath) -> str:
+        """The node's text with surrogate pairs (JSON's escapes) joined, which PyYAML leaves."""
+        try:
+            return str(node.value).encode("utf-16", "surrogatepass").decode("utf-16")
+        except UnicodeDecodeError:
+            self._note(node, path, "holds half of a character (a lone surrogate)")
+            return ""
 
     def syntax_problem(self, error: yaml.MarkedYAMLError) -> Problem:
         """What the parser said, at the place it said it of."""
