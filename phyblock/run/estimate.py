@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-from phyblock.models import ReplyCache, estimate_call, price_of, reply_key
+from phyblock.models import Price, ReplyCache, Request, Usage, cost_usd, price_of, reply_key
+from phyblock.models import estimate as estimate_call
 from phyblock.resources import reply_cache_file
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan, sample_id
@@ -17,7 +17,7 @@ from phyblock.run.store import MANIFEST, read_records
 __all__ = ["Estimate", "estimate"]
 
 
-@dataclass(frozen=True)
+@dataclass
 class Estimate:
     """What one model would take; `cost_usd` is None where the price is not known.
 
@@ -28,60 +28,56 @@ class Estimate:
     model: str
     kind: str
     samples: int
-    done: int
-    cached: int
-    calls: int
-    prompt_tokens: int
-    completion_tokens: int
-    cost_usd: float | None
+    price: Price | None
+    done: int = 0
+    cached: int = 0
+    calls: int = 0
+    prompt_tokens: int = 0
+    completion_tokens: int = 0
+
+    @property
+    def cost_usd(self) -> float | None:
+        """Dollars of the calls, at the price of today."""
+        return cost_usd(self.price, Usage(self.prompt_tokens, self.completion_tokens))
 
 
 def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
     """Estimates in the order of the plan's models."""
     earlier = read_records(folder) if (folder / MANIFEST).exists() else {}
+    settled = {sample for sample, record in earlier.items() if is_final(record)}
     path = reply_cache_file()
-    if not use_cache or not path.exists():
-        return [_estimate(plan, model, earlier, None) for model in plan.models]
-    with ReplyCache(path) as cache:
-        return [_estimate(plan, model, earlier, cache) for model in plan.models]
+    with ReplyCache(path) if use_cache and path.exists() else nullcontext() as cache:
+        rows = [
+            Estimate(m.name, m.config.kind, plan.samples_per_model, price_of(m.config))
+            for m in plan.models
+        ]
+        for task in plan.dataset.tasks:
+            outline, real = plan.track.outline(task)
+            for model, row in zip(plan.models, rows, strict=True):
+                _add(row, plan, model, outline, settled, cache if real else None)
+    return rows
 
 
-def _estimate(
+def _add(
+    row: Estimate,
     plan: RunPlan,
     model: PlannedModel,
-    earlier: Mapping[str, Mapping[str, Any]],
+    outline: Request,
+    settled: set[str],
     cache: ReplyCache | None,
-) -> Estimate:
+) -> None:
+    """Count one scene of one model, all its seeds."""
     config = model.config
-    done = cached = calls = prompt = completion = 0
+    request = replace(outline, params=config.params)
+    expected = estimate_call(config, request) if config.kind == "litellm" else None
     for seed in plan.suite.seeds:
-        for task in plan.dataset.tasks:
-            record = earlier.get(sample_id(plan.track.name, model.name, task.scene.id, seed))
-            if record is not None and is_final(record):
-                done += 1
-            elif config.kind == "litellm":
-                request, real = plan.track.outline(task, seed, config.params)
-                if cache is not None and real and reply_key(config, request) in cache:
-                    cached += 1
-                    continue
-                calls += 1
-                expected = estimate_call(config, request)
-                prompt += expected.prompt_tokens
-                completion += expected.completion_tokens
-    price = price_of(config)
-    cost = (
-        None
-        if price is None
-        else (prompt * price.input_usd + completion * price.output_usd) / 1_000_000
-    )
-    return Estimate(
-        model.name,
-        config.kind,
-        plan.samples_per_model,
-        done,
-        cached,
-        calls,
-        prompt,
-        completion,
-        cost,
-    )
+        if sample_id(plan.track.name, model.name, request.key, seed) in settled:
+            row.done += 1
+        elif expected is None:
+            continue
+        elif cache is not None and reply_key(config, replace(request, seed=seed)) in cache:
+            row.cached += 1
+        else:
+            row.calls += 1
+            row.prompt_tokens += expected.prompt_tokens
+            row.completion_tokens += expected.completion_tokens

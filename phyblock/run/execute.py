@@ -99,7 +99,7 @@ class Executor:
         seed: int,
     ) -> bool:
         record = earlier.get(sample_id(self._plan.track.name, planned.name, task.scene.id, seed))
-        return record is not None and is_final(dict(record))
+        return record is not None and is_final(record)
 
     async def _work(self, planned: PlannedModel, queue: deque[tuple[AssemblyTask, int]]) -> None:
         while queue and self.result.reason is None and planned.name not in self.result.stopped:

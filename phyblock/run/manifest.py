@@ -34,7 +34,7 @@ def make_manifest(
 
     `prompt` and `pictures` are None when every model is a recording.
     """
-    inputs = {
+    inputs: dict[str, Any] = {
         "format": _FORMAT,
         "suite": suite.identity(),
         "models": [

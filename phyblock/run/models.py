@@ -64,7 +64,7 @@ def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfi
     if spec.replay is not None:
         return _replay(name, Path(spec.replay))
     assert spec.id is not None
-    price = spec.price and Price(spec.price.input, spec.price.output)
+    price = None if spec.price is None else Price(spec.price.input, spec.price.output)
     params = spec.params(suite.sampling)
     if spec.extra_body:
         params["extra_body"] = spec.extra_body

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import datetime, timezone
 from typing import Any
@@ -62,7 +63,7 @@ def judged(record: dict[str, Any], judgement: Judgement, parser: str) -> dict[st
     }
 
 
-def is_final(record: dict[str, Any]) -> bool:
+def is_final(record: Mapping[str, Any]) -> bool:
     """Whether asking again would be wrong: answered, or an error that asking cannot mend."""
     error = record["error"]
     return error is None or error["kind"] in ("sample", "refused")

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 from phyblock.errors import Problem, SpecError
 from phyblock.models import (
     Budget,
+    Gate,
     Model,
     ModelEvent,
-    OverallLimit,
     ReplyCache,
+    RetryPolicy,
     api_key_status,
     build_model,
 )
@@ -49,6 +52,7 @@ class Session:
         self._cache: ReplyCache | None = None
         self._store: RunStore | None = None
         self._models: dict[str, Model] = {}
+        self._earlier: dict[str, dict[str, Any]] = {}
         self.executor: Executor
 
     async def __aenter__(self) -> Session:
@@ -58,8 +62,11 @@ class Session:
             if self._use_cache:
                 self._cache = ReplyCache(reply_cache_file())
             limits = plan.suite.limits
-            overall = OverallLimit(limits.max_concurrency)
-            budget = Budget(limits.max_cost_usd)
+            self._earlier = read_records(self._folder)
+            overall = Gate(limits.max_concurrency)
+            budget = None
+            if limits.max_cost_usd is not None:
+                budget = Budget(limits.max_cost_usd, _spent_usd(self._earlier))
             for model in plan.models:
                 self._models[model.name] = build_model(
                     model.config,
@@ -67,7 +74,7 @@ class Session:
                     overall=overall,
                     budget=budget,
                     observer=self._notice,
-                    max_attempts=limits.max_attempts,
+                    policy=RetryPolicy(attempts=limits.max_attempts),
                 )
             self.executor = Executor(plan, self._store, self._models, self._watch)
         except BaseException:
@@ -85,7 +92,7 @@ class Session:
 
     async def run(self) -> RunResult:
         """Ask what is left to ask; see `Executor.run`."""
-        earlier = read_records(self._folder)
+        earlier = self._earlier
         self._watch(
             RunStarted(
                 {model.name: self._plan.samples_per_model for model in self._plan.models},
@@ -108,3 +115,9 @@ class Session:
         for resource in (self._cache, self._store):
             if resource is not None:
                 resource.close()
+
+
+def _spent_usd(records: Mapping[str, Mapping[str, Any]]) -> float:
+    """What the run's replies cost so far; a reply from the cache was paid for elsewhere."""
+    replies = [record["reply"] for record in records.values() if record["reply"]]
+    return sum(reply["cost_usd"] or 0.0 for reply in replies if not reply["cached"])

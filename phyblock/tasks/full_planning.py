@@ -58,14 +58,14 @@ class FullPlanning:
             return Request(task.scene.id, seed, (), params, "", task.scene, task.candidates)
         return self._request(task, seed, params, self._prompt, await self._pictures.of(task))
 
-    def outline(
-        self, task: AssemblyTask, seed: int, params: Mapping[str, object]
-    ) -> tuple[Request, bool]:
-        """The request without rendering anything, and whether its pictures are the real ones."""
+    def outline(self, task: AssemblyTask) -> tuple[Request, bool]:
+        """A request with seed 0 and no parameters, made without rendering anything, and whether
+        its pictures are the real ones.
+        """
         if self._prompt is None or self._pictures is None:
-            return Request(task.scene.id, seed, (), params, "", task.scene, task.candidates), True
+            return Request(task.scene.id, 0, (), {}, "", task.scene, task.candidates), True
         pictures, real = self._pictures.outline(task)
-        return self._request(task, seed, params, self._prompt, pictures), real
+        return self._request(task, 0, {}, self._prompt, pictures), real
 
     def _request(
         self,
