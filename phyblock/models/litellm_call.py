@@ -9,11 +9,12 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import re
 import time
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from phyblock.errors import ModelError, UnavailableError
+from phyblock.errors import ModelError, RefusedError, UnavailableError
 from phyblock.models.base import Reply
 from phyblock.models.completions import read_completion
 from phyblock.models.config import ModelConfig
@@ -35,6 +36,7 @@ _DEFAULTS = {
     "LITELLM_LOCAL_MODEL_COST_MAP": "True",  # else the import fetches the price map
     "LITELLM_MODE": "PRODUCTION",  # else the import reads keys from any .env file above
 }
+_MALFORMED = re.compile("Unable to get json response|Error converting to valid response")
 _open: set[LitellmTransport] = set()
 
 
@@ -93,18 +95,38 @@ class LitellmTransport:
         return UnavailableError(hidden(message, self._secrets))
 
     def _failure(self, call: Call, error: Exception) -> ModelError | SeedRefusedError:
-        status = getattr(error, "status_code", None)
-        message = str(error)
+        status, message = _status(error), _message(error)
         if call.seed is not None and refuses_seed(status, message):
             return SeedRefusedError(sent=True)
+        text = hidden(message, self._secrets)
+        if isinstance(error, _litellm().ContentPolicyViolationError):
+            return RefusedError(text, status=status)
         headers = getattr(error, "litellm_response_headers", None)
-        return classify(
-            status, hidden(message, self._secrets), retry_after_s=retry_after_s(headers)
-        )
+        return classify(status, text, retry_after_s=retry_after_s(headers))
+
+
+def _status(error: Exception) -> int | None:
+    """The server's status; None where litellm made one up for a connection that failed.
+
+    A body that litellm could not read comes with whatever status; the server had said 200.
+    """
+    if _MALFORMED.search(str(error)):
+        return 200
+    status: int | None = getattr(error, "status_code", None)
+    heard = getattr(error, "litellm_response_headers", None) is not None
+    return status if heard or (status is not None and status != 408 and status < 500) else None
+
+
+def _message(error: Exception) -> str:
+    """What went wrong, with the code of the error body, and without litellm's own traceback."""
+    body = getattr(error, "body", None)
+    code = body.get("code") if isinstance(body, dict) else None
+    text = str(error).partition("Traceback (most recent call last)")[0]
+    return f"{text} {code}" if code else text
 
 
 def _litellm() -> types.ModuleType:
-    """litellm, imported with its network access, key files, chatter and bookkeeping off."""
+    """litellm, imported with its network access, key files, chatter and second requests off."""
     for name, value in _DEFAULTS.items():
         os.environ.setdefault(name, value)
     import litellm
@@ -115,8 +137,24 @@ def _litellm() -> types.ModuleType:
         litellm.drop_params = False
         for name in ("LiteLLM", "LiteLLM Router", "LiteLLM Proxy"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
+        _send_once()
     module: types.ModuleType = litellm
     return module
+
+
+def _send_once() -> None:
+    """Take from litellm's HTTP client its habit of sending again what died with its connection.
+
+    It has no setting for it (BerriAI/litellm pull request 34830 removes it), and a request that
+    the server may have answered and billed would be sent twice unseen.
+    """
+    import httpx
+    from litellm.llms.custom_httpx.http_handler import AsyncHTTPHandler
+
+    async def refuse(_: object, url: str, **__: object) -> None:
+        raise httpx.ReadError("the connection was lost", request=httpx.Request("POST", url))
+
+    AsyncHTTPHandler.single_connection_post_request = refuse
 
 
 def _plain(response: Any) -> Mapping[str, object]:

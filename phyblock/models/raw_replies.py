@@ -152,12 +152,12 @@ def _conversation(raw: object) -> RawReply | None:
 
 def _single_field(raw: object) -> RawReply | None:
     """A dump with the reply under one name; `predict` stands beside a dataset's own `output`."""
-    for field in ("predict", "prediction", "text", "response", "answer", "outputs", "output"):
-        value = _get(raw, field)
+    for name in ("predict", "prediction", "text", "response", "answer", "outputs", "output"):
+        value = _get(raw, name)
         if isinstance(value, list) and len(value) == 1:
             value = value[0]
         if isinstance(value, str):
-            return RawReply(field, value)
+            return RawReply(name, value)
     inner = _get(raw, "response", "body")
     if isinstance(inner, Mapping):
         return next((reply for reader in _READERS if (reply := reader(inner))), None)

@@ -60,6 +60,9 @@ async def with_retries(
         if isinstance(error, RetryableError) and state.next_action is not None:
             on_retry(error, state.next_action.sleep)
 
+    async def once() -> T:
+        return await send()
+
     retrying = tenacity.AsyncRetrying(
         stop=tenacity.stop_after_attempt(policy.attempts),
         wait=policy.wait(),
@@ -68,4 +71,4 @@ async def with_retries(
         before_sleep=before_sleep,
         reraise=True,
     )
-    return await retrying(send)
+    return await retrying(once)

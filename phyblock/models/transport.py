@@ -29,7 +29,7 @@ _POLICY = re.compile(
 )
 _NEVER = re.compile(
     r"insufficient_quota|billing_hard_limit_reached|model_not_found|invalid_api_key"
-    r"|API_KEY_INVALID|API key not valid|LLM Provider NOT provided",
+    r"|credit balance is too low|API_KEY_INVALID|API key not valid|LLM Provider NOT provided",
     re.IGNORECASE,
 )
 _LONGEST_MESSAGE = 500
@@ -66,10 +66,13 @@ class Transport(Protocol):
 
 
 def classify(status: int | None, message: str, *, retry_after_s: float | None = None) -> ModelError:
-    """The error of an answer that is not a reply; None as status is a connection that failed."""
+    """The error of an answer that is not a reply.
+
+    None as status is a connection that failed, 200 a body that could not be read.
+    """
     text = " ".join(message.split())[:_LONGEST_MESSAGE]
     text = text if status is None else f"HTTP {status}: {text}"
-    if status is None or status >= 500:
+    if status is None or status == 200 or status >= 500:
         return RetryableError(text, status=status, retry_after_s=retry_after_s)
     if _POLICY.search(message):
         return RefusedError(text, status=status)

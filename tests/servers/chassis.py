@@ -1,0 +1,283 @@
+"""What the local servers share: counting, faults, running in a thread or as a process.
+
+A server derives a sample's id from the content of its messages and its seed, and draws faults from
+that id and the number of times the sample was asked, so that a run meets the same faults whatever
+the order of its requests.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import hashlib
+import json
+import socket
+import struct
+import threading
+from abc import ABC, abstractmethod
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Any
+
+from aiohttp import web
+
+FAULTS = ("429", "500", "reset", "cut", "html", "empty")
+
+
+@dataclass(frozen=True)
+class Faults:
+    """Shares of requests that fail in each way, and how an answer comes otherwise.
+
+    `malformed` is spread over cut JSON, an HTML page with status 200, and a reply without choices.
+    `mode` makes every request end in one way: a name of FAULTS, or "401", "403", "404", "quota",
+    "400", "policy", "seed" (400 for a request with a seed), "echo-key", "length", "filtered",
+    "blank", "slow" (never answers).
+    """
+
+    rate_limited: float = 0.0
+    server_error: float = 0.0
+    reset: float = 0.0
+    malformed: float = 0.0
+    latency_s: float = 0.0
+    retry_after: str = "1"
+    mode: str = "ok"
+
+    def draw(self, sample: str, nth: int) -> str:
+        """The way in which the nth request of a sample ends."""
+        if self.mode != "ok":
+            return self.mode
+        number = int(hashlib.sha256(f"{sample}|{nth}".encode()).hexdigest(), 16)
+        share, kind = (number % 10**6) / 10**6, (number >> 64) % 3
+        for name, size in (
+            ("429", self.rate_limited),
+            ("500", self.server_error),
+            ("reset", self.reset),
+            (("cut", "html", "empty")[kind], self.malformed),
+        ):
+            if share < size:
+                return name
+            share -= size
+        return "ok"
+
+
+ISSUE_MIX = Faults(rate_limited=0.10, server_error=0.05, reset=0.02, malformed=0.01)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A request as it arrived: parts are texts and (MIME type, SHA-256 of the bytes) in order."""
+
+    model: str
+    system: str
+    parts: tuple[str | tuple[str, str], ...]
+    params: dict[str, Any]
+    seed: int | None
+    key: str
+    raw: dict[str, Any] = field(repr=False, default_factory=dict)
+
+    @property
+    def sample(self) -> str:
+        content = json.dumps([self.system, self.parts, self.seed])
+        return hashlib.sha256(content.encode()).hexdigest()[:16]
+
+    @property
+    def reply_text(self) -> str:
+        """Four steps that depend on the messages alone."""
+        digest = hashlib.sha256(json.dumps([self.system, self.parts]).encode()).digest()
+        return "\n".join(
+            f"Step{i}: Move block with index {byte % 16 + 1}"
+            for i, byte in enumerate(digest[:4], 1)
+        )
+
+
+class LocalServer(ABC):
+    """One provider's protocol; `ended` counts requests by how they ended."""
+
+    def __init__(self, faults: Faults | None = None, *, keep: bool = True) -> None:
+        self.faults = faults or Faults()
+        self.keep = keep
+        self.seen: list[Seen] = []
+        self.ended: Counter[str] = Counter()
+        self.by_sample: Counter[str] = Counter()
+        self.answered_by_sample: Counter[str] = Counter()
+        self.at_once = 0
+        self.most_at_once = 0
+
+    @abstractmethod
+    def read(self, body: dict[str, Any], request: web.Request) -> Seen:
+        """The request in common terms."""
+
+    @abstractmethod
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        """A reply; `ending` is "ok", "length", "filtered", "blank" or "empty" (no choices)."""
+
+    @abstractmethod
+    def error(self, status: int, ending: str, message: str) -> dict[str, Any]:
+        """An error body."""
+
+    @abstractmethod
+    def add_routes(self, app: web.Application) -> None:
+        """Register the protocol's routes with `self.handle`."""
+
+    @property
+    def requests(self) -> int:
+        return sum(self.ended.values())
+
+    def stats(self) -> dict[str, Any]:
+        return {
+            "requests": self.requests,
+            "ended": dict(self.ended),
+            "by_sample": dict(self.by_sample),
+            "answered_by_sample": dict(self.answered_by_sample),
+            "most_at_once": self.most_at_once,
+        }
+
+    def app(self) -> web.Application:
+        app = web.Application(client_max_size=64 * 2**20)
+        self.add_routes(app)
+        app.router.add_get("/stats", self._stats)
+        return app
+
+    async def _stats(self, _: web.Request) -> web.Response:
+        return web.json_response(self.stats())
+
+    async def handle(self, request: web.Request) -> web.StreamResponse:
+        self.at_once += 1
+        self.most_at_once = max(self.most_at_once, self.at_once)
+        try:
+            seen = self.read(await request.json(), request)
+            sample = seen.sample
+            if self.keep:
+                self.seen.append(seen)
+            self.by_sample[sample] += 1
+            ending = self.faults.draw(sample, self.by_sample[sample])
+            if ending == "seed" and seen.seed is None:
+                ending = "ok"
+            self.ended[ending] += 1
+            if self.faults.latency_s:
+                await asyncio.sleep(self.faults.latency_s)
+            response = await self._end(seen, ending, request)
+            if ending == "ok":
+                self.answered_by_sample[sample] += 1
+            return response
+        finally:
+            self.at_once -= 1
+
+    async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
+        if ending == "reset":
+            return _reset(request)
+        if ending == "slow":
+            await asyncio.sleep(3600)
+        if ending == "html":
+            return web.Response(
+                text="<html><body>Bad gateway</body></html>", content_type="text/html"
+            )
+        if ending == "cut":
+            whole = json.dumps(self.reply(seen, "ok"))
+            return web.Response(text=whole[: len(whole) // 2], content_type="application/json")
+        if ending in ("ok", "empty", "length", "filtered", "blank"):
+            return web.json_response(self.reply(seen, ending))
+        return self._refuse(seen, ending)
+
+    def _refuse(self, seen: Seen, ending: str) -> web.Response:
+        status, message = {
+            "429": (429, "Rate limit reached"),
+            "500": (500, "The server had an error"),
+            "401": (401, "Incorrect API key provided"),
+            "echo-key": (401, f"Incorrect API key provided: {seen.key}"),
+            "403": (403, "Not allowed for your project"),
+            "404": (404, f"The model {seen.model} does not exist"),
+            "400": (400, "Invalid value for messages"),
+            "quota": (429, "You exceeded your current quota, please check your plan"),
+            "policy": (400, "Your request was rejected as a result of our safety system"),
+            "seed": (400, "Unrecognized request argument supplied: seed"),
+        }[ending]
+        headers = {"Retry-After": self.faults.retry_after} if ending == "429" else {}
+        return web.json_response(
+            self.error(status, ending, message), status=status, headers=headers
+        )
+
+
+def _reset(request: web.Request) -> web.Response:
+    """Send a TCP reset in the place of an answer."""
+    transport = request.transport
+    assert transport is not None
+    lingering = struct.pack("ii", 1, 0)
+    transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, lingering)
+    transport.abort()
+    return web.Response()
+
+
+class Running:
+    """A server on a free port, in a thread with a loop of its own; a context manager."""
+
+    def __init__(self, server: LocalServer) -> None:
+        self.server = server
+        self.port = 0
+        self._ready = threading.Event()
+        self._stop: asyncio.Event | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()))
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    def __enter__(self) -> Running:
+        self._thread.start()
+        assert self._ready.wait(10), "the server did not start"
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        assert self._loop is not None
+        assert self._stop is not None
+        self._loop.call_soon_threadsafe(self._stop.set)
+        self._thread.join(10)
+        assert not self._thread.is_alive(), "the server did not stop"
+
+    async def _serve(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._stop = asyncio.Event()
+        runner, self.port = await start(self.server, 0)
+        self._ready.set()
+        await self._stop.wait()
+        await runner.cleanup()
+
+
+async def start(server: LocalServer, port: int) -> tuple[web.AppRunner, int]:
+    runner = web.AppRunner(server.app(), access_log=None, shutdown_timeout=0.5)
+    await runner.setup()
+    site = web.TCPSite(runner, "127.0.0.1", port, backlog=1024)
+    await site.start()
+    bound: int = runner.addresses[0][1]
+    return runner, bound
+
+
+def main(kind: type[LocalServer]) -> None:
+    """Serve until killed; the first line printed is the port."""
+    parser = argparse.ArgumentParser(description=kind.__doc__)
+    parser.add_argument("--port", type=int, default=0)
+    parser.add_argument("--latency", type=float, default=0.0, metavar="SECONDS")
+    parser.add_argument("--rate-limited", type=float, default=0.0, metavar="SHARE")
+    parser.add_argument("--server-error", type=float, default=0.0, metavar="SHARE")
+    parser.add_argument("--reset", type=float, default=0.0, metavar="SHARE")
+    parser.add_argument("--malformed", type=float, default=0.0, metavar="SHARE")
+    parser.add_argument("--retry-after", default="1")
+    parser.add_argument("--mode", default="ok")
+    given = parser.parse_args()
+    faults = Faults(
+        given.rate_limited,
+        given.server_error,
+        given.reset,
+        given.malformed,
+        given.latency,
+        given.retry_after,
+        given.mode,
+    )
+
+    async def serve() -> None:
+        _, port = await start(kind(faults, keep=False), given.port)
+        print(port, flush=True)
+        await asyncio.Event().wait()
+
+    asyncio.run(serve())

@@ -1,0 +1,67 @@
+"""A server that speaks the Gemini generateContent protocol."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from typing import Any
+
+from aiohttp import web
+
+from tests.servers.chassis import LocalServer, Seen, main
+
+
+class GeminiGenerate(LocalServer):
+    """POST /v1beta/models/<model>:generateContent."""
+
+    def add_routes(self, app: web.Application) -> None:
+        app.router.add_post("/{tail:.*}", self.handle)
+
+    def read(self, body: dict[str, Any], request: web.Request) -> Seen:
+        instruction = body.get("system_instruction") or body.get("systemInstruction") or {}
+        system = "".join(part["text"] for part in instruction.get("parts", []))
+        parts = tuple(_part(part) for content in body["contents"] for part in content["parts"])
+        params = dict(body.get("generationConfig", {}))
+        seed = params.pop("seed", None)
+        model = request.path.rpartition("/")[2].partition(":")[0]
+        key = request.headers.get("x-goog-api-key") or request.query.get("key", "")
+        return Seen(model, system, parts, params, seed, key, body)
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        finish = {"length": "MAX_TOKENS", "filtered": "SAFETY"}.get(ending, "STOP")
+        text = "" if ending in ("length", "filtered", "blank") else seen.reply_text
+        parts = [{"text": "Let me see.", "thought": True}, {"text": text}]
+        candidate = {
+            "content": {"role": "model", "parts": parts},
+            "finishReason": finish,
+            "index": 0,
+        }
+        body = {
+            "candidates": [candidate],
+            "usageMetadata": {
+                "promptTokenCount": 1000,
+                "candidatesTokenCount": 30,
+                "thoughtsTokenCount": 10,
+                "totalTokenCount": 1040,
+            },
+            "modelVersion": seen.model,
+        }
+        return {} if ending == "empty" else body
+
+    def error(self, status: int, ending: str, message: str) -> dict[str, Any]:  # noqa: ARG002
+        names = {429: "RESOURCE_EXHAUSTED", 500: "INTERNAL", 401: "UNAUTHENTICATED"}
+        name = names.get(status, "INVALID_ARGUMENT")
+        return {"error": {"code": status, "message": message, "status": name}}
+
+
+def _part(part: dict[str, Any]) -> str | tuple[str, str]:
+    if "text" in part:
+        text: str = part["text"]
+        return text
+    data = part.get("inline_data") or part["inlineData"]
+    mime = data.get("mime_type") or data["mimeType"]
+    return mime, hashlib.sha256(base64.b64decode(data["data"])).hexdigest()
+
+
+if __name__ == "__main__":
+    main(GeminiGenerate)

@@ -1,0 +1,63 @@
+"""A server that speaks the OpenAI chat protocol: `python -m tests.servers.openai_chat --port 0`."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from typing import Any
+
+from aiohttp import web
+
+from tests.servers.chassis import LocalServer, Seen, main
+
+_CODES = {"policy": "content_policy_violation", "quota": "insufficient_quota"}
+
+
+class OpenAIChat(LocalServer):
+    """POST /v1/chat/completions."""
+
+    def add_routes(self, app: web.Application) -> None:
+        app.router.add_post("/v1/chat/completions", self.handle)
+
+    def read(self, body: dict[str, Any], request: web.Request) -> Seen:
+        system, parts = "", []
+        for message in body["messages"]:
+            content = message["content"]
+            if message["role"] == "system":
+                system += content if isinstance(content, str) else content[0]["text"]
+            else:
+                parts += [content] if isinstance(content, str) else map(_part, content)
+        params = {k: v for k, v in body.items() if k not in ("model", "messages", "seed")}
+        key = request.headers.get("Authorization", "").removeprefix("Bearer ")
+        return Seen(body["model"], system, tuple(parts), params, body.get("seed"), key, body)
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        finish = {"length": "length", "filtered": "content_filter"}.get(ending, "stop")
+        text = "" if ending in ("length", "filtered", "blank") else seen.reply_text
+        message = {"role": "assistant", "content": text, "reasoning_content": "Let me see."}
+        choice = {"index": 0, "message": message, "finish_reason": finish}
+        return {
+            "id": f"chatcmpl-{seen.sample}",
+            "object": "chat.completion",
+            "created": 1_700_000_000,
+            "model": f"{seen.model}-served",
+            "choices": [] if ending == "empty" else [choice],
+            "usage": {"prompt_tokens": 1000, "completion_tokens": 40, "total_tokens": 1040},
+        }
+
+    def error(self, status: int, ending: str, message: str) -> dict[str, Any]:
+        code = _CODES.get(ending)
+        kind = "invalid_request_error" if status == 400 else "api_error"
+        return {"error": {"message": message, "type": kind, "param": None, "code": code}}
+
+
+def _part(part: dict[str, Any]) -> str | tuple[str, str]:
+    if part["type"] == "text":
+        text: str = part["text"]
+        return text
+    head, _, data = part["image_url"]["url"].partition(";base64,")
+    return head.removeprefix("data:"), hashlib.sha256(base64.b64decode(data)).hexdigest()
+
+
+if __name__ == "__main__":
+    main(OpenAIChat)
