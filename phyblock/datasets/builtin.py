@@ -7,70 +7,61 @@ required), numbered from 1 in the order given. docs/data-format.md holds the sch
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from phyblock.datasets.base import AssemblyTask, Dataset
-from phyblock.datasets.checks import RawReader, check_solvable
+from phyblock.datasets.checks import SceneReader
+from phyblock.datasets.raw import parse_json, read_text
 from phyblock.domain import Scene
 from phyblock.errors import DataError, Problem
 
 __all__ = ["SCENES_FILE", "read_builtin"]
 
 SCENES_FILE = "scenes.jsonl"
+_LEVELS = ("[1]", "[2]", "[3]", "[4]", "[1, 2]")
 
 
 def read_builtin(folder: Path) -> Dataset:
     """All scenes of a data set folder; raises DataError with everything that is wrong in it."""
     path = folder / SCENES_FILE
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except OSError as error:
-        allowed = f"a folder with {SCENES_FILE}, or the name of a bundled data set"
-        problem = Problem(str(path), f"cannot be read: {error.strerror}", allowed=allowed)
-        raise DataError(problem) from error
-    except UnicodeDecodeError as error:
-        raise DataError(Problem(str(path), f"is not UTF-8 text: {error.reason}")) from error
-    tasks: dict[str, AssemblyTask] = {}
+    text = read_text(path, f"a folder with {SCENES_FILE}, or the name of a bundled data set")
+    # Not splitlines(): a JSON string may hold U+2028 and other line ends of Unicode.
+    lines = text.removesuffix("\n").split("\n") if text else []
+    first_line: dict[str, int] = {}
+    tasks: list[AssemblyTask] = []
     problems: list[Problem] = []
     for number, line in enumerate(lines, 1):
         try:
-            task = _read_line(f"{path}:{number}", line)
+            task = _read_line(path, number, line)
         except DataError as error:
             problems += error.problems
             continue
-        if task.scene.id in tasks:
-            message = "is used by an earlier line"
+        first = first_line.setdefault(task.scene.id, number)
+        if first != number:
+            message = f"is used by line {first} already"
             problems.append(Problem(f"{path}:{number}", message, "id", repr(task.scene.id)))
-        tasks[task.scene.id] = task
+        tasks.append(task)
     if not lines:
         problems.append(Problem(str(path), "holds no scenes", allowed="one scene a line"))
     if problems:
         raise DataError(problems)
-    return Dataset(folder.name, folder, tuple(tasks[key] for key in sorted(tasks)))
+    return Dataset(folder.name, folder, tuple(sorted(tasks, key=lambda task: task.scene.id)))
 
 
-def _read_line(where: str, line: str) -> AssemblyTask:
-    try:
-        raw = json.loads(line)
-    except json.JSONDecodeError as error:
-        raise DataError(Problem(f"{where}:{error.colno}", f"is not valid JSON: {error.msg}")) from (
-            error
-        )
-    reader = RawReader(where)
-    name = reader.get(raw, "id")
-    if not isinstance(name, str) or not name or "/" in name:
-        reader.complain("id", "is not a name", name, "a non-empty string without '/'")
+def _read_line(path: Path, number: int, line: str) -> AssemblyTask:
+    reader = SceneReader(f"{path}:{number}")
+    raw = reader.mapping(parse_json(line, path, number))
+    name = reader.name(reader.get(raw, "id"), "id")
     levels = reader.items(reader.get(raw, "levels"), "levels")
-    for i, level in enumerate(levels):
-        reader.integer(level, f"levels[{i}]", 1, 4)
+    if levels and str(levels) not in _LEVELS:
+        reader.complain("levels", "are not allowed", levels, "one level 1 to 4, or [1, 2]")
     parents = reader.items(reader.get(raw, "parents"), "parents")
-    if any(not isinstance(parent, str) for parent in parents):
-        reader.complain("parents", "are not scene ids", parents, "a list of strings")
+    for i, parent in enumerate(parents):
+        reader.name(parent, f"parents[{i}]")
     blocks = reader.blocks(reader.get(raw, "blocks"), strict_layers=True)
     candidates = reader.candidates(reader.get(raw, "candidates"))
     reader.raise_if_broken()
-    scene = Scene(name, tuple(sorted(levels)), blocks, tuple(parents))
-    check_solvable(reader, scene, candidates)
+    scene = Scene(name, tuple(levels), blocks, tuple(parents))
+    reader.check_solvable(scene, candidates)
     reader.raise_if_broken()
     return AssemblyTask(scene, candidates)

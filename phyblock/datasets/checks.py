@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any, cast
 
+from phyblock.datasets.raw import RawReader
 from phyblock.domain import (
     BLOCK_TYPES,
     COLORS,
@@ -21,150 +19,105 @@ from phyblock.domain import (
     CycleError,
     Scene,
 )
-from phyblock.errors import DataError, Problem
 
-__all__ = ["MAX_BLOCKS", "RawReader", "check_solvable", "read_json"]
+__all__ = ["MAX_BLOCKS", "SceneReader"]
 
 MAX_BLOCKS = 22
-_SHOWN = 80
 
 
-class RawReader:
-    """Reads one raw object and collects what is wrong with it.
-
-    The methods return a usable value or None; call `raise_if_broken` before trusting any.
-    """
-
-    def __init__(self, where: str) -> None:
-        self.where = where
-        self.problems: list[Problem] = []
-
-    def complain(self, field: str, message: str, found: object = None, allowed: str = "") -> None:
-        """Note one problem."""
-        shown = "" if found is None else _show(found)
-        self.problems.append(Problem(self.where, message, field, shown, allowed))
-
-    def raise_if_broken(self) -> None:
-        """Raise DataError with everything that was noted, if anything was."""
-        if self.problems:
-            raise DataError(self.problems)
-
-    def get(self, raw: object, field: str, prefix: str = "") -> Any:
-        """`raw[field]`, or None after a complaint that it is missing."""
-        if not isinstance(raw, Mapping):
-            self.complain(prefix.rstrip("."), "is not an object", raw, "an object")
-            return None
-        if field not in raw:
-            self.complain(prefix + field, "is missing", sorted(map(str, raw)), f"a field {field!r}")
-            return None
-        return raw[field]
-
-    def integer(self, value: object, field: str, low: int, high: int | None = None) -> int | None:
-        """An integer in low..high."""
-        fits = isinstance(value, int) and not isinstance(value, bool) and value >= low
-        if fits and (high is None or cast(int, value) <= high):
-            return cast(int, value)
-        allowed = f"an integer of at least {low}" if high is None else f"an integer {low} to {high}"
-        self.complain(field, "is not an allowed number", value, allowed)
-        return None
-
-    def choice(self, value: object, field: str, allowed: Sequence[str]) -> str | None:
-        """One of the allowed words."""
-        if isinstance(value, str) and value in allowed:
-            return value
-        self.complain(field, "is not known", value, ", ".join(allowed))
-        return None
-
-    def vector(self, value: object, field: str) -> tuple[float, float, float] | None:
-        """Three finite numbers."""
-        if isinstance(value, list | tuple) and len(value) == 3:
-            numbers = [v for v in value if isinstance(v, int | float) and not isinstance(v, bool)]
-            if len(numbers) == 3 and all(map(math.isfinite, numbers)):
-                x, y, z = map(float, numbers)
-                return (x, y, z)
-        self.complain(field, "is not a vector", value, "three finite numbers")
-        return None
-
-    def items(self, value: object, field: str) -> list[Any]:
-        """A non-empty list."""
-        if isinstance(value, list) and value:
-            return value
-        self.complain(field, "is not a non-empty list", value, "a list with at least one entry")
-        return []
+class SceneReader(RawReader):
+    """Reads the parts of a scene and its candidate set, and collects what is wrong with them."""
 
     def blocks(self, raw: object, *, strict_layers: bool) -> tuple[Block, ...]:
-        """The blocks of a scene, with a graph that is known to be sound."""
+        """The blocks of a scene, with a graph that is known to be sound; () after a complaint."""
+        before = len(self.problems)
         entries = self.items(raw, "blocks")
         if len(entries) > MAX_BLOCKS:
             self.complain("blocks", "are too many", len(entries), f"at most {MAX_BLOCKS}")
-        blocks = [self._block(entry, f"blocks[{i}]") for i, entry in enumerate(entries)]
-        if self.problems:
-            return ()
-        whole = tuple(cast(Block, block) for block in blocks)
-        self._check_graph(whole)
-        if strict_layers and not self.problems:
-            self._check_layers(whole)
-        return whole
+        found = [self._block(entry, f"blocks[{i}]") for i, entry in enumerate(entries)]
+        if len(self.problems) == before:
+            whole = tuple(cast(Block, block) for block in found)
+            self._check_graph(whole)
+            if strict_layers and len(self.problems) == before:
+                self._check_layers(whole)
+        return whole if len(self.problems) == before else ()
 
     def candidates(self, raw: object) -> CandidateSet:
-        """A candidate set: at most 16, no two alike."""
+        """A candidate set: at most 16, no two alike; empty after a complaint."""
+        before = len(self.problems)
         entries = self.items(raw, "candidates")
         if len(entries) > MAX_CANDIDATES:
             self.complain("candidates", "are too many", len(entries), f"at most {MAX_CANDIDATES}")
         found = [self._candidate(entry, f"candidates[{i}]") for i, entry in enumerate(entries)]
-        whole = CandidateSet(tuple(candidate for candidate in found if candidate is not None))
         first: dict[object, int] = {}
-        for index, candidate in enumerate(whole.candidates, 1):
-            if candidate.look in first:
+        for i, candidate in enumerate(found):
+            if candidate is None:
+                continue
+            number = first.setdefault(candidate.look, i + 1)
+            if number != i + 1:
                 self.complain(
-                    f"candidates[{index - 1}]",
-                    f"looks the same as candidate {first[candidate.look]}",
+                    f"candidates[{i}]",
+                    f"looks the same as candidate {number}",
                     [candidate.type, candidate.color, list(candidate.euler_deg)],
                     "candidates that differ in type, color or orientation",
                 )
-            first.setdefault(candidate.look, index)
-        return whole
+        sound = len(self.problems) == before
+        return CandidateSet(tuple(cast(list[Candidate], found)) if sound else ())
 
-    def _block(self, raw: object, at: str) -> Block | None:
-        before = len(self.problems)
+    def check_solvable(self, scene: Scene, candidates: CandidateSet) -> None:
+        """Complain about every block of the scene that no candidate can stand for."""
+        missing = candidates.missing(scene)
+        for block in scene.blocks:
+            if block.order in missing:
+                self.complain(
+                    "candidates",
+                    f"hold nothing that block {block.order} of scene {scene.id} needs",
+                    [block.type, block.color, list(block.euler_deg)],
+                    "every type, color and orientation that the scene uses",
+                )
+
+    def _block(self, entry: object, at: str) -> Block | None:
+        raw = self.mapping(entry, at)
         order = self.integer(self.get(raw, "order", f"{at}."), f"{at}.order", 1)
         kind, color = self._kind(raw, at)
         layer = self.integer(self.get(raw, "layer", f"{at}."), f"{at}.layer", 1)
         position = self.vector(self.get(raw, "position", f"{at}."), f"{at}.position")
         euler = self._euler(raw, at)
         depend = self._depend(self.get(raw, "depend", f"{at}."), f"{at}.depend")
-        if len(self.problems) > before or not (order and layer and position and euler):
+        if order is None or kind is None or color is None or layer is None:
             return None
-        if depend is None:
+        if position is None or euler is None or depend is None:
             return None
         return Block(order, kind, color, position, euler, depend, layer)
 
-    def _candidate(self, raw: object, at: str) -> Candidate | None:
-        before = len(self.problems)
+    def _candidate(self, entry: object, at: str) -> Candidate | None:
+        raw = self.mapping(entry, at)
         kind, color = self._kind(raw, at)
         euler = self._euler(raw, at)
-        if len(self.problems) > before or euler is None:
+        if kind is None or color is None or euler is None:
             return None
         return Candidate(kind, color, euler)
 
-    def _kind(self, raw: object, at: str) -> tuple[BlockType, Color]:
+    def _kind(self, raw: Any, at: str) -> tuple[BlockType | None, Color | None]:
         kind = self.choice(self.get(raw, "type", f"{at}."), f"{at}.type", BLOCK_TYPES)
         color = self.choice(self.get(raw, "color", f"{at}."), f"{at}.color", COLORS)
-        return cast(BlockType, kind), cast(Color, color)
+        return cast(BlockType | None, kind), cast(Color | None, color)
 
-    def _euler(self, raw: object, at: str) -> tuple[float, float, float] | None:
+    def _euler(self, raw: Any, at: str) -> tuple[float, float, float] | None:
         # The paper's text calls the field `orientation`, the released files `euler`.
-        named = isinstance(raw, Mapping) and "orientation" in raw and "euler" not in raw
+        named = isinstance(raw, dict) and "orientation" in raw and "euler" not in raw
         field = "orientation" if named else "euler"
         return self.vector(self.get(raw, field, f"{at}."), f"{at}.{field}")
 
     def _depend(self, raw: object, field: str) -> tuple[int, ...] | None:
-        orders = [self.integer(entry, field, 0) for entry in self.items(raw, field)]
+        entries = enumerate(self.items(raw, field))
+        orders = [self.integer(entry, f"{field}[{i}]", 0) for i, entry in entries]
         if not orders or None in orders:
             return None
         return tuple(order for order in orders if order)
 
     def _check_graph(self, blocks: Sequence[Block]) -> None:
+        before = len(self.problems)
         orders = [block.order for block in blocks]
         for i, block in enumerate(blocks):
             if block.order in orders[:i]:
@@ -175,7 +128,7 @@ class RawReader:
                         map(str, sorted(orders))
                     )
                     self.complain(f"blocks[{i}].depend", "names no block", order, known)
-        if self.problems:
+        if len(self.problems) > before:
             return
         try:
             AOVGraph(tuple(frozenset(orders.index(order) for order in b.depend) for b in blocks))
@@ -190,33 +143,3 @@ class RawReader:
             if block.layer != layer:
                 wanted = f"{layer}, the longest path of dependencies"
                 self.complain(f"blocks[{i}].layer", "is wrong", block.layer, wanted)
-
-
-def check_solvable(reader: RawReader, scene: Scene, candidates: CandidateSet) -> None:
-    """Complain about every block of the scene that no candidate can stand for."""
-    for order in candidates.missing(scene):
-        block = next(block for block in scene.blocks if block.order == order)
-        reader.complain(
-            "candidates",
-            f"hold nothing that block {order} of scene {scene.id} needs",
-            [block.type, block.color, list(block.euler_deg)],
-            "every type, color and orientation that the scene uses",
-        )
-
-
-def read_json(path: Path) -> Any:
-    """The JSON value in `path`; DataError when it cannot be read or holds NaN or bad syntax."""
-    try:
-        return json.loads(path.read_bytes())
-    except OSError as error:
-        raise DataError(Problem(str(path), f"cannot be read: {error.strerror}")) from error
-    except UnicodeDecodeError as error:
-        raise DataError(Problem(str(path), f"is not UTF-8 text: {error.reason}")) from error
-    except json.JSONDecodeError as error:
-        where = f"{path}:{error.lineno}:{error.colno}"
-        raise DataError(Problem(where, f"is not valid JSON: {error.msg}")) from error
-
-
-def _show(value: object) -> str:
-    text = json.dumps(value, default=str)
-    return text if len(text) <= _SHOWN else text[: _SHOWN - 1] + "…"

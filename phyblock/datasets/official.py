@@ -11,10 +11,13 @@ order, so a level-2 scene is read as a scene of levels 1 and 2.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar, cast
 
 from phyblock.datasets.base import AssemblyTask, Dataset
-from phyblock.datasets.checks import RawReader, check_solvable, read_json
+from phyblock.datasets.checks import SceneReader
+from phyblock.datasets.raw import read_json
 from phyblock.domain import CandidateSet, Scene
 from phyblock.errors import DataError, Problem
 
@@ -25,6 +28,7 @@ _CANDIDATES = Path("data", "SCENEs_400_Cand_Jsons")
 _PICTURES = Path("data", "SCENEs_400_Goal_and_Cand_Imgs_resized")
 _OUTPUTS = Path("outputs")
 _PICTURE_MARK = "<IMG_CONTEXT>"
+_T = TypeVar("_T")
 
 
 def read_official(root: Path) -> Dataset:
@@ -82,43 +86,53 @@ def official_prompt(root: Path) -> str:
 
 
 def _read_task(root: Path, path: Path) -> AssemblyTask:
-    scene = _read_scene(path)
     candidates_path = root / _CANDIDATES / f"{path.stem}_16_cand_blocks.json"
-    candidates = _read_candidates(candidates_path)
-    reader = RawReader(str(candidates_path))
-    check_solvable(reader, scene, candidates)
+    scene, problems = _try(_read_scene, path)
+    candidates, more_problems = _try(_read_candidates, candidates_path)
+    if scene is None or candidates is None:
+        raise DataError([*problems, *more_problems])
+    reader = SceneReader(str(candidates_path))
+    reader.check_solvable(scene, candidates)
     reader.raise_if_broken()
     picture = root / _PICTURES / f"{path.stem}.png"
     return AssemblyTask(scene, candidates, picture if picture.is_file() else None)
 
 
+def _try(read: Callable[[Path], _T], path: Path) -> tuple[_T | None, tuple[Problem, ...]]:
+    try:
+        return read(path), ()
+    except DataError as error:
+        return None, error.problems
+
+
 def _read_scene(path: Path) -> Scene:
-    raw = read_json(path)
-    reader = RawReader(str(path))
+    reader = SceneReader(str(path))
+    raw = reader.mapping(read_json(path))
     level = reader.integer(reader.get(raw, "level"), "level", 1, 4)
-    look_at = raw.get("lookat_pos") if isinstance(raw, dict) else None
-    look_at_m = None if look_at is None else reader.vector(look_at, "lookat_pos")
     # Declared layers differ from the longest path in 70 of the 400 released scenes.
     blocks = reader.blocks(reader.get(raw, "blocks"), strict_layers=False)
-    combined = raw.get("combined") if isinstance(raw, dict) else None
-    if combined is not None and not (isinstance(combined, str) and combined):
-        reader.complain("combined", "is not allowed", combined, "base scenes joined by '_'")
+    optional = raw if isinstance(raw, dict) else {}
+    look_at = optional.get("lookat_pos")
+    look_at_m = None if look_at is None else reader.vector(look_at, "lookat_pos")
+    parents = [path.stem]
+    if (combined := optional.get("combined")) is not None:
+        parents = combined.split("_") if isinstance(combined, str) else []
+        if not parents or not all(parents):
+            reader.complain("combined", "is not allowed", combined, "base scenes joined by '_'")
     reader.raise_if_broken()
-    assert level is not None
-    parents = tuple(combined.split("_")) if combined else (path.stem,)
-    return Scene(path.stem, (1, 2) if level == 2 else (level,), blocks, parents, look_at_m)
+    levels = (1, 2) if level == 2 else (cast(int, level),)
+    return Scene(path.stem, levels, blocks, tuple(parents), look_at_m)
 
 
 def _read_candidates(path: Path) -> CandidateSet:
     raw = read_json(path)
-    reader = RawReader(str(path))
+    reader = SceneReader(str(path))
     candidates = reader.candidates(raw)
-    if isinstance(raw, list):
-        for i, entry in enumerate(raw):
-            # In candidate files `position` is the 1-based number that the picture shows.
-            number = entry.get("position") if isinstance(entry, dict) else None
-            if number != i + 1:
-                allowed = f"{i + 1}: candidates are numbered from 1 in file order"
-                reader.complain(f"candidates[{i}].position", "is wrong", number, allowed)
+    for i, entry in enumerate(raw if isinstance(raw, list) else []):
+        # In candidate files `position` is the 1-based number that the picture shows.
+        number = entry.get("position") if isinstance(entry, dict) else i + 1
+        if number != i + 1:
+            allowed = f"{i + 1}: candidates are numbered from 1 in file order"
+            reader.complain(f"candidates[{i}].position", "is wrong", number, allowed)
     reader.raise_if_broken()
     return candidates
