@@ -1,0 +1,220 @@
+"""The reader of the project's own format: what is sound reads back, what is broken is named."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from phyblock.datasets import read_builtin
+from phyblock.domain import Block, Candidate, Scene
+from phyblock.errors import DataError, Problem
+from tests.datasets.broken import Raw, sound_scene, with_value, without, write_scenes
+
+SCENE = sound_scene()
+CUBE, ARCH = SCENE["blocks"]
+
+
+def problems_of(folder: Path) -> tuple[Problem, ...]:
+    with pytest.raises(DataError) as caught:
+        read_builtin(folder)
+    return caught.value.problems
+
+
+def test_a_sound_scene_is_read(tmp_path: Path) -> None:
+    dataset = read_builtin(write_scenes(tmp_path, SCENE))
+    (task,) = dataset.tasks
+    assert dataset.name == tmp_path.name
+    assert task.composite is None
+    assert task.scene == Scene(
+        "s1",
+        (1, 2),
+        (
+            Block(1, "cube", "red", (0, 0, 0.025), (0, 0, 0), (), 1),
+            Block(2, "arch", "red", (0, 0, 0.075), (0, 0, 90), (1,), 2),
+        ),
+        ("s1",),
+    )
+    assert task.candidates[3] == Candidate("arch", "red", (0, 0, 90))
+
+
+def test_scenes_come_in_id_order_whatever_their_lines(tmp_path: Path) -> None:
+    scenes = [{**SCENE, "id": name} for name in ("c", "a", "b")]
+    dataset = read_builtin(write_scenes(tmp_path, *scenes))
+    assert [task.scene.id for task in dataset.tasks] == ["a", "b", "c"]
+    assert read_builtin(write_scenes(tmp_path, *scenes[::-1])).sha256 == dataset.sha256
+    assert read_builtin(write_scenes(tmp_path, *scenes[:2])).sha256 != dataset.sha256
+
+
+def test_the_digest_tells_scenes_apart_but_not_spellings_of_one(tmp_path: Path) -> None:
+    def digest(scene: Raw) -> str:
+        return read_builtin(write_scenes(tmp_path, scene)).sha256
+
+    same = with_value(SCENE, "blocks.0.position", [-0.0, 0.0, 25e-3])
+    moved = with_value(SCENE, "blocks.0.position", [0.001, 0, 0.025])
+    turned = with_value(SCENE, "candidates.1.euler", [0, 90, 0])
+    assert digest(SCENE) == digest(same)
+    assert len({digest(SCENE), digest(moved), digest(turned)}) == 3
+
+
+def test_orientation_is_read_as_euler(tmp_path: Path) -> None:
+    blocks = [
+        {**{k: v for k, v in block.items() if k != "euler"}, "orientation": block["euler"]}
+        for block in SCENE["blocks"]
+    ]
+    renamed = read_builtin(write_scenes(tmp_path, {**SCENE, "blocks": blocks}))
+    assert renamed.tasks == read_builtin(write_scenes(tmp_path, SCENE)).tasks
+
+
+def test_line_ends_of_any_kind_and_a_missing_last_one_are_read(tmp_path: Path) -> None:
+    lines = [json.dumps({**SCENE, "id": name}) for name in "ab"]
+    for text in ("\n".join(lines), "\r\n".join(lines) + "\r\n"):
+        (tmp_path / "scenes.jsonl").write_bytes(text.encode())
+        assert len(read_builtin(tmp_path).tasks) == 2
+
+
+def test_unicode_line_ends_inside_a_string_do_not_end_a_line(tmp_path: Path) -> None:
+    noted = {**SCENE, "note": "a\u2028b\x85c"}
+    text = json.dumps(noted, ensure_ascii=False)
+    (tmp_path / "scenes.jsonl").write_text(text, encoding="utf-8")
+    assert len(read_builtin(tmp_path).tasks) == 1
+
+
+BROKEN_VALUES: dict[str, tuple[str, object, str, str, str]] = {
+    # name: path, value, field of the problem, words of its message, words of what is allowed
+    "id is no string": ("id", 3, "id", "not a name", "letters"),
+    "id is empty": ("id", "", "id", "not a name", "letters"),
+    "id is a path": ("id", "../s1", "id", "not a name", "letters"),
+    "id is a parent folder": ("id", "..", "id", "not a name", "letters"),
+    "id has two lines": ("id", "a\nb", "id", "not a name", "letters"),
+    "level 5": ("levels", [5], "levels", "not allowed", "one level 1 to 4, or [1, 2]"),
+    "levels 1 and 3": ("levels", [1, 3], "levels", "not allowed", "[1, 2]"),
+    "level twice": ("levels", [2, 2], "levels", "not allowed", "[1, 2]"),
+    "level is true": ("levels", [True], "levels", "not allowed", "[1, 2]"),
+    "levels is no list": ("levels", 2, "levels", "non-empty list", "at least one"),
+    "no levels": ("levels", [], "levels", "non-empty list", "at least one"),
+    "parents is a number": ("parents", [3], "parents[0]", "not a name", "letters"),
+    "no parents": ("parents", [], "parents", "non-empty list", "at least one"),
+    "no blocks": ("blocks", [], "blocks", "non-empty list", "at least one"),
+    "block is no object": ("blocks.1", [1], "blocks[1]", "not an object", "an object"),
+    "order 0": ("blocks.0.order", 0, "blocks[0].order", "allowed number", "at least 1"),
+    "order is null": ("blocks.0.order", None, "blocks[0].order", "allowed number", "at least 1"),
+    "order is true": ("blocks.0.order", True, "blocks[0].order", "allowed number", "at least 1"),
+    "order is a float": ("blocks.1.order", 2.0, "blocks[1].order", "number", "at least 1"),
+    "order twice": ("blocks.1.order", 1, "blocks[1].order", "used twice", "unique"),
+    "unknown type": ("blocks.1.type", "arc", "blocks[1].type", "not known", "arch, cube, cub"),
+    "type is a list": ("blocks.1.type", ["arch"], "blocks[1].type", "not known", "arch, cube"),
+    "unknown color": ("blocks.0.color", "pink", "blocks[0].color", "not known", "red, yellow"),
+    "layer 0": ("blocks.0.layer", 0, "blocks[0].layer", "allowed number", "at least 1"),
+    "wrong layer": ("blocks.1.layer", 1, "blocks[1].layer", "is wrong", "2, the longest path"),
+    "NaN": ("blocks.0.position", [0, 0, float("nan")], "blocks[0].position", "vector", "finite"),
+    "infinity": ("blocks.0.position", [0, 0, 1e999], "blocks[0].position", "vector", "finite"),
+    "too large": ("blocks.0.position", [0, 0, 10**400], "blocks[0].position", "vector", "finite"),
+    "two coordinates": ("blocks.0.position", [0, 0], "blocks[0].position", "vector", "three"),
+    "a word for a coordinate": ("blocks.0.position", [0, 0, "1"], "blocks[0].position", "v", "thr"),
+    "true as an angle": ("blocks.1.euler", [0, 0, True], "blocks[1].euler", "vector", "three"),
+    "dangling depend": ("blocks.1.depend", [7], "blocks[1].depend", "names no block", ": 1, 2"),
+    "negative depend": ("blocks.1.depend", [-1], "blocks[1].depend[0]", "number", "at least 0"),
+    "no depend": ("blocks.1.depend", [], "blocks[1].depend", "non-empty list", "at least one"),
+    "cycle": ("blocks.0.depend", [2], "blocks[0].depend", "part of a cycle", "without a cycle"),
+    "self-dependent": ("blocks.1.depend", [2], "blocks[1].depend", "part of a cycle", "without"),
+    "no candidates": ("candidates", [], "candidates", "non-empty list", "at least one"),
+    "duplicate look": (
+        "candidates.1.euler",
+        [0, 0, 270],
+        "candidates[2]",
+        "looks the same as candidate 2",
+        "that differ in type, color or orientation",
+    ),
+    "unknown candidate": ("candidates.0.type", "cuboid", "candidates[0].type", "known", "cuboid1"),
+    "unsolvable": ("candidates.2.color", "blue", "candidates", "hold nothing that block 2", "ever"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN_VALUES)
+def test_a_broken_value_is_named_with_file_line_and_field(tmp_path: Path, name: str) -> None:
+    path, value, field, message, allowed = BROKEN_VALUES[name]
+    sound = {**SCENE, "id": "s0"}
+    (problem,) = problems_of(write_scenes(tmp_path, sound, with_value(SCENE, path, value)))
+    assert problem.where == f"{tmp_path / 'scenes.jsonl'}:2"
+    assert problem.field == field
+    assert message in problem.message
+    assert allowed in problem.allowed
+    assert problem.found
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["id", "levels", "parents", "blocks", "candidates"]
+    + [f"blocks.0.{field}" for field in CUBE]
+    + ["candidates.1.type", "candidates.1.color", "candidates.1.euler"],
+)
+def test_a_missing_field_is_said_once(tmp_path: Path, path: str) -> None:
+    (problem,) = problems_of(write_scenes(tmp_path, without(SCENE, path)))
+    field = path.replace(".0.", "[0].").replace(".1.", "[1].")
+    assert (problem.field, problem.message) == (field, "is missing")
+
+
+def test_blocks_and_candidates_are_bounded(tmp_path: Path) -> None:
+    blocks = [{**CUBE, "order": order} for order in range(1, 24)]
+    (problem,) = problems_of(write_scenes(tmp_path, {**SCENE, "blocks": blocks}))
+    assert (problem.field, problem.found, problem.allowed) == ("blocks", "23", "at most 22")
+    candidates = [
+        {"type": "cuboid3", "color": "red", "euler": [0, 0, 10 * i]} for i in range(14)
+    ] + SCENE["candidates"]
+    (problem,) = problems_of(write_scenes(tmp_path, {**SCENE, "candidates": candidates}))
+    assert (problem.field, problem.found, problem.allowed) == ("candidates", "17", "at most 16")
+
+
+def test_everything_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
+    first = with_value(with_value(SCENE, "levels", [9]), "blocks.0.depend", [2])
+    first = with_value(first, "candidates.0.color", "pink")
+    second = {**with_value(SCENE, "blocks.1.layer", 7), "id": "s2"}
+    third = {**SCENE, "id": "s3"}
+    found = problems_of(write_scenes(tmp_path, first, second, third, third))
+    assert [(p.where.rpartition(":")[2], p.field) for p in found] == [
+        ("1", "levels"),
+        ("1", "blocks[0].depend"),
+        ("1", "candidates[0].color"),
+        ("2", "blocks[1].layer"),
+        ("4", "id"),
+    ]
+    assert "line 3" in found[-1].message
+
+
+BROKEN_TEXTS: dict[str, tuple[bytes, str, str]] = {
+    # name: bytes, what stands after the file name in `where`, words of the message
+    "empty file": (b"", "", "holds no scenes"),
+    "blank line": (b"\n", ":1:1", "not valid JSON"),
+    "not JSON": (b'{"id": "s1",}', ":1:13", "not valid JSON"),
+    "cut off": (b'{"id": "s1", "levels": [', ":1:25", "not valid JSON"),
+    "two objects on a line": (b"{} {}", ":1:4", "not valid JSON"),
+    "a list": (b"[]", ":1", "not an object"),
+    "null": (b"null", ":1", "not an object"),
+    "byte order mark": (b"\xef\xbb\xbf{}", ":1:1", "not valid JSON"),
+    "not UTF-8": (b'{"id": "\xff"}', "", "not UTF-8"),
+    "UTF-16": ("{}".encode("utf-16"), "", "not UTF-8"),
+    "a field twice": (b'{"id": "s1", "id": "s2"}', ":1", "twice"),
+    "too many digits": (b'{"id": ' + b"1" * 5000 + b"}", ":1", "too many digits"),
+    "nested without end": (b"[" * 200_000, ":1", "nested too deeply"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN_TEXTS)
+def test_a_broken_text_is_named_with_its_place(tmp_path: Path, name: str) -> None:
+    data, place, message = BROKEN_TEXTS[name]
+    (tmp_path / "scenes.jsonl").write_bytes(data)
+    (problem,) = problems_of(tmp_path)
+    assert problem.where == f"{tmp_path / 'scenes.jsonl'}{place}"
+    assert message in problem.message
+
+
+def test_a_missing_file_and_a_folder_in_its_place_are_named(tmp_path: Path) -> None:
+    (problem,) = problems_of(tmp_path / "nowhere")
+    assert problem.where.endswith("scenes.jsonl")
+    assert "No such file" in problem.message
+    assert "bundled" in problem.allowed
+    (tmp_path / "scenes.jsonl").mkdir()
+    (problem,) = problems_of(tmp_path)
+    assert "cannot be read" in problem.message
