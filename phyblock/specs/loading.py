@@ -22,7 +22,7 @@ from phyblock.specs.suite import (
     RECORDED,
     SuiteSpec,
 )
-from phyblock.specs.validation import check, find_secrets
+from phyblock.specs.validation import check, find_secrets, merge_problems
 from phyblock.specs.words import did_you_mean, show
 from phyblock.specs.yaml_source import FieldPath, YamlSource, dotted, read_yaml
 
@@ -70,7 +70,7 @@ def load_suite(path: Path, overrides: Sequence[str] = (), *, data_dir: Path) -> 
     secrets = list(find_secrets(source.data, source))
     if suite is None and isinstance(source.data, dict):
         problems += _broken_rules(source, problems)
-    found = _merge(source.problems, secrets, problems)
+    found = merge_problems(source.problems, secrets, problems)
     if suite is None or found:
         raise SpecError(sort_problems(found))
     return _locate(suite, path, source, data_dir)
@@ -103,12 +103,6 @@ def resolve_models(
     if problems:
         raise SpecError(problems)
     return {name: known.get(name) for name in names}
-
-
-def _merge(syntax: list[Problem], secrets: list[Problem], problems: list[Problem]) -> list[Problem]:
-    """All problems, but one of a value that YAML could not read or that is a secret."""
-    hidden = {problem.where for problem in (*syntax, *secrets) if problem.where[:2] != "--"}
-    return [*syntax, *secrets, *(p for p in problems if p.where not in hidden)]
 
 
 def _broken_rules(source: YamlSource, problems: list[Problem]) -> list[Problem]:

@@ -12,7 +12,7 @@ from phyblock.specs.fields import ModelName
 from phyblock.specs.model import ModelSpec
 from phyblock.specs.paths import expand, sort_problems
 from phyblock.specs.suite import BASELINES, RECORDED
-from phyblock.specs.validation import check, find_secrets
+from phyblock.specs.validation import check, find_secrets, merge_problems
 from phyblock.specs.words import show
 from phyblock.specs.yaml_source import YamlSource, read_yaml
 
@@ -33,16 +33,16 @@ def load_models(path: Path) -> dict[str, ModelSpec]:
                         "a mapping: name: provider/model")  # fmt: skip
         raise SpecError([*source.problems, wrong])
     models: dict[str, ModelSpec] = {}
-    secrets = list(find_secrets(data, source))
-    hidden = {problem.field for problem in secrets}
-    problems = [*source.problems, *secrets]
+    problems: list[Problem] = []
     for name, entry in data.items():
         spec, found = _read_entry(name, entry, source)
-        problems += [problem for problem in found if problem.field not in hidden]
+        problems += found
         if spec is not None:
             models[name] = spec
-    if problems:
-        raise SpecError(sort_problems(problems))
+    secrets = list(find_secrets(data, source))
+    merged = merge_problems(source.problems, secrets, problems)
+    if merged:
+        raise SpecError(sort_problems(merged))
     return models
 
 

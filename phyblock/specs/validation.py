@@ -14,7 +14,7 @@ from phyblock.errors import Problem
 from phyblock.specs.words import SECRET_KEYS, did_you_mean, looks_secret, show
 from phyblock.specs.yaml_source import FieldPath, YamlSource, dotted
 
-__all__ = ["check", "find_secrets"]
+__all__ = ["check", "find_secrets", "merge_problems"]
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
@@ -91,6 +91,16 @@ def find_secrets(data: object, source: YamlSource, base: FieldPath = ()) -> Iter
             yield from find_secrets(value, source, (*base, index))
     elif isinstance(data, str) and looks_secret(data):
         yield _secret(source, base)
+
+
+def merge_problems(
+    syntax: list[Problem], secrets: list[Problem], problems: list[Problem]
+) -> list[Problem]:
+    """All problems, but those of a value that YAML could not read or that is a secret."""
+    fields = {problem.field for problem in secrets}
+    places = {problem.where for problem in syntax if not problem.where.startswith("--")}
+    rest = (p for p in problems if p.field not in fields and p.where not in places)
+    return [*syntax, *secrets, *rest]
 
 
 def _secret(source: YamlSource, path: FieldPath) -> Problem:

@@ -17,7 +17,7 @@ import yaml
 
 from phyblock.errors import Problem, SpecError
 
-__all__ = ["FieldPath", "YamlSource", "dotted", "parse_yaml", "read_yaml"]
+__all__ = ["CoreLoader", "FieldPath", "YamlSource", "dotted", "parse_yaml", "read_yaml"]
 
 FieldPath = tuple[str | int, ...]
 
@@ -27,11 +27,11 @@ MAX_VALUES = 100_000
 _TAG = "tag:yaml.org,2002:"
 
 
-class _CoreLoader(yaml.SafeLoader):
+class CoreLoader(yaml.SafeLoader):
     """SafeLoader with the scalars of YAML 1.2's core schema."""
 
 
-_CoreLoader.yaml_implicit_resolvers = {}
+CoreLoader.yaml_implicit_resolvers = {}
 
 for _kind, _pattern, _first in (
     ("null", r"^(?:~|null|Null|NULL|)$", ["~", "n", "N", ""]),
@@ -45,7 +45,7 @@ for _kind, _pattern, _first in (
     ),
     ("merge", r"^<<$", ["<"]),
 ):
-    _CoreLoader.add_implicit_resolver(_TAG + _kind, re.compile(_pattern), _first)
+    CoreLoader.add_implicit_resolver(_TAG + _kind, re.compile(_pattern), _first)
 
 
 def dotted(path: FieldPath) -> str:
@@ -71,12 +71,9 @@ class YamlSource:
 
     def where(self, path: FieldPath, *, key: bool = False) -> str:
         """Place of the value at `path` (or of its key), else of the nearest thing around it."""
-        if key and path in self.keys:
-            return self.keys[path]
-        if not key and path in self.values:
-            return self.values[path]
+        first, second = (self.keys, self.values) if key else (self.values, self.keys)
         for end in range(len(path), 0, -1):
-            found = self.keys.get(path[:end]) or self.values.get(path[:end])
+            found = first.get(path[:end]) or second.get(path[:end])
             if found:
                 return found
         return self.values.get((), f"{self.label}:1:1")
@@ -130,7 +127,7 @@ def parse_yaml(text: str, label: str, *, place: str | None = None) -> YamlSource
 
 
 def _compose(text: str) -> yaml.Node | None:
-    loader = _CoreLoader(text)
+    loader = CoreLoader(text)
     try:
         node: yaml.Node | None = loader.get_single_node()
         return node

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from phyblock.errors import SpecError
 from phyblock.specs import LoadedSuite, SuiteSpec, load_suite
-from phyblock.specs.yaml_source import _CoreLoader
+from phyblock.specs.yaml_source import CoreLoader
 from tests.specs.strategies import FIELDS, REQUIRED, SECTIONS, SUITES
 
 
@@ -23,7 +23,7 @@ class CoreDumper(yaml.SafeDumper):
     """Quotes what the loader would otherwise not read as text."""
 
 
-CoreDumper.yaml_implicit_resolvers = _CoreLoader.yaml_implicit_resolvers
+CoreDumper.yaml_implicit_resolvers = CoreLoader.yaml_implicit_resolvers
 
 
 @pytest.fixture(scope="module")

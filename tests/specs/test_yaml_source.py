@@ -85,7 +85,8 @@ def test_places_of_keys_and_values() -> None:
 
 def test_a_missing_path_stands_where_its_parent_does() -> None:
     source = parse_yaml("a:\n  b: 1\n", "f.yaml")
-    assert source.where(("a", "x")) == "f.yaml:1:1"
+    assert source.where(("a", "x")) == "f.yaml:2:3"
+    assert source.where(("a", "x"), key=True) == "f.yaml:1:1"
     assert source.where(("x", "y")) == "f.yaml:1:1"
 
 

@@ -1,0 +1,139 @@
+"""The suites and the models file that come with the project."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from phyblock.errors import SpecError
+from phyblock.specs import SamplingSpec, load_models, load_suite, resolve_models
+from phyblock.specs.yaml_source import read_yaml
+
+ROOT = Path(__file__).parents[2]
+SUITES = sorted((ROOT / "benchmarks").glob("*.yaml"))
+STAMP = re.compile(r"# yaml-language-server: \$schema=(\S+)\n")
+
+OFFICIAL_ONLY = {"paper-table1", "paper-random"}
+
+PUBLISHED = """
+Claude-3.5 Haiku, Claude-3.5 Sonnet, Claude-3.7 Sonnet, Claude-3.7 Sonnet-Thinking, GPT-4o-mini,
+GPT-4o, GPT-o1, Gemini-1.5-flash-8b, Gemini-1.5-flash, Gemini-2.0-flash-lite, Gemini-2.0-flash,
+Gemini-2.0-flash-thinking-exp, Qwen-VL-Max, InternVL2.5-1B, InternVL2.5-8B, InternVL2.5-78B,
+Qwen2.5-VL-3B-Instruct, Qwen2.5-VL-7B-Instruct, LLaVa-OneVision-0.5B, LLaVa-OneVision-7B,
+GPT-4.1, GPT-o3, Qwen2.5-VL-72B-Instruct, Cosmos-Reason1-7B
+"""
+
+
+@pytest.mark.parametrize("path", [*SUITES, ROOT / "models.yaml"], ids=lambda path: path.name)
+def test_a_shipped_file_is_valid_by_the_schema_it_names(path: Path) -> None:
+    stamp = STAMP.match(path.read_text(encoding="utf-8"))
+    assert stamp is not None
+    schema = json.loads((path.parent / stamp[1]).read_text(encoding="utf-8"))
+    source = read_yaml(path)
+    assert source.problems == []
+    Draft202012Validator(schema).validate(source.data)
+
+
+@pytest.mark.parametrize("path", SUITES, ids=lambda path: path.stem)
+def test_a_shipped_suite_loads_and_its_models_are_known(path: Path, tmp_path: Path) -> None:
+    (tmp_path / "phyblock-mini").mkdir()
+    overrides = [f"dataset.path={tmp_path}"] if path.stem in OFFICIAL_ONLY else []
+    loaded = load_suite(path, overrides, data_dir=tmp_path)
+    assert loaded.suite.name == path.stem
+    assert loaded.suite.description
+    if loaded.suite.models != "recorded":
+        assert resolve_models(loaded, load_models(ROOT / "models.yaml"))
+
+
+@pytest.mark.parametrize("name", sorted(OFFICIAL_ONLY))
+def test_an_official_suite_without_data_says_how_to_set_it(name: str, tmp_path: Path) -> None:
+    with pytest.raises(SpecError) as caught:
+        load_suite(ROOT / "benchmarks" / f"{name}.yaml", data_dir=tmp_path)
+    (problem,) = caught.value.problems
+    assert problem.field == "dataset.path"
+    assert "--set dataset.path=FOLDER" in problem.hint
+
+
+def test_the_suites_are_those_that_are_promised() -> None:
+    assert {"quick", "full", "paper-table1"} <= {path.stem for path in SUITES}
+
+
+def test_the_paper_suite_scores_as_the_paper_did(tmp_path: Path) -> None:
+    path = ROOT / "benchmarks" / "paper-table1.yaml"
+    suite = load_suite(path, [f"dataset.path={tmp_path}"], data_dir=tmp_path).suite
+    assert suite.dataset.format == "official"
+    assert suite.models == "recorded"
+    assert suite.parser == "official"
+    assert suite.scoring.matchers == ("paper", "optimal")
+    assert (suite.scoring.level1, suite.scoring.missing) == ("membership", "skip")
+    assert "published" in suite.tables
+
+
+def test_every_model_of_the_paper_is_listed() -> None:
+    known = {spec.published for spec in load_models(ROOT / "models.yaml").values()} - {None}
+    assert known == {name.strip() for name in PUBLISHED.split(",")}
+
+
+def test_the_list_is_that_of_the_papers_tables(official_dir: Path) -> None:
+    named = {name.strip() for name in PUBLISHED.split(",")}
+    tables = sorted((official_dir / "paper").glob("table*.csv"))
+    assert tables
+    for table in tables:
+        with table.open(encoding="utf-8", newline="") as file:
+            rows = {row["model"] for row in csv.DictReader(file)}
+        assert rows - {"Random"} <= named
+
+
+def test_full_holds_the_models_of_table_1(tmp_path: Path) -> None:
+    (tmp_path / "phyblock-mini").mkdir()
+    models = load_models(ROOT / "models.yaml")
+    suite = load_suite(ROOT / "benchmarks" / "full.yaml", data_dir=tmp_path).suite
+    rows = [models[name].published for name in suite.models if name in models]
+    assert rows == [name.strip() for name in PUBLISHED.split(",")][:20]
+    assert suite.seeds == (0, 1, 2, 3, 4)
+
+
+def test_models_that_refuse_a_temperature_are_sent_none() -> None:
+    models = load_models(ROOT / "models.yaml")
+    for name in ("o1", "o3", "gpt-5.6", "claude-sonnet-5-5", "claude-3-7-thinking"):
+        assert "temperature" not in models[name].params(SamplingSpec())
+
+
+LITELLM_CHECK = """
+import json, sys
+import litellm
+litellm.suppress_debug_info = True
+refused = {}
+for name, (provider, model, params) in json.load(sys.stdin).items():
+    try:
+        litellm.get_optional_params(model=model, custom_llm_provider=provider, **params)
+    except litellm.UnsupportedParamsError as error:
+        refused[name] = str(error)
+print(json.dumps(refused))
+"""
+
+
+@pytest.mark.slow
+def test_litellm_takes_the_parameters_of_every_model() -> None:
+    calls = {}
+    for name, spec in load_models(ROOT / "models.yaml").items():
+        assert spec.id is not None
+        provider, _, model = spec.id.partition("/")
+        calls[name] = (provider, model, spec.params(SamplingSpec()))
+    done = subprocess.run(
+        [sys.executable, "-c", LITELLM_CHECK],
+        input=json.dumps(calls),
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "LITELLM_LOCAL_MODEL_COST_MAP": "True"},
+    )
+    assert json.loads(done.stdout.splitlines()[-1]) == {}
