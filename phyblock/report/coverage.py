@@ -36,21 +36,21 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     `expected` samples are `recorded` + `not_run`; the outcomes split `recorded`. Of the `replies`
     (samples that hold one): token sums of those that tell, with `tokens_unknown` that do not;
     `cost_usd` the sum of the known prices, NaN where none is, with `cost_unknown` without one;
-    `latency_s` the mean over replies that were asked for now, not `cached`; `attempts` the sum of
-    requests sent.
+    `latency_s` the mean over replies for which a request was sent, so neither `cached` ones nor
+    recordings; `attempts` the sum of requests sent.
     """
     records = run.records[run.records["track"].isin(run.design.tracks)]
     replied = records["finish"].notna()
-    cached = records["cached"].fillna(False).astype(bool)
+    attempts = records["attempts"].fillna(0).astype("int64")
     facts = records[["model", *_TOKENS, "cost_usd"]].assign(
         recorded=1,
         **{name: (records["outcome"] == name).astype("int64") for name in OUTCOMES},
         replies=replied.astype("int64"),
         tokens_unknown=(replied & records["completion_tokens"].isna()).astype("int64"),
         cost_unknown=(replied & records["cost_usd"].isna()).astype("int64"),
-        cached=cached.astype("int64"),
-        attempts=records["attempts"].fillna(0).astype("int64"),
-        latency_s=records["latency_s"].mask(cached),
+        cached=records["cached"].fillna(False).astype("int64"),
+        attempts=attempts,
+        latency_s=records["latency_s"].where(attempts > 0),
     )
     groups = facts.groupby("model")
     sums = groups[list(_COUNTS)].sum()

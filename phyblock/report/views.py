@@ -45,7 +45,7 @@ def table1_view(table: pd.DataFrame, run: Run) -> TextTable:
         (row["model"], *(_percent(row, cell) for cell in cells)) for row in table.to_dict("records")
     ]
     return TextTable(
-        f"Assembly planning{_of_suite(design)}: precision, recall and F1 (%) by level",
+        f"Assembly planning (%){_of_suite(design)}",
         (_MODEL, *columns),
         tuple(rows),
         (_how(design), *_table1_notes(run), _LABELS_NOTE),
@@ -111,15 +111,20 @@ def errors_view(table: pd.DataFrame, run: Run) -> TextTable:
         f"Wrong steps by type{_of_suite(design)}",
         (_MODEL, Column("Level", is_text=True), Column("Plans"), Column("Wrong steps"), *pairs),
         tuple(rows),
-        (f"Setting {design.setting}, matcher {design.matcher}; shares are of all wrong steps.",),
+        (
+            f"Setting {design.setting}, matcher {design.matcher}, every level by aov; "
+            "shares are of all wrong steps.",
+        ),
     )
 
 
 def published_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """Published, ours and difference out of `published_frame`: a row a model and metric."""
+    """Published, ours and difference out of `published_frame`: a row a model and metric.
+
+    Under the name of a model stands the name that it was published by.
+    """
     columns = (
         _MODEL,
-        Column("Published as", is_text=True),
         Column("Metric", is_text=True),
         *(
             Column(name, _level_name(level))
@@ -139,13 +144,13 @@ def published_view(table: pd.DataFrame, run: Run) -> TextTable:
     largest = largest_differences(table)
     rows = [
         (
-            *((model, name) if metric == METRICS[0] else ("", "")),
+            label,
             _METRIC_NAMES[metric],
             *(cell for level in PUBLISHED_LEVELS for cell in cells[model, level, metric]),
             number(largest[model], 3) if metric == METRICS[0] else "",
         )
         for model, name in run.design.published.items()
-        for metric in METRICS
+        for label, metric in zip((model, f"({name})", ""), METRICS, strict=True)
     ]
     return TextTable(
         f"Our numbers beside the paper's Table 1{_of_suite(run.design)} (%)",
@@ -168,28 +173,46 @@ def _difference_notes(table: pd.DataFrame, design: Design) -> list[str]:
 
 
 def coverage_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """Outcomes, tokens, cost and time out of `coverage_frame`."""
-    names = ("Expected", "Not run", "OK", "Parse failure", "Refusal", "Truncated", "API error")
-    usage = ("Prompt tokens", "Completion tokens", "Reasoning tokens", "Cost", "Latency (s)")
-    columns = (*names, "Missing", *usage, "Cached", "Attempts")
-    rows = [
-        (
-            row["model"],
-            *(str(row[name]) for name in ("expected", "not_run", *OUTCOMES)),
-            *(_tokens(row[f"{kind}_tokens"]) for kind in ("prompt", "completion", "reasoning")),
-            _cost(row["cost_usd"], row["cost_unknown"], row["replies"]),
-            number(row["latency_s"], 2),
-            str(row["cached"]),
-            str(row["attempts"]),
-        )
-        for row in table.to_dict("records")
+    """Outcomes, tokens, cost and time out of `coverage_frame`.
+
+    Tokens, latency, cached and requests are left out where no model has any.
+    """
+    counts = ("expected", "not_run", *OUTCOMES)
+    parts: list[tuple[Column, list[str]]] = [(_MODEL, list(table["model"]))]
+    parts += [
+        (Column(heading), [str(count) for count in table[name]])
+        for heading, name in zip(_COVERAGE_COUNTS, counts, strict=True)
     ]
+    usage = [
+        *(
+            (Column(f"Tokens {name}"), [_tokens(n) for n in table[f"{kind}_tokens"]])
+            for kind, name in (("prompt", "in"), ("completion", "out"), ("reasoning", "reasoning"))
+        ),
+        (Column("Latency (s)"), [number(seconds, 2) for seconds in table["latency_s"]]),
+        (Column("Cached"), [str(count) for count in table["cached"]]),
+        (Column("Requests"), [str(count) for count in table["attempts"]]),
+    ]
+    costs = zip(table["cost_usd"], table["cost_unknown"], table["replies"], strict=True)
+    parts.append((Column("Cost"), [_cost(*cost) for cost in costs]))
+    parts += [(column, cells) for column, cells in usage if set(cells) - {NO_VALUE, "0"}]
     return TextTable(
         f"Coverage{_of_suite(run.design)}: what became of every sample",
-        (_MODEL, *(Column(name) for name in columns)),
-        tuple(rows),
+        tuple(column for column, _ in parts),
+        tuple(zip(*(cells for _, cells in parts), strict=True)),
         tuple(_coverage_notes(table, run)),
     )
+
+
+_COVERAGE_COUNTS = (
+    "Expected",
+    "Not run",
+    "OK",
+    "Unparsed",
+    "Refusal",
+    "Truncated",
+    "API error",
+    "Missing",
+)
 
 
 def _tokens(total: int | None) -> str:
@@ -206,7 +229,9 @@ def _cost(known: float, unknown: int, replies: int) -> str:
 
 
 def _coverage_notes(table: pd.DataFrame, run: Run) -> list[str]:
-    notes = ["Latency is the mean over replies that were not cached."]
+    notes = []
+    if table["latency_s"].notna().any():
+        notes.append("Latency is the mean over replies that were asked for in this run.")
     partly = table[table["tokens_unknown"].between(1, table["replies"] - 1)]
     if len(partly):
         counts = zip(partly["model"], partly["tokens_unknown"], partly["replies"], strict=True)

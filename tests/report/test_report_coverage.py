@@ -60,3 +60,22 @@ def test_an_unknown_cost_is_never_shown_as_zero() -> None:
         "dear": "$1,234.50",
         "unasked": NO_VALUE,
     }
+
+
+def test_columns_that_tell_nothing_are_not_shown() -> None:
+    run = run_of([record("alpha", attempts=0, latency_s=0.0)], manifest())
+    bare = coverage_view(coverage_frame(run), run)
+    always = ["Model", "Expected", "Not run", "OK", "Unparsed", "Refusal", "Truncated"]
+    always += ["API error", "Missing", "Cost"]
+    assert [column.name for column in bare.columns] == always
+    assert bare.notes == ()
+    run = run_of([record("alpha", prompt_tokens=1200, latency_s=0.25)], manifest())
+    full = coverage_view(coverage_frame(run), run)
+    assert [column.name for column in full.columns] == [
+        *always,
+        "Tokens in",
+        "Latency (s)",
+        "Requests",
+    ]
+    assert full.rows[0][-3:] == ("1,200", "0.25", "1")
+    assert full.rows[1][-3:] == (NO_VALUE, NO_VALUE, "0")
