@@ -1,0 +1,191 @@
+"""Blocks: the Euler convention, orientation classes against geometry, sizes and masses."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from phyblock.datasets import read_official
+from phyblock.domain import (
+    BLOCK_TYPES,
+    COLORS,
+    KIT_PALETTE,
+    SHAPES,
+    BlockType,
+    Euler,
+    euler_deg_to_quat_xyzw,
+    orientation_class,
+    quat_xyzw_to_matrix,
+)
+
+ANGLES = st.floats(-720, 720)
+EULERS = st.tuples(ANGLES, ANGLES, ANGLES)
+GRID_EULERS = st.tuples(*[st.sampled_from([-90, 0, 30, 45, 60, 90, 120, 180, 270])] * 3)
+TYPES = st.sampled_from(BLOCK_TYPES)
+
+
+def half_disc(radius: float, segments: int) -> list[tuple[float, float]]:
+    angles = [math.pi * i / segments for i in range(segments + 1)]
+    return [(radius * math.cos(angle), radius * math.sin(angle)) for angle in angles]
+
+
+def extruded(profile_yz: list[tuple[float, float]]) -> NDArray[np.float64]:
+    return np.array([(x, y, z) for x in (-0.025, 0.025) for y, z in profile_yz])
+
+
+def box(x: float, y: float, z: float) -> NDArray[np.float64]:
+    return np.array(list(itertools.product((-x, x), (-y, y), (-z, z))))
+
+
+# Vertices [m], written here apart from the package: a block looks the same in two orientations
+# when its vertices fall on the same points.
+VERTICES: dict[BlockType, NDArray[np.float64]] = {
+    "cube": box(0.025, 0.025, 0.025),
+    "cuboid1": box(0.025, 0.025, 0.0125),
+    "cuboid2": box(0.05, 0.025, 0.0125),
+    "cuboid3": box(0.075, 0.025, 0.0125),
+    "cylinder": np.array(
+        [
+            (0.025 * math.cos(math.pi * i / 9), 0.025 * math.sin(math.pi * i / 9), z)
+            for i in range(18)
+            for z in (-0.05, 0.05)
+        ]
+    ),
+    "semi_cylinder": extruded(half_disc(0.025, 10)),
+    "triangle": extruded([(-0.05 / 2**0.5, 0), (0.05 / 2**0.5, 0), (0, 0.05 / 2**0.5)]),
+    "arch": extruded(
+        [(-0.05, -0.025), (0.05, -0.025), (0.05, 0.025), (-0.05, 0.025)]
+        + [(y, z - 0.025) for y, z in half_disc(0.0375, 10)]
+    ),
+}
+
+
+def looks_alike(block_type: BlockType, one: Rotation, other: Rotation) -> bool:
+    a, b = one.apply(VERTICES[block_type]), other.apply(VERTICES[block_type])
+    distance_m = np.linalg.norm(a[:, None] - b[None], axis=2)
+    return bool(distance_m.min(axis=0).max() < 1e-5 and distance_m.min(axis=1).max() < 1e-5)
+
+
+def rotation(euler_deg: Euler) -> Rotation:
+    return Rotation.from_euler("xyz", euler_deg, degrees=True)
+
+
+@given(euler_deg=EULERS)
+def test_euler_angles_are_extrinsic_x_y_z(euler_deg: Euler) -> None:
+    quat_xyzw = euler_deg_to_quat_xyzw(euler_deg)
+    assert np.linalg.norm(quat_xyzw) == pytest.approx(1)
+    expected = rotation(euler_deg)
+    same_sign = np.sign(quat_xyzw @ expected.as_quat())
+    np.testing.assert_allclose(same_sign * quat_xyzw, expected.as_quat(), atol=1e-9)
+    np.testing.assert_allclose(quat_xyzw_to_matrix(quat_xyzw), expected.as_matrix(), atol=1e-9)
+
+
+def test_one_euler_angle_turns_about_its_own_axis() -> None:
+    for axis, euler_deg in enumerate([(90.0, 0.0, 0.0), (0.0, 90.0, 0.0), (0.0, 0.0, 90.0)]):
+        matrix = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(euler_deg))
+        unit = np.eye(3)
+        np.testing.assert_allclose(matrix @ unit[axis], unit[axis], atol=1e-12)
+        np.testing.assert_allclose(matrix @ unit[(axis + 1) % 3], unit[(axis + 2) % 3], atol=1e-12)
+
+
+@given(block_type=TYPES, one=GRID_EULERS, other=GRID_EULERS)
+def test_orientations_are_one_class_exactly_when_the_block_looks_alike(
+    block_type: BlockType, one: Euler, other: Euler
+) -> None:
+    same = orientation_class(block_type, one) == orientation_class(block_type, other)
+    assert same == looks_alike(block_type, rotation(one), rotation(other))
+
+
+def test_every_grid_orientation_of_every_type_is_classed_by_its_look() -> None:
+    looks = {"cube": 1, "cuboid1": 3, "cuboid2": 6, "cuboid3": 6, "cylinder": 6}
+    for block_type in BLOCK_TYPES:
+        classes = {orientation_class(block_type, euler) for euler in QUARTER_TURNS}
+        assert len(classes) == looks.get(block_type, 12)
+
+
+QUARTER_TURNS = list(itertools.product((0, 90, 180, 270), repeat=3))
+SYMMETRIES = {
+    block_type: [
+        turn
+        for turn in map(
+            rotation, [*QUARTER_TURNS, *((0, 0, angle) for angle in range(20, 360, 20))]
+        )
+        if looks_alike(block_type, turn, Rotation.identity())
+    ]
+    for block_type in BLOCK_TYPES
+}
+
+
+@given(block_type=TYPES, euler_deg=GRID_EULERS, data=st.data())
+def test_a_symmetry_of_the_block_leaves_its_class(
+    block_type: BlockType, euler_deg: Euler, data: st.DataObject
+) -> None:
+    turn = data.draw(st.sampled_from(SYMMETRIES[block_type]))
+    turned = (rotation(euler_deg) * turn).as_matrix()
+    # Angles of the turned block, by the textbook formulas for R = Rz Ry Rx.
+    pitch = -math.asin(max(-1.0, min(1.0, turned[2, 0])))
+    if abs(turned[2, 0]) < 1 - 1e-9:
+        roll = math.atan2(turned[2, 1], turned[2, 2])
+        yaw = math.atan2(turned[1, 0], turned[0, 0])
+    else:
+        roll, yaw = 0.0, math.atan2(-turned[0, 1], turned[1, 1])
+    again = (math.degrees(roll), math.degrees(pitch), math.degrees(yaw))
+    assert orientation_class(block_type, again) == orientation_class(block_type, euler_deg)
+
+
+@given(block_type=TYPES, euler_deg=GRID_EULERS, turns=st.tuples(*[st.integers(-2, 2)] * 3))
+def test_whole_turns_change_nothing(
+    block_type: BlockType, euler_deg: Euler, turns: tuple[int, int, int]
+) -> None:
+    more = tuple(angle + 360 * turn for angle, turn in zip(euler_deg, turns, strict=True))
+    assert orientation_class(block_type, more) == orientation_class(block_type, euler_deg)  # type: ignore[arg-type]
+
+
+def test_on_the_official_data_classes_and_euler_angles_tell_the_same_apart(
+    official_checkout: Path,
+) -> None:
+    used: dict[BlockType, set[Euler]] = {}
+    for task in read_official(official_checkout).tasks:
+        for block in (*task.scene.blocks, *task.candidates.candidates):
+            used.setdefault(block.type, set()).add(block.euler_deg)
+    for block_type, eulers in used.items():
+        classes = {orientation_class(block_type, euler) for euler in eulers}
+        assert len(classes) == len(eulers), block_type
+
+
+VOLUMES_CM3 = {
+    "cube": 125,
+    "cuboid1": 62.5,
+    "cuboid2": 125,
+    "cuboid3": 187.5,
+    "cylinder": 192.37,
+    "semi_cylinder": 48.28,
+    "triangle": 62.5,
+    "arch": 141.36,
+}
+CENTERS_Z_M = {"semi_cylinder": 0.01052, "triangle": 0.01179, "arch": 0.00708}
+
+
+@pytest.mark.parametrize("block_type", BLOCK_TYPES)
+def test_sizes_volumes_and_centers_of_mass(block_type: BlockType) -> None:
+    shape = SHAPES[block_type]
+    np.testing.assert_allclose(shape.low_m, VERTICES[block_type].min(axis=0), atol=1e-9)
+    np.testing.assert_allclose(shape.high_m, VERTICES[block_type].max(axis=0), atol=1e-9)
+    assert shape.volume_m3 * 1e6 == pytest.approx(VOLUMES_CM3[block_type], rel=1e-3)
+    assert shape.mass_kg == pytest.approx(1040 * shape.volume_m3)
+    center_z_m = CENTERS_Z_M.get(block_type, 0)
+    assert shape.center_of_mass_m == pytest.approx((0, 0, center_z_m), abs=1e-5)
+
+
+def test_the_kit_uses_every_type_and_color() -> None:
+    assert {block_type for block_type, _ in KIT_PALETTE} == set(BLOCK_TYPES) == set(SHAPES)
+    assert {color for _, color in KIT_PALETTE} == set(COLORS)
+    assert len(set(KIT_PALETTE)) == len(KIT_PALETTE) == 12
