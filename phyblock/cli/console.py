@@ -13,7 +13,7 @@ from rich.text import Text
 
 from phyblock.report import TextTable
 
-__all__ = ["make_console", "plain_table", "print_view", "shown_path"]
+__all__ = ["make_console", "plain_table", "print_view", "shown_path", "width_of"]
 
 _PLAIN_WIDTH = 160
 
@@ -47,6 +47,15 @@ def print_view(console: Console, view: TextTable) -> None:
     for note in view.notes:
         console.print(Text(note, style="dim"))
     console.print()
+
+
+def width_of(view: TextTable) -> int:
+    """Characters that a table takes when nothing in it is cut."""
+    widths = (
+        max(len(column.name), *(len(row[i]) for row in view.rows), 0)
+        for i, column in enumerate(view.columns)
+    )
+    return sum(width + 2 for width in widths) + 2
 
 
 def plain_table(headings: Sequence[str], rows: Sequence[Sequence[str]], *, numbers: int) -> Table:

@@ -43,7 +43,7 @@ def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> 
     unknown = [row.model for row in rows if row.calls and row.cost_usd is None]
     text = f"{calls:,} calls, about {_dollars(known)}"
     if unknown:
-        text += f" and what {', '.join(unknown)} cost (price unknown)"
+        text += f", and what {len(unknown)} models of unknown price cost (price: in models.yaml)"
     console.print(text + ".", soft_wrap=True, markup=False)
     if calls:
         console.print(

@@ -10,8 +10,9 @@ import click
 from phyblock.cli.console import make_console, plain_table, shown_path
 from phyblock.cli.files import find_models_file
 from phyblock.errors import ModelError, Problem, SpecError
-from phyblock.models import ModelConfig, api_key_status, check_model, price_of
+from phyblock.models import ModelConfig, api_key_status, price_of
 from phyblock.report import NO_VALUE
+from phyblock.run.check import check_model
 from phyblock.run.models import to_config
 from phyblock.specs import BASELINES, ModelSpec, SuiteSpec, load_models
 
@@ -47,6 +48,9 @@ def check(known: dict[str, ModelSpec], name: str) -> int:
         raise SpecError(Problem("models check", "is not in the models file", "", name, hint=hint))
     console = make_console()
     config = _config(name, known)
+    if config.kind != "litellm":
+        console.print(f"{name} is {config.kind}: it makes no calls.", markup=False)
+        return 0
     try:
         reply = asyncio.run(check_model(config))
     except ModelError as error:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from phyblock.cli.console import make_console, print_view, shown_path
+from phyblock.cli.console import make_console
+from phyblock.cli.summary import print_summary
 from phyblock.report import write_tables
 
 __all__ = ["command", "show_tables"]
@@ -23,9 +24,5 @@ def command(run: Path) -> None:
 
 
 def show_tables(folder: Path) -> None:
-    """Write and print all tables of a run folder."""
-    console = make_console()
-    written = write_tables(folder)
-    for view in written.views.values():
-        print_view(console, view)
-    console.print(f"Tables are in {shown_path(written.folder)}", soft_wrap=True)
+    """Write the tables of a run folder and print what matters of them."""
+    print_summary(make_console(), write_tables(folder))

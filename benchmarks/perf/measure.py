@@ -1,0 +1,59 @@
+"""Running a command as a whole process tree: wall time, CPU time and peak memory."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import psutil
+
+__all__ = ["Cost", "run_measured"]
+
+_EVERY_S = 0.05
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Wall and CPU seconds, and the peak of resident memory summed over the tree [MB]."""
+
+    wall_s: float
+    cpu_s: float
+    peak_mb: float
+
+
+def run_measured(command: Sequence[str], env: Mapping[str, str]) -> Cost:
+    """Run a command to its end; exits with its output when it fails."""
+    start = time.perf_counter()
+    process = subprocess.Popen(
+        command, env=dict(env), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    root = psutil.Process(process.pid)
+    peak = 0
+    cpu: dict[int, float] = {}
+    while process.poll() is None:
+        peak = max(peak, _sample(root, cpu))
+        time.sleep(_EVERY_S)
+    wall_s = time.perf_counter() - start
+    output = process.stdout.read() if process.stdout else ""
+    if process.returncode:
+        sys.exit(f"{' '.join(command)} failed ({process.returncode}):\n{output}")
+    return Cost(wall_s, sum(cpu.values()), peak / 1e6)
+
+
+def _sample(root: psutil.Process, cpu: dict[int, float]) -> int:
+    resident = 0
+    try:
+        tree = [root, *root.children(recursive=True)]
+    except psutil.NoSuchProcess:
+        return 0
+    for process in tree:
+        try:
+            times = process.cpu_times()
+            cpu[process.pid] = times.user + times.system
+            resident += process.memory_info().rss
+        except psutil.NoSuchProcess:
+            continue
+    return resident

@@ -1,0 +1,78 @@
+"""A run's tables in the terminal: what fits and matters; the files hold the rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rich.console import Console
+
+from phyblock.cli.console import print_view, shown_path, width_of
+from phyblock.report import TablesWritten, TextTable, largest_differences
+
+__all__ = ["print_summary"]
+
+_SIDE_METRICS = ("Prec", "Rec")
+_MET = 0.06
+"""Largest difference that rounding of the published numbers and of ours explains [points]."""
+
+
+def print_summary(console: Console, written: TablesWritten) -> None:
+    """Print Table 1, wrong steps over all levels, what was not answered, and the comparison."""
+    views = written.views
+    table1 = views["table1"]
+    if width_of(table1) > console.width:
+        table1 = _without(table1, _SIDE_METRICS)
+        note = "F1 alone, to fit; precision and recall are in tables/table1.md."
+        table1 = replace(table1, notes=(note, *table1.notes))
+    print_view(console, table1)
+    print_view(console, _overall(views["errors"]))
+    coverage = written.frames["coverage"]
+    if (coverage["ok"] < coverage["expected"]).any():
+        print_view(console, _answered(views["coverage"]))
+    if "published" in written.frames:
+        _print_comparison(console, written)
+    console.print(f"Tables are in {shown_path(written.folder)}", soft_wrap=True, markup=False)
+
+
+def _print_comparison(console: Console, written: TablesWritten) -> None:
+    frame = written.frames["published"].dropna(subset=["difference"])
+    largest = largest_differences(written.frames["published"])
+    names = [name for name in largest.index if name in set(frame["model"])]
+    if not names:
+        return
+    width = max(map(len, names))
+    console.print("Beside the paper's Table 1: largest difference in points", style="bold")
+    for name in names:
+        cells = int((frame["model"] == name).sum())
+        mark = "as published" if largest[name] <= _MET else "differs"
+        console.print(
+            f"{name:<{width}}  {largest[name]:>7.3f}  {cells} cells, {mark}", markup=False
+        )
+    console.print()
+
+
+def _overall(errors: TextTable) -> TextTable:
+    """The rows over all levels, each with its model's name."""
+    rows, model = [], ""
+    for row in errors.rows:
+        model = row[0] or model
+        if row[1] == "Overall":
+            rows.append((model, *row[2:]))
+    columns = (errors.columns[0], *errors.columns[2:])
+    return replace(errors, columns=columns, rows=tuple(rows))
+
+
+def _answered(coverage: TextTable) -> TextTable:
+    """Samples and outcomes; tokens and costs stay in the file."""
+    dropped = [c.name for c in coverage.columns if c.group not in ("", "Samples", "Outcome")]
+    side = ("Cost", "Latency (s)", "Requests", "Cached", "Attempts")
+    return replace(_without(coverage, (*dropped, *side)), notes=())
+
+
+def _without(view: TextTable, names: tuple[str, ...]) -> TextTable:
+    kept = [i for i, column in enumerate(view.columns) if column.name not in names]
+    return replace(
+        view,
+        columns=tuple(view.columns[i] for i in kept),
+        rows=tuple(tuple(row[i] for i in kept) for row in view.rows),
+    )
