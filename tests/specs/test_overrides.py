@@ -172,3 +172,9 @@ def test_a_bare_name_is_a_bundled_data_set(folder: Path) -> None:
 def test_a_prompt_that_is_a_word_has_no_path(folder: Path) -> None:
     with pytest.raises(ValueError, match="'default' is not a template file"):
         _ = load(folder).prompt_path
+
+
+def test_a_section_left_empty_in_the_file_can_be_filled(folder: Path) -> None:
+    path = folder / "suites" / "s.yaml"
+    path.write_text(SUITE + "limits:\n", encoding="utf-8")
+    assert load(folder, "limits.max_attempts=2").suite.limits.max_attempts == 2

@@ -119,3 +119,13 @@ def test_overrides_equal_editing_the_file(
 def test_a_suite_made_in_python_obeys_the_rules_between_fields(raw: dict[str, Any]) -> None:
     with pytest.raises(ValidationError, match="recorded replies come with the official data"):
         SuiteSpec.model_validate({**raw, "models": "recorded"})
+
+
+@given(raw=SUITES)
+def test_identity_does_not_depend_on_where_things_lie(raw: dict[str, Any]) -> None:
+    here = {**raw, "dataset": {"path": "./a"}, "prompt": "a.j2"}
+    there = {**raw, "dataset": {"path": "/b"}, "prompt": "b/c.j2"}
+    default = {**raw, "dataset": {}, "prompt": "default"}
+    identity = SuiteSpec.model_validate(here).identity()
+    assert SuiteSpec.model_validate(there).identity() == identity
+    assert SuiteSpec.model_validate(default).identity() != identity
