@@ -82,7 +82,8 @@ def contact_extent(
     """Area [m2] and length [m] of the contact of two touching pieces.
 
     `direction` is the unit contact normal, from the first to the second. The length counts only
-    where one of the two touches with an edge, as a cylinder that lies on a facet's edge does.
+    where one of the two touches with an edge, as a cylinder that lies on a facet's edge does, and
+    that edge lies inside the other's face: two edges that meet carry nothing.
     """
     basis = _plane_basis(direction)
     lower = _patch(first.vertices_m, direction, basis)
@@ -92,6 +93,8 @@ def contact_extent(
         return 0.0, 0.0
     if len(lower) > 2 and len(upper) > 2:
         return _area(shared), 0.0
+    if _depth_inside(shared.mean(axis=0), lower if len(lower) > 2 else upper) < _LINE_M:
+        return 0.0, 0.0
     return 0.0, float(np.linalg.norm(shared - shared[0], axis=1).max())
 
 
@@ -161,6 +164,14 @@ def _clip(subject: NDArray[np.float64], window: NDArray[np.float64]) -> NDArray[
                 corners.append(kept[i] + share * (kept[j] - kept[i]))
         kept = np.array(corners).reshape(-1, 2)
     return kept
+
+
+def _depth_inside(point: NDArray[np.float64], polygon: NDArray[np.float64]) -> float:
+    """Distance of a point from the nearest side of a convex polygon [m], positive inside."""
+    sides = np.roll(polygon, -1, axis=0) - polygon
+    inward = np.stack([-sides[:, 1], sides[:, 0]], axis=1)
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    return float(np.einsum("ij,ij->i", point - polygon, inward).min())
 
 
 def _area(polygon: NDArray[np.float64]) -> float:

@@ -44,7 +44,7 @@ RENDER_VERSION = 1
 """Raised whenever the same input gives other pixels, so that stored pictures are made again."""
 
 _GOAL_WINDOW = Window(-0.84, 0.84, -0.84, 0.84)
-_GOAL_MIN_DISTANCE_M = 0.6
+_GOAL_MIN_DISTANCE_M = 0.48
 _CELL_WINDOW = Window(-0.86, 0.86, 2 * LABEL_STRIP - 1.0, 0.86)
 _LARGEST_DIAGONAL_M = 0.16
 _SIZE_CUE = 0.25

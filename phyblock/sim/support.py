@@ -33,7 +33,7 @@ CONTACT_TOLERANCE_M = 0.0015
 """Blocks closer than this touch [m]."""
 _MAX_CONTACT_OVERLAP_M = 0.003
 _MIN_VERTICAL = 0.7
-_MIN_AREA_M2 = 4e-6
+_MIN_AREA_M2 = 1e-5
 _MIN_LENGTH_M = 0.005
 
 

@@ -1,0 +1,15 @@
+"""Scenes and candidate sets made here, with ground truth from geometry and physics."""
+
+from phyblock.generate.acceptance import accept, form_problems, physics_problems
+from phyblock.generate.candidates import make_candidates
+from phyblock.generate.dataset import designed_scenes, scene_line, write_dataset
+
+__all__ = [
+    "accept",
+    "designed_scenes",
+    "form_problems",
+    "make_candidates",
+    "physics_problems",
+    "scene_line",
+    "write_dataset",
+]

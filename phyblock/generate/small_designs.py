@@ -1,0 +1,122 @@
+"""Structures of levels 1 and 2, designed by hand: up to five blocks, up to three or four layers.
+
+Coordinates are grid units of 2.5 cm; y runs along the front that the camera sees best.
+"""
+
+from __future__ import annotations
+
+from phyblock.generate.sketch import Design, Sketch
+
+__all__ = ["LEVEL_1", "LEVEL_2"]
+
+
+def _gate(s: Sketch) -> None:
+    s.put("arch")
+    s.put("cuboid2", pose="flat-y")
+    s.put("triangle")
+
+
+def _lighthouse(s: Sketch) -> None:
+    s.put("cube", color="blue")
+    s.put("cylinder")
+    s.put("semi_cylinder", pose="dome-turned")
+
+
+def _cottage(s: Sketch) -> None:
+    s.put("cube", -1, color="yellow")
+    s.put("cube", 1, color="green")
+    s.put("cuboid2", pose="flat-y")
+    s.put("triangle")
+
+
+def _dolmen(s: Sketch) -> None:
+    s.pair("cylinder", 2)
+    s.put("cuboid3", pose="flat-y")
+    s.put("triangle")
+
+
+def _boat(s: Sketch) -> None:
+    s.put("arch", pose="cradle")
+    s.put("cuboid3", pose="flat-y")
+    s.put("cube", color="blue")
+
+
+def _dog(s: Sketch) -> None:
+    s.put("arch")
+    s.put("cube", 1, color="blue")
+    s.put("triangle", -1, pose="ramp-y")
+    s.put("semi_cylinder", 1)
+
+
+def _bench(s: Sketch) -> None:
+    s.pair("cuboid1", 2)
+    s.put("cuboid3", pose="flat-y")
+    s.put("semi_cylinder", 2, pose="dome")
+
+
+def _slide(s: Sketch) -> None:
+    s.put("cube", color="red")
+    s.put("triangle", 2, pose="ramp+y")
+    s.put("cuboid1")
+
+
+def _castle_gate(s: Sketch) -> None:
+    s.put("arch")
+    s.pair("cube", 3, color="green")
+    s.pair("triangle", 3, poses=("roof", "roof"))
+
+
+def _bridge(s: Sketch) -> None:
+    s.put("arch")
+    s.pair("triangle", 3, poses=("ramp-y", "ramp+y"))
+    s.put("cuboid2", pose="flat-y")
+    s.put("semi_cylinder")
+
+
+def _locomotive(s: Sketch) -> None:
+    s.pair("cylinder", 2, poses=("lying-x", "lying-x"))
+    s.put("cuboid3", pose="flat-y")
+    s.put("cube", -2, color="blue")
+    s.put("semi_cylinder", 1.5, pose="round+y")
+
+
+def _sofa(s: Sketch) -> None:
+    s.put("cuboid2", pose="flat-y")
+    s.put("cuboid3", x=-1.5, pose="edge-y")
+    s.pair("cube", 3, color="red")
+    s.put("cuboid1")
+
+
+def _chapel(s: Sketch) -> None:
+    s.put("cuboid3", pose="flat-y")
+    s.put("cube", 2, color="green")
+    s.put("arch", -1, pose="gate")
+    s.put("semi_cylinder", -1)
+    s.put("triangle", 2)
+
+
+def _rocket(s: Sketch) -> None:
+    s.put("cylinder")
+    s.pair("triangle", 2, poses=("ramp-y", "ramp+y"))
+    s.put("cube", color="red")
+    s.put("triangle")
+
+
+LEVEL_1: dict[str, Design] = {
+    "l1-bench": _bench,
+    "l1-boat": _boat,
+    "l1-cottage": _cottage,
+    "l1-dog": _dog,
+    "l1-dolmen": _dolmen,
+    "l1-gate": _gate,
+    "l1-lighthouse": _lighthouse,
+    "l1-slide": _slide,
+}
+LEVEL_2: dict[str, Design] = {
+    "l2-bridge": _bridge,
+    "l2-castle-gate": _castle_gate,
+    "l2-chapel": _chapel,
+    "l2-locomotive": _locomotive,
+    "l2-rocket": _rocket,
+    "l2-sofa": _sofa,
+}
