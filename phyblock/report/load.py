@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pandas as pd
-import yaml
 
 from phyblock.errors import Problem, StoreError
 from phyblock.report.design import Design, read_design
 from phyblock.report.flat import TEXTS, flat_record, flat_scores, frame_of
+from phyblock.run.reading import MANIFEST, RecordLines, read_manifest
 
 __all__ = ["Frames", "Run", "frames_from", "load_run"]
 
@@ -32,8 +31,8 @@ class Run:
     `records` has one row a sample: track, model, scene, levels, parents, n_blocks, seed, outcome,
     the reply's text, tokens, cost_usd, latency_s and so on, error, prompt, parsed plan. `scores`
     has one row a sample, criterion, matcher ("" where a criterion knows none) and setting with the
-    counts tp, fp, fn and the four error types (missing where there are none). `cut_lines` is 1
-    where the last line was cut off by a kill and therefore ignored.
+    counts tp, fp, fn and the four error types (missing where there are none). `is_cut` says
+    that the last line was cut off by a kill and therefore ignored.
     """
 
     path: Path
@@ -41,7 +40,7 @@ class Run:
     design: Design = field(repr=False)
     records: pd.DataFrame = field(repr=False)
     scores: pd.DataFrame = field(repr=False)
-    cut_lines: int = 0
+    is_cut: bool = False
 
 
 def load_run(path: str | Path, *, texts: bool = True) -> Run:
@@ -51,11 +50,11 @@ def load_run(path: str | Path, *, texts: bool = True) -> Run:
     `records.jsonl` other than an unfinished last one.
     """
     folder = Path(path)
-    manifest = _read_manifest(folder / "run.yaml")
-    design = read_design(manifest, str(folder / "run.yaml"))
-    lines = _Lines(folder / "records.jsonl")
+    manifest = read_manifest(folder)
+    design = read_design(manifest, str(folder / MANIFEST))
+    lines = RecordLines(folder)
     records, scores = _frames(lines, design, texts=texts)
-    return Run(folder, manifest, design, records, scores, lines.cut)
+    return Run(folder, manifest, design, records, scores, lines.is_cut)
 
 
 def frames_from(records: Iterable[Mapping[str, Any]], manifest: Mapping[str, Any]) -> Frames:
@@ -105,47 +104,3 @@ def _flatten(where: str, record: Mapping[str, Any]) -> tuple[dict[str, Any], lis
 
 
 _HINT = "remove this line; the next `phyblock run` asks for the sample again"
-
-
-class _Lines:
-    """Records of a file with where they stand; `cut` counts an unfinished last line."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.cut = 0
-
-    def __iter__(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
-        try:
-            with self.path.open("rb") as file:
-                yield from self._parse(file)
-        except FileNotFoundError:
-            return
-        except OSError as error:
-            raise StoreError(Problem(str(self.path), f"cannot be read: {error}")) from error
-
-    def _parse(self, lines: Iterable[bytes]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-        for number, line in enumerate(lines, 1):
-            if not line.endswith(b"\n"):
-                self.cut = 1
-                return
-            where = f"{self.path}:{number}"
-            try:
-                record = json.loads(line)
-            except ValueError as error:
-                raise StoreError(Problem(where, f"not JSON: {error}", hint=_HINT)) from error
-            if not isinstance(record, dict):
-                raise StoreError(Problem(where, "not a record", found=str(record)[:80], hint=_HINT))
-            yield where, record
-
-
-def _read_manifest(path: Path) -> dict[str, Any]:
-    try:
-        manifest = yaml.safe_load(path.read_text("utf-8"))
-    except FileNotFoundError as error:
-        hint = "give the folder that `phyblock run` wrote"
-        raise StoreError(Problem(str(path), "not found, so no run is here", hint=hint)) from error
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise StoreError(Problem(str(path), f"cannot be read: {error}")) from error
-    if not isinstance(manifest, dict):
-        raise StoreError(Problem(str(path), "must hold a mapping", found=str(manifest)[:80]))
-    return manifest

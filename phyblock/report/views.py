@@ -237,6 +237,6 @@ def _coverage_notes(table: pd.DataFrame, run: Run) -> list[str]:
         counts = zip(partly["model"], partly["tokens_unknown"], partly["replies"], strict=True)
         listed = ", ".join(f"{model} {unknown} of {replies}" for model, unknown, replies in counts)
         notes.append(f"Tokens are sums over the replies that tell them; these do not: {listed}.")
-    if run.cut_lines:
+    if run.is_cut:
         notes.append("The last line of records.jsonl was cut off and is ignored.")
     return notes

@@ -11,8 +11,8 @@ from phyblock.models import estimate as estimate_call
 from phyblock.resources import reply_cache_file
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan, sample_id
+from phyblock.run.reading import MANIFEST, read_records
 from phyblock.run.records import is_final
-from phyblock.run.store import MANIFEST, read_records
 
 __all__ = ["Estimate", "estimate"]
 

@@ -13,8 +13,8 @@ import yaml
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.parsing import PlanParser
 from phyblock.run.plan import open_dataset, planning_rules
+from phyblock.run.reading import MANIFEST, RECORDS, read_manifest, read_records
 from phyblock.run.records import judged
-from phyblock.run.store import MANIFEST, RECORDS, read_manifest, read_records
 from phyblock.scoring import Matcher
 from phyblock.specs import SuiteSpec
 from phyblock.tasks import FullPlanning

@@ -22,7 +22,8 @@ from phyblock.resources import reply_cache_file
 from phyblock.run.events import ModelNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.plan import RunPlan
-from phyblock.run.store import RunStore, read_records
+from phyblock.run.reading import read_records
+from phyblock.run.store import RunStore
 
 __all__ = ["Session", "check_ready"]
 

@@ -1,4 +1,4 @@
-"""A run on disk: `run.yaml`, written first and never changed, and `records.jsonl`.
+"""Writing a run: `run.yaml`, written first and never changed, and `records.jsonl`.
 
 Records are appended and synced one at a time, so a kill at any moment loses nothing that was
 written; a line that a kill cut short is dropped when the run is opened again. A later record of a
@@ -10,7 +10,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from io import FileIO
 from pathlib import Path
 from typing import IO, Any
@@ -18,36 +18,11 @@ from typing import IO, Any
 import yaml
 
 from phyblock.errors import Problem, StoreError
+from phyblock.run.reading import MANIFEST, RECORDS, RecordLines, read_manifest
 
-__all__ = ["MANIFEST", "RECORDS", "RunStore", "read_manifest", "read_records"]
+__all__ = ["RunStore"]
 
-MANIFEST = "run.yaml"
-RECORDS = "records.jsonl"
 _LOCK = ".lock"
-
-
-def read_manifest(folder: Path) -> dict[str, Any]:
-    """The run's manifest; StoreError when there is none or it cannot be read."""
-    path = folder / MANIFEST
-    try:
-        manifest = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        allowed = "a folder that phyblock run wrote"
-        raise StoreError(Problem(str(folder), f"holds no {MANIFEST}", allowed=allowed)) from error
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise StoreError(Problem(str(path), f"cannot be read: {error}")) from error
-    if not isinstance(manifest, dict) or "identity" not in manifest:
-        raise StoreError(Problem(str(path), "is not a run manifest", "identity"))
-    return manifest
-
-
-def read_records(folder: Path) -> dict[str, dict[str, Any]]:
-    """The newest record of every sample, by sample id, in order of first appearance.
-
-    An unfinished last line, which a kill leaves behind, is passed over; any other line that is
-    not a record is a StoreError naming file and line.
-    """
-    return {record["sample"]: record for record, _ in _lines(folder / RECORDS)}
 
 
 class RunStore:
@@ -140,38 +115,11 @@ class RunStore:
         os.replace(partial, path)
 
     def _drop_cut_line(self) -> None:
-        path = self.folder / RECORDS
-        whole = sum(size for _, size in _lines(path))
-        if whole < path.stat().st_size:
-            os.truncate(path, whole)
-
-
-def _lines(path: Path) -> Iterator[tuple[dict[str, Any], int]]:
-    """Whole records with the bytes they take; stops before an unfinished last line."""
-    try:
-        handle = path.open("rb")
-    except FileNotFoundError:
-        return
-    except OSError as error:
-        raise StoreError(Problem(str(path), f"cannot be read: {error.strerror}")) from error
-    with handle:
-        for number, line in enumerate(handle, 1):
-            if not line.endswith(b"\n"):
-                return
-            yield _parse(path, number, line), len(line)
-
-
-def _parse(path: Path, number: int, line: bytes) -> dict[str, Any]:
-    hint = "restore the file from a copy, or remove this line: its sample is then run again"
-    try:
-        record = json.loads(line)
-    except ValueError as error:
-        where = f"{path}:{number}"
-        raise StoreError(Problem(where, f"is not a record: {error}", hint=hint)) from error
-    if not isinstance(record, dict) or not isinstance(record.get("sample"), str):
-        where = f"{path}:{number}"
-        raise StoreError(Problem(where, "is not a record", "sample", hint=hint))
-    return record
+        lines = RecordLines(self.folder)
+        for _ in lines:
+            pass
+        if lines.is_cut:
+            os.truncate(lines.path, lines.whole_bytes)
 
 
 def _changed(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:

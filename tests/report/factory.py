@@ -34,6 +34,7 @@ def manifest(
 ) -> dict[str, Any]:
     named = [(model, None) if isinstance(model, str) else model for model in models]
     return {
+        "identity": "0" * 64,
         "suite": {
             "name": "test",
             "levels": list(levels),

@@ -100,11 +100,11 @@ def test_a_cut_last_line_is_passed_over_and_counted(
         file.write(line[:kept])
     run = load_run(folder)
     assert run.records["model"].tolist() == ["alpha"]
-    assert run.cut_lines == 1
+    assert run.is_cut
 
 
 def test_a_whole_file_has_no_cut_line(tmp_path: Path) -> None:
-    assert load_run(write_run(tmp_path / "run", [record()], manifest())).cut_lines == 0
+    assert not load_run(write_run(tmp_path / "run", [record()], manifest())).is_cut
 
 
 def test_a_run_without_records_is_empty(tmp_path: Path) -> None:
@@ -118,10 +118,10 @@ def test_a_run_without_records_is_empty(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ('{"sample": "x', "not JSON"),
-        ("\0\0\0", "not JSON"),
-        ("[1, 2]", "not a record"),
-        ("{}", "no 'sample'"),
+        ('{"sample": "x', "is not a record: "),
+        ("\0\0\0", "is not a record: "),
+        ("[1, 2]", "is not a record"),
+        ("{}", "is not a record"),
         (json.dumps(record() | {"seed": "first"}), "not in the run format"),
         (json.dumps(record() | {"scores": [{"criterion": "aov"}]}), "no 'matcher'"),
         (json.dumps(record() | {"reply": "text"}), "not in the run format"),
@@ -141,7 +141,7 @@ def test_a_corrupt_line_is_named(tmp_path: Path, line: str, said: str) -> None:
 
 
 def test_a_folder_that_is_no_run_is_said_so(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match=r"run\.yaml: not found"):
+    with pytest.raises(StoreError, match=r"holds no run\.yaml"):
         load_run(tmp_path)
 
 
