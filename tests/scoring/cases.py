@@ -1,0 +1,98 @@
+"""Random small scenes with candidates and plans, and plain re-implementations to check against."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+from hypothesis import strategies as st
+
+from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.scoring import Setting
+from tests.domain.graphs import acyclic
+
+# Both types look the same after a half turn about z, so 0 and 180 are one orientation.
+TYPES = ("arch", "cuboid3")
+COLORS = ("red", "blue")
+YAWS_DEG = (0.0, 90.0, 180.0)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene, a candidate set and a plan for it."""
+
+    scene: Scene
+    candidates: CandidateSet
+    plan: Plan
+
+
+@st.composite
+def cases(draw: st.DrawFn, max_blocks: int = 6, max_steps: int = 8) -> Case:
+    """Few looks and many dependencies, so that choices matter; candidates may be lacking."""
+    edges = draw(acyclic(max_blocks).filter(bool))
+    kinds = st.tuples(st.sampled_from(TYPES), st.sampled_from(COLORS))
+    palette = draw(st.lists(kinds, min_size=1, max_size=3))
+    blocks = tuple(
+        Block(
+            vertex + 1,
+            *draw(st.sampled_from(palette)),
+            (0.0, 0.0, 0.0),
+            (0.0, 0.0, draw(st.sampled_from(YAWS_DEG))),
+            tuple(sorted(other + 1 for other in needed)),
+            1,
+        )
+        for vertex, needed in enumerate(edges)
+    )
+    pool = [
+        Candidate(kind, color, (0.0, 0.0, yaw))
+        for kind in TYPES
+        for color in COLORS
+        for yaw in YAWS_DEG[:2]
+    ]
+    chosen = draw(st.permutations(pool))[: draw(st.integers(1, len(pool)))]
+    steps = draw(st.lists(st.integers(1, len(chosen)), max_size=max_steps))
+    scene = Scene("s", draw(st.sampled_from([(1, 2), (3,)])), blocks, ("s",))
+    return Case(scene, CandidateSet(tuple(chosen)), Plan(tuple(steps)))
+
+
+def equal(block: Block, candidate: Candidate, setting: Setting) -> bool:
+    """Whether a candidate stands for a block, said without orientation classes."""
+    same_kind = (block.type, block.color) == (candidate.type, candidate.color)
+    same_yaw = block.euler_deg[2] % 180 == candidate.euler_deg[2] % 180
+    return same_kind and (same_yaw or setting == "B")
+
+
+def choices(case: Case, index: int, placed: frozenset[int], setting: Setting) -> list[Block]:
+    """Unplaced ready blocks, in file order, that a step may place; `placed` holds orders."""
+    candidate = case.candidates[index]
+    return [
+        block
+        for block in case.scene.blocks
+        if block.order not in placed
+        and placed.issuperset(block.depend)
+        and equal(block, candidate, setting)
+    ]
+
+
+def greedy_tp(case: Case, setting: Setting) -> int:
+    """Algorithm 1: every step takes the first block that it may place."""
+    placed: frozenset[int] = frozenset()
+    for index in case.plan.steps:
+        placed |= {block.order for block in choices(case, index, placed, setting)[:1]}
+    return len(placed)
+
+
+def greatest_tp(case: Case, setting: Setting) -> int:
+    """The most true positives over every sequence of choices, skipping a step among them."""
+
+    @functools.cache
+    def best(step: int, placed: frozenset[int]) -> int:
+        if step == len(case.plan):
+            return 0
+        taken = [
+            1 + best(step + 1, placed | {block.order})
+            for block in choices(case, case.plan.steps[step], placed, setting)
+        ]
+        return max([best(step + 1, placed), *taken])
+
+    return best(0, frozenset())

@@ -1,0 +1,97 @@
+"""Error types: one for each wrong step, and the right one."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+
+from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.scoring import (
+    ERROR_TYPES,
+    MATCHERS,
+    SETTINGS,
+    ErrorType,
+    Goal,
+    Matcher,
+    Setting,
+    count_errors,
+    match_plan,
+    step_errors,
+)
+from tests.scoring.cases import Case, cases, equal
+
+FLAT, TURNED = (0.0, 0.0, 0.0), (0.0, 0.0, 90.0)
+
+
+def errors_of(case: Case, setting: Setting, matcher: Matcher) -> tuple[ErrorType | None, ...]:
+    goal = Goal(case.scene, case.candidates, setting)
+    match = match_plan(goal, case.plan, matcher)
+    return step_errors(case.scene, case.candidates, goal, case.plan, match)
+
+
+def true_of(case: Case, setting: Setting, index: int, placed: set[int]) -> ErrorType:
+    """The four definitions, each written out whole, of which exactly one must hold."""
+    candidate = case.candidates[index]
+    of_kind = [b for b in case.scene.blocks if b.kind == candidate.kind]
+    free = [b for b in of_kind if b.order not in placed]
+    free_equal = [b for b in free if equal(b, candidate, setting)]
+    holds: dict[ErrorType, bool] = {
+        "shape_not_in_gt": not of_kind,
+        "overflow": bool(of_kind) and not free,
+        "incorrect_orientation": bool(free) and not free_equal,
+        "dependency_not_met": bool(free_equal)
+        and not any(placed.issuperset(b.depend) for b in free_equal),
+    }
+    (name,) = (name for name, true in holds.items() if true)
+    return name
+
+
+@pytest.mark.parametrize("matcher", MATCHERS)
+@pytest.mark.parametrize("setting", SETTINGS)
+@given(case=cases(max_blocks=8, max_steps=12))
+def test_each_wrong_step_has_exactly_the_one_type_that_holds(
+    setting: Setting, matcher: Matcher, case: Case
+) -> None:
+    match = match_plan(Goal(case.scene, case.candidates, setting), case.plan, matcher)
+    errors = errors_of(case, setting, matcher)
+    placed: set[int] = set()
+    for index, vertex, error in zip(case.plan.steps, match.vertices, errors, strict=True):
+        if vertex is None:
+            assert error == true_of(case, setting, index, placed)
+        else:
+            assert error is None
+            placed.add(case.scene.blocks[vertex].order)
+    counted = count_errors(errors)
+    assert tuple(counted) == ERROR_TYPES
+    assert sum(counted.values()) == match.counts.fp
+
+
+@pytest.mark.parametrize("matcher", MATCHERS)
+@given(case=cases())
+def test_orientation_is_never_wrong_where_it_is_not_compared(matcher: Matcher, case: Case) -> None:
+    assert "incorrect_orientation" not in errors_of(case, "B", matcher)
+
+
+def test_the_four_types() -> None:
+    position = (0.0, 0.0, 0.0)
+    blocks = (
+        Block(1, "cuboid3", "red", position, FLAT, (), 1),
+        Block(2, "arch", "red", position, FLAT, (1,), 2),
+    )
+    candidates = CandidateSet(
+        (
+            Candidate("cuboid3", "red", FLAT),
+            Candidate("arch", "red", FLAT),
+            Candidate("arch", "red", TURNED),
+            Candidate("arch", "blue", FLAT),
+        )
+    )
+    scene = Scene("s", (3,), blocks, ("s",))
+    case = Case(scene, candidates, Plan((4, 2, 3, 1, 1, 2, 3)))
+    overflow, early = "overflow", "dependency_not_met"
+    assert errors_of(case, "A", "paper") == (
+        "shape_not_in_gt", early, "incorrect_orientation", None, overflow, None, overflow,
+    )  # fmt: skip
+    assert errors_of(case, "B", "paper") == (
+        "shape_not_in_gt", early, early, None, overflow, None, overflow,
+    )  # fmt: skip

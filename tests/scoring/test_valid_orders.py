@@ -1,0 +1,40 @@
+"""The law of the headline metric, on every scene there is: a valid order scores exactly 1."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from phyblock.datasets import AssemblyTask, read_builtin, read_official
+from phyblock.domain import Plan
+from phyblock.scoring import SETTINGS, Goal, match_plan
+
+ORDERS = 200
+BUNDLED = sorted((Path(__file__).parents[2] / "benchmarks" / "data").glob("*/scenes.jsonl"))
+
+
+def assert_every_order_scores_1(task: AssemblyTask, rng: np.random.Generator) -> None:
+    number = [task.candidates.index_of(block.look) for block in task.scene.blocks]
+    steps = [index for index in number if index is not None]
+    assert len(steps) == len(number), task.scene.id
+    goals = [Goal(task.scene, task.candidates, setting) for setting in SETTINGS]
+    for order in {task.scene.graph.random_order(rng) for _ in range(ORDERS)}:
+        assert task.scene.graph.is_valid(order)
+        plan = Plan(tuple(steps[vertex] for vertex in order))
+        for goal in goals:
+            assert match_plan(goal, plan, "optimal").counts.f1 == 1, (task.scene.id, order)
+
+
+def test_valid_orders_of_the_official_scenes_score_1(official_checkout: Path) -> None:
+    rng = np.random.default_rng(0)
+    for task in read_official(official_checkout).tasks:
+        assert_every_order_scores_1(task, rng)
+
+
+@pytest.mark.parametrize("path", BUNDLED, ids=lambda path: path.parent.name)
+def test_valid_orders_of_the_bundled_scenes_score_1(path: Path) -> None:
+    rng = np.random.default_rng(0)
+    for task in read_builtin(path.parent).tasks:
+        assert_every_order_scores_1(task, rng)
