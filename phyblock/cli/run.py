@@ -34,7 +34,11 @@ _INTERRUPTED = 130
 @click.option(
     "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Override a value of the suite."
 )
-@click.option("--models", metavar="A,B", help="Run only these models of the suite.")
+@click.option(
+    "--models",
+    metavar="A,B",
+    help="Run these models in place of the suite's: any of models.yaml or the baselines.",
+)
 @click.option(
     "--limit", type=click.IntRange(min=1), metavar="N", help="Run N scenes, spread over levels."
 )

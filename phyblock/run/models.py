@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,32 +29,42 @@ class PlannedModel:
 def plan_models(
     loaded: LoadedSuite, known: Mapping[str, ModelSpec], only: Sequence[str]
 ) -> tuple[PlannedModel, ...]:
-    """The suite's models in its order; `only` keeps some of them.
+    """The suite's models in its order, or those that `only` names, in its order.
 
-    Raises SpecError for a name that is not known, DataError where no recordings are found.
+    `only` may name any known model, in the suite or not; of recordings, any that is there. Raises
+    SpecError for a name that is not known, DataError where no recordings are found.
     """
     if loaded.suite.models == RECORDED:
-        planned = tuple(
-            PlannedModel(name, _replay(name, folder), match_published(name))
-            for name, folder in recorded_models(loaded.dataset_path).items()
+        folders = recorded_models(loaded.dataset_path)
+        _check_known(only, list(folders))
+        return tuple(
+            PlannedModel(name, _replay(name, folders[name]), match_published(name))
+            for name in only or folders
         )
+    if only:
+        _check_known(only, [*BASELINES, *known])
+        specs = {name: known.get(name) for name in only}
     else:
         specs = resolve_models(loaded, known)
-        planned = tuple(
-            PlannedModel(
-                name,
-                to_config(name, spec, loaded.suite),
-                match_published(name) if spec is None else spec.published or match_published(name),
-                None if spec is None else spec.size_b,
-            )
-            for name, spec in specs.items()
-        )
-    names = [model.name for model in planned]
-    unknown = ", ".join(name for name in only if name not in names)
-    if unknown:
-        problem = Problem("--models", "is not in the suite", "", unknown, ", ".join(names))
-        raise SpecError(problem)
-    return tuple(model for model in planned if not only or model.name in only)
+    return tuple(_planned(name, spec, loaded.suite) for name, spec in specs.items())
+
+
+def _check_known(names: Sequence[str], known: Sequence[str]) -> None:
+    problems = []
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1)
+            hint = f"did you mean {near[0]}?" if near else "list them: phyblock models"
+            message = "is neither in the models file nor a built-in baseline"
+            problems.append(Problem("--models", message, "", name, hint=hint))
+    if problems:
+        raise SpecError(problems)
+
+
+def _planned(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> PlannedModel:
+    published = match_published(name) if spec is None else spec.published or match_published(name)
+    size_b = None if spec is None else spec.size_b
+    return PlannedModel(name, to_config(name, spec, suite), published, size_b)
 
 
 def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfig:
