@@ -13,7 +13,7 @@ from phyblock.models.cost import Budget, Estimate, cost_usd, estimate
 from phyblock.models.events import EventKind, ModelEvent, Observer
 from phyblock.models.keys import hidden
 from phyblock.models.limits import ModelLimiter
-from phyblock.models.payload import wire_messages, wire_params
+from phyblock.models.payload import wire_params
 from phyblock.models.retry import RetryPolicy, with_retries
 from phyblock.models.transport import Call, SeedRefusedError, Transport
 
@@ -101,7 +101,7 @@ class ChatModel:
         request = question.request
         params = wire_params(self._config, request)
         seed = request.seed if self._takes_seed else None
-        call = Call(wire_messages(request.messages), params, seed)
+        call = Call(request.messages, params, seed)
         try:
             reply = await self._send_paid(call, question)
         except SeedRefusedError as refusal:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import asyncio
 import json
 import time
+import urllib.parse
+import urllib.request
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +19,7 @@ from phyblock.models.base import Reply
 from phyblock.models.completions import read_completion
 from phyblock.models.config import ModelConfig
 from phyblock.models.keys import api_key, hidden
+from phyblock.models.payload import json_body
 from phyblock.models.transport import (
     Call,
     SeedRefusedError,
@@ -41,6 +44,7 @@ class DirectTransport:
         self._secrets = secrets
         base = config.api_base or OPENAI_API_BASE
         self._url = f"{base.rstrip('/')}/chat/completions"
+        self._proxy = _proxy_for(self._url)
         self._session: aiohttp.ClientSession | None = None
 
     async def send(self, call: Call) -> Reply:
@@ -51,7 +55,9 @@ class DirectTransport:
         data, headers = self._encode(call)
         started = time.perf_counter()
         try:
-            async with session.post(self._url, data=data, headers=headers) as response:
+            async with session.post(
+                self._url, data=data, headers=headers, proxy=self._proxy
+            ) as response:
                 status, answered = response.status, response.headers
                 body = await response.read()
         except (aiohttp.ClientError, asyncio.TimeoutError, OSError) as error:
@@ -75,7 +81,6 @@ class DirectTransport:
             self._session = aiohttp.ClientSession(
                 connector=aiohttp.TCPConnector(limit=0),
                 timeout=aiohttp.ClientTimeout(total=self._config.timeout_s),
-                trust_env=True,
             )
         return self._session
 
@@ -83,15 +88,15 @@ class DirectTransport:
         params = dict(call.params)
         extra_body = params.pop("extra_body", {})
         extra_headers = params.pop("extra_headers", {})
-        body = {"model": self._config.provider_model, "messages": call.messages, **params}
+        fields = {"model": self._config.provider_model, **params}
         if call.seed is not None:
-            body["seed"] = call.seed
+            fields["seed"] = call.seed
         headers = {
             "Authorization": f"Bearer {api_key(self._config)}",
             "Content-Type": "application/json",
             **extra_headers,
         }
-        return json.dumps({**body, **extra_body}).encode(), headers
+        return json_body({**fields, **extra_body}, call.messages), headers
 
     def _decode(self, body: bytes) -> object:
         try:
@@ -113,6 +118,14 @@ class DirectTransport:
         self, status: int | None, message: str, retry_after_s: float | None = None
     ) -> ModelError:
         return classify(status, hidden(message, self._secrets), retry_after_s=retry_after_s)
+
+
+def _proxy_for(url: str) -> str | None:
+    """The proxy that the environment names for this address, looked up once and not per call."""
+    parts = urllib.parse.urlsplit(url)
+    if urllib.request.proxy_bypass(parts.hostname or ""):
+        return None
+    return urllib.request.getproxies().get(parts.scheme)
 
 
 def _message(body: bytes) -> str:

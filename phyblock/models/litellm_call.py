@@ -19,6 +19,7 @@ from phyblock.models.base import Reply
 from phyblock.models.completions import read_completion
 from phyblock.models.config import ModelConfig
 from phyblock.models.keys import api_key, hidden
+from phyblock.models.payload import wire_messages
 from phyblock.models.transport import (
     Call,
     SeedRefusedError,
@@ -34,6 +35,7 @@ __all__ = ["LitellmTransport"]
 
 _DEFAULTS = {
     "LITELLM_LOCAL_MODEL_COST_MAP": "True",  # else the import fetches the price map
+    "MAX_BASE64_LENGTH_FOR_LOGGING": "0",  # else a regex goes over every picture for its log
     "LITELLM_MODE": "PRODUCTION",  # else the import reads keys from any .env file above
 }
 _MALFORMED = re.compile("Unable to get json response|Error converting to valid response")
@@ -78,7 +80,7 @@ class LitellmTransport:
         arguments = {
             **call.params,
             "model": self._config.id,
-            "messages": call.messages,
+            "messages": wire_messages(call.messages),
             "timeout": self._config.timeout_s,
             "num_retries": 0,
             "max_retries": 0,

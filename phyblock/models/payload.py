@@ -1,15 +1,23 @@
-"""From a request to the JSON of the OpenAI chat protocol, which litellm speaks too."""
+"""From a request to the JSON of the OpenAI chat protocol, which litellm speaks too.
+
+`wire_messages` gives messages as litellm takes them, `json_body` a whole request body as bytes;
+both say the same. Pictures make up nearly all of a body, so they enter it without passing through
+the JSON encoder: base64 has nothing to escape.
+"""
 
 from __future__ import annotations
 
 import base64
+import json
+import secrets
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from phyblock.errors import DataError, Problem
 from phyblock.models.base import Image, Message, Request
 from phyblock.models.config import ModelConfig
 
-__all__ = ["data_uri", "mime_type", "wire_messages", "wire_params"]
+__all__ = ["data_uri", "json_body", "mime_type", "wire_messages", "wire_params"]
 
 _MAGIC = (
     (b"\x89PNG\r\n\x1a\n", "image/png"),
@@ -40,7 +48,24 @@ def data_uri(image: Image) -> str:
 
 def wire_messages(messages: tuple[Message, ...]) -> list[dict[str, Any]]:
     """Chat messages, texts and pictures in the order given; a lone text is a plain string."""
-    return [{"role": message.role, "content": _content(message)} for message in messages]
+    return _messages(messages, data_uri)
+
+
+def json_body(fields: Mapping[str, Any], messages: tuple[Message, ...]) -> bytes:
+    """A request body: `messages` in place of that field, beside all others."""
+    pictures: list[bytes] = []
+
+    def placeholder(image: Image) -> str:
+        pictures.append(f"data:{mime_type(image)};base64,".encode() + base64.b64encode(image.data))
+        return mark
+
+    mark = secrets.token_hex(16)
+    body = {**fields, "messages": _messages(messages, placeholder)}
+    first, *others = json.dumps(body, allow_nan=False).encode().split(mark.encode())
+    pieces = [first]
+    for picture, piece in zip(pictures, others, strict=True):
+        pieces += [picture, piece]
+    return b"".join(pieces)
 
 
 def wire_params(config: ModelConfig, request: Request) -> dict[str, Any]:
@@ -49,13 +74,19 @@ def wire_params(config: ModelConfig, request: Request) -> dict[str, Any]:
     return {name: value for name, value in merged.items() if value is not None}
 
 
-def _content(message: Message) -> str | list[dict[str, Any]]:
+def _messages(
+    messages: tuple[Message, ...], url_of: Callable[[Image], str]
+) -> list[dict[str, Any]]:
+    return [{"role": message.role, "content": _content(message, url_of)} for message in messages]
+
+
+def _content(message: Message, url_of: Callable[[Image], str]) -> str | list[dict[str, Any]]:
     if len(message.parts) == 1 and isinstance(message.parts[0], str):
         return message.parts[0]
-    return [_part(part) for part in message.parts]
+    return [_part(part, url_of) for part in message.parts]
 
 
-def _part(part: str | Image) -> dict[str, Any]:
+def _part(part: str | Image, url_of: Callable[[Image], str]) -> dict[str, Any]:
     if isinstance(part, str):
         return {"type": "text", "text": part}
-    return {"type": "image_url", "image_url": {"url": data_uri(part)}}
+    return {"type": "image_url", "image_url": {"url": url_of(part)}}

@@ -16,7 +16,7 @@ from phyblock.errors import (
     SampleError,
     UnavailableError,
 )
-from phyblock.models.base import Reply
+from phyblock.models.base import Message, Reply
 
 __all__ = ["Call", "SeedRefusedError", "Transport", "classify", "refuses_seed", "retry_after_s"]
 
@@ -37,9 +37,9 @@ _LONGEST_MESSAGE = 500
 
 @dataclass(frozen=True)
 class Call:
-    """One request as JSON: chat messages, sampling parameters, and the seed or None."""
+    """One request: messages, sampling parameters by their OpenAI names, and the seed or None."""
 
-    messages: list[dict[str, Any]]
+    messages: tuple[Message, ...]
     params: Mapping[str, Any]
     seed: int | None
 
