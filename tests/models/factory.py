@@ -1,0 +1,121 @@
+"""Requests, configurations and models for tests of the network seam."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Coroutine, Sequence
+from typing import Any, TypeVar
+
+from phyblock.domain import Block, Candidate, CandidateSet, Scene
+from phyblock.errors import ModelError
+from phyblock.models import (
+    Budget,
+    Gate,
+    Image,
+    Message,
+    Model,
+    ModelConfig,
+    ModelEvent,
+    Reply,
+    ReplyCache,
+    Request,
+    RetryPolicy,
+    build_model,
+)
+
+T = TypeVar("T")
+
+PNG = b"\x89PNG\r\n\x1a\n"
+JPEG = b"\xff\xd8\xff\xe0"
+QUICK = RetryPolicy(base_s=0.001, max_wait_s=0.002, max_retry_after_s=0.002)
+"""The default number of attempts with next to no wait between them."""
+
+BLOCKS = (
+    Block(1, "cube", "red", (0.0, 0.0, 0.025), (0.0, 0.0, 0.0), (), 1),
+    Block(2, "arch", "red", (0.0, 0.0, 0.075), (0.0, 0.0, 90.0), (1,), 2),
+    Block(3, "cube", "blue", (0.0, 0.1, 0.025), (0.0, 0.0, 0.0), (), 1),
+)
+SCENE = Scene("000", (2,), BLOCKS, ("000",))
+CANDIDATES = CandidateSet(
+    (
+        Candidate("arch", "red", (0.0, 0.0, 0.0)),
+        Candidate("cube", "blue", (0.0, 0.0, 0.0)),
+        Candidate("arch", "red", (0.0, 0.0, 90.0)),
+        Candidate("cube", "red", (0.0, 0.0, 0.0)),
+        Candidate("triangle", "orange", (0.0, 0.0, 0.0)),
+    )
+)
+
+
+def picture(content: int, magic: bytes = PNG, size: int = 300) -> bytes:
+    """Bytes that start like a picture and differ by `content`."""
+    return magic + content.to_bytes(4, "big") * (size // 4)
+
+
+def make_request(
+    key: str = "000", seed: int = 0, *, pictures: Sequence[bytes] | None = None, **params: object
+) -> Request:
+    """A system part, and a user part of text, picture, text, picture, text."""
+    number = int.from_bytes(key.encode(), "big") % 2**31
+    goal, candidates = pictures or (picture(number), picture(number + 1))
+    user: tuple[str | Image, ...] = (
+        "The goal:",
+        Image(goal, "goal", 640, 480),
+        "The candidates, numbered:",
+        Image(candidates, "candidates", 800, 800),
+        f"Scene {key}: which blocks, in which order?",
+    )
+    messages = (Message("system", ("You assemble blocks.",)), Message("user", user))
+    given = {"temperature": 0.5, "top_p": 0.9, "max_tokens": 128, **params}
+    return Request(key, seed, messages, given, "prompt-1", SCENE, CANDIDATES)
+
+
+def make_model(
+    config: ModelConfig,
+    *,
+    cache: ReplyCache | None = None,
+    overall: Gate | None = None,
+    budget: Budget | None = None,
+    events: list[ModelEvent] | None = None,
+    policy: RetryPolicy = QUICK,
+) -> Model:
+    """A model with quick retries; its events go into the list."""
+    return build_model(
+        config,
+        cache=cache,
+        overall=overall or Gate(64),
+        budget=budget,
+        observer=(events if events is not None else []).append,
+        policy=policy,
+    )
+
+
+def ask(model: Model, *requests: Request) -> list[Reply | ModelError | None]:
+    """Ask all at once and close the model; errors of calls stand among the replies."""
+
+    async def one(request: Request) -> Reply | ModelError | None:
+        try:
+            return await model.ask(request)
+        except ModelError as error:
+            return error
+
+    async def everything() -> list[Reply | ModelError | None]:
+        try:
+            return await asyncio.gather(*map(one, requests))
+        finally:
+            await model.aclose()
+
+    return asyncio.run(everything())
+
+
+def reply_of(model: Model, request: Request) -> Reply:
+    """The reply to one request, which must be one."""
+    (answer,) = ask(model, request)
+    assert isinstance(answer, Reply), answer
+    return answer
+
+
+def run(main: Callable[[], Coroutine[Any, Any, T]] | Awaitable[T]) -> T:
+    """Run a coroutine function in a loop of its own."""
+    assert callable(main)
+    return asyncio.run(main())
