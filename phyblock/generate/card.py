@@ -36,7 +36,8 @@ A scene is in the set only when
 
 * no two blocks overlap, and none hangs above its support, by more than {fit_mm:g} mm;
 * the finished structure stands for {duration:g} s of simulated time: no block moves more than
-  {limit_mm:g} mm or turns more than {limit_deg:g} degrees, at time steps of {settings};
+  {limit_mm:g} mm or turns more than {limit_deg:g} degrees, at time steps of
+  {settings};
 * so does every intermediate structure when blocks are placed in the stored order (at the first
   setting);
 * it keeps the limits of its levels:

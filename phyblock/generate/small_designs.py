@@ -80,11 +80,11 @@ def _locomotive(s: Sketch) -> None:
     s.put("semi_cylinder", 1.5, pose="round+y")
 
 
-def _sofa(s: Sketch) -> None:
-    s.put("cuboid2", pose="flat-y")
-    s.put("cuboid3", x=-1.5, pose="edge-y")
-    s.pair("cube", 3, color="red")
+def _throne(s: Sketch) -> None:
     s.put("cuboid1")
+    s.put("cuboid2", x=-1.5, pose="upright-x")
+    s.pair("cuboid1", 1.5, poses=("edge-x", "edge-x"))
+    s.put("semi_cylinder")
 
 
 def _chapel(s: Sketch) -> None:
@@ -118,5 +118,5 @@ LEVEL_2: dict[str, Design] = {
     "l2-chapel": _chapel,
     "l2-locomotive": _locomotive,
     "l2-rocket": _rocket,
-    "l2-sofa": _sofa,
+    "l2-throne": _throne,
 }
