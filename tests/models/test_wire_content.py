@@ -1,0 +1,135 @@
+"""What arrives at the servers: pictures byte for byte and in order, texts, parameters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phyblock.models import Image, Message
+from phyblock.models.payload import json_body, wire_messages
+from tests.models.factory import JPEG, PNG, make_model, make_request, picture, reply_of
+from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.servers.chassis import Running, Seen
+
+
+@pytest.fixture(autouse=True)
+def _key(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+
+
+def arrived(route: str, *, pictures: tuple[bytes, bytes], **params: object) -> Seen:
+    server = ROUTES[route].server()
+    with Running(server) as running:
+        config = ROUTES[route].config(running.url)
+        reply_of(make_model(config), make_request("017", 42, pictures=pictures, **params))
+    return server.seen[0]
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_texts_and_pictures_arrive_in_order_byte_for_byte(route: str) -> None:
+    pictures = (picture(1, PNG, 150_000), picture(2, JPEG, 90_000))
+    request = make_request("017", 42, pictures=pictures)
+    goal, candidates = (p for p in request.messages[1].parts if isinstance(p, Image))
+    seen = arrived(route, pictures=pictures)
+    assert seen.system == "You assemble blocks."
+    assert seen.parts == (
+        "The goal:",
+        ("image/png", goal.sha256),
+        "The candidates, numbered:",
+        ("image/jpeg", candidates.sha256),
+        "Scene 017: which blocks, in which order?",
+    )
+
+
+@pytest.mark.parametrize(
+    ("route", "names"),
+    [
+        ("direct", ("temperature", "top_p", "max_tokens")),
+        ("openai", ("temperature", "top_p", "max_tokens")),
+        ("vllm", ("temperature", "top_p", "max_tokens")),
+        ("anthropic", ("temperature", "top_p", "max_tokens")),
+        ("gemini", ("temperature", "top_p", "max_output_tokens")),
+    ],
+)
+def test_sampling_parameters_arrive_and_nothing_else(route: str, names: tuple[str, ...]) -> None:
+    seen = arrived(route, pictures=(picture(1), picture(2)))
+    assert seen.params == dict(zip(names, (0.5, 0.9, 128), strict=True))
+    assert seen.seed == (None if route == "anthropic" else 42)
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [
+        {},
+        {"extra_body": {"top_k": 20, "chat_template_kwargs": {"enable_thinking": False}}},
+        {"stop": ["END"], "presence_penalty": 0.5},
+        {"temperature": None, "top_p": None},
+    ],
+)
+def test_both_transports_put_the_same_json_on_the_wire(extra: dict[str, object]) -> None:
+    pictures = (picture(1), picture(2))
+    direct, through_openai = (
+        arrived(route, pictures=pictures, **extra).raw for route in ("direct", "openai")
+    )
+    assert direct == through_openai
+    assert direct["seed"] == 42
+    assert ("temperature" in direct) == (extra.get("temperature", 0) is not None)
+
+
+def test_a_models_own_parameters_win_and_null_is_not_sent() -> None:
+    server = ROUTES["direct"].server()
+    with Running(server) as running:
+        config = ROUTES["direct"].config(running.url, params={"temperature": 0.1, "top_p": None})
+        reply_of(make_model(config), make_request())
+    assert server.seen[0].params == {"temperature": 0.1, "max_tokens": 128}
+
+
+@pytest.mark.parametrize("route", ["direct", "openai"])
+def test_thoughts_left_in_the_text_become_reasoning(route: str) -> None:
+    thinking = "<think>\nred first\n</think>\n\nStep1: Move block with index 3"
+
+    class Thinker(ROUTES[route].server):  # type: ignore[misc, name-defined]
+        def reply(self, seen: Seen, ending: str) -> dict[str, object]:
+            body: dict[str, object] = super().reply(seen, ending)
+            message = {"role": "assistant", "content": thinking}
+            return {**body, "choices": [{"message": message, "finish_reason": "stop"}]}
+
+    with Running(Thinker()) as running:
+        reply = reply_of(make_model(ROUTES[route].config(running.url)), make_request())
+    assert reply.text.strip() == "Step1: Move block with index 3"
+    assert reply.reasoning.strip() == "red first"
+
+
+texts = st.text(max_size=30)
+images = st.builds(
+    lambda magic, tail: Image(magic + tail, "goal", 8, 8),
+    st.sampled_from([PNG, JPEG, b"GIF89a", b"RIFF0000WEBP"]),
+    st.binary(max_size=40),
+)
+messages = st.builds(
+    Message,
+    st.sampled_from(["system", "user", "assistant"]),
+    st.lists(texts | images, min_size=1, max_size=5).map(tuple),
+)
+
+
+@settings(max_examples=200)
+@given(st.lists(messages, max_size=4).map(tuple), st.dictionaries(texts, texts, max_size=3))
+def test_a_body_made_around_the_encoder_says_what_the_encoder_would(
+    content: tuple[Message, ...], fields: dict[str, str]
+) -> None:
+    import json
+
+    expected = {**fields, "messages": wire_messages(content)}
+    assert json.loads(json_body(fields, content)) == expected
+
+
+def test_only_pictures_are_sent_as_pictures() -> None:
+    from phyblock.errors import DataError
+
+    request = make_request(pictures=(b"<html>", picture(1)))
+    with pytest.raises(DataError, match=r"'goal'.*is no picture"):
+        wire_messages(replace(request).messages)
