@@ -1,0 +1,298 @@
+"""The reply cache: what its key holds, what it keeps, and what may happen to its file."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.errors import StoreError
+from phyblock.models import (
+    Image,
+    Message,
+    ModelConfig,
+    Price,
+    Reply,
+    ReplyCache,
+    Request,
+    Usage,
+    reply_key,
+)
+from tests.models.factory import SCENE, make_request, picture
+
+CONFIG = ModelConfig("m", "litellm", "openai/m", api_base="http://localhost:1/v1")
+REPLY = Reply("Step1: Move block with index 3", "red", usage=Usage(10, 5, 2), latency_s=1.5)
+
+values = st.none() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text()
+params = st.dictionaries(st.text(min_size=1), values, max_size=4)
+texts = st.text(max_size=20)
+images = st.binary(max_size=20).map(lambda data: Image(data, "goal", 8, 8))
+messages = st.lists(
+    st.builds(
+        Message,
+        st.sampled_from(["system", "user", "assistant"]),
+        st.lists(texts | images, max_size=4).map(tuple),
+    ),
+    max_size=3,
+).map(tuple)
+requests = st.builds(
+    lambda seed, content, given_params, version: Request(
+        "000", seed, content, given_params, version, SCENE, make_request().candidates
+    ),
+    st.integers(),
+    messages,
+    params,
+    texts,
+)
+configs = st.builds(
+    lambda model_id, base, sends: ModelConfig(
+        "m", "litellm", model_id, api_base=base, sends_seed=sends
+    ),
+    st.text(min_size=1),
+    st.none() | st.sampled_from(["http://a/v1", "http://b/v1"]),
+    st.sampled_from(["auto", "never"]),
+)
+
+
+def what_decides(config: ModelConfig, request: Request) -> object:
+    """All that may change a reply, in a form that can be compared."""
+    sent = {**request.params, **config.params}
+    return (
+        config.id,
+        config.api_base,
+        config.sends_seed,
+        sorted((k, type(v), v) for k, v in sent.items() if v is not None),
+        [(m.role, [(type(p), getattr(p, "data", p)) for p in m.parts]) for m in request.messages],
+        request.seed,
+        request.prompt_version,
+    )
+
+
+@given(configs, requests, configs, requests)
+def test_keys_are_equal_when_all_that_decides_is_equal(
+    config: ModelConfig, request: Request, other_config: ModelConfig, other: Request
+) -> None:
+    same = what_decides(config, request) == what_decides(other_config, other)
+    assert (reply_key(config, request) == reply_key(other_config, other)) == same
+
+
+BASE = make_request("001", 3)
+USER = BASE.messages[1]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda c, r: (replace(c, id="openai/n"), r),
+        lambda c, r: (replace(c, api_base="http://localhost:2/v1"), r),
+        lambda c, r: (replace(c, api_base=None), r),
+        lambda c, r: (replace(c, params={"temperature": 0.1}), r),
+        lambda c, r: (replace(c, params={"extra_body": {"top_k": 1}}), r),
+        lambda c, r: (replace(c, sends_seed="never"), r),
+        lambda c, r: (c, replace(r, seed=4)),
+        lambda c, r: (c, replace(r, prompt_version="prompt-2")),
+        lambda c, r: (c, replace(r, params={**r.params, "temperature": 0.6})),
+        lambda c, r: (c, replace(r, params={**r.params, "num_ctx": 8})),
+        lambda c, r: (c, replace(r, params={"temperature": 0.5})),
+        lambda c, r: (c, replace(r, messages=r.messages[1:])),
+        lambda c, r: (c, replace(r, messages=r.messages[::-1])),
+        lambda c, r: (c, with_parts(r, USER.parts[::-1])),
+        lambda c, r: (c, with_parts(r, USER.parts[:-1])),
+        lambda c, r: (c, with_parts(r, (*USER.parts[:-1], "Which?"))),
+        lambda c, r: (c, with_parts(r, (USER.parts[0], changed(USER.parts[1]), *USER.parts[2:]))),
+        lambda c, r: (
+            c,
+            with_parts(r, (USER.parts[0], USER.parts[3], USER.parts[2], USER.parts[1])),
+        ),
+    ],
+)
+def test_each_thing_that_changes_a_reply_changes_the_key(
+    change: Callable[[ModelConfig, Request], tuple[ModelConfig, Request]],
+) -> None:
+    assert reply_key(*change(CONFIG, BASE)) != reply_key(CONFIG, BASE)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda c, r: (replace(c, name="other"), r),
+        lambda c, r: (replace(c, transport="litellm", max_concurrency=1, rpm=5, tpm=7), r),
+        lambda c, r: (replace(c, price=Price(1, 2), timeout_s=1.0, api_key_env="KEY"), r),
+        lambda c, r: (replace(c, api_base="http://localhost:1/v1/"), r),
+        lambda c, r: (c, replace(r, key="002")),
+        lambda c, r: (replace(c, params={"temperature": 0.5}), r),
+        lambda c, r: (replace(c, params={"top_k": None}), r),
+    ],
+)
+def test_what_does_not_change_a_reply_does_not_change_the_key(
+    change: Callable[[ModelConfig, Request], tuple[ModelConfig, Request]],
+) -> None:
+    assert reply_key(*change(CONFIG, BASE)) == reply_key(CONFIG, BASE)
+
+
+def with_parts(request: Request, parts: tuple[str | Image, ...]) -> Request:
+    return replace(request, messages=(request.messages[0], Message("user", parts)))
+
+
+def changed(part: str | Image) -> Image:
+    assert isinstance(part, Image)
+    return replace(part, data=part.data[:-1] + b"\x07")
+
+
+def test_a_reply_comes_back_whole_and_marked(tmp_path: Path) -> None:
+    with ReplyCache(tmp_path / "deep" / "replies.sqlite") as cache:
+        assert cache.get("k") is None
+        assert "k" not in cache
+        assert cache.put("k", "openai/m", replace(REPLY, seed_sent=False, text="å\ud800 \x00"))
+        assert "k" in cache
+        expected = replace(REPLY, seed_sent=False, text="å\ud800 \x00", cached=True, attempts=0)
+        assert cache.get("k") == expected
+
+
+@pytest.mark.parametrize(
+    "reply",
+    [
+        replace(REPLY, text=""),
+        replace(REPLY, text=" \n"),
+        replace(REPLY, finish="length"),
+        replace(REPLY, finish="refusal"),
+    ],
+)
+def test_replies_that_are_not_whole_are_not_kept(tmp_path: Path, reply: Reply) -> None:
+    with ReplyCache(tmp_path / "c.sqlite") as cache:
+        assert not cache.put("k", "openai/m", reply)
+        assert "k" not in cache
+
+
+def test_pictures_and_prompts_do_not_enter_the_file(tmp_path: Path) -> None:
+    request = make_request("001", pictures=(picture(0x41424344), picture(0x45464748)))
+    path = tmp_path / "c.sqlite"
+    with ReplyCache(path) as cache:
+        cache.put(reply_key(CONFIG, request), CONFIG.id, REPLY)
+    stored = b"".join(file.read_bytes() for file in tmp_path.iterdir())
+    assert b"index 3" in stored
+    assert b"ABCD" not in stored
+    assert b"You assemble" not in stored
+
+
+def test_stats_count_and_clear_drops(tmp_path: Path) -> None:
+    with ReplyCache(tmp_path / "c.sqlite") as cache:
+        empty = cache.stats()
+        assert (empty.replies, empty.by_model, empty.oldest_s) == (0, {}, None)
+        for key in "abc":
+            cache.put(key, "openai/m", REPLY)
+        cache.put("d", "gemini/n", REPLY)
+        stats = cache.stats()
+        assert stats.replies == 4
+        assert stats.by_model == {"gemini/n": 1, "openai/m": 3}
+        assert stats.size_bytes > 0
+        assert cache.clear("openai/m") == 3
+        assert "d" in cache
+        assert cache.clear() == 1
+        assert cache.stats().replies == 0
+
+
+@pytest.mark.parametrize(
+    "content", [b"this is not a database at all, but long enough to look at" * 40, b"SQLite"]
+)
+def test_a_file_that_is_no_cache_is_one_clear_error(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "c.sqlite"
+    path.write_bytes(content)
+    with pytest.raises(StoreError) as caught:
+        ReplyCache(path)
+    assert str(path) in str(caught.value)
+    assert "delete the file" in str(caught.value)
+    assert path.read_bytes() == content
+
+
+def test_another_programs_database_is_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "c.sqlite"
+    db = sqlite3.connect(path)
+    db.execute("CREATE TABLE letters (text)")
+    db.close()
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match="no reply cache"):
+        ReplyCache(path)
+    assert path.read_bytes() == before
+
+
+def test_a_page_overwritten_in_the_middle_is_an_error_not_a_reply(tmp_path: Path) -> None:
+    path = tmp_path / "c.sqlite"
+    with ReplyCache(path) as cache:
+        for number in range(200):
+            cache.put(f"{number:064}", "openai/m", replace(REPLY, text="x" * 500))
+    whole = path.read_bytes()
+    path.write_bytes(whole[:4096] + b"\xff" * (len(whole) - 4096))
+    with pytest.raises(StoreError, match="cannot be used"), ReplyCache(path) as cache:
+        cache.get(f"{7:064}")
+
+
+def test_a_row_that_is_no_reply_is_an_error(tmp_path: Path) -> None:
+    path = tmp_path / "c.sqlite"
+    with ReplyCache(path) as cache:
+        cache.put("k", "openai/m", REPLY)
+    db = sqlite3.connect(path)
+    with db:
+        db.execute("UPDATE replies SET reply = '{\"text\": 1'")
+    db.close()
+    with ReplyCache(path) as cache, pytest.raises(StoreError, match="broken reply"):
+        cache.get("k")
+
+
+def test_a_folder_in_the_way_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    for path in (tmp_path, tmp_path / "file" / "c.sqlite"):
+        with pytest.raises(StoreError, match="cannot be"):
+            ReplyCache(path)
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from phyblock.models import Reply, ReplyCache
+with ReplyCache(Path(sys.argv[1])) as cache:
+    for number in range(int(sys.argv[3])):
+        cache.put(f"{sys.argv[2]}-{number}", "openai/m", Reply(f"reply {number}"))
+        print(number, flush=True)
+"""
+
+
+def writer(path: Path, name: str, count: int) -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", WRITER, str(path), name, str(count)]
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[2]
+    )
+
+
+def test_processes_share_one_file(tmp_path: Path) -> None:
+    path = tmp_path / "c.sqlite"
+    writers = [writer(path, name, 100) for name in "abcd"]
+    for process in writers:
+        process.communicate()
+        assert process.returncode == 0
+    with ReplyCache(path) as cache:
+        assert cache.stats().replies == 400
+        assert all(f"{name}-{n}" in cache for name in "abcd" for n in range(100))
+
+
+def test_what_was_kept_survives_a_kill(tmp_path: Path) -> None:
+    path = tmp_path / "c.sqlite"
+    process = writer(path, "a", 10**6)
+    assert process.stdout is not None
+    for _ in range(50):
+        last = int(process.stdout.readline())
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    process.stdout.close()
+    with ReplyCache(path) as cache:
+        assert all(f"a-{n}" in cache for n in range(last + 1))
+        assert cache.put("after", "openai/m", REPLY)
