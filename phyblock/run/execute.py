@@ -21,6 +21,7 @@ from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan, sample_id
 from phyblock.run.records import is_final, judged, to_record
 from phyblock.run.store import RunStore
+from phyblock.run.writer import RecordWriter
 
 __all__ = ["Executor", "RunResult"]
 
@@ -44,7 +45,7 @@ class Executor:
         self, plan: RunPlan, store: RunStore, models: Mapping[str, Model], watch: Watcher
     ) -> None:
         self._plan = plan
-        self._store = store
+        self._writer = RecordWriter(store)
         self._models = models
         self._watch = watch
         self.result = RunResult()
@@ -86,6 +87,7 @@ class Executor:
             for worker in workers:
                 worker.cancel()
             await asyncio.gather(*workers, return_exceptions=True)
+            await self._writer.drain()
         if self._failure is not None:
             raise self._failure
         self.result.left += sum(len(queue) for queue in pending.values())
@@ -139,7 +141,7 @@ class Executor:
             track.judge(task, text),
             track.rules.parser,
         )
-        self._store.append(record)
+        await self._writer.put(record)
         self.result.written += 1
         self.result.left += not is_final(record)
         self._watch(SampleDone(record))

@@ -1,6 +1,6 @@
 """Writing a run: `run.yaml`, written first and never changed, and `records.jsonl`.
 
-Records are appended and synced one at a time, so a kill at any moment loses nothing that was
+A record counts only when it is appended and synced, so a kill at any moment loses nothing that was
 written; a line that a kill cut short is dropped when the run is opened again. A later record of a
 sample replaces an earlier one.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from io import FileIO
 from pathlib import Path
 from typing import IO, Any
@@ -60,13 +60,12 @@ class RunStore:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def append(self, record: Mapping[str, Any]) -> None:
-        """Write one record and wait until it is on disk.
+    def append(self, records: Iterable[Mapping[str, Any]]) -> None:
+        """Write records, a line each, and wait until they are on disk.
 
         Raises StoreError when the disk refuses; what was written before stays whole.
         """
-        line = json.dumps(record, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-        data = line.encode("utf-8", "replace") + b"\n"
+        data = b"".join(_line(record) for record in records)
         assert self._file is not None, "the store is closed"
         size = self._file.seek(0, os.SEEK_END)
         try:
@@ -120,6 +119,11 @@ class RunStore:
             pass
         if lines.is_cut:
             os.truncate(lines.path, lines.whole_bytes)
+
+
+def _line(record: Mapping[str, Any]) -> bytes:
+    text = json.dumps(record, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return text.encode("utf-8", "replace") + b"\n"
 
 
 def _changed(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:

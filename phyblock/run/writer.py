@@ -1,0 +1,50 @@
+"""Records on their way to disk: those that come while one sync runs share the next."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+from typing import Any
+
+from phyblock.errors import StoreError
+from phyblock.run.store import RunStore
+
+__all__ = ["RecordWriter"]
+
+
+class RecordWriter:
+    """Appends records off the event loop; `put` returns when its record is synced."""
+
+    def __init__(self, store: RunStore) -> None:
+        self._store = store
+        self._waiting: list[tuple[Mapping[str, Any], asyncio.Future[None]]] = []
+        self._flusher: asyncio.Task[None] | None = None
+
+    async def put(self, record: Mapping[str, Any]) -> None:
+        """Append a record and wait until it is on disk; StoreError when the disk refuses."""
+        written: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._waiting.append((record, written))
+        if self._flusher is None:
+            self._flusher = asyncio.create_task(self._flush())
+        await written
+
+    async def drain(self) -> None:
+        """Wait until everything that was put is on disk or refused."""
+        if self._flusher is not None:
+            await self._flusher
+
+    async def _flush(self) -> None:
+        while self._waiting:
+            batch, self._waiting = self._waiting, []
+            failure: StoreError | None = None
+            try:
+                await asyncio.to_thread(self._store.append, [record for record, _ in batch])
+            except StoreError as error:
+                failure = error
+            # A waiter that was cancelled has a future that is already done.
+            for written in (future for _, future in batch if not future.done()):
+                if failure is None:
+                    written.set_result(None)
+                else:
+                    written.set_exception(failure)
+        self._flusher = None
