@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
+from textwrap import fill
 
 from rich import box
 from rich.console import Console
@@ -16,12 +18,13 @@ from phyblock.report import TextTable
 __all__ = ["make_console", "plain_table", "print_view", "shown_path", "width_of"]
 
 _PLAIN_WIDTH = 160
+_HEADING_WIDTH = 12
 
 
 def make_console(*, stderr: bool = False) -> Console:
     """The console; wide enough for whole tables when the output is no terminal."""
     console = Console(stderr=stderr, highlight=False)
-    if not console.is_terminal:
+    if not console.is_terminal and "COLUMNS" not in os.environ:
         console = Console(stderr=stderr, highlight=False, width=_PLAIN_WIDTH)
     return console
 
@@ -35,11 +38,12 @@ def print_view(console: Console, view: TextTable) -> None:
         pad_edge=False,
         collapse_padding=True,
     )
-    for column in view.columns:
-        first = _is_first(view, column.group, column.name)
-        heading = Text(f"{column.group if first else ''}\n{column.name}".lstrip("\n"))
+    for heading, column in zip(_headings(view), view.columns, strict=True):
         table.add_column(
-            heading, justify="left" if column.is_text else "right", no_wrap=not column.is_text
+            Text(heading),
+            justify="left" if column.is_text else "right",
+            no_wrap=not column.is_text,
+            vertical="bottom",
         )
     for row in view.rows:
         table.add_row(*(Text(cell) for cell in row))
@@ -77,9 +81,11 @@ def shown_path(path: Path) -> str:
         return str(path)
 
 
-def _is_first(view: TextTable, group: str, name: str) -> bool:
-    for key, columns in groupby(view.columns, key=lambda column: column.group):
-        members = list(columns)
-        if key == group and any(column.name == name for column in members):
-            return members[0].name == name
-    return False
+def _headings(view: TextTable) -> list[str]:
+    """Names of the columns, each group's name above its first; alone, it is broken by words."""
+    headings: list[str] = []
+    for group, members in groupby(view.columns, key=lambda column: column.group):
+        names = [column.name for column in members]
+        above = fill(group, _HEADING_WIDTH) if len(names) == 1 else group
+        headings += [f"{above}\n{names[0]}".lstrip("\n"), *names[1:]]
+    return headings

@@ -12,6 +12,7 @@ from phyblock.report import TablesWritten, TextTable, largest_differences
 __all__ = ["print_summary"]
 
 _SIDE_METRICS = ("Prec", "Rec")
+_OUTCOMES = ("OK", "Unparsed", "Refusal", "Truncated", "API error", "Missing")
 _MET = 0.06
 """Largest difference that rounding of the published numbers and of ours explains [points]."""
 
@@ -22,8 +23,9 @@ def print_summary(console: Console, written: TablesWritten) -> None:
     table1 = views["table1"]
     if width_of(table1) > console.width:
         table1 = _without(table1, _SIDE_METRICS)
+        # The last note is about the labels of the columns that were left out.
         note = "F1 alone, to fit; precision and recall are in tables/table1.md."
-        table1 = replace(table1, notes=(note, *table1.notes))
+        table1 = replace(table1, notes=(note, *table1.notes[:-1]))
     print_view(console, table1)
     print_view(console, _overall(views["errors"]))
     coverage = written.frames["coverage"]
@@ -52,21 +54,20 @@ def _print_comparison(console: Console, written: TablesWritten) -> None:
 
 
 def _overall(errors: TextTable) -> TextTable:
-    """The rows over all levels, each with its model's name."""
+    """The rows over all levels, each with its model's name; shares alone."""
     rows, model = [], ""
     for row in errors.rows:
         model = row[0] or model
         if row[1] == "Overall":
-            rows.append((model, *row[2:]))
-    columns = (errors.columns[0], *errors.columns[2:])
-    return replace(errors, columns=columns, rows=tuple(rows))
+            rows.append((model, *row[1:]))
+    return _without(replace(errors, rows=tuple(rows)), ("Level", "n"))
 
 
 def _answered(coverage: TextTable) -> TextTable:
     """Samples and outcomes; tokens and costs stay in the file."""
-    dropped = [c.name for c in coverage.columns if c.group not in ("", "Samples", "Outcome")]
-    side = ("Cost", "Latency (s)", "Requests", "Cached", "Attempts")
-    return replace(_without(coverage, (*dropped, *side)), notes=())
+    kept = ("Model", "Expected", "Not run", *_OUTCOMES)
+    dropped = [column.name for column in coverage.columns if column.name not in kept]
+    return replace(_without(coverage, tuple(dropped)), notes=())
 
 
 def _without(view: TextTable, names: tuple[str, ...]) -> TextTable:
