@@ -79,21 +79,15 @@ def _twin_towers(s: Sketch) -> None:
 
 
 def _cathedral(s: Sketch) -> None:
-    for depth in (-1, 1):
-        s.put("arch", x=depth)
-    for side in (-3, 3):
-        s.put("cube", side, 1, color="yellow")
-    for depth in (-1, 1):
-        s.put("cuboid2", x=depth, pose="flat-y")
-    for side in (-3, 3):
-        s.put("cylinder", side, 1)
-    for depth in (-1, 1):
-        s.put("triangle", -1, depth, pose="ramp-y")
-        s.put("triangle", 1, depth, pose="ramp+y")
-    for side in (-3, 3):
-        s.put("cube", side, 1, color="blue")
-    for side in (-3, 3):
-        s.put("triangle", side, 1)
+    s.put("arch")
+    s.pair("cube", 3, color="yellow")
+    s.pair("triangle", 5, poses=("ramp-y", "ramp+y"))
+    s.put("cuboid2", pose="flat-y")
+    s.pair("cylinder", 3)
+    s.put("arch")
+    s.pair("cube", 3, color="blue")
+    s.put("triangle")
+    s.pair("triangle", 3, poses=("roof", "roof"))
 
 
 def _harbor(s: Sketch) -> None:

@@ -35,9 +35,11 @@ __all__ = [
     "candidates_key",
     "candidates_png",
     "composite_png",
+    "drawn",
     "goal_camera",
     "goal_key",
     "goal_png",
+    "on_the_floor",
 ]
 
 RENDER_VERSION = 1
@@ -55,7 +57,7 @@ class PictureStyle:
     """How pictures look: side length [pixels], background, and where they are seen from.
 
     Azimuth 0 looks from +x and 90 from +y; elevation 90 looks straight down [degrees]. Raises
-    ValueError for a size under 64 or over 2048, an elevation outside 1..90, an azimuth that is
+    ValueError for a size under 128 or over 2048, an elevation outside 1..90, an azimuth that is
     no number, or an unknown background.
     """
 
@@ -65,8 +67,8 @@ class PictureStyle:
     elevation_deg: float = VIEWS["oblique"][1]
 
     def __post_init__(self) -> None:
-        if not 64 <= self.size_px <= 2048:
-            raise ValueError(f"size_px is {self.size_px}, allowed 64..2048")
+        if not 128 <= self.size_px <= 2048:
+            raise ValueError(f"size_px is {self.size_px}, allowed 128..2048")
         if self.background not in BACKGROUNDS:
             raise ValueError(f"background is {self.background!r}, allowed {', '.join(BACKGROUNDS)}")
         if not 1 <= self.elevation_deg <= 90:
@@ -86,7 +88,7 @@ class PictureStyle:
 
 def goal_png(scene: Scene, style: PictureStyle) -> bytes:
     """PNG of the finished structure, square, framed so that no block is cut off."""
-    blocks = _drawn(scene)
+    blocks = drawn(scene)
     image = picture(blocks, goal_camera(scene, style), style.background, style.size_px)
     return to_png(image)
 
@@ -110,7 +112,7 @@ def composite_png(goal: bytes, candidates: bytes) -> bytes:
 
 def goal_key(scene: Scene, style: PictureStyle) -> str:
     """SHA-256 [hex] of all that the goal picture depends on; the scene's id is not part of it."""
-    return _key("goal", style, [astuple(block) for block in _drawn(scene)])
+    return _key("goal", style, [astuple(block) for block in drawn(scene)])
 
 
 def candidates_key(candidates: CandidateSet, style: PictureStyle) -> str:
@@ -122,7 +124,7 @@ def goal_camera(scene: Scene, style: PictureStyle) -> Camera:
     """The camera of the goal picture; raises DataError for a scene without blocks."""
     if not scene.blocks:
         raise DataError(Problem(where=scene.id, field="blocks", message="there is none to draw"))
-    points = np.vstack([block.vertices_m for block in _drawn(scene)])
+    points = np.vstack([block.vertices_m for block in drawn(scene)])
     axes = view_axes(style.azimuth_deg, style.elevation_deg)
     return frame(points, axes, _GOAL_WINDOW, _GOAL_MIN_DISTANCE_M)
 
@@ -160,7 +162,8 @@ def _empty_cell(style: PictureStyle, cell_px: int) -> Image.Image:
     return picture([], candidate_camera(block, style), style.background, cell_px)
 
 
-def _drawn(scene: Scene) -> list[DrawnBlock]:
+def drawn(scene: Scene) -> list[DrawnBlock]:
+    """The blocks of a scene as the renderer takes them."""
     return [DrawnBlock(b.type, b.color, b.position_m, b.euler_deg) for b in scene.blocks]
 
 

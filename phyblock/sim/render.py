@@ -40,7 +40,7 @@ COLOR_RGB: dict[Color, tuple[int, int, int]] = {
     "yellow": (250, 218, 50),
     "blue": (56, 88, 246),
     "green": (72, 190, 42),
-    "orange": (250, 112, 58),
+    "orange": (250, 124, 46),
 }
 """Color of a fully lit face, 0..255."""
 _EDGE_RGB = (14, 14, 16)

@@ -1,0 +1,126 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial import ConvexHull
+
+from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, SHAPES, BlockType, Color
+from phyblock.sim.geometry import collision_pieces, edge_bars, solid_mesh
+from phyblock.sim.mesh import Mesh
+
+every_type = pytest.mark.parametrize("block_type", BLOCK_TYPES)
+
+
+@every_type
+def test_solid_is_closed_and_faces_outward(block_type: BlockType) -> None:
+    solid = solid_mesh(block_type)
+    assert solid.is_closed()
+    assert solid.volume_m3 > 0
+
+
+@every_type
+def test_mass_and_extent_are_those_of_the_block_library(block_type: BlockType) -> None:
+    solid, shape = solid_mesh(block_type), SHAPES[block_type]
+    assert_allclose(solid.volume_m3, shape.volume_m3, rtol=1e-9)
+    assert_allclose(solid.center_of_mass_m, shape.center_of_mass_m, atol=1e-9)
+    assert_allclose(solid.vertices_m.min(axis=0), shape.low_m, atol=1e-9)
+    assert_allclose(solid.vertices_m.max(axis=0), shape.high_m, atol=1e-9)
+
+
+@every_type
+def test_principal_axes_of_inertia_are_the_body_axes(block_type: BlockType) -> None:
+    inertia = solid_mesh(block_type).inertia_m2
+    assert_allclose(inertia, np.diag(np.diag(inertia)), atol=1e-12)
+    one, two, three = sorted(np.diag(inertia))
+    assert 0 < one <= two <= three < one + two
+
+
+def test_inertia_of_a_box_is_the_textbook_one() -> None:
+    x, y, z = 0.15, 0.05, 0.025
+    expected = np.array([y * y + z * z, x * x + z * z, x * x + y * y]) / 12
+    assert_allclose(np.diag(solid_mesh("cuboid3").inertia_m2), expected, rtol=1e-9)
+
+
+@every_type
+def test_pieces_are_convex_and_fill_the_block(block_type: BlockType) -> None:
+    pieces = collision_pieces(block_type)
+    assert len(pieces) == (10 if block_type == "arch" else 1)
+    hulls = [ConvexHull(piece.vertices_m) for piece in pieces]
+    assert_allclose(sum(hull.volume for hull in hulls), SHAPES[block_type].volume_m3, rtol=1e-9)
+    for hull, piece in zip(hulls, pieces, strict=True):
+        assert len(hull.vertices) == len(piece.vertices_m)
+
+
+@every_type
+def test_inset_moves_every_plane_by_that_much(block_type: BlockType) -> None:
+    inset_m = 0.001
+    full, inset = collision_pieces(block_type), collision_pieces(block_type, inset_m)
+    for outer, inner in zip(full, inset, strict=True):
+        normals = np.vstack([outer.face_normals, -outer.face_normals])
+        planes = ConvexHull(outer.vertices_m).equations
+        for normal in normals:
+            if np.any(planes[:, :3] @ normal > 1 - 1e-9):
+                moved = (outer.vertices_m @ normal).max() - (inner.vertices_m @ normal).max()
+                assert moved == pytest.approx(inset_m, abs=1e-9)
+
+
+@every_type
+def test_separating_axes_name_every_face_and_edge(block_type: BlockType) -> None:
+    for piece in collision_pieces(block_type):
+        planes = ConvexHull(piece.vertices_m).equations[:, :3]
+        alike = np.abs(planes @ piece.face_normals.T).max(axis=1)
+        assert_allclose(alike, 1.0, atol=1e-9)
+        assert_allclose(np.linalg.norm(piece.edge_directions, axis=1), 1.0)
+
+
+@every_type
+def test_edge_bars_hug_the_edges(block_type: BlockType) -> None:
+    half_m = 0.00045
+    bars = edge_bars(block_type, half_m)
+    shape = SHAPES[block_type]
+    assert bars.is_closed()
+    assert bars.volume_m3 > 0
+    assert np.all(bars.vertices_m > np.array(shape.low_m) - 2 * half_m)
+    assert np.all(bars.vertices_m < np.array(shape.high_m) + 2 * half_m)
+
+
+@pytest.mark.parametrize(("block_type", "edges"), [("cube", 12), ("triangle", 9), ("cylinder", 36)])
+def test_only_true_edges_have_bars(block_type: BlockType, edges: int) -> None:
+    assert len(edge_bars(block_type, 0.0005).triangles) == 12 * edges
+
+
+@pytest.mark.parametrize(("block_type", "color"), KIT_PALETTE)
+def test_agrees_with_the_official_mesh(
+    block_type: BlockType, color: Color, official_checkout: Path
+) -> None:
+    path = official_checkout / "data" / "block_assets" / f"{block_type}_{color}.obj"
+    official, solid = _colored_part(path), solid_mesh(block_type)
+    for low_or_high in (np.min, np.max):
+        ours = low_or_high(solid.vertices_m, axis=0)
+        theirs = low_or_high(official.vertices_m, axis=0)
+        assert_allclose(ours, theirs, atol=1e-4)
+    assert solid.volume_m3 == pytest.approx(official.volume_m3, rel=0.005)
+    assert_allclose(solid.center_of_mass_m, official.center_of_mass_m, atol=1e-4)
+
+
+def _colored_part(path: Path) -> Mesh:
+    """The object of an OBJ whose material is the block's color, not its black edges."""
+    vertices: list[list[float]] = []
+    triangles: list[list[int]] = []
+    colored = False
+    for line in path.read_text(encoding="utf-8").splitlines():
+        word, _, rest = line.partition(" ")
+        if word == "v":
+            vertices.append([float(number) for number in rest.split()])
+        elif word == "usemtl":
+            colored = rest.startswith("block_")
+        elif word == "f" and colored:
+            corners = [int(corner.split("/")[0]) - 1 for corner in rest.split()]
+            triangles += [[corners[0], *corners[i : i + 2]] for i in range(1, len(corners) - 1)]
+    used = sorted({corner for triangle in triangles for corner in triangle})
+    number = {corner: index for index, corner in enumerate(used)}
+    faces = [[number[corner] for corner in triangle] for triangle in triangles]
+    return Mesh(np.array([vertices[corner] for corner in used]), np.array(faces))
