@@ -1,0 +1,210 @@
+"""A model as a whole: cache, limits and failures together, over a real wire."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from phyblock.errors import RetryableError, SpecError, UnavailableError
+from phyblock.models import Gate, ModelConfig, ModelEvent, Reply, ReplyCache, RetryPolicy
+from tests.models.factory import QUICK, ask, make_model, make_request, reply_of, run
+from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.servers.chassis import Faults, Running
+
+KEY = "sk-not-a-real-key-1234"
+
+
+@pytest.fixture(autouse=True)
+def _key(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, KEY)
+
+
+def test_what_was_answered_is_not_asked_again(tmp_path: Path) -> None:
+    server = ROUTES["direct"].server()
+    requests = [make_request(f"{n:03}", seed) for n in range(5) for seed in (1, 2)]
+    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
+        config = ROUTES["direct"].config(running.url)
+        first = ask(make_model(config, cache=cache), *requests)
+        assert server.requests == 10
+        second = ask(make_model(config, cache=cache), *requests)
+    assert server.requests == 10
+    for new, kept in zip(first, second, strict=True):
+        assert isinstance(new, Reply)
+        assert isinstance(kept, Reply)
+        assert (new.cached, kept.cached) == (False, True)
+        assert (new.attempts, kept.attempts) == (1, 0)
+        assert (new.text, new.usage, new.latency_s) == (kept.text, kept.usage, kept.latency_s)
+
+
+def test_seeds_are_kept_apart_also_where_the_provider_takes_none(tmp_path: Path) -> None:
+    server = ROUTES["direct"].server(Faults(mode="seed"))
+    requests = [make_request("001", seed) for seed in range(5)]
+    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
+        config = ROUTES["direct"].config(running.url, max_concurrency=1)
+        ask(make_model(config, cache=cache), *requests)
+        assert cache.stats().replies == 5
+        again = ask(make_model(config, cache=cache), *requests)
+    assert server.ended == {"seed": 1, "ok": 5}
+    assert [reply.seed_sent for reply in again] == [False] * 5  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("mode", ["length", "filtered", "blank", "400", "policy", "500", "html"])
+def test_what_is_no_whole_reply_is_asked_again(tmp_path: Path, mode: str) -> None:
+    server = ROUTES["direct"].server(Faults(mode=mode))
+    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
+        config = ROUTES["direct"].config(running.url)
+        ask(make_model(config, cache=cache), make_request())
+        before = server.requests
+        ask(make_model(config, cache=cache), make_request())
+        assert server.requests == 2 * before
+        assert cache.stats().replies == 0
+
+
+def test_a_dead_model_still_gives_what_is_cached(tmp_path: Path) -> None:
+    server = ROUTES["direct"].server()
+    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
+        config = ROUTES["direct"].config(running.url, max_concurrency=1)
+        reply_of(make_model(config, cache=cache), make_request("001"))
+        server.faults = Faults(mode="401")
+        answers = ask(make_model(config, cache=cache), *(make_request(k) for k in ("002", "001")))
+    assert isinstance(answers[0], UnavailableError)
+    assert isinstance(answers[1], Reply)
+
+
+def test_one_dead_model_leaves_the_others_going() -> None:
+    dead, alive = (ROUTES["direct"].server(Faults(mode=mode)) for mode in ("403", "ok"))
+    with Running(dead) as first, Running(alive) as second:
+        models = [
+            make_model(ROUTES["direct"].config(running.url), overall=gate)
+            for gate in [Gate(4)]
+            for running in (first, second)
+        ]
+
+        async def main() -> list[object]:
+            asked = (m.ask(make_request(f"{n:03}")) for n in range(20) for m in models)
+            answers = await asyncio.gather(*asked, return_exceptions=True)
+            for model in models:
+                await model.aclose()
+            return list(answers)
+
+        answers = run(main)
+    assert [type(answer) for answer in answers] == [UnavailableError, Reply] * 20
+    assert alive.requests == 20
+    assert dead.requests <= 4
+
+
+def test_concurrency_stays_under_the_models_and_the_overall_limit() -> None:
+    server = ROUTES["direct"].server(Faults(latency_s=0.01))
+    requests = [make_request(f"{n:03}") for n in range(30)]
+    with Running(server) as running:
+        config = ROUTES["direct"].config(running.url, max_concurrency=5)
+        ask(make_model(config), *requests)
+        assert server.most_at_once == 5
+        server.most_at_once = 0
+        ask(make_model(config, overall=Gate(2)), *requests)
+        assert server.most_at_once == 2
+
+
+def test_a_429_slows_the_model_down_and_is_told() -> None:
+    server = ROUTES["direct"].server(Faults(rate_limited=0.5))
+    events: list[ModelEvent] = []
+    with Running(server) as running:
+        config = ROUTES["direct"].config(running.url, max_concurrency=8)
+        policy = RetryPolicy(attempts=30, base_s=0.001, max_wait_s=0.001, max_retry_after_s=0.0)
+        answers = ask(
+            make_model(config, events=events, policy=policy),
+            *(make_request(f"{n:03}") for n in range(40)),
+        )
+    assert all(isinstance(answer, Reply) for answer in answers)
+    slower = [event.limit for event in events if event.kind == "slow_down"]
+    assert slower[0] == 4
+    assert min(slower) < 4
+    assert sum(event.kind == "retry" for event in events) == server.ended["429"]
+
+
+def test_a_server_that_is_not_there_is_a_connection_error(unused_port: int) -> None:
+    for name in ("direct", "openai"):
+        config = ROUTES[name].config(f"http://127.0.0.1:{unused_port}")
+        (answer,) = ask(make_model(config), make_request())
+        assert isinstance(answer, RetryableError)
+        assert answer.status is None
+
+
+@pytest.fixture
+def unused_port() -> int:
+    with Running(ROUTES["direct"].server()) as running:
+        return running.port
+
+
+def test_a_wrong_path_says_to_look_at_the_address() -> None:
+    with Running(ROUTES["direct"].server()) as running:
+        config = ROUTES["direct"].config(running.url + "/nowhere")
+        (answer,) = ask(make_model(config), make_request())
+    assert isinstance(answer, UnavailableError)
+    assert answer.status == 404
+
+
+def test_a_missing_key_sends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(KEY_VARIABLE)
+    for name, route in ROUTES.items():
+        server = route.server()
+        with Running(server) as running:
+            (answer,) = ask(make_model(route.config(running.url)), make_request())
+        assert isinstance(answer, UnavailableError), name
+        assert KEY_VARIABLE in str(answer)
+        assert server.requests == 0
+
+
+def test_no_key_reaches_the_cache_even_when_a_server_repeats_it(tmp_path: Path) -> None:
+    class Parrot(ROUTES["direct"].server):  # type: ignore[misc, name-defined]
+        def reply(self, seen, ending):  # type: ignore[no-untyped-def]
+            body = super().reply(seen, ending)
+            body["choices"][0]["message"]["content"] += f" {seen.key}"
+            body["choices"][0]["message"]["reasoning_content"] += f" {seen.key}"
+            return body
+
+    with Running(Parrot()) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
+        reply = reply_of(
+            make_model(ROUTES["direct"].config(running.url), cache=cache), make_request()
+        )
+        assert cache.stats().replies == 1
+    assert KEY not in repr(reply)
+    assert KEY.encode() not in b"".join(file.read_bytes() for file in tmp_path.iterdir())
+
+
+def test_attempts_count_every_request_that_was_sent() -> None:
+    server = ROUTES["direct"].server(Faults(server_error=0.4))
+    with Running(server) as running:
+        answers = ask(
+            make_model(ROUTES["direct"].config(running.url), policy=QUICK),
+            *(make_request(f"{n:03}") for n in range(20)),
+        )
+    assert sum(reply.attempts for reply in answers) == server.requests  # type: ignore[union-attr]
+
+
+def test_an_id_without_a_provider_is_an_error_at_the_start() -> None:
+    with pytest.raises(SpecError, match="needs a provider"):
+        make_model(ModelConfig("m", "litellm", "gpt-4o"))
+
+
+@pytest.mark.parametrize(
+    ("model_id", "api_base", "transport", "is_direct"),
+    [
+        ("openai/m", "http://x/v1", "auto", True),
+        ("hosted_vllm/m", "http://x/v1", "auto", True),
+        ("lm_studio/m", "http://x/v1", "auto", True),
+        ("openai/m", None, "auto", False),
+        ("openai/o1", "http://x/v1", "auto", False),
+        ("openai/gpt-5-mini", "http://x/v1", "auto", False),
+        ("anthropic/c", "http://x", "auto", False),
+        ("anthropic/c", "http://x", "direct", True),
+        ("openai/m", "http://x/v1", "litellm", False),
+    ],
+)
+def test_the_transport_is_chosen_by_rule(
+    model_id: str, api_base: str | None, transport: str, is_direct: bool
+) -> None:
+    config = ModelConfig("m", "litellm", model_id, api_base=api_base, transport=transport)  # type: ignore[arg-type]
+    assert config.is_direct == is_direct

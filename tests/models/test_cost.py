@@ -1,0 +1,193 @@
+"""Prices, estimates and the budget."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.errors import SpecError
+from phyblock.models import (
+    Budget,
+    BudgetReachedError,
+    Estimate,
+    Gate,
+    Image,
+    Message,
+    ModelConfig,
+    Price,
+    Reply,
+    Request,
+    Usage,
+    build_model,
+    cost_usd,
+    estimate,
+    price_of,
+)
+from tests.models.factory import CANDIDATES, SCENE, ask, make_model, make_request, run
+from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.servers.chassis import Faults, Running
+
+
+def config(model_id: str, **fields: object) -> ModelConfig:
+    return ModelConfig("m", "litellm", model_id, **fields)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("model_id", "price"),
+    [
+        ("openai/gpt-4o-2024-08-06", Price(2.5, 10.0)),
+        ("openai/o1", Price(15.0, 60.0)),
+        ("azure/gpt-4o-2024-08-06", Price(2.5, 10.0)),
+        ("hosted_vllm/gpt-4o-2024-08-06", None),
+        ("openai/some-model-of-nobody", None),
+    ],
+)
+def test_prices_come_from_the_map_where_the_provider_is_the_same(
+    model_id: str, price: Price | None
+) -> None:
+    found = price_of(config(model_id))
+    if price is None:
+        assert found is None
+    else:
+        assert found is not None
+        assert found.input_usd == pytest.approx(price.input_usd, rel=0.2)
+        assert found.output_usd == pytest.approx(price.output_usd, rel=0.2)
+
+
+def test_a_price_of_ones_own_comes_first() -> None:
+    assert price_of(config("openai/o1", price=Price(1, 2))) == Price(1, 2)
+
+
+@pytest.mark.parametrize("kind", ["replay", "baseline"])
+def test_recordings_and_baselines_cost_nothing(kind: str) -> None:
+    assert price_of(ModelConfig("m", kind)) == Price(0, 0)  # type: ignore[arg-type]
+
+
+@given(st.integers(0, 10**7), st.integers(0, 10**6))
+def test_cost_is_linear_in_tokens(prompt: int, completion: int) -> None:
+    cost = cost_usd(Price(2.0, 8.0), Usage(prompt, completion))
+    assert cost == pytest.approx((2 * prompt + 8 * completion) / 1e6)
+
+
+@pytest.mark.parametrize("usage", [Usage(), Usage(5, None), Usage(None, 5)])
+def test_what_is_not_known_is_not_nothing(usage: Usage) -> None:
+    assert cost_usd(Price(1, 1), usage) is None
+    assert cost_usd(None, Usage(1, 1)) is None
+    assert cost_usd(Price(0, 0), usage) == 0.0
+
+
+def request_of(*parts: str | Image, **params: object) -> Request:
+    return Request("0", 0, (Message("user", parts),), params, "v", SCENE, CANDIDATES)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "tokens"),
+    [(512, 512, 255), (1024, 1024, 765), (2048, 4096, 1105), (100, 100, 255), (4096, 512, 765)],
+)
+def test_pictures_are_counted_by_tiles(width: int, height: int, tokens: int) -> None:
+    image = Image(b"", "goal", width, height)
+    assert estimate(config("x/y"), request_of(image)).prompt_tokens == tokens
+
+
+def test_the_longest_reply_is_what_was_asked_for_or_what_the_model_can() -> None:
+    def most(model_id: str, **params: object) -> int:
+        return estimate(config(model_id), request_of("a", **params)).most_completion_tokens
+
+    assert most("openai/gpt-4o-2024-08-06", max_tokens=100) == 100
+    assert most("openai/gpt-4o-2024-08-06", max_completion_tokens=70) == 70
+    assert most("openai/gpt-4o-2024-08-06") == 16384
+    assert most("x/y") == 32768
+
+
+def test_a_model_without_a_price_under_a_budget_is_an_error_at_the_start() -> None:
+    with pytest.raises(SpecError, match="no known price"):
+        build_model(config("openai/nobodys"), cache=None, overall=Gate(1), budget=Budget(1.0))
+
+
+@given(
+    st.floats(0.1, 10),
+    st.lists(st.tuples(st.floats(0.01, 3), st.floats(0, 1), st.integers(0, 3)), max_size=30),
+)
+def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(
+    limit: float, calls: list[tuple[float, float, int]]
+) -> None:
+    async def main() -> None:
+        budget = Budget(limit)
+        refused: list[float] = []
+
+        async def call(most: float, share: float, steps: int) -> None:
+            try:
+                held = await budget.reserve(most)
+            except BudgetReachedError:
+                refused.append(most)
+                assert budget.spent_usd + most > limit
+                return
+            for _ in range(steps):
+                await asyncio.sleep(0)
+            budget.settle(held, most * share)
+            assert budget.spent_usd <= limit + 1e-9
+
+        await asyncio.gather(*(call(*one) for one in calls))
+        assert budget.spent_usd <= limit + 1e-9
+
+    run(main)
+
+
+def test_a_reservation_without_a_known_cost_counts_in_full() -> None:
+    async def main() -> None:
+        budget = Budget(1.0, spent_usd=0.25)
+        budget.settle(await budget.reserve(0.5), None)
+        assert budget.spent_usd == 0.75
+        with pytest.raises(BudgetReachedError, match=r"0\.7500 spent"):
+            await budget.reserve(0.5)
+
+    run(main)
+
+
+def test_a_provider_that_counts_pictures_higher_is_reserved_for() -> None:
+    budget, price = Budget(1.0), Price(1.0, 1.0)
+    expected = Estimate(1000, 100, 100)
+    before = budget.most_usd("m", price, expected)
+    budget.learn("m", expected, Usage(20_000, 10))
+    assert budget.most_usd("m", price, expected) > 10 * before
+    assert budget.most_usd("n", price, expected) == before
+
+
+def test_a_run_stops_before_its_limit_and_answers_say_what_they_cost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    # A call really costs (1000 * 10 + 40 * 100) / 1e6 = 0.014 dollars.
+    server = ROUTES["direct"].server(Faults(rate_limited=0.2, latency_s=0.001))
+    budget = Budget(0.3)
+    with Running(server) as running:
+        model = make_model(
+            ROUTES["direct"].config(running.url, price=Price(10.0, 100.0), max_concurrency=8),
+            budget=budget,
+        )
+
+        async def main() -> list[Reply | BaseException | None]:
+            try:
+                asked = (model.ask(make_request(f"{n:03}")) for n in range(60))
+                return await asyncio.gather(*asked, return_exceptions=True)
+            finally:
+                await model.aclose()
+
+        answers = run(main)
+    replies = [answer for answer in answers if isinstance(answer, Reply)]
+    assert {type(answer) for answer in answers} == {Reply, BudgetReachedError}
+    assert all(reply.cost_usd == pytest.approx(0.014) for reply in replies)
+    assert len(replies) == server.ended["ok"]
+    assert budget.spent_usd == pytest.approx(0.014 * len(replies))
+    assert 0.25 < budget.spent_usd <= 0.3
+
+
+def test_an_unknown_price_is_an_unknown_cost(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    with Running(ROUTES["direct"].server()) as running:
+        (answer,) = ask(make_model(ROUTES["direct"].config(running.url)), make_request())
+    assert isinstance(answer, Reply)
+    assert answer.cost_usd is None

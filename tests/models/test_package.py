@@ -1,0 +1,74 @@
+"""The package as a whole: its public names, and what it does not import."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import phyblock.models
+
+ROOT = Path(__file__).parents[2]
+
+CACHED = """
+import asyncio, sys
+from pathlib import Path
+from phyblock.models import Gate, ModelConfig, Reply, ReplyCache, build_model, reply_key
+from tests.models.factory import make_request
+config = ModelConfig("m", "litellm", "anthropic/claude")
+with ReplyCache(Path(sys.argv[1])) as cache:
+    cache.put(reply_key(config, make_request()), config.id, Reply("kept"))
+    model = build_model(config, cache=cache, overall=Gate(1))
+    async def main():
+        assert (await model.ask(make_request())).text == "kept"
+        await model.aclose()
+    asyncio.run(main())
+"""
+IMPORTED = "\nprint([name for name in ('litellm', 'aiohttp', 'httpx') if name in sys.modules])"
+
+SENDING = """
+import asyncio, os, sys
+from phyblock.models import Gate, ModelConfig, RetryPolicy, build_model
+from tests.models.factory import make_request
+os.chdir(sys.argv[1])
+model = build_model(
+    ModelConfig("m", "litellm", "anthropic/claude", api_base="http://127.0.0.1:9", timeout_s=5),
+    cache=None, overall=Gate(1), policy=RetryPolicy(attempts=1),
+)
+async def main():
+    try:
+        await model.ask(make_request())
+    except Exception as error:
+        print(type(error).__name__)
+    await model.aclose()
+asyncio.run(main())
+print(os.environ.get("FROM_DOTENV"))
+"""
+
+
+def python(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-W", "error", "-c", code, *arguments]
+    environment = {"PYTHONPATH": str(ROOT), "PATH": ""}
+    return subprocess.run(
+        command, capture_output=True, text=True, check=True, cwd=ROOT, env=environment
+    )
+
+
+def test_every_public_name_is_there() -> None:
+    for name in phyblock.models.__all__:
+        assert hasattr(phyblock.models, name)
+    assert sorted(phyblock.models.__all__) == phyblock.models.__all__
+
+
+@pytest.mark.parametrize("code", ["import sys, phyblock.models", CACHED])
+def test_no_client_is_imported_before_a_call_is_sent(tmp_path: Path, code: str) -> None:
+    assert python(code + IMPORTED, str(tmp_path / "c.sqlite")).stdout == "[]\n"
+
+
+def test_litellm_reads_no_key_file_and_says_nothing(tmp_path: Path) -> None:
+    (tmp_path / ".env").write_text("FROM_DOTENV=1\nANTHROPIC_API_KEY=sk-from-a-file-12345\n")
+    done = python(SENDING, str(tmp_path))
+    assert done.stdout == "RetryableError\nNone\n"
+    assert done.stderr == ""

@@ -1,0 +1,132 @@
+"""Recorded replies in the place of a model."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+
+from phyblock.errors import DataError, RefusedError, SampleError
+from phyblock.models import Gate, Model, ModelConfig, Reply, Usage, build_model
+from tests.models.factory import make_request
+
+STEPS = "Step1: Move block with index 3"
+
+
+def replay(folder: Path, model: str = "m") -> Model:
+    config = ModelConfig(model, "replay", model, recording=folder)
+    return build_model(config, cache=None, overall=Gate(1))
+
+
+def answer(model: Model, key: str, seed: int = 0) -> Reply | None:
+    return asyncio.run(model.ask(make_request(key, seed)))
+
+
+def test_a_reply_is_found_by_key_whatever_the_seed(tmp_path: Path) -> None:
+    (tmp_path / "007.json").write_text(json.dumps({"predict": STEPS}))
+    model = replay(tmp_path)
+    assert not model.needs_messages
+    replies = [answer(model, "007", seed) for seed in (0, 1)]
+    assert replies == [Reply(STEPS, finish="unknown", cost_usd=0.0, attempts=0)] * 2
+
+
+def test_a_missing_reply_is_none(tmp_path: Path) -> None:
+    (tmp_path / "007.json").write_text(json.dumps(STEPS))
+    assert answer(replay(tmp_path), "008") is None
+
+
+def test_a_file_may_say_more_after_the_key(tmp_path: Path) -> None:
+    (tmp_path / "007_reply.json").write_text(json.dumps(STEPS))
+    (tmp_path / "0071.json").write_text(json.dumps("other"))
+    reply = answer(replay(tmp_path), "007")
+    assert reply is not None
+    assert reply.text == STEPS
+    (tmp_path / "007_again.json").write_text(json.dumps(STEPS))
+    with pytest.raises(DataError, match="more than one recording"):
+        answer(replay(tmp_path), "007")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b'{"predict": "a"', r"007\.json:1:\d+: is not JSON"),
+        (b"\xff\xfe\x00", r"007\.json:1:1: is not JSON"),
+        (b'{"error": "overloaded"}', "no recorded reply of a known shape"),
+    ],
+)
+def test_a_broken_recording_is_an_error_at_its_place(
+    tmp_path: Path, content: bytes, said: str
+) -> None:
+    (tmp_path / "007.json").write_bytes(content)
+    with pytest.raises(DataError, match=said):
+        answer(replay(tmp_path), "007")
+
+
+def test_a_folder_that_is_missing_or_empty_is_an_error_at_the_start(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="recordings not found"):
+        replay(tmp_path / "nowhere")
+    with pytest.raises(DataError, match="no recorded replies"):
+        replay(tmp_path)
+
+
+def record(model: str, scene: str, seed: int, **fields: object) -> str:
+    reply = {**asdict(Reply(STEPS, "red", usage=Usage(7, 5), cost_usd=0.5, seed_sent=False))}
+    whole = {"model": model, "scene": scene, "seed": seed, "reply": reply, "error": None}
+    return json.dumps({**whole, **fields}) + "\n"
+
+
+def test_a_run_of_our_own_is_matched_by_model_key_and_seed(tmp_path: Path) -> None:
+    (tmp_path / "records.jsonl").write_text(
+        record("m", "007", 1)
+        + record("n", "007", 1, reply=asdict(Reply("other")))
+        + record("m", "007", 2, reply=asdict(Reply("first")))
+        + record("m", "007", 2, reply=asdict(Reply("last")))
+        + record("m", "008", 1, reply=None)
+        + '{"model": "m", "scene": "009"'
+    )
+    model = replay(tmp_path)
+    assert not model.needs_messages
+    expected = Reply(STEPS, "red", usage=Usage(7, 5), cost_usd=0.0, attempts=0, seed_sent=False)
+    assert answer(model, "007", 1) == expected
+    last = answer(model, "007", 2)
+    assert last is not None
+    assert last.text == "last"
+    assert answer(model, "007", 3) is None
+    assert answer(model, "008", 1) is None
+    assert answer(model, "009", 1) is None
+
+
+@pytest.mark.parametrize(("kind", "error"), [("sample", SampleError), ("refused", RefusedError)])
+def test_a_recorded_error_is_raised_again(
+    tmp_path: Path, kind: str, error: type[SampleError]
+) -> None:
+    failed = {"kind": kind, "status": 400, "message": "no"}
+    (tmp_path / "records.jsonl").write_text(record("m", "007", 1, reply=None, error=failed))
+    with pytest.raises(error, match="no") as caught:
+        answer(replay(tmp_path), "007", 1)
+    assert caught.value.status == 400
+
+
+def test_the_only_model_of_a_run_needs_no_name_and_others_do(tmp_path: Path) -> None:
+    path = tmp_path / "records.jsonl"
+    path.write_text(record("gpt", "007", 1))
+    assert answer(replay(tmp_path, "mine"), "007", 1) is not None
+    path.write_text(record("gpt", "007", 1) + record("qwen", "007", 1))
+    with pytest.raises(DataError, match="no records of this model"):
+        replay(tmp_path, "mine")
+
+
+@pytest.mark.parametrize("line", ["{", "[]", '{"model": "m"}', "7"])
+def test_a_broken_record_is_an_error_at_its_line(tmp_path: Path, line: str) -> None:
+    (tmp_path / "records.jsonl").write_text(record("m", "007", 1) + line + "\n")
+    with pytest.raises(DataError, match=r"records\.jsonl:2: is not a record"):
+        replay(tmp_path)
+
+
+def test_the_official_recordings_answer_for_their_scenes(official_checkout: Path) -> None:
+    model = replay(official_checkout / "outputs" / "claude-3-7-thinking")
+    replies = [answer(model, f"{number:03}") for number in range(400)]
+    assert sum(reply is not None for reply in replies) == 390
