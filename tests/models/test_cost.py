@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.errors import SpecError
+from phyblock.errors import RetryableError, SpecError
 from phyblock.models import (
     Budget,
     BudgetReachedError,
@@ -191,3 +191,18 @@ def test_an_unknown_price_is_an_unknown_cost(monkeypatch: pytest.MonkeyPatch) ->
         (answer,) = ask(make_model(ROUTES["direct"].config(running.url)), make_request())
     assert isinstance(answer, Reply)
     assert answer.cost_usd is None
+
+
+@pytest.mark.parametrize(("mode", "is_counted"), [("html", True), ("reset", True), ("500", False)])
+def test_a_failure_that_may_have_been_billed_counts_against_the_budget(
+    monkeypatch: pytest.MonkeyPatch, mode: str, is_counted: bool
+) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    budget = Budget(100.0)
+    with Running(ROUTES["direct"].server(Faults(mode=mode))) as running:
+        model = make_model(
+            ROUTES["direct"].config(running.url, price=Price(10.0, 100.0)), budget=budget
+        )
+        (answer,) = ask(model, make_request())
+    assert isinstance(answer, RetryableError)
+    assert (budget.spent_usd > 0.1) == is_counted

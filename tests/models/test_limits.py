@@ -234,6 +234,21 @@ def test_a_gate_survives_waiters_that_give_up(plans: list[tuple[int, bool]], wid
     run(main)
 
 
+def test_a_place_given_to_a_waiter_that_was_cancelled_meanwhile_is_not_lost() -> None:
+    async def main() -> None:
+        gate = Gate(1)
+        await gate.enter()
+        waiter = asyncio.create_task(gate.enter())
+        await asyncio.sleep(0)
+        gate.leave()
+        waiter.cancel()
+        await asyncio.gather(waiter, return_exceptions=True)
+        assert waiter.cancelled()
+        assert gate.inside == 0
+
+    run(main)
+
+
 def test_a_gate_needs_a_width() -> None:
     with pytest.raises(ValueError, match="width of at least 1"):
         Gate(0)
