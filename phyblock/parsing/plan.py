@@ -178,10 +178,8 @@ def _last_list(text: str, head: re.Pattern[str], item: re.Pattern[str]) -> _List
 
 def _relation(text: str, before: _List, found: _List) -> _Relation:
     """What a list is to the one before it, by the text between them."""
-    between = text[before.end : found.start]
-    if len(between) > 4 * _HEADING_CHARS:
-        return "other"
-    heading = [line for line in _MARKUP.sub(" ", between).splitlines() if line.strip()]
+    between = _MARKUP.sub(" ", text[before.end : found.start])
+    heading = [line for line in between.splitlines() if line.strip()]
     title = heading[0].strip() if len(heading) == 1 else ""
     if len(heading) > 1 or len(title) > _HEADING_CHARS or _REVISION.search(title):
         return "other"

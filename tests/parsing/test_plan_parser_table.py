@@ -66,6 +66,11 @@ STEP_LISTS = {
         "Step3: Move block with index 7 on the block of step 2, step 1 below it",
         (3, 6, 7),
     ),
+    "another step named after a comma": (
+        "Step1: Move block with index 3\nStep2: Move block with index 6, step 1 holds it\n"
+        "Step3: Move block with index 7",
+        (3, 6, 7),
+    ),
     "several blocks in a step": (
         "Step 1: Move blocks with index 1, 2 and 5\nStep 2: Move blocks with indices 7 & 8",
         (1, 2, 5, 7, 8),
@@ -125,6 +130,11 @@ STEP_LISTS = {
         '{\n  "Step1": "Move block with index 1",\n  "Step2": "Move block with index 7"\n}\n\n'
         "**Explanation of the steps:**\n\n* **Step 1:** The long block (index 1) is the base.\n"
         "* **Step 2:** Then comes the roof (index 9, seen from the left).",
+        (1, 7),
+    ),
+    "an explanation in two parts": (
+        "Step1: Move block with index 1\nStep2: Move block with index 7\n\nExplanation:\n"
+        "Step 1: index 1 is the base.\n\nRight structure:\nStep 1: index 9 is the roof.",
         (1, 7),
     ),
     "headings that are called steps": (
