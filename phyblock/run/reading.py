@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 import yaml
@@ -17,6 +19,24 @@ MANIFEST = "run.yaml"
 RECORDS = "records.jsonl"
 _HINT = "restore the file from a copy, or remove this line: its sample is then run again"
 
+_MANIFEST_HINT = "run.yaml is written by `phyblock run` and never edited: restore it from a copy"
+
+_Fields = Mapping[str, Any]
+"""Types of fields by name; a mapping in the place of a type is an object or null."""
+_COUNT = (int, NoneType)
+_REPLY: _Fields = {
+    "text": str,
+    "usage": {"prompt_tokens": _COUNT, "completion_tokens": _COUNT},
+    "cost_usd": (int, float, NoneType),
+    "cached": bool,
+}
+_RECORD: _Fields = {
+    **dict.fromkeys(("sample", "track", "model", "scene", "outcome"), str),
+    **{"seed": int, "n_blocks": int, "levels": list, "scores": list},
+    **{"reply": _REPLY, "error": {"kind": str}},
+}
+_SCORE: _Fields = {"criterion": str, "setting": str, "tp": int, "fp": int, "fn": int}
+
 
 def read_manifest(folder: Path) -> dict[str, Any]:
     """The run's manifest; StoreError when there is none or it cannot be read."""
@@ -26,10 +46,15 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     except (FileNotFoundError, NotADirectoryError) as error:
         allowed = "a folder that phyblock run wrote"
         raise StoreError(Problem(str(folder), f"holds no {MANIFEST}", allowed=allowed)) from error
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise StoreError(Problem(str(path), f"cannot be read: {error}")) from error
+    except OSError as error:
+        raise StoreError(Problem(str(path), f"cannot be read: {error.strerror}")) from error
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"{path}:{mark.line + 1}:{mark.column + 1}" if mark else str(path)
+        raise StoreError(Problem(where, "is not YAML", hint=_MANIFEST_HINT)) from error
     if not isinstance(manifest, dict) or "identity" not in manifest:
-        raise StoreError(Problem(str(path), "is not a run manifest", "identity", "no such key"))
+        problem = Problem(str(path), "is not a run manifest", "identity", "no such key")
+        raise StoreError(replace(problem, hint=_MANIFEST_HINT))
     return manifest
 
 
@@ -71,8 +96,30 @@ def read_records(folder: Path) -> dict[str, dict[str, Any]]:
 def _parse(where: str, line: bytes) -> dict[str, Any]:
     try:
         record = json.loads(line)
-    except ValueError as error:
-        raise StoreError(Problem(where, f"is not a record: {error}", hint=_HINT)) from error
-    if not isinstance(record, dict) or not isinstance(record.get("sample"), str):
-        raise StoreError(Problem(where, "is not a record", "sample", hint=_HINT))
-    return record
+    except json.JSONDecodeError as error:
+        where = f"{where}:{error.colno}"
+        raise StoreError(Problem(where, f"is not a record: {error.msg}", hint=_HINT)) from error
+    except UnicodeDecodeError as error:
+        raise StoreError(Problem(where, "is not a record: not UTF-8", hint=_HINT)) from error
+    wrong = _first_wrong(record, _RECORD)
+    if wrong is not None:
+        message = "is not a record: missing or of the wrong type"
+        raise StoreError(Problem(where, message, wrong, hint=_HINT))
+    return dict(record)
+
+
+def _first_wrong(found: object, wanted: _Fields) -> str | None:
+    """Dotted name of the first field that is not there or of another type, or None."""
+    if not isinstance(found, dict):
+        return ""
+    for name, kind in wanted.items():
+        value = found.get(name, ...)
+        if isinstance(kind, dict):
+            below = None if value is None else _first_wrong(value, kind)
+        else:
+            below = None if isinstance(value, kind) else ""
+        if below is not None:
+            return f"{name}.{below}".rstrip(".")
+    scores = found.get("scores", ())
+    wrong = ((i, _first_wrong(score, _SCORE)) for i, score in enumerate(scores))
+    return next((f"scores[{i}].{name}".rstrip(".") for i, name in wrong if name is not None), None)

@@ -116,27 +116,29 @@ def test_a_run_without_records_is_empty(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "at", "field"),
     [
-        ('{"sample": "x', "is not a record: "),
-        ("\0\0\0", "is not a record: "),
-        ("[1, 2]", "is not a record"),
-        ("{}", "is not a record"),
-        (json.dumps(record() | {"seed": "first"}), "not in the run format"),
-        (json.dumps(record() | {"scores": [{"criterion": "aov"}]}), "no 'matcher'"),
-        (json.dumps(record() | {"reply": "text"}), "not in the run format"),
-        (json.dumps(record() | {"levels": 2}), "not in the run format"),
+        ('{"sample": "x', ":14", ""),
+        ("\0\0\0", ":1", ""),
+        ("[1, 2]", "", ""),
+        ("{}", "", "sample"),
+        (json.dumps(record() | {"seed": "first"}), "", "seed"),
+        (json.dumps(record() | {"scores": [{"criterion": "aov"}]}), "", "scores[0].setting"),
+        (json.dumps(record() | {"scores": [7]}), "", "scores[0]"),
+        (json.dumps(record() | {"reply": "text"}), "", "reply"),
+        (json.dumps(record() | {"levels": 2}), "", "levels"),
     ],
 )
-def test_a_corrupt_line_is_named(tmp_path: Path, line: str, said: str) -> None:
+def test_a_corrupt_line_is_named(tmp_path: Path, line: str, at: str, field: str) -> None:
     folder = write_run(tmp_path / "run", [], manifest())
     good = json.dumps(record())
     (folder / "records.jsonl").write_text(f"{good}\n{line}\n{good}\n", encoding="utf-8")
     with pytest.raises(StoreError) as caught:
         load_run(folder)
     (problem,) = caught.value.problems
-    assert problem.where == f"{folder / 'records.jsonl'}:2"
-    assert said in problem.message
+    assert problem.where == f"{folder / 'records.jsonl'}:2{at}"
+    assert problem.message.startswith("is not a record")
+    assert problem.field == field
     assert problem.hint
 
 
