@@ -23,6 +23,14 @@ from phyblock.run.reading import MANIFEST, RECORDS, RecordLines, read_manifest
 __all__ = ["RunStore"]
 
 _LOCK = ".lock"
+_NOT_IDENTITY = (
+    "suite.description",
+    "suite.limits",
+    "suite.tables",
+    "suite.dataset",
+    "dataset.root",
+)
+"""Parts of a manifest that may change while the run stays the same, or that others repeat."""
 
 
 class RunStore:
@@ -31,8 +39,8 @@ class RunStore:
     def __init__(self, folder: Path, manifest: Mapping[str, Any]) -> None:
         """Open `folder` for the run that `manifest` describes, creating it when it is new.
 
-        Raises StoreError when the folder cannot be written, holds another run (its identity
-        differs), or is being written by another process.
+        Raises StoreError when the folder cannot be written, holds records of another run (its
+        identity differs), or is being written by another process.
         """
         self.folder = folder
         self._lock: IO[str] | None = None
@@ -98,20 +106,25 @@ class RunStore:
 
     def _claim(self, manifest: Mapping[str, Any]) -> None:
         path = self.folder / MANIFEST
-        if path.exists():
-            found = read_manifest(self.folder)
-            if found["identity"] != manifest["identity"]:
-                hint = "choose another folder with --out"
-                changed = ", ".join(_changed(found, manifest)) or "the versions of its inputs"
-                message = "holds another run"
-                raise StoreError(
-                    Problem(str(self.folder), message, found=f"different: {changed}", hint=hint)
-                )
+        found = read_manifest(self.folder) if path.exists() else None
+        if found is not None and found["identity"] == manifest["identity"]:
             return
+        if self._has_records():
+            changed = f"records, and no {MANIFEST}"
+            if found is not None:
+                names = _changed(found, manifest)
+                changed = f"different: {', '.join(names) or 'how pictures are drawn'}"
+            hint = "choose another folder with --out"
+            message = "holds another run"
+            raise StoreError(Problem(str(self.folder), message, found=changed, hint=hint))
         text = yaml.safe_dump(dict(manifest), sort_keys=False, allow_unicode=True, width=100)
         partial = path.with_suffix(".part")
         partial.write_text(text, encoding="utf-8")
         os.replace(partial, path)
+
+    def _has_records(self) -> bool:
+        """Whether anything would be lost with the folder: a run that failed at once leaves none."""
+        return next(iter(RecordLines(self.folder)), None) is not None
 
     def _drop_cut_line(self) -> None:
         lines = RecordLines(self.folder)
@@ -127,12 +140,13 @@ def _line(record: Mapping[str, Any]) -> bytes:
 
 
 def _changed(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
-    """Dotted names of the parts in which two manifests differ."""
+    """Dotted names of the parts in which two manifests differ and that make them two runs."""
     names: list[str] = []
     for part in ("suite", "models", "dataset", "prompt", "limit"):
         old, new = found.get(part), wanted.get(part)
         if isinstance(old, dict) and isinstance(new, dict):
-            names += [f"{part}.{key}" for key in new if old.get(key) != new[key]]
+            keys = [key for key in new if f"{part}.{key}" not in _NOT_IDENTITY]
+            names += [f"{part}.{key}" for key in keys if old.get(key) != new[key]]
         elif old != new:
             names.append(part)
     return names

@@ -6,7 +6,6 @@ import asyncio
 from collections.abc import Mapping
 from typing import Any
 
-from phyblock.errors import StoreError
 from phyblock.run.store import RunStore
 
 __all__ = ["RecordWriter"]
@@ -36,10 +35,11 @@ class RecordWriter:
     async def _flush(self) -> None:
         while self._waiting:
             batch, self._waiting = self._waiting, []
-            failure: StoreError | None = None
+            failure: Exception | None = None
             try:
                 await asyncio.to_thread(self._store.append, [record for record, _ in batch])
-            except StoreError as error:
+            except Exception as error:
+                # Whatever it is, those who wait must hear of it, or they wait for ever.
                 failure = error
             # A waiter that was cancelled has a future that is already done.
             for written in (future for _, future in batch if not future.done()):
