@@ -20,11 +20,13 @@ __all__ = ["command"]
 @click.option("--parser", type=click.Choice(PLAN_PARSERS), help="Parser to read replies with.")
 @click.option("--matcher", type=click.Choice(MATCHERS), help="Matcher of the headline numbers.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for the new scores.")
-def command(run: Path, parser: str | None, matcher: str | None, out: Path | None) -> None:
+@click.option("--data", type=click.Path(path_type=Path), help="The data set, where it has moved.")
+def command(
+    run: Path, parser: str | None, matcher: str | None, out: Path | None, data: Path | None
+) -> None:
     """Read and score the stored replies of the folder RUN again; no model is called.
 
     The new scores go to RUN/scores/PARSER-MATCHER (or --out); RUN itself stays as it is.
     """
-    show_tables(
-        rescore(run, cast("PlanParser | None", parser), cast("Matcher | None", matcher), out)
-    )
+    chosen = cast("PlanParser | None", parser), cast("Matcher | None", matcher)
+    show_tables(rescore(run, *chosen, out, data))

@@ -5,16 +5,20 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import yaml
+from pydantic import ValidationError
 
+from phyblock.datasets import AssemblyTask
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.parsing import PlanParser
 from phyblock.run.plan import open_dataset, planning_rules
 from phyblock.run.reading import MANIFEST, RECORDS, read_manifest, read_records
 from phyblock.run.records import judged
+from phyblock.run.select import select_tasks
 from phyblock.scoring import Matcher
 from phyblock.specs import SuiteSpec
 from phyblock.tasks import FullPlanning
@@ -23,48 +27,88 @@ __all__ = ["rescore"]
 
 
 def rescore(
-    folder: Path, parser: PlanParser | None, matcher: Matcher | None, out: Path | None
+    folder: Path,
+    parser: PlanParser | None,
+    matcher: Matcher | None,
+    out: Path | None,
+    data: Path | None = None,
 ) -> Path:
     """Score a run again, with another parser or headline matcher, into a run folder of its own.
 
     The new folder (`<run>/scores/<parser>-<matcher>` when `out` is None) holds a manifest and
-    records like any run, so that tables and notebooks read it. Raises StoreError for a folder that
-    is no run or cannot be written, DataError when the data set is not what the run was made on.
+    records like any run, so that tables and notebooks read it. `data` is where the data set is now,
+    if it has moved. Raises StoreError for a folder that is no run or cannot be written, DataError
+    when the data set is not what the run was made on.
     """
     manifest = read_manifest(folder)
-    suite = SuiteSpec.model_validate(_with(manifest["suite"], parser, matcher))
-    dataset = open_dataset(suite.dataset.format, Path(manifest["dataset"]["root"]))
-    tasks = {task.scene.id: task for task in dataset.tasks}
+    suite = _suite(folder, manifest, parser, matcher)
+    tasks = {task.scene.id: task for task in _tasks(folder, manifest, suite, data)}
     track = FullPlanning(planning_rules(suite))
     records = []
     for record in read_records(folder).values():
         task = tasks.get(record["scene"])
-        if task is None or len(task.scene) != record["n_blocks"]:
-            found = "no such scene" if task is None else f"{len(task.scene)} blocks"
-            raise DataError(
-                Problem(
-                    str(dataset.root),
-                    "is not the data set that the run was made on",
-                    f"scene {record['scene']}",
-                    found,
-                    f"{record['n_blocks']} blocks",
-                )
-            )
+        if task is None:
+            where, hint = str(folder / RECORDS), "the file was changed: restore it from a copy"
+            raise StoreError(
+                Problem(where, "names a scene that the run has not", "scene", record["scene"],
+                        hint=hint)
+            )  # fmt: skip
         text = None if record["reply"] is None else record["reply"]["text"]
         records.append(judged(record, track.judge(task, text), suite.parser))
     target = out or folder / "scores" / f"{suite.parser}-{suite.scoring.matchers[0]}"
-    _write(target, {**manifest, "suite": suite.model_dump(mode="json")}, records)
+    identity = f"{manifest['identity']} scored by {suite.parser}, {suite.scoring.matchers[0]}"
+    scored = {**manifest, "identity": identity, "suite": suite.model_dump(mode="json")}
+    if (target / MANIFEST).exists() and read_manifest(target)["identity"] != identity:
+        hint = "choose another folder with --out: what a run stored is never changed"
+        raise StoreError(Problem(str(target), "holds another run", hint=hint))
+    _write(target, scored, records)
     return target
 
 
-def _with(
-    suite: Mapping[str, Any], parser: PlanParser | None, matcher: Matcher | None
-) -> dict[str, Any]:
-    scoring = dict(suite["scoring"])
-    if matcher is not None:
-        others = [name for name in scoring["matchers"] if name != matcher]
-        scoring["matchers"] = [matcher, *others]
-    return {**suite, "scoring": scoring, "parser": parser or suite["parser"]}
+def _suite(
+    folder: Path,
+    manifest: Mapping[str, Any],
+    parser: PlanParser | None,
+    matcher: Matcher | None,
+) -> SuiteSpec:
+    """The run's suite with parser and headline matcher replaced."""
+    try:
+        suite = SuiteSpec.model_validate(manifest.get("suite"))
+        matchers = suite.scoring.matchers
+        if matcher is not None:
+            matchers = (matcher, *(name for name in matchers if name != matcher))
+        scoring = suite.scoring.model_copy(update={"matchers": matchers})
+        return suite.model_copy(update={"scoring": scoring, "parser": parser or suite.parser})
+    except ValidationError as error:
+        raise _broken(folder, "suite") from error
+
+
+def _tasks(
+    folder: Path, manifest: Mapping[str, Any], suite: SuiteSpec, data: Path | None
+) -> tuple[AssemblyTask, ...]:
+    """The tasks of the run, known to be those that it was made on."""
+    recorded = manifest.get("dataset")
+    if not isinstance(recorded, dict) or not {"root", "sha256"} <= recorded.keys():
+        raise _broken(folder, "dataset")
+    hint = "name the folder where it is now with --data"
+    root = data or Path(recorded["root"])
+    if not root.is_dir():
+        raise DataError(Problem(str(root), "the data set of the run is not there", hint=hint))
+    dataset = open_dataset(suite.dataset.format, root)
+    dataset = replace(
+        dataset, tasks=select_tasks(dataset.tasks, suite.levels, manifest.get("limit"))
+    )
+    if dataset.sha256 != recorded["sha256"]:
+        message = "is not the data set that the run was made on, or it was changed since"
+        raise DataError(
+            Problem(str(root), message, "sha256", dataset.sha256, recorded["sha256"], hint)
+        )
+    return dataset.tasks
+
+
+def _broken(folder: Path, field: str) -> StoreError:
+    hint = "run.yaml is written by `phyblock run` and is never edited"
+    return StoreError(Problem(str(folder / MANIFEST), "is missing or wrong", field, hint=hint))
 
 
 def _write(folder: Path, manifest: Mapping[str, Any], records: list[dict[str, Any]]) -> None:
