@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,10 +100,18 @@ class TemplatePrompt:
         context = self._template.new_context(dict(facts))
         try:
             return "".join(self._template.blocks[block](context)).strip()
-        except jinja2.TemplateError as error:
+        except Exception as error:
+            # A template is a program: what it computes can fail in any way.
             known = "names that are there: " + ", ".join(sorted(facts))
-            problem = Problem(str(self._path), f"cannot be rendered: {error}", block, "", known)
-            raise PromptError(problem) from error
+            message = f"cannot be rendered: {error or type(error).__name__}"
+            where = f"{self._path}:{self._line_of(error)}"
+            raise PromptError(Problem(where, message, f"block {block}", "", known)) from error
+
+    def _line_of(self, error: Exception) -> int:
+        """The template's line at which rendering failed."""
+        frames = traceback.extract_tb(error.__traceback__)
+        compiled = [frame.lineno or 1 for frame in frames if frame.filename == "<template>"]
+        return self._template.get_corresponding_lineno(compiled[-1]) if compiled else 1
 
 
 def _digest(text: str) -> str:
