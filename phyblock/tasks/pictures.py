@@ -7,12 +7,14 @@ import hashlib
 import io
 import os
 import signal
+import threading
 from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from pathlib import Path
 from typing import Literal
 
@@ -20,7 +22,7 @@ from PIL import Image as PillowImage
 from PIL import UnidentifiedImageError
 
 from phyblock.datasets import AssemblyTask
-from phyblock.errors import DataError, Problem, StoreError
+from phyblock.errors import DataError, Problem, SimulationError, StoreError
 from phyblock.models.base import Image
 from phyblock.sim import (
     PictureStyle,
@@ -107,9 +109,14 @@ class Pictures:
         if self.policy.source == "dataset":
             return self._from_dataset(task), True
         drawings = self._drawings(task)
-        if all(self._path(drawing.key).is_file() for drawing in drawings):
-            paths = [(self._path(drawing.key), drawing.label) for drawing in drawings]
-            return tuple(_image(path.read_bytes(), label) for path, label in paths), True
+        kept = [_whole_png(self._path(drawing.key)) for drawing in drawings]
+        images = [
+            _image(data, drawing.label)
+            for data, drawing in zip(kept, drawings, strict=True)
+            if data is not None
+        ]
+        if len(images) == len(drawings):
+            return tuple(images), True
         side = self.policy.style.size_px
         wide = 2 * side if self.policy.layout == "composite" else side
         return tuple(Image(b"", drawing.label, wide, side) for drawing in drawings), False
@@ -117,7 +124,8 @@ class Pictures:
     def keys(self, task: AssemblyTask) -> tuple[str, ...]:
         """What decides the pixels of a task's pictures: digests of content, style and renderer."""
         if self.policy.source == "dataset":
-            return (str(task.composite and task.composite.name),)
+            data = b"" if task.composite is None else read_picture(task.composite)
+            return (hashlib.sha256(data).hexdigest(),)
         return tuple(drawing.key for drawing in self._drawings(task))
 
     def close(self) -> None:
@@ -153,8 +161,8 @@ class Pictures:
 
     async def _image(self, drawing: _Drawing) -> Image:
         path = self._path(drawing.key)
-        if path.is_file():
-            return _image(path.read_bytes(), drawing.label)
+        if (kept := _whole_png(path)) is not None:
+            return _image(kept, drawing.label)
         if drawing.key not in self._making:
             self._making[drawing.key] = asyncio.create_task(self._draw(path, drawing))
         # Shielded: others may wait for the same picture when one waiter is cancelled.
@@ -163,12 +171,12 @@ class Pictures:
     async def _draw(self, path: Path, drawing: _Drawing) -> bytes:
         if self._pool is None:
             self._pool = ProcessPoolExecutor(
-                self._workers, get_context("spawn"), initializer=_ignore_interrupts
+                self._workers, get_context("spawn"), initializer=_start_worker
             )
-        data = await asyncio.get_running_loop().run_in_executor(self._pool, drawing.make)
-        self.rendered += 1
         part = path.with_suffix(f".{os.getpid()}.part")
         try:
+            data = await asyncio.get_running_loop().run_in_executor(self._pool, drawing.make)
+            self.rendered += 1
             path.parent.mkdir(parents=True, exist_ok=True)
             part.write_bytes(data)
             os.replace(part, path)
@@ -176,6 +184,8 @@ class Pictures:
             hint = "name another cache folder with PHYBLOCK_CACHE"
             problem = Problem(str(path), f"cannot be written: {error.strerror}", hint=hint)
             raise StoreError(problem) from error
+        except BrokenProcessPool as error:
+            raise SimulationError("a process that draws pictures was killed") from error
         finally:
             del self._making[drawing.key]
         return data
@@ -194,7 +204,9 @@ def read_picture(path: Path) -> bytes:
         data = path.read_bytes()
         with PillowImage.open(io.BytesIO(data)) as picture:
             picture.verify()
-    except (OSError, UnidentifiedImageError, SyntaxError) as error:
+    except UnidentifiedImageError as error:
+        raise DataError(Problem(str(path), "is no picture", allowed="PNG or JPEG")) from error
+    except (OSError, SyntaxError) as error:
         problem = Problem(str(path), f"is not a readable picture: {error}", allowed="PNG or JPEG")
         raise DataError(problem) from error
     return data
@@ -220,6 +232,22 @@ def _image(data: bytes, label: str) -> Image:
         return Image(data, label, *picture.size)
 
 
-def _ignore_interrupts() -> None:
+def _whole_png(path: Path) -> bytes | None:
+    """The bytes of a picture in the cache; None when it is not there, or not whole."""
+    data = path.read_bytes() if path.is_file() else b""
+    is_whole = data.startswith(b"\x89PNG\r\n\x1a\n") and data.endswith(b"IEND\xaeB`\x82")
+    return data if is_whole else None
+
+
+def _start_worker() -> None:
     # Ctrl-C reaches the whole process group; only the runner decides what to do about it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """A runner that is killed tells its workers nothing: without this they would stay for ever."""
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
