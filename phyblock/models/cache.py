@@ -32,6 +32,7 @@ _FOREIGN = "belongs to another version of phyblock, or is no reply cache"
 _HINT = (
     "delete the file, or name another cache folder; answered samples of a run stay in its records"
 )
+_ELSEWHERE = "free some space, or name another cache folder with PHYBLOCK_CACHE"
 _CREATE = """
 CREATE TABLE IF NOT EXISTS replies (
     key TEXT PRIMARY KEY,
@@ -81,7 +82,7 @@ class ReplyCache:
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
             except OSError as error:
-                raise self._problem(f"cannot be made: {error.strerror}") from error
+                raise self._problem(f"cannot be made: {error.strerror}", hint=_ELSEWHERE) from error
             self._db = sqlite3.connect(path, timeout=_BUSY_TIMEOUT_S, isolation_level=None)
             try:
                 self._prepare()
@@ -174,14 +175,19 @@ class ReplyCache:
     def _explained(self) -> Iterator[None]:
         try:
             yield
+        except sqlite3.OperationalError as error:
+            # The disk or the place, not the content: to delete paid replies would be no help.
+            raise self._problem(f"cannot be used: {error}", hint=_ELSEWHERE) from error
         except sqlite3.Error as error:
             raise self._problem(f"cannot be used: {error}") from error
         except (ValueError, KeyError, TypeError) as error:
             raise self._problem(f"holds a broken reply: {error}") from error
 
-    def _problem(self, message: str, found: str = "", allowed: str = "") -> StoreError:
+    def _problem(
+        self, message: str, found: str = "", allowed: str = "", hint: str = _HINT
+    ) -> StoreError:
         where = f"reply cache {self.path}"
-        return StoreError(Problem(where, message, found=found, allowed=allowed, hint=_HINT))
+        return StoreError(Problem(where, message, found=found, allowed=allowed, hint=hint))
 
 
 def _reply(stored: dict[str, Any]) -> Reply:
