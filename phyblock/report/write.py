@@ -106,4 +106,4 @@ def _as_store_error(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise StoreError(Problem(str(folder), f"cannot be written: {error}")) from error
+        raise StoreError(Problem(str(folder), f"cannot be written: {error.strerror}")) from error
