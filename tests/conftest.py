@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.workspace import Workspace
+
 OFFICIAL_MISSING = (
     "official PhyBlock data not found: put it at ../shared or set PHYBLOCK_OFFICIAL to the folder "
     "that holds PhyBlock/ and expected/"
@@ -33,3 +35,18 @@ def official_dir() -> Path:
 def official_checkout(official_dir: Path) -> Path:
     """The (partial) checkout of the official repository."""
     return official_dir / "PhyBlock"
+
+
+@pytest.fixture(scope="session")
+def pictures_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where all workspaces of a test session, in all its processes, keep rendered pictures."""
+    base = tmp_path_factory.getbasetemp()
+    return (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "pictures"
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, pictures_dir: Path) -> Workspace:
+    """A folder with scenes and nothing else; see Workspace."""
+    made = Workspace(tmp_path, pictures_dir)
+    made.write_scenes()
+    return made

@@ -1,0 +1,204 @@
+"""A working folder for tests of whole runs: tiny scenes, a suite, models, the real command."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+Raw = dict[str, Any]
+
+COMMAND = (sys.executable, "-m", "phyblock")
+_CUBE_M = 0.05
+_COLORS = ("red", "yellow", "blue", "green", "orange")
+
+
+def candidates() -> list[Raw]:
+    """Sixteen candidates that all differ; the first five are the cubes."""
+    looks = [("cube", color, 0) for color in _COLORS]
+    looks += [("cylinder", color, 0) for color in _COLORS]
+    looks += [("cuboid2", "green", 0), ("cuboid2", "green", 90)]
+    looks += [("arch", "red", 0), ("arch", "red", 90)]
+    looks += [("triangle", "orange", 0), ("triangle", "orange", 90)]
+    return [{"type": t, "color": c, "euler": [0, 0, turn]} for t, c, turn in looks]
+
+
+def tower(scene_id: str, levels: list[int], colors: tuple[str, ...]) -> Raw:
+    """Cubes of the given colors, each on the one before."""
+    blocks = [
+        {
+            "order": i,
+            "type": "cube",
+            "color": color,
+            "layer": i,
+            "depend": [i - 1],
+            "position": [0, 0, (i - 0.5) * _CUBE_M],
+            "euler": [0, 0, 0],
+        }
+        for i, color in enumerate(colors, 1)
+    ]
+    needed = [
+        {**c, "required": colors.count(c["color"]) if c["type"] == "cube" else 0}
+        for c in candidates()
+    ]
+    return {
+        "id": scene_id,
+        "levels": levels,
+        "parents": [scene_id],
+        "blocks": blocks,
+        "candidates": needed,
+    }
+
+
+SCENES: tuple[Raw, ...] = (
+    tower("t1", [1, 2], ("red", "blue")),
+    tower("t2", [1, 2], ("green", "green")),
+    tower("t3", [3], ("yellow", "red", "blue")),
+    tower("t4", [3], ("orange", "green", "orange")),
+    tower("t5", [4], ("blue", "blue", "red", "yellow")),
+)
+
+
+@dataclass(frozen=True)
+class Done:
+    """How a command ended."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def errors(self) -> list[str]:
+        """The messages on stderr, one a problem."""
+        found: list[str] = []
+        for line in self.err.splitlines():
+            if line.startswith("error: "):
+                found.append(line)
+            elif found:
+                found[-1] += "\n" + line
+        return found
+
+
+class Workspace:
+    """A folder with `data/`, `suite.yaml` and `models.yaml`, and a reply cache of its own.
+
+    Pictures are shared between workspaces, because each takes a while to draw.
+    """
+
+    def __init__(self, root: Path, pictures: Path) -> None:
+        self.root = root
+        self.cache = root / "cache"
+        pictures.mkdir(parents=True, exist_ok=True)
+        if not self.cache.exists():
+            self.cache.mkdir()
+            (self.cache / "pictures").symlink_to(pictures, target_is_directory=True)
+        self.out = root / "out"
+        self.env = {
+            "PATH": os.environ["PATH"],
+            "HOME": str(root),
+            "PHYBLOCK_CACHE": str(self.cache),
+            "LITELLM_LOCAL_MODEL_COST_MAP": "True",
+        }
+
+    def write_scenes(self, *scenes: Raw) -> Path:
+        """`data/scenes.jsonl`."""
+        folder = self.root / "data"
+        folder.mkdir(exist_ok=True)
+        text = "".join(json.dumps(scene) + "\n" for scene in scenes or SCENES)
+        (folder / "scenes.jsonl").write_text(text, encoding="utf-8")
+        return folder
+
+    def write_suite(self, *, name: str = "trial", **fields: Any) -> Path:
+        """`suite.yaml`: small pictures, the scenes of `data`; `fields` replace whole sections."""
+        suite = {
+            "name": name,
+            "dataset": {"format": "builtin", "path": "./data"},
+            "images": {"size_px": 128},
+            "models": ["random", "oracle"],
+            **fields,
+        }
+        return self.write_yaml("suite.yaml", suite)
+
+    def write_models(self, url: str, *names: str, **fields: Any) -> Path:
+        """`models.yaml`: each name is a model of the local server at `url`."""
+        base = {"api_base": f"{url}/v1", **fields}
+        return self.write_yaml(
+            "models.yaml", {name: {"id": f"hosted_vllm/{name}", **base} for name in names}
+        )
+
+    def write_yaml(self, name: str, content: object) -> Path:
+        path = self.root / name
+        path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+        return path
+
+    def phyblock(
+        self,
+        *args: str | Path,
+        env: Mapping[str, str] | None = None,
+        before: Callable[[], None] | None = None,
+    ) -> Done:
+        """Run the command to its end."""
+        done = subprocess.run(
+            [*COMMAND, *map(str, args)],
+            cwd=self.root,
+            env={**self.env, **(env or {})},
+            capture_output=True,
+            text=True,
+            timeout=300,
+            stdin=subprocess.DEVNULL,
+            preexec_fn=before,
+        )
+        return Done(done.returncode, done.stdout, done.stderr)
+
+    def run(self, *args: str | Path, **options: Any) -> Done:
+        """`phyblock run suite.yaml --out out`, and what more is given."""
+        return self.phyblock("run", "suite.yaml", "--out", self.out, *args, **options)
+
+    def start(self, *args: str | Path) -> subprocess.Popen[str]:
+        """Start `run` and return at once; the process leads a group of its own."""
+        return subprocess.Popen(
+            [*COMMAND, "run", "suite.yaml", "--out", str(self.out), *map(str, args)],
+            cwd=self.root,
+            env=self.env,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+
+    def records(self, folder: Path | None = None) -> list[Raw]:
+        """The lines of a run's records, as they stand."""
+        path = (folder or self.out) / "records.jsonl"
+        return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+    def tables(self, folder: Path | None = None) -> dict[str, bytes]:
+        """The table files of a run by name."""
+        return {p.name: p.read_bytes() for p in sorted((folder or self.out).glob("tables/*"))}
+
+    def files(self) -> dict[str, bytes]:
+        """Every file below the folder but pictures, by relative path."""
+        return {
+            str(path.relative_to(self.root)): path.read_bytes()
+            for path in sorted(self.root.rglob("*"))
+            if path.is_file() and "pictures" not in path.parts
+        }
+
+
+def small_files_only(limit_bytes: int) -> Callable[[], None]:
+    """For `before`: writes beyond the limit fail as on a full disk."""
+
+    def apply() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, limit_bytes))
+
+    return apply
