@@ -118,17 +118,20 @@ def _anthropic(raw: object) -> RawReply | None:
 
 
 def _gemini(raw: object) -> RawReply | None:
-    """Gemini generateContent, in the REST names or those of the Python client."""
+    """Gemini generateContent, in the REST names or those of the Python client.
+
+    An answer without candidates is an empty reply when it says why or what it took.
+    """
     if not isinstance(raw, Mapping) or "candidates" not in raw:
         return None
     candidate = _first(raw["candidates"])
     blocked = _get(_get(raw, "promptFeedback", "prompt_feedback"), "blockReason", "block_reason")
-    if not isinstance(candidate, Mapping) and not blocked:
+    counts = _get(raw, "usageMetadata", "usage_metadata")
+    if not isinstance(candidate, Mapping) and not blocked and counts is None:
         return None
     parts = _get(_get(candidate, "content"), "parts")
     text, thoughts = _parts(parts if isinstance(parts, list) else [])
     finish = finish_of(_get(candidate, "finishReason", "finish_reason"))
-    counts = _get(raw, "usageMetadata", "usage_metadata")
     usage = Usage(
         _count(_get(counts, "promptTokenCount", "prompt_token_count")),
         _count(_get(counts, "candidatesTokenCount", "candidates_token_count")),

@@ -117,6 +117,10 @@ SHAPES: dict[str, tuple[object, RawReply]] = {
         {"candidates": [{"content": None, "finish_reason": "MAX_TOKENS"}]},
         RawReply("Gemini", "", "", "length"),
     ),
+    "gemini without candidates": (
+        {"candidates": None, "usage_metadata": {"prompt_token_count": 7}},
+        RawReply("Gemini", "", "", "unknown", Usage(7)),
+    ),
     "internvl": (
         {"instruction": "i", "input": "", "output": "gold", "image": ["a"], "predict": STEPS},
         RawReply("predict", STEPS),
