@@ -9,13 +9,14 @@ with the official expression, and both are timed without reading files.
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 import time
 from pathlib import Path
 
 from phyblock.datasets import AssemblyTask, read_official, recorded_models
-from phyblock.models.replay import read_recording
+from phyblock.models import read_raw_reply
 from phyblock.parsing import parse_plan
 from phyblock.scoring import AssemblyScorer
 
@@ -52,7 +53,7 @@ def main() -> None:
     root = Path(sys.argv[1])
     tasks = {task.scene.id: task for task in read_official(root).tasks}
     replies = [
-        (tasks[path.stem], read_recording(path).text)
+        (tasks[path.stem], read_raw_reply(json.loads(path.read_bytes()), str(path)).text)
         for folder in recorded_models(root).values()
         for path in sorted(folder.glob("*.json"))
         if path.stem in tasks
