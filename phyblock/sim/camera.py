@@ -72,13 +72,21 @@ class Camera:
         """Pixel coordinates (column, row), row 0 on top, of world points (n, 3), shape (n, 2)."""
         return (self.project(points_m) * [1.0, -1.0] + 1.0) * (size_px / 2)
 
-    def rays(self, size_px: int) -> NDArray[np.float64]:
-        """World direction through each pixel's center, shape (size, size, 3), row 0 on top."""
+    def ray_component(self, axis: int, size_px: int) -> NDArray[np.float32]:
+        """One world component of the direction through each pixel's center, row 0 on top.
+
+        Shape (size, size); the three components are not of unit length, but of unit depth. They
+        are given one by one because a picture's worth of all three takes much memory.
+        """
         steps = ((np.arange(size_px) + 0.5) / size_px * 2 - 1) * _HALF_TANGENT
-        right, up, forward = self.axes
-        rays: NDArray[np.float64] = steps[None, :, None] * right - steps[:, None, None] * up
-        rays += forward
-        return rays
+        right, up, forward = self.axes[:, axis]
+        across, down = steps * right + forward, steps * up
+        component: NDArray[np.float32] = np.subtract.outer(-down, -across).astype(np.float32)
+        return component
+
+    def width_m(self, depth_m: float) -> float:
+        """Width of what the picture shows at a depth [m]."""
+        return 2 * depth_m * _HALF_TANGENT
 
     def view_matrix(self) -> list[float]:
         """OpenGL view matrix, column-major, 16 numbers."""

@@ -12,7 +12,7 @@ from types import ModuleType
 
 from phyblock.errors import SimulationError
 
-__all__ = ["client", "load", "version"]
+__all__ = ["client", "connect", "load", "version"]
 
 
 def version() -> str:
@@ -27,9 +27,8 @@ def load() -> ModuleType:
         return importlib.import_module("pybullet")
 
 
-@contextlib.contextmanager
-def client() -> Iterator[tuple[ModuleType, int]]:
-    """The module and the id of a fresh DIRECT client, closed on leaving.
+def connect() -> tuple[ModuleType, int]:
+    """The module and the id of a fresh DIRECT client, which the caller closes.
 
     Raises SimulationError when PyBullet has no client left to give.
     """
@@ -37,6 +36,13 @@ def client() -> Iterator[tuple[ModuleType, int]]:
     number = bullet.connect(bullet.DIRECT)
     if number < 0:
         raise SimulationError("PyBullet gave no client: too many are open in this process")
+    return bullet, number
+
+
+@contextlib.contextmanager
+def client() -> Iterator[tuple[ModuleType, int]]:
+    """The module and the id of a fresh DIRECT client, closed on leaving; raises as `connect`."""
+    bullet, number = connect()
     try:
         yield bullet, number
     finally:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +23,9 @@ from phyblock.domain.blocks import (
     euler_deg_to_quat_xyzw,
     quat_xyzw_to_matrix,
 )
-from phyblock.sim import engine
 from phyblock.sim.camera import Camera
 from phyblock.sim.geometry import edge_bars, solid_mesh
-from phyblock.sim.mesh import Mesh
+from phyblock.sim.stage import Prop, stage
 from phyblock.sim.textures import Background, floor, shadow
 
 __all__ = ["COLOR_RGB", "RENDERER", "SUPERSAMPLE", "DrawnBlock", "Shot", "picture", "shoot"]
@@ -44,11 +42,12 @@ COLOR_RGB: dict[Color, tuple[int, int, int]] = {
 }
 """Color of a fully lit face, 0..255."""
 _EDGE_RGB = (14, 14, 16)
-_EDGE_HALF_WIDTH_M = 0.00045
-_EDGE_HALF_WIDTH_PX = 0.48
+_EDGE_HALF_WIDTH_M = 0.0004
+_EDGE_HALF_WIDTH_PX = 0.45
+_EDGE_STEP_M = 0.0001
 
 _BODIES_PER_BLOCK = 2
-"""Solid and edges; a fresh client counts its bodies from 0, and -1 // 2 stays -1."""
+"""Its solid and its edges."""
 
 _AMBIENT = 0.55
 _DIFFUSE = 0.55
@@ -97,16 +96,15 @@ class Shot:
 
 
 def shoot(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> Shot:
-    """Draw blocks alone, with no floor behind them, at exactly `size_px` and unsmoothed."""
-    depth = float(
-        np.mean([(np.array(b.position_m) - camera.eye_m) @ camera.axes[2] for b in blocks])
-    )
-    half_width_m = _edge_half_width_m(depth, size_px)
-    with engine.client() as (bullet, client):
-        for block in blocks:
-            _add_body(bullet, client, solid_mesh(block.type), COLOR_RGB[block.color], block)
-            _add_body(bullet, client, edge_bars(block.type, half_width_m), _EDGE_RGB, block)
-        width, height, rgba, _, bodies = bullet.getCameraImage(
+    """Draw blocks (one at least) alone, with no floor, at exactly `size_px` and unsmoothed."""
+    half_width_m = _edge_half_width_m(blocks, camera, size_px)
+    props: list[Prop] = []
+    for block in blocks:
+        where = (block.position_m, euler_deg_to_quat_xyzw(block.euler_deg))
+        props.append((solid_mesh(block.type), COLOR_RGB[block.color], *where))
+        props.append((edge_bars(block.type, half_width_m), _EDGE_RGB, *where))
+    with stage().showing(props) as (bullet, client, numbers):
+        width, height, rgba, _, seen = bullet.getCameraImage(
             size_px,
             size_px,
             camera.view_matrix(),
@@ -120,8 +118,10 @@ def shoot(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> Shot:
             physicsClientId=client,
         )
     colors = np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[..., :3]
-    seen = np.asarray(bodies, dtype=np.int64).reshape(height, width)
-    return Shot(colors.copy(), seen // _BODIES_PER_BLOCK)
+    owner = np.full(max(numbers) + 2, -1)
+    owner[list(numbers)] = np.arange(len(numbers)) // _BODIES_PER_BLOCK
+    bodies = np.asarray(seen, dtype=np.int64).reshape(height, width)
+    return Shot(colors.copy(), owner[bodies])
 
 
 def picture(
@@ -134,8 +134,8 @@ def picture(
         shot = shoot(blocks, camera, large_px)
         triangles = [block.triangles_m for block in blocks]
         image *= shadow(background, camera, large_px, triangles, light_direction(camera))
-        image = np.where(shot.block[..., None] >= 0, shot.rgb, image)
-    pixels = np.rint(image).astype(np.uint8)
+        np.copyto(image, shot.rgb, where=shot.block[..., None] >= 0)
+    pixels = np.rint(image, out=image).astype(np.uint8)
     return Image.fromarray(pixels).resize((size_px, size_px), Image.Resampling.BOX)
 
 
@@ -150,28 +150,10 @@ def light_direction(camera: Camera) -> NDArray[np.float64]:
     )
 
 
-def _edge_half_width_m(depth_m: float, size_px: int) -> float:
-    """True width, but never finer than a pixel of the finished picture."""
-    pixel_m = 2 * depth_m * math.tan(math.radians(15)) * SUPERSAMPLE / size_px
-    return max(_EDGE_HALF_WIDTH_M, _EDGE_HALF_WIDTH_PX * pixel_m)
-
-
-def _add_body(
-    bullet: ModuleType, client: int, mesh: Mesh, rgb: tuple[int, int, int], block: DrawnBlock
-) -> None:
-    corners = mesh.corners_m.reshape(-1, 3)
-    shape = bullet.createVisualShape(
-        bullet.GEOM_MESH,
-        vertices=corners.tolist(),
-        indices=list(range(len(corners))),
-        normals=np.repeat(mesh.normals, 3, axis=0).tolist(),
-        uvs=[[0.0, 0.0]] * len(corners),
-        rgbaColor=[*(channel / 255 for channel in rgb), 1.0],
-        physicsClientId=client,
-    )
-    bullet.createMultiBody(
-        baseVisualShapeIndex=shape,
-        basePosition=block.position_m,
-        baseOrientation=euler_deg_to_quat_xyzw(block.euler_deg).tolist(),
-        physicsClientId=client,
-    )
+def _edge_half_width_m(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> float:
+    """True width, but never finer than a pixel of the finished picture; in steps of 0.1 mm."""
+    places = np.array([block.position_m for block in blocks])
+    depth_m = float(((places - camera.eye_m) @ camera.axes[2]).mean())
+    pixel_m = camera.width_m(depth_m) * SUPERSAMPLE / size_px
+    finest_m = max(_EDGE_HALF_WIDTH_M, _EDGE_HALF_WIDTH_PX * pixel_m)
+    return round(math.ceil(finest_m / _EDGE_STEP_M) * _EDGE_STEP_M, 6)

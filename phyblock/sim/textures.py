@@ -21,23 +21,29 @@ Background = Literal["white", "checkerboard"]
 BACKGROUNDS: tuple[Background, ...] = ("white", "checkerboard")
 
 _TILE_M = 0.4
-_LIGHT_TILE = np.array([39.0, 56.0, 75.0])
-_DARK_TILE = np.array([21.0, 37.0, 53.0])
-_FADE_FROM_M = 4.0
+_LIGHT_TILE = np.array([39.0, 56.0, 75.0], dtype=np.float32)
+_DARK_TILE = np.array([21.0, 37.0, 53.0], dtype=np.float32)
+_FADE_FROM_M = np.float32(4.0)
+"""Farther tiles blend into their mean color; at the horizon they are finer than a pixel."""
 _SHADOW_STRENGTH: dict[Background, float] = {"white": 0.16, "checkerboard": 0.5}
 
 
-def floor(background: Background, camera: Camera, size_px: int) -> NDArray[np.float64]:
+def floor(background: Background, camera: Camera, size_px: int) -> NDArray[np.float32]:
     """Color of every pixel's floor, shape (size, size, 3), 0..255, before any shadow."""
     if background == "white":
-        return np.full((size_px, size_px, 3), 255.0)
-    rays = camera.rays(size_px)
-    down = -rays[..., 2]
-    distance = camera.eye_m[2] / np.where(down > 1e-6, down, np.inf)
-    hit = camera.eye_m[:2] + distance[..., None] * rays[..., :2]
-    parity = np.floor(hit / _TILE_M).astype(np.int64).sum(axis=-1) % 2
-    tiles = np.where(parity[..., None] == 0, _LIGHT_TILE, _DARK_TILE)
-    return _fade(tiles, np.where(down > 1e-6, distance, np.inf)[..., None])
+        return np.full((size_px, size_px, 3), 255.0, dtype=np.float32)
+    down = -camera.ray_component(2, size_px)
+    below = down > 1e-6
+    distance = np.float32(camera.eye_m[2]) / np.where(below, down, np.float32(np.inf))
+    parity = np.zeros((size_px, size_px), dtype=np.int64)
+    for axis in (0, 1):
+        hit = camera.eye_m[axis] + distance * camera.ray_component(axis, size_px)
+        parity += np.floor(hit / _TILE_M).astype(np.int64)
+    contrast = np.where(parity % 2 == 0, np.float32(0.5), np.float32(-0.5))
+    contrast *= np.where(below, _FADE_FROM_M / np.maximum(distance, _FADE_FROM_M), 0.0)
+    colors: NDArray[np.float32] = contrast[..., None] * (_LIGHT_TILE - _DARK_TILE)
+    colors += (_LIGHT_TILE + _DARK_TILE) / 2
+    return colors
 
 
 def shadow(
@@ -46,7 +52,7 @@ def shadow(
     size_px: int,
     triangles_m: Iterable[NDArray[np.float64]],
     light: NDArray[np.float64],
-) -> NDArray[np.float64]:
+) -> NDArray[np.float32]:
     """Share of light that is left on each pixel's floor, shape (size, size, 1), 0..1.
 
     `triangles_m` are arrays of world triangles (m, 3, 3) [m]; `light` points to the light.
@@ -59,13 +65,7 @@ def shadow(
         for polygon in pixels:
             draw.polygon([float(number) for number in polygon], fill=255)
     soft = mask.filter(ImageFilter.GaussianBlur(size_px / 340))
-    share = np.asarray(soft, dtype=np.float64)[..., None] / 255.0
-    return 1.0 - _SHADOW_STRENGTH[background] * share
-
-
-def _fade(tiles: NDArray[np.float64], distance_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Tiles that blend into their mean color far away, where they are finer than a pixel."""
-    mean = (_LIGHT_TILE + _DARK_TILE) / 2
-    share = np.clip(_FADE_FROM_M / np.maximum(distance_m, 1e-9), 0.0, 1.0)
-    faded: NDArray[np.float64] = mean + (tiles - mean) * share
-    return faded
+    left = np.asarray(soft, dtype=np.float32)[..., None]
+    left *= -_SHADOW_STRENGTH[background] / 255.0
+    left += 1.0
+    return left

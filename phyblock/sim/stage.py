@@ -1,0 +1,99 @@
+"""The stage that pictures are taken on: one PyBullet client a process, its shapes kept.
+
+PyBullet never gives back the memory of a visual shape, not even when its client is closed: a
+fresh client for each picture grows by megabytes a scene. So the client and the few shapes that
+there are stay, and only bodies come and go. They go in reverse, which hands the same numbers to
+the next ones: a picture does not depend on those taken before it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import threading
+from collections.abc import Iterator, Sequence
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.sim import engine
+from phyblock.sim.mesh import Mesh
+
+__all__ = ["Prop", "Stage", "stage"]
+
+Prop = tuple[Mesh, tuple[int, int, int], tuple[float, float, float], NDArray[np.float64]]
+"""Mesh, color 0..255, position of its frame [m], orientation (x, y, z, w)."""
+
+
+class Stage:
+    """A client with the visual shapes made so far; use it through `stage`."""
+
+    def __init__(self, bullet: ModuleType, client: int) -> None:
+        self._bullet = bullet
+        self._client = client
+        self._shapes: dict[tuple[int, tuple[int, int, int]], tuple[int, Mesh]] = {}
+        self._lock = threading.Lock()
+
+    @contextlib.contextmanager
+    def showing(self, props: Sequence[Prop]) -> Iterator[tuple[ModuleType, int, tuple[int, ...]]]:
+        """Put props up, and take them down on leaving; one user at a time.
+
+        Gives the module, the client and the body number of each prop. Meshes must be the same
+        objects from picture to picture, for their shapes are kept.
+        """
+        with self._lock:
+            bodies: list[int] = []
+            try:
+                bodies += (self._put_up(prop) for prop in props)
+                yield self._bullet, self._client, tuple(bodies)
+            finally:
+                for body in reversed(bodies):
+                    self._bullet.removeBody(body, physicsClientId=self._client)
+
+    def _put_up(self, prop: Prop) -> int:
+        mesh, rgb, position_m, quat_xyzw = prop
+        return int(
+            self._bullet.createMultiBody(
+                baseVisualShapeIndex=self._shape(mesh, rgb),
+                basePosition=position_m,
+                baseOrientation=quat_xyzw.tolist(),
+                physicsClientId=self._client,
+            )
+        )
+
+    def _shape(self, mesh: Mesh, rgb: tuple[int, int, int]) -> int:
+        """The kept shape; the mesh is kept with it, so that its identity stays taken."""
+        key = (id(mesh), rgb)
+        if key not in self._shapes:
+            self._shapes[key] = (self._make_shape(mesh, rgb), mesh)
+        return self._shapes[key][0]
+
+    def _make_shape(self, mesh: Mesh, rgb: tuple[int, int, int]) -> int:
+        """Every triangle with corners of its own, which keeps the shading of faces flat."""
+        corners = mesh.corners_m.reshape(-1, 3)
+        return int(
+            self._bullet.createVisualShape(
+                self._bullet.GEOM_MESH,
+                vertices=corners.tolist(),
+                indices=list(range(len(corners))),
+                normals=np.repeat(mesh.normals, 3, axis=0).tolist(),
+                uvs=[[0.0, 0.0]] * len(corners),
+                rgbaColor=[*(channel / 255 for channel in rgb), 1.0],
+                physicsClientId=self._client,
+            )
+        )
+
+
+_opening = threading.Lock()
+
+
+def stage() -> Stage:
+    """This process's stage; its client stays open until the process ends."""
+    with _opening:
+        return _only_stage()
+
+
+@functools.cache
+def _only_stage() -> Stage:
+    return Stage(*engine.connect())
