@@ -17,6 +17,7 @@ from phyblock.models.cost import (
     price_of,
 )
 from phyblock.models.events import ModelEvent, Observer
+from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import KeyStatus, api_key_status
 from phyblock.models.limits import Gate
 from phyblock.models.raw_replies import RawReply, read_raw_reply
@@ -30,6 +31,8 @@ __all__ = [
     "Estimate",
     "Finish",
     "Gate",
+    "Halt",
+    "HaltedError",
     "Image",
     "KeyStatus",
     "Kind",

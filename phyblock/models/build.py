@@ -11,6 +11,7 @@ from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, price_of, require_price
 from phyblock.models.direct_call import DirectTransport
 from phyblock.models.events import Observer, ignore_event
+from phyblock.models.halt import Halt
 from phyblock.models.keys import secrets_of
 from phyblock.models.limits import Gate, ModelLimiter
 from phyblock.models.litellm_call import LitellmTransport
@@ -29,10 +30,12 @@ def build_model(
     budget: Budget | None = None,
     observer: Observer = ignore_event,
     policy: RetryPolicy | None = None,
+    halt: Halt | None = None,
 ) -> Model:
     """The model that a configuration describes; nothing is imported or sent before it is asked.
 
-    `overall` bounds what all models of a run have under way together. Raises SpecError for an
+    `overall` bounds what all models of a run have under way together, `halt` ends their waits.
+    Raises SpecError for an
     unknown baseline or a model without a price under a budget, DataError for missing recordings.
     """
     if config.kind == "baseline":
@@ -53,6 +56,7 @@ def build_model(
         policy=policy or RetryPolicy(),
         secrets=secrets,
         observer=observer,
+        halt=halt or Halt(),
     )
     return ChatModel(config, parts)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
 
 from phyblock.errors import ModelError, RetryableError, UnavailableError
@@ -11,6 +12,7 @@ from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.config import ModelConfig, Price
 from phyblock.models.cost import Budget, Estimate, cost_usd, estimate
 from phyblock.models.events import EventKind, ModelEvent, Observer
+from phyblock.models.halt import Halt
 from phyblock.models.keys import hidden
 from phyblock.models.limits import ModelLimiter
 from phyblock.models.payload import wire_params
@@ -32,6 +34,7 @@ class ChatParts:
     policy: RetryPolicy
     secrets: Sequence[str]
     observer: Observer
+    halt: Halt
 
 
 @dataclass
@@ -59,7 +62,8 @@ class ChatModel:
         """The cached reply, or a new one, which is then cached if it is whole.
 
         `cost_usd` of a cached reply is what it cost when it was new. Raises what the model seam
-        says, BudgetReachedError when the call does not fit, StoreError for a broken cache.
+        says, BudgetReachedError when the call does not fit, HaltedError when the run ends before it
+        is sent, StoreError for a broken cache.
         """
         cache, price = self._parts.cache, self._parts.price
         key = reply_key(self._config, request) if cache is not None else ""
@@ -67,7 +71,9 @@ class ChatModel:
             return replace(kept, cost_usd=cost_usd(price, kept.usage))
         question = _Question(request, estimate(self._config, request))
         reply = await with_retries(
-            lambda: self._attempt(question), self._parts.policy, self._on_retry
+            lambda: self._attempt(question),
+            replace(self._parts.policy, sleep=self._sleep),
+            self._on_retry,
         )
         reply = self._finished(reply, question)
         if cache is not None:
@@ -81,7 +87,10 @@ class ChatModel:
     async def _attempt(self, question: _Question) -> Reply:
         expected = question.expected
         limiter = self._parts.limiter
-        async with limiter.slot(expected.prompt_tokens + expected.completion_tokens) as slot:
+        async with AsyncExitStack() as stack:
+            with self._parts.halt.giving_up():
+                tokens = expected.prompt_tokens + expected.completion_tokens
+                slot = await stack.enter_async_context(limiter.slot(tokens))
             if self._unavailable is not None:
                 raise UnavailableError(str(self._unavailable), status=self._unavailable.status)
             try:
@@ -124,7 +133,8 @@ class ChatModel:
         if budget is None or price is None:
             question.sent += 1
             return await self._parts.transport.send(call)
-        held = await budget.reserve(budget.most_usd(self.name, price, question.expected))
+        with self._parts.halt.giving_up():
+            held = await budget.reserve(budget.most_usd(self.name, price, question.expected))
         spent_usd: float | None = None
         try:
             question.sent += 1
@@ -140,6 +150,10 @@ class ChatModel:
             raise
         finally:
             budget.settle(held, spent_usd)
+
+    async def _sleep(self, wait_s: float) -> None:
+        with self._parts.halt.giving_up():
+            await self._parts.policy.sleep(wait_s)
 
     def _finished(self, reply: Reply, question: _Question) -> Reply:
         secrets = self._parts.secrets

@@ -1,7 +1,7 @@
 """Executing a plan: bounded concurrency, every answer on disk before the next is judged.
 
-The executor emits events and prints nothing. It stops cleanly: no new sample is started, calls
-that are under way are waited for, because they are paid for.
+The executor emits events and prints nothing. It stops cleanly: nothing more is sent, calls that
+are under way are waited for, because they are paid for.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import ModelError, PhyblockError, UnavailableError
-from phyblock.models import BudgetReachedError, Model
+from phyblock.models import BudgetReachedError, Halt, HaltedError, Model
 from phyblock.models.base import Reply
 from phyblock.run.events import ModelStopped, SampleDone, Stopping, Watcher
 from phyblock.run.models import PlannedModel
@@ -28,12 +28,17 @@ __all__ = ["Executor", "RunResult"]
 
 @dataclass
 class RunResult:
-    """How a run ended: `left` samples have no final record; `stopped` models and why."""
+    """How a run ended: how many of its samples have a final record; `stopped` models and why."""
 
-    written: int = 0
-    left: int = 0
+    samples: int
+    settled: int = 0
     stopped: dict[str, str] = field(default_factory=dict)
     reason: str | None = None
+
+    @property
+    def left(self) -> int:
+        """Samples that have no final record."""
+        return self.samples - self.settled
 
 
 class Executor:
@@ -42,13 +47,20 @@ class Executor:
     INTERRUPTED = "interrupted"
 
     def __init__(
-        self, plan: RunPlan, store: RunStore, models: Mapping[str, Model], watch: Watcher
+        self,
+        plan: RunPlan,
+        store: RunStore,
+        models: Mapping[str, Model],
+        watch: Watcher,
+        halt: Halt,
     ) -> None:
+        """`halt` is the switch that `models` were built with."""
         self._plan = plan
         self._writer = RecordWriter(store)
         self._models = models
         self._watch = watch
-        self.result = RunResult()
+        self._halt = halt
+        self.result = RunResult(plan.samples_per_model * len(plan.models))
         self._in_flight = 0
         self._failure: PhyblockError | None = None
 
@@ -58,10 +70,11 @@ class Executor:
         return self.result.reason is not None
 
     def stop(self, reason: str) -> None:
-        """Start no new sample; safe to call from a signal handler in the loop's thread."""
+        """Send nothing more; safe to call from a signal handler in the loop's thread."""
         if self.result.reason is None:
             self.result.reason = reason
-            self._watch(Stopping(reason, self._in_flight))
+            self._watch(Stopping(reason, self._in_flight - self._halt.waiting))
+            self._halt.set()
 
     async def run(self, earlier: Mapping[str, Mapping[str, Any]]) -> RunResult:
         """Run what `earlier` records have not settled.
@@ -70,7 +83,6 @@ class Executor:
         way have ended.
         """
         workers: list[asyncio.Task[None]] = []
-        pending: dict[str, deque[tuple[AssemblyTask, int]]] = {}
         for planned in self._plan.models:
             queue = deque(
                 (task, seed)
@@ -78,7 +90,7 @@ class Executor:
                 for task in self._plan.dataset.tasks
                 if not self._settled(earlier, planned, task, seed)
             )
-            pending[planned.name] = queue
+            self.result.settled += self._plan.samples_per_model - len(queue)
             count = min(planned.config.max_concurrency, len(queue))
             workers += [asyncio.create_task(self._work(planned, queue)) for _ in range(count)]
         try:
@@ -90,7 +102,6 @@ class Executor:
             await self._writer.drain()
         if self._failure is not None:
             raise self._failure
-        self.result.left += sum(len(queue) for queue in pending.values())
         return self.result
 
     def _settled(
@@ -110,11 +121,11 @@ class Executor:
             try:
                 await self._one(planned, task, seed)
             except UnavailableError as error:
-                self.result.left += 1
                 self._stop_model(planned.name, str(error))
             except BudgetReachedError as error:
-                self.result.left += 1
                 self.stop(str(error))
+            except HaltedError:
+                return
             except PhyblockError as error:
                 self._failure = self._failure or error
                 self.stop("an error that the run cannot go on with")
@@ -124,9 +135,10 @@ class Executor:
     async def _one(self, planned: PlannedModel, task: AssemblyTask, seed: int) -> None:
         model = self._models[planned.name]
         track = self._plan.track
-        request = await track.request(
-            task, seed, planned.config.params, with_messages=model.needs_messages
-        )
+        with self._halt.giving_up():
+            request = await track.request(
+                task, seed, planned.config.params, with_messages=model.needs_messages
+            )
         answer: Reply | ModelError | None
         try:
             answer = await model.ask(request)
@@ -142,8 +154,7 @@ class Executor:
             track.rules.parser,
         )
         await self._writer.put(record)
-        self.result.written += 1
-        self.result.left += not is_final(record)
+        self.result.settled += is_final(record)
         self._watch(SampleDone(record))
 
     def _stop_model(self, name: str, reason: str) -> None:

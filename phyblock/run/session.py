@@ -11,6 +11,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.models import (
     Budget,
     Gate,
+    Halt,
     Model,
     ModelEvent,
     ReplyCache,
@@ -65,6 +66,7 @@ class Session:
             limits = plan.suite.limits
             self._earlier = read_records(self._folder)
             overall = Gate(limits.max_concurrency)
+            halt = Halt()
             budget = None
             if limits.max_cost_usd is not None:
                 budget = Budget(limits.max_cost_usd, _spent_usd(self._earlier))
@@ -76,8 +78,9 @@ class Session:
                     budget=budget,
                     observer=self._notice,
                     policy=RetryPolicy(attempts=limits.max_attempts),
+                    halt=halt,
                 )
-            self.executor = Executor(plan, self._store, self._models, self._watch)
+            self.executor = Executor(plan, self._store, self._models, self._watch, halt)
         except BaseException:
             await self._close()
             raise

@@ -1,0 +1,113 @@
+"""Ctrl-C: calls under way are waited for, the rest is left, and the same command goes on."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+
+import pytest
+
+from tests.servers.chassis import Faults, Running
+from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import Workspace
+
+SAMPLES = 20
+AT_ONCE = 4
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    for _ in range(3000):
+        if condition():
+            return
+        time.sleep(0.01)
+    raise AssertionError("this did not come to pass")
+
+
+def ended(process: subprocess.Popen[str]) -> tuple[int, str, str]:
+    out, err = process.communicate(timeout=60)
+    return process.returncode, out, err
+
+
+def prepare(workspace: Workspace, url: str, *names: str) -> None:
+    workspace.write_models(url, *names)
+    workspace.write_suite(
+        models=list(names), seeds=[0, 1, 2, 3], limits={"max_concurrency": AT_ONCE}
+    )
+
+
+@pytest.mark.parametrize("name", [signal.SIGINT, signal.SIGTERM])
+def test_calls_under_way_are_waited_for_and_nothing_more_is_asked(
+    workspace: Workspace, name: signal.Signals
+) -> None:
+    with Running(OpenAIChat(Faults(latency_s=1.5))) as running:
+        server = running.server
+        prepare(workspace, running.url, "alpha")
+        process = workspace.start()
+        wait_for(lambda: server.at_once == AT_ONCE)
+        process.send_signal(name)
+        code, out, err = ended(process)
+
+        assert (code, err) == (130, "")
+        assert f"waiting for {AT_ONCE} calls under way" in out
+        assert f"{AT_ONCE} of {SAMPLES} samples are done (interrupted)" in out
+        assert f"phyblock run suite.yaml --out {workspace.out}" in out
+        assert server.requests == AT_ONCE
+        assert [record["outcome"] for record in workspace.records()] == ["ok"] * AT_ONCE
+
+        server.faults = Faults()
+        done = workspace.run()
+        assert (done.code, done.err) == (0, "")
+        assert f"All {SAMPLES} samples are done" in done.out
+        assert server.requests == SAMPLES
+        before = workspace.files()
+        again = workspace.run()
+        assert (again.code, again.out) == (0, done.out)
+        assert server.requests == SAMPLES
+        assert workspace.files() == before
+
+
+def test_calls_that_wait_for_their_turn_are_not_sent_any_more(workspace: Workspace) -> None:
+    with Running(OpenAIChat(Faults(latency_s=1.5))) as running:
+        server = running.server
+        prepare(workspace, running.url, "alpha", "beta")
+        process = workspace.start()
+        wait_for(lambda: server.at_once == AT_ONCE)
+        process.send_signal(signal.SIGINT)
+        code, out, _ = ended(process)
+    assert code == 130
+    assert f"waiting for {AT_ONCE} calls under way" in out
+    assert server.requests == AT_ONCE
+    assert len(workspace.records()) == AT_ONCE
+
+
+def test_a_wait_before_another_attempt_is_given_up(workspace: Workspace) -> None:
+    with Running(OpenAIChat(Faults(rate_limited=1.0, retry_after="100"))) as running:
+        server = running.server
+        prepare(workspace, running.url, "alpha")
+        process = workspace.start()
+        wait_for(lambda: server.requests == AT_ONCE and not server.at_once)
+        process.send_signal(signal.SIGINT)
+        code, out, err = ended(process)
+    assert (code, err) == (130, "")
+    assert f"0 of {SAMPLES} samples are done" in out
+    assert not workspace.records()
+    assert server.requests == AT_ONCE
+
+
+def test_a_second_interrupt_ends_at_once(workspace: Workspace) -> None:
+    with Running(OpenAIChat(Faults(mode="slow"))) as running:
+        prepare(workspace, running.url, "alpha")
+        process = workspace.start()
+        wait_for(lambda: running.server.at_once == AT_ONCE)
+        process.send_signal(signal.SIGINT)
+        assert process.stdout is not None
+        said = process.stdout.readline()
+        assert "Ctrl-C again" in said
+        process.send_signal(signal.SIGINT)
+        code, out, err = ended(process)
+    assert (code, err) == (130, "")
+    assert f"0 of {SAMPLES} samples are done (interrupted)" in out
+    assert "give the same command again" in out
+    assert not workspace.records()
