@@ -11,6 +11,7 @@ PhyblockError
 │   ├── SampleError         this request will never succeed (400): go on with the next
 │   │   └── RefusedError    the provider's content policy refused it
 │   └── UnavailableError    this model will never answer (401, 403, unknown): stop the model
+├── BudgetReachedError      the next call could pass the cost limit; it was not made
 └── SimulationError         the physics engine could not do what was asked
 """
 
@@ -20,6 +21,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 __all__ = [
+    "BudgetReachedError",
     "DataError",
     "InputError",
     "ModelError",
@@ -117,6 +119,10 @@ class RefusedError(SampleError):
 
 class UnavailableError(ModelError):
     """This model cannot answer at all: bad key, no permission, unknown name."""
+
+
+class BudgetReachedError(PhyblockError):
+    """The next call could bring the cost above the limit; it was not made."""
 
 
 class SimulationError(PhyblockError):

@@ -12,6 +12,7 @@ order, so a level-2 scene is read as a scene of levels 1 and 2.
 from __future__ import annotations
 
 from collections.abc import Callable
+import re
 from pathlib import Path
 from typing import TypeVar, cast
 
@@ -27,7 +28,8 @@ _GOALS = Path("data", "SCENEs_400_Goal_Jsons")
 _CANDIDATES = Path("data", "SCENEs_400_Cand_Jsons")
 _PICTURES = Path("data", "SCENEs_400_Goal_and_Cand_Imgs_resized")
 _OUTPUTS = Path("outputs")
-_PICTURE_MARK = "<IMG_CONTEXT>"
+# <IMG_CONTEXT> of InternVL, <|image_pad|> of Qwen, <image> of LLaVA
+_PICTURE_MARKS = re.compile(r"\A(?:\s*<\|?[A-Za-z_]{1,30}\|?>)+")
 _T = TypeVar("_T")
 
 
@@ -63,26 +65,27 @@ def recorded_models(root: Path) -> dict[str, Path]:
 def official_prompt(root: Path) -> str:
     """The exact official text prompt, read out of the recordings that carry it.
 
-    Those recordings show the goal picture and the candidate picture apart, before the text.
-    Raises DataError when no recording carries an instruction or when they differ.
+    Those recordings show the goal picture and the candidate picture apart, before the text; the
+    marks that stood for the pictures are taken off. Where recordings differ, the prompt of most
+    models is taken. Raises DataError when no recording carries one, or when there is no most.
     """
-    found: dict[str, Path] = {}
-    for folder in recorded_models(root).values():
-        for path in sorted(folder.glob("*.json")):
-            raw = read_json(path)
-            instruction = raw.get("instruction") if isinstance(raw, dict) else None
-            if not isinstance(instruction, str):
-                break
-            found.setdefault(instruction.replace(_PICTURE_MARK, ""), path)
-    if len(found) == 1:
-        return next(iter(found))
+    found: dict[str, list[str]] = {}
+    for name, folder in recorded_models(root).items():
+        raw = read_json(min(folder.glob("*.json")))
+        instruction = raw.get("instruction") if isinstance(raw, dict) else None
+        if isinstance(instruction, str):
+            found.setdefault(_PICTURE_MARKS.sub("", instruction), []).append(name)
     where = str(root / _OUTPUTS)
     if not found:
         message = "no recording carries the official prompt"
         allowed = "recordings with a field 'instruction', such as those of the InternVL models"
         raise DataError(Problem(where, message, "instruction", allowed=allowed))
-    files = ", ".join(str(path) for path in found.values())
-    raise DataError(Problem(where, "the recordings carry different prompts", "instruction", files))
+    ranked = sorted(found, key=lambda text: -len(found[text]))
+    if len(ranked) > 1 and len(found[ranked[0]]) == len(found[ranked[1]]):
+        names = "; ".join(", ".join(models) for models in found.values())
+        message = "the recordings carry different prompts, none more often than the others"
+        raise DataError(Problem(where, message, "instruction", names))
+    return ranked[0]
 
 
 def _read_task(root: Path, path: Path) -> AssemblyTask:

@@ -10,7 +10,6 @@ from phyblock.models.cache import CacheStats, ReplyCache, reply_key
 from phyblock.models.config import Kind, ModelConfig, Price
 from phyblock.models.cost import (
     Budget,
-    BudgetReachedError,
     Estimate,
     cost_usd,
     estimate,
@@ -26,7 +25,6 @@ from phyblock.models.retry import RetryPolicy
 __all__ = [
     "BASELINES",
     "Budget",
-    "BudgetReachedError",
     "CacheStats",
     "Estimate",
     "Finish",

@@ -15,14 +15,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from phyblock.errors import PhyblockError, Problem, SpecError
+from phyblock.errors import BudgetReachedError, Problem, SpecError
 from phyblock.models.base import Image, Request, Usage
 from phyblock.models.config import ModelConfig, Price
 from phyblock.models.payload import wire_params
 
 __all__ = [
     "Budget",
-    "BudgetReachedError",
     "Estimate",
     "cost_usd",
     "estimate",
@@ -36,10 +35,6 @@ _TYPICAL_REPLY_TOKENS = 500
 _LONGEST_REPLY_TOKENS = 32_768
 _PROMPT_MARGIN = 1.5
 _PER_MILLION = 1_000_000
-
-
-class BudgetReachedError(PhyblockError):
-    """The next call could bring the cost above the limit; it was not made."""
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from phyblock.datasets import AssemblyTask
-from phyblock.errors import ModelError, PhyblockError, UnavailableError
-from phyblock.models import BudgetReachedError, Halt, HaltedError, Model
+from phyblock.errors import BudgetReachedError, ModelError, PhyblockError, UnavailableError
+from phyblock.models import Halt, HaltedError, Model
 from phyblock.models.base import Reply
 from phyblock.run.events import ModelStopped, SampleDone, Stopping, Watcher
 from phyblock.run.models import PlannedModel

@@ -154,14 +154,16 @@ def test_recorded_models_are_the_folders_that_hold_replies(tmp_path: Path) -> No
     assert list(recorded_models(tmp_path)) == ["a", "b"]
 
 
-def test_the_official_prompt_is_what_all_recordings_agree_on(tmp_path: Path) -> None:
+def test_the_official_prompt_is_what_most_recordings_carry(tmp_path: Path) -> None:
     record(tmp_path, "plain", "000", {"choices": []})
     with pytest.raises(DataError, match="no recording carries the official prompt"):
         official_prompt(tmp_path)
     record(tmp_path, "a", "000", {"instruction": "<IMG_CONTEXT><IMG_CONTEXT>Build it."})
-    record(tmp_path, "b", "000", {"instruction": "<IMG_CONTEXT>Build it."})
+    record(tmp_path, "b", "000", {"instruction": "<|image_pad|><|image_pad|>Build it."})
     assert official_prompt(tmp_path) == "Build it."
-    record(tmp_path, "b", "001", {"instruction": "Build this."})
+    record(tmp_path, "c", "000", {"instruction": "<image>\n<image>Build this."})
+    assert official_prompt(tmp_path) == "Build it."
+    record(tmp_path, "d", "000", {"instruction": "Build this."})
     with pytest.raises(DataError, match="different prompts"):
         official_prompt(tmp_path)
 

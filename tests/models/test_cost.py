@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.errors import RetryableError, SpecError
+from phyblock.errors import BudgetReachedError, RetryableError, SpecError
 from phyblock.models import (
     Budget,
-    BudgetReachedError,
     Estimate,
     Gate,
     Image,
