@@ -1,0 +1,142 @@
+"""kill -9 at any moment: every reply that was read is kept, and none is asked for twice."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import random
+import signal
+import sqlite3
+import time
+from typing import Any
+
+import psutil
+import pytest
+
+from tests.servers.chassis import Faults, Running, Seen
+from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import Workspace
+
+AT_ONCE = 6
+LATENCY_S = 0.03
+
+
+class Signing(OpenAIChat):
+    """Puts the sample's id into the reasoning of a reply, so that it is found again on disk."""
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        body = super().reply(seen, ending)
+        body["choices"][0]["message"]["reasoning_content"] = seen.sample
+        return body
+
+
+def kept(workspace: Workspace) -> set[str]:
+    """Ids of all samples whose reply is on disk, in a whole record or in the cache."""
+    found: set[str] = set()
+    with contextlib.suppress(FileNotFoundError):
+        lines = (workspace.out / "records.jsonl").read_bytes().split(b"\n")[:-1]
+        found |= {json.loads(line)["reply"]["reasoning"] for line in lines}
+    path = workspace.cache / "replies.sqlite"
+    if path.exists():
+        with contextlib.closing(sqlite3.connect(path)) as database:
+            tables = database.execute("SELECT name FROM sqlite_master").fetchall()
+            rows = database.execute("SELECT reply FROM replies").fetchall() if tables else []
+        found |= {json.loads(row[0])["reasoning"] for row in rows}
+    return found
+
+
+def settle(server: OpenAIChat) -> int:
+    """Wait until the server has dealt with all it was sent; how many requests that were."""
+    seen = -1
+    while server.at_once or seen != len(server.seen):
+        seen = len(server.seen)
+        time.sleep(0.05)
+    return seen
+
+
+def run_until_killed(workspace: Workspace, server: OpenAIChat, *, more: int, extra_s: float) -> int:
+    """Kill a run after `more` further requests and a little time; its exit code."""
+    target = len(server.seen) + more
+    with workspace.start() as process:
+        while process.poll() is None and len(server.seen) < target:
+            time.sleep(0.002)
+        time.sleep(extra_s)
+        process.kill()
+        process.communicate()
+    return process.returncode
+
+
+def prepare(workspace: Workspace, url: str, seeds: int) -> None:
+    workspace.write_models(url, "alpha")
+    workspace.write_suite(
+        models=["alpha", "random"],
+        seeds=list(range(seeds)),
+        limits={"max_concurrency": AT_ONCE},
+    )
+
+
+@pytest.mark.parametrize(
+    ("kills", "seeds", "start"),
+    [(4, 20, 1), pytest.param(20, 80, 2, marks=pytest.mark.slow)],
+)
+def test_what_was_answered_is_kept_whenever_the_run_is_killed(
+    workspace: Workspace, kills: int, seeds: int, start: int
+) -> None:
+    draw = random.Random(start)
+    samples = 5 * seeds
+    with Running(Signing(Faults(latency_s=LATENCY_S))) as running:
+        server = running.server
+        assert isinstance(server, OpenAIChat)
+        prepare(workspace, running.url, seeds)
+        lost = 0
+        kept_at: dict[int, set[str]] = {}
+        for _ in range(kills):
+            more = draw.randrange(samples // kills // 2)
+            code = run_until_killed(workspace, server, more=more, extra_s=draw.random() / 20)
+            assert code == -signal.SIGKILL
+            asked = settle(server)
+            on_disk = kept(workspace)
+            in_flight = len({seen.sample for seen in server.seen[:asked]} - on_disk)
+            assert in_flight <= AT_ONCE
+            lost += in_flight
+            kept_at[asked] = on_disk
+        done = workspace.run()
+        assert (done.code, done.err) == (0, "")
+        assert f"All {2 * samples:,} samples are done" in done.out
+        assert server.requests <= samples + lost
+        for asked, on_disk in kept_at.items():
+            assert on_disk.isdisjoint(seen.sample for seen in server.seen[asked:])
+
+        records = workspace.records()
+        names = [record["sample"] for record in records]
+        assert len(names) == len(set(names)) == 2 * samples
+        assert {record["outcome"] for record in records} == {"ok"}
+
+        killed = workspace.tables()
+        workspace.out = workspace.root / "undisturbed"
+        assert workspace.run("--no-cache").code == 0
+        for name in ("assembly.csv", "table1.csv", "table1.md", "errors.csv"):
+            assert workspace.tables()[name] == killed[name]
+
+
+def test_no_process_outlives_a_killed_run(workspace: Workspace) -> None:
+    """Pictures are drawn by processes of the run's own."""
+    (workspace.cache / "pictures").unlink()
+    with Running(OpenAIChat()) as running:
+        prepare(workspace, running.url, 1)
+        with workspace.start() as process:
+            family: list[psutil.Process] = []
+            while not any("spawn_main" in " ".join(_command(child)) for child in family):
+                family = psutil.Process(process.pid).children(recursive=True)
+                time.sleep(0.01)
+            os.kill(process.pid, signal.SIGKILL)
+            process.wait()
+        _, alive = psutil.wait_procs(family, timeout=30)
+    assert not alive
+
+
+def _command(process: psutil.Process) -> list[str]:
+    with contextlib.suppress(psutil.NoSuchProcess):
+        return process.cmdline()
+    return []
