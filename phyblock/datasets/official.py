@@ -11,8 +11,8 @@ order, so a level-2 scene is read as a scene of levels 1 and 2.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar, cast
 
