@@ -16,9 +16,11 @@ OFFICIAL_MISSING = (
 
 
 def official_root() -> Path | None:
-    """The folder that holds `PhyBlock/` and `expected/`, or None."""
+    """The folder that holds `PhyBlock/` and `expected/`, or None; the checkout itself will do."""
     named = os.environ.get("PHYBLOCK_OFFICIAL")
     root = Path(named) if named else Path(__file__).parents[2] / "shared"
+    if (root / "data").is_dir() and root.name == "PhyBlock":
+        root = root.parent
     return root if (root / "PhyBlock" / "data").is_dir() else None
 
 
