@@ -1,0 +1,69 @@
+"""max_cost_usd: reached, never passed, and raised to go on."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.servers.chassis import Running
+from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import Workspace
+
+PRICE = {"input": 10.0, "output": 100.0}
+CALL_USD = 1000 * PRICE["input"] / 1e6 + 40 * PRICE["output"] / 1e6
+"""The server counts 1,000 tokens in and 40 out for every call."""
+MOST_USD = 0.5
+
+
+def spent(workspace: Workspace) -> float:
+    return sum(record["reply"]["cost_usd"] for record in workspace.records())
+
+
+def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as running:
+        server = running.server
+        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
+        workspace.write_suite(models=["alpha"], seeds=list(range(12)))
+        first = workspace.run("--set", f"limits.max_cost_usd={MOST_USD}")
+        assert (first.code, first.err) == (1, "")
+        assert f"max_cost_usd {MOST_USD} is reached" in first.out
+        assert "give the same command again" in first.out
+        assert spent(workspace) == pytest.approx(CALL_USD * server.requests)
+        # It stops no earlier than it must: another two calls at their dearest would pass it.
+        assert MOST_USD - 2 * (CALL_USD + 100 * PRICE["output"] / 1e6) < spent(workspace)
+        assert spent(workspace) <= MOST_USD
+
+        asked = server.requests
+        same = workspace.run("--set", f"limits.max_cost_usd={MOST_USD}")
+        assert same.code == 1
+        assert server.requests == asked
+
+        more = workspace.run("--set", "limits.max_cost_usd=5")
+        assert (more.code, more.err) == (0, "")
+        assert "All 60 samples are done" in more.out
+        assert server.requests == 60
+
+
+def test_nothing_is_asked_where_not_even_one_call_fits(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "alpha", price=PRICE)
+        workspace.write_suite(models=["alpha", "random"])
+        done = workspace.run("--set", "limits.max_cost_usd=0")
+        assert done.code == 1
+        assert "max_cost_usd 0 is reached" in done.out
+        assert running.server.requests == 0
+
+
+def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "alpha", price=PRICE)
+        workspace.write_suite(models=["alpha", "random"], seeds=[0, 1])
+        before = workspace.files()
+        done = workspace.run("--dry-run")
+        assert done.code == 0
+        assert "10 calls, about $" in done.out
+        assert running.server.requests == 0
+        assert workspace.files() == before
+
+        assert workspace.run().code == 0
+        after = workspace.run("--dry-run")
+        assert "0 calls, about $0.00" in after.out

@@ -1,0 +1,147 @@
+"""What goes wrong at a provider: retried, recorded by its kind, or the end of one model alone."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections import Counter
+from typing import Any
+
+import pytest
+from aiohttp import web
+
+from tests.servers.chassis import ISSUE_MIX, Faults, Running, Seen
+from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import Raw, Workspace
+
+
+class BySeed(OpenAIChat):
+    """Ends each request as its seed says."""
+
+    def __init__(self, endings: dict[int, str]) -> None:
+        super().__init__()
+        self._endings = endings
+
+    def read(self, body: dict[str, Any], request: web.Request) -> Seen:
+        seen = super().read(body, request)
+        self.faults = Faults(mode=self._endings.get(seen.seed or 0, "ok"))
+        return seen
+
+
+def is_scored(record: Raw) -> bool:
+    """Whether a record has a score of every setting and matcher."""
+    found = {(s["setting"], s["matcher"]) for s in record["scores"] if s["criterion"] == "aov"}
+    return found == {(setting, matcher) for setting in "AB" for matcher in ("optimal", "paper")}
+
+
+def coverage(workspace: Workspace) -> dict[str, Raw]:
+    text = workspace.tables()["coverage.csv"].decode()
+    return {row["model"]: row for row in csv.DictReader(io.StringIO(text))}
+
+
+@pytest.mark.parametrize("samples", [200, pytest.param(1000, marks=pytest.mark.slow)])
+def test_every_sample_is_scored_through_the_mix_of_faults(
+    workspace: Workspace, samples: int
+) -> None:
+    with Running(OpenAIChat(ISSUE_MIX, keep=False)) as running:
+        workspace.write_models(running.url, "alpha")
+        workspace.write_suite(models=["alpha"], seeds=list(range(samples // 5)))
+        done = workspace.run()
+    assert (done.code, done.err) == (0, "")
+    assert f"All {samples:,} samples are done" in done.out
+    records = workspace.records()
+    assert len({record["sample"] for record in records}) == len(records) == samples
+    assert {record["outcome"] for record in records} == {"ok"}
+    assert all(is_scored(record) for record in records)
+
+    ended = running.server.ended
+    assert ended["ok"] == samples
+    assert ended.keys() >= {"429", "500", "reset"}
+    assert running.server.requests == sum(record["reply"]["attempts"] for record in records)
+
+
+def test_a_model_that_cannot_answer_is_stopped_alone(workspace: Workspace) -> None:
+    servers = [OpenAIChat(Faults(mode=mode)) for mode in ("401", "404", "ok")]
+    with Running(servers[0]) as locked, Running(servers[1]) as unknown, Running(servers[2]) as fine:
+        urls = {"locked": locked.url, "unknown": unknown.url, "fine": fine.url}
+        workspace.write_yaml(
+            "models.yaml",
+            {n: {"id": f"hosted_vllm/{n}", "api_base": f"{u}/v1"} for n, u in urls.items()},
+        )
+        workspace.write_suite(models=list(urls), seeds=list(range(20)))
+        done = workspace.run("--set", "limits.max_concurrency=6")
+        assert (done.code, done.err) == (1, "")
+        assert "locked was stopped: HTTP 401: Incorrect API key provided" in done.out
+        assert "unknown was stopped: HTTP 404: The model unknown does not exist" in done.out
+        assert "100 of 300 samples are done" in done.out
+        assert "give the same command again" in done.out
+        assert max(servers[0].requests, servers[1].requests) <= 6
+        assert servers[2].requests == 100
+        told = coverage(workspace)
+        assert [told[name]["ok"] for name in urls] == ["0", "0", "100"]
+        assert [told[name]["expected"] for name in urls] == ["100"] * 3
+
+        # The key is set right, the name too: the same command asks for what is missing alone.
+        for server in servers:
+            server.faults = Faults()
+        again = workspace.run("--set", "limits.max_concurrency=6")
+    assert again.code == 0
+    assert "All 300 samples are done" in again.out
+    assert [server.ended["ok"] for server in servers] == [100, 100, 100]
+
+
+def test_each_way_to_fail_is_an_outcome_of_its_own(workspace: Workspace) -> None:
+    endings = {1: "400", 2: "policy", 3: "length", 4: "filtered", 5: "blank"}
+    outcomes = ("ok", "api_error", "refusal", "truncated", "refusal", "parse_failure")
+    with Running(BySeed(endings)) as running:
+        workspace.write_models(running.url, "alpha")
+        workspace.write_suite(models=["alpha"], seeds=[0, 1, 2, 3, 4, 5])
+        done = workspace.run()
+        assert done.code == 0
+        records = workspace.records()
+        found = {(record["seed"], record["outcome"]) for record in records}
+        assert found == set(enumerate(outcomes))
+        assert all(is_scored(record) for record in records)
+        assert running.server.requests == 30
+        assert workspace.run().out == done.out
+        assert running.server.requests == 30
+    told = coverage(workspace)["alpha"]
+    assert Counter({name: int(told[name]) for name in set(outcomes)}) == {
+        name: 5 * outcomes.count(name) for name in outcomes
+    }
+
+
+def test_a_sample_whose_every_attempt_failed_is_asked_again_by_the_next_run(
+    workspace: Workspace,
+) -> None:
+    with Running(BySeed({1: "500"})) as running:
+        workspace.write_models(running.url, "alpha")
+        workspace.write_suite(models=["alpha"], seeds=[0, 1], limits={"max_attempts": 2})
+        done = workspace.run()
+        assert (done.code, done.err) == (1, "")
+        assert "5 of 10 samples are done" in done.out
+        assert running.server.requests == 5 + 5 * 2
+        assert coverage(workspace)["alpha"]["api_error"] == "5"
+
+        running.server._endings = {}  # type: ignore[attr-defined]
+        again = workspace.run()
+        assert again.code == 0
+        assert running.server.requests == 20
+    assert coverage(workspace)["alpha"]["api_error"] == "0"
+    assert "All 10 samples are done" in again.out
+
+
+def test_refused_seeds_are_said_in_the_tables(workspace: Workspace) -> None:
+    with Running(OpenAIChat(Faults(mode="seed"))) as running:
+        workspace.write_models(running.url, "alpha")
+        workspace.write_suite(models=["alpha", "random"], seeds=[0, 1, 2])
+        done = workspace.run()
+    assert done.code == 0
+    note = "seed unsupported: 3 independent repeats"
+    assert note in done.out
+    tables = workspace.tables()
+    assert note in tables["table1.md"].decode()
+    assert note in tables["table1.tex"].decode()
+    records = [record for record in workspace.records() if record["model"] == "alpha"]
+    assert {record["reply"]["seed_sent"] for record in records} == {False}
+    assert len(records) == running.server.ended["ok"] == 15

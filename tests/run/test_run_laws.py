@@ -1,0 +1,221 @@
+"""Laws of runs: what must not matter does not, what is stored is enough, one process a folder."""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+import time
+from pathlib import Path
+
+import pytest
+
+from phyblock import load_run
+from tests.servers.chassis import Faults, Running
+from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import Raw, Workspace
+
+SCORED = ("assembly.csv", "errors.csv", "errors.md", "table1.csv", "table1.md", "table1.tex")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+    """A run of a model that answers, one whose every call fails, and two baselines."""
+    made = Workspace(tmp_path_factory.mktemp("laws"), pictures_dir)
+    made.write_scenes()
+    made.write_suite(models=["alpha", "random", "oracle"], seeds=[0, 1, 2])
+    with Running(OpenAIChat()) as running:
+        made.write_models(running.url, "alpha")
+        done = made.run()
+    assert (done.code, done.err) == (0, "")
+    return made
+
+
+@pytest.fixture
+def copy(finished: Workspace, tmp_path: Path) -> Workspace:
+    root = tmp_path / "copy"
+    shutil.copytree(finished.root, root, symlinks=True)
+    return Workspace(root, finished.cache / "pictures")
+
+
+def scores(records: list[Raw]) -> dict[str, Raw]:
+    """What was read in each reply and what it is worth, by sample."""
+    return {r["sample"]: {k: r[k] for k in ("outcome", "parse", "scores")} for r in records}
+
+
+def test_records_in_any_order_give_the_same_tables(copy: Workspace) -> None:
+    before = copy.tables()
+    path = copy.out / "records.jsonl"
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    random.Random(3).shuffle(lines)
+    path.write_text("".join(lines), encoding="utf-8")
+    assert copy.phyblock("report", "out").code == 0
+    assert copy.tables() == before
+
+
+def test_tables_are_rebuilt_byte_for_byte(copy: Workspace) -> None:
+    before = copy.tables()
+    shutil.rmtree(copy.out / "tables")
+    (copy.root / "data").rename(copy.root / "elsewhere")
+    done = copy.phyblock("report", "out")
+    assert (done.code, done.err) == (0, "")
+    assert copy.tables() == before
+
+
+def test_scoring_again_by_the_same_rules_changes_nothing(copy: Workspace) -> None:
+    before = copy.files()
+    done = copy.phyblock("score", "out")
+    assert (done.code, done.err) == (0, "")
+    again = copy.out / "scores" / "steps-optimal"
+    assert copy.records(again) == copy.records()
+    assert copy.tables(again) == copy.tables()
+    after = copy.files()
+    assert {name: after[name] for name in before} == before
+
+
+def test_another_parser_scores_the_same_replies(copy: Workspace) -> None:
+    before = copy.files()
+    done = copy.phyblock("score", "out", "--parser", "official", "--matcher", "paper")
+    assert (done.code, done.err) == (0, "")
+    again = copy.out / "scores" / "official-paper"
+    records = copy.records(again)
+    assert {record["parse"]["parser"] for record in records} == {"official"}
+    assert [record["reply"] for record in records] == [r["reply"] for r in copy.records()]
+    assert "matcher paper" in done.out
+    after = copy.files()
+    assert {name: after[name] for name in before} == before
+    # Its tables are rebuilt like any run's.
+    told = copy.tables(again)
+    assert copy.phyblock("report", again).code == 0
+    assert copy.tables(again) == told
+
+
+def test_scores_can_be_made_where_the_data_set_has_moved(copy: Workspace) -> None:
+    shutil.move(copy.root / "data", copy.root / "moved")
+    manifest = copy.out / "run.yaml"
+    lost = manifest.read_text(encoding="utf-8").replace("root: ", "root: /nowhere")
+    manifest.write_text(lost, encoding="utf-8")
+    assert copy.phyblock("score", "out").code == 2
+    assert copy.phyblock("score", "out", "--data", "moved").code == 0
+
+
+def test_replies_from_the_cache_are_worth_the_same(copy: Workspace) -> None:
+    # The server is gone: whatever is answered comes from the cache.
+    first = scores(copy.records())
+    copy.out = copy.root / "cached"
+    done = copy.run()
+    assert (done.code, done.err) == (0, "")
+    asked = [record for record in copy.records() if record["model"] == "alpha"]
+    assert all(r["reply"]["cached"] and r["reply"]["attempts"] == 0 for r in asked)
+    assert scores(copy.records()) == first
+    assert {name: copy.tables()[name] for name in SCORED} == {
+        name: copy.tables(copy.root / "out")[name] for name in SCORED
+    }
+
+
+def test_without_the_cache_it_is_neither_read_nor_written(copy: Workspace) -> None:
+    first = scores(copy.records())
+    before = (copy.cache / "replies.sqlite").read_bytes()
+    copy.out = copy.root / "uncached"
+    with Running(OpenAIChat()) as running:
+        copy.write_models(running.url, "alpha")
+        assert copy.run("--no-cache").code == 0
+        assert running.server.requests == 15
+    assert scores(copy.records()) == first
+    assert (copy.cache / "replies.sqlite").read_bytes() == before
+
+
+def test_a_cut_last_line_is_dropped_and_its_sample_run_again(copy: Workspace) -> None:
+    path = copy.out / "records.jsonl"
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-30])
+    done = copy.run()
+    assert (done.code, done.err) == (0, "")
+    assert len(copy.records()) == 45
+    assert path.read_bytes().startswith(whole[:-30].rpartition(b"\n")[0])
+    assert load_run(copy.out).records["sample"].is_unique
+
+
+def test_a_second_process_is_refused_and_the_first_goes_on(workspace: Workspace) -> None:
+    with Running(OpenAIChat(Faults(latency_s=2.0))) as running:
+        workspace.write_models(running.url, "alpha")
+        workspace.write_suite(models=["alpha"])
+        with workspace.start() as first:
+            while not running.server.at_once:
+                time.sleep(0.01)
+            second = workspace.run()
+            out, err = first.communicate()
+        assert second.code == 2
+        assert "out: is being written by another phyblock run" in second.err
+        assert len(second.errors) == 1
+        assert (first.returncode, err) == (0, "")
+        assert "All 5 samples are done" in out
+        assert running.server.requests == 5
+
+
+def test_a_run_opens_as_a_frame_with_a_row_a_sample(finished: Workspace) -> None:
+    records = load_run(finished.out).records
+    stored = {record["sample"]: record for record in finished.records()}
+    assert len(records) == len(stored) == 45
+    assert set(records["sample"]) == set(stored)
+    for row in records.to_dict("records"):
+        assert row["text"] == stored[row["sample"]]["reply"]["text"]
+        assert row["outcome"] == stored[row["sample"]]["outcome"]
+
+
+def test_a_limit_keeps_some_of_every_level_and_is_a_run_of_its_own(copy: Workspace) -> None:
+    copy.out = copy.root / "few"
+    assert copy.run("--limit", "3", "--models", "oracle").code == 0
+    records = copy.records()
+    assert len({r["scene"] for r in records}) == 3
+    assert {level for r in records for level in r["levels"]} == {1, 2, 3, 4}
+    other = copy.run("--limit", "4", "--models", "oracle")
+    assert other.code == 2
+    assert "found: different: limit" in other.err
+
+
+def test_what_does_not_change_results_does_not_make_another_run(copy: Workspace) -> None:
+    done = copy.run("--set", "limits.max_concurrency=1", "--set", "description=x")
+    assert (done.code, done.err) == (0, "")
+    assert "All 45 samples are done" in done.out
+
+
+def test_the_same_model_named_twice_is_run_once(copy: Workspace) -> None:
+    copy.out = copy.root / "twice"
+    done = copy.run("--models", "oracle,oracle")
+    assert done.code == 0
+    names = [record["sample"] for record in copy.records()]
+    assert len(names) == len(set(names)) == 15
+
+
+def test_a_folder_that_holds_no_record_is_free_for_the_mended_suite(workspace: Workspace) -> None:
+    template = workspace.root / "mine.j2"
+    template.write_text("{% block user %}{{ wrong }}{% endblock %}", encoding="utf-8")
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "alpha")
+        workspace.write_suite(models=["alpha"], prompt="mine.j2")
+        assert workspace.run().code == 2
+        template.write_text("{% block user %}right{% endblock %}", encoding="utf-8")
+        done = workspace.run()
+    assert (done.code, done.err) == (0, "")
+
+
+def test_a_record_is_one_line_of_json_whatever_the_reply_holds(workspace: Workspace) -> None:
+    class Strange(OpenAIChat):
+        def reply(self, seen: object, ending: str) -> Raw:
+            body = super().reply(seen, ending)  # type: ignore[arg-type]
+            text = "Step1: Move block with index 1\n\u2028\x85\r\0\ud800 ￿ 😀"
+            body["choices"][0]["message"]["content"] = text
+            return body
+
+    with Running(Strange()) as running:
+        workspace.write_models(running.url, "alpha")
+        workspace.write_suite(models=["alpha"])
+        done = workspace.run()
+        assert (done.code, done.err) == (0, "")
+        again = workspace.run()
+        assert (again.code, again.out) == (0, done.out)
+        assert running.server.requests == 5
+    lines = (workspace.out / "records.jsonl").read_bytes().split(b"\n")[:-1]
+    assert len(lines) == 5
+    assert all("😀" in json.loads(line)["reply"]["text"] for line in lines)
