@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
+from phyblock import report
 from phyblock.cli.console import make_console
 from phyblock.cli.summary import print_summary
-from phyblock.report import write_tables
 
 __all__ = ["command", "show_tables"]
 
@@ -25,4 +25,4 @@ def command(run: Path) -> None:
 
 def show_tables(folder: Path) -> None:
     """Write the tables of a run folder and print what matters of them."""
-    print_summary(make_console(), write_tables(folder))
+    print_summary(make_console(), report.write_tables(folder))

@@ -11,12 +11,12 @@ from pathlib import Path
 import click
 from rich.console import Console
 
+from phyblock import report
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.estimate_view import show_estimate
 from phyblock.cli.files import find_models_file, find_suite
 from phyblock.cli.progress import ProgressView
 from phyblock.cli.summary import print_summary
-from phyblock.report import write_tables
 from phyblock.resources import bundled
 from phyblock.run.estimate import Estimate, estimate
 from phyblock.run.execute import Executor, RunResult
@@ -77,7 +77,7 @@ def command(
     if not yes and sys.stdin.isatty() and not _agreed(console, plan, folder, not no_cache):
         return 1
     result = asyncio.run(_run(console, plan, folder, use_cache=not no_cache))
-    print_summary(console, write_tables(folder))
+    print_summary(console, report.write_tables(folder))
     return _conclude(console, plan, folder, result)
 
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from phyblock import report
 from phyblock.cli.console import print_view, shown_path, width_of
-from phyblock.report import TablesWritten, TextTable, largest_differences
+
+if TYPE_CHECKING:
+    from phyblock.report import TablesWritten, TextTable
 
 __all__ = ["print_summary"]
 
@@ -38,7 +42,7 @@ def print_summary(console: Console, written: TablesWritten) -> None:
 
 def _print_comparison(console: Console, written: TablesWritten) -> None:
     frame = written.frames["published"].dropna(subset=["difference"])
-    largest = largest_differences(written.frames["published"])
+    largest = report.largest_differences(written.frames["published"])
     names = [name for name in largest.index if name in set(frame["model"])]
     if not names:
         return
