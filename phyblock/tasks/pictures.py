@@ -165,6 +165,7 @@ class Pictures:
             return _image(kept, drawing.label)
         if drawing.key not in self._making:
             self._making[drawing.key] = asyncio.create_task(self._draw(path, drawing))
+            self._making[drawing.key].add_done_callback(_take_note)
         # Shielded: others may wait for the same picture when one waiter is cancelled.
         return _image(await asyncio.shield(self._making[drawing.key]), drawing.label)
 
@@ -192,6 +193,12 @@ class Pictures:
 
     def _path(self, key: str) -> Path:
         return self._folder / key[:2] / f"{key}.png"
+
+
+def _take_note(drawn: asyncio.Task[bytes]) -> None:
+    # Of a failure that every waiter was cancelled before: asyncio would print it otherwise.
+    if not drawn.cancelled():
+        drawn.exception()
 
 
 def _composite(make_goal: Callable[[], bytes], make_grid: Callable[[], bytes]) -> bytes:
