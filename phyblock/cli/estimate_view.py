@@ -19,8 +19,8 @@ _HEADINGS = ("model", "kind", "samples", "done", "cached", "calls", "tokens in",
 def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> None:
     """Print what each model would take, and the sum."""
     console.print(
-        f"{plan.suite.name}: {len(plan.dataset.tasks)} scenes of {plan.dataset.name}, "
-        f"{len(plan.suite.seeds)} seeds, {len(plan.models)} models",
+        f"{plan.suite.name}: {_counted(len(plan.dataset.tasks), 'scene')} of {plan.dataset.name}, "
+        f"{_counted(len(plan.suite.seeds), 'seed')}, {_counted(len(plan.models), 'model')}",
         highlight=False,
     )
     cells = [
@@ -41,10 +41,14 @@ def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> 
     calls = sum(row.calls for row in rows)
     known = sum(row.cost_usd or 0.0 for row in rows)
     unknown = [row.model for row in rows if row.calls and row.cost_usd is None]
-    text = f"{calls:,} calls, about {_dollars(known)}"
+    priced = len(unknown) < sum(row.calls > 0 for row in rows) or not unknown
+    costs = [f"about {_dollars(known)}"] if priced else []
     if unknown:
-        text += f", and what {len(unknown)} models of unknown price cost (price: in models.yaml)"
-    console.print(text + ".", soft_wrap=True, markup=False)
+        costs.append(
+            f"unknown cost of {_counted(len(unknown), 'model')} (give a price in models.yaml)"
+        )
+    text = f"{_counted(calls, 'call')}, {' and '.join(costs)}."
+    console.print(text, soft_wrap=True, markup=False)
     if calls:
         console.print(
             "Tokens are estimates: 4 characters a token, pictures by OpenAI's tile rule, replies "
@@ -52,6 +56,10 @@ def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> 
             style="dim",
             soft_wrap=True,
         )
+
+
+def _counted(number: int, word: str) -> str:
+    return f"{number:,} {word}{'' if number == 1 else 's'}"
 
 
 def _dollars(cost_usd: float | None) -> str:

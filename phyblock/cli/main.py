@@ -63,6 +63,9 @@ def phyblock() -> None:
 
 def main() -> None:
     """Run the command line; exit code 2 for bad input, 1 for a failure, 130 for Ctrl-C."""
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal that knows no plus-minus sign shall show a question mark, not fail.
+        stream.reconfigure(errors="replace")  # type: ignore[union-attr]
     try:
         code = phyblock.main(prog_name="phyblock", standalone_mode=False)
     except click.ClickException as error:

@@ -7,9 +7,11 @@ from types import TracebackType
 
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
+from rich.padding import Padding
 from rich.panel import Panel
 from rich.progress_bar import ProgressBar
 from rich.table import Table
+from rich.text import Text
 
 from phyblock.cli.tally import Tally
 from phyblock.run.events import (
@@ -113,12 +115,13 @@ class ProgressView:
         done = sum(tally.done for tally in self._tallies.values())
         total = sum(tally.expected for tally in self._tallies.values()) or 1
         parts: list[RenderableType] = [
-            ProgressBar(total=total, completed=done, width=None),
-            self._summary(),
+            # The bar alone would not end its line, and what follows would be cut off.
+            Padding(ProgressBar(total=total, completed=done, width=None), 0),
+            Text(self._summary()),
             self._table(),
         ]
         if self._status:
-            parts.append(f"[yellow]{self._status}[/yellow]")
+            parts.append(Text(self._status, style="yellow"))
         return Panel(Group(*parts), title=self._title, title_align="left", border_style="dim")
 
     def _table(self) -> Table:
@@ -138,7 +141,8 @@ class ProgressView:
                 f"{tally.cached:,}",
                 f"{tally.retries:,}",
                 tally.failure_text,
-                tally.notice if tally.done < tally.expected else "",
+                # Text, because what a provider says may look like markup.
+                Text(tally.notice if tally.done < tally.expected else ""),
             )
         return table
 

@@ -42,7 +42,11 @@ _INTERRUPTED = 130
 @click.option(
     "--limit", type=click.IntRange(min=1), metavar="N", help="Run N scenes, spread over levels."
 )
-@click.option("--out", type=click.Path(path_type=Path), help="Folder of the run.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Folder of the run. [default: results/SUITE-DIGEST]",
+)
 @click.option("--models-file", metavar="FILE", help="Models file instead of models.yaml.")
 @click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
 @click.option("--dry-run", is_flag=True, help="Print calls, tokens and dollars; call nothing.")
@@ -124,12 +128,14 @@ def _conclude(console: Console, plan: RunPlan, folder: Path, result: RunResult) 
         console.print(f"[red]{name}[/red] was stopped: ", end="")
         console.print(reason, markup=False)
     if not result.left:
-        console.print(f"All {total:,} samples are done. The run is in {where}", soft_wrap=True)
+        text = f"All {total:,} samples are done. The run is in {where}"
+        console.print(text, soft_wrap=True, markup=False)
         return 0
     reason = f" ({result.reason})" if result.reason else ""
     console.print(
         f"{total - result.left:,} of {total:,} samples are done{reason}. The run is in {where}",
         soft_wrap=True,
+        markup=False,
     )
     again = shlex.join(["phyblock", *sys.argv[1:]])
     console.print(f"To go on, give the same command again: {again}", soft_wrap=True, markup=False)

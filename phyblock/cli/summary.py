@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -17,27 +18,50 @@ __all__ = ["print_summary"]
 
 _SIDE_METRICS = ("Prec", "Rec")
 _OUTCOMES = ("OK", "Unparsed", "Refusal", "Truncated", "API error", "Missing")
+_FAILURES_SHOWN = 8
 _MET = 0.06
 """Largest difference that rounding of the published numbers and of ours explains [points]."""
 
 
 def print_summary(console: Console, written: TablesWritten) -> None:
-    """Print Table 1, wrong steps over all levels, what was not answered, and the comparison."""
+    """Print Table 1, wrong steps over all levels, what was not answered and why, and the
+    comparison; tables that the suite does not ask for are left out.
+    """
     views = written.views
-    table1 = views["table1"]
+    if (table1 := views.get("table1")) is not None:
+        _print_table1(console, table1)
+    if "errors" in views:
+        print_view(console, _overall(views["errors"]))
+    coverage = written.frames["coverage"]
+    if (coverage["ok"] < coverage["expected"]).any():
+        print_view(console, _answered(views["coverage"]))
+        _print_failures(console, written)
+    if "published" in written.frames:
+        _print_comparison(console, written)
+    console.print(f"Tables are in {shown_path(written.folder)}", soft_wrap=True, markup=False)
+
+
+def _print_table1(console: Console, table1: TextTable) -> None:
     if width_of(table1) > console.width:
         table1 = _without(table1, _SIDE_METRICS)
         # The last note is about the labels of the columns that were left out.
         note = "F1 alone, to fit; precision and recall are in tables/table1.md."
         table1 = replace(table1, notes=(note, *table1.notes[:-1]))
     print_view(console, table1)
-    print_view(console, _overall(views["errors"]))
-    coverage = written.frames["coverage"]
-    if (coverage["ok"] < coverage["expected"]).any():
-        print_view(console, _answered(views["coverage"]))
-    if "published" in written.frames:
-        _print_comparison(console, written)
-    console.print(f"Tables are in {shown_path(written.folder)}", soft_wrap=True, markup=False)
+
+
+def _print_failures(console: Console, written: TablesWritten) -> None:
+    """What providers said where a call failed, the most frequent first."""
+    failed = written.run.records.dropna(subset=["error_message"])
+    said = Counter(zip(failed["model"], failed["error_message"], strict=True))
+    if not said:
+        return
+    console.print("Failed calls", style="bold")
+    for (model, message), times in said.most_common(_FAILURES_SHOWN):
+        console.print(f"{times:>6,} x {model}: {message}", markup=False, soft_wrap=True)
+    if len(said) > _FAILURES_SHOWN:
+        console.print(f"       and {len(said) - _FAILURES_SHOWN} other messages", markup=False)
+    console.print()
 
 
 def _print_comparison(console: Console, written: TablesWritten) -> None:

@@ -1,0 +1,130 @@
+"""What is printed where: pipes, terminals, and outputs that know few characters."""
+
+from __future__ import annotations
+
+import os
+import pty
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.servers.chassis import Faults, Running
+from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import COMMAND, Workspace
+
+
+def in_terminal(workspace: Workspace, answer: str, *args: str) -> tuple[int, str]:
+    """Run with a terminal of 120 columns, and type `answer` first; exit code and screen."""
+    master, slave = pty.openpty()
+    with subprocess.Popen(
+        [*COMMAND, "run", "suite.yaml", "--out", str(workspace.out), *args],
+        cwd=workspace.root,
+        env=workspace.env | {"TERM": "xterm-256color", "COLUMNS": "120", "LINES": "40"},
+        stdin=slave,
+        stdout=slave,
+        stderr=slave,
+        start_new_session=True,
+    ) as process:
+        os.close(slave)
+        os.write(master, answer.encode())
+        screen = b""
+        while chunk := _read(master):
+            screen += chunk
+    os.close(master)
+    return process.returncode, screen.decode()
+
+
+def _read(master: int) -> bytes:
+    try:
+        return os.read(master, 65536)
+    except OSError:  # Linux says EIO when the other side is closed.
+        return b""
+
+
+@pytest.fixture
+def suite(workspace: Workspace) -> Workspace:
+    workspace.write_suite()
+    return workspace
+
+
+def test_a_pipe_gets_whole_tables_without_escapes(suite: Workspace) -> None:
+    done = suite.run()
+    assert done.code == 0
+    assert "\x1b" not in done.out
+    heading = next(line for line in done.out.splitlines() if line.startswith(" Model"))
+    assert heading.split() == ["Model", *["Prec", "Rec", "F1"] * 5]
+    assert "Tables are in out/tables" in done.out
+
+
+def test_output_in_ascii_is_no_failure(suite: Workspace) -> None:
+    done = suite.run("--set", "seeds=[0,1]", env={"PYTHONIOENCODING": "ascii"})
+    assert (done.code, done.err) == (0, "")
+    assert "oracle" in done.out
+
+
+def test_a_suite_may_do_without_tables(suite: Workspace) -> None:
+    done = suite.run("--set", "tables=[]")
+    assert (done.code, done.err) == (0, "")
+    assert list(suite.tables()) == ["coverage.csv", "coverage.md"]
+
+
+def test_a_terminal_shows_the_panel_and_then_the_tables(suite: Workspace) -> None:
+    class Bracketing(OpenAIChat):
+        """What it says looks like markup."""
+
+        def error(self, status: int, ending: str, message: str) -> dict[str, object]:
+            return super().error(status, ending, f"[/bold] busy [blink {message}")
+
+    faults = Faults(latency_s=0.3, rate_limited=0.5, retry_after="0")
+    with Running(Bracketing(faults)) as running:
+        suite.write_models(running.url, "alpha", price={"input": 0.0, "output": 0.0})
+        code, screen = in_terminal(
+            suite, "", "--models", "alpha,oracle", "--set", "seeds=[0,1,2,3]"
+        )
+    assert code == 0
+    assert "Traceback" not in screen
+    assert "Go on?" not in screen
+    assert "[/bold] busy [blink" in screen
+    assert screen.index("of 40 samples") < screen.index("Assembly planning (%), suite trial")
+    assert "All 40 samples are done" in screen
+
+
+@pytest.mark.parametrize(("answer", "code", "calls"), [("n\n", 1, 0), ("y\n", 0, 5)])
+def test_a_person_is_asked_before_money_is_spent(
+    suite: Workspace, answer: str, code: int, calls: int
+) -> None:
+    with Running(OpenAIChat()) as running:
+        suite.write_models(running.url, "alpha")
+        found, screen = in_terminal(suite, answer, "--models", "alpha")
+        assert (found, running.server.requests) == (code, calls)
+    assert "5 calls, unknown cost of 1 model" in screen
+    assert "Go on?" in screen
+    assert suite.out.exists() == (code == 0)
+
+
+def test_yes_asks_no_person(suite: Workspace) -> None:
+    with Running(OpenAIChat()) as running:
+        suite.write_models(running.url, "alpha")
+        code, screen = in_terminal(suite, "", "--models", "alpha", "--yes")
+        assert (code, running.server.requests) == (0, 5)
+    assert "Go on?" not in screen
+
+
+def test_failed_calls_are_shown_with_what_the_provider_said(suite: Workspace) -> None:
+    with Running(OpenAIChat(Faults(mode="400"))) as running:
+        suite.write_models(running.url, "alpha")
+        done = suite.run("--models", "alpha,oracle")
+    assert done.code == 0
+    assert "5 x alpha: HTTP 400: Invalid value for messages" in done.out
+
+
+def test_the_folder_of_a_run_is_found_again_without_naming_it(suite: Workspace) -> None:
+    first = suite.phyblock("run", "suite.yaml")
+    assert first.code == 0
+    (folder,) = (suite.root / "results").iterdir()
+    assert folder.name.startswith("trial-")
+    assert f"The run is in {Path('results') / folder.name}" in first.out
+    before = suite.files()
+    assert suite.phyblock("run", "suite.yaml").out == first.out
+    assert suite.files() == before
