@@ -24,6 +24,7 @@ from phyblock.run.events import ModelNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.plan import RunPlan
 from phyblock.run.reading import read_records
+from phyblock.run.records import is_final
 from phyblock.run.store import RunStore
 
 __all__ = ["Session", "check_ready"]
@@ -61,7 +62,7 @@ class Session:
         plan = self._plan
         try:
             self._store = RunStore(self._folder, plan.manifest)
-            if self._use_cache:
+            if self._use_cache and any(m.config.kind == "litellm" for m in plan.models):
                 self._cache = ReplyCache(reply_cache_file())
             limits = plan.suite.limits
             self._earlier = read_records(self._folder)
@@ -101,7 +102,11 @@ class Session:
             RunStarted(
                 {model.name: self._plan.samples_per_model for model in self._plan.models},
                 {
-                    model.name: tuple(r for r in earlier.values() if r["model"] == model.name)
+                    model.name: tuple(
+                        record
+                        for record in earlier.values()
+                        if record["model"] == model.name and is_final(record)
+                    )
                     for model in self._plan.models
                 },
             )

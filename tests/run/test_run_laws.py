@@ -219,3 +219,9 @@ def test_a_record_is_one_line_of_json_whatever_the_reply_holds(workspace: Worksp
     lines = (workspace.out / "records.jsonl").read_bytes().split(b"\n")[:-1]
     assert len(lines) == 5
     assert all("😀" in json.loads(line)["reply"]["text"] for line in lines)
+
+
+def test_baselines_need_no_cache(workspace: Workspace) -> None:
+    workspace.write_suite()
+    done = workspace.run(env={"PHYBLOCK_CACHE": "/proc/nowhere"})
+    assert (done.code, done.err) == (0, "")

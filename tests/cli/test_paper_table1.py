@@ -1,0 +1,99 @@
+"""The paper's Table 1 out of the official recordings, by the command a reader would type."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import pytest
+
+from tests.workspace import Done, Workspace
+
+ROUNDING = 0.06
+"""Both numbers are rounded to a tenth [points]."""
+METRICS = ("precision", "recall", "f1")
+
+
+@pytest.fixture(scope="module")
+def reproduced(
+    official_checkout: Path, tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path
+) -> tuple[Workspace, Done]:
+    workspace = Workspace(tmp_path_factory.mktemp("paper"), pictures_dir)
+    dataset = f"dataset.path={official_checkout}"
+    done = workspace.phyblock("run", "paper-table1", "--set", dataset, "--out", "out")
+    assert (done.code, done.err) == (0, "")
+    return workspace, done
+
+
+def rows(workspace: Workspace, name: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(workspace.tables()[name].decode())))
+
+
+def test_every_published_cell_comes_out_again(
+    reproduced: tuple[Workspace, Done], official_checkout: Path
+) -> None:
+    workspace, done = reproduced
+    cells = rows(workspace, "published.csv")
+    recorded = {folder.name for folder in (official_checkout / "outputs").iterdir()}
+    known = {cell["model"] for cell in cells if cell["difference"]}
+    assert len(known) >= min(6, len(recorded))
+    for model in known:
+        mine = [cell for cell in cells if cell["model"] == model]
+        assert {(cell["level"], cell["metric"]) for cell in mine} == {
+            (level, metric) for level in ("1", "2", "3", "4", "overall") for metric in METRICS
+        }
+        for cell in mine:
+            assert abs(float(cell["ours"]) - float(cell["published"])) <= ROUNDING, cell
+    assert done.out.count("15 cells, as published") == len(known)
+    assert "differs" not in done.out
+
+
+def test_missing_replies_are_skipped_and_said(reproduced: tuple[Workspace, Done]) -> None:
+    workspace, done = reproduced
+    missing = {row["model"]: int(row["missing"]) for row in rows(workspace, "coverage.csv")}
+    assert missing.pop("claude-3-7-thinking") == 10
+    assert "claude-3-7-thinking 390" in done.out
+    scored = {
+        row["model"]: row["n"]
+        for row in rows(workspace, "assembly.csv")
+        if row["level"] == "overall"
+    }
+    assert scored["claude-3-7-thinking"] == "390"
+    assert {scored[model] for model, lost in missing.items() if not lost} == {"400"}
+
+
+def test_counts_are_the_expected_ones_scene_by_scene(
+    reproduced: tuple[Workspace, Done], official_dir: Path
+) -> None:
+    workspace, _ = reproduced
+    found = {
+        (record["model"], record["scene"], score["setting"], score["criterion"]): (
+            score["tp"],
+            score["fp"],
+            score["fn"],
+        )
+        for record in workspace.records()
+        if record["reply"] is not None
+        for score in record["scores"]
+        if score["matcher"] in (None, "paper")
+    }
+    with (official_dir / "expected" / "assembly_counts.csv").open(newline="") as file:
+        wanted = {
+            (row["model"], row["scene"], row["setting"], row["criterion"]): (
+                int(row["tp"]),
+                int(row["fp"]),
+                int(row["fn"]),
+            )
+            for row in csv.DictReader(file)
+        }
+    assert wanted
+    assert {key: found.get(key) for key in wanted} == wanted
+
+
+def test_a_recording_is_never_asked_anything(reproduced: tuple[Workspace, Done]) -> None:
+    workspace, _ = reproduced
+    replies = [record["reply"] for record in workspace.records() if record["reply"]]
+    assert {reply["attempts"] for reply in replies} == {0}
+    assert {reply["cost_usd"] for reply in replies} == {0.0}
+    assert not (workspace.cache / "replies.sqlite").exists()
