@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from phyblock.errors import Problem, StoreError
+from phyblock.files import atomic_write
 from phyblock.report.assembly import assembly_frame, table1_frame
 from phyblock.report.comparison import published_frame
 from phyblock.report.coverage import coverage_frame
@@ -62,7 +61,7 @@ def write_tables(path: str | Path) -> TablesWritten:
     with _as_store_error(folder):
         folder.mkdir(exist_ok=True)
         for name, text in texts.items():
-            _replace(folder / name, text)
+            atomic_write(folder / name, text)
     return TablesWritten(folder, tuple(folder / name for name in texts), frames, views, run)
 
 
@@ -88,17 +87,6 @@ def _tables(run: Run) -> tuple[dict[str, pd.DataFrame], dict[str, TextTable]]:
 def _csv(frame: pd.DataFrame, name: str) -> str:
     decimals = "%.1f" if name == "table1" else "%.6f"
     return frame.to_csv(index=False, float_format=decimals, lineterminator="\n")
-
-
-def _replace(target: Path, text: str) -> None:
-    descriptor, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    try:
-        with os.fdopen(descriptor, "w", encoding="utf-8", newline="") as file:
-            file.write(text)
-        Path(temporary).replace(target)
-    except BaseException:
-        Path(temporary).unlink()
-        raise
 
 
 @contextlib.contextmanager

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from pydantic import ValidationError
 
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import DataError, Problem, StoreError
+from phyblock.files import atomic_write
 from phyblock.parsing import PlanParser
 from phyblock.run.plan import open_dataset, planning_rules
 from phyblock.run.reading import MANIFEST, RECORDS, read_manifest, read_records
@@ -120,9 +120,7 @@ def _write(folder: Path, manifest: Mapping[str, Any], records: list[dict[str, An
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():
-            partial = folder / f"{name}.part"
-            partial.write_text(text, encoding="utf-8")
-            os.replace(partial, folder / name)
+            atomic_write(folder / name, text)
     except OSError as error:
         problem = Problem(str(folder), f"cannot be written: {error.strerror}")
         raise StoreError(problem) from error

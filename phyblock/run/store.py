@@ -18,6 +18,7 @@ from typing import IO, Any
 import yaml
 
 from phyblock.errors import Problem, StoreError
+from phyblock.files import atomic_write
 from phyblock.run.reading import MANIFEST, RECORDS, RecordLines, read_manifest
 
 __all__ = ["RunStore"]
@@ -118,9 +119,7 @@ class RunStore:
             message = "holds another run"
             raise StoreError(Problem(str(self.folder), message, found=changed, hint=hint))
         text = yaml.safe_dump(dict(manifest), sort_keys=False, allow_unicode=True, width=100)
-        partial = path.with_suffix(".part")
-        partial.write_text(text, encoding="utf-8")
-        os.replace(partial, path)
+        atomic_write(path, text)
 
     def _has_records(self) -> bool:
         """Whether anything would be lost with the folder: a run that failed at once leaves none."""
