@@ -1,4 +1,4 @@
-"""Every exception that phyblock raises on purpose.
+"""Every exception that phyblock raises on purpose and lets a caller see.
 
 PhyblockError
 ├── InputError              what the user gave is wrong (exit code 2)
@@ -92,10 +92,15 @@ class StoreError(InputError):
 
 
 class ModelError(PhyblockError):
-    """A call to a model failed; the message is safe to store (it holds no key)."""
+    """A call to a model failed; the message is safe to store (it holds no key).
+
+    `billed_usd` is what a run's cost limit counts for it [US dollars], all attempts included; None
+    where there is no limit.
+    """
 
     def __init__(self, message: str, *, status: int | None = None) -> None:
         self.status = status
+        self.billed_usd: float | None = None
         super().__init__(message)
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 
 from phyblock.errors import Problem, SpecError
 from phyblock.resources import bundled
+from phyblock.specs import did_you_mean
 
 __all__ = ["find_models_file", "find_suite"]
 
@@ -24,8 +24,7 @@ def find_suite(name: str) -> Path:
         if inside.is_file():
             return inside
     names = sorted(p.stem for p in bundled("benchmarks").glob("*.yaml"))
-    near = difflib.get_close_matches(path.stem, names, 1)
-    hint = f"did you mean {near[0]}?" if near else ""
+    hint = did_you_mean(path.stem, names)
     allowed = "a suite file, or a bundled suite: " + ", ".join(names)
     message = "is a folder" if path.is_dir() else "there is no such suite"
     raise SpecError(Problem(name, message, allowed=allowed, hint=hint))

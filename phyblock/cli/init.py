@@ -13,9 +13,11 @@ from phyblock.resources import bundled
 
 __all__ = ["command"]
 
+_SUITE = "quick.yaml"
+_OWN_PROMPT = "prompt: ../prompts/full_planning.j2   # change it as you like\n"
 _FILES = (
     ("models.yaml",),
-    ("benchmarks", "quick.yaml"),
+    ("benchmarks", _SUITE),
     ("benchmarks", "schemas", "suite.schema.json"),
     ("benchmarks", "schemas", "models.schema.json"),
     ("prompts", "full_planning.j2"),
@@ -39,6 +41,9 @@ def command(folder: Path) -> None:
             target = folder.joinpath(*parts)
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(bundled(*parts), target)
+            if target.name == _SUITE:
+                with target.open("a", encoding="utf-8") as suite:
+                    suite.write(_OWN_PROMPT)
             console.print(f"  {shown_path(target)}")
     except OSError as error:
         problem = Problem(str(folder), f"cannot be written: {error.strerror}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import difflib
 
 import click
 
@@ -14,7 +13,7 @@ from phyblock.models import ModelConfig, api_key_status, price_of
 from phyblock.report import NO_VALUE
 from phyblock.run.check import check_model
 from phyblock.run.models import to_config
-from phyblock.specs import BASELINES, ModelSpec, SuiteSpec, load_models
+from phyblock.specs import BASELINES, ModelSpec, SuiteSpec, did_you_mean, load_models
 
 __all__ = ["command"]
 
@@ -43,8 +42,7 @@ def check(known: dict[str, ModelSpec], name: str) -> int:
     """Make one tiny call to the model NAME and say what came back."""
     names = [*BASELINES, *known]
     if name not in names:
-        near = difflib.get_close_matches(name, names, 1)
-        hint = f"did you mean {near[0]}?" if near else "list them: phyblock models"
+        hint = did_you_mean(name, names) or "list them: phyblock models"
         raise SpecError(Problem("models check", "is not in the models file", "", name, hint=hint))
     console = make_console()
     config = _config(name, known)

@@ -79,6 +79,7 @@ def command(
         return 0
     check_ready(plan)
     if not yes and sys.stdin.isatty() and not _agreed(console, plan, folder, not no_cache):
+        console.print("Nothing was asked.")
         return 1
     result = asyncio.run(_run(console, plan, folder, use_cache=not no_cache))
     print_summary(console, report.write_tables(folder))

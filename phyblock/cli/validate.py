@@ -8,24 +8,28 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import make_console, shown_path
-from phyblock.cli.files import find_models_file
+from phyblock.cli.files import find_models_file, find_suite
 from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
-from phyblock.errors import InputError, Problem, SpecError
+from phyblock.errors import InputError, Problem
 from phyblock.resources import bundled
 from phyblock.run.plan import make_plan
-from phyblock.specs import load_models, load_suite
+from phyblock.specs import SuiteSpec, load_models, load_suite
 
 __all__ = ["command"]
 
 # A models file has model names at its top level, a suite has these.
-_SUITE_KEY = re.compile(r"^(?:models|tracks|dataset)[ \t]*:", re.MULTILINE)
+_SUITE_KEY = re.compile(rf"^(?:{'|'.join(SuiteSpec.model_fields)})[ \t]*:", re.MULTILINE)
 
 
 @click.command("validate")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Override a value of the suites."
+)
 @click.option("--models-file", metavar="FILE", help="Models file that suites are checked against.")
-def command(files: tuple[Path, ...], models_file: str | None) -> None:
-    """Check FILES: suites and models files (YAML), data set folders, official checkouts.
+def command(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | None) -> None:
+    """Check FILES: suites (or names of bundled ones) and models files, data set folders, official
+    checkouts.
 
     All problems of all files are shown; exit code 2 when there are any.
     """
@@ -33,7 +37,7 @@ def command(files: tuple[Path, ...], models_file: str | None) -> None:
     problems: list[Problem] = []
     for path in files:
         try:
-            told = _check(path, models_file)
+            told = _check(path, sets, models_file)
         except InputError as error:
             problems += error.problems
         else:
@@ -42,17 +46,17 @@ def command(files: tuple[Path, ...], models_file: str | None) -> None:
         raise InputError(problems)
 
 
-def _check(path: Path, models_file: str | None) -> str:
+def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> str:
     if path.is_dir():
         is_builtin = (path / SCENES_FILE).exists()
         return _about(read_builtin(path) if is_builtin else read_official(path))
     if path.name == SCENES_FILE:
         return _about(read_builtin(path.parent))
     if not path.exists():
-        raise SpecError(Problem(str(path), "there is no such file or folder"))
+        path = find_suite(str(path))
     if not _SUITE_KEY.search(path.read_text(encoding="utf-8", errors="replace")):
         return f"models file, {len(load_models(path))} models"
-    loaded = load_suite(path, data_dir=bundled("benchmarks", "data"))
+    loaded = load_suite(path, sets, data_dir=bundled("benchmarks", "data"))
     plan = make_plan(loaded, load_models(find_models_file(models_file, path)))
     calls = plan.samples_per_model
     return f"suite {plan.suite.name}, {len(plan.models)} models, {calls} samples a model"

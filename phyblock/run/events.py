@@ -19,7 +19,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class RunStarted:
-    """Samples in all and already on disk, by model; `earlier` are the records found."""
+    """Samples in all, and the final records already on disk, by model."""
 
     expected: Mapping[str, int]
     earlier: Mapping[str, tuple[Mapping[str, Any], ...]]

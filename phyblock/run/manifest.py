@@ -38,7 +38,7 @@ def make_manifest(
         "format": _FORMAT,
         "suite": suite.identity(),
         "models": [
-            {"name": m.name, "published": m.published, "size_b": m.size_b, **m.config.identity()}
+            {"name": m.name, "published": m.published, "size_b": m.size_b, **_identity(m)}
             for m in models
         ],
         "dataset": {"name": dataset.name, "sha256": dataset.sha256},
@@ -60,6 +60,17 @@ def make_manifest(
         },
         "versions": {"python": platform.python_version(), **{n: version(n) for n in _LIBRARIES}},
     }
+
+
+def _identity(model: PlannedModel) -> dict[str, object]:
+    """What decides a model's replies; a recording by what is in it, not by where it is."""
+    folder = model.config.recording
+    if folder is None:
+        return model.config.identity()
+    digest = hashlib.sha256()
+    for path in sorted((*folder.glob("*.json"), *folder.glob("records.jsonl"))):
+        digest.update(f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+    return {**model.config.identity(), "recording": digest.hexdigest()}
 
 
 def _pictures_digest(pictures: Pictures, dataset: Dataset) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,15 @@ from phyblock.datasets import recorded_models
 from phyblock.datasets.published_names import match_published
 from phyblock.errors import Problem, SpecError
 from phyblock.models import ModelConfig, Price
-from phyblock.specs import BASELINES, RECORDED, LoadedSuite, ModelSpec, SuiteSpec, resolve_models
+from phyblock.specs import (
+    BASELINES,
+    RECORDED,
+    LoadedSuite,
+    ModelSpec,
+    SuiteSpec,
+    did_you_mean,
+    resolve_models,
+)
 
 __all__ = ["PlannedModel", "plan_models", "to_config"]
 
@@ -36,27 +43,27 @@ def plan_models(
     """
     if loaded.suite.models == RECORDED:
         folders = recorded_models(loaded.dataset_path)
-        _check_known(only, list(folders))
+        _check_known(only, list(folders), f"is not among the recordings: {', '.join(folders)}")
         return tuple(
             PlannedModel(name, _replay(name, folders[name]), match_published(name))
-            for name in only or folders
+            for name in dict.fromkeys(only) or folders
         )
     if only:
-        _check_known(only, [*BASELINES, *known])
+        _check_known(
+            only, [*BASELINES, *known], "is neither in the models file nor a built-in baseline"
+        )
         specs = {name: known.get(name) for name in only}
     else:
         specs = resolve_models(loaded, known)
     return tuple(_planned(name, spec, loaded.suite) for name, spec in specs.items())
 
 
-def _check_known(names: Sequence[str], known: Sequence[str]) -> None:
-    problems = []
-    for name in names:
-        if name not in known:
-            near = difflib.get_close_matches(name, known, 1)
-            hint = f"did you mean {near[0]}?" if near else "list them: phyblock models"
-            message = "is neither in the models file nor a built-in baseline"
-            problems.append(Problem("--models", message, "", name, hint=hint))
+def _check_known(names: Sequence[str], known: Sequence[str], message: str) -> None:
+    problems = [
+        Problem("--models", message, "", name, hint=did_you_mean(name, known))
+        for name in names
+        if name not in known
+    ]
     if problems:
         raise SpecError(problems)
 

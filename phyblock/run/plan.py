@@ -74,8 +74,8 @@ def make_plan(
 ) -> RunPlan:
     """Resolve a suite against the known models.
 
-    `only` keeps these models of the suite; `limit` keeps that many scenes, stratified by level.
-    Raises SpecError, DataError or PromptError with all that is wrong.
+    `only` names models to run in place of the suite's; `limit` keeps that many scenes, stratified
+    by level. Raises SpecError, DataError or PromptError with all that is wrong.
     """
     suite = loaded.suite
     dataset = _select(loaded, limit)
@@ -135,7 +135,7 @@ def _open_prompt(loaded: LoadedSuite) -> Prompt:
         return OfficialPrompt(official_prompt(loaded.dataset_path))
     if name == "default":
         return TemplatePrompt(bundled("prompts", "full_planning.j2"), name)
-    return TemplatePrompt(loaded.prompt_path, name)
+    return TemplatePrompt(loaded.prompt_path, loaded.prompt_path.stem)
 
 
 def _open_pictures(suite: SuiteSpec, dataset: Dataset) -> Pictures:

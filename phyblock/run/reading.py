@@ -61,26 +61,30 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 class RecordLines:
     """Every record of a folder with where it stands, one at a time, oldest first.
 
-    An unfinished last line, which a kill leaves behind, ends the iteration: `is_cut` is then set.
-    `whole_bytes` is the size of the lines passed so far. Any other line that is not a record is a
-    StoreError naming file and line.
+    A last line without its newline is a record all the same when it is whole; else, as a kill
+    leaves it behind, it ends the iteration: `is_cut` is then set. `lacks_newline` says that the
+    last record needs one. `whole_bytes` is the size of the records passed so far. Any other line
+    that is not a record is a StoreError naming file and line.
     """
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / RECORDS
         self.is_cut = False
+        self.lacks_newline = False
         self.whole_bytes = 0
 
     def __iter__(self) -> Iterator[tuple[str, dict[str, Any]]]:
         try:
             with self.path.open("rb") as lines:
                 for number, line in enumerate(lines, 1):
-                    if not line.endswith(b"\n"):
+                    where = f"{self.path}:{number}"
+                    self.lacks_newline = not line.endswith(b"\n")
+                    if self.lacks_newline and not _is_json(line):
                         self.is_cut = True
                         return
+                    record = _parse(where, line)
                     self.whole_bytes += len(line)
-                    where = f"{self.path}:{number}"
-                    yield where, _parse(where, line)
+                    yield where, record
         except FileNotFoundError:
             return
         except OSError as error:
@@ -91,6 +95,14 @@ class RecordLines:
 def read_records(folder: Path) -> dict[str, dict[str, Any]]:
     """The newest record of every sample, by sample id, in order of first appearance."""
     return {record["sample"]: record for _, record in RecordLines(folder)}
+
+
+def _is_json(line: bytes) -> bool:
+    try:
+        json.loads(line)
+    except ValueError:
+        return False
+    return True
 
 
 def _parse(where: str, line: bytes) -> dict[str, Any]:

@@ -7,9 +7,11 @@ sample replaces an earlier one.
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import os
+import threading
 from collections.abc import Iterable, Mapping
 from io import FileIO
 from pathlib import Path
@@ -21,7 +23,7 @@ from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
 from phyblock.run.reading import MANIFEST, RECORDS, RecordLines, read_manifest
 
-__all__ = ["RunStore"]
+__all__ = ["RunStore", "holds_run"]
 
 _LOCK = ".lock"
 _NOT_IDENTITY = (
@@ -44,6 +46,7 @@ class RunStore:
         identity differs), or is being written by another process.
         """
         self.folder = folder
+        self._writing = threading.Lock()
         self._lock: IO[str] | None = None
         self._file: FileIO | None = None
         try:
@@ -75,6 +78,10 @@ class RunStore:
         Raises StoreError when the disk refuses; what was written before stays whole.
         """
         data = b"".join(_line(record) for record in records)
+        with self._writing:
+            self._append(data)
+
+    def _append(self, data: bytes) -> None:
         assert self._file is not None, "the store is closed"
         size = self._file.seek(0, os.SEEK_END)
         try:
@@ -83,18 +90,21 @@ class RunStore:
                 written += self._file.write(data[written:])
             os.fsync(self._file.fileno())
         except OSError as error:
-            self._file.truncate(size)
-            hint = "free some space and give the same command again: nothing is asked twice"
+            # Where even this fails, what is left is an unfinished line: the next start drops it.
+            with contextlib.suppress(OSError):
+                self._file.truncate(size)
+            hint = "free some space and give the same command again: it goes on from here"
             path = self.folder / RECORDS
             problem = Problem(str(path), f"cannot be written: {error.strerror}", hint=hint)
             raise StoreError(problem) from error
 
     def close(self) -> None:
-        """Release the files and the lock."""
-        for handle in (self._file, self._lock):
-            if handle is not None:
-                handle.close()
-        self._file = self._lock = None
+        """Release the files and the lock, once what is being written is written."""
+        with self._writing:
+            for handle in (self._file, self._lock):
+                if handle is not None:
+                    handle.close()
+            self._file = self._lock = None
 
     def _acquire(self) -> None:
         assert self._lock is not None
@@ -106,31 +116,40 @@ class RunStore:
             raise StoreError(Problem(str(self.folder), message, hint=hint)) from error
 
     def _claim(self, manifest: Mapping[str, Any]) -> None:
-        path = self.folder / MANIFEST
-        found = read_manifest(self.folder) if path.exists() else None
-        if found is not None and found["identity"] == manifest["identity"]:
+        if holds_run(self.folder, manifest):
             return
-        if self._has_records():
-            changed = f"records, and no {MANIFEST}"
-            if found is not None:
-                names = _changed(found, manifest)
-                changed = f"different: {', '.join(names) or 'how pictures are drawn'}"
-            hint = "choose another folder with --out"
-            message = "holds another run"
-            raise StoreError(Problem(str(self.folder), message, found=changed, hint=hint))
+        path = self.folder / MANIFEST
         text = yaml.safe_dump(dict(manifest), sort_keys=False, allow_unicode=True, width=100)
         atomic_write(path, text)
-
-    def _has_records(self) -> bool:
-        """Whether anything would be lost with the folder: a run that failed at once leaves none."""
-        return next(iter(RecordLines(self.folder)), None) is not None
 
     def _drop_cut_line(self) -> None:
         lines = RecordLines(self.folder)
         for _ in lines:
             pass
+        assert self._file is not None
         if lines.is_cut:
             os.truncate(lines.path, lines.whole_bytes)
+        elif lines.lacks_newline:
+            self._file.write(b"\n")
+
+
+def holds_run(folder: Path, manifest: Mapping[str, Any]) -> bool:
+    """Whether `folder` holds the run that `manifest` describes; reads alone.
+
+    Raises StoreError when it holds records of another run. A manifest without records is no run
+    yet: one that failed at once leaves it behind, and nothing would be lost with it.
+    """
+    found = read_manifest(folder) if (folder / MANIFEST).exists() else None
+    if found is not None and found["identity"] == manifest["identity"]:
+        return True
+    if next(iter(RecordLines(folder)), None) is None:
+        return False
+    changed = f"records, and no {MANIFEST}"
+    if found is not None:
+        names = _changed(found, manifest)
+        changed = f"different: {', '.join(names) or 'how pictures are drawn'}"
+    hint = "choose another folder with --out"
+    raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=hint))
 
 
 def _line(record: Mapping[str, Any]) -> bytes:

@@ -15,6 +15,7 @@ from phyblock.specs.suite import (
     ScoringSpec,
     SuiteSpec,
 )
+from phyblock.specs.words import did_you_mean
 
 __all__ = [
     "BASELINES",
@@ -29,6 +30,7 @@ __all__ = [
     "SamplingSpec",
     "ScoringSpec",
     "SuiteSpec",
+    "did_you_mean",
     "load_models",
     "load_suite",
     "models_schema",

@@ -68,12 +68,6 @@ RULES = (
         _SET_OFFICIAL + ", or use images.source: render",
     ),
     Rule(
-        ("images.layout", "images.source"),
-        lambda get: get("images.source") == "dataset" and get("images.layout") == "separate",
-        "the data set's pictures are composites",
-        "use images.layout: composite, or images.source: render",
-    ),
-    Rule(
         ("tables", "dataset.format"),
         lambda get: "published" in get("tables") and _unofficial(get),
         "published numbers compare with the official data set only",

@@ -109,7 +109,8 @@ class ImagesSpec(Section):
 
     source: Literal["render", "dataset"] = Field(
         default="render",
-        description="render: drawn from the scene. dataset: the official composites.",
+        description="render: drawn from the scene. dataset: the official composites, or "
+        "their two halves apart; a scene without one is an error.",
     )
     layout: Literal["composite", "separate"] = Field(
         default="composite",

@@ -114,8 +114,6 @@ BAD = [
      "dataset.format to official"),
     (HEAD + "prompt: official\n", "3:9", "prompt", "checkout", "", "prompt: default"),
     (HEAD + "images: {source: dataset}\n", "3:18", "images.source", "official", "", "render"),
-    (HEAD + "dataset: {format: official, path: .}\nimages: {source: dataset, layout: separate}\n",
-     "4:35", "images.layout", "composites", "", "composite"),
     (HEAD + "dataset: {format: official, path: .}\nscoring: {matchers: [optimal], level1: aov}\n"
      "levels: [2]\ntables: [published]\n", "4:21", "scoring.matchers", "paper matcher", "", "add"),
     (HEAD + "dataset: {format: official, path: .}\ntables: [published]\n", "4:9",
