@@ -71,9 +71,11 @@ class Usage:
 class Reply:
     """An answer that was read.
 
-    `cost_usd` is None when the price is unknown (never 0 for that); `attempts` counts requests
-    sent for it, 0 when `cached`; `seed_sent` is False where the provider takes no seed, so that
-    seeds are independent repeats; `latency_s` is the time of the successful request alone.
+    `cost_usd` is None when the price is unknown (never 0 for that); `billed_usd` is what a run's
+    cost limit counts for it, failed attempts included, None where there is no limit; `attempts`
+    counts requests sent for it, 0 when `cached`; `seed_sent` is False where the provider takes no
+    seed, so that seeds are independent repeats; `latency_s` is the time of the successful request
+    alone.
     """
 
     text: str
@@ -81,6 +83,7 @@ class Reply:
     finish: Finish = "stop"
     usage: Usage = Usage()
     cost_usd: float | None = None
+    billed_usd: float | None = None
     latency_s: float = 0.0
     provider_model: str = ""
     attempts: int = 1
@@ -97,7 +100,11 @@ class Model(Protocol):
 
     @property
     def needs_messages(self) -> bool:
-        """Whether prompts and pictures must be made for it (False for recordings)."""
+        """Whether prompts and pictures must be made for it.
+
+        False for recordings alone: they are looked up by a request's key, and what was asked when
+        they were made is not known.
+        """
 
     async def ask(self, request: Request) -> Reply | None:
         """Answer, or None when a recording holds no reply for the request.

@@ -74,10 +74,14 @@ def _message(message: Message) -> list[object]:
 
 
 class ReplyCache:
-    """Replies by key. Every method raises StoreError when the file is broken or cannot be used."""
+    """Replies by key.
+
+    Every method but `keep` raises StoreError when the file is broken or cannot be used.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._failure: StoreError | None = None
         with self._explained():
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -111,6 +115,8 @@ class ReplyCache:
         """Keep a reply, unless it is empty, truncated or refused; whether it was kept."""
         if reply.finish in ("length", "refusal") or not reply.text.strip():
             return False
+        # What this run paid is no part of what another finds.
+        reply = replace(reply, billed_usd=None)
         text = json.dumps(asdict(reply), ensure_ascii=True, separators=(",", ":"))
         with self._explained():
             self._db.execute(
@@ -118,6 +124,18 @@ class ReplyCache:
                 (key, model_id, time.time(), text),
             )
         return True
+
+    def keep(self, key: str, model_id: str, reply: Reply) -> None:
+        """`put` a reply that was paid for and must not be lost: `check` raises what went wrong."""
+        try:
+            self.put(key, model_id, reply)
+        except StoreError as error:
+            self._failure = error
+
+    def check(self) -> None:
+        """Raise the StoreError that `keep` met last, if any."""
+        if self._failure is not None:
+            raise self._failure
 
     def stats(self) -> CacheStats:
         """What the cache holds."""

@@ -6,13 +6,19 @@ from collections.abc import Sequence
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
 
-from phyblock.errors import ModelError, RetryableError, UnavailableError
+from phyblock.errors import (
+    BudgetReachedError,
+    ModelError,
+    RetryableError,
+    StoreError,
+    UnavailableError,
+)
 from phyblock.models.base import Reply, Request
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.config import ModelConfig, Price
 from phyblock.models.cost import Budget, Estimate, cost_usd, estimate
 from phyblock.models.events import EventKind, ModelEvent, Observer
-from phyblock.models.halt import Halt
+from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import hidden
 from phyblock.models.limits import ModelLimiter
 from phyblock.models.payload import wire_params
@@ -39,11 +45,13 @@ class ChatParts:
 
 @dataclass
 class _Question:
-    """A request with its expected size and the number of times it was sent."""
+    """A request with its expected size, how often it was sent, what that cost, its last failure."""
 
     request: Request
     expected: Estimate
     sent: int = 0
+    billed_usd: float | None = None
+    failure: RetryableError | None = None
 
 
 class ChatModel:
@@ -63,26 +71,42 @@ class ChatModel:
 
         `cost_usd` of a cached reply is what it cost when it was new. Raises what the model seam
         says, BudgetReachedError when the call does not fit, HaltedError when the run ends before it
-        is sent, StoreError for a broken cache.
+        is sent, StoreError for a broken cache. A new reply that the cache refuses is returned all
+        the same; the StoreError is raised in the place of the next request.
         """
         cache, price = self._parts.cache, self._parts.price
         key = reply_key(self._config, request) if cache is not None else ""
         if cache is not None and (kept := cache.get(key)) is not None:
             return replace(kept, cost_usd=cost_usd(price, kept.usage))
-        question = _Question(request, estimate(self._config, request))
-        reply = await with_retries(
-            lambda: self._attempt(question),
-            replace(self._parts.policy, sleep=self._sleep),
-            self._on_retry,
-        )
-        reply = self._finished(reply, question)
+        reply = await self._ask_new(_Question(request, estimate(self._config, request)))
         if cache is not None:
-            cache.put(key, self._config.id, reply)
+            cache.keep(key, self._config.id, reply)
         return reply
 
     async def aclose(self) -> None:
         """Release connections."""
         await self._parts.transport.aclose()
+
+    async def _ask_new(self, question: _Question) -> Reply:
+        """Send until answered; whatever ends it, what was billed is told."""
+        try:
+            reply = await with_retries(
+                lambda: self._attempt(question),
+                replace(self._parts.policy, sleep=self._sleep),
+                self._on_retry,
+            )
+        except (UnavailableError, BudgetReachedError, HaltedError, StoreError):
+            if not question.billed_usd:
+                raise
+            # These leave no record. The attempt that was billed needs one, and the next request
+            # meets the same end.
+            assert question.failure is not None, "only failures that may pass are billed"
+            question.failure.billed_usd = question.billed_usd
+            raise question.failure from None
+        except ModelError as error:
+            error.billed_usd = question.billed_usd
+            raise
+        return self._finished(reply, question)
 
     async def _attempt(self, question: _Question) -> Reply:
         expected = question.expected
@@ -91,11 +115,14 @@ class ChatModel:
             with self._parts.halt.giving_up():
                 tokens = expected.prompt_tokens + expected.completion_tokens
                 slot = await stack.enter_async_context(limiter.slot(tokens))
+            if self._parts.cache is not None:
+                self._parts.cache.check()
             if self._unavailable is not None:
                 raise UnavailableError(str(self._unavailable), status=self._unavailable.status)
             try:
                 reply = await self._send_seeded(question)
             except RetryableError as error:
+                question.failure = error
                 if error.status == 429 and slot.rate_limited():
                     self._tell("slow_down", str(error), limit=limiter.width)
                 raise
@@ -127,7 +154,8 @@ class ChatModel:
     async def _send_paid(self, call: Call, question: _Question) -> Reply:
         """Send with the call's greatest cost reserved in the budget.
 
-        A failure without a status of the server's own may have been billed, and counts in full.
+        A failure without a status of the server's own may have been billed, and counts in full;
+        a model that is found unable before anything is sent costs nothing.
         """
         budget, price = self._parts.budget, self._parts.price
         if budget is None or price is None:
@@ -142,14 +170,15 @@ class ChatModel:
             spent_usd = cost_usd(price, reply.usage)
             budget.learn(self.name, question.expected, reply.usage)
             return reply
-        except SeedRefusedError:
+        except (SeedRefusedError, UnavailableError):
             spent_usd = 0.0
             raise
         except ModelError as error:
             spent_usd = None if error.status in (None, 200) else 0.0
             raise
         finally:
-            budget.settle(held, spent_usd)
+            counted_usd = budget.settle(held, spent_usd)
+            question.billed_usd = (question.billed_usd or 0.0) + counted_usd
 
     async def _sleep(self, wait_s: float) -> None:
         with self._parts.halt.giving_up():
@@ -162,6 +191,7 @@ class ChatModel:
             text=hidden(reply.text, secrets, guess=False),
             reasoning=hidden(reply.reasoning, secrets, guess=False),
             cost_usd=cost_usd(self._parts.price, reply.usage),
+            billed_usd=question.billed_usd,
             attempts=question.sent,
         )
 

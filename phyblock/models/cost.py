@@ -183,11 +183,16 @@ class Budget:
         self._held[self._next] = usd
         return self._next
 
-    def settle(self, reservation: int, usd: float | None) -> None:
-        """Put the real cost in the place of a reservation; None counts all that was held."""
+    def settle(self, reservation: int, usd: float | None) -> float:
+        """Put the real cost in the place of a reservation; None counts all that was held.
+
+        Returns what was counted [US dollars].
+        """
         held = self._held.pop(reservation)
-        self._spent_usd += held if usd is None else usd
+        counted = held if usd is None else usd
+        self._spent_usd += counted
         self._changed.set()
+        return counted
 
     def learn(self, model: str, expected: Estimate, usage: Usage) -> None:
         """Compare an estimate with what the provider counted."""

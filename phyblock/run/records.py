@@ -88,7 +88,12 @@ def _error(error: ModelError) -> dict[str, Any]:
         kind = "retryable"
     elif isinstance(error, SampleError):
         kind = "refused" if isinstance(error, RefusedError) else "sample"
-    return {"kind": kind, "status": error.status, "message": str(error)}
+    return {
+        "kind": kind,
+        "status": error.status,
+        "message": str(error),
+        "billed_usd": error.billed_usd,
+    }
 
 
 def _prompt(request: Request, template: str) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from phyblock.resources import reply_cache_file
 from phyblock.run.events import ModelNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.plan import RunPlan
-from phyblock.run.reading import read_records
+from phyblock.run.reading import RecordLines, read_records
 from phyblock.run.records import is_final
 from phyblock.run.store import RunStore
 
@@ -70,7 +70,7 @@ class Session:
             halt = Halt()
             budget = None
             if limits.max_cost_usd is not None:
-                budget = Budget(limits.max_cost_usd, _spent_usd(self._earlier))
+                budget = Budget(limits.max_cost_usd, _spent_usd(self._folder))
             for model in plan.models:
                 self._models[model.name] = build_model(
                     model.config,
@@ -96,7 +96,10 @@ class Session:
         await self._close()
 
     async def run(self) -> RunResult:
-        """Ask what is left to ask; see `Executor.run`."""
+        """Ask what is left to ask; see `Executor.run`.
+
+        Raises StoreError also where all is asked but the cache refused a reply.
+        """
         earlier = self._earlier
         self._watch(
             RunStarted(
@@ -111,7 +114,10 @@ class Session:
                 },
             )
         )
-        return await self.executor.run(earlier)
+        result = await self.executor.run(earlier)
+        if self._cache is not None:
+            self._cache.check()
+        return result
 
     def _notice(self, event: ModelEvent) -> None:
         self._watch(ModelNotice(event.model, event.kind, event.message))
@@ -126,7 +132,15 @@ class Session:
                 resource.close()
 
 
-def _spent_usd(records: Mapping[str, Mapping[str, Any]]) -> float:
-    """What the run's replies cost so far; a reply from the cache was paid for elsewhere."""
-    replies = [record["reply"] for record in records.values() if record["reply"]]
-    return sum(reply["cost_usd"] or 0.0 for reply in replies if not reply["cached"])
+def _spent_usd(folder: Path) -> float:
+    """What the run cost so far: of every line, also of those that later ones replaced."""
+    return sum(_billed_usd(record) for _, record in RecordLines(folder))
+
+
+def _billed_usd(record: Mapping[str, Any]) -> float:
+    """What a limit counted for a record, else its reply's cost unless that was paid elsewhere."""
+    reply = record["reply"] or {}
+    billed_usd: float | None = (reply or record["error"] or {}).get("billed_usd")
+    if billed_usd is None and not reply.get("cached"):
+        billed_usd = reply.get("cost_usd")
+    return billed_usd or 0.0

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import sqlite3
 from pathlib import Path
 
 import pytest
 
-from phyblock.errors import RetryableError, SpecError, UnavailableError
+from phyblock.errors import RetryableError, SpecError, StoreError, UnavailableError
 from phyblock.models import Gate, ModelConfig, ModelEvent, Reply, ReplyCache, RetryPolicy
 from tests.models.factory import QUICK, ask, make_model, make_request, reply_of, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
@@ -60,6 +61,42 @@ def test_what_is_no_whole_reply_is_asked_again(tmp_path: Path, mode: str) -> Non
         ask(make_model(config, cache=cache), make_request())
         assert server.requests == 2 * before
         assert cache.stats().replies == 0
+
+
+def refuse_after(path: Path, replies: int) -> None:
+    """Make a cache that takes so many replies and not one more."""
+    ReplyCache(path).close()
+    db = sqlite3.connect(path)
+    db.execute(
+        f"CREATE TRIGGER full BEFORE INSERT ON replies WHEN (SELECT count(*) FROM replies) >= "
+        f"{replies} BEGIN SELECT RAISE(ABORT, 'the disk is full'); END"
+    )
+    db.close()
+
+
+@pytest.mark.parametrize("at_once", [1, 4])
+def test_a_reply_that_the_cache_refuses_is_not_lost_and_nothing_more_is_sent(
+    tmp_path: Path, at_once: int
+) -> None:
+    refuse_after(tmp_path / "c.sqlite", 3)
+    server = ROUTES["direct"].server(Faults(latency_s=0.01))
+    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
+        model = make_model(
+            ROUTES["direct"].config(running.url, max_concurrency=at_once), cache=cache
+        )
+
+        async def main() -> list[object]:
+            asked = (model.ask(make_request(f"{n:03}")) for n in range(20))
+            answers = await asyncio.gather(*asked, return_exceptions=True)
+            await model.aclose()
+            return list(answers)
+
+        answers = run(main)
+        with pytest.raises(StoreError, match="the disk is full"):
+            cache.check()
+    assert {type(answer) for answer in answers} == {Reply, StoreError}
+    assert 4 <= sum(isinstance(answer, Reply) for answer in answers) < 4 + at_once
+    assert server.ended == {"ok": sum(isinstance(answer, Reply) for answer in answers)}
 
 
 def test_a_dead_model_still_gives_what_is_cached(tmp_path: Path) -> None:

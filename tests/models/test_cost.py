@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.errors import BudgetReachedError, RetryableError, SpecError
+from phyblock.errors import BudgetReachedError, RetryableError, SpecError, UnavailableError
 from phyblock.models import (
     Budget,
     Estimate,
@@ -18,6 +19,7 @@ from phyblock.models import (
     ModelConfig,
     Price,
     Reply,
+    ReplyCache,
     Request,
     Usage,
     build_model,
@@ -205,3 +207,31 @@ def test_a_failure_that_may_have_been_billed_counts_against_the_budget(
         (answer,) = ask(model, make_request())
     assert isinstance(answer, RetryableError)
     assert (budget.spent_usd > 0.1) == is_counted
+    assert answer.billed_usd == pytest.approx(budget.spent_usd)
+
+
+def test_a_reply_says_what_the_limit_counts_for_all_its_attempts(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    server = ROUTES["direct"].server(Faults(reset=0.2, malformed=0.2, server_error=0.2))
+    requests = [make_request(f"{n:03}") for n in range(30)]
+    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
+        config = ROUTES["direct"].config(running.url, price=Price(10.0, 100.0))
+        budget = Budget(100.0)
+        replies = ask(make_model(config, cache=cache, budget=budget), *requests)
+        again = ask(make_model(config, cache=cache, budget=Budget(1.0)), *requests)
+        free = ask(make_model(config), requests[0])
+    billed = [reply.billed_usd for reply in replies]  # type: ignore[union-attr]
+    assert sum(usd or 0.0 for usd in billed) == pytest.approx(budget.spent_usd)
+    assert max(usd or 0.0 for usd in billed) > min(usd or 0.0 for usd in billed) > 0
+    assert {reply.billed_usd for reply in [*again, *free]} == {None}  # type: ignore[union-attr]
+
+
+def test_a_model_without_its_key_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(KEY_VARIABLE, raising=False)
+    budget = Budget(1.0)
+    config = ROUTES["direct"].config("http://127.0.0.1:9", price=Price(10.0, 100.0))
+    (answer,) = ask(make_model(config, budget=budget), make_request())
+    assert isinstance(answer, UnavailableError)
+    assert budget.spent_usd == 0

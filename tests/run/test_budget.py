@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
-from tests.servers.chassis import Running
+from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
 
@@ -12,6 +14,13 @@ PRICE = {"input": 10.0, "output": 100.0}
 CALL_USD = 1000 * PRICE["input"] / 1e6 + 40 * PRICE["output"] / 1e6
 """The server counts 1,000 tokens in and 40 out for every call."""
 MOST_USD = 0.5
+
+
+class Silent(OpenAIChat):
+    """Does not say how many tokens it counted."""
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        return {**super().reply(seen, ending), "usage": None}
 
 
 def spent(workspace: Workspace) -> float:
@@ -67,3 +76,48 @@ def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace: Workspace
         assert workspace.run().code == 0
         after = workspace.run("--dry-run")
         assert "0 calls, about $0.00" in after.out
+
+
+@pytest.mark.parametrize(
+    "server",
+    [Silent(), OpenAIChat(Faults(mode="html")), OpenAIChat(Faults(mode="reset"))],
+    ids=["no usage", "no reply", "no answer"],
+)
+def test_what_an_earlier_run_may_have_paid_counts_in_the_next(
+    workspace: Workspace, server: OpenAIChat
+) -> None:
+    dearest_reply_usd = 1000 * PRICE["output"] / 1e6
+    with Running(server) as running:
+        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=1000)
+        workspace.write_suite(models=["alpha"], seeds=list(range(4)), limits={"max_attempts": 2})
+        codes = [workspace.run("--set", "limits.max_cost_usd=1").code for _ in range(3)]
+    assert codes == [1, 1, 1]
+    assert 2 <= server.requests <= 1 / dearest_reply_usd
+    kept = [record["reply"] or record["error"] for record in workspace.records()]
+    billed_usd = sum(one["billed_usd"] for one in kept)
+    assert server.requests * dearest_reply_usd < billed_usd <= 1
+
+
+def test_an_attempt_that_was_billed_is_recorded_though_the_next_does_not_fit(
+    workspace: Workspace,
+) -> None:
+    with Running(OpenAIChat(Faults(mode="html"))) as running:
+        server = running.server
+        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=1000)
+        workspace.write_suite(models=["alpha"], limits={"max_concurrency": 1})
+        for _ in range(2):
+            assert workspace.run("--set", "limits.max_cost_usd=0.15").code == 1
+    assert server.requests == 1
+    assert [record["error"]["kind"] for record in workspace.records()] == ["retryable"]
+
+
+def test_a_run_without_a_limit_counts_once_there_is_one(workspace: Workspace) -> None:
+    with Running(OpenAIChat(Faults(server_error=0.5))) as running:
+        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
+        workspace.write_suite(models=["alpha"], seeds=[0, 1, 2, 3], limits={"max_attempts": 1})
+        assert workspace.run().code == 1
+        asked, answered = running.server.requests, running.server.ended["ok"]
+        assert 0 < answered < asked == 20
+        same = workspace.run("--set", f"limits.max_cost_usd={answered * CALL_USD}")
+        assert same.code == 1
+        assert running.server.requests == asked
