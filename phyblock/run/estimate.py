@@ -11,8 +11,9 @@ from phyblock.models import estimate as estimate_call
 from phyblock.resources import reply_cache_file
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan, sample_id
-from phyblock.run.reading import MANIFEST, read_records
+from phyblock.run.reading import read_records
 from phyblock.run.records import is_final
+from phyblock.run.store import holds_run
 
 __all__ = ["Estimate", "estimate"]
 
@@ -42,8 +43,8 @@ class Estimate:
 
 
 def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
-    """Estimates in the order of the plan's models."""
-    earlier = read_records(folder) if (folder / MANIFEST).exists() else {}
+    """Estimates in the order of the plan's models; StoreError for the folder of another run."""
+    earlier = read_records(folder) if holds_run(folder, plan.manifest) else {}
     settled = {sample for sample, record in earlier.items() if is_final(record)}
     path = reply_cache_file()
     with ReplyCache(path) if use_cache and path.exists() else nullcontext() as cache:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pty
+import re
 import subprocess
 from pathlib import Path
 
@@ -100,7 +101,29 @@ def test_a_person_is_asked_before_money_is_spent(
         assert (found, running.server.requests) == (code, calls)
     assert "5 calls, unknown cost of 1 model" in screen
     assert "Go on?" in screen
+    assert ("Nothing was asked." in screen) == (calls == 0)
     assert suite.out.exists() == (code == 0)
+
+
+def test_samples_that_are_asked_again_are_counted_once(suite: Workspace) -> None:
+    with Running(OpenAIChat(Faults(mode="500"))) as running:
+        suite.write_models(running.url, "alpha", price={"input": 0.0, "output": 0.0})
+        limits = ["--set", "limits.max_attempts=1", "--models", "alpha,oracle"]
+        assert suite.run(*limits).code == 1
+        running.server.faults = Faults(latency_s=0.5)
+        code, screen = in_terminal(suite, "", *limits)
+    assert code == 0
+    shown = {int(number) for number in re.findall(r"(\d+) of 10 samples ", screen)}
+    assert shown
+    assert min(shown) == 5
+    assert max(shown) <= 10
+
+
+def test_tables_may_be_read_by_whoever_may_read_the_records(suite: Workspace) -> None:
+    assert suite.run().code == 0
+    modes = {path.stat().st_mode for path in suite.out.rglob("*") if path.is_file()}
+    assert modes == {(suite.out / "records.jsonl").stat().st_mode}
+    assert not list(suite.out.rglob("*.part"))
 
 
 def test_yes_asks_no_person(suite: Workspace) -> None:
