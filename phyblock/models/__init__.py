@@ -17,7 +17,7 @@ from phyblock.models.cost import (
 )
 from phyblock.models.events import ModelEvent, Observer
 from phyblock.models.halt import Halt, HaltedError
-from phyblock.models.keys import KeyStatus, api_key_status
+from phyblock.models.keys import KeyStatus, api_key_status, server_address
 from phyblock.models.limits import Gate
 from phyblock.models.raw_replies import RawReply, read_raw_reply
 from phyblock.models.retry import RetryPolicy
@@ -53,4 +53,5 @@ __all__ = [
     "price_of",
     "read_raw_reply",
     "reply_key",
+    "server_address",
 ]

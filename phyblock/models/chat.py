@@ -133,7 +133,11 @@ class ChatModel:
             return reply
 
     async def _send_seeded(self, question: _Question) -> Reply:
-        """Send with the seed, or without where the provider is known or found to take none."""
+        """Send with the seed, or without where the provider is known or found to take none.
+
+        That an error speaks of a seed proves nothing, as some repeat the whole request: only a
+        reply to the same request without a seed does.
+        """
         request = question.request
         params = wire_params(self._config, request)
         seed = request.seed if self._takes_seed else None
@@ -144,11 +148,11 @@ class ChatModel:
             question.sent -= not refusal.sent
             if self._config.sends_seed == "always":
                 raise UnavailableError("the provider takes no seed, and seed is `always`") from None
+            call = replace(call, seed=None)
+            reply = await self._send_paid(call, question)
             if self._takes_seed:
                 self._takes_seed = False
                 self._tell("seed_unsupported", "takes no seed: seeds are independent repeats")
-            call = replace(call, seed=None)
-            reply = await self._send_paid(call, question)
         return replace(reply, seed_sent=call.seed is not None)
 
     async def _send_paid(self, call: Call, question: _Question) -> Reply:

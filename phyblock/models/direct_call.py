@@ -1,7 +1,7 @@
 """Calls to OpenAI-compatible servers straight over HTTP: one request, no library in between.
 
 Puts the same JSON on the wire as litellm does, at a tenth of its CPU time. aiohttp is imported
-when the first model of this kind is built.
+by the first call.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import urllib.request
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from phyblock.errors import ModelError, RetryableError
+from phyblock.errors import ModelError, Problem, RetryableError, SpecError
 from phyblock.models.base import Reply
 from phyblock.models.completions import read_completion
 from phyblock.models.config import ModelConfig
@@ -40,6 +40,13 @@ class DirectTransport:
     """`POST {api_base}/chat/completions`, over one session that is opened by the first call."""
 
     def __init__(self, config: ModelConfig, secrets: Sequence[str]) -> None:
+        """SpecError where no address is given and the provider is not OpenAI.
+
+        Its key would go to OpenAI else.
+        """
+        if config.api_base is None and config.provider != "openai":
+            message = "needs an api_base to be called directly"
+            raise SpecError(Problem(f"model {config.name}", message, "api_base", config.id))
         self._config = config
         self._secrets = secrets
         base = config.api_base or OPENAI_API_BASE
@@ -48,7 +55,7 @@ class DirectTransport:
         self._session: aiohttp.ClientSession | None = None
 
     async def send(self, call: Call) -> Reply:
-        """Send once; see Transport."""
+        """Send once; see Transport. A redirect is an answer of its own: it is not followed."""
         import aiohttp
 
         session = self._open_session()
@@ -56,7 +63,7 @@ class DirectTransport:
         started = time.perf_counter()
         try:
             async with session.post(
-                self._url, data=data, headers=headers, proxy=self._proxy
+                self._url, data=data, headers=headers, proxy=self._proxy, allow_redirects=False
             ) as response:
                 status, answered = response.status, response.headers
                 body = await response.read()

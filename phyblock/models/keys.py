@@ -1,4 +1,4 @@
-"""API keys: which variable of the environment holds one, and keeping keys out of all text."""
+"""What the environment says of a model: its key, which no text may hold, and its server."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from phyblock.errors import UnavailableError
 from phyblock.models.config import ModelConfig
 
-__all__ = ["KeyStatus", "api_key", "api_key_status", "hidden", "secrets_of"]
+__all__ = ["KeyStatus", "api_key", "api_key_status", "hidden", "secrets_of", "server_address"]
 
 _KEY_VARIABLES: Mapping[str, tuple[str, ...]] = {
     "cloudflare": ("CLOUDFLARE_API_KEY",),
@@ -35,6 +35,34 @@ _OWN_CREDENTIALS = (
 
 _KEYLESS = ("hosted_vllm", "lm_studio", "llamafile", "ollama", "ollama_chat")
 """Local servers, which take a key but need none."""
+
+_ADDRESS_VARIABLES: Mapping[str, tuple[str, ...]] = {
+    "anthropic": ("ANTHROPIC_API_BASE", "ANTHROPIC_BASE_URL"),
+    "fireworks_ai": ("FIREWORKS_API_BASE",),
+    "mistral": ("MISTRAL_AZURE_API_BASE", "MISTRAL_API_BASE"),
+    "ollama_chat": ("OLLAMA_API_BASE",),
+    "openai": ("OPENAI_BASE_URL", "OPENAI_API_BASE"),
+    **{
+        provider: (f"{provider.upper()}_API_BASE",)
+        for provider in (
+            "azure",
+            "azure_ai",
+            "dashscope",
+            "deepseek",
+            "gemini",
+            "groq",
+            "hosted_vllm",
+            "llamafile",
+            "lm_studio",
+            "moonshot",
+            "ollama",
+            "openrouter",
+            "together_ai",
+            "xai",
+        )
+    },
+}
+"""Where litellm looks for a server's address when it is given none, in its order."""
 
 _PLACEHOLDER = "no-key"
 _SHORTEST_SECRET = 8
@@ -81,6 +109,15 @@ def api_key(config: ModelConfig) -> str | None:
         names = " or ".join(status.variables)
         raise UnavailableError(f"no API key for {config.name}: set {names} in the environment")
     return None if config.provider in _OWN_CREDENTIALS else _PLACEHOLDER
+
+
+def server_address(model_id: str) -> str | None:
+    """Address of the model's server that the environment names, or None.
+
+    litellm would find it too, but unseen: replies of two servers must not pass for one another's.
+    """
+    names = _ADDRESS_VARIABLES.get(model_id.partition("/")[0], ())
+    return next((value for name in names if (value := os.environ.get(name))), None)
 
 
 def secrets_of(config: ModelConfig) -> tuple[str, ...]:

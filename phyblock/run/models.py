@@ -9,7 +9,7 @@ from pathlib import Path
 from phyblock.datasets import recorded_models
 from phyblock.datasets.published_names import match_published
 from phyblock.errors import Problem, SpecError
-from phyblock.models import ModelConfig, Price
+from phyblock.models import ModelConfig, Price, server_address
 from phyblock.specs import (
     BASELINES,
     RECORDED,
@@ -90,7 +90,7 @@ def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfi
         name=name,
         kind="litellm",
         id=spec.id,
-        api_base=spec.api_base,
+        api_base=spec.api_base or server_address(spec.id),
         api_key_env=spec.api_key_env,
         transport=spec.transport,
         params=params,

@@ -119,8 +119,8 @@ class ModelSpec(Section):
     )
     seed: Literal["auto", "always", "never"] = Field(
         default="auto",
-        description="auto: seeds are sent where the provider is known to take them. always, "
-        "never: whatever is known.",
+        description="auto: seeds are sent until the provider refuses one, then repeats are "
+        "independent. always: a refused seed is an error. never: none is sent.",
     )
     timeout_s: Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] | None = Field(
         default=None, description="Longest wait for one reply [s]; null: the suite's."
@@ -144,6 +144,7 @@ class ModelSpec(Section):
                 raise refuse(
                     "needs an id (or a replay folder)", hint="for example id: openai/gpt-4o"
                 )
+            self._check_direct(self.id)
             return self
         for key in sorted(self.model_fields_set - _WITH_REPLAY):
             raise refuse(
@@ -154,6 +155,17 @@ class ModelSpec(Section):
                 hint="keep either id or replay",
             )
         return self
+
+    def _check_direct(self, model_id: str) -> None:
+        """Without an address, a direct call would take the provider's key to OpenAI."""
+        provider = model_id.partition("/")[0]
+        if self.transport == "direct" and self.api_base is None and provider != "openai":
+            raise refuse(
+                f"needs the address of the server that speaks for {provider}",
+                at=("transport",),
+                allowed="direct with an api_base, else auto or litellm",
+                hint="add api_base, or take the line out",
+            )
 
     def params(self, defaults: SamplingSpec) -> dict[str, Any]:
         """Sampling parameters to send, by their OpenAI names: its own, else the suite's."""

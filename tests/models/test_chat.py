@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import sqlite3
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from aiohttp import web
 
 from phyblock.errors import RetryableError, SpecError, StoreError, UnavailableError
 from phyblock.models import Gate, ModelConfig, ModelEvent, Reply, ReplyCache, RetryPolicy
@@ -224,6 +226,32 @@ def test_attempts_count_every_request_that_was_sent() -> None:
 def test_an_id_without_a_provider_is_an_error_at_the_start() -> None:
     with pytest.raises(SpecError, match="needs a provider"):
         make_model(ModelConfig("m", "litellm", "gpt-4o"))
+
+
+def test_a_providers_key_never_goes_to_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XAI_API_KEY", KEY)
+    with pytest.raises(SpecError, match="needs an api_base"):
+        make_model(ModelConfig("m", "litellm", "xai/grok", transport="direct"))
+
+
+def test_a_redirect_is_not_followed_and_says_to_look_at_the_address() -> None:
+    class Moved(ROUTES["direct"].server):  # type: ignore[misc, name-defined]
+        def add_routes(self, app):  # type: ignore[no-untyped-def]
+            super().add_routes(app)
+            app.router.add_post("/old/chat/completions", self.moved)
+
+        async def moved(self, _):  # type: ignore[no-untyped-def]
+            self.ended["moved"] += 1
+            raise web.HTTPPermanentRedirect("/v1/chat/completions")
+
+    server = Moved()
+    with Running(server) as running:
+        config = ROUTES["direct"].config(running.url)
+        (answer,) = ask(make_model(replace(config, api_base=f"{running.url}/old")), make_request())
+    assert isinstance(answer, UnavailableError)
+    assert answer.status == 308
+    assert "is api_base the address" in str(answer)
+    assert server.ended == {"moved": 1}
 
 
 @pytest.mark.parametrize(

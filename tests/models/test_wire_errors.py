@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import traceback
 
 import pytest
+from aiohttp import web
 
 from phyblock.errors import RefusedError, RetryableError, SampleError, UnavailableError
 from phyblock.models import ModelConfig, ModelEvent, Reply
-from tests.models.factory import QUICK, ask, make_model, make_request
+from tests.models.factory import QUICK, ask, make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
-from tests.servers.chassis import Faults, LocalServer, Running
+from tests.servers.chassis import Faults, LocalServer, Running, Seen
+from tests.servers.openai_chat import OpenAIChat
 
 KEY = "sk-not-a-real-key-1234"
 RETRIED = ("429", "500", "reset", "cut", "html", "empty")
@@ -134,6 +137,35 @@ def test_a_refused_seed_is_left_out_from_then_on_and_said(route: str) -> None:
     assert [answer.attempts for answer in answers] == [2, 1, 1]  # type: ignore[union-attr]
     assert [seen.seed for seen in server.seen] == [1, None, None, None]
     assert [event.kind for event in events] == ["seed_unsupported"]
+
+
+class Echoing(OpenAIChat):
+    """Refuses a request by repeating it, as FastAPI servers do."""
+
+    def _refuse(self, seen: Seen, ending: str) -> web.Response:
+        error = {"type": ending, "loc": ["body", "messages", 1], "input": seen.raw}
+        return web.json_response({"detail": [error]}, status=422)
+
+
+@pytest.mark.parametrize("route", ["direct", "openai", "vllm"])
+def test_an_error_that_repeats_the_request_is_no_refusal_of_seeds(route: str) -> None:
+    server = Echoing(Faults(mode="400"))
+    events: list[ModelEvent] = []
+    with Running(server) as running:
+        model = make_model(config(route, running.url, max_concurrency=1), events=events)
+
+        async def main() -> list[object]:
+            bad = await asyncio.gather(model.ask(make_request("001", 1)), return_exceptions=True)
+            server.faults = Faults()
+            good = [await model.ask(make_request(key, 2)) for key in ("001", "002")]
+            await model.aclose()
+            return [*bad, *good]
+
+        refused, *replies = run(main)
+    assert isinstance(refused, SampleError), refused
+    assert [reply.seed_sent for reply in replies] == [True, True]  # type: ignore[attr-defined]
+    assert [seen.seed for seen in server.seen] == [1, None, 2, 2]
+    assert events == []
 
 
 def test_where_no_seed_exists_none_is_spent_on_finding_out() -> None:

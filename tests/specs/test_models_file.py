@@ -100,6 +100,7 @@ BAD = [
     ("m: {id: a/b, transport: drect}\n", "1:25", "m.transport", "choices", "", "mean direct?"),
     ("m: {id: a/b, reasoning_effort: hgh}\n", "1:32", "m.reasoning_effort", "", "low", "high?"),
     ("m: {id: a/b, api_base: localhost}\n", "1:24", "m.api_base", "address", "http://", "8000"),
+    ("m: {id: xai/g, transport: direct}\n", "1:27", "m.transport", "address", "api_base", "add"),
     ("m: {id: a/b, price: 5}\n", "1:21", "m.price", "wrong type", "a mapping", ""),
     ("m: {id: a/b, price: {input: 1}}\n", "1:14", "m.price.output", "is missing", "", "add"),
     ("m: {id: a/b, price: {input: 1, output: -1}}\n", "1:40", "m.price.output", "range", "0", ""),

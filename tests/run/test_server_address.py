@@ -1,0 +1,77 @@
+"""Addresses of servers that stand in the environment: part of what a reply is known by."""
+
+from __future__ import annotations
+
+import pytest
+
+from phyblock.models import ModelConfig, reply_key
+from phyblock.run.models import to_config
+from phyblock.specs import ModelSpec, SuiteSpec
+from tests.models.factory import ask, make_model, make_request
+from tests.servers.anthropic_messages import AnthropicMessages
+from tests.servers.chassis import LocalServer, Running
+from tests.servers.gemini_generate import GeminiGenerate
+from tests.servers.openai_chat import OpenAIChat
+
+KEY = "sk-not-a-real-key-1234"
+WAYS: list[tuple[str, str, str, type[LocalServer]]] = [
+    ("OPENAI_BASE_URL", "openai/m", "/v1", OpenAIChat),
+    ("OPENAI_API_BASE", "openai/m", "/v1", OpenAIChat),
+    ("HOSTED_VLLM_API_BASE", "hosted_vllm/m", "/v1", OpenAIChat),
+    ("LM_STUDIO_API_BASE", "lm_studio/m", "/v1", OpenAIChat),
+    ("LLAMAFILE_API_BASE", "llamafile/m", "/v1", OpenAIChat),
+    ("XAI_API_BASE", "xai/m", "/v1", OpenAIChat),
+    ("DASHSCOPE_API_BASE", "dashscope/m", "/v1", OpenAIChat),
+    ("MISTRAL_API_BASE", "mistral/m", "/v1", OpenAIChat),
+    ("OPENROUTER_API_BASE", "openrouter/m", "/v1", OpenAIChat),
+    ("TOGETHER_AI_API_BASE", "together_ai/m", "/v1", OpenAIChat),
+    ("MOONSHOT_API_BASE", "moonshot/m", "/v1", OpenAIChat),
+    ("ANTHROPIC_API_BASE", "anthropic/claude-3-7-sonnet-20250219", "", AnthropicMessages),
+    ("ANTHROPIC_BASE_URL", "anthropic/claude-3-7-sonnet-20250219", "", AnthropicMessages),
+    ("GEMINI_API_BASE", "gemini/gemini-2.5-flash", "", GeminiGenerate),
+]
+
+
+def config_of(model_id: str, transport: str = "auto") -> ModelConfig:
+    spec = ModelSpec(id=model_id, api_key_env="PHYBLOCK_TEST_KEY", transport=transport)  # type: ignore[arg-type]
+    return to_config("m", spec, SuiteSpec(name="s", models=("m",)))
+
+
+@pytest.fixture(autouse=True)
+def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PHYBLOCK_TEST_KEY", KEY)
+    for variable, *_ in WAYS:
+        monkeypatch.delenv(variable, raising=False)
+
+
+@pytest.mark.parametrize(("variable", "model_id", "path", "server"), WAYS)
+def test_calls_go_to_the_address_and_keys_name_it(
+    monkeypatch: pytest.MonkeyPatch,
+    variable: str,
+    model_id: str,
+    path: str,
+    server: type[LocalServer],
+) -> None:
+    keys = {reply_key(config_of(model_id), make_request())}
+    with Running(server()) as running:
+        monkeypatch.setenv(variable, running.url + path)
+        config = config_of(model_id)
+        assert config.identity()["api_base"] == running.url + path
+        answers = ask(make_model(config), make_request("001"))
+        assert running.server.ended == {"ok": 1}, answers
+        keys.add(reply_key(config, make_request()))
+        monkeypatch.setenv(variable, "http://127.0.0.1:9/v1")
+        keys.add(reply_key(config_of(model_id), make_request()))
+    assert len(keys) == 3
+
+
+def test_what_the_models_file_says_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_BASE_URL", "http://127.0.0.1:9/v1")
+    spec = ModelSpec(id="openai/m", api_base="http://127.0.0.1:10/v1")
+    config = to_config("m", spec, SuiteSpec(name="s", models=("m",)))
+    assert config.api_base == "http://127.0.0.1:10/v1"
+
+
+def test_an_empty_variable_names_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_BASE_URL", "")
+    assert config_of("openai/m").api_base is None
