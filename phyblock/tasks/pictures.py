@@ -23,6 +23,7 @@ from PIL import UnidentifiedImageError
 
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import DataError, Problem, SimulationError, StoreError
+from phyblock.files import atomic_write
 from phyblock.models.base import Image
 from phyblock.sim import (
     PictureStyle,
@@ -174,13 +175,11 @@ class Pictures:
             self._pool = ProcessPoolExecutor(
                 self._workers, get_context("spawn"), initializer=_start_worker
             )
-        part = path.with_suffix(f".{os.getpid()}.part")
         try:
             data = await asyncio.get_running_loop().run_in_executor(self._pool, drawing.make)
             self.rendered += 1
             path.parent.mkdir(parents=True, exist_ok=True)
-            part.write_bytes(data)
-            os.replace(part, path)
+            atomic_write(path, data)
         except OSError as error:
             hint = "name another cache folder with PHYBLOCK_CACHE"
             problem = Problem(str(path), f"cannot be written: {error.strerror}", hint=hint)
