@@ -10,6 +10,8 @@ from rich.console import Console
 
 from phyblock import report
 from phyblock.cli.console import print_view, shown_path, width_of
+from phyblock.report.outcomes import HEADINGS
+from phyblock.report.text_table import number
 
 if TYPE_CHECKING:
     from phyblock.report import TablesWritten, TextTable
@@ -17,7 +19,6 @@ if TYPE_CHECKING:
 __all__ = ["print_summary"]
 
 _SIDE_METRICS = ("Prec", "Rec")
-_OUTCOMES = ("OK", "Unparsed", "Refusal", "Truncated", "API error", "Missing")
 _FAILURES_SHOWN = 8
 _MET = 0.06
 """Largest difference that rounding of the published numbers and of ours explains [points]."""
@@ -65,19 +66,19 @@ def _print_failures(console: Console, written: TablesWritten) -> None:
 
 
 def _print_comparison(console: Console, written: TablesWritten) -> None:
-    frame = written.frames["published"].dropna(subset=["difference"])
-    largest = report.largest_differences(written.frames["published"])
-    names = [name for name in largest.index if name in set(frame["model"])]
-    if not names:
-        return
-    width = max(map(len, names))
+    frame = written.frames["published"]
+    largest = report.largest_differences(frame)
+    cells = Counter(frame.dropna(subset=["difference"])["model"])
+    width = max(map(len, largest.index), default=0)
     console.print("Beside the paper's Table 1: largest difference in points", style="bold")
-    for name in names:
-        cells = int((frame["model"] == name).sum())
-        mark = "as published" if largest[name] <= _MET else "differs"
+    for name, points in largest.items():
+        # Where nothing was compared, there is no difference to judge.
+        mark = ("as published" if points <= _MET else "differs") if cells[name] else "not compared"
         console.print(
-            f"{name:<{width}}  {largest[name]:>7.3f}  {cells} cells, {mark}", markup=False
+            f"{name:<{width}}  {number(points, 3):>7}  {cells[name]} cells, {mark}", markup=False
         )
+    for note in report.comparison_notes(frame, written.run.design):
+        console.print(note, markup=False, soft_wrap=True)
     console.print()
 
 
@@ -93,7 +94,7 @@ def _overall(errors: TextTable) -> TextTable:
 
 def _answered(coverage: TextTable) -> TextTable:
     """Samples and outcomes; tokens and costs stay in the file."""
-    kept = ("Model", "Expected", "Not run", *_OUTCOMES)
+    kept = ("Model", "Expected", "Not run", *HEADINGS.values())
     dropped = [column.name for column in coverage.columns if column.name not in kept]
     return replace(_without(coverage, tuple(dropped)), notes=())
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from phyblock.report import NO_VALUE
+from phyblock.report.outcomes import FAILURES
 from phyblock.scoring import Counts
 
 __all__ = ["Tally"]
-
-_FAILED = ("parse_failure", "refusal", "truncated", "api_error", "missing")
 
 
 @dataclass
@@ -35,7 +34,7 @@ class Tally:
         self.done += 1
         self.fresh += fresh
         outcome = record["outcome"]
-        if outcome in _FAILED:
+        if outcome in FAILURES:
             self.failures[outcome] = self.failures.get(outcome, 0) + 1
         headline = next((s for s in record["scores"] if s["criterion"] == "aov"), None)
         if headline is not None:

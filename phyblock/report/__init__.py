@@ -12,12 +12,17 @@ from phyblock.report.text_table import NO_VALUE, Column, TextTable
 
 if TYPE_CHECKING:
     from phyblock.report.assembly import ASSEMBLY_COLUMNS, assembly_frame, table1_frame
-    from phyblock.report.comparison import largest_differences, published_frame, published_table
+    from phyblock.report.comparison import (
+        comparison_notes,
+        largest_differences,
+        published_frame,
+        published_table,
+    )
     from phyblock.report.coverage import coverage_frame
     from phyblock.report.design import Design, read_design
     from phyblock.report.errors import errors_frame
     from phyblock.report.latex import to_latex
-    from phyblock.report.load import Frames, Run, frames_from, load_run
+    from phyblock.report.load import Run, load_run
     from phyblock.report.markdown import to_markdown
     from phyblock.report.write import TablesWritten, write_tables
 
@@ -26,14 +31,13 @@ __all__ = [
     "NO_VALUE",
     "Column",
     "Design",
-    "Frames",
     "Run",
     "TablesWritten",
     "TextTable",
     "assembly_frame",
+    "comparison_notes",
     "coverage_frame",
     "errors_frame",
-    "frames_from",
     "largest_differences",
     "load_run",
     "published_frame",
@@ -49,6 +53,7 @@ _HOMES = {
     "ASSEMBLY_COLUMNS": "assembly",
     "assembly_frame": "assembly",
     "table1_frame": "assembly",
+    "comparison_notes": "comparison",
     "largest_differences": "comparison",
     "published_frame": "comparison",
     "published_table": "comparison",
@@ -57,9 +62,7 @@ _HOMES = {
     "read_design": "design",
     "errors_frame": "errors",
     "to_latex": "latex",
-    "Frames": "load",
     "Run": "load",
-    "frames_from": "load",
     "load_run": "load",
     "to_markdown": "markdown",
     "TablesWritten": "write",

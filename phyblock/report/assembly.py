@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pandas as pd
 
 from phyblock.report.cells import METRICS, cell_scores, micro_averages, with_levels
 from phyblock.report.design import OVERALL, Design
 from phyblock.report.load import Run
+from phyblock.report.outcomes import FAILURES, WITHOUT_REPLY
 
 __all__ = ["ASSEMBLY_COLUMNS", "assembly_frame", "headline_cells", "level_column", "table1_frame"]
 
 _CELL = ("model", "track", "setting", "matcher", "criterion", "level")
 _GROUP = ("model", "track", "level")
-_OUTCOMES = {
-    "missing": "missing",
-    "parse_failure": "parse_failures",
-    "api_error": "api_errors",
-    "refusal": "refusals",
-    "truncated": "truncated",
-}
+_PLURALS = {"parse_failure": "parse_failures", "api_error": "api_errors", "refusal": "refusals"}
+_OUTCOMES = {outcome: _PLURALS.get(outcome, outcome) for outcome in FAILURES}
 _SPREAD = tuple(f"{metric}_{what}" for metric in METRICS for what in ("mean", "sd"))
 _COUNTS = ("n", *_OUTCOMES.values(), "tp", "fp", "fn", "seeds")
 
@@ -43,8 +40,9 @@ def assembly_frame(run: Run) -> pd.DataFrame:
 
     `n` samples are scored of `expected`; tp, fp, fn are sums over them and precision, recall, f1
     the micro averages in [0, 1], NaN where undefined. `*_mean` and `*_sd` (ddof = 1) are taken
-    over the micro averages of the `seeds` single seeds. `matcher` is "" for a Level-1 criterion
-    that knows none.
+    over the micro averages of the `seeds` single seeds. A cell in which no sample has a reply has
+    counts, if the suite counts empty plans, but no metrics: nothing was measured. `matcher` is ""
+    for a Level-1 criterion that knows none.
     """
     scores = cell_scores(run)
     frame = (
@@ -53,6 +51,7 @@ def assembly_frame(run: Run) -> pd.DataFrame:
         .join(_over_seeds(scores), on=list(_CELL))
         .join(_outcomes(run), on=list(_GROUP))
     )
+    frame.loc[frame["replied"].fillna(0) == 0, [*METRICS, *_SPREAD]] = np.nan
     frame[list(_COUNTS)] = frame[list(_COUNTS)].fillna(0).astype("int64")
     notes = _seed_notes(run)
     frame["seed_note"] = [notes.get(model, "") for model in frame["model"]]
@@ -83,11 +82,13 @@ def _over_seeds(scores: pd.DataFrame) -> pd.DataFrame:
 
 
 def _outcomes(run: Run) -> pd.DataFrame:
-    """How many samples ended other than well, by model, track and level."""
+    """How many samples ended other than well, and had a reply, by model, track and level."""
     samples = run.records[["sample", "model", "track"]]
     for outcome, column in _OUTCOMES.items():
         samples = samples.assign(**{column: (run.records["outcome"] == outcome).astype("int64")})
-    return with_levels(samples, run).groupby(list(_GROUP))[list(_OUTCOMES.values())].sum()
+    samples["replied"] = (~run.records["outcome"].isin(WITHOUT_REPLY)).astype("int64")
+    counts = [*_OUTCOMES.values(), "replied"]
+    return with_levels(samples, run).groupby(list(_GROUP))[counts].sum()
 
 
 def _seed_notes(run: Run) -> dict[str, str]:
@@ -117,11 +118,13 @@ def table1_frame(run: Run) -> pd.DataFrame:
     return table
 
 
-def headline_cells(assembly: pd.DataFrame, design: Design, matcher: str = "") -> pd.DataFrame:
-    """One row a model and level: first track, first setting, and one matcher (the headline)."""
+def headline_cells(
+    assembly: pd.DataFrame, design: Design, *, matcher: str = "", setting: str = ""
+) -> pd.DataFrame:
+    """One row a model and level: first track, one matcher and setting (the headline ones)."""
     return assembly[
         assembly["track"].isin(design.tracks[:1])
-        & (assembly["setting"] == design.setting)
+        & (assembly["setting"] == (setting or design.setting))
         & assembly["matcher"].isin(["", matcher or design.matcher])
     ]
 

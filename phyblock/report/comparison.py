@@ -8,12 +8,26 @@ import pandas as pd
 
 from phyblock.report.assembly import assembly_frame, headline_cells
 from phyblock.report.cells import METRICS
+from phyblock.report.design import OVERALL, Design
 from phyblock.report.load import Run
+from phyblock.report.text_table import number
 
-__all__ = ["PUBLISHED_LEVELS", "largest_differences", "published_frame", "published_table"]
+__all__ = [
+    "PUBLISHED_LEVELS",
+    "PUBLISHED_SETTING",
+    "comparison_notes",
+    "largest_differences",
+    "published_frame",
+    "published_table",
+]
 
 PUBLISHED_LEVELS = ("1", "2", "3", "4", "overall")
 """Levels of the paper's Table 1, in its order."""
+PUBLISHED_SETTING = "A"
+"""The setting of every number in it."""
+
+_OVERALL_LEVELS = frozenset({2, 3, 4})
+"""Levels whose scenes the paper's overall numbers pool."""
 
 _COLUMNS = (
     "model",
@@ -41,11 +55,18 @@ def published_table(number: int) -> pd.DataFrame:
 def published_frame(run: Run) -> pd.DataFrame:
     """15 rows for each model with a row in Table 1: published, ours, ours minus published [%].
 
-    Ours is not rounded; it is NaN for a level that the suite does not run. The `paper` matcher is
-    compared where the run has it, else the headline one; `n` samples are behind our number.
+    Ours is in setting A and not rounded; it is NaN for what the suite does not run: a level,
+    `overall` without one of the levels 2, 3 and 4, everything without setting A. The `paper`
+    matcher is compared where the run has it, else the headline one; `n` samples are behind our
+    number.
     """
-    matcher = "paper" if "paper" in run.design.suite.scoring.matchers else run.design.matcher
-    ours = headline_cells(assembly_frame(run), run.design, matcher).melt(
+    design = run.design
+    printed = published_table(1).rename(columns={"model": "published_name", "value": "published"})
+    rows = set(printed["published_name"])
+    matcher = "paper" if "paper" in design.suite.scoring.matchers else design.matcher
+    ours = headline_cells(
+        assembly_frame(run), design, matcher=matcher, setting=PUBLISHED_SETTING
+    ).melt(
         id_vars=["model", "level", "criterion", "matcher", "n"],
         value_vars=list(METRICS),
         var_name="metric",
@@ -54,13 +75,15 @@ def published_frame(run: Run) -> pd.DataFrame:
     cells = pd.DataFrame(
         [
             (model, name, level, metric)
-            for model, name in run.design.published.items()
+            for model, name in design.published.items()
+            if name in rows
             for level in PUBLISHED_LEVELS
             for metric in METRICS
         ],
         columns=["model", "published_name", "level", "metric"],
     )
-    printed = published_table(1).rename(columns={"model": "published_name", "value": "published"})
+    if not set(design.suite.levels) >= _OVERALL_LEVELS:
+        ours = ours[ours["level"] != OVERALL]
     table = cells.merge(printed, on=["published_name", "level", "metric"], how="left")
     table = table.merge(ours, on=["model", "level", "metric"], how="left")
     table["ours"] = 100 * table["ours"]
@@ -77,3 +100,18 @@ def largest_differences(published: pd.DataFrame) -> pd.Series[float]:
     NaN for a model of which no cell can be compared; `.max()` is the largest of all.
     """
     return published["difference"].abs().groupby(published["model"], sort=False).max()
+
+
+def comparison_notes(published: pd.DataFrame, design: Design) -> tuple[str, ...]:
+    """The largest difference of all, and what of the run could not be compared, as sentences."""
+    compared = int(published["difference"].notna().sum())
+    largest = number(largest_differences(published).max(), 3)
+    notes = [f"Largest absolute difference of {compared} cells: {largest}."]
+    known = set(published["model"])
+    if without := [name for name in design.model_names if name not in known]:
+        notes.append(f"No published row: {', '.join(without)}.")
+    if PUBLISHED_SETTING not in design.suite.settings:
+        notes.append(f"The paper's setting, {PUBLISHED_SETTING}, was not run.")
+    if not set(design.suite.levels) >= _OVERALL_LEVELS:
+        notes.append("Overall is not compared: the paper's pools the levels 2, 3 and 4.")
+    return tuple(notes)

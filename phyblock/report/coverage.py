@@ -6,10 +6,10 @@ import pandas as pd
 
 from phyblock.report.design import OVERALL
 from phyblock.report.load import Run
+from phyblock.report.outcomes import OUTCOMES
 
-__all__ = ["OUTCOMES", "coverage_frame"]
+__all__ = ["coverage_frame"]
 
-OUTCOMES = ("ok", "parse_failure", "refusal", "truncated", "api_error", "missing")
 _TOKENS = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
 _COUNTS = ("recorded", *OUTCOMES, "replies", "tokens_unknown", "cost_unknown", "cached", "attempts")
 
@@ -35,20 +35,24 @@ def coverage_frame(run: Run) -> pd.DataFrame:
 
     `expected` samples are `recorded` + `not_run`; the outcomes split `recorded`. Of the `replies`
     (samples that hold one): token sums of those that tell, with `tokens_unknown` that do not;
-    `cost_usd` the sum of the known prices, NaN where none is, with `cost_unknown` without one;
+    `cost_usd` what the run paid, the sum of the known prices, NaN where none is, with
+    `cost_unknown` without one; `cached` ones were paid for by another run and cost nothing here;
     `latency_s` the mean over replies for which a request was sent, so neither `cached` ones nor
-    recordings; `attempts` the sum of requests sent.
+    recordings; `attempts` the sum of requests sent for them, not for samples without a reply.
     """
     records = run.records[run.records["track"].isin(run.design.tracks)]
     replied = records["finish"].notna()
+    cached = records["cached"].fillna(False).astype("bool")
+    paid = replied & ~cached
     attempts = records["attempts"].fillna(0).astype("int64")
-    facts = records[["model", *_TOKENS, "cost_usd"]].assign(
+    facts = records[["model", *_TOKENS]].assign(
         recorded=1,
         **{name: (records["outcome"] == name).astype("int64") for name in OUTCOMES},
         replies=replied.astype("int64"),
         tokens_unknown=(replied & records["completion_tokens"].isna()).astype("int64"),
-        cost_unknown=(replied & records["cost_usd"].isna()).astype("int64"),
-        cached=records["cached"].fillna(False).astype("int64"),
+        cost_usd=records["cost_usd"].where(paid),
+        cost_unknown=(paid & records["cost_usd"].isna()).astype("int64"),
+        cached=cached.astype("int64"),
         attempts=attempts,
         latency_s=records["latency_s"].where(attempts > 0),
     )
@@ -59,6 +63,7 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     table["expected"] = run.design.expected(OVERALL) * len(run.design.tracks)
     table = table.join(sums, on="model").join(known, on="model")
     table[list(_COUNTS)] = table[list(_COUNTS)].fillna(0).astype("int64")
+    table.loc[(table["replies"] > 0) & (table["replies"] == table["cached"]), "cost_usd"] = 0.0
     table["not_run"] = table["expected"] - table["recorded"]
     table["latency_s"] = table["model"].map(groups["latency_s"].mean())
     return table[list(_COLUMNS)]

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic_core import PydanticCustomError
 
 from phyblock.errors import Problem, StoreError
+from phyblock.report.outcomes import WITHOUT_REPLY
 
 __all__ = ["OVERALL", "Design", "read_design"]
 
 OVERALL = "overall"
 """Name of the row that pools the scenes of all levels."""
 
-ASSEMBLY_TRACKS = ("full_planning", "step_planning")
-_SCORELESS = frozenset({"missing", "api_error"})
+ASSEMBLY_TRACKS = ("full_planning",)
 
 
 class _Part(BaseModel):
@@ -57,6 +59,14 @@ class Design(_Part):
     scenes_by_level: dict[int, int]
     scenes: int
 
+    @field_validator("models")
+    @classmethod
+    def _differ(cls, models: tuple[_Model, ...]) -> tuple[_Model, ...]:
+        counts = Counter(model.name for model in models)
+        if twice := [name for name, count in counts.items() if count > 1]:
+            raise PydanticCustomError("twice", f"names models twice: {', '.join(twice)}")
+        return models
+
     @property
     def model_names(self) -> tuple[str, ...]:
         """Names of the models in the order of the suite."""
@@ -64,7 +74,7 @@ class Design(_Part):
 
     @property
     def published(self) -> dict[str, str]:
-        """Row of the paper's Table 1 for each model that has one."""
+        """What the paper calls each model that it knows; Table 1 need not have a row of it."""
         return {model.name: model.published for model in self.models if model.published}
 
     @property
@@ -90,7 +100,7 @@ class Design(_Part):
     @property
     def outcomes_left_out(self) -> frozenset[str]:
         """Outcomes whose samples enter no score under the policy on missing replies."""
-        return _SCORELESS if self.suite.scoring.missing == "skip" else frozenset()
+        return frozenset(WITHOUT_REPLY) if self.suite.scoring.missing == "skip" else frozenset()
 
     def criterion(self, level: str) -> str:
         """The criterion that scores a level.

@@ -14,7 +14,7 @@ from phyblock.report.design import Design, read_design
 from phyblock.report.flat import TEXTS, flat_record, flat_scores, frame_of
 from phyblock.run.reading import MANIFEST, RecordLines, read_manifest
 
-__all__ = ["Frames", "Run", "frames_from", "load_run"]
+__all__ = ["Frames", "Run", "frames_of", "load_run"]
 
 
 class Frames(NamedTuple):
@@ -26,7 +26,7 @@ class Frames(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run folder, read.
+    """A run folder, read: `manifest` is its `run.yaml`, `design` the part that tables need.
 
     `records` has one row a sample: track, model, scene, levels, parents, n_blocks, seed, outcome,
     the reply's text, tokens, cost_usd, latency_s and so on, error, prompt, parsed plan. `scores`
@@ -53,22 +53,17 @@ def load_run(path: str | Path, *, texts: bool = True) -> Run:
     manifest = read_manifest(folder)
     design = read_design(manifest, str(folder / MANIFEST))
     lines = RecordLines(folder)
-    records, scores = _frames(lines, design, texts=texts)
+    records, scores = frames_of(lines, design, texts=texts)
     return Run(folder, manifest, design, records, scores, lines.is_cut)
 
 
-def frames_from(records: Iterable[Mapping[str, Any]], manifest: Mapping[str, Any]) -> Frames:
-    """Frames of records that are already in memory; a later record of a sample replaces it.
-
-    Raises StoreError for a manifest or a record that lacks what tables need.
-    """
-    numbered = ((f"record {number}", record) for number, record in enumerate(records, 1))
-    return _frames(numbered, read_design(manifest), texts=True)
-
-
-def _frames(
-    records: Iterable[tuple[str, Mapping[str, Any]]], design: Design, *, texts: bool
+def frames_of(
+    records: Iterable[tuple[str, Mapping[str, Any]]], design: Design, *, texts: bool = True
 ) -> Frames:
+    """Frames of records, each with where it stands; a later record of a sample replaces it.
+
+    Raises StoreError for a record that lacks what tables need.
+    """
     samples: dict[str, tuple[dict[str, Any], list[dict[str, Any]]]] = {}
     for where, record in records:
         row, scores = _flatten(where, record)

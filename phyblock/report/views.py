@@ -9,10 +9,15 @@ import pandas as pd
 
 from phyblock.report.assembly import assembly_frame, headline_cells, level_column
 from phyblock.report.cells import METRICS
-from phyblock.report.comparison import PUBLISHED_LEVELS, largest_differences
-from phyblock.report.coverage import OUTCOMES
+from phyblock.report.comparison import (
+    PUBLISHED_LEVELS,
+    PUBLISHED_SETTING,
+    comparison_notes,
+    largest_differences,
+)
 from phyblock.report.design import OVERALL, Design
 from phyblock.report.load import Run
+from phyblock.report.outcomes import HEADINGS, OUTCOMES
 from phyblock.report.text_table import NO_VALUE, Column, TextTable, number, spread
 from phyblock.scoring import ERROR_TYPES, ErrorType
 
@@ -66,8 +71,27 @@ def _table1_notes(run: Run) -> list[str]:
         counts = zip(short["model"], short["n"], strict=True)
         listed = ", ".join(f"{model} {n}" for model, n in counts)
         notes.append(f"Scored of {run.design.expected(OVERALL)} samples: {listed}.")
+    if run.design.suite.scoring.missing == "count":
+        notes += _empty_plan_notes(cells)
     for note, rows in overall[overall["seed_note"] != ""].groupby("seed_note", sort=False):
         notes.append(f"{', '.join(rows['model'])}: {note}.")
+    return notes
+
+
+def _empty_plan_notes(cells: pd.DataFrame) -> list[str]:
+    """Which models have samples without a reply, by kind; a lone kind needs no number."""
+    listed = []
+    for row in cells[cells["level"] == OVERALL].to_dict("records"):
+        kinds = {"API errors": row["api_errors"], "missing replies": row["missing"]}
+        kinds = {name: count for name, count in kinds.items() if count}
+        if kinds:
+            each = [f"{name} {count}" for name, count in kinds.items()]
+            why = ", ".join(kinds if len(kinds) == 1 else each)
+            listed.append(f"{row['model']} {sum(kinds.values())} of {row['n']} ({why})")
+    notes = [f"Counted as empty plans: {', '.join(listed)}."] if listed else []
+    unanswered = cells["api_errors"] + cells["missing"]
+    if ((unanswered > 0) & (unanswered == cells["n"])).any():
+        notes.append("No value stands where a model has no reply at all.")
     return notes
 
 
@@ -149,7 +173,7 @@ def published_view(table: pd.DataFrame, run: Run) -> TextTable:
             *(cell for level in PUBLISHED_LEVELS for cell in cells[model, level, metric]),
             number(largest[model], 3) if metric == METRICS[0] else "",
         )
-        for model, name in run.design.published.items()
+        for model, name in dict(zip(table["model"], table["published_name"], strict=True)).items()
         for label, metric in zip((model, f"({name})", ""), METRICS, strict=True)
     ]
     return TextTable(
@@ -161,15 +185,13 @@ def published_view(table: pd.DataFrame, run: Run) -> TextTable:
 
 
 def _difference_notes(table: pd.DataFrame, design: Design) -> list[str]:
-    compared = int(table["difference"].notna().sum())
-    notes = [
-        f"Largest absolute difference of {compared} cells: "
-        f"{number(largest_differences(table).max(), 3)}; the last column has it by model."
-    ]
     matchers = "/".join(sorted(set(table["matcher"]) - {""})) or NO_VALUE
     level1 = f", Level-1 by {design.suite.scoring.level1}" if 1 in design.suite.levels else ""
-    notes.append(f"Ours: setting {design.setting}, matcher {matchers}{level1}.")
-    return notes
+    return [
+        *comparison_notes(table, design),
+        f"Ours: setting {PUBLISHED_SETTING}, matcher {matchers}{level1}.",
+        "The last column has the largest absolute difference of each model.",
+    ]
 
 
 def coverage_view(table: pd.DataFrame, run: Run) -> TextTable:
@@ -177,11 +199,11 @@ def coverage_view(table: pd.DataFrame, run: Run) -> TextTable:
 
     Tokens, latency, cached and requests are left out where no model has any.
     """
-    counts = ("expected", "not_run", *OUTCOMES)
+    counts = {"expected": "Expected", "not_run": "Not run"}
+    counts |= {outcome: HEADINGS[outcome] for outcome in OUTCOMES}
     parts: list[tuple[Column, list[str]]] = [(_MODEL, list(table["model"]))]
     parts += [
-        (Column(heading), [str(count) for count in table[name]])
-        for heading, name in zip(_COVERAGE_COUNTS, counts, strict=True)
+        (Column(heading), [str(count) for count in table[name]]) for name, heading in counts.items()
     ]
     usage = [
         *(
@@ -203,18 +225,6 @@ def coverage_view(table: pd.DataFrame, run: Run) -> TextTable:
     )
 
 
-_COVERAGE_COUNTS = (
-    "Expected",
-    "Not run",
-    "OK",
-    "Unparsed",
-    "Refusal",
-    "Truncated",
-    "API error",
-    "Missing",
-)
-
-
 def _tokens(total: int | None) -> str:
     return NO_VALUE if total is None or pd.isna(total) else f"{total:,}"
 
@@ -232,6 +242,11 @@ def _coverage_notes(table: pd.DataFrame, run: Run) -> list[str]:
     notes = []
     if table["latency_s"].notna().any():
         notes.append("Latency is the mean over replies that were asked for in this run.")
+    if table["cached"].any():
+        notes.append("Cost is what this run paid; replies from the cache cost it nothing.")
+    unanswered = table["recorded"] - table["missing"] - table["replies"]
+    if table["attempts"].any() and unanswered.any():
+        notes.append("Requests are those that led to a reply, with their retries.")
     partly = table[table["tokens_unknown"].between(1, table["replies"] - 1)]
     if len(partly):
         counts = zip(partly["model"], partly["tokens_unknown"], partly["replies"], strict=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,8 +32,7 @@ class TablesWritten:
     """What `write_tables` made.
 
     `frames` and `views` (as text, ready to print) go by table name: those of assembly (frame
-    only), table1, errors and published that the suite asks for, the last one only where a model
-    has published numbers, and coverage in any case.
+    only), table1, errors and published that were asked for, and coverage in any case.
     """
 
     folder: Path
@@ -43,13 +42,14 @@ class TablesWritten:
     run: Run
 
 
-def write_tables(path: str | Path) -> TablesWritten:
+def write_tables(path: str | Path, tables: Sequence[str] | None = None) -> TablesWritten:
     """Rebuild `tables/` of a run folder from its records; each file appears whole or not at all.
 
-    Raises StoreError for a broken run (see `load_run`) or a folder that cannot be written.
+    `tables` names those to write; None is what the suite in `run.yaml` asks for. Raises StoreError
+    for a broken run (see `load_run`) or a folder that cannot be written.
     """
     run = load_run(path, texts=False)
-    frames, views = _tables(run)
+    frames, views = _tables(run, run.design.suite.tables if tables is None else tables)
     texts = {f"{name}.csv": _csv(frame, name) for name, frame in frames.items()}
     texts |= {f"{name}.md": to_markdown(view) for name, view in views.items()}
     texts |= {
@@ -74,10 +74,8 @@ _MAKERS: dict[str, tuple[Callable[[Run], pd.DataFrame], _View | None]] = {
 }
 
 
-def _tables(run: Run) -> tuple[dict[str, pd.DataFrame], dict[str, TextTable]]:
-    wanted = {"coverage", *run.design.suite.tables}
-    if not run.design.published:
-        wanted.discard("published")
+def _tables(run: Run, names: Sequence[str]) -> tuple[dict[str, pd.DataFrame], dict[str, TextTable]]:
+    wanted = {"coverage", *names}
     makers = {name: maker for name, maker in _MAKERS.items() if name in wanted}
     frames = {name: frame(run) for name, (frame, _) in makers.items()}
     views = {name: view(frames[name], run) for name, (_, view) in makers.items() if view}

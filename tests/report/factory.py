@@ -11,14 +11,15 @@ import yaml
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from phyblock.report import Run, frames_from, read_design
+from phyblock.report import Run, read_design
+from phyblock.report.load import Frames, frames_of
+from phyblock.report.outcomes import OUTCOMES
 from phyblock.scoring import ERROR_TYPES
 
 laws = settings(max_examples=20, deadline=None)
 """Tables take some 50 ms each, so that fewer examples must do."""
 
 LEVELS = {"000": (1, 2), "001": (2,), "002": (3,), "003": (4,), "004": (1,)}
-OUTCOMES = ("ok", "parse_failure", "refusal", "truncated", "api_error", "missing")
 
 
 def manifest(
@@ -114,6 +115,11 @@ def record(
         "scores": [dict(one) for one in scores],
         "time": "2026-11-20T10:00:00Z",
     }
+
+
+def frames_from(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Frames:
+    numbered = ((f"record {number}", one) for number, one in enumerate(records, 1))
+    return frames_of(numbered, read_design(facts))
 
 
 def run_of(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Run:

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.report import ASSEMBLY_COLUMNS, assembly_frame, errors_frame, table1_frame
+from phyblock.report.views import table1_view
 from phyblock.scoring import ERROR_TYPES, Counts, micro
 from tests.report.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
 
@@ -42,8 +43,14 @@ def test_each_cell_is_the_micro_average_of_its_records(records: Records, missing
         total = micro(counts)
         assert row["n"] == len(counts)
         assert (row["tp"], row["fp"], row["fn"]) == (total.tp, total.fp, total.fn)
+        answered = any(
+            kept["outcome"] not in ("missing", "api_error")
+            for kept in records
+            if kept["model"] == row["model"]
+            if row["level"] == "overall" or int(row["level"]) in kept["levels"]
+        )
         for metric in ("precision", "recall", "f1"):
-            wanted = getattr(total, metric)
+            wanted = getattr(total, metric) if answered else None
             found = row[metric]
             assert math.isnan(found) if wanted is None else found == pytest.approx(wanted)
 
@@ -136,6 +143,47 @@ def test_missing_replies_are_left_out_or_count_as_empty_plans() -> None:
     for row in (skipped, counted):
         assert (row["missing"], row["api_errors"], row["expected"]) == (1, 1, 10)
         assert row["precision"] == 0.75
+
+
+@pytest.mark.parametrize("seeds", [[0], [0, 1]])
+def test_a_cell_without_any_reply_has_no_value_where_empty_plans_count(seeds: list[int]) -> None:
+    records = [
+        record(scene="001", seed=seeds[-1], scores=[score(3, 1, 1)]),
+        record(scene="002", scores=[score(0, 0, 4)], outcome="missing"),
+        *(
+            record("beta", scene, scores=[score(0, 0, 4)], outcome="api_error")
+            for scene in ("001", "002")
+        ),
+    ]
+    run = run_of(records, manifest(missing="count", seeds=seeds))
+    table1 = table1_frame(run)
+    values = table1.set_index("model").drop(columns=[c for c in table1 if c.endswith("_sd")])
+    assert values.loc["beta"].isna().all()
+    assert values.loc["alpha"].filter(like="level3").isna().all()
+    assert values.loc["alpha", ["level2_recall", "overall_precision"]].tolist() == [75, 75]
+    unanswered = cell(assembly_frame(run), model="beta", level="overall")
+    assert (unanswered["n"], unanswered["fn"], unanswered["api_errors"]) == (2, 8, 2)
+    notes = table1_view(table1, run).notes
+    assert (
+        "Counted as empty plans: alpha 1 of 2 (missing replies), beta 2 of 2 (API errors)." in notes
+    )
+    assert "No value stands where a model has no reply at all." in notes
+
+
+def test_empty_plans_of_two_kinds_are_counted_apart_and_those_left_out_are_not_said() -> None:
+    records = [
+        record(scene="000", scores=[score(1, 0, 0)]),
+        record(scene="001", scores=[score(0, 0, 4)], outcome="missing"),
+        record(scene="001", seed=1, scores=[score(0, 0, 4)], outcome="api_error"),
+    ]
+    notes = {}
+    for missing in ("count", "skip"):
+        run = run_of(records, manifest(missing=missing))
+        notes[missing] = table1_view(table1_frame(run), run).notes
+    said = "Counted as empty plans: alpha 2 of 3 (API errors 1, missing replies 1)."
+    assert said in notes["count"]
+    assert "No value stands where a model has no reply at all." not in notes["count"]
+    assert not any("empty plans:" in note for note in notes["skip"])
 
 
 def test_what_is_undefined_has_no_value_and_is_not_zero() -> None:

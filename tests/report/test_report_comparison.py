@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from phyblock.datasets.published_names import PUBLISHED_NAMES, match_published
-from phyblock.report import largest_differences, published_frame, published_table
+from phyblock.report import (
+    NO_VALUE,
+    comparison_notes,
+    largest_differences,
+    published_frame,
+    published_table,
+)
+from phyblock.report.views import published_view
 from tests.report.factory import manifest, record, run_of, score
 
 LEVELS = ["1", "2", "3", "4", "overall"]
@@ -76,10 +83,66 @@ def test_the_headline_matcher_is_compared_where_the_paper_s_was_not_run() -> Non
     assert np.isnan(largest_differences(table)["mine"])
 
 
+def test_setting_a_is_compared_whatever_the_headline() -> None:
+    scores = [score(1, 1, 3, matcher="paper"), score(4, 0, 0, matcher="paper", setting="B")]
+    records = [record("mine", "001", scores=scores)]
+    for settings, wanted in ((["B", "A"], 50), (["A", "B"], 50), (["B"], None)):
+        facts = manifest(models=[("mine", "GPT-4o")], seeds=[0], settings=settings)
+        table = published_frame(run_of(records, facts)).set_index(["level", "metric"])
+        assert len(table) == 15
+        if wanted is None:
+            assert table["ours"].isna().all()
+            assert table["difference"].isna().all()
+            assert (table["n"] == 0).all()
+        else:
+            assert table.loc[("2", "precision"), "ours"] == wanted
+
+
+@pytest.mark.parametrize(
+    ("levels", "has_overall"),
+    [([1, 2], False), ([3], False), ([1, 3, 4], False), ([2, 3, 4], True), ([1, 2, 3, 4], True)],
+)
+def test_overall_is_compared_where_the_paper_s_levels_were_run(
+    levels: list[int], has_overall: bool
+) -> None:
+    facts = manifest(models=[("mine", "GPT-4o")], seeds=[0], levels=levels)
+    records = [
+        record("mine", scene, scores=[score(1, 1, 3, matcher="paper")])
+        for scene in ("001", "002", "003")
+    ]
+    run = run_of(records, facts)
+    table = published_frame(run)
+    overall = table[table["level"] == "overall"]
+    assert overall["ours"].notna().all() == has_overall
+    note = "Overall is not compared: the paper's pools the levels 2, 3 and 4."
+    assert (note in published_view(table, run).notes) != has_overall
+
+
+def test_models_without_a_published_row_are_listed() -> None:
+    facts = manifest(
+        models=[("mine", "GPT-4o"), ("gpt-4.1", "GPT-4.1"), "my-claude"],
+        settings=["B"],
+    )
+    run = run_of([], facts)
+    table = published_frame(run)
+    assert table["model"].unique().tolist() == ["mine"]
+    view = published_view(table, run)
+    assert len(view.rows) == 3
+    assert view.notes[:3] == comparison_notes(table, run.design)
+    assert view.notes[:3] == (
+        f"Largest absolute difference of 0 cells: {NO_VALUE}.",
+        "No published row: gpt-4.1, my-claude.",
+        "The paper's setting, A, was not run.",
+    )
+
+
 def test_a_run_without_published_models_has_nothing_to_compare() -> None:
-    table = published_frame(run_of([record()], manifest()))
+    run = run_of([record()], manifest())
+    table = published_frame(run)
     assert table.empty
     assert largest_differences(table).empty
+    assert comparison_notes(table, run.design)[1] == "No published row: alpha, beta."
+    assert published_view(table, run).rows == ()
 
 
 def test_the_published_numbers_come_out_of_the_official_counts(official_dir: Path) -> None:

@@ -6,9 +6,10 @@ import pandas as pd
 from hypothesis import given
 
 from phyblock.report import coverage_frame
+from phyblock.report.outcomes import HEADINGS, OUTCOMES
 from phyblock.report.text_table import NO_VALUE
 from phyblock.report.views import coverage_view
-from tests.report.factory import OUTCOMES, laws, manifest, record, record_lists, run_of
+from tests.report.factory import laws, manifest, record, record_lists, run_of
 
 
 @laws
@@ -32,7 +33,7 @@ def test_sums_are_of_what_is_known_and_say_how_much_is_not() -> None:
     table = coverage_frame(run_of(records, manifest())).set_index("model")
     alpha = table.loc["alpha"]
     assert (alpha["prompt_tokens"], alpha["completion_tokens"]) == (30, 12)
-    assert (alpha["tokens_unknown"], alpha["cost_unknown"]) == (1, 1)
+    assert (alpha["tokens_unknown"], alpha["cost_unknown"]) == (1, 0)
     assert alpha["cost_usd"] == 0.75
     assert alpha["latency_s"] == 1.5
     assert (alpha["cached"], alpha["attempts"], alpha["replies"]) == (1, 2, 3)
@@ -60,6 +61,38 @@ def test_an_unknown_cost_is_never_shown_as_zero() -> None:
         "dear": "$1,234.50",
         "unasked": NO_VALUE,
     }
+
+
+def test_replies_from_the_cache_cost_this_run_nothing() -> None:
+    facts = manifest(models=["mixed", "cached", "unpriced"])
+    records = [
+        record("mixed", scene="000", cost_usd=0.5),
+        record("mixed", scene="001", cost_usd=0.25, cached=True, attempts=0),
+        record("cached", cost_usd=0.25, cached=True, attempts=0),
+        record("unpriced", scene="000", cached=True, attempts=0),
+        record("unpriced", scene="001"),
+    ]
+    run = run_of(records, facts)
+    table = coverage_frame(run)
+    costs = table.set_index("model")[["cost_usd", "cost_unknown"]]
+    assert costs.loc["mixed"].tolist() == [0.5, 0]
+    assert costs.loc["cached"].tolist() == [0.0, 0]
+    assert costs["cost_usd"].isna().tolist() == [False, False, True]
+    assert costs.loc["unpriced", "cost_unknown"] == 1
+    assert "Cost is what this run paid; replies from the cache cost it nothing." in (
+        coverage_view(table, run).notes
+    )
+
+
+def test_requests_say_which_they_are_where_some_led_to_no_reply() -> None:
+    note = "Requests are those that led to a reply, with their retries."
+    for outcome, said in (("ok", False), ("missing", False), ("api_error", True)):
+        run = run_of([record(scene="000", attempts=2), record("beta", outcome=outcome)], manifest())
+        assert (note in coverage_view(coverage_frame(run), run).notes) == said
+
+
+def test_every_outcome_has_a_heading() -> None:
+    assert tuple(HEADINGS) == OUTCOMES
 
 
 def test_columns_that_tell_nothing_are_not_shown() -> None:

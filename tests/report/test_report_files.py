@@ -130,6 +130,16 @@ def test_only_the_tables_that_the_suite_asks_for_are_written(tmp_path: Path) -> 
     assert {file.stem for file in written.files} == {"errors", "coverage"}
 
 
+@pytest.mark.parametrize(("asked", "made"), [(["table1"], {"table1"}), ([], set())])
+def test_tables_asked_for_by_name_are_written_whatever_the_suite_says(
+    tmp_path: Path, asked: list[str], made: set[str]
+) -> None:
+    folder = write_run(tmp_path / "run", [], manifest(models=[("alpha", "GPT-4o")]))
+    written = write_tables(folder, asked)
+    assert set(written.frames) == {"coverage", *made}
+    assert {file.stem for file in written.folder.iterdir()} == {"coverage", *made}
+
+
 def test_csv_files_hold_numbers_and_empty_cells(tmp_path: Path) -> None:
     folder = write_run(tmp_path / "run", records_of("alpha"), manifest())
     written = write_tables(folder)
@@ -167,7 +177,7 @@ def test_the_largest_difference_is_said(tmp_path: Path) -> None:
     written = write_tables(write_run(tmp_path / "run", records_of("alpha"), facts))
     largest = written.frames["published"]["difference"].abs().max()
     text = (written.folder / "published.md").read_text("utf-8")
-    assert f"Largest absolute difference of 15 cells: {largest:.3f};" in text
+    assert f"Largest absolute difference of 15 cells: {largest:.3f}." in text
 
 
 @laws

@@ -12,8 +12,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import StoreError
-from phyblock.report import frames_from, load_run
-from tests.report.factory import laws, manifest, record, record_lists, score, write_run
+from phyblock.report import load_run
+from tests.report.factory import (
+    frames_from,
+    laws,
+    manifest,
+    record,
+    record_lists,
+    score,
+    write_run,
+)
 
 
 def test_records_have_one_row_a_sample_and_scores_one_a_score(tmp_path: Path) -> None:
@@ -95,12 +103,21 @@ def test_a_cut_last_line_is_passed_over_and_counted(
 ) -> None:
     folder = write_run(tmp_path_factory.mktemp("runs") / "run", [record()], manifest())
     line = json.dumps(record("beta"))
-    kept = data.draw(st.integers(1, len(line)))
+    kept = data.draw(st.integers(1, len(line) - 1))
     with (folder / "records.jsonl").open("a", encoding="utf-8") as file:
         file.write(line[:kept])
     run = load_run(folder)
     assert run.records["model"].tolist() == ["alpha"]
     assert run.is_cut
+
+
+def test_a_whole_last_line_without_its_end_is_read(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", [record()], manifest())
+    with (folder / "records.jsonl").open("a", encoding="utf-8") as file:
+        file.write(json.dumps(record("beta")))
+    run = load_run(folder)
+    assert run.records["model"].tolist() == ["alpha", "beta"]
+    assert not run.is_cut
 
 
 def test_a_whole_file_has_no_cut_line(tmp_path: Path) -> None:
@@ -167,9 +184,17 @@ def test_all_that_a_manifest_lacks_is_said_at_once(tmp_path: Path) -> None:
     }
 
 
+def test_models_of_one_name_are_refused(tmp_path: Path) -> None:
+    facts = manifest(models=["alpha", "beta", "alpha"])
+    with pytest.raises(StoreError) as caught:
+        load_run(write_run(tmp_path / "run", [record()], facts))
+    (problem,) = caught.value.problems
+    assert (problem.field, problem.message) == ("models", "names models twice: alpha")
+
+
 def test_reading_runs_needs_no_simulator_and_no_network() -> None:
     code = (
-        "import sys, phyblock.report\n"
+        "import sys, phyblock.report.load, phyblock.report.write\n"
         "heavy = {'litellm', 'pybullet', 'rich', 'matplotlib', 'aiohttp'} & set(sys.modules)\n"
         "sys.exit(repr(heavy) if heavy else 0)"
     )
