@@ -13,7 +13,10 @@ from phyblock.run.plan import RunPlan
 
 __all__ = ["show_estimate"]
 
-_HEADINGS = ("model", "kind", "samples", "done", "cached", "calls", "tokens in", "out", "cost")
+_HEADINGS = (
+    *("model", "kind", "samples", "done", "cached", "calls"),
+    *("tokens in", "out", "cost", "at most"),
+)
 
 
 def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> None:
@@ -34,10 +37,11 @@ def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> 
             f"{row.prompt_tokens:,}",
             f"{row.completion_tokens:,}",
             _dollars(row.cost_usd) if row.calls else NO_VALUE,
+            _dollars(row.most_usd) if row.calls else NO_VALUE,
         )
         for row in rows
     ]
-    console.print(plain_table(_HEADINGS, cells, numbers=7))
+    console.print(plain_table(_HEADINGS, cells, numbers=8))
     calls = sum(row.calls for row in rows)
     known = sum(row.cost_usd or 0.0 for row in rows)
     unknown = [row.model for row in rows if row.calls and row.cost_usd is None]
@@ -51,8 +55,8 @@ def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> 
     console.print(text, soft_wrap=True, markup=False)
     if calls:
         console.print(
-            "Tokens are estimates: 4 characters a token, pictures by OpenAI's tile rule, replies "
-            "of usual length.",
+            "Tokens are estimates: 4 characters a token, pictures by OpenAI's rules, replies of "
+            "usual length; at most: each as long as it can be.",
             style="dim",
             soft_wrap=True,
         )

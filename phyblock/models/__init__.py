@@ -13,6 +13,7 @@ from phyblock.models.cost import (
     Estimate,
     cost_usd,
     estimate,
+    most_usd,
     price_of,
 )
 from phyblock.models.events import ModelEvent, Observer
@@ -50,6 +51,7 @@ __all__ = [
     "build_model",
     "cost_usd",
     "estimate",
+    "most_usd",
     "price_of",
     "read_raw_reply",
     "reply_key",

@@ -19,12 +19,14 @@ from phyblock.errors import BudgetReachedError, Problem, SpecError
 from phyblock.models.base import Image, Request, Usage
 from phyblock.models.config import ModelConfig, Price
 from phyblock.models.payload import wire_params
+from phyblock.models.picture_tokens import picture_tokens
 
 __all__ = [
     "Budget",
     "Estimate",
     "cost_usd",
     "estimate",
+    "most_usd",
     "price_of",
     "require_price",
 ]
@@ -32,6 +34,8 @@ __all__ = [
 _PRICE_MAP = "model_prices_and_context_window_backup.json"
 _CHARS_PER_TOKEN = 4
 _TYPICAL_REPLY_TOKENS = 500
+_TYPICAL_THINKING_TOKENS = 4_000
+_ROOM_TO_THINK_TOKENS = 8_192
 _LONGEST_REPLY_TOKENS = 32_768
 _PROMPT_MARGIN = 1.5
 _PER_MILLION = 1_000_000
@@ -41,8 +45,9 @@ _PER_MILLION = 1_000_000
 class Estimate:
     """Tokens of a call that was not made yet.
 
-    `prompt_tokens`: a token per four characters, and pictures by OpenAI's rule for detailed
-    pictures; `completion_tokens`: a usual reply, `most_completion_tokens` the longest possible.
+    `prompt_tokens`: a token per four characters, and pictures by OpenAI's rules for detailed
+    pictures; `completion_tokens`: a usual reply, with thoughts where the model is told to think or
+    has room for them; `most_completion_tokens`: the longest possible.
     """
 
     prompt_tokens: int
@@ -92,25 +97,31 @@ def cost_usd(price: Price | None, usage: Usage) -> float | None:
     return spent / _PER_MILLION
 
 
+def most_usd(price: Price, expected: Estimate, ratio: float = 1.0) -> float:
+    """The most US dollars that a call can cost, its prompt `ratio` times its estimate.
+
+    There is a margin on the prompt, as its tokens are estimated.
+    """
+    prompt = expected.prompt_tokens * _PROMPT_MARGIN * ratio
+    spent = prompt * price.input_usd + expected.most_completion_tokens * price.output_usd
+    return spent / _PER_MILLION
+
+
 def estimate(config: ModelConfig, request: Request) -> Estimate:
     """Tokens that the request would take."""
     parts = [part for message in request.messages for part in message.parts]
     text = sum(len(part) for part in parts if isinstance(part, str))
-    pictures = sum(_picture_tokens(part) for part in parts if isinstance(part, Image))
+    pictures = sum(picture_tokens(config.id, part) for part in parts if isinstance(part, Image))
     params = wire_params(config, request)
     given = params.get("max_completion_tokens", params.get("max_tokens"))
     known = _map_entry(config).get("max_output_tokens")
     most = next((n for n in (given, known) if isinstance(n, int)), _LONGEST_REPLY_TOKENS)
     prompt = math.ceil(text / _CHARS_PER_TOKEN) + pictures
-    return Estimate(prompt, min(_TYPICAL_REPLY_TOKENS, most), most)
-
-
-def _picture_tokens(image: Image) -> int:
-    """OpenAI's rule: fit into 2048 x 2048, short side to 768, 85 and 170 a tile of 512."""
-    width, height = float(image.width_px), float(image.height_px)
-    scale = min(1.0, 2048 / max(width, height), 768 / min(width, height))
-    tiles = math.ceil(width * scale / 512) * math.ceil(height * scale / 512)
-    return 85 + 170 * tiles
+    thinks = params.get("reasoning_effort", "none") != "none" or (
+        isinstance(given, int) and given > _ROOM_TO_THINK_TOKENS
+    )
+    usual = _TYPICAL_THINKING_TOKENS if thinks else _TYPICAL_REPLY_TOKENS
+    return Estimate(prompt, min(usual, most), most)
 
 
 @functools.cache
@@ -161,10 +172,8 @@ class Budget:
         return self._max_usd
 
     def most_usd(self, model: str, price: Price, expected: Estimate) -> float:
-        """The most that a call can cost, with a margin on its prompt."""
-        prompt = expected.prompt_tokens * _PROMPT_MARGIN * self._ratio.get(model, 1.0)
-        spent = prompt * price.input_usd + expected.most_completion_tokens * price.output_usd
-        return spent / _PER_MILLION
+        """The most that a call can cost, as far as the model is known by now."""
+        return most_usd(price, expected, self._ratio.get(model, 1.0))
 
     async def reserve(self, usd: float) -> int:
         """Hold `usd`, waiting for calls under way to settle; returns the reservation's number.

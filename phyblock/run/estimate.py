@@ -6,7 +6,17 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from phyblock.models import Price, ReplyCache, Request, Usage, cost_usd, price_of, reply_key
+from phyblock.models import Estimate as CallEstimate
+from phyblock.models import (
+    Price,
+    ReplyCache,
+    Request,
+    Usage,
+    cost_usd,
+    most_usd,
+    price_of,
+    reply_key,
+)
 from phyblock.models import estimate as estimate_call
 from phyblock.resources import reply_cache_file
 from phyblock.run.models import PlannedModel
@@ -20,7 +30,7 @@ __all__ = ["Estimate", "estimate"]
 
 @dataclass
 class Estimate:
-    """What one model would take; `cost_usd` is None where the price is not known.
+    """What one model would take; dollars are None where the price is not known.
 
     `done` samples have a record in the folder, `cached` ones a reply in the cache, `calls` are
     left to make (none for recordings and baselines, which answer here).
@@ -35,11 +45,20 @@ class Estimate:
     calls: int = 0
     prompt_tokens: int = 0
     completion_tokens: int = 0
+    most_completion_tokens: int = 0
 
     @property
     def cost_usd(self) -> float | None:
         """Dollars of the calls, at the price of today."""
         return cost_usd(self.price, Usage(self.prompt_tokens, self.completion_tokens))
+
+    @property
+    def most_usd(self) -> float | None:
+        """Dollars if every reply were as long as it can be and no call had to be repeated."""
+        if self.price is None:
+            return None
+        tokens = (self.prompt_tokens, self.completion_tokens, self.most_completion_tokens)
+        return most_usd(self.price, CallEstimate(*tokens))
 
 
 def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
@@ -82,3 +101,4 @@ def _add(
             row.calls += 1
             row.prompt_tokens += expected.prompt_tokens
             row.completion_tokens += expected.completion_tokens
+            row.most_completion_tokens += expected.most_completion_tokens

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -25,6 +26,7 @@ from phyblock.models import (
     build_model,
     cost_usd,
     estimate,
+    most_usd,
     price_of,
 )
 from tests.models.factory import CANDIDATES, SCENE, ask, make_model, make_request, run
@@ -91,6 +93,57 @@ def request_of(*parts: str | Image, **params: object) -> Request:
 def test_pictures_are_counted_by_tiles(width: int, height: int, tokens: int) -> None:
     image = Image(b"", "goal", width, height)
     assert estimate(config("x/y"), request_of(image)).prompt_tokens == tokens
+
+
+@pytest.mark.parametrize(
+    ("model_id", "width", "height", "tokens"),
+    [
+        ("openai/gpt-4o-mini-2024-07-18", 512, 512, 2833 + 5667),
+        ("openrouter/openai/gpt-4o-mini", 1024, 1024, 2833 + 4 * 5667),
+        ("openai/gpt-4o-2024-08-06", 1024, 1024, 765),
+        ("openai/gpt-4.1-mini", 1024, 1024, 1659),
+        ("openai/o4-mini", 2048, 2048, 2642),
+        ("openai/gpt-4.1-nano", 64, 33, 10),
+    ],
+)
+def test_a_picture_counts_as_its_model_counts_it(
+    model_id: str, width: int, height: int, tokens: int
+) -> None:
+    image = Image(b"", "goal", width, height)
+    assert estimate(config(model_id), request_of(image)).prompt_tokens == tokens
+
+
+@pytest.mark.parametrize(
+    ("params", "tokens"),
+    [
+        ({}, 500),
+        ({"max_tokens": 300}, 300),
+        ({"max_tokens": 8192}, 500),
+        ({"max_tokens": 16384}, 4000),
+        ({"reasoning_effort": "low"}, 4000),
+        ({"reasoning_effort": "none"}, 500),
+        ({"reasoning_effort": "high", "max_tokens": 1000}, 1000),
+    ],
+)
+def test_a_model_that_thinks_is_expected_to_say_more(params: dict[str, Any], tokens: int) -> None:
+    assert estimate(config("x/y"), request_of("a", **params)).completion_tokens == tokens
+
+
+@given(
+    st.lists(st.tuples(st.integers(1, 9999), st.integers(1, 500), st.integers(500, 9999))),
+    st.floats(0, 100),
+    st.floats(0, 100),
+)
+def test_the_most_of_many_calls_is_the_sum_and_above_the_usual(
+    calls: list[tuple[int, int, int]], input_usd: float, output_usd: float
+) -> None:
+    price = Price(input_usd, output_usd)
+    whole = Estimate(*(sum(call[i] for call in calls) for i in range(3)))
+    together = sum(most_usd(price, Estimate(*call)) for call in calls)
+    assert most_usd(price, whole) == pytest.approx(together)
+    usual = cost_usd(price, whole.usage)
+    assert usual is not None
+    assert most_usd(price, whole) >= usual
 
 
 def test_the_longest_reply_is_what_was_asked_for_or_what_the_model_can() -> None:

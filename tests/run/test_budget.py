@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pytest
@@ -64,12 +65,15 @@ def test_nothing_is_asked_where_not_even_one_call_fits(workspace: Workspace) -> 
 
 def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace: Workspace) -> None:
     with Running(OpenAIChat()) as running:
-        workspace.write_models(running.url, "alpha", price=PRICE)
+        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=9000)
         workspace.write_suite(models=["alpha", "random"], seeds=[0, 1])
         before = workspace.files()
         done = workspace.run("--dry-run")
         assert done.code == 0
         assert "10 calls, about $" in done.out
+        usual, most = re.findall(r"\$([\d.]+)", done.out)[:2]
+        assert 10 * 4000 * PRICE["output"] / 1e6 < float(usual) < 5
+        assert 10 * 9000 * PRICE["output"] / 1e6 < float(most) < 10
         assert running.server.requests == 0
         assert workspace.files() == before
 
