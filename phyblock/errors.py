@@ -101,7 +101,8 @@ class ModelError(PhyblockError):
     def __init__(self, message: str, *, status: int | None = None) -> None:
         self.status = status
         self.billed_usd: float | None = None
-        super().__init__(message)
+        # A server's words end up in terminals: no escape codes, no right-to-left marks.
+        super().__init__("".join(c if c.isprintable() else " " for c in message))
 
 
 class RetryableError(ModelError):

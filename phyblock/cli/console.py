@@ -15,7 +15,7 @@ from rich.text import Text
 
 from phyblock.report import TextTable
 
-__all__ = ["make_console", "plain_table", "print_view", "shown_path", "width_of"]
+__all__ = ["counted", "make_console", "plain_table", "print_view", "shown_path", "width_of"]
 
 _PLAIN_WIDTH = 160
 _HEADING_WIDTH = 12
@@ -23,9 +23,10 @@ _HEADING_WIDTH = 12
 
 def make_console(*, stderr: bool = False) -> Console:
     """The console; wide enough for whole tables when the output is no terminal."""
-    console = Console(stderr=stderr, highlight=False)
+    # Without markup: paths, names and what servers say may hold brackets.
+    console = Console(stderr=stderr, highlight=False, markup=False)
     if not console.is_terminal and "COLUMNS" not in os.environ:
-        console = Console(stderr=stderr, highlight=False, width=_PLAIN_WIDTH)
+        console.width = _PLAIN_WIDTH
     return console
 
 
@@ -39,10 +40,13 @@ def print_view(console: Console, view: TextTable) -> None:
         collapse_padding=True,
     )
     for heading, column in zip(_headings(view), view.columns, strict=True):
+        names = not table.columns
         table.add_column(
             Text(heading),
             justify="left" if column.is_text else "right",
-            no_wrap=not column.is_text,
+            no_wrap=names or not column.is_text,
+            # Whatever is cut in a narrow terminal, it is not the name of a model.
+            min_width=max((len(row[0]) for row in view.rows), default=0) if names else None,
             vertical="bottom",
         )
     for row in view.rows:
@@ -56,10 +60,10 @@ def print_view(console: Console, view: TextTable) -> None:
 def width_of(view: TextTable) -> int:
     """Characters that a table takes when nothing in it is cut."""
     widths = (
-        max(len(column.name), *(len(row[i]) for row in view.rows), 0)
-        for i, column in enumerate(view.columns)
+        max(*(len(line) for line in heading.splitlines()), *(len(row[i]) for row in view.rows), 0)
+        for i, heading in enumerate(_headings(view))
     )
-    return sum(width + 2 for width in widths) + 2
+    return sum(width + 2 for width in widths)
 
 
 def plain_table(headings: Sequence[str], rows: Sequence[Sequence[str]], *, numbers: int) -> Table:
@@ -67,10 +71,21 @@ def plain_table(headings: Sequence[str], rows: Sequence[Sequence[str]], *, numbe
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for position, heading in enumerate(headings):
         right = position >= len(headings) - numbers
-        table.add_column(heading, justify="right" if right else "left", overflow="fold")
+        table.add_column(
+            heading,
+            justify="right" if right else "left",
+            no_wrap=position == 0,
+            min_width=max((len(row[0]) for row in rows), default=0) if position == 0 else None,
+            overflow="fold",
+        )
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))
     return table
+
+
+def counted(number: int, noun: str) -> str:
+    """A number with its noun: `1 call`, `2 calls`."""
+    return f"{number:,} {noun}" + ("" if number == 1 else "s")
 
 
 def shown_path(path: Path) -> str:

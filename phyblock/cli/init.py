@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 from pathlib import Path
 
@@ -49,7 +50,7 @@ def command(folder: Path) -> None:
         problem = Problem(str(folder), f"cannot be written: {error.strerror}")
         raise StoreError(problem) from error
     console.print(
-        f"\nNext: cd {shown_path(folder)} && phyblock run benchmarks/quick.yaml\n"
+        f"\nNext: cd {shlex.quote(shown_path(folder))} && phyblock run benchmarks/quick.yaml\n"
         "Add a model with one line in models.yaml, then name it under models in the suite.",
         markup=False,
     )

@@ -6,7 +6,7 @@ import asyncio
 
 import click
 
-from phyblock.cli.console import make_console, plain_table, shown_path
+from phyblock.cli.console import counted, make_console, plain_table, shown_path
 from phyblock.cli.files import find_models_file
 from phyblock.errors import ModelError, Problem, SpecError
 from phyblock.models import ModelConfig, api_key_status, price_of
@@ -16,6 +16,9 @@ from phyblock.run.models import to_config
 from phyblock.specs import BASELINES, ModelSpec, SuiteSpec, did_you_mean, load_models
 
 __all__ = ["command"]
+
+_WIDE = 130
+"""Characters from which kinds and prices fit beside names, ids and keys."""
 
 
 @click.group("models", invoke_without_command=True)
@@ -30,9 +33,15 @@ def command(ctx: click.Context, models_file: str | None) -> None:
     console = make_console()
     names = [*BASELINES, *ctx.obj]
     rows = [_row(name, _config(name, ctx.obj)) for name in names]
-    headings = ("model", "kind", "id", "key", "$/M in", "$/M out")
-    console.print(plain_table(headings, rows, numbers=2))
-    console.print(f"{len(ctx.obj)} models in {shown_path(path)}", soft_wrap=True, markup=False)
+    if console.width < _WIDE:
+        rows = [(name, model_id, key) for name, _, model_id, key, *_ in rows]
+        console.print(plain_table(("model", "id", "key"), rows, numbers=0))
+    else:
+        headings = ("model", "kind", "id", "key", "$/M in", "$/M out")
+        console.print(plain_table(headings, rows, numbers=2))
+    console.print(
+        f"{counted(len(ctx.obj), 'model')} in {shown_path(path)}", soft_wrap=True, markup=False
+    )
 
 
 @command.command("check")
@@ -47,16 +56,19 @@ def check(known: dict[str, ModelSpec], name: str) -> int:
     console = make_console()
     config = _config(name, known)
     if config.kind != "litellm":
-        console.print(f"{name} is {config.kind}: it makes no calls.", markup=False)
+        console.print(f"{name} is a {config.kind}: it makes no calls.", markup=False)
         return 0
     try:
         reply = asyncio.run(check_model(config))
     except ModelError as error:
-        console.print(f"[red]{name} does not answer:[/red] ", end="")
-        console.print(str(error), markup=False)
+        console.print(f"{name} does not answer:", style="red", end=" ")
+        console.print(str(error))
+        return 1
+    if not reply.text.strip():
+        console.print(f"{name} answered with nothing (it ended by: {reply.finish})", style="red")
         return 1
     tokens = f"{reply.usage.prompt_tokens or '?'} + {reply.usage.completion_tokens or '?'} tokens"
-    cost = "price unknown" if reply.cost_usd is None else f"${reply.cost_usd:.6f}"
+    cost = "cost unknown" if reply.cost_usd is None else f"${reply.cost_usd:.6f}"
     told = (
         f"{name} answers: {reply.text.strip()[:80]!r} in {reply.latency_s:.1f} s, {tokens}, {cost}"
     )

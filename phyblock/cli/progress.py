@@ -26,6 +26,7 @@ from phyblock.run.events import (
 __all__ = ["ProgressView"]
 
 _LINE_EVERY_S = 10.0
+_REMARKS = 6
 
 
 class ProgressView:
@@ -73,18 +74,20 @@ class ProgressView:
             tally.retries += event.kind == "retry"
             tally.notice = event.text
         elif isinstance(event, ModelStopped):
-            self._tallies[event.model].notice = "stopped"
-            self._console.print(f"[red]{event.model} stopped:[/red] ", end="")
-            self._console.print(event.reason, markup=False, highlight=False)
+            self._tallies[event.model].notice = f"stopped: {event.reason}"
+            self._console.print(f"{event.model} stopped:", style="red", end=" ")
+            self._console.print(event.reason)
         elif isinstance(event, Stopping):
             self._status = self._stopping_text(event)
             if self._live is None:
                 self._console.print(self._status, markup=False)
 
     @property
-    def spent_usd(self) -> float:
-        """Dollars spent by this command, as far as prices are known."""
-        return sum(tally.cost_usd for tally in self._tallies.values())
+    def cost_text(self) -> str:
+        """What the whole run cost so far, as far as prices are known."""
+        spent = sum(tally.cost_usd for tally in self._tallies.values())
+        unknown = any(tally.unpriced for tally in self._tallies.values())
+        return f"${spent:,.2f}" + (" and replies whose cost is not known" if unknown else "")
 
     def _stopping_text(self, event: Stopping) -> str:
         if not event.in_flight:
@@ -118,19 +121,36 @@ class ProgressView:
             # The bar alone would not end its line, and what follows would be cut off.
             Padding(ProgressBar(total=total, completed=done, width=None), 0),
             Text(self._summary()),
-            self._table(),
         ]
+        # Above the table: a screen that is too low for all models shows it all the same.
         if self._status:
             parts.append(Text(self._status, style="yellow"))
-        return Panel(Group(*parts), title=self._title, title_align="left", border_style="dim")
+        parts += [self._table(), *self._remarks()]
+        return Panel(
+            Group(*parts),
+            title=self._title,
+            title_align="left",
+            border_style="dim",
+            # The terminal writes ^C behind the last column and would wrap a full line.
+            width=self._console.width - 3,
+        )
+
+    def _remarks(self) -> list[Text]:
+        """A cut line for each model that has something to say: failures, the last notice."""
+        lines = []
+        for name, tally in self._tallies.items():
+            said = [tally.failure_text] if tally.failures else []
+            said += [tally.notice] if tally.notice and tally.done < tally.expected else []
+            if said:
+                text = f"{name}: {'; '.join(said)}"
+                lines.append(Text(text, style="yellow", no_wrap=True, overflow="ellipsis"))
+        return lines[:_REMARKS]
 
     def _table(self) -> Table:
         table = Table(box=None, pad_edge=False, header_style="dim", padding=(0, 2, 0, 0))
-        table.add_column("model", no_wrap=True)
+        table.add_column("model", no_wrap=True, min_width=max(map(len, self._tallies), default=0))
         for name in ("done", "F1 %", "tokens", "cost", "cached", "retries"):
             table.add_column(name, justify="right", no_wrap=True)
-        table.add_column("failures")
-        table.add_column("", style="yellow")
         for name, tally in self._tallies.items():
             table.add_row(
                 name,
@@ -140,9 +160,6 @@ class ProgressView:
                 tally.cost_text,
                 f"{tally.cached:,}",
                 f"{tally.retries:,}",
-                tally.failure_text,
-                # Text, because what a provider says may look like markup.
-                Text(tally.notice if tally.done < tally.expected else ""),
             )
         return table
 

@@ -12,11 +12,12 @@ import click
 from rich.console import Console
 
 from phyblock import report
-from phyblock.cli.console import make_console, shown_path
+from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.estimate_view import show_estimate
 from phyblock.cli.files import find_models_file, find_suite
 from phyblock.cli.progress import ProgressView
 from phyblock.cli.summary import print_summary
+from phyblock.errors import Problem, SpecError
 from phyblock.resources import bundled
 from phyblock.run.estimate import Estimate, estimate
 from phyblock.run.execute import Executor, RunResult
@@ -50,6 +51,7 @@ _INTERRUPTED = 130
 @click.option("--models-file", metavar="FILE", help="Models file instead of models.yaml.")
 @click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
 @click.option("--dry-run", is_flag=True, help="Print calls, tokens and dollars; call nothing.")
+@click.option("--retry-failed", is_flag=True, help="Ask again where a request was rejected.")
 @click.option("--yes", is_flag=True, help="Do not ask before spending money.")
 def command(
     suite: str,
@@ -60,19 +62,19 @@ def command(
     models_file: str | None,
     no_cache: bool,
     dry_run: bool,
+    retry_failed: bool,
     yes: bool,
 ) -> int:
-    """Run SUITE, a YAML file or the name of a bundled suite (quick, full, paper-table1).
+    """Run SUITE: a YAML file, or a bundled suite (quick, full, paper-table1, paper-random).
 
     Records are kept as they come; the same command again goes on where it stopped and asks
     nothing twice.
     """
     console = make_console()
     path = find_suite(suite)
-    only = [name.strip() for name in models.split(",") if name.strip()] if models else []
     loaded = load_suite(path, sets, data_dir=bundled("benchmarks", "data"))
     known = load_models(find_models_file(models_file, path))
-    plan = make_plan(loaded, known, only=only, limit=limit)
+    plan = make_plan(loaded, known, only=_names(models), limit=limit)
     folder = out or Path("results") / plan.folder_name
     if dry_run:
         show_estimate(console, plan, estimate(plan, folder, use_cache=not no_cache))
@@ -81,17 +83,29 @@ def command(
     if not yes and sys.stdin.isatty() and not _agreed(console, plan, folder, not no_cache):
         console.print("Nothing was asked.")
         return 1
-    result = asyncio.run(_run(console, plan, folder, use_cache=not no_cache))
-    print_summary(console, report.write_tables(folder))
-    return _conclude(console, plan, folder, result)
+    view = ProgressView(console, plan.suite.name)
+    session = Session(plan, folder, view, use_cache=not no_cache, retry_failed=retry_failed)
+    result = asyncio.run(_run(session, view))
+    print_summary(console, report.write_tables(folder, plan.suite.tables))
+    return _conclude(console, folder, result, view.cost_text)
 
 
-async def _run(console: Console, plan: RunPlan, folder: Path, *, use_cache: bool) -> RunResult:
+def _names(models: str | None) -> list[str]:
+    if models is None:
+        return []
+    names = [name.strip() for name in models.split(",")]
+    if not all(names):
+        allowed = "names separated by single commas"
+        raise SpecError(Problem("--models", "holds an empty name", "", repr(models), allowed))
+    return names
+
+
+async def _run(opened: Session, view: ProgressView) -> RunResult:
     loop = asyncio.get_running_loop()
     whole = asyncio.current_task()
     assert whole is not None
-    with ProgressView(console, plan.suite.name) as view:
-        async with Session(plan, folder, view, use_cache=use_cache) as session:
+    with view:
+        async with opened as session:
 
             def interrupted() -> None:
                 if session.executor.stopping:
@@ -122,22 +136,31 @@ def _may_cost(row: Estimate) -> bool:
     return row.calls > 0 and (row.cost_usd is None or row.cost_usd > 0)
 
 
-def _conclude(console: Console, plan: RunPlan, folder: Path, result: RunResult) -> int:
-    total = plan.samples_per_model * len(plan.models)
+def _conclude(console: Console, folder: Path, result: RunResult, cost: str) -> int:
     where = shown_path(folder)
     for name, reason in result.stopped.items():
-        console.print(f"[red]{name}[/red] was stopped: ", end="")
-        console.print(reason, markup=False)
-    if not result.left:
-        text = f"All {total:,} samples are done. The run is in {where}"
-        console.print(text, soft_wrap=True, markup=False)
-        return 0
+        console.print(f"{name} was stopped:", style="red", end=" ")
+        console.print(reason, soft_wrap=True)
+    done = (
+        f"All {result.samples:,}"
+        if not result.left
+        else f"{result.settled:,} of {result.samples:,}"
+    )
     reason = f" ({result.reason})" if result.reason else ""
     console.print(
-        f"{total - result.left:,} of {total:,} samples are done{reason}. The run is in {where}",
+        f"{done} samples are done{reason}. Cost so far: {cost}. The run is in {where}",
         soft_wrap=True,
-        markup=False,
     )
-    again = shlex.join(["phyblock", *sys.argv[1:]])
-    console.print(f"To go on, give the same command again: {again}", soft_wrap=True, markup=False)
-    return _INTERRUPTED if result.reason == Executor.INTERRUPTED else 1
+    if result.failed:
+        rejected = (
+            f"{counted(result.failed, 'request')} rejected for good; when the cause is mended,"
+        )
+        console.print(f"{rejected} ask again with --retry-failed", style="red", soft_wrap=True)
+    if result.left:
+        again = shlex.join(["phyblock", *sys.argv[1:]])
+        how = "raise limits.max_cost_usd" if "max_cost_usd" in reason else "give"
+        how += " and give the same command again" if "raise" in how else " the same command again"
+        console.print(f"To go on, {how}: {again}", soft_wrap=True)
+    if result.reason == Executor.INTERRUPTED and result.left:
+        return _INTERRUPTED
+    return 1 if result.left or result.failed else 0

@@ -32,7 +32,10 @@ def print_summary(console: Console, written: TablesWritten) -> None:
     if (table1 := views.get("table1")) is not None:
         _print_table1(console, table1)
     if "errors" in views:
-        print_view(console, _overall(views["errors"]))
+        errors = _overall(views["errors"])
+        if width_of(errors) > console.width:
+            errors = _without(errors, ("Plans", "Wrong steps"))
+        print_view(console, errors)
     coverage = written.frames["coverage"]
     if (coverage["ok"] < coverage["expected"]).any():
         print_view(console, _answered(views["coverage"]))
@@ -48,6 +51,10 @@ def _print_table1(console: Console, table1: TextTable) -> None:
         # The last note is about the labels of the columns that were left out.
         note = "F1 alone, to fit; precision and recall are in tables/table1.md."
         table1 = replace(table1, notes=(note, *table1.notes[:-1]))
+    if width_of(table1) > console.width:
+        table1 = replace(
+            table1, rows=tuple(tuple(c.partition(" ± ")[0] for c in row) for row in table1.rows)
+        )
     print_view(console, table1)
 
 

@@ -47,12 +47,12 @@ class Tally:
         self.tokens += (usage["prompt_tokens"] or 0) + (usage["completion_tokens"] or 0)
         if reply["cost_usd"] is None:
             self.unpriced += 1
-        elif fresh and not reply["cached"]:
+        elif not reply["cached"]:
             self.cost_usd += reply["cost_usd"]
 
     @property
     def cost_text(self) -> str:
-        """Dollars spent by this command, or that the price is not known."""
+        """Dollars the run spent on this model, or that the price is not known."""
         if self.unpriced and self.unpriced == self.done:
             return "unknown"
         return f"${self.cost_usd:.2f}" + (" + unknown" if self.unpriced else "")

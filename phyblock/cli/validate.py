@@ -7,10 +7,10 @@ from pathlib import Path
 
 import click
 
-from phyblock.cli.console import make_console, shown_path
+from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.files import find_models_file, find_suite
 from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
-from phyblock.errors import InputError, Problem
+from phyblock.errors import InputError, Problem, SpecError
 from phyblock.resources import bundled
 from phyblock.run.plan import make_plan
 from phyblock.specs import SuiteSpec, load_models, load_suite
@@ -55,11 +55,16 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> str:
     if not path.exists():
         path = find_suite(str(path))
     if not _SUITE_KEY.search(path.read_text(encoding="utf-8", errors="replace")):
-        return f"models file, {len(load_models(path))} models"
+        known = load_models(path)
+        if not known:
+            allowed = "a suite, or a models file with name: provider/model lines"
+            raise SpecError(Problem(str(path), "names nothing", allowed=allowed))
+        return f"models file, {counted(len(known), 'model')}"
     loaded = load_suite(path, sets, data_dir=bundled("benchmarks", "data"))
     plan = make_plan(loaded, load_models(find_models_file(models_file, path)))
     calls = plan.samples_per_model
-    return f"suite {plan.suite.name}, {len(plan.models)} models, {calls} samples a model"
+    models = counted(len(plan.models), "model")
+    return f"suite {plan.suite.name}, {models}, {counted(calls, 'sample')} a model"
 
 
 def _about(dataset: Dataset) -> str:
@@ -67,4 +72,4 @@ def _about(dataset: Dataset) -> str:
         f"{sum(level in task.scene.levels for task in dataset.tasks)} of level {level}"
         for level in sorted({n for task in dataset.tasks for n in task.scene.levels})
     )
-    return f"data set {dataset.name}, {len(dataset.tasks)} scenes ({by_level})"
+    return f"data set {dataset.name}, {counted(len(dataset.tasks), 'scene')} ({by_level})"

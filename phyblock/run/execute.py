@@ -19,7 +19,7 @@ from phyblock.models.base import Reply
 from phyblock.run.events import ModelStopped, SampleDone, Stopping, Watcher
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan, sample_id
-from phyblock.run.records import is_final, judged, to_record
+from phyblock.run.records import is_answered, is_final, judged, to_record
 from phyblock.run.store import RunStore
 from phyblock.run.writer import RecordWriter
 
@@ -28,10 +28,13 @@ __all__ = ["Executor", "RunResult"]
 
 @dataclass
 class RunResult:
-    """How a run ended: how many of its samples have a final record; `stopped` models and why."""
+    """How a run ended: how many of its samples have a final record, and how many of those are
+    requests that were rejected for good; `stopped` models and why.
+    """
 
     samples: int
     settled: int = 0
+    failed: int = 0
     stopped: dict[str, str] = field(default_factory=dict)
     reason: str | None = None
 
@@ -53,8 +56,13 @@ class Executor:
         models: Mapping[str, Model],
         watch: Watcher,
         halt: Halt,
+        *,
+        retry_failed: bool = False,
     ) -> None:
-        """`halt` is the switch that `models` were built with."""
+        """`halt` is the switch that `models` were built with; `retry_failed` asks again also where
+        a request was rejected for good.
+        """
+        self.is_settled = is_answered if retry_failed else is_final
         self._plan = plan
         self._writer = RecordWriter(store)
         self._models = models
@@ -112,7 +120,10 @@ class Executor:
         seed: int,
     ) -> bool:
         record = earlier.get(sample_id(self._plan.track.name, planned.name, task.scene.id, seed))
-        return record is not None and is_final(record)
+        if record is None or not self.is_settled(record):
+            return False
+        self.result.failed += not is_answered(record)
+        return True
 
     async def _work(self, planned: PlannedModel, queue: deque[tuple[AssemblyTask, int]]) -> None:
         while queue and self.result.reason is None and planned.name not in self.result.stopped:
@@ -155,6 +166,7 @@ class Executor:
         )
         await self._writer.put(record)
         self.result.settled += is_final(record)
+        self.result.failed += is_final(record) and not is_answered(record)
         self._watch(SampleDone(record))
 
     def _stop_model(self, name: str, reason: str) -> None:

@@ -13,7 +13,7 @@ from phyblock.models.base import Image, Reply, Request
 from phyblock.scoring import Score
 from phyblock.tasks import Judgement, Outcome
 
-__all__ = ["is_final", "judged", "to_record"]
+__all__ = ["is_answered", "is_final", "judged", "to_record"]
 
 
 def to_record(
@@ -65,8 +65,13 @@ def judged(record: dict[str, Any], judgement: Judgement, parser: str) -> dict[st
 
 def is_final(record: Mapping[str, Any]) -> bool:
     """Whether asking again would be wrong: answered, or an error that asking cannot mend."""
+    return is_answered(record) or record["error"]["kind"] == "sample"
+
+
+def is_answered(record: Mapping[str, Any]) -> bool:
+    """Whether the model answered, if only by refusing; a recording may have no reply to give."""
     error = record["error"]
-    return error is None or error["kind"] in ("sample", "refused")
+    return error is None or error["kind"] == "refused"
 
 
 def _outcome(record: dict[str, Any], readable: bool) -> Outcome:

@@ -24,16 +24,24 @@ from phyblock.run.events import ModelNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.plan import RunPlan
 from phyblock.run.reading import RecordLines, read_records
-from phyblock.run.records import is_final
 from phyblock.run.store import RunStore
 
-__all__ = ["Session", "check_ready"]
+__all__ = ["SERVERS", "Session", "check_ready"]
+
+SERVERS = ("hosted_vllm", "lm_studio", "llamafile")
+"""Providers that are nowhere unless `api_base` or their variable says where."""
 
 
 def check_ready(plan: RunPlan) -> None:
-    """Raise SpecError naming every model whose key is not set."""
+    """Raise SpecError naming every model whose key or address is not set."""
     problems = []
     for model in plan.models:
+        if model.config.provider in SERVERS and model.config.api_base is None:
+            message = "is behind a server of your own: it needs an address"
+            hint = "api_base: http://localhost:8000/v1 in the models file"
+            problems.append(
+                Problem(f"model {model.name}", message, "api_base", model.config.id, hint=hint)
+            )
         status = api_key_status(model.config)
         if status.is_needed and not status.is_set:
             message = "needs an API key, and none is set"
@@ -47,7 +55,16 @@ def check_ready(plan: RunPlan) -> None:
 class Session:
     """Runs one plan in one folder; an async context manager."""
 
-    def __init__(self, plan: RunPlan, folder: Path, watch: Watcher, *, use_cache: bool) -> None:
+    def __init__(
+        self,
+        plan: RunPlan,
+        folder: Path,
+        watch: Watcher,
+        *,
+        use_cache: bool,
+        retry_failed: bool = False,
+    ) -> None:
+        self._retry_failed = retry_failed
         self._plan = plan
         self._folder = folder
         self._watch = watch
@@ -81,7 +98,9 @@ class Session:
                     policy=RetryPolicy(attempts=limits.max_attempts),
                     halt=halt,
                 )
-            self.executor = Executor(plan, self._store, self._models, self._watch, halt)
+            self.executor = Executor(
+                plan, self._store, self._models, self._watch, halt, retry_failed=self._retry_failed
+            )
         except BaseException:
             await self._close()
             raise
@@ -108,7 +127,7 @@ class Session:
                     model.name: tuple(
                         record
                         for record in earlier.values()
-                        if record["model"] == model.name and is_final(record)
+                        if record["model"] == model.name and self.executor.is_settled(record)
                     )
                     for model in self._plan.models
                 },

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import hashlib
 import io
 import os
 import signal
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -176,7 +177,9 @@ class Pictures:
                 self._workers, get_context("spawn"), initializer=_start_worker
             )
         try:
-            data = await asyncio.get_running_loop().run_in_executor(self._pool, drawing.make)
+            with _workers_without_interrupts():
+                drawn = asyncio.get_running_loop().run_in_executor(self._pool, drawing.make)
+            data = await drawn
             self.rendered += 1
             path.parent.mkdir(parents=True, exist_ok=True)
             atomic_write(path, data)
@@ -192,6 +195,16 @@ class Pictures:
 
     def _path(self, key: str) -> Path:
         return self._folder / key[:2] / f"{key}.png"
+
+
+@contextlib.contextmanager
+def _workers_without_interrupts() -> Iterator[None]:
+    """Processes that start here never see Ctrl-C, not even while they import."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _take_note(drawn: asyncio.Task[bytes]) -> None:
