@@ -24,10 +24,11 @@ class BaselineModel:
     """A rule instead of a model.
 
     What it draws depends on its name, the seed and the request's key alone, not on the order in
-    which it is asked.
+    which it is asked. It takes prompts and pictures like any model and does not look at them, so
+    that a run of baselines shows that a whole run works.
     """
 
-    needs_messages = False
+    needs_messages = True
 
     def __init__(self, config: ModelConfig) -> None:
         if config.id not in BASELINES:

@@ -21,7 +21,7 @@ seeds = st.integers(0, 10**6)
 
 def reply(name: str, request: Request) -> Reply:
     model = build_model(ModelConfig(name, "baseline", name), cache=None, overall=Gate(1))
-    assert not model.needs_messages
+    assert model.needs_messages
     answer = asyncio.run(model.ask(request))
     assert answer is not None
     return answer
@@ -88,6 +88,12 @@ def test_what_is_drawn_depends_on_seed_and_key_alone(name: str) -> None:
 def test_they_cost_nothing_and_send_nothing(name: str) -> None:
     answer = reply(name, make_request())
     assert (answer.cost_usd, answer.attempts, answer.finish) == (0.0, 0, "stop")
+
+
+@pytest.mark.parametrize("name", BASELINES)
+def test_they_do_not_look_at_what_they_are_sent(name: str) -> None:
+    whole = make_request()
+    assert reply(name, whole) == reply(name, replace(whole, messages=()))
 
 
 def test_an_oracle_without_its_candidate_is_an_error() -> None:

@@ -221,7 +221,17 @@ def test_a_record_is_one_line_of_json_whatever_the_reply_holds(workspace: Worksp
     assert all("😀" in json.loads(line)["reply"]["text"] for line in lines)
 
 
-def test_baselines_need_no_cache(workspace: Workspace) -> None:
-    workspace.write_suite()
-    done = workspace.run(env={"PHYBLOCK_CACHE": "/proc/nowhere"})
+def test_baselines_need_no_replies_kept_but_take_prompts_and_pictures(
+    workspace: Workspace,
+) -> None:
+    (workspace.cache / "replies.sqlite").mkdir()
+    workspace.write_suite(models=["random", "oracle"], prompt="mine.j2")
+    (workspace.root / "mine.j2").write_text("{% block user %}Build it.{% endblock %}")
+    done = workspace.run()
     assert (done.code, done.err) == (0, "")
+    records = workspace.records()
+    assert len(records) == 10
+    assert {record["prompt"]["template"] for record in records} == {"mine"}
+    shown = {r["scene"]: [i["sha256"] for i in r["prompt"]["images"]] for r in records}
+    assert all(shown.values())
+    assert len({tuple(pictures) for pictures in shown.values()}) == 5
