@@ -138,8 +138,17 @@ def test_failed_calls_are_shown_with_what_the_provider_said(suite: Workspace) ->
     with Running(OpenAIChat(Faults(mode="400"))) as running:
         suite.write_models(running.url, "alpha")
         done = suite.run("--models", "alpha,oracle")
-    assert done.code == 0
-    assert "5 x alpha: HTTP 400: Invalid value for messages" in done.out
+        assert done.code == 1
+        assert "5 x alpha: HTTP 400: Invalid value for messages" in done.out
+        assert "5 requests rejected for good" in done.out
+
+        running.server.faults = Faults()
+        same = suite.run("--models", "alpha,oracle")
+        assert (same.code, running.server.requests) == (1, 5)
+        mended = suite.run("--models", "alpha,oracle", "--retry-failed")
+        assert (mended.code, running.server.requests) == (0, 10)
+    assert "All 10 samples are done" in mended.out
+    assert "rejected" not in mended.out
 
 
 def test_the_folder_of_a_run_is_found_again_without_naming_it(suite: Workspace) -> None:
