@@ -100,10 +100,16 @@ def _overall(errors: TextTable) -> TextTable:
 
 
 def _answered(coverage: TextTable) -> TextTable:
-    """Samples and outcomes; tokens and costs stay in the file."""
-    kept = ("Model", "Expected", "Not run", *HEADINGS.values())
-    dropped = [column.name for column in coverage.columns if column.name not in kept]
-    return replace(_without(coverage, tuple(dropped)), notes=())
+    """Samples and the outcomes that occurred; tokens and costs stay in the file."""
+    always = ("Model", "Expected", "OK")
+    told = ("Not run", *HEADINGS.values())
+    dropped = tuple(
+        column.name
+        for i, column in enumerate(coverage.columns)
+        if column.name not in always
+        and (column.name not in told or all(row[i] == "0" for row in coverage.rows))
+    )
+    return replace(_without(coverage, dropped), notes=())
 
 
 def _without(view: TextTable, names: tuple[str, ...]) -> TextTable:
