@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 from phyblock.sim.surfaces import SURFACES
 from phyblock.sim.textures import Background
 
-__all__ = ["GRID_COLUMNS", "LABEL_STRIP", "numbered_grid", "side_by_side", "to_png"]
+__all__ = ["GRID_COLUMNS", "LABEL_STRIP", "ink_on", "numbered_grid", "side_by_side", "to_png"]
 
 GRID_COLUMNS = 4
 LABEL_STRIP = 0.23
@@ -36,6 +36,11 @@ _LINE: dict[Background, tuple[int, int, int]] = {
     "concrete": (98, 98, 96),
     "lawn": (158, 180, 120),
 }
+
+
+def ink_on(background: Background) -> tuple[int, int, int]:
+    """The color of writing that reads well on a background."""
+    return _INK[background]
 
 
 def to_png(image: Image.Image) -> bytes:
