@@ -1,4 +1,4 @@
-"""`phyblock scenes`: everything that is done with scenes and without models."""
+"""`phyblock scenes`: make data sets, check them, look at them; verbs are loaded when called."""
 
 from __future__ import annotations
 
@@ -9,10 +9,15 @@ from phyblock.cli.verbs import Verbs
 __all__ = ["command"]
 
 _VERBS = {
-    "audit": "Hold a data set against geometry and physics; write a corrected copy.",
+    "generate": "Make a data set from a seed.",
+    "verify": "Derive everything in a data set again and compare.",
+    "audit": "Hold any data set against geometry and physics.",
+    "show": "Show the facts of one scene.",
+    "render": "Draw scenes: views, backgrounds, exploded, filmstrips, animations.",
+    "stats": "Count sizes, types, colors, layers and candidates by level.",
 }
 
 
 @click.group("scenes", cls=Verbs, verbs=_VERBS, prefix="phyblock.cli.scenes_")
 def command() -> None:
-    """Make, check, show and draw scenes."""
+    """Make data sets of scenes, check them against physics, and look at them."""

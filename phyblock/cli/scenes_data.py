@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Sequence
 from pathlib import Path
 
-from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
+from phyblock.datasets import SCENES_FILE, AssemblyTask, Dataset, read_builtin, read_official
 from phyblock.errors import DataError, Problem
 from phyblock.resources import bundled
 
-__all__ = ["find_data_set", "read_data_set"]
+__all__ = ["find_data_set", "find_scenes", "read_data_set"]
 
 
 def find_data_set(name: str) -> Path:
@@ -34,3 +36,21 @@ def read_data_set(name: str) -> Dataset:
     """The data set that `name` means; raises DataError with everything that is wrong in it."""
     folder = find_data_set(name)
     return read_builtin(folder) if (folder / SCENES_FILE).is_file() else read_official(folder)
+
+
+def find_scenes(data: Dataset, names: Sequence[str]) -> tuple[AssemblyTask, ...]:
+    """The named scenes, in the order named; raises DataError with all that are not there."""
+    tasks = {task.scene.id: task for task in data.tasks}
+    problems = []
+    for name in names:
+        if name not in tasks:
+            near = difflib.get_close_matches(name, tasks, 1)
+            hint = f"did you mean {near[0]}?" if near else f"it holds {_some(list(tasks))}"
+            problems.append(Problem(str(data.root), "holds no such scene", "", name, hint=hint))
+    if problems:
+        raise DataError(problems)
+    return tuple(tasks[name] for name in names)
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names) if len(names) <= 6 else f"{', '.join(names[:3])}, ..., {names[-1]}"

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 
 import numpy as np
 import pytest
@@ -87,7 +88,7 @@ def test_each_step_adds_to_the_picture_and_the_last_is_the_goal(name: str) -> No
     steps = [np.asarray(image).astype(int) for image in step_images(scene, SMALL)]
     assert len(steps) == len(scene)
     assert np.array_equal(steps[-1], pixels(goal_png(scene, SMALL)))
-    for before, after in zip(steps, steps[1:], strict=False):
+    for before, after in itertools.pairwise(steps):
         assert (before != after).any()
 
 
