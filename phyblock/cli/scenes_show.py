@@ -33,13 +33,13 @@ def command(data: str, scene: str) -> None:
     headings = ("block", "type", "color", "on", "position mm", "euler deg")
     numbers = ("layer", "candidate", "seen")
     console.print(plain_table((*headings, *numbers), _blocks(task), numbers=3))
-    headings = ("candidate", "type", "color", "euler deg", "needed")
-    console.print(plain_table(headings, _candidates(task), numbers=1))
+    offered = ("candidate", "type", "color", "euler deg", "needed")
+    console.print(plain_table(offered, _candidates(task), numbers=1))
 
 
 def _blocks(task: AssemblyTask) -> list[tuple[str, ...]]:
     seen = visible_shares(task.scene, PictureStyle())
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for block in task.scene.blocks:
         place = " ".join(f"{1000 * c + 0.0:.1f}".removesuffix(".0") for c in block.position_m)
         number = task.candidates.index_of(block.look)
@@ -51,7 +51,7 @@ def _blocks(task: AssemblyTask) -> list[tuple[str, ...]]:
 
 def _candidates(task: AssemblyTask) -> list[tuple[str, ...]]:
     looks = [block.look for block in task.scene.blocks]
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for number, candidate in enumerate(task.candidates.candidates, 1):
         needed = looks.count(candidate.look)
         what = (str(number), candidate.type, candidate.color, _angles(candidate.euler_deg))

@@ -33,8 +33,8 @@ def command(data: str) -> None:
     console.print("Blocks, by type and color")
     console.print(plain_table(("type", *COLORS, "all", "share"), _palette(read), numbers=7))
     console.print("Candidate sets")
-    headings = ("level", "candidates", "needed", "other pose", "other color", "other type")
-    console.print(plain_table(headings, [_offers(*one) for one in by_level], numbers=5))
+    offered = ("level", "candidates", "needed", "other pose", "other color", "other type")
+    console.print(plain_table(offered, [_offers(*one) for one in by_level], numbers=5))
     console.print(
         "Candidates that are not needed differ from what is needed by their pose alone, else by "
         "their color, else by their type.",
