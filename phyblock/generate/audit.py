@@ -14,7 +14,8 @@ from phyblock.domain.aov import AOVGraph, CycleError
 from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Block, Scene
 from phyblock.generate.acceptance import PREFIX_TRIAL
-from phyblock.sim.stability import DEFAULT_TRIAL, Trial, check, check_prefixes
+from phyblock.sim.stability import DEFAULT_TRIAL, Trial, check
+from phyblock.sim.steps import check_steps
 from phyblock.sim.support import GROUND, find_gaps, find_overlaps, support_graph
 
 __all__ = [
@@ -181,7 +182,7 @@ def _stability(scene: Scene, settings: AuditSettings) -> Iterator[Finding]:
         settled = "" if whole.agreed else ", not the same ones at every time step"
         message = f"blocks {_listed(whole.fallen)} fall from the finished structure{settled}"
         yield Finding(scene.id, "unstable", message, whole.fallen, whole.moved_m * 1000, "mm")
-    steps = check_prefixes(scene.blocks[:-1], settings.step_trial)
+    steps = check_steps(scene.blocks[:-1], settings.step_trial)
     for block, step in zip(scene.blocks, steps, strict=False):
         if not step.stable:
             fallen = _listed(step.fallen)
