@@ -6,18 +6,16 @@ import csv
 import functools
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 
 from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
-from phyblock.errors import Problem, SimulationError, StoreError
+from phyblock.errors import Problem, StoreError
 from phyblock.generate.audit import AuditSettings, Check, Finding, SceneAudit, audit_scene
 from phyblock.generate.dataset import scene_line
 from phyblock.generate.symmetry import fingerprint
+from phyblock.generate.workers import open_workers
 
 __all__ = [
     "Audit",
@@ -102,19 +100,10 @@ def audit_scenes(
 ) -> Iterator[SceneAudit]:
     """Check many scenes in `jobs` processes; results come in the order given.
 
-    Raises SimulationError when a process is killed, or as the simulator does.
+    Raises PhyblockError when a process is killed, SimulationError as the simulator does.
     """
-    work = functools.partial(_audit_task, settings=settings)
-    if jobs == 1:
-        yield from map(work, tasks)
-        return
-    pool = ProcessPoolExecutor(jobs, get_context("spawn"))
-    try:
-        yield from pool.map(work, tasks)
-    except BrokenProcessPool as error:
-        raise SimulationError("a process that audits scenes was killed") from error
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+    with open_workers(jobs) as workers:
+        yield from workers.map(functools.partial(_audit_task, settings=settings), tasks)
 
 
 def find_duplicates(scenes: Iterable[Scene]) -> tuple[Finding, ...]:
