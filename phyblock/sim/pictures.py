@@ -25,7 +25,8 @@ from phyblock.errors import DataError, Problem
 from phyblock.sim import engine
 from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
 from phyblock.sim.compose import GRID_COLUMNS, LABEL_STRIP, numbered_grid, side_by_side, to_png
-from phyblock.sim.render import RENDERER, DrawnBlock, picture
+from phyblock.sim.render import DrawnBlock, picture
+from phyblock.sim.renderer import renderer
 from phyblock.sim.textures import BACKGROUNDS, Background
 
 __all__ = [
@@ -177,7 +178,7 @@ def _key(kind: str, style: PictureStyle, content: Iterable[object]) -> str:
     parts = {
         "kind": kind,
         "render_version": RENDER_VERSION,
-        "renderer": RENDERER,
+        "renderer": renderer(),
         "pybullet": engine.version(),
         "pillow": importlib.metadata.version("pillow"),
         "style": [style.size_px, style.background, style.azimuth_deg, style.elevation_deg],
