@@ -1,4 +1,4 @@
-"""Pictures that point at blocks: those in question in full color, numbered; the rest faded."""
+"""Pictures that point at blocks: those in question in full color, the rest faded."""
 
 from __future__ import annotations
 

@@ -30,12 +30,18 @@ _PLANKS = 16
 _JOINT_PX = 1.6
 
 
-def surface_map(surface: Surface) -> tuple[NDArray[np.float32], ...]:
+@functools.cache
+def surface_map(surface: Surface) -> tuple[NDArray[np.uint8], ...]:
     """The texture at full size, then halved again and again down to one texel.
 
     Each has shape (n, n, 3), 0..255; rows run along y, columns along x.
     """
-    return _maps(surface)
+    maps = [_MAKERS[surface]().astype(np.float32).clip(0, 255)]
+    while len(maps[-1]) > 1:
+        last = maps[-1]
+        half = len(last) // 2
+        maps.append(last.reshape(half, 2, half, 2, 3).mean(axis=(1, 3)))
+    return tuple(np.rint(one).astype(np.uint8) for one in maps)
 
 
 def sample(surface: Surface, x_m: Grid, y_m: Grid, footprint_m: Grid) -> NDArray[np.float32]:
@@ -54,17 +60,7 @@ def sample(surface: Surface, x_m: Grid, y_m: Grid, footprint_m: Grid) -> NDArray
     return colors
 
 
-@functools.cache
-def _maps(surface: Surface) -> tuple[NDArray[np.float32], ...]:
-    maps = [_MAKERS[surface]().astype(np.float32).clip(0, 255)]
-    while len(maps[-1]) > 1:
-        last = maps[-1]
-        half = len(last) // 2
-        maps.append(last.reshape(half, 2, half, 2, 3).mean(axis=(1, 3)))
-    return tuple(maps)
-
-
-def _bilinear(texture: NDArray[np.float32], x_m: Grid, y_m: Grid) -> NDArray[np.float32]:
+def _bilinear(texture: NDArray[np.uint8], x_m: Grid, y_m: Grid) -> NDArray[np.float32]:
     size = len(texture)
     across, along = (place / PERIOD_M * size - 0.5 for place in (x_m, y_m))
     column, row = np.floor(across).astype(np.int64), np.floor(along).astype(np.int64)
