@@ -94,7 +94,7 @@ def filmstrip(scene: Scene) -> Image.Image:
 def main() -> None:
     """Draw and write all sheets."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--data", default="phyblock-mini")
+    parser.add_argument("--data", default="phyblock-400")
     parser.add_argument("--out", type=Path, default=OUT)
     options = parser.parse_args()
     folder = Path(options.data)
