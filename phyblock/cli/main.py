@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
 import sys
 
 import click
 
+from phyblock.cli.verbs import Verbs
 from phyblock.errors import InputError, PhyblockError
 
 __all__ = ["main"]
@@ -17,42 +17,16 @@ _VERBS = {
     "report": "Write a run's tables again from its records.",
     "models": "List models with kinds, prices and keys; check one.",
     "validate": "Check suites, models files and data sets.",
+    "scenes": "Make, check, show and draw scenes.",
     "cache": "Show or clear the reply cache.",
     "init": "Lay out a working folder: a suite, models.yaml, prompts.",
 }
 
 
-class _Verbs(click.Group):
-    """Names and help texts are known without importing any verb."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        del ctx
-        return list(_VERBS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        del ctx
-        if cmd_name not in _VERBS:
-            return None
-        command = importlib.import_module(f"phyblock.cli.{cmd_name}").command
-        assert isinstance(command, click.Command)
-        return command
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        if args and args[0] not in _VERBS and not args[0].startswith("-"):
-            known = ", ".join(_VERBS)
-            raise click.UsageError(f"No such command {args[0]!r}. Commands: {known}", ctx)
-        return super().resolve_command(ctx, args)
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        del ctx
-        with formatter.section("Commands"):
-            formatter.write_dl(list(_VERBS.items()))
-
-
 @click.group(
-    cls=_Verbs,
+    cls=Verbs,
+    verbs=_VERBS,
+    prefix="phyblock.cli.",
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="Start with: phyblock run quick",
 )

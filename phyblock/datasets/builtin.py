@@ -15,7 +15,7 @@ from phyblock.datasets.raw import parse_json, read_text
 from phyblock.domain import Scene
 from phyblock.errors import DataError, Problem
 
-__all__ = ["SCENES_FILE", "read_builtin"]
+__all__ = ["SCENES_FILE", "read_builtin", "read_line", "scene_lines"]
 
 SCENES_FILE = "scenes.jsonl"
 _LEVELS = ("[1]", "[2]", "[3]", "[4]", "[1, 2]")
@@ -24,15 +24,13 @@ _LEVELS = ("[1]", "[2]", "[3]", "[4]", "[1, 2]")
 def read_builtin(folder: Path) -> Dataset:
     """All scenes of a data set folder; raises DataError with everything that is wrong in it."""
     path = folder / SCENES_FILE
-    text = read_text(path, f"a folder with {SCENES_FILE}, or the name of a bundled data set")
-    # Not splitlines(): a JSON string may hold U+2028 and other line ends of Unicode.
-    lines = text.removesuffix("\n").split("\n") if text else []
+    lines = scene_lines(path)
     first_line: dict[str, int] = {}
     tasks: list[AssemblyTask] = []
     problems: list[Problem] = []
     for number, line in enumerate(lines, 1):
         try:
-            task = _read_line(path, number, line)
+            task = read_line(path, number, line)
         except DataError as error:
             problems += error.problems
             continue
@@ -48,8 +46,18 @@ def read_builtin(folder: Path) -> Dataset:
     return Dataset(folder.name, folder, tuple(sorted(tasks, key=lambda task: task.scene.id)))
 
 
-def _read_line(path: Path, number: int, line: str) -> AssemblyTask:
-    reader = SceneReader(f"{path}:{number}")
+def scene_lines(path: Path) -> list[str]:
+    """The lines of a data set file; DataError when it cannot be read."""
+    text = read_text(path, f"a folder with {SCENES_FILE}, or the name of a bundled data set")
+    # Not splitlines(): a JSON string may hold U+2028 and other line ends of Unicode.
+    return text.removesuffix("\n").split("\n") if text else []
+
+
+def read_line(
+    path: Path, number: int, line: str, reader: SceneReader | None = None
+) -> AssemblyTask:
+    """The task in one line; raises DataError with everything that `reader` finds wrong."""
+    reader = reader or SceneReader(f"{path}:{number}")
     raw = reader.mapping(parse_json(line, path, number))
     name = reader.name(reader.get(raw, "id"), "id")
     levels = reader.items(reader.get(raw, "levels"), "levels")

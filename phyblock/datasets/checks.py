@@ -37,9 +37,10 @@ class SceneReader(RawReader):
         found = [self._block(entry, f"blocks[{i}]") for i, entry in enumerate(entries)]
         if len(self.problems) == before:
             whole = tuple(cast(Block, block) for block in found)
-            self._check_graph(whole)
+            self._check_orders(whole)
+            self.check_dependencies(whole)
             if strict_layers and len(self.problems) == before:
-                self._check_layers(whole)
+                self.check_layers(whole)
         return whole if len(self.problems) == before else ()
 
     def candidates(self, raw: object) -> CandidateSet:
@@ -116,12 +117,17 @@ class SceneReader(RawReader):
             return None
         return tuple(order for order in orders if order)
 
-    def _check_graph(self, blocks: Sequence[Block]) -> None:
-        before = len(self.problems)
+    def _check_orders(self, blocks: Sequence[Block]) -> None:
         orders = [block.order for block in blocks]
         for i, block in enumerate(blocks):
             if block.order in orders[:i]:
                 self.complain(f"blocks[{i}].order", "is used twice", block.order, "unique orders")
+
+    def check_dependencies(self, blocks: tuple[Block, ...]) -> None:
+        """Complain about dependencies that name no block or run in a circle; orders are unique."""
+        before = len(self.problems)
+        orders = [block.order for block in blocks]
+        for i, block in enumerate(blocks):
             for order in block.depend:
                 if order not in orders:
                     known = "0 (the ground) or an order of the scene: " + ", ".join(
@@ -137,7 +143,8 @@ class SceneReader(RawReader):
             at = f"blocks[{error.vertices[0]}].depend"
             self.complain(at, "is part of a cycle", cycle, "dependencies without a cycle")
 
-    def _check_layers(self, blocks: tuple[Block, ...]) -> None:
+    def check_layers(self, blocks: tuple[Block, ...]) -> None:
+        """Complain about every layer that is not the longest path; dependencies are sound."""
         layers = Scene("", (2,), blocks, ()).graph.layers
         for i, (block, layer) in enumerate(zip(blocks, layers, strict=True)):
             if block.layer != layer:

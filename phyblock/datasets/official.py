@@ -22,7 +22,15 @@ from phyblock.datasets.raw import read_json
 from phyblock.domain import CandidateSet, Scene
 from phyblock.errors import DataError, Problem
 
-__all__ = ["official_prompt", "read_official", "recorded_models"]
+__all__ = [
+    "candidates_file",
+    "goal_files",
+    "official_prompt",
+    "read_candidates",
+    "read_official",
+    "read_scene",
+    "recorded_models",
+]
 
 _GOALS = Path("data", "SCENEs_400_Goal_Jsons")
 _CANDIDATES = Path("data", "SCENEs_400_Cand_Jsons")
@@ -35,13 +43,9 @@ _T = TypeVar("_T")
 
 def read_official(root: Path) -> Dataset:
     """All scenes of a checkout; raises DataError with everything that is wrong in it."""
-    goals = sorted((root / _GOALS).glob("*.json"))
-    if not goals:
-        allowed = f"a checkout of the official PhyBlock repository, with {_GOALS.as_posix()}/*.json"
-        raise DataError(Problem(str(root), "holds no official scenes", allowed=allowed))
     tasks: list[AssemblyTask] = []
     problems: list[Problem] = []
-    for path in goals:
+    for path in goal_files(root):
         try:
             tasks.append(_read_task(root, path))
         except DataError as error:
@@ -49,6 +53,20 @@ def read_official(root: Path) -> Dataset:
     if problems:
         raise DataError(problems)
     return Dataset("official", root, tuple(tasks))
+
+
+def goal_files(root: Path) -> list[Path]:
+    """The goal files of a checkout, one at least, by name; DataError when there is none."""
+    goals = sorted((root / _GOALS).glob("*.json"))
+    if not goals:
+        allowed = f"a checkout of the official PhyBlock repository, with {_GOALS.as_posix()}/*.json"
+        raise DataError(Problem(str(root), "holds no official scenes", allowed=allowed))
+    return goals
+
+
+def candidates_file(root: Path, goal: Path) -> Path:
+    """Where the candidate set of a goal file is."""
+    return root / _CANDIDATES / f"{goal.stem}_16_cand_blocks.json"
 
 
 def recorded_models(root: Path) -> dict[str, Path]:
@@ -89,9 +107,9 @@ def official_prompt(root: Path) -> str:
 
 
 def _read_task(root: Path, path: Path) -> AssemblyTask:
-    candidates_path = root / _CANDIDATES / f"{path.stem}_16_cand_blocks.json"
-    scene, problems = _try(_read_scene, path)
-    candidates, more_problems = _try(_read_candidates, candidates_path)
+    candidates_path = candidates_file(root, path)
+    scene, problems = _try(read_scene, path)
+    candidates, more_problems = _try(read_candidates, candidates_path)
     if scene is None or candidates is None:
         raise DataError([*problems, *more_problems])
     reader = SceneReader(str(candidates_path))
@@ -108,8 +126,9 @@ def _try(read: Callable[[Path], _T], path: Path) -> tuple[_T | None, tuple[Probl
         return None, error.problems
 
 
-def _read_scene(path: Path) -> Scene:
-    reader = SceneReader(str(path))
+def read_scene(path: Path, reader: SceneReader | None = None) -> Scene:
+    """The scene in a goal file; raises DataError with everything that `reader` finds wrong."""
+    reader = reader or SceneReader(str(path))
     raw = reader.mapping(read_json(path))
     level = reader.integer(reader.get(raw, "level"), "level", 1, 4)
     # Declared layers differ from the longest path in 70 of the 400 released scenes.
@@ -127,7 +146,8 @@ def _read_scene(path: Path) -> Scene:
     return Scene(path.stem, levels, blocks, tuple(parents), look_at_m)
 
 
-def _read_candidates(path: Path) -> CandidateSet:
+def read_candidates(path: Path) -> CandidateSet:
+    """The candidate set in a file; raises DataError with everything that is wrong in it."""
     raw = read_json(path)
     reader = SceneReader(str(path))
     candidates = reader.candidates(raw)

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS, KIT_PALETTE, Euler
 from phyblock.domain.candidates import MAX_CANDIDATES, Candidate, CandidateSet
-from phyblock.domain.scene import Look, Scene
+from phyblock.domain.scene import Kind, Look, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.generate.poses import POSES
 
@@ -20,12 +20,17 @@ __all__ = ["make_candidates"]
 _COLOR_PLACES = 2
 
 
-def make_candidates(scene: Scene, seed: int = 0, size: int = MAX_CANDIDATES) -> CandidateSet:
+def make_candidates(
+    scene: Scene,
+    seed: int = 0,
+    size: int = MAX_CANDIDATES,
+    palette: tuple[Kind, ...] = KIT_PALETTE,
+) -> CandidateSet:
     """Up to `size` candidates that look different, all that the scene needs among them.
 
-    They stand grouped by type and color, so that a place tells nothing about being needed. The
-    same scene id and seed give the same set everywhere. Raises DataError when the scene needs
-    more than `size` looks.
+    Distractors of another color or type come from `palette`. They stand grouped by type and
+    color, so that a place tells nothing about being needed. The same scene id and seed give the
+    same set everywhere. Raises DataError when the scene needs more than `size` looks.
     """
     needed = _distinct(Candidate(b.type, b.color, b.euler_deg) for b in scene.blocks)
     if len(needed) > size:
@@ -33,8 +38,8 @@ def make_candidates(scene: Scene, seed: int = 0, size: int = MAX_CANDIDATES) -> 
         raise DataError(Problem(scene.id, message, "blocks", str(len(needed)), f"at most {size}"))
     salt = f"{seed}/{scene.id}"
     poses = _shuffled(_other_poses(needed), salt)
-    colors = _shuffled(_other_colors(needed), salt)
-    types = _shuffled(_other_types(needed), salt)
+    colors = _shuffled(_other_colors(needed, palette), salt)
+    types = _shuffled(_other_types(needed, palette), salt)
     reserved = min(_COLOR_PLACES, len(_distinct([*needed, *colors])) - len(needed))
     first = _distinct([*needed, *poses])[: max(len(needed), size - reserved)]
     chosen = _distinct([*first, *colors[:_COLOR_PLACES], *poses, *colors, *types])[:size]
@@ -49,22 +54,22 @@ def _other_poses(needed: Iterable[Candidate]) -> list[Candidate]:
     ]
 
 
-def _other_colors(needed: Iterable[Candidate]) -> list[Candidate]:
+def _other_colors(needed: Iterable[Candidate], palette: tuple[Kind, ...]) -> list[Candidate]:
     kinds = {candidate.kind for candidate in needed}
     return [
         Candidate(candidate.type, color, candidate.euler_deg)
         for candidate in needed
-        for block_type, color in KIT_PALETTE
+        for block_type, color in palette
         if block_type == candidate.type and (block_type, color) not in kinds
     ]
 
 
-def _other_types(needed: Iterable[Candidate]) -> list[Candidate]:
+def _other_types(needed: Iterable[Candidate], palette: tuple[Kind, ...]) -> list[Candidate]:
     types = {candidate.type for candidate in needed}
     colors = {candidate.color for candidate in needed}
     return [
         Candidate(block_type, color, next(iter(POSES[block_type].values())))
-        for block_type, color in KIT_PALETTE
+        for block_type, color in palette
         if block_type not in types and color in colors
     ]
 

@@ -10,7 +10,7 @@ from phyblock.generate.acceptance import LEVEL_LIMITS
 from phyblock.sim.stability import DEFAULT_TRIAL
 from phyblock.sim.support import FIT_TOLERANCE_M
 
-__all__ = ["card"]
+__all__ = ["FILE_TEXT", "card"]
 
 _TEXT = """# {name}
 
@@ -56,7 +56,8 @@ Files and checks are made anew, byte for byte, by
 
 Types and colors are means over scenes. The candidate sets hold {candidates}.
 
-## The file
+"""
+FILE_TEXT = """## The file
 
 `scenes.jsonl` holds one scene a line, sorted by `id`:
 
@@ -70,6 +71,7 @@ Types and colors are means over scenes. The candidate sets hold {candidates}.
 | `blocks[].depend`, `layer` | blocks it rests on, 0 the ground; longest path, from 1 |
 | `candidates[]` | `type`, `color`, `euler`, and `required`: whether the scene needs it |
 """
+"""How a scene stands in the file, which is the same in every data set."""
 
 
 def card(name: str, scenes: Sequence[Scene], candidates: Sequence[CandidateSet]) -> str:
@@ -81,7 +83,7 @@ def card(name: str, scenes: Sequence[Scene], candidates: Sequence[CandidateSet])
         f"1/{round(1 / physics.time_step_s)} s ({physics.iterations} solver iterations)"
         for physics in DEFAULT_TRIAL.physics
     )
-    return _TEXT.format(
+    text = _TEXT.format(
         name=name,
         name_path=f"benchmarks/data/{name}",
         count=len(scenes),
@@ -96,6 +98,7 @@ def card(name: str, scenes: Sequence[Scene], candidates: Sequence[CandidateSet])
         rows="\n".join(_row(level, found) for level, found in by_level.items()),
         candidates=" to ".join(str(size) for size in sorted({min(sizes), max(sizes)})),
     )
+    return text + FILE_TEXT
 
 
 def _limit(level: int) -> str:

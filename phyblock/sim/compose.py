@@ -7,24 +7,40 @@ from collections.abc import Sequence
 
 from PIL import Image, ImageDraw, ImageFont
 
+from phyblock.sim.surfaces import SURFACES
 from phyblock.sim.textures import Background
 
-__all__ = ["GRID_COLUMNS", "LABEL_STRIP", "numbered_grid", "side_by_side", "to_png"]
+__all__ = ["GRID_COLUMNS", "LABEL_STRIP", "ink_on", "numbered_grid", "side_by_side", "to_png"]
 
 GRID_COLUMNS = 4
 LABEL_STRIP = 0.23
 """Share of a cell's height, at its foot, that is kept free for the number."""
 _LABEL_SIZE = 0.17
 _LABEL_MARGIN = 0.05
+_RIM = 0.012
 _GAP = 0.016
+_DARK_INK, _LIGHT_INK = (20, 24, 32), (255, 255, 255)
 _INK: dict[Background, tuple[int, int, int]] = {
-    "white": (20, 24, 32),
-    "checkerboard": (255, 255, 255),
+    "white": _DARK_INK,
+    "checkerboard": _LIGHT_INK,
+    "light-wood": _DARK_INK,
+    "dark-wood": _LIGHT_INK,
+    "concrete": _DARK_INK,
+    "lawn": _LIGHT_INK,
 }
 _LINE: dict[Background, tuple[int, int, int]] = {
     "white": (205, 208, 214),
     "checkerboard": (62, 80, 100),
+    "light-wood": (138, 104, 70),
+    "dark-wood": (150, 116, 88),
+    "concrete": (98, 98, 96),
+    "lawn": (158, 180, 120),
 }
+
+
+def ink_on(background: Background) -> tuple[int, int, int]:
+    """The color of writing that reads well on a background."""
+    return _INK[background]
 
 
 def to_png(image: Image.Image) -> bytes:
@@ -45,7 +61,7 @@ def numbered_grid(
         box = (edges[column], edges[row], edges[column + 1], edges[row + 1])
         cell = cells[place].copy() if place < len(cells) else empty.copy()
         if place < len(cells):
-            _write_number(cell, place + 1, _INK[background])
+            _write_number(cell, place + 1, background)
         grid.paste(cell.resize((box[2] - box[0], box[3] - box[1])), box[:2])
     draw = ImageDraw.Draw(grid)
     for edge in edges[1:-1]:
@@ -63,8 +79,14 @@ def side_by_side(left: Image.Image, right: Image.Image) -> Image.Image:
     return joined
 
 
-def _write_number(cell: Image.Image, number: int, ink: tuple[int, int, int]) -> None:
+def _write_number(cell: Image.Image, number: int, background: Background) -> None:
+    """The number at the foot of the cell; on a floor with a grain, with a rim around it."""
     side = cell.height
     font = ImageFont.load_default(size=_LABEL_SIZE * side)
     place = (side * (1 - _LABEL_MARGIN), side * (1 - _LABEL_MARGIN))
-    ImageDraw.Draw(cell).text(place, str(number), fill=ink, font=font, anchor="rs")
+    ink = _INK[background]
+    rim = _DARK_INK if ink == _LIGHT_INK else _LIGHT_INK
+    width = round(side * _RIM) if background in SURFACES else 0
+    ImageDraw.Draw(cell).text(
+        place, str(number), ink, font, anchor="rs", stroke_width=width, stroke_fill=rim
+    )

@@ -12,7 +12,7 @@ import importlib.metadata
 import io
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import astuple, dataclass
 
 import numpy as np
@@ -25,12 +25,14 @@ from phyblock.errors import DataError, Problem
 from phyblock.sim import engine
 from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
 from phyblock.sim.compose import GRID_COLUMNS, LABEL_STRIP, numbered_grid, side_by_side, to_png
-from phyblock.sim.render import RENDERER, DrawnBlock, picture
+from phyblock.sim.render import DrawnBlock, picture
+from phyblock.sim.renderer import renderer
 from phyblock.sim.textures import BACKGROUNDS, Background
 
 __all__ = [
     "RENDER_VERSION",
     "PictureStyle",
+    "camera_for",
     "candidate_camera",
     "candidates_key",
     "candidates_png",
@@ -122,9 +124,14 @@ def candidates_key(candidates: CandidateSet, style: PictureStyle) -> str:
 
 def goal_camera(scene: Scene, style: PictureStyle) -> Camera:
     """The camera of the goal picture; raises DataError for a scene without blocks."""
-    if not scene.blocks:
-        raise DataError(Problem(where=scene.id, field="blocks", message="there is none to draw"))
-    points = np.vstack([block.vertices_m for block in drawn(scene)])
+    return camera_for(drawn(scene), style, scene.id)
+
+
+def camera_for(blocks: Sequence[DrawnBlock], style: PictureStyle, where: str) -> Camera:
+    """The camera that frames blocks as a goal; DataError, at `where`, when there are none."""
+    if not blocks:
+        raise DataError(Problem(where=where, field="blocks", message="there is none to draw"))
+    points = np.vstack([block.vertices_m for block in blocks])
     axes = view_axes(style.azimuth_deg, style.elevation_deg)
     return frame(points, axes, _GOAL_WINDOW, _GOAL_MIN_DISTANCE_M)
 
@@ -171,7 +178,7 @@ def _key(kind: str, style: PictureStyle, content: Iterable[object]) -> str:
     parts = {
         "kind": kind,
         "render_version": RENDER_VERSION,
-        "renderer": RENDERER,
+        "renderer": renderer(),
         "pybullet": engine.version(),
         "pillow": importlib.metadata.version("pillow"),
         "style": [style.size_px, style.background, style.azimuth_deg, style.elevation_deg],

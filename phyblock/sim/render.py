@@ -1,4 +1,4 @@
-"""Blocks to pixels with PyBullet's software renderer (TinyRenderer), the same on every machine.
+"""Blocks to pixels with PyBullet: by its software renderer (TinyRenderer), or by EGL if asked for.
 
 TinyRenderer has no anti-aliasing, so pictures are made at twice the size and scaled down. A block
 is drawn as its solid and as black bars along its true edges; outlines found afterwards in depth
@@ -25,12 +25,12 @@ from phyblock.domain.blocks import (
 )
 from phyblock.sim.camera import Camera
 from phyblock.sim.geometry import edge_bars, solid_mesh
+from phyblock.sim.renderer import renderer
 from phyblock.sim.stage import Prop, stage
 from phyblock.sim.textures import Background, floor, shadow
 
-__all__ = ["COLOR_RGB", "RENDERER", "SUPERSAMPLE", "DrawnBlock", "Shot", "picture", "shoot"]
+__all__ = ["COLOR_RGB", "SUPERSAMPLE", "DrawnBlock", "Shot", "picture", "shoot"]
 
-RENDERER = "tinyrenderer"
 SUPERSAMPLE = 2
 
 COLOR_RGB: dict[Color, tuple[int, int, int]] = {
@@ -114,7 +114,9 @@ def shoot(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> Shot:
             lightDiffuseCoeff=_DIFFUSE,
             lightSpecularCoeff=0.0,
             shadow=0,
-            renderer=bullet.ER_TINY_RENDERER,
+            renderer=(
+                bullet.ER_BULLET_HARDWARE_OPENGL if renderer() == "egl" else bullet.ER_TINY_RENDERER
+            ),
             physicsClientId=client,
         )
     colors = np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[..., :3]

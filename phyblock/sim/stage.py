@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import tempfile
 import threading
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -19,6 +21,7 @@ from numpy.typing import NDArray
 
 from phyblock.sim import engine
 from phyblock.sim.mesh import Mesh
+from phyblock.sim.renderer import Renderer, load_egl, renderer
 
 __all__ = ["Prop", "Stage", "stage"]
 
@@ -29,9 +32,13 @@ Prop = tuple[Mesh, tuple[int, int, int], tuple[float, float, float], NDArray[np.
 class Stage:
     """A client with the visual shapes made so far; use it through `stage`."""
 
-    def __init__(self, bullet: ModuleType, client: int) -> None:
+    def __init__(self, bullet: ModuleType, client: int, drawn_by: Renderer) -> None:
         self._bullet = bullet
         self._client = client
+        self._make_shape = self._shape_in_memory
+        if drawn_by == "egl":
+            load_egl(bullet, client)
+            self._make_shape = self._shape_from_file
         self._shapes: dict[tuple[int, tuple[int, int, int]], tuple[int, Mesh]] = {}
         self._lock = threading.Lock()
 
@@ -69,7 +76,7 @@ class Stage:
             self._shapes[key] = (self._make_shape(mesh, rgb), mesh)
         return self._shapes[key][0]
 
-    def _make_shape(self, mesh: Mesh, rgb: tuple[int, int, int]) -> int:
+    def _shape_in_memory(self, mesh: Mesh, rgb: tuple[int, int, int]) -> int:
         """Every triangle with corners of its own, which keeps the shading of faces flat."""
         corners = mesh.corners_m.reshape(-1, 3)
         return int(
@@ -84,6 +91,25 @@ class Stage:
             )
         )
 
+    def _shape_from_file(self, mesh: Mesh, rgb: tuple[int, int, int]) -> int:
+        """The same shape for EGL, which crashes on meshes that come from memory."""
+        corners, normals = mesh.corners_m.reshape(-1, 3), np.repeat(mesh.normals, 3, axis=0)
+        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in corners.tolist()]
+        lines += [f"vn {x!r} {y!r} {z!r}" for x, y, z in normals.tolist()]
+        numbers = range(1, len(corners), 3)
+        lines += [f"f {i}//{i} {i + 1}//{i + 1} {i + 2}//{i + 2}" for i in numbers]
+        with tempfile.TemporaryDirectory(prefix="phyblock-") as folder:
+            path = Path(folder, "shape.obj")
+            path.write_text("\n".join(lines) + "\n", encoding="ascii")
+            return int(
+                self._bullet.createVisualShape(
+                    self._bullet.GEOM_MESH,
+                    fileName=str(path),
+                    rgbaColor=[*(channel / 255 for channel in rgb), 1.0],
+                    physicsClientId=self._client,
+                )
+            )
+
 
 _opening = threading.Lock()
 
@@ -96,4 +122,4 @@ def stage() -> Stage:
 
 @functools.cache
 def _only_stage() -> Stage:
-    return Stage(*engine.connect())
+    return Stage(*engine.connect(), renderer())

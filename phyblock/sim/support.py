@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import euler_deg_to_quat_xyzw, quat_xyzw_to_matrix
 from phyblock.domain.scene import Block
 from phyblock.sim.convex import Axes, contact_extent, drop_m, moved, separating_axes
-from phyblock.sim.geometry import ConvexPiece, collision_pieces
+from phyblock.sim.geometry import ConvexPiece, collision_pieces, solid_mesh
 
 __all__ = [
     "CONTACT_TOLERANCE_M",
@@ -19,6 +19,7 @@ __all__ = [
     "GROUND",
     "Gap",
     "Overlap",
+    "bounds_m",
     "drop_height_m",
     "find_gaps",
     "find_overlaps",
@@ -120,6 +121,13 @@ def drop_height_m(block: Block, blocks: Sequence[Block]) -> float:
     Zero when it touches or overlaps what is below it already.
     """
     return _clearance_m(_solid(block), [_solid(other) for other in blocks])
+
+
+def bounds_m(block: Block) -> NDArray[np.float64]:
+    """Low and high corner of the box round a block, shape (2, 3) [m], world frame."""
+    rotation = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(block.euler_deg))
+    corners = solid_mesh(block.type).vertices_m @ rotation.T + np.array(block.position_m)
+    return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 
 def _solid(block: Block) -> _Solid:

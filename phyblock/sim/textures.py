@@ -7,25 +7,34 @@ file, has no far edge, and costs less than drawing a textured plane in the softw
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFilter
 
 from phyblock.sim.camera import Camera
+from phyblock.sim.surfaces import PERIOD_M, SURFACES, Surface, sample
 
 __all__ = ["BACKGROUNDS", "Background", "floor", "shadow"]
 
-Background = Literal["white", "checkerboard"]
-BACKGROUNDS: tuple[Background, ...] = ("white", "checkerboard")
+Background = Literal["white", "checkerboard", "light-wood", "dark-wood", "concrete", "lawn"]
+BACKGROUNDS: tuple[Background, ...] = get_args(Background)
+"""The six backgrounds of the paper; the checkerboard is dark."""
 
 _TILE_M = 0.4
 _LIGHT_TILE = np.array([39.0, 56.0, 75.0], dtype=np.float32)
 _DARK_TILE = np.array([21.0, 37.0, 53.0], dtype=np.float32)
 _FADE_FROM_M = np.float32(4.0)
 """Farther tiles blend into their mean color; at the horizon they are finer than a pixel."""
-_SHADOW_STRENGTH: dict[Background, float] = {"white": 0.16, "checkerboard": 0.5}
+_SHADOW_STRENGTH: dict[Background, float] = {
+    "white": 0.16,
+    "checkerboard": 0.5,
+    "light-wood": 0.34,
+    "dark-wood": 0.5,
+    "concrete": 0.38,
+    "lawn": 0.48,
+}
 
 
 def floor(background: Background, camera: Camera, size_px: int) -> NDArray[np.float32]:
@@ -35,15 +44,42 @@ def floor(background: Background, camera: Camera, size_px: int) -> NDArray[np.fl
     down = -camera.ray_component(2, size_px)
     below = down > 1e-6
     distance = np.float32(camera.eye_m[2]) / np.where(below, down, np.float32(np.inf))
-    parity = np.zeros((size_px, size_px), dtype=np.int64)
+    if background in SURFACES:
+        return _surface(background, camera, down, distance)
+    return _checkerboard(camera, below, distance)
+
+
+def _checkerboard(
+    camera: Camera, below: NDArray[np.bool_], distance: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    parity = np.zeros(distance.shape, dtype=np.int64)
     for axis in (0, 1):
-        hit = camera.eye_m[axis] + distance * camera.ray_component(axis, size_px)
+        hit = camera.eye_m[axis] + distance * camera.ray_component(axis, len(distance))
         parity += np.floor(hit / _TILE_M).astype(np.int64)
     contrast = np.where(parity % 2 == 0, np.float32(0.5), np.float32(-0.5))
     contrast *= np.where(below, _FADE_FROM_M / np.maximum(distance, _FADE_FROM_M), 0.0)
     colors: NDArray[np.float32] = contrast[..., None] * (_LIGHT_TILE - _DARK_TILE)
     colors += (_LIGHT_TILE + _DARK_TILE) / 2
     return colors
+
+
+def _surface(
+    surface: Surface,
+    camera: Camera,
+    down: NDArray[np.float32],
+    distance: NDArray[np.float32],
+) -> NDArray[np.float32]:
+    """A procedural floor; above the horizon, its mean color goes on."""
+    size_px = len(distance)
+    far = distance <= 0
+    places = [
+        (camera.eye_m[axis] + distance * camera.ray_component(axis, size_px)).astype(np.float32)
+        for axis in (0, 1)
+    ]
+    wide = distance * np.float32(camera.width_m(1.0) / size_px)
+    footprint = wide / np.sqrt(np.maximum(down, np.float32(1e-6)))
+    footprint[far] = PERIOD_M
+    return sample(surface, places[0], places[1], footprint)
 
 
 def shadow(

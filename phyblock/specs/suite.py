@@ -55,6 +55,7 @@ Level = Annotated[Literal[1, 2, 3, 4], BeforeValidator(_check_whole)]
 Setting = Literal["A", "B"]
 Matcher = Literal["optimal", "paper"]
 Picture = Literal["goal", "candidates"]
+Background = Literal["checkerboard", "white", "light-wood", "dark-wood", "concrete", "lawn"]
 Table = Literal["assembly", "table1", "errors", "published"]
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
 
@@ -126,8 +127,10 @@ class ImagesSpec(Section):
     size_px: Annotated[int, Field(strict=True, ge=128, le=2048)] = Field(
         default=512, description="Edge of a rendered picture [pixels]."
     )
-    background: Literal["checkerboard", "white"] = Field(
-        default="checkerboard", description="Ground of rendered pictures."
+    background: Background = Field(
+        default="checkerboard",
+        description="Ground of rendered pictures, one of the paper's six; the checkerboard is "
+        "dark.",
     )
 
 

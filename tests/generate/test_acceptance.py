@@ -50,7 +50,7 @@ def test_a_wrong_dependency_is_named_with_the_right_one() -> None:
     ("changes", "said"),
     [
         ({"layer": 2}, "longest path"),
-        ({"color": "green"}, "not in the kit"),
+        ({"color": "green"}, "not in the palette"),
         ({"depend": ()}, "longest path"),
     ],
 )

@@ -6,6 +6,8 @@ from typing import Any
 
 from hypothesis import strategies as st
 
+from phyblock.sim.textures import BACKGROUNDS
+
 NAMES = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._:+-]{0,20}", fullmatch=True)
 LINES = st.text(st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\ufeff"))
 
@@ -24,7 +26,7 @@ SECTIONS: dict[str, dict[str, st.SearchStrategy[Any]]] = {
         "layout": st.sampled_from(["composite", "separate"]),
         "order": st.permutations(["goal", "candidates"]),
         "size_px": st.integers(128, 2048),
-        "background": st.sampled_from(["checkerboard", "white"]),
+        "background": st.sampled_from(BACKGROUNDS),
     },
     "scoring": {
         "matchers": _some(["optimal", "paper"]),

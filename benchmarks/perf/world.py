@@ -1,0 +1,118 @@
+"""The block world's speed: scenes generated, verified, audited and rendered a second.
+
+    python benchmarks/perf/world.py [--count 40] [--jobs 1 2]
+
+First the rate of each kind of work with each number of processes, over the same scenes; then what
+one scene costs in CPU time in this process, at 4, 12 and 22 blocks. A verified scene is one whose
+every state of its building order was simulated; an audited one was measured as any foreign scene
+is. A rendered scene is a composite of 512 pixel pictures, none of them on disk before.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from phyblock.domain import Scene
+from phyblock.generate import accept, designed_scenes, make_candidates
+from phyblock.generate.audit import audit_scene
+from phyblock.generate.production import Order, produce, shares
+from phyblock.generate.sketch import make_scene
+from phyblock.generate.workers import Workers, open_workers
+from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
+
+SIZES = (4, 12, 22)
+STYLE = PictureStyle()
+APART_M = 0.4
+
+
+def verify(scene: Scene) -> None:
+    accept(scene)
+
+
+def audit(scene: Scene) -> int:
+    return len(audit_scene(scene, make_candidates(scene)).findings)
+
+
+def render(scene: Scene) -> int:
+    grid = candidates_png(make_candidates(scene), STYLE)
+    return len(composite_png(goal_png(scene, STYLE), grid))
+
+
+def generate(workers: Workers, count: int, seed: int) -> list[Scene]:
+    return list(produce(Order(seed, "kit", shares(count)), workers))
+
+
+def run_all(workers: Workers, work: Callable[[Scene], Any], scenes: Iterable[Scene]) -> None:
+    for _ in workers.map(work, scenes):
+        pass
+
+
+def of_size(blocks: int) -> Scene:
+    """A sound structure of that many blocks, cut from designs that stand side by side."""
+    designs = [s for s in designed_scenes() if s.level >= 3]
+    taken = [
+        replace(b, position_m=(b.position_m[0] + APART_M * i, *b.position_m[1:]))
+        for i, scene in enumerate(designs[-2:])
+        for b in scene.blocks
+    ][:blocks]
+    numbered = [replace(b, order=n, depend=(), layer=1) for n, b in enumerate(taken, 1)]
+    level = 2 if blocks < 6 else 3 if blocks < 13 else 4
+    return make_scene(f"size-{blocks}", (level,), numbered)
+
+
+def timed(work: Callable[[], Any], clock: Callable[[], float]) -> tuple[Any, float]:
+    start = clock()
+    answer = work()
+    return answer, clock() - start
+
+
+def show_rates(count: int, jobs: Sequence[int]) -> None:
+    print(
+        f"{'scenes a second':<24}{'generated':>12}{'verified':>12}{'audited':>12}{'rendered':>12}"
+    )
+    for number in jobs:
+        with open_workers(number) as workers:
+            # The processes start with their first work, which is not timed.
+            run_all(workers, render, [of_size(4)] * number)
+            make = functools.partial(generate, workers, count, 1)
+            scenes, taken_s = timed(make, time.perf_counter)
+            rates = [len(scenes) / taken_s]
+            for work in (verify, audit, render):
+                go = functools.partial(run_all, workers, work, scenes)
+                rates.append(len(scenes) / timed(go, time.perf_counter)[1])
+        name = f"{number} process{'es' if number > 1 else ''}"
+        print(f"{name:<24}" + "".join(f"{rate:>12.2f}" for rate in rates), flush=True)
+
+
+def show_costs() -> None:
+    names = ("verify", "audit", "goal", "candidates")
+    print(f"\n{'CPU seconds a scene':<24}" + "".join(f"{name:>12}" for name in names))
+    for blocks in SIZES:
+        scene = of_size(blocks)
+        candidates = make_candidates(scene)
+        jobs = (
+            functools.partial(verify, scene),
+            functools.partial(audit, scene),
+            functools.partial(goal_png, scene, STYLE),
+            functools.partial(candidates_png, candidates, STYLE),
+        )
+        costs = [timed(job, time.process_time)[1] for job in jobs]
+        print(f"{f'{len(scene)} blocks':<24}" + "".join(f"{cost:>12.2f}" for cost in costs))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=40)
+    parser.add_argument("--jobs", type=int, nargs="+", default=[1, 2])
+    options = parser.parse_args()
+    show_rates(options.count, options.jobs)
+    show_costs()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,107 @@
+"""Where tasks run: in this process, in several, or on a Ray cluster; the answers are the same."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import multiprocessing
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from itertools import islice
+from typing import Any, Protocol, TypeVar
+
+from phyblock.errors import InputError, PhyblockError, Problem
+
+__all__ = ["Workers", "open_workers"]
+
+T = TypeVar("T")
+R = TypeVar("R")
+_AHEAD = 4
+"""Tasks under way for each process, so that none waits and memory stays flat."""
+_RAY_AHEAD = 64
+_RAY_RETRIES = 5
+
+
+class Workers(Protocol):
+    """Runs pure functions on many inputs."""
+
+    def map(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
+        """The answers in the order of the tasks, few tasks ahead of what is taken."""
+
+
+@contextlib.contextmanager
+def open_workers(jobs: int = 1, ray_address: str | None = None) -> Iterator[Workers]:
+    """Workers for the time of a with statement.
+
+    `ray_address` is that of a Ray cluster, or `local` for one of `jobs` workers on this machine;
+    without it there are `jobs` processes, or this one alone. Raises InputError when Ray is asked
+    for and not installed or not reachable.
+    """
+    if ray_address is not None:
+        with _ray(jobs, ray_address) as workers:
+            yield workers
+    elif jobs == 1:
+        yield _Here()
+    else:
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(jobs, mp_context=context) as pool:
+            yield _Processes(pool, jobs * _AHEAD)
+
+
+class _Here:
+    def map(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
+        return map(function, tasks)
+
+
+class _Processes:
+    def __init__(self, pool: ProcessPoolExecutor, ahead: int) -> None:
+        self._pool, self._ahead = pool, ahead
+
+    def map(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
+        waiting = iter(tasks)
+        running = [self._pool.submit(function, task) for task in islice(waiting, self._ahead)]
+        try:
+            while running:
+                yield running.pop(0).result()
+                running += [self._pool.submit(function, task) for task in islice(waiting, 1)]
+        except BrokenProcessPool as error:
+            raise PhyblockError("a worker process was killed; nothing was written") from error
+
+
+class _Ray:
+    """Tasks on a cluster; one whose worker dies runs again, which changes nothing: it is pure."""
+
+    def __init__(self, ray: Any) -> None:
+        self._ray = ray
+
+    def map(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
+        remote = self._ray.remote(max_retries=_RAY_RETRIES)(function)
+        waiting = iter(tasks)
+        running = [remote.remote(task) for task in islice(waiting, _RAY_AHEAD)]
+        while running:
+            yield self._ray.get(running.pop(0))
+            running += [remote.remote(task) for task in islice(waiting, 1)]
+
+
+@contextlib.contextmanager
+def _ray(jobs: int, address: str) -> Iterator[Workers]:
+    try:
+        ray = importlib.import_module("ray")
+    except ModuleNotFoundError as error:
+        hint = "pip install 'phyblock[ray]'"
+        raise InputError(Problem("--ray", "Ray is not installed", hint=hint)) from error
+    try:
+        if address == "local":
+            ray.init(num_cpus=jobs, include_dashboard=False, log_to_driver=False)
+        else:
+            ray.init(address=address, log_to_driver=False)
+    except (ConnectionError, ValueError, RuntimeError) as error:
+        allowed = "local, auto, or the address of a running cluster"
+        raise InputError(
+            Problem("--ray", "no such cluster", found=address, allowed=allowed)
+        ) from error
+    try:
+        yield _Ray(ray)
+    finally:
+        ray.shutdown()

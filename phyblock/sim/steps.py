@@ -1,0 +1,136 @@
+"""Stability of every step of a building order, at a fraction of the cost of trying each for long.
+
+Two facts save time and change no verdict: blocks that nothing brings near one another cannot
+disturb one another, so a step is tried with the new block's own group alone; and a group that has
+been quiet for a while is at rest, for an unsupported load of 0.2 % of a block's weight would show.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.domain.scene import Block
+from phyblock.sim.stability import DEFAULT_TRIAL, Stability, Trial
+from phyblock.sim.support import bounds_m
+from phyblock.sim.world import Physics, Pose, World
+
+__all__ = ["DEFAULT_REST", "Rest", "check_at_rest", "check_steps", "groups"]
+
+
+@dataclass(frozen=True)
+class Rest:
+    """When a trial may end early: no corner was faster than `speed_m_s` [m/s] for `quiet_s` [s].
+
+    Speeds are read every `every_s` [s]. 5 mm/s lies above the jitter of resting contacts (up to
+    4 mm/s) and far below what a block reaches that has begun to tip.
+    """
+
+    speed_m_s: float = 0.005
+    quiet_s: float = 0.25
+    every_s: float = 0.05
+
+
+DEFAULT_REST = Rest()
+_REACH_M = 0.012
+"""Groups this far apart stay apart while no block passes the limits of a trial."""
+
+
+def check_steps(
+    blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL, rest: Rest | None = DEFAULT_REST
+) -> tuple[Stability, ...]:
+    """Stability after each step when blocks are placed in the order given.
+
+    Only the group of the block just placed is tried, every block at its goal pose; the other
+    groups were tried at earlier steps. With `rest` None every trial takes its full time.
+    """
+    verdicts: list[list[tuple[float, float, tuple[int, ...]]]] = [[] for _ in blocks]
+    for physics in trial.physics:
+        with World(physics) as world:
+            for count in range(len(blocks)):
+                group = _group_of_last(blocks[: count + 1])
+                verdicts[count].append(_try(world, group, physics, trial, rest))
+    return tuple(_verdict(found, trial) for found in verdicts)
+
+
+def check_at_rest(
+    blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL, rest: Rest = DEFAULT_REST
+) -> Stability:
+    """Stability of a state as `check` finds it, each group watched until it is at rest."""
+    found = []
+    for physics in trial.physics:
+        with World(physics) as world:
+            tried = [_try(world, group, physics, trial, rest) for group in groups(blocks)]
+        fallen = tuple(sorted(order for _, _, orders in tried for order in orders))
+        found.append((max(one[0] for one in tried), max(one[1] for one in tried), fallen))
+    return _verdict(found, trial)
+
+
+def groups(blocks: Sequence[Block], reach_m: float = _REACH_M) -> tuple[tuple[Block, ...], ...]:
+    """The blocks in groups that keep more than `reach_m` [m] of free space between them."""
+    boxes = [bounds_m(block) for block in blocks]
+    left = set(range(len(blocks)))
+    found: list[tuple[Block, ...]] = []
+    while left:
+        frontier = [min(left)]
+        left.remove(frontier[0])
+        members = []
+        while frontier:
+            at = frontier.pop()
+            members.append(at)
+            near = {other for other in left if _near(boxes[at], boxes[other], reach_m)}
+            left -= near
+            frontier += sorted(near)
+        found.append(tuple(blocks[member] for member in sorted(members)))
+    return tuple(found)
+
+
+def _group_of_last(blocks: Sequence[Block]) -> tuple[Block, ...]:
+    return next(group for group in groups(blocks) if blocks[-1] in group)
+
+
+def _try(
+    world: World, group: Sequence[Block], physics: Physics, trial: Trial, rest: Rest | None
+) -> tuple[float, float, tuple[int, ...]]:
+    """Largest movement [m], largest turn [degrees] and the orders of the fallen."""
+    world.place_all(group)
+    if rest is None:
+        world.step(trial.duration_s)
+    else:
+        _run_until_quiet(world, physics, trial.duration_s, rest)
+    poses = world.poses()
+    for block in group:
+        world.remove(block.order)
+    moved = [poses[block.order].distance_m(Pose.goal(block)) for block in group]
+    turned = [poses[block.order].angle_deg(Pose.goal(block)) for block in group]
+    fallen = tuple(
+        block.order
+        for block, distance_m, angle_deg in zip(group, moved, turned, strict=True)
+        if distance_m > trial.limit_m or angle_deg > trial.limit_deg
+    )
+    return max(moved), max(turned), fallen
+
+
+def _run_until_quiet(world: World, physics: Physics, duration_s: float, rest: Rest) -> None:
+    every_s = max(rest.every_s, physics.time_step_s)
+    quiet_s = 0.0
+    for _ in range(round(duration_s / every_s)):
+        world.step(every_s)
+        quiet_s = quiet_s + every_s if world.fastest_m_s() < rest.speed_m_s else 0.0
+        if quiet_s >= rest.quiet_s - every_s / 2:
+            return
+
+
+def _verdict(found: Sequence[tuple[float, float, tuple[int, ...]]], trial: Trial) -> Stability:
+    fallen = sorted({order for _, _, orders in found for order in orders})
+    agreed = len({orders for _, _, orders in found}) <= 1
+    moved_m, turned_deg = max(one[0] for one in found), max(one[1] for one in found)
+    return Stability(tuple(fallen), moved_m, turned_deg, agreed, trial)
+
+
+def _near(first: NDArray[np.float64], second: NDArray[np.float64], reach_m: float) -> bool:
+    apart = np.maximum(first[0] - second[1], second[0] - first[1])
+    return bool(apart.max() <= reach_m)

@@ -1,0 +1,161 @@
+"""Procedural floors: wood, concrete and lawn as seamless square textures, and their sampling.
+
+A texture is made once a process from integer hashes and filtered noise: no image file, the same
+pixels whatever the version of a random generator. It repeats every two meters, and is kept at
+every halving of its size, so that far ground shows its mean color and never flickers.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["PERIOD_M", "SURFACES", "Surface", "sample", "surface_map"]
+
+Surface = Literal["light-wood", "dark-wood", "concrete", "lawn"]
+Grid = NDArray[np.float32]
+"""One number a texel or pixel, shape (n, n)."""
+Colors = NDArray[np.float64]
+"""Colors of a texture, shape (n, n, 3), about 0..255."""
+
+PERIOD_M = 2.0
+"""Textures repeat after this in x and y [m]."""
+_SIZE = 2048
+_PLANKS = 16
+_JOINT_PX = 1.6
+
+
+@functools.cache
+def surface_map(surface: Surface) -> tuple[NDArray[np.uint8], ...]:
+    """The texture at full size, then halved again and again down to one texel.
+
+    Each has shape (n, n, 3), 0..255; rows run along y, columns along x.
+    """
+    maps = [_MAKERS[surface]().astype(np.float32).clip(0, 255)]
+    while len(maps[-1]) > 1:
+        last = maps[-1]
+        half = len(last) // 2
+        maps.append(last.reshape(half, 2, half, 2, 3).mean(axis=(1, 3)))
+    return tuple(np.rint(one).astype(np.uint8) for one in maps)
+
+
+def sample(surface: Surface, x_m: Grid, y_m: Grid, footprint_m: Grid) -> NDArray[np.float32]:
+    """Colors at points of the floor, shape of `x_m` plus (3,), 0..255.
+
+    `footprint_m` is the width of floor that each pixel sees [m]: finer detail is left out.
+    """
+    maps = surface_map(surface)
+    texel_m = PERIOD_M / _SIZE
+    depth = np.log2(np.maximum(footprint_m, texel_m) / texel_m)
+    level = np.clip(np.rint(depth), 0, len(maps) - 1).astype(np.int8)
+    colors = np.empty((*x_m.shape, 3), dtype=np.float32)
+    for number in np.unique(level).tolist():
+        chosen = level == number
+        colors[chosen] = _bilinear(maps[number], x_m[chosen], y_m[chosen])
+    return colors
+
+
+def _bilinear(texture: NDArray[np.uint8], x_m: Grid, y_m: Grid) -> NDArray[np.float32]:
+    size = len(texture)
+    across, along = (place / PERIOD_M * size - 0.5 for place in (x_m, y_m))
+    column, row = np.floor(across).astype(np.int64), np.floor(along).astype(np.int64)
+    right, down = (across - column)[:, None], (along - row)[:, None]
+    column, row, beside, below = (n % size for n in (column, row, column + 1, row + 1))
+    upper = texture[row, column] * (1 - right) + texture[row, beside] * right
+    lower = texture[below, column] * (1 - right) + texture[below, beside] * right
+    mixed: NDArray[np.float32] = (upper * (1 - down) + lower * down).astype(np.float32)
+    return mixed
+
+
+def _wood(pale: tuple[int, int, int], deep: tuple[int, int, int], seed: int) -> Colors:
+    """Boards along x, each with a tone and a grain of its own, and thin joints between them."""
+    width = _SIZE // _PLANKS
+    board = np.arange(_SIZE) // width
+    tone = (_hashed(seed, _PLANKS)[board] - 0.5)[:, None]
+    shift = (_hashed(seed + 1, _PLANKS)[board] * _SIZE).astype(np.int64)
+    columns = (np.arange(_SIZE)[None, :] + shift[:, None]) % _SIZE
+    rows = np.arange(_SIZE)[:, None]
+    wave = _noise(seed + 2, 2.0, 40.0, (7.0, 1.0))[rows, columns]
+    fiber = _noise(seed + 3, 0.6, 900.0, (36.0, 1.0))[rows, columns]
+    pore = np.maximum(_noise(seed + 4, 0.0, 700.0, (22.0, 1.0))[rows, columns] - 1.6, 0.0)
+    rings = np.sin(2 * math.pi * (rows / width * 2.2 + 0.9 * wave + 3 * tone))
+    depth = 0.42 + 0.55 * tone + 0.14 * rings + 0.10 * fiber + 0.22 * pore
+    edge = np.minimum(np.arange(_SIZE) % width, width - np.arange(_SIZE) % width)
+    joint = np.clip(1 - edge / _JOINT_PX, 0, 1)[:, None]
+    colors = np.array(pale) + depth[..., None] * (np.array(deep) - np.array(pale))
+    wood: Colors = colors * (1 - 0.55 * joint[..., None])
+    return wood
+
+
+def _concrete() -> Colors:
+    """Gray, with broad clouds, fine grain and a few small pores."""
+    clouds, grain = _noise(31, 1.6, 120.0), _noise(32, 0.3, 1000.0)
+    pores = np.maximum(_noise(33, 0.0, 160.0) - 2.7, 0.0)
+    light = 158 + 7.5 * clouds + 4.5 * grain - 46 * np.minimum(pores, 1.0)
+    concrete: Colors = light[..., None] * np.array([1.0, 0.995, 0.975])
+    return concrete
+
+
+def _lawn() -> Colors:
+    """Blades in many directions, light ones over dark ones, on ground of uneven tone."""
+    patches = _noise(41, 1.8, 24.0)
+    blades = np.full((_SIZE, _SIZE), -3.0)
+    for number in range(6):
+        layer = _noise(50 + number, 0.2, 420.0, (5.0, 1.0), math.pi * number / 6)
+        blades = np.maximum(blades, layer)
+    light = np.clip(0.36 * (blades - 1.2) + 0.07 * patches, -1, 1)[..., None]
+    dry = (0.5 + 0.5 * np.tanh(0.8 * _noise(43, 1.4, 60.0)))[..., None]
+    green = np.array([70, 104, 42]) + light * np.array([46, 60, 28])
+    lawn: Colors = green + dry * np.array([9, 2, -3])
+    return lawn
+
+
+_MAKERS: dict[Surface, Callable[[], Colors]] = {
+    "light-wood": functools.partial(_wood, (232, 204, 164), (196, 156, 110), 11),
+    "dark-wood": functools.partial(_wood, (112, 76, 52), (62, 39, 27), 21),
+    "concrete": _concrete,
+    "lawn": _lawn,
+}
+SURFACES: tuple[Surface, ...] = tuple(_MAKERS)
+
+
+def _noise(
+    seed: int,
+    slope: float,
+    finest: float,
+    stretch: tuple[float, float] = (1.0, 1.0),
+    turn_rad: float = 0.0,
+) -> Grid:
+    """Seamless noise of mean 0 and deviation 1, shape (size, size).
+
+    Its amplitude falls with frequency to the power `slope`, and is gone above `finest` waves a
+    period; `stretch` draws it out along x and y, which are turned by `turn_rad`.
+    """
+    white = _hashed(seed, _SIZE * _SIZE).reshape(_SIZE, _SIZE) - 0.5
+    rows = np.fft.fftfreq(_SIZE, 1 / _SIZE)[:, None]
+    columns = np.fft.rfftfreq(_SIZE, 1 / _SIZE)[None, :]
+    cosine, sine = math.cos(turn_rad), math.sin(turn_rad)
+    along, across = cosine * columns + sine * rows, cosine * rows - sine * columns
+    waves = np.hypot(along * stretch[0], across * stretch[1])
+    gain = np.maximum(waves, 1.0) ** -slope * np.exp(-((waves / finest) ** 2))
+    gain[0, 0] = 0.0
+    noise = np.fft.irfft2(np.fft.rfft2(white) * gain, s=(_SIZE, _SIZE))
+    scaled: Grid = (noise / noise.std()).astype(np.float32)
+    return scaled
+
+
+def _hashed(seed: int, count: int) -> NDArray[np.float64]:
+    """Numbers in 0..1 from an integer hash (SplitMix64), shape (count,)."""
+    mixed = np.arange(count, dtype=np.uint64) + np.uint64((seed << 40) + 1)
+    mixed *= np.uint64(0x9E3779B97F4A7C15)
+    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        mixed ^= mixed >> np.uint64(shift)
+        mixed *= np.uint64(factor)
+    mixed ^= mixed >> np.uint64(31)
+    numbers: NDArray[np.float64] = (mixed >> np.uint64(11)) / float(1 << 53)
+    return numbers

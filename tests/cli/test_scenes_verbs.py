@@ -1,0 +1,102 @@
+"""`phyblock scenes audit|show|render|stats` as a person calls them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+
+from phyblock.cli.main import phyblock
+from phyblock.datasets import read_builtin
+from phyblock.errors import DataError, StoreError
+from tests.workspace import SCENES, tower
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """The five towers of a workspace, and one whose middle block is lifted and misdeclared."""
+    spoiled = tower("t6", [3], ("red", "blue", "green"))
+    spoiled["blocks"][2]["position"][2] += 0.02
+    spoiled["blocks"][1] |= {"depend": [0], "layer": 1}
+    spoiled["blocks"][2]["depend"] = [1]
+    spoiled["blocks"][2]["layer"] = 2
+    folder = tmp_path / "data"
+    folder.mkdir()
+    text = "".join(json.dumps(scene) + "\n" for scene in (*SCENES, spoiled))
+    (folder / "scenes.jsonl").write_text(text, encoding="utf-8")
+    return folder
+
+
+def scenes(*args: object) -> str:
+    """What the command prints."""
+    done = CliRunner().invoke(
+        phyblock, ["scenes", *map(str, args)], standalone_mode=False, catch_exceptions=False
+    )
+    return done.stdout
+
+
+def test_an_audit_tells_files_draws_and_mends(data: Path, tmp_path: Path) -> None:
+    table, fixed, pictures = tmp_path / "found.csv", tmp_path / "fixed", tmp_path / "worst"
+    told = scenes(
+        *("audit", data, "--jobs", 1, "--csv", table, "--fix", fixed, "--pictures", pictures)
+    )
+    assert "6 scenes read; 5 with no finding" in told
+    assert "5 stand when finished, 5 at every step as well" in told
+    assert "block 3 (green cube) hangs 20.0 mm above what is below it" in told
+    rows = list(csv.DictReader(io.StringIO(table.read_text(encoding="utf-8"))))
+    assert {row["check"] for row in rows if row["scene"] == "t6"} >= {"floating", "unstable"}
+    assert [path.name for path in sorted(pictures.iterdir())] == ["t6.png"]
+    tasks = {task.scene.id: task.scene for task in read_builtin(fixed).tasks}
+    assert [b.depend for b in tasks["t6"].blocks] == [(), (1,), (1,)]
+    assert "t6" in (fixed / "changes.csv").read_text(encoding="utf-8")
+
+
+def test_an_audit_says_what_cannot_be_read(data: Path) -> None:
+    with (data / "scenes.jsonl").open("a", encoding="utf-8") as file:
+        file.write("{}\n")
+    assert "line 7" in scenes("audit", data, "--jobs", 1)
+
+
+def test_an_audit_refuses_to_write_over_before_it_works(data: Path) -> None:
+    with pytest.raises(StoreError, match="already there"):
+        scenes("audit", data, "--fix", data)
+
+
+def test_show_prints_the_facts(data: Path) -> None:
+    told = scenes("show", data, "t3")
+    assert "scene t3 · level 3 · 3 blocks · 3 layers" in told
+    assert "0 0 75" in told
+    with pytest.raises(DataError, match="no such scene"):
+        scenes("show", data, "t9")
+
+
+def test_stats_count(data: Path) -> None:
+    told = scenes("stats", data)
+    assert "data: 6 scenes, 6 base scenes" in told
+    assert "100.0 %" in told
+
+
+def test_render_names_views_backgrounds_and_kinds(data: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    extras = ("--composite", "--exploded", "--filmstrip", "--gif", "--webp")
+    scenes("render", data, "t1", "--out", out, "--size", 128, *extras)
+    stem = "t1-oblique-checkerboard"
+    tails = (".png", "-composite.png", "-exploded.png", "-filmstrip.png", ".gif", ".webp")
+    assert {path.name for path in out.iterdir()} == {stem + tail for tail in tails}
+    for path in out.iterdir():
+        with Image.open(path) as image:
+            assert image.format == path.suffix[1:].upper()
+    scenes("render", data, "--out", tmp_path / "all", "--size", 128, "--view", "all")
+    assert len(list((tmp_path / "all").iterdir())) == 6 * 4
+    scenes("render", data, "t1", "--out", tmp_path / "one", "--size", 128, "--azimuth", 20)
+    assert [path.name for path in (tmp_path / "one").iterdir()] == ["t1-20-22-checkerboard.png"]
+
+
+def test_a_data_set_that_is_not_there_is_refused_with_the_bundled_ones() -> None:
+    with pytest.raises(DataError, match="phyblock-mini"):
+        scenes("stats", "nowhere")
