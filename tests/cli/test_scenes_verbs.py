@@ -34,7 +34,7 @@ def data(tmp_path: Path) -> Path:
 
 def scenes(*args: object) -> str:
     """What the command prints."""
-    done = CliRunner().invoke(
+    done = CliRunner(env={"COLUMNS": "160"}).invoke(
         phyblock, ["scenes", *map(str, args)], standalone_mode=False, catch_exceptions=False
     )
     return done.stdout
