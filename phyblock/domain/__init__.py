@@ -15,27 +15,51 @@ from phyblock.domain.blocks import (
 )
 from phyblock.domain.candidates import MAX_CANDIDATES, Candidate, CandidateSet
 from phyblock.domain.plan import Plan
+from phyblock.domain.question import (
+    CATEGORIES,
+    LETTERS,
+    SUBTASK_NAMES,
+    SUBTASKS,
+    Category,
+    Mark,
+    Question,
+    QuestionPicture,
+    Subtask,
+    category_of,
+    is_picture_option,
+)
 from phyblock.domain.scene import Block, Kind, Look, Scene
 
 __all__ = [
     "BLOCK_TYPES",
+    "CATEGORIES",
     "COLORS",
     "KIT_PALETTE",
+    "LETTERS",
     "MAX_CANDIDATES",
     "SHAPES",
+    "SUBTASKS",
+    "SUBTASK_NAMES",
     "AOVGraph",
     "Block",
     "BlockType",
     "Candidate",
     "CandidateSet",
+    "Category",
     "Color",
     "CycleError",
     "Euler",
     "Kind",
     "Look",
+    "Mark",
     "Plan",
+    "Question",
+    "QuestionPicture",
     "Scene",
+    "Subtask",
+    "category_of",
     "euler_deg_to_quat_xyzw",
+    "is_picture_option",
     "orientation_class",
     "quat_xyzw_to_matrix",
 ]

@@ -1,0 +1,131 @@
+"""Multiple-choice questions about scenes: the 16 subtasks, pictures as recipes, answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_args
+
+from phyblock.domain.scene import Block, Scene
+
+__all__ = [
+    "CATEGORIES",
+    "LETTERS",
+    "SUBTASKS",
+    "SUBTASK_NAMES",
+    "Category",
+    "Mark",
+    "Question",
+    "QuestionPicture",
+    "Subtask",
+    "category_of",
+    "is_picture_option",
+]
+
+Subtask = Literal[
+    "SH", "CO", "SI", "NU", "RP", "AP", "RD", "RR", "OC", "LC", "TC", "VP", "CF", "PD", "OR", "AD"
+]
+Category = Literal[
+    "object_property", "object_relationship", "scene_understanding", "dynamic_reasoning"
+]
+
+SUBTASKS: tuple[Subtask, ...] = get_args(Subtask)
+"""In the order of the paper's Table 2."""
+CATEGORIES: Mapping[Category, tuple[Subtask, ...]] = {
+    "object_property": ("SH", "CO", "SI", "NU"),
+    "object_relationship": ("RP", "AP", "RD", "RR"),
+    "scene_understanding": ("OC", "LC", "TC", "VP"),
+    "dynamic_reasoning": ("CF", "PD", "OR", "AD"),
+}
+"""The four categories of paper section 3.3 and their subtasks."""
+SUBTASK_NAMES: Mapping[Subtask, str] = {
+    "SH": "shape",
+    "CO": "color",
+    "SI": "size",
+    "NU": "number",
+    "RP": "relative position",
+    "AP": "absolute position",
+    "RD": "relative dependency",
+    "RR": "relative rotation",
+    "OC": "object counting",
+    "LC": "layer counting",
+    "TC": "type counting",
+    "VP": "viewpoint",
+    "CF": "counterfactual",
+    "PD": "predictive",
+    "OR": "ordering",
+    "AD": "affordance",
+}
+LETTERS = "ABCD"
+"""The options of a question, in order."""
+
+
+def category_of(subtask: Subtask) -> Category:
+    """The category that a subtask belongs to."""
+    return next(name for name, subtasks in CATEGORIES.items() if subtask in subtasks)
+
+
+def is_picture_option(option: str) -> bool:
+    """Whether an option is a picture: `<img1>` to `<img4>`, as in the official files."""
+    return option in ("<img1>", "<img2>", "<img3>", "<img4>")
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A lettered place drawn into a picture; `position_m` in the world [m]."""
+
+    letter: str
+    position_m: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class QuestionPicture:
+    """A picture as a recipe: what is drawn, from where.
+
+    `label` says what it is: `scene`, the letter of the option it is (`A` to `D`), or the block
+    asked about (`block`). `blocks` are drawn at the poses they have here, which need not be goal
+    poses; `view_deg` is the camera's azimuth and elevation [degrees]; the camera is framed on
+    `framed`, or on `blocks` where that is empty, so that pictures that are compared share a camera.
+    """
+
+    label: str
+    blocks: tuple[Block, ...]
+    view_deg: tuple[float, float]
+    marks: tuple[Mark, ...] = ()
+    framed: tuple[Block, ...] = ()
+
+
+@dataclass(frozen=True)
+class Question:
+    """One multiple-choice question (paper section 3.3, appendix A.4).
+
+    `scene` is the scene as shown, recolored where the question says so; `options` are texts or
+    `<img1>` to `<img4>`, which are the pictures labeled A to D; `answer` holds the 0-based index
+    of the right option, or for ordering (`OR`) all four indices in the right order; `wording`
+    names the template of the text; `evidence` is what the answer was derived from.
+    """
+
+    id: str
+    subtask: Subtask
+    scene: Scene
+    text: str
+    options: tuple[str, ...]
+    answer: tuple[int, ...]
+    pictures: tuple[QuestionPicture, ...] = ()
+    wording: str = ""
+    evidence: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def key(self) -> str:
+        """What samples and caches call the question."""
+        return self.id
+
+    @property
+    def category(self) -> Category:
+        """The category of its subtask."""
+        return category_of(self.subtask)
+
+    @property
+    def answer_letters(self) -> str:
+        """The answer as letters: `B`, or for ordering `BADC`."""
+        return "".join(LETTERS[index] for index in self.answer)
