@@ -1,0 +1,1 @@
+"""Multiple-choice questions about scenes, with answers derived from geometry and physics."""
