@@ -15,7 +15,7 @@ from phyblock.errors import PhyblockError
 __all__ = ["Draft", "Maker", "Option", "UnfairError"]
 
 Option = str | QuestionPicture | Mark
-"""A text; a picture (its label is given later); or a place, which is marked in the first picture."""
+"""A text; a picture, labeled later; or a place, which is marked in the first picture."""
 
 
 class UnfairError(PhyblockError):
