@@ -9,7 +9,7 @@ from typing import Literal, get_args
 from phyblock.domain import CandidateSet, Plan, Scene
 from phyblock.scoring.match import Goal, Match
 
-__all__ = ["ERROR_TYPES", "ErrorType", "count_errors", "step_errors"]
+__all__ = ["ERROR_TYPES", "ErrorType", "count_errors", "error_type", "step_errors"]
 
 ErrorType = Literal["shape_not_in_gt", "overflow", "incorrect_orientation", "dependency_not_met"]
 ERROR_TYPES: tuple[ErrorType, ...] = get_args(ErrorType)
@@ -31,12 +31,15 @@ def step_errors(
     }
     equal = {index: sum(1 << v for v in goal.equal_to[index]) for index in of_kind}
     return tuple(
-        _why(of_kind[index], equal[index], placed) if vertex is None else None
+        error_type(of_kind[index], equal[index], placed) if vertex is None else None
         for index, vertex, placed in zip(plan.steps, match.vertices, match.placed, strict=True)
     )
 
 
-def _why(of_kind: int, equal: int, placed: int) -> ErrorType:
+def error_type(of_kind: int, equal: int, placed: int) -> ErrorType:
+    """Why a step is wrong: bit masks of the goal blocks of the candidate's type and color, of
+    those equal to it under the setting, and of those placed when the step came.
+    """
     if not of_kind:
         return "shape_not_in_gt"
     if not of_kind & ~placed:

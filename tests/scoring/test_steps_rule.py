@@ -1,0 +1,237 @@
+"""The rule of a step: what a move does to an assembly."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.datasets import AssemblyTask, read_builtin, read_official
+from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.scoring import ERROR_TYPES, SETTINGS, Goal, Setting, match_plan
+from phyblock.scoring.steps import (
+    GATINGS,
+    MOVE_OUTCOMES,
+    Assembly,
+    Gating,
+    attempted_counts,
+    gated,
+    placed_counts,
+)
+from tests.scoring.cases import Case, cases
+
+ORDERS = 20
+BUILT_IN = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400"
+
+settings = st.sampled_from(SETTINGS)
+gatings = st.sampled_from(GATINGS)
+
+
+def solved_number(task_scene: Scene, candidates: CandidateSet) -> list[int]:
+    numbers = [candidates.index_of(block.look) for block in task_scene.blocks]
+    assert None not in numbers
+    return [number for number in numbers if number is not None]
+
+
+def assert_no_valid_order_fails(
+    task: AssemblyTask, orders: int, rng: np.random.Generator, setting: Setting, gating: Gating
+) -> None:
+    numbers = solved_number(task.scene, task.candidates)
+    graph = gated(task.scene, gating).graph
+    for _ in range(orders):
+        order = graph.random_order(rng)
+        assembly = Assembly(task.scene, task.candidates, setting, gating)
+        outcomes = {assembly.move(numbers[vertex]).outcome for vertex in order}
+        assert outcomes == {"placed"}, (task.scene.id, setting, gating, order)
+        assert assembly.is_complete
+        assert assembly.vertices == tuple(range(len(task.scene)))
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_no_valid_order_of_the_official_scenes_fails(
+    official_checkout: Path, setting: Setting
+) -> None:
+    rng = np.random.default_rng(0)
+    for task in read_official(official_checkout).tasks:
+        assert_no_valid_order_fails(task, ORDERS, rng, setting, "aov")
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_no_valid_order_of_the_built_in_scenes_fails(setting: Setting) -> None:
+    rng = np.random.default_rng(1)
+    for task in read_builtin(BUILT_IN).tasks:
+        assert_no_valid_order_fails(task, ORDERS, rng, setting, "aov")
+
+
+def test_no_order_by_layers_fails_under_layer_gating() -> None:
+    rng = np.random.default_rng(2)
+    for task in read_builtin(BUILT_IN).tasks:
+        assert_no_valid_order_fails(task, 2, rng, "A", "layer")
+
+
+def right(case: Case, setting: Setting) -> list[int]:
+    """For each block of the scene, candidates that stand for it; none is 0."""
+    attribute = "look" if setting == "A" else "kind"
+    return [
+        next(
+            (
+                n
+                for n, candidate in enumerate(case.candidates.candidates, 1)
+                if getattr(candidate, attribute) == getattr(block, attribute)
+            ),
+            0,
+        )
+        for block in case.scene.blocks
+    ]
+
+
+@given(cases(), settings, gatings, st.randoms(use_true_random=False))
+def test_a_valid_order_never_fails_whatever_looks_alike(
+    case: Case, setting: Setting, gating: Gating, random: object
+) -> None:
+    numbers = right(case, setting)
+    rng = np.random.default_rng(random.getrandbits(32))  # type: ignore[attr-defined]
+    assembly = Assembly(case.scene, case.candidates, setting, gating)
+    for vertex in gated(case.scene, gating).graph.random_order(rng):
+        if numbers[vertex] == 0:
+            return
+        assert numbers[vertex] in assembly.right_moves()
+        assert assembly.move(numbers[vertex]).outcome == "placed"
+    assert assembly.is_complete
+
+
+@given(cases(max_steps=14), settings, gatings)
+def test_the_world_is_always_one_that_can_be_built(
+    case: Case, setting: Setting, gating: Gating
+) -> None:
+    """Whatever is placed has all that it depends on, and the right moves are those that work."""
+    assembly = Assembly(case.scene, case.candidates, setting, gating)
+    graph = gated(case.scene, gating).graph
+    for index in case.plan.steps:
+        before, expected = assembly.vertices, index in assembly.right_moves()
+        move = assembly.move(index)
+        assert (move.outcome == "placed") == expected
+        for vertex in assembly.vertices:
+            assert graph.depends_on[vertex] <= set(assembly.vertices)
+        if move.outcome == "placed":
+            left = {one for one, _ in move.swapped}
+            entered = {other for _, other in move.swapped} | {move.vertex}
+            assert set(assembly.vertices) == set(before) - left | entered
+            assert len(assembly.vertices) == len(before) + 1 == len(assembly.chosen)
+        else:
+            assert (assembly.vertices, move.vertex, move.swapped) == (before, None, ())
+
+
+@given(cases(max_steps=14), settings)
+def test_a_wrong_move_has_the_error_type_of_its_moment(case: Case, setting: Setting) -> None:
+    assembly = Assembly(case.scene, case.candidates, setting)
+    for index in case.plan.steps:
+        candidate = case.candidates[index]
+        unplaced = [b for v, b in enumerate(case.scene.blocks) if v not in assembly.vertices]
+        outcome = assembly.move(index).outcome
+        if all(block.kind != candidate.kind for block in case.scene.blocks):
+            assert outcome == "shape_not_in_gt"
+        elif all(block.kind != candidate.kind for block in unplaced):
+            assert outcome == "overflow"
+        elif setting == "A" and all(block.look != candidate.look for block in unplaced):
+            assert outcome == "incorrect_orientation"
+        else:
+            assert outcome in ("placed", "dependency_not_met")
+
+
+@given(cases(max_steps=14), settings)
+def test_no_more_is_placed_than_the_optimal_matcher_allows(case: Case, setting: Setting) -> None:
+    assembly = Assembly(case.scene, case.candidates, setting)
+    outcomes = [assembly.move(index).outcome for index in case.plan.steps]
+    placed = Plan(tuple(assembly.chosen))
+    goal = Goal(case.scene, case.candidates, setting)
+    assert match_plan(goal, placed, "optimal").counts.fp == 0
+    assert outcomes.count("placed") <= match_plan(goal, case.plan, "optimal").counts.tp
+
+
+@given(cases(), st.integers(-(10**9), 10**9))
+def test_a_number_that_no_candidate_has_is_invalid(case: Case, index: int) -> None:
+    assembly = Assembly(case.scene, case.candidates, "A")
+    outcome = assembly.move(index).outcome
+    assert (outcome == "invalid") == (not 1 <= index <= len(case.candidates))
+    assert outcome in MOVE_OUTCOMES
+
+
+def cube(order: int, color: str, depend: tuple[int, ...] = (), turn: float = 0.0) -> Block:
+    layer = 1 + bool(depend)
+    return Block(order, "arch", color, (0, 0, 0), (0, 0, turn), depend, layer)  # type: ignore[arg-type]
+
+
+def two_pillars() -> tuple[Scene, CandidateSet]:
+    """Two equal red blocks; a blue one stands on the first, a green one on the second."""
+    blocks = (cube(1, "red"), cube(2, "red"), cube(3, "blue", (1,)), cube(4, "green", (2,)))
+    colors = ("red", "blue", "green", "yellow")
+    numbered = tuple(Candidate("arch", color, (0, 0, 0)) for color in colors)  # type: ignore[arg-type]
+    return Scene("pillars", (3,), blocks, ("pillars",)), CandidateSet(numbered)
+
+
+@pytest.mark.parametrize(("third", "standing"), [(2, (0, 2)), (3, (1, 3))])
+def test_equal_blocks_change_places_where_the_next_move_needs_it(
+    third: int, standing: tuple[int, ...]
+) -> None:
+    """After one red block, blue and green are both right: the picture follows the choice."""
+    assembly = Assembly(*two_pillars(), "A")
+    assembly.move(1)
+    assert assembly.right_moves() == (1, 2, 3)
+    move = assembly.move(third)
+    assert move.outcome == "placed"
+    assert assembly.vertices == standing
+    assert assembly.move(5 - third).outcome == "dependency_not_met"
+
+
+def test_a_swap_is_told() -> None:
+    assembly = Assembly(*two_pillars(), "A")
+    first = assembly.move(1).vertex
+    assert first == 0
+    move = assembly.move(3)
+    assert (move.vertex, move.swapped) == (3, ((0, 1),))
+
+
+def test_layers_wait_for_the_whole_layer_below() -> None:
+    scene, candidates = two_pillars()
+    moves = (1, 2, 1, 2)
+    outcomes = {
+        gating: [assembly.move(n).outcome for n in moves]
+        for gating in GATINGS
+        for assembly in [Assembly(scene, candidates, "A", gating)]
+    }
+    assert outcomes == {
+        "aov": ["placed", "placed", "placed", "overflow"],
+        "layer": ["placed", "dependency_not_met", "placed", "placed"],
+    }
+
+
+def test_what_counts_as_placed_rightly() -> None:
+    """Setting A counts a turned block as wrong, where setting B let it be placed."""
+    scene = Scene("s", (2,), (cube(1, "red"), cube(2, "red", (1,), 90.0)), ("s",))
+    candidates = CandidateSet((Candidate("arch", "red", (0, 0, 0)),))
+    assembly = Assembly(scene, candidates, "B")
+    assert [assembly.move(1).outcome for _ in range(3)] == ["placed", "placed", "overflow"]
+    in_a, in_b = (placed_counts(scene, candidates, s, assembly.chosen) for s in SETTINGS)
+    assert (in_a.tp, in_a.fp, in_a.fn) == (1, 1, 1)
+    assert (in_b.tp, in_b.fp, in_b.fn) == (2, 0, 0)
+    tried = attempted_counts(in_a, 3)
+    assert (tried.tp, tried.fp, tried.fn) == (1, 2, 1)
+    fallen = placed_counts(scene, candidates, "B", assembly.chosen, (1,))
+    assert (fallen.tp, fallen.fp, fallen.fn) == (1, 1, 1)
+
+
+@given(cases(max_steps=14), settings)
+def test_every_placed_block_is_right_under_the_setting_that_let_it(
+    case: Case, setting: Setting
+) -> None:
+    assembly = Assembly(case.scene, case.candidates, setting)
+    outcomes = [assembly.move(index).outcome for index in case.plan.steps]
+    placed = placed_counts(case.scene, case.candidates, setting, assembly.chosen)
+    assert (placed.tp, placed.fp) == (outcomes.count("placed"), 0)
+    assert placed.tp + placed.fn == len(case.scene)
+    tried = attempted_counts(placed, len(outcomes))
+    assert tried.fp == sum(outcomes.count(name) for name in ERROR_TYPES)
