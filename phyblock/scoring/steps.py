@@ -138,7 +138,8 @@ class Assembly:
     def _show(self, index: int, before: int) -> Move:
         """Bring the world to one of the sets that explain all moves, with the least change."""
         if open_to := self._choices(index, before):
-            vertex = max(open_to, key=lambda v: (self._above[v], -v))
+            look, blocks = self.candidates[index].look, self.scene.blocks
+            vertex = max(open_to, key=lambda v: (blocks[v].look == look, self._above[v], -v))
             self.placed = before | 1 << vertex
             return Move("placed", vertex)
         self.placed = min(self._frontier, key=lambda mask: ((before & ~mask).bit_count(), mask))

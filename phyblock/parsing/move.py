@@ -1,0 +1,238 @@
+"""Reply text -> one move, with the rule that matched, or a named problem.
+
+A reply to a step of step-by-step planning names one operation: `Move(3)` or `Done`. Strict forms
+are tried first, where an answer is expected: the last lines, a JSON object, a line with a label
+("Next plan: Move(3)"). Then lenient ones, the last line before the whole text. `Done` counts as an
+answer alone, never as a word of the reasoning. A reply that names two different operations is not
+guessed at. Nothing here raises on any text, and all of it takes linear time.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import unicodedata
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from phyblock.parsing.reasoning import after_reasoning
+
+__all__ = ["MOVE_PROBLEMS", "MOVE_RULES", "MoveProblem", "ParsedMove", "parse_move"]
+
+MoveProblem = Literal["empty", "no_move", "several_moves", "move_and_done"]
+MOVE_PROBLEMS: tuple[MoveProblem, ...] = get_args(MoveProblem)
+
+
+@dataclass(frozen=True)
+class ParsedMove:
+    """What was read out of a reply: a candidate's number as it stands there, `Done`, or a problem.
+
+    `move` may be a number that no candidate has; `rule` names the rule that matched, also where
+    it found two operations, and is None where none did.
+    """
+
+    move: int | None = None
+    is_done: bool = False
+    rule: str | None = None
+    problem: MoveProblem | None = None
+
+
+_Operation = int | Literal["done"]
+_Find = Callable[[str, list[str]], Sequence[_Operation]]
+
+_LARGEST_DIGITS = 6
+_TOO_LARGE = 1_000_000
+"""What a longer number is read as: no candidate has either."""
+
+_INTEGER = r"(?P<number>[-+\u2212]?[0-9]+)(?![0-9])(?![.,][0-9])"
+_CALL = (
+    rf"move\s{{0,3}}[(\[]\s{{0,9}}(?:(?:id|index|block)\s{{0,3}}[=:]\s{{0,3}})?[\"'#<]?"
+    rf"{_INTEGER}[\"'>]?\s{{0,9}}[)\]]"
+)
+_PHRASE = (
+    rf"move\s{{1,3}}(?:the\s)?(?:block|candidate)\s{{1,3}}(?:with\s)?"
+    rf"(?:the\s)?(?:index|number|id)\s{{0,3}}[=:#]?\s{{0,3}}[(\"'\[]?{_INTEGER}[)\"'\]]?"
+)
+_DONE = r"done(?:\s{0,3}\(\s{0,3}\))?"
+
+
+def _named(pattern: str, name: str) -> str:
+    return pattern.replace("?P<number>", f"?P<{name}>")
+
+
+_LABEL = (
+    r"(?:(?:my|the|your|final|next|chosen|selected|single)\s{1,3}){0,3}"
+    r"(?:plan|step(?:\s{0,2}#?[0-9]{1,3})?|answer|action|operation|move|output|decision|choice)"
+    r"\s{0,3}(?:is|:|=|->|\u2192)\s{0,3}"
+)
+_OPERATION = rf"(?:{_named(_CALL, 'call')}|{_named(_PHRASE, 'phrase')}|(?P<done>{_DONE}))"
+_ANSWER_LINE = re.compile(rf"(?:{_LABEL}:?\s{{0,3}})?{_OPERATION}\s{{0,3}}[.!;]?", re.IGNORECASE)
+_LABELED = re.compile(rf"(?<![\w]){_LABEL}[`*\"'_ ]{{0,6}}{_OPERATION}(?!\w)", re.IGNORECASE)
+_MENTION = re.compile(
+    rf"(?<![\w]){_named(_CALL, 'call')}|(?<![\w]){_named(_PHRASE, 'phrase')}", re.IGNORECASE
+)
+_MANY = re.compile(
+    r"(?<!\w)move\s{0,3}[(\[]\s{0,9}(?P<list>[0-9]{1,6}"
+    r"(?:\s{0,3}(?:[,;/&]|and|or)\s{0,3}[0-9]{1,6}){1,31})(?![0-9])",
+    re.IGNORECASE,
+)
+_DONE_SENTENCE = re.compile(
+    rf"(?:\A|[.!?:;\u2014]\s{{1,3}}|(?:->|\u2192|\bthen)\s{{0,3}}){_DONE}\s{{0,2}}[.!]?\Z",
+    re.IGNORECASE,
+)
+_LOOSE = re.compile(
+    r"\b(?:move|place|put|use|add|stack|choose|select|pick)\b[^\w\n]{0,6}"
+    r"(?:(?:the|block|candidate|number|index|with|no\.?|id) ){0,5}"
+    r"(?:block|candidate|number|index|no\.?|id|#)\s{0,2}[#:=(\"'\[]{0,3}" + _INTEGER,
+    re.IGNORECASE,
+)
+_BARE = re.compile(rf"(?:{_LABEL})?[#(\[]?{_INTEGER}[)\].]?", re.IGNORECASE)
+_OBJECT = re.compile(r"\{[^{}]{0,600}\}")
+_FENCE = re.compile(r"(?:`{3,}|~{3,})\s{0,3}[\w+-]{0,16}")
+_MARKUP = re.compile(r"[*`_~]{1,3}|\\boxed\{|[{}]")
+_EDGES = " \t\r\f\v>#-*+\u2022|\"'"
+_THINKING_OPENS = re.compile(r"<think(?:ing)?>", re.IGNORECASE)
+_INDEX_KEYS = ("index", "block_index", "id", "block_id", "block", "candidate", "number")
+_INDEX_ALONE = _INDEX_KEYS[:4]
+"""Keys that are enough without an action."""
+_ACTION_KEYS = ("action", "operation", "next_plan", "next plan", "plan", "answer", "move", "step")
+
+
+def parse_move(text: str) -> ParsedMove:
+    """Read the one operation that a reply names."""
+    answer = unicodedata.normalize("NFKC", _answer(text))
+    lines = [line for line in map(_plain, answer.splitlines()) if line]
+    if not lines:
+        return ParsedMove(problem="no_move" if text.strip() else "empty")
+    for rule, find in _RULES:
+        if found := find(answer, lines):
+            return _verdict(found, rule)
+    return ParsedMove(problem="no_move")
+
+
+def _answer(text: str) -> str:
+    """The reply without what is thought aloud; thoughts that never end hold no answer."""
+    answer = after_reasoning(text)
+    opened = _THINKING_OPENS.search(answer)
+    return answer[: opened.start()] if opened else answer
+
+
+def _plain(line: str) -> str:
+    """A line without markup; "" for the fence of a code block."""
+    line = line.strip()
+    return "" if _FENCE.fullmatch(line) else _MARKUP.sub(" ", line).strip(_EDGES)
+
+
+def _verdict(found: Iterable[_Operation], rule: str) -> ParsedMove:
+    operations = set(found)
+    if len(operations) > 1:
+        return ParsedMove(
+            rule=rule, problem="move_and_done" if "done" in operations else "several_moves"
+        )
+    (operation,) = operations
+    if operation == "done":
+        return ParsedMove(is_done=True, rule=rule)
+    return ParsedMove(move=operation, rule=rule)
+
+
+def _number(digits: str) -> int:
+    sign = -1 if digits[0] in "-\u2212" else 1
+    bare = digits.lstrip("+-\u2212").lstrip("0") or "0"
+    return sign * (int(bare) if len(bare) <= _LARGEST_DIGITS else _TOO_LARGE)
+
+
+def _operation(match: re.Match[str]) -> _Operation:
+    groups = match.groupdict()
+    digits = groups.get("call") or groups.get("phrase")
+    return _number(digits) if digits else "done"
+
+
+def _last_lines(_: str, lines: list[str]) -> list[_Operation]:
+    """The operations of the lines at the end that say nothing else."""
+    found: list[_Operation] = []
+    for line in reversed(lines):
+        match = _ANSWER_LINE.fullmatch(line)
+        if match is None:
+            break
+        found.append(_operation(match))
+    return found
+
+
+def _json(answer: str, _: list[str]) -> list[_Operation]:
+    found = [_from_object(match.group()) for match in _OBJECT.finditer(answer)]
+    return [operation for operation in found if operation is not None]
+
+
+def _from_object(text: str) -> _Operation | None:
+    """The operation of a JSON object, or None when it is none."""
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    fields = {str(key).strip().lower(): value for key, value in content.items()}
+    index = next((_whole(fields[key]) for key in _INDEX_KEYS if key in fields), None)
+    for key in _ACTION_KEYS:
+        value = fields.get(key)
+        if key == "move" and _whole(value) is not None:
+            return _whole(value)
+        word = value.strip() if isinstance(value, str) else ""
+        if word.lower() == "move" and index is not None:
+            return index
+        if match := _ANSWER_LINE.fullmatch(word):
+            return _operation(match)
+    has_action = any(key in fields for key in _ACTION_KEYS)
+    is_alone = not has_action and any(key in fields for key in _INDEX_ALONE)
+    return index if is_alone else None
+
+
+def _whole(value: object) -> int | None:
+    if isinstance(value, str):
+        return _number(value.strip()) if re.fullmatch("[-+]?[0-9]+", value.strip()) else None
+    if isinstance(value, bool) or not isinstance(value, int):
+        return None
+    return max(-_TOO_LARGE, min(_TOO_LARGE, value))
+
+
+def _labeled(_: str, lines: list[str]) -> list[_Operation]:
+    return [_operation(match) for line in lines for match in _LABELED.finditer(line)]
+
+
+def _mentions(line: str) -> list[_Operation]:
+    found = [_operation(match) for match in _MENTION.finditer(line)]
+    for many in _MANY.finditer(line):
+        found += [int(digits) for digits in re.findall("[0-9]+", many["list"])]
+    return found
+
+
+def _in_last_line(_: str, lines: list[str]) -> list[_Operation]:
+    done: list[_Operation] = ["done"] if _DONE_SENTENCE.search(lines[-1]) else []
+    return [*_mentions(lines[-1]), *done]
+
+
+def _anywhere(_: str, lines: list[str]) -> list[_Operation]:
+    return [operation for line in lines for operation in _mentions(line)]
+
+
+def _loose(_: str, lines: list[str]) -> list[int]:
+    last = [_number(match["number"]) for match in _LOOSE.finditer(lines[-1])]
+    return last or [_number(m["number"]) for line in lines for m in _LOOSE.finditer(line)]
+
+
+def _bare(_: str, lines: list[str]) -> list[int]:
+    match = _BARE.fullmatch(lines[-1])
+    is_answer = match is not None and (len(lines) == 1 or not match.start("number") <= 1)
+    return [_number(match["number"])] if match and is_answer else []
+
+
+_RULES: tuple[tuple[str, _Find], ...] = (
+    ("last_lines", _last_lines),
+    ("json", _json),
+    ("label", _labeled),
+    ("last_line_mention", _in_last_line),
+    ("mention", _anywhere),
+    ("loose", _loose),
+    ("bare_number", _bare),
+)
+MOVE_RULES: tuple[str, ...] = tuple(name for name, _ in _RULES)
+"""Rules in the order in which they are tried."""
