@@ -9,8 +9,8 @@ from typing import cast
 import click
 
 from phyblock.cli.console import shown_path
+from phyblock.generate.card import card
 from phyblock.generate.draft import Palette
-from phyblock.generate.generated_card import generated_card
 from phyblock.generate.production import Order, produce, shares
 from phyblock.generate.workers import open_workers
 from phyblock.generate.writing import open_writer
@@ -66,5 +66,5 @@ def command(
         chosen = ",".join(map(str, levels))
         made_by = f"phyblock scenes generate --count {count} --seed {seed} --levels {chosen}"
         made_by += f" --palette {palette} --out {out.name}"
-        writer.finish(generated_card(out.name, writer, made_by, _PALETTE_TEXT[kind]))
+        writer.finish(card(out.name, writer, made_by, _PALETTE_TEXT[kind]))
     click.echo(f"{count} scenes, all checks passed: {shown_path(out)}")

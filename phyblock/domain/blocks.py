@@ -28,6 +28,7 @@ __all__ = [
     "Color",
     "Euler",
     "Shape",
+    "euler_deg_to_matrix",
     "euler_deg_to_quat_xyzw",
     "orientation_class",
     "quat_xyzw_to_matrix",
@@ -188,6 +189,11 @@ def quat_xyzw_to_matrix(quat_xyzw: NDArray[np.float64]) -> NDArray[np.float64]:
     )
 
 
+def euler_deg_to_matrix(euler_deg: Euler) -> NDArray[np.float64]:
+    """Rotation matrix, shape (3, 3), body to world, of extrinsic x-y-z Euler angles in degrees."""
+    return quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(euler_deg))
+
+
 @functools.cache
 def _symmetries(block_type: BlockType) -> NDArray[np.float64]:
     """Rotations that map the block onto itself, body frame, shape (k, 3, 3)."""
@@ -202,7 +208,7 @@ def _symmetries(block_type: BlockType) -> NDArray[np.float64]:
 
 
 def _turn_z(angle_deg: float) -> NDArray[np.float64]:
-    return quat_xyzw_to_matrix(euler_deg_to_quat_xyzw((0.0, 0.0, angle_deg)))
+    return euler_deg_to_matrix((0.0, 0.0, angle_deg))
 
 
 def _cube_rotations() -> NDArray[np.float64]:
@@ -223,6 +229,6 @@ def orientation_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, .
     The least, in lexicographic order, of the nine matrix entries (rounded to 1e-4) over all
     rotations that are indistinguishable from the given one.
     """
-    rotation = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(euler_deg))
+    rotation = euler_deg_to_matrix(euler_deg)
     alike = np.round(rotation @ _symmetries(block_type), 4) + 0.0
     return min(tuple(float(entry) for entry in matrix.ravel()) for matrix in alike)

@@ -2,14 +2,12 @@
 
 from phyblock.generate.acceptance import accept, form_problems, physics_problems
 from phyblock.generate.candidates import make_candidates
-from phyblock.generate.dataset import designed_scenes, scene_line, write_dataset
+from phyblock.generate.writing import scene_line
 
 __all__ = [
     "accept",
-    "designed_scenes",
     "form_problems",
     "make_candidates",
     "physics_problems",
     "scene_line",
-    "write_dataset",
 ]

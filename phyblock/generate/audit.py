@@ -13,7 +13,7 @@ from typing import Literal, get_args
 from phyblock.domain.aov import AOVGraph, CycleError
 from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Block, Scene
-from phyblock.generate.acceptance import PREFIX_TRIAL
+from phyblock.generate.checks import STEP_TRIAL
 from phyblock.sim.stability import DEFAULT_TRIAL, Trial, check
 from phyblock.sim.steps import check_steps
 from phyblock.sim.support import GROUND, find_gaps, find_overlaps, support_graph
@@ -55,7 +55,7 @@ class AuditSettings:
 
     tolerance_m: float = 0.002
     trial: Trial = DEFAULT_TRIAL
-    step_trial: Trial = PREFIX_TRIAL
+    step_trial: Trial = STEP_TRIAL
 
 
 @dataclass(frozen=True)

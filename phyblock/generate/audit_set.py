@@ -13,9 +13,9 @@ from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
 from phyblock.generate.audit import AuditSettings, Check, Finding, SceneAudit, audit_scene
-from phyblock.generate.dataset import scene_line
-from phyblock.generate.symmetry import fingerprint
+from phyblock.generate.symmetry import find_twins
 from phyblock.generate.workers import open_workers
+from phyblock.generate.writing import SCENES_FILE, scene_line
 
 __all__ = [
     "Audit",
@@ -108,14 +108,12 @@ def audit_scenes(
 
 def find_duplicates(scenes: Iterable[Scene]) -> tuple[Finding, ...]:
     """Scenes that equal an earlier one up to quarter turns, mirroring and shifting."""
-    first: dict[bytes, str] = {}
-    found: list[Finding] = []
-    for scene in scenes:
-        earlier = first.setdefault(fingerprint(scene.blocks), scene.id)
-        if earlier != scene.id:
-            message = f"is scene {earlier}, turned, mirrored or shifted at most"
-            found.append(Finding(scene.id, "duplicate", message, found=earlier))
-    return tuple(found)
+    return tuple(
+        Finding(
+            name, "duplicate", f"is scene {twin}, turned, mirrored or shifted at most", found=twin
+        )
+        for name, twin in find_twins(scenes).items()
+    )
 
 
 def findings_csv(audit: Audit) -> str:
@@ -168,7 +166,7 @@ def write_fixed(
         changes += changes_of(audit)
     rows = [(c.scene, str(c.block), c.field, c.before, c.after) for c in changes]
     texts = {
-        "scenes.jsonl": "".join(f"{line}\n" for line in lines),
+        SCENES_FILE: "".join(f"{line}\n" for line in lines),
         "changes.csv": _csv(("scene", "block", "field", "before", "after"), rows),
     }
     _write_new(folder, texts)

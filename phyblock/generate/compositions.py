@@ -14,7 +14,7 @@ from phyblock.generate.creatures import CREATURES
 from phyblock.generate.draft import Draft, Theme
 from phyblock.generate.sketch import UNIT_M
 from phyblock.generate.symmetry import Symmetry, transformed
-from phyblock.sim.support import bounds_m
+from phyblock.sim.support import whole_bounds_m
 
 __all__ = ["COMPOSITIONS", "Axis", "beside"]
 
@@ -29,8 +29,7 @@ def beside(parts: Sequence[Sequence[Block]], gap_units: float, axis: Axis = 1) -
     row: list[Block] = []
     edge_m = 0.0
     for part in parts:
-        boxes = np.stack([bounds_m(block) for block in part])
-        low_m, high_m = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+        low_m, high_m = whole_bounds_m(part)
         shift = -(low_m + high_m) / 2
         shift[2] = 0.0
         shift[axis] = edge_m - low_m[axis]

@@ -15,8 +15,8 @@ import numpy as np
 from phyblock.domain.aov import CycleError
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.scene import Block, Kind, Scene
-from phyblock.generate.acceptance import LEVEL_LIMITS
 from phyblock.generate.buildings import BUILDINGS
+from phyblock.generate.checks import LEVEL_LIMITS
 from phyblock.generate.compositions import COMPOSITIONS, beside
 from phyblock.generate.creatures import CREATURES
 from phyblock.generate.draft import PALETTES, Draft, Palette, Theme

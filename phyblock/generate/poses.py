@@ -6,65 +6,41 @@ from phyblock.domain.blocks import BlockType, Color, Euler
 
 __all__ = ["KIT_COLOR", "POSES"]
 
+
+def _turns(*names: str, roll: float = 0.0, pitch: float = 0.0) -> dict[str, Euler]:
+    """One pose and its quarter turns about the vertical, as many as there are names."""
+    return {name: (roll, pitch, 90.0 * turn) for turn, name in enumerate(names)}
+
+
+_SLAB = {
+    **_turns("flat-x", "flat-y"),
+    **_turns("edge-x", "edge-y", roll=90.0),
+    **_turns("upright-x", "upright-y", pitch=90.0),
+}
 POSES: dict[BlockType, dict[str, Euler]] = {
     "arch": {
-        "gate": (0.0, 0.0, 0.0),
-        "gate-turned": (0.0, 0.0, 90.0),
-        "cradle": (0.0, 180.0, 0.0),
-        "cradle-turned": (0.0, 180.0, 90.0),
-        "open+y": (90.0, 0.0, 0.0),
-        "open-x": (90.0, 0.0, 90.0),
-        "open-y": (90.0, 0.0, 180.0),
-        "open+x": (90.0, 0.0, 270.0),
+        **_turns("gate", "gate-turned"),
+        **_turns("cradle", "cradle-turned", pitch=180.0),
+        **_turns("open+y", "open-x", "open-y", "open+x", roll=90.0),
     },
-    "cube": {"flat": (0.0, 0.0, 0.0)},
-    "cuboid1": {
-        "flat": (0.0, 0.0, 0.0),
-        "edge-x": (90.0, 0.0, 0.0),
-        "edge-y": (90.0, 0.0, 90.0),
-    },
-    "cuboid2": {
-        "flat-x": (0.0, 0.0, 0.0),
-        "flat-y": (0.0, 0.0, 90.0),
-        "edge-x": (90.0, 0.0, 0.0),
-        "edge-y": (90.0, 0.0, 90.0),
-        "upright-x": (0.0, 90.0, 0.0),
-        "upright-y": (0.0, 90.0, 90.0),
-    },
-    "cuboid3": {
-        "flat-x": (0.0, 0.0, 0.0),
-        "flat-y": (0.0, 0.0, 90.0),
-        "edge-x": (90.0, 0.0, 0.0),
-        "edge-y": (90.0, 0.0, 90.0),
-        "upright-x": (0.0, 90.0, 0.0),
-        "upright-y": (0.0, 90.0, 90.0),
-    },
+    "cube": _turns("flat"),
+    "cuboid1": {**_turns("flat"), **_turns("edge-x", "edge-y", roll=90.0)},
+    "cuboid2": _SLAB,
+    "cuboid3": _SLAB,
     "cylinder": {
-        "upright": (0.0, 0.0, 0.0),
+        **_turns("upright"),
         "lying-x": (90.0, 0.0, 90.0),
         "lying-y": (90.0, 0.0, 0.0),
     },
     "semi_cylinder": {
-        "dome": (0.0, 0.0, 0.0),
-        "dome-turned": (0.0, 0.0, 90.0),
-        "bowl": (180.0, 0.0, 0.0),
-        "bowl-turned": (180.0, 0.0, 90.0),
-        "round+x": (0.0, 90.0, 0.0),
-        "round+y": (0.0, 90.0, 90.0),
-        "round-x": (0.0, 90.0, 180.0),
-        "round-y": (0.0, 90.0, 270.0),
+        **_turns("dome", "dome-turned"),
+        **_turns("bowl", "bowl-turned", roll=180.0),
+        **_turns("round+x", "round+y", "round-x", "round-y", pitch=90.0),
     },
     "triangle": {
-        "roof": (0.0, 0.0, 0.0),
-        "roof-turned": (0.0, 0.0, 90.0),
-        "ramp+y": (135.0, 0.0, 0.0),
-        "ramp-x": (135.0, 0.0, 90.0),
-        "ramp-y": (135.0, 0.0, 180.0),
-        "ramp+x": (135.0, 0.0, 270.0),
-        "wedge+x": (-135.0, 90.0, 0.0),
-        "wedge+y": (-135.0, 90.0, 90.0),
-        "wedge-x": (-135.0, 90.0, 180.0),
-        "wedge-y": (-135.0, 90.0, 270.0),
+        **_turns("roof", "roof-turned"),
+        **_turns("ramp+y", "ramp-x", "ramp-y", "ramp+x", roll=135.0),
+        **_turns("wedge+x", "wedge+y", "wedge-x", "wedge-y", roll=-135.0, pitch=90.0),
     },
 }
 """Euler angles [degrees] of each named pose; the first is the one a design means by default.

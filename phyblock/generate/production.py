@@ -14,8 +14,8 @@ from phyblock.generate.acceptance import form_problems, is_sound
 from phyblock.generate.draft import PALETTES, Palette
 from phyblock.generate.grammar import GROUP_LEVELS, Group, Request, draw
 from phyblock.generate.symmetry import fingerprint
-from phyblock.generate.visibility import hidden_blocks
 from phyblock.generate.workers import Workers
+from phyblock.sim.visibility import hidden_blocks
 
 __all__ = ["Order", "Share", "produce", "shares"]
 
@@ -79,9 +79,7 @@ def shares(count: int, levels: Sequence[int] = (1, 2, 3, 4)) -> tuple[Share, ...
     return tuple(Share(group, given[group, 0], given[group, 1]) for group in groups)
 
 
-def produce(
-    order: Order, workers: Workers, told: Callable[[Scene], None] = lambda _: None
-) -> Iterator[Scene]:
+def produce(order: Order, workers: Workers) -> Iterator[Scene]:
     """Accepted scenes: first all base scenes, group by group, then the variations.
 
     The same order gives the same scenes with any workers: a candidate depends on its number
@@ -90,13 +88,9 @@ def produce(
     """
     maker = _Maker(order, workers)
     for share in order.shares:
-        for scene in maker.bases(share.group, share.base):
-            told(scene)
-            yield scene
+        yield from maker.bases(share.group, share.base)
     for share in order.shares:
-        for scene in maker.variations(share.group, share.varied):
-            told(scene)
-            yield scene
+        yield from maker.variations(share.group, share.varied)
 
 
 class _Maker:

@@ -6,24 +6,18 @@ on; so a design holds no heights, no overlap and no gap, and its order can be bu
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from phyblock.domain.aov import AOVGraph
-from phyblock.domain.blocks import (
-    BlockType,
-    Color,
-    euler_deg_to_quat_xyzw,
-    quat_xyzw_to_matrix,
-)
+from phyblock.domain.blocks import BlockType, Color
 from phyblock.domain.scene import Block, Scene
 from phyblock.generate.poses import KIT_COLOR, POSES
-from phyblock.sim.geometry import solid_mesh
-from phyblock.sim.support import GROUND, drop_height_m, support_graph
+from phyblock.sim.geometry import corners_m
+from phyblock.sim.support import GROUND, drop_height_m, support_graph, whole_bounds_m
 
-__all__ = ["UNIT_M", "Design", "Sketch", "make_scene"]
+__all__ = ["UNIT_M", "Sketch", "make_scene"]
 
 UNIT_M = 0.025
 """Grid unit [m]: half the side of a cube."""
@@ -32,10 +26,9 @@ _ABOVE_M = 1.0
 
 @dataclass
 class Sketch:
-    """A structure in the making; `origin` shifts all that follows, in grid units (y, x)."""
+    """A structure in the making."""
 
     blocks: list[Block] = field(default_factory=list)
-    origin: tuple[float, float] = (0.0, 0.0)
 
     def put(
         self,
@@ -51,32 +44,15 @@ class Sketch:
         """
         poses = POSES[block_type]
         euler = poses[pose] if pose else next(iter(poses.values()))
-        rotation = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(euler))
-        corners = solid_mesh(block_type).vertices_m @ rotation.T
+        corners = corners_m(block_type, (0.0, 0.0, 0.0), euler)
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-        place = np.array([x + self.origin[1], y + self.origin[0]]) * UNIT_M - middle[:2]
+        place = np.array([x, y]) * UNIT_M - middle[:2]
         above = (float(place[0]), float(place[1]), _ABOVE_M)
         order = len(self.blocks) + 1
         block = Block(order, block_type, color or KIT_COLOR[block_type], above, euler, (), 1)
         fall_m = drop_height_m(block, self.blocks)
         landed = tuple(round(c, 6) + 0.0 for c in (above[0], above[1], _ABOVE_M - fall_m))
         self.blocks.append(replace(block, position_m=(landed[0], landed[1], landed[2])))
-
-    def pair(
-        self,
-        block_type: BlockType,
-        y: float,
-        x: float = 0.0,
-        poses: tuple[str, str] = ("", ""),
-        color: Color | None = None,
-    ) -> None:
-        """The same block at -y and at +y, the mirror image when the two poses say so."""
-        self.put(block_type, -y, x, poses[0], color)
-        self.put(block_type, y, x, poses[1], color)
-
-
-Design = Callable[[Sketch], None]
-"""A structure as the steps that draw it."""
 
 
 def make_scene(
@@ -100,12 +76,8 @@ def make_scene(
 
 
 def _centered(blocks: list[Block]) -> list[Block]:
-    corners = []
-    for block in blocks:
-        rotation = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(block.euler_deg))
-        corners.append(solid_mesh(block.type).vertices_m @ rotation.T + block.position_m)
-    points = np.vstack(corners)[:, :2]
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    low, high = whole_bounds_m(blocks)
+    middle = (low + high) / 2
     return [
         replace(
             block,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,14 +18,20 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import (
     BlockType,
     Euler,
-    euler_deg_to_quat_xyzw,
+    euler_deg_to_matrix,
     orientation_class,
-    quat_xyzw_to_matrix,
 )
-from phyblock.domain.scene import Block
+from phyblock.domain.scene import Block, Scene
 from phyblock.generate.poses import POSES
 
-__all__ = ["SYMMETRIES", "Symmetry", "canonical_form", "fingerprint", "transformed"]
+__all__ = [
+    "SYMMETRIES",
+    "Symmetry",
+    "canonical_form",
+    "find_twins",
+    "fingerprint",
+    "transformed",
+]
 
 Matrix = NDArray[np.float64]
 _MIRROR = np.diag([-1.0, 1.0, 1.0])
@@ -80,6 +86,13 @@ def fingerprint(blocks: Sequence[Block]) -> bytes:
     return hashlib.sha256(repr(canonical_form(blocks)).encode()).digest()[:16]
 
 
+def find_twins(scenes: Iterable[Scene]) -> dict[str, str]:
+    """Scenes, by id, that equal an earlier one but for turning, mirroring and shifting: its id."""
+    first: dict[bytes, str] = {}
+    earlier = {scene.id: first.setdefault(fingerprint(scene.blocks), scene.id) for scene in scenes}
+    return {name: twin for name, twin in earlier.items() if twin != name}
+
+
 def _form(blocks: Sequence[Block]) -> tuple[tuple[object, ...], ...]:
     places = np.array([block.position_m for block in blocks])
     places[:, :2] -= places[:, :2].min(axis=0)
@@ -101,7 +114,7 @@ def _moved(position_m: tuple[float, float, float], symmetry: Symmetry) -> Euler:
 def _turned(block_type: BlockType, euler_deg: Euler, symmetry: Symmetry) -> Euler:
     """Angles of the image of a pose, as `POSES` names them where it does."""
     body = _MIRROR if symmetry.mirrored else np.eye(3)
-    image = symmetry.matrix @ _rotation(euler_deg) @ body
+    image = symmetry.matrix @ euler_deg_to_matrix(euler_deg) @ body
     angles = _angles_deg(image)
     wanted = _pose_class(block_type, angles)
     for known in POSES[block_type].values():
@@ -113,14 +126,10 @@ def _turned(block_type: BlockType, euler_deg: Euler, symmetry: Symmetry) -> Eule
 @functools.cache
 def _pose_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, ...]:
     """The orientation class; of an upright cylinder, whose 18 facets no one counts, its axis."""
-    rotation = _rotation(euler_deg)
+    rotation = euler_deg_to_matrix(euler_deg)
     if block_type == "cylinder" and abs(rotation[2, 2]) > 1 - 1e-6:
         return (0.0, 0.0, 1.0)
     return orientation_class(block_type, euler_deg)
-
-
-def _rotation(euler_deg: Euler) -> Matrix:
-    return quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(euler_deg))
 
 
 def _angles_deg(rotation: Matrix) -> Euler:

@@ -12,16 +12,22 @@ import numpy as np
 from phyblock.domain.candidates import MAX_CANDIDATES, Candidate, CandidateSet
 from phyblock.domain.scene import Block, Scene
 from phyblock.errors import Problem
-from phyblock.generate.acceptance import LEVEL_LIMITS, PREFIX_TRIAL
-from phyblock.generate.symmetry import fingerprint
-from phyblock.generate.visibility import hidden_blocks
+from phyblock.generate.checks import (
+    dependency_problems,
+    finished_problems,
+    gap_problems,
+    layer_problems,
+    order_problems,
+    overlap_problems,
+    size_problems,
+    step_problems,
+)
+from phyblock.generate.symmetry import find_twins
 from phyblock.generate.workers import Workers
 from phyblock.generate.writing import SUMS_FILE
 from phyblock.sim.pictures import PictureStyle, candidate_camera, on_the_floor
 from phyblock.sim.render import picture
-from phyblock.sim.stability import check
-from phyblock.sim.steps import check_steps
-from phyblock.sim.support import GROUND, find_gaps, find_overlaps, support_graph
+from phyblock.sim.visibility import hidden_blocks
 
 __all__ = [
     "SCENE_CHECKS",
@@ -36,6 +42,7 @@ __all__ = [
 Found = dict[str, tuple[Problem, ...]]
 """What each check found wrong; empty when a check passed."""
 _Task = tuple[Scene, CandidateSet]
+_Check = Callable[[Scene, CandidateSet], Iterable[Problem]]
 _LEAST_PIXELS = 0.01
 """Two looks must differ in this share of a candidate's picture."""
 _VISIBLE_STEP = 24
@@ -52,64 +59,7 @@ def _verify(task: _Task) -> Found:
     return {name: tuple(run(scene, candidates)) for name, run in SCENE_CHECKS.items()}
 
 
-def _limits(scene: Scene, _: CandidateSet) -> Iterator[Problem]:
-    layers = max(scene.graph.layers)
-    for level in scene.levels:
-        limits = LEVEL_LIMITS[level]
-        if not limits.least_blocks <= len(scene) <= limits.most_blocks:
-            allowed = f"{limits.least_blocks} to {limits.most_blocks} at level {level}"
-            yield Problem(scene.id, "wrong size", "blocks", str(len(scene)), allowed)
-        if layers > limits.most_layers:
-            allowed = f"at most {limits.most_layers} at level {level}"
-            yield Problem(scene.id, "too high", "layers", str(layers), allowed)
-
-
-def _depend(scene: Scene, _: CandidateSet) -> Iterator[Problem]:
-    below = support_graph(scene.blocks)
-    for i, block in enumerate(scene.blocks):
-        rests_on = sorted(below[block.order] - {GROUND})
-        if rests_on != sorted(block.depend):
-            field = f"blocks[{i}].depend"
-            found, allowed = str(list(block.depend) or [GROUND]), str(rests_on or [GROUND])
-            yield Problem(scene.id, "differs from the contacts", field, found, allowed)
-
-
-def _layers(scene: Scene, _: CandidateSet) -> Iterator[Problem]:
-    for i, (block, layer) in enumerate(zip(scene.blocks, scene.graph.layers, strict=True)):
-        if block.layer != layer:
-            message, field = "is not the longest path", f"blocks[{i}].layer"
-            yield Problem(scene.id, message, field, str(block.layer), str(layer))
-
-
-def _order(scene: Scene, _: CandidateSet) -> Iterator[Problem]:
-    if not scene.graph.is_valid(range(len(scene))):
-        yield Problem(scene.id, "the stored order puts a block before its support", "blocks")
-
-
-def _overlaps(scene: Scene, _: CandidateSet) -> Iterator[Problem]:
-    for one in find_overlaps(scene.blocks):
-        message = f"blocks {one.first} and {one.second} overlap by {one.depth_m * 1000:.2f} mm"
-        yield Problem(scene.id, message)
-
-
-def _gaps(scene: Scene, _: CandidateSet) -> Iterator[Problem]:
-    for gap in find_gaps(scene.blocks):
-        yield Problem(scene.id, f"block {gap.order} floats {gap.height_m * 1000:.2f} mm too high")
-
-
-def _stability(scene: Scene, _: CandidateSet) -> Iterator[Problem]:
-    whole = check(scene.blocks)
-    if not whole.stable:
-        yield Problem(scene.id, f"blocks {list(whole.fallen)} fall when it is finished")
-
-
-def _steps(scene: Scene, _: CandidateSet) -> Iterator[Problem]:
-    for count, step in enumerate(check_steps(scene.blocks, PREFIX_TRIAL), 1):
-        if not step.stable:
-            yield Problem(scene.id, f"blocks {list(step.fallen)} fall at step {count}")
-
-
-def _visibility(scene: Scene, _: CandidateSet) -> Iterator[Problem]:
+def _visibility(scene: Scene) -> Iterator[Problem]:
     for order in hidden_blocks(scene):
         yield Problem(scene.id, f"block {order} does not show in the goal picture")
 
@@ -134,16 +84,21 @@ def _near(candidate: Candidate, block: Block) -> bool:
     return candidate.color == block.color or candidate.look[2] == block.look[2]
 
 
-SCENE_CHECKS: Mapping[str, Callable[[Scene, CandidateSet], Iterable[Problem]]] = {
-    "limits of its levels": _limits,
-    "dependencies are contacts": _depend,
-    "layers are longest paths": _layers,
-    "order can be built": _order,
-    "no overlap": _overlaps,
-    "no gap": _gaps,
-    "stands when finished": _stability,
-    "stands at every step": _steps,
-    "every block shows": _visibility,
+def _of_scene(find: Callable[[Scene], Iterable[Problem]]) -> _Check:
+    """A check that does not look at the candidates."""
+    return lambda scene, _: find(scene)
+
+
+SCENE_CHECKS: Mapping[str, _Check] = {
+    "limits of its levels": _of_scene(size_problems),
+    "dependencies are contacts": _of_scene(dependency_problems),
+    "layers are longest paths": _of_scene(layer_problems),
+    "order can be built": _of_scene(order_problems),
+    "no overlap": _of_scene(overlap_problems),
+    "no gap": _of_scene(gap_problems),
+    "stands when finished": _of_scene(finished_problems),
+    "stands at every step": _of_scene(step_problems),
+    "every block shows": _of_scene(_visibility),
     "candidate set": _candidates,
 }
 """The checks of a scene by itself, by name."""
@@ -151,13 +106,10 @@ SCENE_CHECKS: Mapping[str, Callable[[Scene, CandidateSet], Iterable[Problem]]] =
 
 def check_duplicates(scenes: Iterable[Scene]) -> dict[str, Problem]:
     """Scenes, by id, that equal an earlier one but for turning, mirroring and shifting."""
-    first: dict[bytes, str] = {}
-    found: dict[str, Problem] = {}
-    for scene in scenes:
-        earlier = first.setdefault(fingerprint(scene.blocks), scene.id)
-        if earlier != scene.id:
-            found[scene.id] = Problem(scene.id, f"is scene {earlier}, turned, mirrored or shifted")
-    return found
+    return {
+        name: Problem(name, f"is scene {twin}, turned, mirrored or shifted at most")
+        for name, twin in find_twins(scenes).items()
+    }
 
 
 def check_parents(scenes: Sequence[Scene]) -> dict[str, Problem]:

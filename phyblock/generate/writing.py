@@ -4,19 +4,29 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import json
 import shutil
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
 from phyblock.generate.candidates import make_candidates
-from phyblock.generate.dataset import scene_line
 from phyblock.generate.draft import PALETTES, Palette
 
-__all__ = ["CARD_FILE", "SUMS_FILE", "LevelStatistics", "SetWriter", "open_writer", "sums_text"]
+__all__ = [
+    "CARD_FILE",
+    "SCENES_FILE",
+    "SUMS_FILE",
+    "LevelStatistics",
+    "SetWriter",
+    "open_writer",
+    "scene_line",
+    "sums_text",
+]
 
 SCENES_FILE = "scenes.jsonl"
 CARD_FILE = "README.md"
@@ -100,8 +110,45 @@ def open_writer(folder: Path, palette: Palette, replace: bool = False) -> Iterat
         raise StoreError(Problem(str(folder), f"cannot be written: {error.strerror}")) from error
 
 
+def scene_line(scene: Scene, candidates: CandidateSet) -> str:
+    """A scene and its candidates as one line of JSON, no newline at its end."""
+    looks = {block.look for block in scene.blocks}
+    record = {
+        "id": scene.id,
+        "levels": list(scene.levels),
+        "parents": list(scene.parents),
+        "blocks": [
+            {
+                "order": block.order,
+                "type": block.type,
+                "color": block.color,
+                "layer": block.layer,
+                "depend": list(block.depend) or [0],
+                "position": [round(c, 6) + 0.0 for c in block.position_m],
+                "euler": [_plain(angle) for angle in block.euler_deg],
+            }
+            for block in scene.blocks
+        ],
+        "candidates": [
+            {
+                "type": candidate.type,
+                "color": candidate.color,
+                "euler": [_plain(angle) for angle in candidate.euler_deg],
+                "required": candidate.look in looks,
+            }
+            for candidate in candidates.candidates
+        ],
+    }
+    return json.dumps(record, allow_nan=False)
+
+
 def sums_text(folder: Path) -> str:
     """Checksums of the scenes and the card, as `sha256sum -c` reads them."""
     names = (CARD_FILE, SCENES_FILE)
     sums = [hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in names]
     return "".join(f"{one}  {name}\n" for one, name in zip(sums, names, strict=True))
+
+
+def _plain(angle_deg: float) -> float | int:
+    """Whole degrees as an integer, which reads better in a file."""
+    return int(angle_deg) if float(angle_deg).is_integer() else angle_deg

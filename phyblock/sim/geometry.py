@@ -17,10 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain.blocks import SHAPES, BlockType
+from phyblock.domain.blocks import SHAPES, BlockType, Euler, euler_deg_to_matrix
 from phyblock.sim.mesh import Mesh
 
-__all__ = ["ConvexPiece", "collision_pieces", "edge_bars", "solid_mesh"]
+__all__ = ["ConvexPiece", "collision_pieces", "corners_m", "edge_bars", "solid_mesh"]
 
 Outline = NDArray[np.float64]
 """Corners of a polygon, shape (n, 2) [m], counter-clockwise."""
@@ -72,6 +72,17 @@ def solid_mesh(block_type: BlockType) -> Mesh:
         j = (i + 1) % n
         triangles += [(i, j, n + j), (i, n + j, n + i)]
     return Mesh(vertices, np.array(triangles))
+
+
+def corners_m(
+    block_type: BlockType, position_m: tuple[float, float, float], euler_deg: Euler
+) -> NDArray[np.float64]:
+    """World corners of a block's solid at a pose, shape (n, 3) [m]."""
+    turned: NDArray[np.float64] = (
+        solid_mesh(block_type).vertices_m @ euler_deg_to_matrix(euler_deg).T
+    )
+    turned += np.array(position_m)
+    return turned
 
 
 @functools.cache

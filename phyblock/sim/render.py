@@ -16,15 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from phyblock.domain.blocks import (
-    BlockType,
-    Color,
-    Euler,
-    euler_deg_to_quat_xyzw,
-    quat_xyzw_to_matrix,
-)
+from phyblock.domain.blocks import BlockType, Color, Euler, euler_deg_to_quat_xyzw
 from phyblock.sim.camera import Camera
-from phyblock.sim.geometry import edge_bars, solid_mesh
+from phyblock.sim.geometry import corners_m, edge_bars, solid_mesh
 from phyblock.sim.renderer import renderer
 from phyblock.sim.stage import Prop, stage
 from phyblock.sim.textures import Background, floor, shadow
@@ -65,16 +59,9 @@ class DrawnBlock:
     euler_deg: Euler
 
     @property
-    def rotation(self) -> NDArray[np.float64]:
-        """Body to world, shape (3, 3)."""
-        return quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(self.euler_deg))
-
-    @property
     def vertices_m(self) -> NDArray[np.float64]:
         """World corners of the solid, shape (n, 3) [m]."""
-        turned: NDArray[np.float64] = solid_mesh(self.type).vertices_m @ self.rotation.T
-        turned += np.array(self.position_m)
-        return turned
+        return corners_m(self.type, self.position_m, self.euler_deg)
 
     @property
     def triangles_m(self) -> NDArray[np.float64]:

@@ -5,13 +5,24 @@ A verdict is only as good as the settings it was reached at, so every result car
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from phyblock.domain.scene import Block
 from phyblock.sim.world import Physics, Pose, World
 
-__all__ = ["DEFAULT_TRIAL", "Stability", "Trial", "check", "check_prefixes", "check_removal"]
+__all__ = [
+    "DEFAULT_TRIAL",
+    "Movement",
+    "Stability",
+    "Trial",
+    "check",
+    "check_prefixes",
+    "check_removal",
+    "movement",
+    "verdict",
+]
 
 
 @dataclass(frozen=True)
@@ -48,19 +59,23 @@ class Stability:
         return not self.fallen
 
 
+class Movement(NamedTuple):
+    """What a trial did to blocks at one of its settings, as in `Stability`."""
+
+    moved_m: float
+    turned_deg: float
+    fallen: tuple[int, ...]
+
+
 def check(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Stability:
     """Let blocks go at their goal poses and see which of them stay."""
-    verdicts: list[frozenset[int]] = []
-    moved_m = turned_deg = 0.0
+    found = []
     for physics in trial.physics:
-        fallen: set[int] = set()
-        for order, distance_m, angle_deg in _movements(blocks, physics, trial.duration_s):
-            moved_m, turned_deg = max(moved_m, distance_m), max(turned_deg, angle_deg)
-            if distance_m > trial.limit_m or angle_deg > trial.limit_deg:
-                fallen.add(order)
-        verdicts.append(frozenset(fallen))
-    union = frozenset[int]().union(*verdicts)
-    return Stability(tuple(sorted(union)), moved_m, turned_deg, len(set(verdicts)) <= 1, trial)
+        with World(physics) as world:
+            world.place_all(blocks)
+            world.step(trial.duration_s)
+            found.append(movement(blocks, world.poses(), trial))
+    return verdict(found, trial)
 
 
 def check_prefixes(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> tuple[Stability, ...]:
@@ -77,13 +92,22 @@ def check_removal(blocks: Sequence[Block], order: int, trial: Trial = DEFAULT_TR
     return check([block for block in blocks if block.order != order], trial)
 
 
-def _movements(
-    blocks: Sequence[Block], physics: Physics, duration_s: float
-) -> Iterator[tuple[int, float, float]]:
-    with World(physics) as world:
-        world.place_all(blocks)
-        world.step(duration_s)
-        poses = world.poses()
-    for block in blocks:
-        goal = Pose.goal(block)
-        yield block.order, poses[block.order].distance_m(goal), poses[block.order].angle_deg(goal)
+def movement(blocks: Sequence[Block], poses: Mapping[int, Pose], trial: Trial) -> Movement:
+    """How far blocks are from their goal poses, and which of them passed the trial's limits."""
+    moved = {b.order: poses[b.order].distance_m(Pose.goal(b)) for b in blocks}
+    turned = {b.order: poses[b.order].angle_deg(Pose.goal(b)) for b in blocks}
+    fallen = (o for o in moved if moved[o] > trial.limit_m or turned[o] > trial.limit_deg)
+    return Movement(
+        max(moved.values(), default=0.0), max(turned.values(), default=0.0), tuple(sorted(fallen))
+    )
+
+
+def verdict(found: Sequence[Movement], trial: Trial) -> Stability:
+    """What the settings of a trial showed together."""
+    return Stability(
+        fallen=tuple(sorted({order for one in found for order in one.fallen})),
+        moved_m=max((one.moved_m for one in found), default=0.0),
+        turned_deg=max((one.turned_deg for one in found), default=0.0),
+        agreed=len({one.fallen for one in found}) <= 1,
+        trial=trial,
+    )

@@ -10,13 +10,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from phyblock.domain.scene import Block
-from phyblock.sim.stability import DEFAULT_TRIAL, Stability, Trial
-from phyblock.sim.support import bounds_m
-from phyblock.sim.world import Physics, Pose, World
+from phyblock.sim.stability import (
+    DEFAULT_TRIAL,
+    Movement,
+    Stability,
+    Trial,
+    movement,
+    verdict,
+)
+from phyblock.sim.support import bounds_m, boxes_near
+from phyblock.sim.world import Physics, World
 
 __all__ = ["DEFAULT_REST", "Rest", "check_at_rest", "check_steps", "groups"]
 
@@ -47,13 +51,13 @@ def check_steps(
     Only the group of the block just placed is tried, every block at its goal pose; the other
     groups were tried at earlier steps. With `rest` None every trial takes its full time.
     """
-    verdicts: list[list[tuple[float, float, tuple[int, ...]]]] = [[] for _ in blocks]
+    found: list[list[Movement]] = [[] for _ in blocks]
     for physics in trial.physics:
         with World(physics) as world:
             for count in range(len(blocks)):
                 group = _group_of_last(blocks[: count + 1])
-                verdicts[count].append(_try(world, group, physics, trial, rest))
-    return tuple(_verdict(found, trial) for found in verdicts)
+                found[count].append(_try(world, group, physics, trial, rest))
+    return tuple(verdict(movements, trial) for movements in found)
 
 
 def check_at_rest(
@@ -64,9 +68,11 @@ def check_at_rest(
     for physics in trial.physics:
         with World(physics) as world:
             tried = [_try(world, group, physics, trial, rest) for group in groups(blocks)]
-        fallen = tuple(sorted(order for _, _, orders in tried for order in orders))
-        found.append((max(one[0] for one in tried), max(one[1] for one in tried), fallen))
-    return _verdict(found, trial)
+        fallen = tuple(sorted(order for one in tried for order in one.fallen))
+        moved_m = max((one.moved_m for one in tried), default=0.0)
+        turned_deg = max((one.turned_deg for one in tried), default=0.0)
+        found.append(Movement(moved_m, turned_deg, fallen))
+    return verdict(found, trial)
 
 
 def groups(blocks: Sequence[Block], reach_m: float = _REACH_M) -> tuple[tuple[Block, ...], ...]:
@@ -81,7 +87,7 @@ def groups(blocks: Sequence[Block], reach_m: float = _REACH_M) -> tuple[tuple[Bl
         while frontier:
             at = frontier.pop()
             members.append(at)
-            near = {other for other in left if _near(boxes[at], boxes[other], reach_m)}
+            near = {other for other in left if boxes_near(boxes[at], boxes[other], reach_m)}
             left -= near
             frontier += sorted(near)
         found.append(tuple(blocks[member] for member in sorted(members)))
@@ -94,24 +100,17 @@ def _group_of_last(blocks: Sequence[Block]) -> tuple[Block, ...]:
 
 def _try(
     world: World, group: Sequence[Block], physics: Physics, trial: Trial, rest: Rest | None
-) -> tuple[float, float, tuple[int, ...]]:
-    """Largest movement [m], largest turn [degrees] and the orders of the fallen."""
+) -> Movement:
+    """What becomes of a group, alone in the world for this trial."""
     world.place_all(group)
     if rest is None:
         world.step(trial.duration_s)
     else:
         _run_until_quiet(world, physics, trial.duration_s, rest)
-    poses = world.poses()
+    found = movement(group, world.poses(), trial)
     for block in group:
         world.remove(block.order)
-    moved = [poses[block.order].distance_m(Pose.goal(block)) for block in group]
-    turned = [poses[block.order].angle_deg(Pose.goal(block)) for block in group]
-    fallen = tuple(
-        block.order
-        for block, distance_m, angle_deg in zip(group, moved, turned, strict=True)
-        if distance_m > trial.limit_m or angle_deg > trial.limit_deg
-    )
-    return max(moved), max(turned), fallen
+    return found
 
 
 def _run_until_quiet(world: World, physics: Physics, duration_s: float, rest: Rest) -> None:
@@ -122,15 +121,3 @@ def _run_until_quiet(world: World, physics: Physics, duration_s: float, rest: Re
         quiet_s = quiet_s + every_s if world.fastest_m_s() < rest.speed_m_s else 0.0
         if quiet_s >= rest.quiet_s - every_s / 2:
             return
-
-
-def _verdict(found: Sequence[tuple[float, float, tuple[int, ...]]], trial: Trial) -> Stability:
-    fallen = sorted({order for _, _, orders in found for order in orders})
-    agreed = len({orders for _, _, orders in found}) <= 1
-    moved_m, turned_deg = max(one[0] for one in found), max(one[1] for one in found)
-    return Stability(tuple(fallen), moved_m, turned_deg, agreed, trial)
-
-
-def _near(first: NDArray[np.float64], second: NDArray[np.float64], reach_m: float) -> bool:
-    apart = np.maximum(first[0] - second[1], second[0] - first[1])
-    return bool(apart.max() <= reach_m)

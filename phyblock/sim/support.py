@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain.blocks import euler_deg_to_quat_xyzw, quat_xyzw_to_matrix
+from phyblock.domain.blocks import euler_deg_to_matrix
 from phyblock.domain.scene import Block
 from phyblock.sim.convex import Axes, contact_extent, drop_m, moved, separating_axes
-from phyblock.sim.geometry import ConvexPiece, collision_pieces, solid_mesh
+from phyblock.sim.geometry import ConvexPiece, collision_pieces, corners_m
 
 __all__ = [
     "CONTACT_TOLERANCE_M",
@@ -20,10 +20,12 @@ __all__ = [
     "Gap",
     "Overlap",
     "bounds_m",
+    "boxes_near",
     "drop_height_m",
     "find_gaps",
     "find_overlaps",
     "support_graph",
+    "whole_bounds_m",
 ]
 
 GROUND = 0
@@ -125,13 +127,24 @@ def drop_height_m(block: Block, blocks: Sequence[Block]) -> float:
 
 def bounds_m(block: Block) -> NDArray[np.float64]:
     """Low and high corner of the box round a block, shape (2, 3) [m], world frame."""
-    rotation = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(block.euler_deg))
-    corners = solid_mesh(block.type).vertices_m @ rotation.T + np.array(block.position_m)
+    corners = corners_m(block.type, block.position_m, block.euler_deg)
     return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 
+def whole_bounds_m(blocks: Iterable[Block]) -> NDArray[np.float64]:
+    """Low and high corner of the box round all blocks, one at least, shape (2, 3) [m]."""
+    boxes = np.stack([bounds_m(block) for block in blocks])
+    return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+
+def boxes_near(first: NDArray[np.float64], second: NDArray[np.float64], reach_m: float) -> bool:
+    """Whether two boxes, each (2, 3) [m] as from `bounds_m`, come within `reach_m` [m]."""
+    apart = np.maximum(first[0] - second[1], second[0] - first[1])
+    return bool(apart.max() <= reach_m)
+
+
 def _solid(block: Block) -> _Solid:
-    rotation = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(block.euler_deg))
+    rotation = euler_deg_to_matrix(block.euler_deg)
     position = np.array(block.position_m)
     pieces = tuple(moved(piece, rotation, position) for piece in collision_pieces(block.type))
     points = np.vstack([piece.vertices_m for piece in pieces])
@@ -142,13 +155,8 @@ def _near_pairs(solids: Sequence[_Solid], reach_m: float) -> Iterator[tuple[_Sol
     """Pairs whose bounding boxes come within `reach_m` of one another."""
     for i, first in enumerate(solids):
         for second in solids[i + 1 :]:
-            if _boxes_near(first.box_m, second.box_m, reach_m):
+            if boxes_near(first.box_m, second.box_m, reach_m):
                 yield first, second
-
-
-def _boxes_near(first: NDArray[np.float64], second: NDArray[np.float64], reach_m: float) -> bool:
-    apart = np.maximum(first[0] - second[1], second[0] - first[1])
-    return bool(apart.max() <= reach_m)
 
 
 def _piece_pairs(first: _Solid, second: _Solid) -> Iterator[tuple[ConvexPiece, ConvexPiece, Axes]]:
@@ -175,7 +183,7 @@ def _clearance_m(solid: _Solid, solids: Sequence[_Solid]) -> float:
     for other in solids:
         reach = solid.box_m.copy()
         reach[0, 2] -= clearance
-        if other is solid or not _boxes_near(other.box_m, reach, 0.0):
+        if other is solid or not boxes_near(other.box_m, reach, 0.0):
             continue
         for _, _, axes in _piece_pairs(other, solid):
             fall = drop_m(axes)

@@ -6,12 +6,14 @@ import pytest
 
 from phyblock.domain import Block, Scene
 from phyblock.errors import DataError
-from phyblock.generate import accept, designed_scenes, form_problems, physics_problems
-from phyblock.generate.sketch import Sketch, make_scene
+from phyblock.generate import accept, form_problems, physics_problems
+from phyblock.generate.sketch import make_scene
+from tests.designs.pad import Pad
+from tests.designs.scenes import designed_scene
 
 
 def gate() -> Scene:
-    return next(scene for scene in designed_scenes() if scene.id == "l1-gate")
+    return designed_scene("l1-gate")
 
 
 def with_block(scene: Scene, index: int, **changes: object) -> Scene:
@@ -31,7 +33,11 @@ def test_a_sound_scene_is_accepted() -> None:
 
 @pytest.mark.parametrize(
     ("rise_m", "said"),
-    [(0.004, "floats 4.00 mm"), (-0.004, "overlaps block 3 by 4.00 mm"), (0.05, "fall at step 3")],
+    [
+        (0.004, "floats 4.00 mm"),
+        (-0.004, "block 3 overlaps block 2 by 4.00 mm"),
+        (0.05, "block 3 falls at step 3"),
+    ],
 )
 def test_a_block_out_of_its_place_is_refused(rise_m: float, said: str) -> None:
     scene = gate()
@@ -42,7 +48,7 @@ def test_a_block_out_of_its_place_is_refused(rise_m: float, said: str) -> None:
 
 def test_a_wrong_dependency_is_named_with_the_right_one() -> None:
     (problem,) = physics_problems(with_block(gate(), 2, depend=(1, 2)))
-    assert problem.field == "blocks[3].depend"
+    assert problem.field == "blocks[2].depend"
     assert problem.allowed == "[2]"
 
 
@@ -66,7 +72,7 @@ def test_an_order_that_cannot_be_built_is_refused() -> None:
 
 
 def test_levels_limit_blocks_and_layers() -> None:
-    tower = Sketch()
+    tower = Pad()
     for _ in range(5):
         tower.put("cube")
     scene = make_scene("tower", (1, 2), tower.blocks)
@@ -76,9 +82,9 @@ def test_levels_limit_blocks_and_layers() -> None:
 
 
 def test_what_falls_midway_is_refused_though_it_stands_in_the_end() -> None:
-    sketch = Sketch()
+    sketch = Pad()
     sketch.put("cube")
     sketch.put("cuboid3", pose="flat-y")
     sketch.pair("cube", 2.8)
     problems = physics_problems(make_scene("beam", (1,), sketch.blocks))
-    assert [problem.message for problem in problems] == ["blocks (2, 3) fall at step 3"]
+    assert [problem.message for problem in problems] == ["blocks 2, 3 fall at step 3"]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from phyblock.datasets import read_builtin, salvage
 from phyblock.domain import CandidateSet, Scene
 from phyblock.errors import StoreError
-from phyblock.generate import designed_scenes, make_candidates
+from phyblock.generate import make_candidates
 from phyblock.generate.audit import CHECKS, AuditSettings, SceneAudit, audit_scene
 from phyblock.generate.audit_set import (
     Audit,
@@ -22,6 +22,7 @@ from phyblock.generate.audit_set import (
     write_fixed,
 )
 from phyblock.sim import Physics, Trial
+from tests.designs.scenes import designed_scenes
 from tests.sim.structures import counterweighted_beam, scene_of, tower
 from tests.sim.test_support import FLOATING, OVERLAPPING
 

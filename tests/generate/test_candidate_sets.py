@@ -6,8 +6,9 @@ from hypothesis import strategies as st
 
 from phyblock.domain import KIT_PALETTE, MAX_CANDIDATES, Block, Candidate, Scene
 from phyblock.errors import DataError
-from phyblock.generate import designed_scenes, make_candidates
+from phyblock.generate import make_candidates
 from phyblock.generate.poses import POSES
+from tests.designs.scenes import designed_scene
 
 EVERY_LOOK = [(kind, euler) for kind in KIT_PALETTE for euler in POSES[kind[0]].values()]
 
@@ -69,7 +70,7 @@ def _color(color: str) -> int:
 
 
 def test_seeds_give_other_distractors_and_the_same_seed_the_same() -> None:
-    scene = next(scene for scene in designed_scenes() if scene.id == "l4-harbor")
+    scene = designed_scene("l4-harbor")
     assert make_candidates(scene, 1) == make_candidates(scene, 1)
     assert len({make_candidates(scene, seed) for seed in range(5)}) > 1
 

@@ -14,9 +14,9 @@ from phyblock.errors import DataError, StoreError
 from phyblock.generate import accept
 from phyblock.generate.production import Order, Share, produce, shares
 from phyblock.generate.symmetry import canonical_form
-from phyblock.generate.visibility import hidden_blocks
 from phyblock.generate.workers import open_workers
 from phyblock.generate.writing import SetWriter, open_writer, sums_text
+from phyblock.sim.visibility import hidden_blocks
 
 SMALL = Order(3, "kit", (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1)))
 

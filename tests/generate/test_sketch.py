@@ -5,10 +5,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, orientation_class
-from phyblock.generate import designed_scenes
 from phyblock.generate.poses import KIT_COLOR, POSES
-from phyblock.generate.sketch import Sketch, make_scene
+from phyblock.generate.sketch import make_scene
 from phyblock.sim import find_gaps, find_overlaps, support_graph
+from tests.designs.pad import Pad
+from tests.designs.scenes import designed_scenes
 
 grid = st.integers(-3, 3)
 steps = st.lists(
@@ -25,7 +26,7 @@ steps = st.lists(
 @given(steps)
 @settings(max_examples=40, deadline=None)
 def test_whatever_is_put_down_neither_overlaps_nor_floats(drawn) -> None:
-    sketch = Sketch()
+    sketch = Pad()
     for block_type, y, x, pose in drawn:
         sketch.put(block_type, y, x, pose)
     assert find_overlaps(sketch.blocks, 1e-5) == ()
@@ -40,7 +41,7 @@ def test_poses_of_a_type_look_different(block_type) -> None:
 
 
 def test_a_pair_stands_on_both_sides() -> None:
-    sketch = Sketch()
+    sketch = Pad()
     sketch.pair("triangle", 3, poses=("ramp-y", "ramp+y"))
     left, right = sketch.blocks
     assert left.position_m[1] == -right.position_m[1] == pytest.approx(-0.075)
@@ -48,7 +49,7 @@ def test_a_pair_stands_on_both_sides() -> None:
 
 
 def test_a_scene_is_centered_and_its_graph_comes_from_contact() -> None:
-    sketch = Sketch(origin=(20.0, -8.0))
+    sketch = Pad(origin=(20.0, -8.0))
     sketch.pair("cube", 2)
     sketch.put("cuboid3", pose="flat-y")
     scene = make_scene("test", (1,), sketch.blocks)

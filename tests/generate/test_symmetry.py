@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain import BLOCK_TYPES, Block, orientation_class
-from phyblock.generate import designed_scenes
 from phyblock.generate.poses import POSES
 from phyblock.generate.symmetry import SYMMETRIES, Symmetry, canonical_form, transformed
 from phyblock.sim import find_overlaps, support_graph
 from phyblock.sim.render import DrawnBlock
+from tests.designs.scenes import designed_scenes
 
 SCENES = designed_scenes()
 EVERY_POSE = [(kind, euler) for kind in BLOCK_TYPES for euler in POSES[kind].values()]

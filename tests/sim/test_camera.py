@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 
 from phyblock.datasets import read_official
 from phyblock.domain import Scene
-from phyblock.generate import designed_scenes
 from phyblock.sim.camera import VIEWS, Window, frame, view_axes
 from phyblock.sim.pictures import PictureStyle, drawn, goal_camera
 from phyblock.sim.render import shoot
+from tests.designs.scenes import designed_scene
 from tests.sim.structures import clouds, scene_of
 
 azimuths = st.floats(-360, 360, allow_nan=False)
@@ -79,7 +79,7 @@ def test_no_official_scene_is_cut_off(view: str, official_checkout: Path) -> Non
 
 @pytest.mark.parametrize("view", sorted(VIEWS))
 def test_the_renderer_draws_where_the_camera_says(view: str) -> None:
-    scene = next(scene for scene in designed_scenes() if scene.id == "l2-rocket")
+    scene = designed_scene("l2-rocket")
     camera, size_px = goal_camera(scene, PictureStyle.from_view(view)), 512
     blocks = drawn(scene)
     shot = shoot(blocks, camera, size_px)

@@ -9,7 +9,6 @@ from PIL import Image, ImageSequence
 
 from phyblock.domain import Scene
 from phyblock.errors import DataError
-from phyblock.generate import designed_scenes
 from phyblock.sim import PictureStyle, goal_png
 from phyblock.sim.assembly import animation, filmstrip_png, step_images
 from phyblock.sim.exploded import exploded_blocks, exploded_png
@@ -17,6 +16,7 @@ from phyblock.sim.marked import marked_png
 from phyblock.sim.pictures import camera_for, drawn, goal_camera
 from phyblock.sim.render import shoot
 from phyblock.sim.visibility import visible_shares
+from tests.designs.scenes import designed_scenes
 from tests.sim.structures import block, scene_of, tower
 
 SMALL = PictureStyle(size_px=128)

@@ -14,7 +14,7 @@ from PIL import Image
 
 from phyblock.domain import KIT_PALETTE, Candidate, CandidateSet, Scene
 from phyblock.errors import DataError
-from phyblock.generate import designed_scenes, make_candidates
+from phyblock.generate import make_candidates
 from phyblock.generate.poses import POSES
 from phyblock.sim import (
     PictureStyle,
@@ -28,6 +28,7 @@ from phyblock.sim.compose import LABEL_STRIP, numbered_grid
 from phyblock.sim.pictures import candidate_camera, on_the_floor
 from phyblock.sim.render import picture, shoot
 from phyblock.sim.textures import BACKGROUNDS
+from tests.designs.scenes import designed_scene
 from tests.sim.structures import block, scene_of
 
 SMALL = PictureStyle(size_px=128)
@@ -39,7 +40,7 @@ EVERY_LOOK = [
 
 
 def designed(name: str) -> Scene:
-    return next(scene for scene in designed_scenes() if scene.id == name)
+    return designed_scene(name)
 
 
 def opened(png: bytes) -> np.ndarray:

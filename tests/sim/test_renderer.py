@@ -11,16 +11,16 @@ import pytest
 from PIL import Image
 
 from phyblock.errors import InputError
-from phyblock.generate import designed_scenes
 from phyblock.sim import PictureStyle, goal_key, goal_png
 from phyblock.sim.renderer import draw_with_egl, renderer, succeeds_in_child
+from tests.designs.scenes import designed_scenes
 
 SCENE = designed_scenes()[0]
 STYLE = PictureStyle(size_px=128)
 DRAW = """
 import sys
 from pathlib import Path
-from phyblock.generate import designed_scenes
+from tests.designs.scenes import designed_scenes
 from phyblock.sim import PictureStyle, goal_key, goal_png
 from phyblock.sim.renderer import renderer
 if __name__ == "__main__":

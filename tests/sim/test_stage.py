@@ -5,10 +5,10 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from phyblock.domain import euler_deg_to_quat_xyzw
-from phyblock.generate import designed_scenes
 from phyblock.sim import PictureStyle, goal_png
 from phyblock.sim.geometry import solid_mesh
 from phyblock.sim.stage import Prop, stage
+from tests.designs.scenes import designed_scenes
 
 SMALL = PictureStyle(size_px=128)
 UPRIGHT = euler_deg_to_quat_xyzw((0.0, 0.0, 0.0))

@@ -5,12 +5,12 @@ from dataclasses import replace
 import pytest
 
 from phyblock.domain import Block
-from phyblock.generate import designed_scenes
-from phyblock.generate.sketch import Sketch
 from phyblock.sim import Trial, check_prefixes
 from phyblock.sim.stability import DEFAULT_TRIAL
 from phyblock.sim.steps import Rest, check_at_rest, check_steps, groups
 from phyblock.sim.support import bounds_m
+from tests.designs.pad import Pad
+from tests.designs.scenes import designed_scenes
 
 SCENES = {scene.id: scene.blocks for scene in designed_scenes()}
 FIRST = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
@@ -18,7 +18,7 @@ FIRST = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
 
 def beam() -> list[Block]:
     """Stands when finished; falls when one end alone is loaded."""
-    sketch = Sketch()
+    sketch = Pad()
     sketch.put("cube")
     sketch.put("cuboid3", pose="flat-y")
     sketch.pair("cube", 2.8)
@@ -26,7 +26,7 @@ def beam() -> list[Block]:
 
 
 def two_gates() -> list[Block]:
-    sketch = Sketch()
+    sketch = Pad()
     for y in (-4, 4):
         sketch.put("arch", y)
         sketch.put("triangle", y)
@@ -49,7 +49,7 @@ def test_what_falls_midway_is_named_at_its_step() -> None:
 
 def test_a_slow_tip_is_not_taken_for_rest() -> None:
     """The load reaches 0.1 mm past the balance point: the slowest fall that a grid can hold."""
-    sketch = Sketch()
+    sketch = Pad()
     sketch.put("cube")
     sketch.put("cuboid3", 1.004, pose="flat-y")
     assert not check_at_rest(sketch.blocks, FIRST).stable
@@ -78,7 +78,7 @@ def test_without_rest_every_trial_takes_its_time() -> None:
 
 
 def test_bounds_are_those_of_the_turned_block() -> None:
-    sketch = Sketch()
+    sketch = Pad()
     sketch.put("cuboid2", pose="flat-y")
     low, high = bounds_m(sketch.blocks[0])
     assert (high - low).tolist() == pytest.approx([0.05, 0.1, 0.025])

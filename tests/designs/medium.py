@@ -5,12 +5,12 @@ Coordinates are grid units of 2.5 cm; y runs along the front that the camera see
 
 from __future__ import annotations
 
-from phyblock.generate.sketch import Design, Sketch
+from tests.designs.pad import Design, Pad
 
 __all__ = ["LEVEL_3"]
 
 
-def _torii(s: Sketch) -> None:
+def _torii(s: Pad) -> None:
     s.pair("cuboid1", 2)
     s.pair("cylinder", 2)
     s.put("cuboid3", pose="flat-y")
@@ -20,7 +20,7 @@ def _torii(s: Sketch) -> None:
     s.pair("triangle", 2, poses=("ramp+y", "ramp-y"))
 
 
-def _beacon(s: Sketch) -> None:
+def _beacon(s: Pad) -> None:
     s.put("cuboid2", x=-1, pose="flat-y")
     s.put("cuboid2", x=1, pose="flat-y")
     s.put("cube", color="red")
@@ -31,7 +31,7 @@ def _beacon(s: Sketch) -> None:
     s.put("triangle")
 
 
-def _robot(s: Sketch) -> None:
+def _robot(s: Pad) -> None:
     s.pair("cylinder", 1)
     s.put("cuboid2", pose="flat-y")
     s.put("cube", -1, color="blue")
@@ -41,7 +41,7 @@ def _robot(s: Sketch) -> None:
     s.put("semi_cylinder")
 
 
-def _viaduct(s: Sketch) -> None:
+def _viaduct(s: Pad) -> None:
     s.pair("arch", 2)
     s.pair("triangle", 5, poses=("ramp-y", "ramp+y"))
     s.pair("cuboid2", 2, poses=("flat-y", "flat-y"))
@@ -51,7 +51,7 @@ def _viaduct(s: Sketch) -> None:
     s.put("triangle")
 
 
-def _elephant(s: Sketch) -> None:
+def _elephant(s: Pad) -> None:
     s.put("arch", x=-1)
     s.put("arch", x=1)
     s.put("cuboid2", -1, pose="flat-x")
@@ -62,7 +62,7 @@ def _elephant(s: Sketch) -> None:
     s.put("semi_cylinder", 1)
 
 
-def _brick_pyramid(s: Sketch) -> None:
+def _brick_pyramid(s: Pad) -> None:
     s.pair("cube", 2, color="blue")
     s.put("cube", color="green")
     s.pair("cube", 1, color="yellow")
@@ -71,7 +71,7 @@ def _brick_pyramid(s: Sketch) -> None:
     s.put("semi_cylinder")
 
 
-def _town_hall(s: Sketch) -> None:
+def _town_hall(s: Pad) -> None:
     s.put("arch")
     s.pair("cube", 3, color="yellow")
     s.pair("cuboid2", 2, poses=("flat-y", "flat-y"))
@@ -81,7 +81,7 @@ def _town_hall(s: Sketch) -> None:
     s.pair("triangle", 3, poses=("ramp-y", "ramp+y"))
 
 
-def _balance(s: Sketch) -> None:
+def _balance(s: Pad) -> None:
     s.put("cuboid2", pose="flat-y")
     s.put("cylinder")
     s.put("arch", pose="cradle")
@@ -90,7 +90,7 @@ def _balance(s: Sketch) -> None:
     s.pair("semi_cylinder", 2)
 
 
-def _tractor(s: Sketch) -> None:
+def _tractor(s: Pad) -> None:
     s.pair("cylinder", 2, poses=("lying-x", "lying-x"))
     s.put("cuboid3", x=0, pose="flat-y")
     s.put("cube", -2, color="red")
@@ -101,7 +101,7 @@ def _tractor(s: Sketch) -> None:
     s.put("semi_cylinder", -2)
 
 
-def _giraffe(s: Sketch) -> None:
+def _giraffe(s: Pad) -> None:
     s.put("arch")
     s.put("cuboid2", pose="flat-y")
     s.put("triangle", -1, pose="ramp-y")

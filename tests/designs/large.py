@@ -5,12 +5,12 @@ Coordinates are grid units of 2.5 cm; y runs along the front that the camera see
 
 from __future__ import annotations
 
-from phyblock.generate.sketch import Design, Sketch
+from tests.designs.pad import Design, Pad
 
 __all__ = ["LEVEL_4"]
 
 
-def _castle(s: Sketch) -> None:
+def _castle(s: Pad) -> None:
     s.put("arch")
     for side in (-3, 3):
         s.put("cube", side, color="blue")
@@ -29,7 +29,7 @@ def _castle(s: Sketch) -> None:
         s.put("triangle", side)
 
 
-def _temple(s: Sketch) -> None:
+def _temple(s: Pad) -> None:
     for depth in (-1, 1):
         s.put("cuboid3", x=depth, pose="flat-y")
     for depth in (-1, 1):
@@ -44,7 +44,7 @@ def _temple(s: Sketch) -> None:
         s.put("triangle", 1, depth, pose="ramp+y")
 
 
-def _aqueduct(s: Sketch) -> None:
+def _aqueduct(s: Pad) -> None:
     for side in (-4, 0, 4):
         s.put("arch", side)
     for side in (-3, 3):
@@ -61,7 +61,7 @@ def _aqueduct(s: Sketch) -> None:
     s.put("triangle")
 
 
-def _twin_towers(s: Sketch) -> None:
+def _twin_towers(s: Pad) -> None:
     for side in (-3, 3):
         s.put("cuboid2", side, pose="flat-x")
     for side in (-3, 3):
@@ -78,7 +78,7 @@ def _twin_towers(s: Sketch) -> None:
         s.put("triangle", side, pose="roof-turned")
 
 
-def _cathedral(s: Sketch) -> None:
+def _cathedral(s: Pad) -> None:
     s.put("arch")
     s.pair("cube", 3, color="yellow")
     s.pair("triangle", 5, poses=("ramp-y", "ramp+y"))
@@ -90,7 +90,7 @@ def _cathedral(s: Sketch) -> None:
     s.pair("triangle", 3, poses=("roof", "roof"))
 
 
-def _harbor(s: Sketch) -> None:
+def _harbor(s: Pad) -> None:
     s.origin = (-5.0, 0.0)
     s.put("cuboid2", x=-1, pose="flat-y")
     s.put("cuboid2", x=1, pose="flat-y")
@@ -110,7 +110,7 @@ def _harbor(s: Sketch) -> None:
     s.put("triangle", -1)
 
 
-def _playground(s: Sketch) -> None:
+def _playground(s: Pad) -> None:
     s.origin = (-4.0, 0.0)
     s.pair("cuboid1", 2)
     s.pair("cylinder", 2)
@@ -127,7 +127,7 @@ def _playground(s: Sketch) -> None:
     s.put("triangle", -2)
 
 
-def _palace(s: Sketch) -> None:
+def _palace(s: Pad) -> None:
     for side in (-3, 3):
         s.put("cuboid3", side, pose="flat-y")
     for side in (-5, 5):

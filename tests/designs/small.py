@@ -5,89 +5,89 @@ Coordinates are grid units of 2.5 cm; y runs along the front that the camera see
 
 from __future__ import annotations
 
-from phyblock.generate.sketch import Design, Sketch
+from tests.designs.pad import Design, Pad
 
 __all__ = ["LEVEL_1", "LEVEL_2"]
 
 
-def _gate(s: Sketch) -> None:
+def _gate(s: Pad) -> None:
     s.put("arch")
     s.put("cuboid2", pose="flat-y")
     s.put("triangle")
 
 
-def _lighthouse(s: Sketch) -> None:
+def _lighthouse(s: Pad) -> None:
     s.put("cube", color="blue")
     s.put("cylinder")
     s.put("semi_cylinder", pose="dome-turned")
 
 
-def _cottage(s: Sketch) -> None:
+def _cottage(s: Pad) -> None:
     s.put("cube", -1, color="yellow")
     s.put("cube", 1, color="green")
     s.put("cuboid2", pose="flat-y")
     s.put("triangle")
 
 
-def _dolmen(s: Sketch) -> None:
+def _dolmen(s: Pad) -> None:
     s.pair("cylinder", 2)
     s.put("cuboid3", pose="flat-y")
     s.put("triangle")
 
 
-def _boat(s: Sketch) -> None:
+def _boat(s: Pad) -> None:
     s.put("arch", pose="cradle")
     s.put("cuboid3", pose="flat-y")
     s.put("cube", color="blue")
 
 
-def _dog(s: Sketch) -> None:
+def _dog(s: Pad) -> None:
     s.put("arch")
     s.put("cube", 1, color="blue")
     s.put("triangle", -1, pose="ramp-y")
     s.put("semi_cylinder", 1)
 
 
-def _bench(s: Sketch) -> None:
+def _bench(s: Pad) -> None:
     s.pair("cuboid1", 2)
     s.put("cuboid3", pose="flat-y")
     s.put("semi_cylinder", 2, pose="dome")
 
 
-def _slide(s: Sketch) -> None:
+def _slide(s: Pad) -> None:
     s.put("cube", color="red")
     s.put("triangle", 2, pose="ramp+y")
     s.put("cuboid1")
 
 
-def _castle_gate(s: Sketch) -> None:
+def _castle_gate(s: Pad) -> None:
     s.put("arch")
     s.pair("cube", 3, color="green")
     s.pair("triangle", 3, poses=("roof", "roof"))
 
 
-def _bridge(s: Sketch) -> None:
+def _bridge(s: Pad) -> None:
     s.put("arch")
     s.pair("triangle", 3, poses=("ramp-y", "ramp+y"))
     s.put("cuboid2", pose="flat-y")
     s.put("semi_cylinder")
 
 
-def _locomotive(s: Sketch) -> None:
+def _locomotive(s: Pad) -> None:
     s.pair("cylinder", 2, poses=("lying-x", "lying-x"))
     s.put("cuboid3", pose="flat-y")
     s.put("cube", -2, color="blue")
     s.put("semi_cylinder", 1.5, pose="round+y")
 
 
-def _throne(s: Sketch) -> None:
+def _throne(s: Pad) -> None:
     s.put("cuboid1")
     s.put("cuboid2", x=-1.5, pose="upright-x")
     s.pair("cuboid1", 1.5, poses=("edge-x", "edge-x"))
     s.put("semi_cylinder")
 
 
-def _chapel(s: Sketch) -> None:
+def _chapel(s: Pad) -> None:
     s.put("cuboid3", pose="flat-y")
     s.put("cube", 2, color="green")
     s.put("arch", -1, pose="gate")
@@ -95,7 +95,7 @@ def _chapel(s: Sketch) -> None:
     s.put("triangle", 2)
 
 
-def _rocket(s: Sketch) -> None:
+def _rocket(s: Pad) -> None:
     s.put("cylinder")
     s.pair("triangle", 2, poses=("ramp-y", "ramp+y"))
     s.put("cube", color="red")
