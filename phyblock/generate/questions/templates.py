@@ -6,5 +6,124 @@ from collections.abc import Mapping
 
 __all__ = ["TEMPLATES"]
 
-TEMPLATES: Mapping[str, str] = {}
-"""An id is the subtask, a kind where there are several, and a number: `rp-side-2`."""
+TEMPLATES: Mapping[str, str] = {
+    "sh-1": "What is the shape of the {block}?",
+    "sh-2": "Which shape does the {block} have?",
+    "sh-3": "The {block} in the picture is of which shape?",
+    "sh-4": "Look at the {block}. What kind of block is it?",
+    "co-1": "What is the color of the {block}?",
+    "co-2": "Which color does the {block} have?",
+    "co-3": "The {block} in the picture is of which color?",
+    "co-4": "Look at the {block}. What color is it?",
+    "si-height-1": (
+        "Which of these blocks is the {comparison}, measured from its lowest to its highest point?"
+    ),
+    "si-height-2": (
+        "Compare the heights of these blocks themselves, not how high they stand. "
+        "Which one is the {comparison}?"
+    ),
+    "si-height-3": "As it stands in the picture, which of these blocks is itself the {comparison}?",
+    "si-length-1": "Which of these blocks is the {comparison}, however it lies?",
+    "si-length-2": "Compare the longest sides of these blocks. Which block is the {comparison}?",
+    "si-length-3": "Of these blocks, which is the {comparison}, measured along its longest side?",
+    "si-volume-1": "Which of these blocks is the {comparison} by volume?",
+    "si-volume-2": "Compare how much space these blocks take up. Which one is the {comparison}?",
+    "si-volume-3": "Of these blocks, which one is the {comparison} in volume?",
+    "si-times-1": "How tall is the {block} itself, compared with the {other}?",
+    "si-times-2": (
+        "From its lowest to its highest point, how does the {block} compare with the {other}?"
+    ),
+    "si-times-3": "Next to the {other}, how tall is the {block} as a block of its own?",
+    "nu-1": "How many {what} are there in the picture?",
+    "nu-2": "How many {what} does the structure have?",
+    "nu-3": "Count the {what}. How many are there?",
+    "nu-4": "What is the number of {what} in this structure?",
+    "rp-corner-1": "Seen from the camera, where along the floor is the {block} from the {other}?",
+    "rp-corner-2": (
+        "Leave heights aside. As seen in the picture, where is the {block} relative to the {other}?"
+    ),
+    "rp-corner-3": (
+        "By left and right, front and back in the picture, where is the {block} from the {other}?"
+    ),
+    "rp-upright-1": "As seen in the picture, where is the {block} relative to the {other}?",
+    "rp-upright-2": "Starting from the {other}, where do you find the {block}?",
+    "rp-upright-3": "What is the position of the {block} with respect to the {other}?",
+    "rp-extreme-1": "Which of these blocks is {extreme} in the picture?",
+    "rp-extreme-2": "In the picture, which of these four blocks is {extreme}?",
+    "rp-nearest-1": "Which of these blocks is nearest to the {other}, from middle to middle?",
+    "rp-nearest-2": "Whose middle is the closest to the middle of the {other}?",
+    "ap-top-1": "If {scale}, how high above the ground is the top of the {block}?",
+    "ap-top-2": "Take as scale that {scale}. At what height is the highest point of the {block}?",
+    "ap-bottom-1": "If {scale}, how high above the ground is the lowest point of the {block}?",
+    "ap-bottom-2": "Take as scale that {scale}. At what height does the {block} begin?",
+    "ap-apart-1": (
+        "If {scale}, how far apart are the middles of the {block} and the {other}, "
+        "measured along the ground?"
+    ),
+    "ap-apart-2": (
+        "Take as scale that {scale}. Seen straight from above, what is the distance between "
+        "the middles of the {block} and the {other}?"
+    ),
+    "ap-rise-1": (
+        "If {scale}, by how much do the tops of the {block} and the {other} differ in height?"
+    ),
+    "ap-rise-2": (
+        "Take as scale that {scale}. What is the difference in height between the highest points "
+        "of the {block} and the {other}?"
+    ),
+    "rd-on-1": "Which of these blocks rests directly on the {block}?",
+    "rd-on-2": "Which block is directly supported by the {block}?",
+    "rd-on-3": "On the {block} stands one of these blocks. Which one?",
+    "rd-under-1": "Which of these blocks directly supports the {block}?",
+    "rd-under-2": "The {block} rests directly on one of these blocks. Which one?",
+    "rd-under-3": "Which block lies directly under the {block} and carries it?",
+    "rd-needed-1": "Which of these blocks has to be in place before the {block} can be put there?",
+    "rd-needed-2": "The {block} depends, directly or through others, on which of these blocks?",
+    "rd-carried-1": "Which of these blocks can be put in place only after the {block}?",
+    "rd-carried-2": "Which of these blocks depends, directly or through others, on the {block}?",
+    "rr-angle-1": (
+        "By how much is the {block} turned about the vertical, compared with the {other}?"
+    ),
+    "rr-angle-2": (
+        "Seen from above, what is the least turn that brings the {block} into the orientation of "
+        "the {other}?"
+    ),
+    "rr-angle-3": (
+        "What is the angle between the orientations of the {block} and the {other}, "
+        "about a vertical axis?"
+    ),
+    "rr-turn-1": ("Seen from above, by how much is the {block} turned, compared with the {other}?"),
+    "rr-turn-2": (
+        "Seen from above, which turn takes the orientation of the {other} to that of the {block}?"
+    ),
+    "rr-turn-3": (
+        "The {other} is turned on the spot until it is oriented like the {block}. "
+        "Seen from above, what is that turn?"
+    ),
+    "oc-1": "How many blocks are there in all?",
+    "oc-2": "How many blocks is the structure made of?",
+    "oc-3": "Count all the blocks in the picture. How many are there?",
+    "oc-4": "What is the total number of blocks?",
+    "lc-1": (
+        "A block on the ground is in layer 1, any other block is one layer above the highest block "
+        "it rests on. How many layers does the structure have?"
+    ),
+    "lc-2": (
+        "How many layers are there, when a block counts one layer more than the highest block "
+        "under it, starting with 1 on the ground?"
+    ),
+    "lc-3": (
+        "Counting upward from the ground, how many blocks are in the longest chain in which each "
+        "block rests on the one before?"
+    ),
+    "tc-1": (
+        "Blocks of the same shape and size are of one type, whatever their color. "
+        "How many types are there in the picture?"
+    ),
+    "tc-2": (
+        "How many different types of blocks does the structure use, if types differ in shape or "
+        "size, not in color?"
+    ),
+    "tc-3": "How many different block types (by shape and size, not color) can you count?",
+}
+"""An id is the subtask, a kind where there are several, and a number: `rp-corner-2`."""

@@ -1,0 +1,141 @@
+"""Counting blocks of a kind, all blocks, layers and types; every counted block can be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from phyblock.domain.blocks import COLORS
+from phyblock.domain.question import Question, Subtask
+from phyblock.domain.scene import Block, Scene
+from phyblock.generate.questions.base import Draft, UnfairError
+from phyblock.generate.questions.referring import SHAPE_WORDS
+from phyblock.generate.questions.seeing import COUNTED, are_seen, require_seen, shown_blocks
+from phyblock.generate.questions.static import StaticMaker, draft, index_of, shuffled, window
+from phyblock.generate.questions.wording import slots_of
+from phyblock.sim.support import GROUND, support_graph
+
+__all__ = ["CountMaker", "LayerMaker", "NumberMaker", "TypeMaker"]
+
+_PLURALS = {word: f"{word}es" if word == "arch" else f"{word}s" for word in SHAPE_WORDS}
+_TYPES_OF = {_PLURALS[word]: types for word, types in SHAPE_WORDS.items()}
+_TRIES = 4
+
+
+def _orders(blocks: Sequence[Block]) -> list[int]:
+    return [block.order for block in blocks]
+
+
+class NumberMaker(StaticMaker):
+    """NU: how many blocks there are of a color, a shape, or both."""
+
+    subtask: Subtask = "NU"
+
+    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """Of all that can be counted in a scene whose blocks all show enough."""
+        if not are_seen(scene.blocks, _orders(scene.blocks), COUNTED):
+            return
+        colors = [color for color in COLORS if any(b.color == color for b in scene.blocks)]
+        kinds = [(f"{color} blocks", "color") for color in colors]
+        kinds += [(word, "shape") for word in _TYPES_OF]
+        kinds += [(f"{color} {word}", "both") for color in colors for word in _TYPES_OF]
+        for what, kind in shuffled(kinds, rng):
+            counted = _fitting(what, scene.blocks)
+            values = window(range(1, 8), len(counted), rng)
+            if values is not None:
+                options = [str(value) for value in values]
+                evidence = {"counted": _orders(counted)}
+                yield draft(scene, "nu", rng, {"what": what}, options, options[0], kind, **evidence)
+
+    def rederive(self, question: Question) -> tuple[int, ...]:
+        """Counts the blocks that fit the words."""
+        blocks = shown_blocks(question)
+        require_seen(blocks, _orders(blocks), COUNTED)
+        return index_of(question, str(len(_fitting(slots_of(question)["what"], blocks))))
+
+
+class _WholeMaker(StaticMaker):
+    """One number that a whole scene has."""
+
+    subtask: Subtask
+    drafts_a_scene = _TRIES
+    least: float = COUNTED
+
+    def __init__(self, values: Sequence[int], count: Callable[[Sequence[Block]], int]) -> None:
+        self._values, self._count = values, count
+
+    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """The same question with windows of options that differ."""
+        if not are_seen(scene.blocks, _orders(scene.blocks), self.least):
+            return
+        right = self._count(scene.blocks)
+        for _ in range(_TRIES):
+            values = window(self._values, right, rng)
+            if values is not None:
+                options = [str(value) for value in values]
+                yield draft(scene, self.subtask.lower(), rng, {}, options, options[0], count=right)
+
+    def rederive(self, question: Question) -> tuple[int, ...]:
+        """Counts anew."""
+        blocks = shown_blocks(question)
+        slots_of(question)
+        require_seen(blocks, _orders(blocks), self.least)
+        return index_of(question, str(self._count(blocks)))
+
+
+class CountMaker(_WholeMaker):
+    """OC: how many blocks in all."""
+
+    subtask: Subtask = "OC"
+
+    def __init__(self) -> None:
+        super().__init__(range(2, 18), len)
+
+
+class LayerMaker(_WholeMaker):
+    """LC: how many layers, by what rests on what."""
+
+    subtask: Subtask = "LC"
+
+    def __init__(self) -> None:
+        super().__init__(range(2, 9), _layers)
+
+
+class TypeMaker(_WholeMaker):
+    """TC: how many types, that is shapes and sizes."""
+
+    subtask: Subtask = "TC"
+
+    def __init__(self) -> None:
+        super().__init__(range(2, 9), _types)
+
+
+def _fitting(what: str, blocks: Sequence[Block]) -> list[Block]:
+    """The blocks that `red blocks`, `cubes` or `red cubes` speaks of."""
+    first, _, rest = what.partition(" ")
+    color, noun = (first, rest) if first in COLORS else ("", what)
+    if noun not in (*_TYPES_OF, "blocks"):
+        raise UnfairError(f"{what!r} cannot be counted")
+    types = _TYPES_OF.get(noun)
+    return [
+        block
+        for block in blocks
+        if color in ("", block.color) and (types is None or block.type in types)
+    ]
+
+
+def _types(blocks: Sequence[Block]) -> int:
+    return len({block.type for block in blocks})
+
+
+def _layers(blocks: Sequence[Block]) -> int:
+    """The longest chain of blocks that rest on one another, from contacts alone."""
+    below = support_graph(blocks)
+    layer = {GROUND: 0}
+    while len(layer) <= len(blocks):
+        ready = [o for o in below if o not in layer and below[o] and below[o] <= layer.keys()]
+        if not ready:
+            raise UnfairError("some block rests on nothing, or on itself")
+        layer.update({order: 1 + max(layer[other] for other in below[order]) for order in ready})
+    return max(layer.values())
