@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from phyblock.domain import Plan
+from phyblock.parsing.reasoning import after_reasoning
 
 __all__ = ["PLAN_PARSERS", "ParsedPlan", "PlanParser", "parse_plan"]
 
@@ -36,7 +37,7 @@ class ParsedPlan:
 
 def parse_plan(text: str, n_candidates: int, parser: PlanParser = "steps") -> ParsedPlan:
     """Read the plan out of a reply to a question with candidates 1..n_candidates."""
-    answer = text if parser == "official" else _answer(text)
+    answer = text if parser == "official" else after_reasoning(text)
     for rule, find in _RULES[parser]:
         numbers = find(answer)
         if numbers:
@@ -49,7 +50,6 @@ def parse_plan(text: str, n_candidates: int, parser: PlanParser = "steps") -> Pa
 # Longer runs of digits are no block numbers, and int() refuses thousands of digits.
 _NUMBER = r"(\d{1,6})(?!\d)"
 _OFFICIAL = re.compile(r"block with index " + _NUMBER)
-_THINKING_ENDS = re.compile(r"</think(?:ing)?>", re.IGNORECASE)
 # A head inside a line (one-line JSON) needs a colon or the like after it: "on top of block 3,
 # step 2 being done" holds none. "Step 2 & 3:" is a head for two steps.
 _STEP_HEAD = re.compile(
@@ -115,13 +115,6 @@ class _List:
     end: int
     numbers: list[int]
     last: list[int]
-
-
-def _answer(text: str) -> str:
-    """What follows the last closing tag of a reasoning section, or the whole text."""
-    ends = list(_THINKING_ENDS.finditer(text))
-    tail = text[ends[-1].end() :] if ends else ""
-    return tail if tail.strip() else text
 
 
 def _numbers(match: re.Match[str]) -> list[int]:

@@ -1,0 +1,290 @@
+"""What a short piece of a reply names: a letter, an option's text, its number, or an order.
+
+A reader gives the letters that a text names, `CONTRADICTION` for a text that names something that
+is no answer (two options, or none of those shown), and None for a text that names nothing.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Sequence
+
+__all__ = ["CONTRADICTION", "ChoiceReader", "OrderReader", "Reader"]
+
+CONTRADICTION = ""
+
+_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+_MARKUP = re.compile(
+    r"\\(?:text|textbf|mathrm|mathbf|boxed)\s{0,2}\{|\\[()\[\]]|[*_~`$\"\u201c\u201d\u00ab\u00bb]"
+    r"|(?<!\w)['\u2018\u2019]|['\u2018\u2019](?!\w)"
+)
+_SPACE = re.compile(r"\s+")
+_NOUN = r"(?:option|choice|answer|letter|alternative|picture|image|figure|place|position|spot)"
+_LEAD = re.compile(
+    rf"(?:(?:(?:the|la|correct|best|right|definitely|clearly|likely|most|selected)\s{{1,3}}){{0,3}}"
+    rf"(?P<noun>{_NOUN})\s{{0,3}}(?P<is>is\s{{1,3}})?:?\s{{0,3}}"
+    rf"|(?:la\s|a\s)?(?:选项|选|選択肢|вариант|opción|opção)\s{{0,3}})",
+    re.IGNORECASE,
+)
+_LETTER = re.compile(r"(?P<open>[(\[<{]{0,2})\s?(?P<letter>[A-Za-z])(?![A-Za-z0-9\-])")
+_CLOSERS = re.compile(r"[\s)\]}>.:,;!。\uff0e、]*")
+_ALSO = re.compile(
+    r"[\s)\]}.]{0,4}(?:(?:,|/|&|\+|\bor\b|\band\b|\bund\b|\boder\b|\bou\b|\bo\b|\by\b|或|和|、)"
+    r"[\s(\[]{0,3}){1,2}(?:option\s|choice\s)?[(\[]?(?P<letter>[A-Za-z])(?![A-Za-z0-9\-'])",
+    re.IGNORECASE,
+)
+_AFTER_LETTER = re.compile(
+    r"(?:because|since|as|is|was|would|which|with|due|for|from|given|based|matches|shows|if|and"
+    r"|but|not|\()\b",
+    re.IGNORECASE,
+)
+_NEGATION = re.compile(
+    r"\b(?:not|no|neither|nor|never|isn't|aren't|wrong|incorrect|none|cannot|can't|except|nicht"
+    r"|kein\w*)\b|不是|n't\b",
+    re.IGNORECASE,
+)
+_SENTENCE_END = re.compile(r"[.!?。](?:\s|\Z)")
+_ARTICLES = re.compile(r"^(?:the|an|a)\s")
+_EDGES = " \t\n.,:;!?()[]{}<>-\u2013\u2014。，"  # noqa: RUF001
+_NUMBERED = re.compile(
+    r"(?:the\s)?(?:option|choice|alternative)\s{0,2}(?:number\s{1,2}|no\.?\s{0,2}|#)?"
+    r"\(?(?P<number>\d{1,2})(?![\d.,]?\d)",
+    re.IGNORECASE,
+)
+_BARE_NUMBER = re.compile(r"[(\[]?(?P<number>\d{1,2})[)\].]{0,2}\s{0,3}\Z")
+_ORDINAL = re.compile(
+    r"\b(?:the\s{1,2})?(?P<word>first|second|third|fourth|1st|2nd|3rd|4th)\s{1,2}"
+    r"(?:option|choice|answer|alternative|one\Z)\b",
+    re.IGNORECASE,
+)
+_ORDINALS = {"first": 1, "second": 2, "third": 3, "fourth": 4}
+_DIGITS = re.compile(r"(?<![\d.])\d{1,6}(?:\.\d{1,6})?(?![\d])")
+_WORD_NUMBERS = {
+    **{"zero": "0", "one": "1", "two": "2", "three": "3", "four": "4", "five": "5", "six": "6"},
+    **{"seven": "7", "eight": "8", "nine": "9", "ten": "10", "eleven": "11", "twelve": "12"},
+}
+
+
+class ChoiceReader:
+    """Reads one option out of a short text, given the options shown, the first one being A."""
+
+    def __init__(self, options: Sequence[str]) -> None:
+        self.letters = _LETTERS[: len(options)]
+        self._texts = [plain(option) for option in options]
+        self._numbers = [_only_number(text) for text in self._texts]
+        self._has_digits = any(re.search(r"\d", text) for text in self._texts)
+        by_length = sorted({text for text in self._texts if text}, key=len, reverse=True)
+        alternatives = "|".join(re.escape(text) for text in by_length) or r"(?!)"
+        self._any_text = re.compile(rf"(?<!\w)(?:{alternatives})(?!\w)")
+
+    def read(self, text: str) -> str | None:
+        """What a text names by letter, else by the option's text, else by its number."""
+        value = _unmarked(text)
+        found = self.letter(value)
+        if found is None:
+            value = _SENTENCE_END.split(value, maxsplit=1)[0]
+            found = self.option_text(value)
+        return self.number(value) if found is None else found
+
+    def letter(self, text: str) -> str | None:
+        """What a text names when it begins with a letter that is no word."""
+        value = _unmarked(text)
+        lead = _LEAD.match(value)
+        head = _LETTER.match(value, lead.end()) if lead else None
+        named = (
+            lead is not None and head is not None and not lead["is"] and lead["noun"] != "answer"
+        )
+        head = head or _LETTER.match(value)
+        if head is None:
+            return None
+        rest = value[head.end() :]
+        after = rest[len(_closers(rest)) :]
+        if _is_word(head, rest, after, named=named) and plain(after) != self._text_of(head):
+            return None
+        letter = head["letter"].upper()
+        also = _ALSO.match(rest)
+        second = also["letter"] if also else ""
+        if second and not (
+            second in "aA" and re.match(r"\s\w", rest[also.end() :] if also else "")
+        ):
+            return letter if second.upper() == letter else CONTRADICTION
+        if letter not in self.letters:
+            return CONTRADICTION
+        named_text = self._exact(after)
+        return letter if named_text in (None, letter) else CONTRADICTION
+
+    def option_text(self, text: str, *, exact: bool = False) -> str | None:
+        """What a text names by the words of an option: all of it, its beginning, or a part."""
+        value = plain(_unmarked(text))
+        found = self._exact(value)
+        if found is not None or exact:
+            return found
+        if _NUMBERED.match(value) and self._has_digits:
+            # "Option 3" where 3 is also the text of another option.
+            return CONTRADICTION
+        if _NEGATION.search(value):
+            return None
+        matches = {match.group() for match in self._any_text.finditer(value)}
+        if not matches:
+            return self._by_number(value)
+        return self._letter_of(matches.pop()) if len(matches) == 1 else CONTRADICTION
+
+    def number(self, text: str) -> str | None:
+        """What a text names by the option's number, where numbers cannot mean anything else."""
+        value = _unmarked(text).strip()
+        ordinal = _ORDINAL.search(value)
+        if ordinal:
+            word = ordinal["word"].lower()
+            return self._nth(_ORDINALS.get(word) or int(word[0]))
+        if self._has_digits:
+            return None
+        numbered = _NUMBERED.match(value) or _BARE_NUMBER.match(value)
+        return self._nth(int(numbered["number"])) if numbered else None
+
+    def exact(self, text: str) -> str | None:
+        """What a whole text is: a letter alone, a letter with its option, or an option alone."""
+        value = _unmarked(text)
+        head, _ = _head(value)
+        if head is not None:
+            after = plain(value[head.end() :])
+            if not after:
+                letter = head["letter"].upper()
+                return letter if letter in self.letters else CONTRADICTION
+            if self._exact(after) is not None:
+                return self.letter(value)
+        return self.option_text(value, exact=True)
+
+    def _text_of(self, head: re.Match[str]) -> str | None:
+        letter = head["letter"].upper()
+        return self._texts[self.letters.index(letter)] if letter in self.letters else None
+
+    def _exact(self, text: str) -> str | None:
+        value = plain(text)
+        if not value:
+            return None
+        hits = [i for i, option in enumerate(self._texts) if option and option == value]
+        return self.letters[hits[0]] if len(hits) == 1 else None
+
+    def _letter_of(self, option: str) -> str:
+        return self.letters[self._texts.index(option)]
+
+    def _by_number(self, value: str) -> str | None:
+        """`5` for `5 cm`: where every option has a number of its own and the text has just one."""
+        known = self._numbers
+        if None in known or len(set(known)) < len(known):
+            return None
+        found = {float(number) for number in _DIGITS.findall(value)}
+        hits = [i for i, number in enumerate(known) if number in found]
+        return self.letters[hits[0]] if len(found) == 1 and hits else None
+
+    def _nth(self, number: int) -> str:
+        return self.letters[number - 1] if 1 <= number <= len(self.letters) else CONTRADICTION
+
+
+_BETWEEN = (
+    r"(?:[\s,;>|/.:()\[\]{}<=\-\u2010-\u2015→⇒➔➜、\uff0c]"
+    r"|\b(?:and|then|to|first|next|finally|lastly|followed|by)\b){1,16}"
+)
+_ARROW = re.compile(r"\\(?:long)?(?:right)?(?:arrow|to)\b")
+_THING = r"(?:(?:picture|image|option|figure|stage|step|photo|frame|img)\s{0,2}[(\[<]{0,1})?"
+
+
+class OrderReader:
+    """Reads an order of all `n` options out of a short text, by letters or by numbers from 1."""
+
+    def __init__(self, n: int) -> None:
+        self.letters = _LETTERS[:n]
+        one_letter = rf"{_THING}([{self.letters}])"
+        one_number = rf"{_THING}([1-{n}])"
+        guard = r"(?<![A-Za-z0-9'])"
+        stop = r"(?![A-Za-z0-9']|\s?[,\->\u2192]\s?(?:\d|[A-Za-z](?![A-Za-z])))"
+        ways = [
+            between.join([one] * n)
+            for one in (one_letter, one_number)
+            for between in ("", _BETWEEN)
+        ]
+        self._order = re.compile(rf"{guard}(?:{'|'.join(ways)}){stop}", re.IGNORECASE)
+        self._item = re.compile(
+            rf"^[\s>*+\-]{{0,6}}(?:step\s)?([1-{n}])(?:st|nd|rd|th)?\s?[.):\-]{{1,2}}\s{{0,3}}"
+            rf"[(\[]?{_THING}([{self.letters}])(?![A-Za-z0-9'])",
+            re.IGNORECASE | re.MULTILINE,
+        )
+
+    def read(self, text: str) -> str | None:
+        """The order in a text; a contradiction where it holds two."""
+        found = self.orders(text)
+        if not found:
+            return self.listed(text)
+        return found[0] if len(set(found)) == 1 else CONTRADICTION
+
+    def exact(self, text: str) -> str | None:
+        """The order that a whole text is."""
+        value = _unmarked(_ARROW.sub(" > ", text)).strip(_EDGES)
+        match = self._order.fullmatch(value)
+        return self._letters(match) if match else None
+
+    def orders(self, text: str) -> list[str]:
+        """All orders in a text, each naming every option once."""
+        value = _unmarked(_ARROW.sub(" > ", text))
+        found = (self._letters(match) for match in self._order.finditer(value))
+        return [order for order in found if order]
+
+    def listed(self, text: str) -> str | None:
+        """The order in the last numbered list of letters."""
+        items = [(int(m[1]), m[2].upper()) for m in self._item.finditer(_unmarked(text))]
+        last = items[-len(self.letters) :]
+        numbers = "".join(letter for _, letter in last)
+        in_turn = [number for number, _ in last] == list(range(1, len(self.letters) + 1))
+        return numbers if in_turn and set(numbers) == set(self.letters) else None
+
+    def _letters(self, match: re.Match[str]) -> str | None:
+        given = "".join(group for group in match.groups() if group).upper()
+        if given[0].isdigit():
+            given = "".join(self.letters[int(digit) - 1] for digit in given)
+        return given if set(given) == set(self.letters) else None
+
+
+Reader = ChoiceReader | OrderReader
+
+
+def plain(text: str) -> str:
+    """A text as options are compared: no case, no markup, no article, digits for numbers."""
+    value = _SPACE.sub(" ", unicodedata.normalize("NFKC", text).casefold())
+    value = _ARTICLES.sub("", _MARKUP.sub("", value).strip(_EDGES))
+    return " ".join(_WORD_NUMBERS.get(word, word) for word in value.split(" "))
+
+
+def _unmarked(text: str) -> str:
+    return _MARKUP.sub("", text).strip()
+
+
+def _closers(text: str) -> str:
+    match = _CLOSERS.match(text)
+    return match.group() if match else ""
+
+
+def _head(value: str) -> tuple[re.Match[str] | None, bool]:
+    """The letter that a text begins with, and whether a noun says that it is an option's."""
+    lead = _LEAD.match(value)
+    head = _LETTER.match(value, lead.end()) if lead else None
+    named = lead is not None and not lead["is"] and (lead["noun"] or "").lower() != "answer"
+    return (head, named) if head else (_LETTER.match(value), False)
+
+
+def _is_word(head: re.Match[str], rest: str, after: str, *, named: bool) -> bool:
+    """Whether a letter is a word of the sentence ("A cube") or of another language."""
+    closed = bool(re.match(r"\s?[)\]}>.:,;!。．，、：\n]|\s?\Z|\s[\-\u2013\u2014]", rest))  # noqa: RUF001
+    if head["open"] or closed:
+        return False
+    if head["letter"] == "a":
+        return True
+    if head["letter"] == "A":
+        follows = re.match(r"\s\(?[a-z0-9]", rest)
+        return follows is not None and not named and _AFTER_LETTER.match(after) is None
+    return head["letter"].islower() and not named
+
+
+def _only_number(text: str) -> float | None:
+    found = _DIGITS.findall(text)
+    return float(found[0]) if len(found) == 1 else None
