@@ -23,6 +23,11 @@ class AssemblyTask:
     candidates: CandidateSet
     composite: Path | None = None
 
+    @property
+    def key(self) -> str:
+        """What samples call it: the scene's id."""
+        return self.scene.id
+
 
 @dataclass(frozen=True)
 class Dataset:

@@ -3,7 +3,19 @@
 Importing this package imports neither litellm nor aiohttp: the first call through one of them does.
 """
 
-from phyblock.models.base import Finish, Image, Message, Model, Reply, Request, Usage
+from phyblock.models.base import (
+    ChoiceSubject,
+    Finish,
+    Image,
+    Message,
+    Model,
+    PlanSubject,
+    Reply,
+    Request,
+    StepSubject,
+    Subject,
+    Usage,
+)
 from phyblock.models.baselines import BASELINES
 from phyblock.models.build import build_model
 from phyblock.models.cache import CacheStats, ReplyCache, reply_key
@@ -27,6 +39,7 @@ __all__ = [
     "BASELINES",
     "Budget",
     "CacheStats",
+    "ChoiceSubject",
     "Estimate",
     "Finish",
     "Gate",
@@ -40,12 +53,15 @@ __all__ = [
     "ModelConfig",
     "ModelEvent",
     "Observer",
+    "PlanSubject",
     "Price",
     "RawReply",
     "Reply",
     "ReplyCache",
     "Request",
     "RetryPolicy",
+    "StepSubject",
+    "Subject",
     "Usage",
     "api_key_status",
     "build_model",

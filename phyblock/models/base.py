@@ -8,9 +8,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
-from phyblock.domain import CandidateSet, Scene
+from phyblock.domain import CandidateSet, Question, Scene
 
-__all__ = ["Finish", "Image", "Message", "Model", "Reply", "Request", "Usage"]
+__all__ = [
+    "ChoiceSubject",
+    "Finish",
+    "Image",
+    "Message",
+    "Model",
+    "PlanSubject",
+    "Reply",
+    "Request",
+    "StepSubject",
+    "Subject",
+    "Usage",
+]
 
 Finish = Literal["stop", "length", "refusal", "unknown"]
 """Why a reply ended: by itself, at the token limit, by a content filter, or not said."""
@@ -40,13 +52,50 @@ class Message:
 
 
 @dataclass(frozen=True)
+class PlanSubject:
+    """A whole plan is asked for."""
+
+    scene: Scene
+    candidates: CandidateSet
+
+
+@dataclass(frozen=True)
+class StepSubject:
+    """The next step is asked for.
+
+    `valid` are the candidates that would be placed now, in ascending order; empty when the goal
+    is complete. `last_failed` is the candidate whose move failed last, if the last move did.
+    """
+
+    scene: Scene
+    candidates: CandidateSet
+    valid: tuple[int, ...]
+    last_failed: int | None = None
+
+
+@dataclass(frozen=True)
+class ChoiceSubject:
+    """One of several options is asked for, of a question as it is shown.
+
+    `guesses` holds what rules over the whole question set answer, by the rule's name: the 0-based
+    indices of `question.answer`'s form.
+    """
+
+    question: Question
+    guesses: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+
+
+Subject = PlanSubject | StepSubject | ChoiceSubject
+
+
+@dataclass(frozen=True)
 class Request:
     """One question to a model.
 
     `key` names the question inside its track (a scene id for full planning) and is what a
     recording is looked up by; `seed` is the sample's seed, which also tells repeats apart;
     `params` are sampling parameters by their OpenAI names; `prompt_version` hashes the template.
-    `scene` and `candidates` are what the question is about: only baselines look at them.
+    `subject` is what the question is about: only baselines look at it.
     """
 
     key: str
@@ -54,8 +103,7 @@ class Request:
     messages: tuple[Message, ...]
     params: Mapping[str, object]
     prompt_version: str
-    scene: Scene
-    candidates: CandidateSet
+    subject: Subject
 
 
 @dataclass(frozen=True)

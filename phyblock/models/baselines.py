@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 
 from phyblock.domain import Block, CandidateSet
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.models.base import Reply, Request, Usage
+from phyblock.models.base import PlanSubject, Reply, Request, Subject, Usage
 from phyblock.models.config import ModelConfig
 
 __all__ = ["BASELINES", "BaselineModel"]
@@ -17,7 +18,9 @@ __all__ = ["BASELINES", "BaselineModel"]
 _RANDOM_STEPS = 4
 """As in the paper's Random row."""
 
-Baseline = Callable[[Request, np.random.Generator], Iterable[int]]
+_S = TypeVar("_S", bound=Subject)
+Rule = Callable[[_S, np.random.Generator], str]
+"""What a baseline answers, in the benchmark's own reply form."""
 
 
 class BaselineModel:
@@ -39,45 +42,55 @@ class BaselineModel:
         self._id = config.id
 
     async def ask(self, request: Request) -> Reply:
-        """The baseline's steps; DataError when an oracle lacks a candidate."""
+        """The rule's answer; DataError when an oracle lacks a candidate.
+
+        Raises SpecError for a subject that the baseline has no rule for.
+        """
+        rule = BASELINES[self._id].get(type(request.subject))
+        if rule is None:
+            problem = Problem(f"model {self.name}", "has no rule for this track")
+            raise SpecError(problem)
         seed_text = f"{self._id}|{request.seed}|{request.key}"
         digest = hashlib.sha256(seed_text.encode()).digest()
         rng = np.random.default_rng(int.from_bytes(digest, "big"))
-        steps = BASELINES[self._id](request, rng)
-        text = "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(steps, 1))
+        text = rule(request.subject, rng)
         return Reply(text, usage=Usage(0, 0), cost_usd=0.0, provider_model=self._id, attempts=0)
 
     async def aclose(self) -> None:
         """Nothing is held open."""
 
 
-def _random(request: Request, rng: np.random.Generator) -> Iterable[int]:
-    return (int(n) for n in rng.integers(1, len(request.candidates) + 1, _RANDOM_STEPS))
+def _plan(steps: Iterable[int]) -> str:
+    return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(steps, 1))
 
 
-def _all_candidates(request: Request, _: np.random.Generator) -> Iterable[int]:
-    return range(1, len(request.candidates) + 1)
+def _random_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
+    return _plan(int(n) for n in rng.integers(1, len(subject.candidates) + 1, _RANDOM_STEPS))
 
 
-def _oracle(request: Request, rng: np.random.Generator) -> Iterable[int]:
-    blocks = request.scene.blocks
-    return [_needed(request, blocks[v]) for v in request.scene.graph.random_order(rng)]
+def _all_candidates(subject: PlanSubject, _: np.random.Generator) -> str:
+    return _plan(range(1, len(subject.candidates) + 1))
 
 
-def _oracle_no_orientation(request: Request, rng: np.random.Generator) -> Iterable[int]:
+def _oracle_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
+    blocks = subject.scene.blocks
+    return _plan(_needed(subject, blocks[v]) for v in subject.scene.graph.random_order(rng))
+
+
+def _unoriented_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
     """A valid order in which every block stands wrongly, wherever a wrong one can be chosen."""
-    blocks = request.scene.blocks
-    order = request.scene.graph.random_order(rng)
-    return [
-        _turned(request.candidates, blocks[v], rng) or _needed(request, blocks[v]) for v in order
-    ]
+    blocks = subject.scene.blocks
+    order = subject.scene.graph.random_order(rng)
+    return _plan(
+        _turned(subject.candidates, blocks[v], rng) or _needed(subject, blocks[v]) for v in order
+    )
 
 
-def _needed(request: Request, block: Block) -> int:
-    index = request.candidates.index_of(block.look)
+def _needed(subject: PlanSubject, block: Block) -> int:
+    index = subject.candidates.index_of(block.look)
     if index is None:
         found = f"{block.color} {block.type} turned {block.euler_deg}"
-        where = f"scene {request.scene.id}"
+        where = f"scene {subject.scene.id}"
         message = "no candidate looks like this block"
         raise DataError(Problem(where, message, f"blocks[order={block.order}]", found))
     return index
@@ -92,10 +105,10 @@ def _turned(candidates: CandidateSet, block: Block, rng: np.random.Generator) ->
     return wrong[int(rng.integers(len(wrong)))] if wrong else None
 
 
-BASELINES: Mapping[str, Baseline] = {
-    "random": _random,
-    "all-candidates": _all_candidates,
-    "oracle": _oracle,
-    "oracle-no-orientation": _oracle_no_orientation,
+BASELINES: Mapping[str, Mapping[type[Subject], Rule[Any]]] = {
+    "random": {PlanSubject: _random_plan},
+    "all-candidates": {PlanSubject: _all_candidates},
+    "oracle": {PlanSubject: _oracle_plan},
+    "oracle-no-orientation": {PlanSubject: _unoriented_plan},
 }
-"""Baselines by name."""
+"""Baselines by name, each with its rule for every subject that it knows."""

@@ -125,7 +125,7 @@ def _read_json(path: Path) -> object:
 
 
 def _read_records(path: Path, model: str) -> dict[tuple[str, int], dict[str, Any]]:
-    """Records of one model by scene and seed; the last one counts where a sample has several.
+    """Records of one model by key and seed; the last one counts where a sample has several.
 
     An unfinished last line, which a killed run leaves, is not there yet. A run of one model is
     that model's whatever its name.
@@ -136,7 +136,7 @@ def _read_records(path: Path, model: str) -> dict[tuple[str, int], dict[str, Any
         try:
             record = json.loads(line)
             by_sample = found.setdefault(record["model"], {})
-            by_sample[str(record["scene"]), record["seed"]] = record
+            by_sample[str(record["key"]), record["seed"]] = record
         except ValueError as error:
             raise DataError(Problem(where, f"is not a record: {error}")) from error
         except (KeyError, TypeError) as error:

@@ -13,6 +13,7 @@ from phyblock.models import (
     Image,
     Message,
     ModelConfig,
+    PlanSubject,
     Reply,
     Request,
     RetryPolicy,
@@ -34,7 +35,8 @@ async def check_model(config: ModelConfig) -> Reply:
     PillowImage.new("RGB", (_SIDE_PX, _SIDE_PX), (216, 49, 49)).save(buffer, "PNG")
     picture = Image(buffer.getvalue(), "check", _SIDE_PX, _SIDE_PX)
     messages = (Message("user", (picture, _QUESTION)),)
-    request = Request("check", 0, messages, {}, "", Scene("check", (1,), (), ()), CandidateSet(()))
+    subject = PlanSubject(Scene("check", (1,), (), ()), CandidateSet(()))
+    request = Request("check", 0, messages, {}, "", subject)
     model = build_model(
         replace(config, sends_seed="never"),
         cache=None,

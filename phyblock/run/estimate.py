@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from phyblock.models import Estimate as CallEstimate
@@ -20,9 +22,10 @@ from phyblock.models import (
 from phyblock.models import estimate as estimate_call
 from phyblock.resources import reply_cache_file
 from phyblock.run.models import PlannedModel
-from phyblock.run.plan import RunPlan, sample_id
+from phyblock.run.plan import RunPlan
 from phyblock.run.reading import read_records
 from phyblock.run.records import is_final
+from phyblock.run.samples import Sample
 from phyblock.run.store import holds_run
 
 __all__ = ["Estimate", "estimate"]
@@ -71,10 +74,12 @@ def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
             Estimate(m.name, m.config.kind, plan.samples_per_model, price_of(m.config))
             for m in plan.models
         ]
-        for task in plan.dataset.tasks:
-            outline, real = plan.track.outline(task)
-            for model, row in zip(plan.models, rows, strict=True):
-                _add(row, plan, model, outline, settled, cache if real else None)
+        for track in plan.tracks:
+            for item in track.items:
+                outlines = list(track.outlines(item))
+                for model, row in zip(plan.models, rows, strict=True):
+                    sample = partial(Sample, track, model.name, item)
+                    _add(row, plan, model, sample, outlines, settled, cache)
     return rows
 
 
@@ -82,23 +87,27 @@ def _add(
     row: Estimate,
     plan: RunPlan,
     model: PlannedModel,
-    outline: Request,
+    sample: Callable[[int], Sample],
+    outlines: Sequence[tuple[Request, bool]],
     settled: set[str],
     cache: ReplyCache | None,
 ) -> None:
-    """Count one scene of one model, all its seeds."""
+    """Count one item of one model, all its seeds."""
     config = model.config
-    request = replace(outline, params=config.params)
-    expected = estimate_call(config, request) if config.kind == "litellm" else None
+    expected = []
+    if config.kind == "litellm":
+        asked = [(replace(outline, params=config.params), real) for outline, real in outlines]
+        expected = [(request, real, estimate_call(config, request)) for request, real in asked]
     for seed in plan.suite.seeds:
-        if sample_id(plan.track.name, model.name, request.key, seed) in settled:
+        if sample(seed).id in settled:
             row.done += 1
-        elif expected is None:
             continue
-        elif cache is not None and reply_key(config, replace(request, seed=seed)) in cache:
-            row.cached += 1
-        else:
-            row.calls += 1
-            row.prompt_tokens += expected.prompt_tokens
-            row.completion_tokens += expected.completion_tokens
-            row.most_completion_tokens += expected.most_completion_tokens
+        for request, is_real, tokens in expected:
+            key = reply_key(config, replace(request, seed=seed)) if is_real and cache else ""
+            if key and cache is not None and key in cache:
+                row.cached += 1
+            else:
+                row.calls += 1
+                row.prompt_tokens += tokens.prompt_tokens
+                row.completion_tokens += tokens.completion_tokens
+                row.most_completion_tokens += tokens.most_completion_tokens

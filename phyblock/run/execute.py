@@ -12,14 +12,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from phyblock.datasets import AssemblyTask
-from phyblock.errors import BudgetReachedError, ModelError, PhyblockError, UnavailableError
+from phyblock.errors import BudgetReachedError, PhyblockError, UnavailableError
 from phyblock.models import Halt, HaltedError, Model
-from phyblock.models.base import Reply
 from phyblock.run.events import ModelStopped, SampleDone, Stopping, Watcher
 from phyblock.run.models import PlannedModel
-from phyblock.run.plan import RunPlan, sample_id
-from phyblock.run.records import is_answered, is_final, judged, to_record
+from phyblock.run.plan import RunPlan
+from phyblock.run.reading import read_turns
+from phyblock.run.records import is_answered, is_final
+from phyblock.run.samples import Sample, SampleRunner
 from phyblock.run.store import RunStore
 from phyblock.run.writer import RecordWriter
 
@@ -64,7 +64,11 @@ class Executor:
         """
         self.is_settled = is_answered if retry_failed else is_final
         self._plan = plan
-        self._writer = RecordWriter(store)
+        self._writer = RecordWriter(store.records)
+        self._turns = RecordWriter(store.turns)
+        self._samples = SampleRunner(
+            self._turns, store.prompts, halt, read_turns(store.folder) if plan.has_episodes else {}
+        )
         self._models = models
         self._watch = watch
         self._halt = halt
@@ -93,10 +97,9 @@ class Executor:
         workers: list[asyncio.Task[None]] = []
         for planned in self._plan.models:
             queue = deque(
-                (task, seed)
-                for seed in self._plan.suite.seeds
-                for task in self._plan.dataset.tasks
-                if not self._settled(earlier, planned, task, seed)
+                sample
+                for sample in self._plan.samples(planned.name)
+                if not self._settled(earlier, sample)
             )
             self.result.settled += self._plan.samples_per_model - len(queue)
             count = min(planned.config.max_concurrency, len(queue))
@@ -108,29 +111,24 @@ class Executor:
                 worker.cancel()
             await asyncio.gather(*workers, return_exceptions=True)
             await self._writer.drain()
+            await self._turns.drain()
         if self._failure is not None:
             raise self._failure
         return self.result
 
-    def _settled(
-        self,
-        earlier: Mapping[str, Mapping[str, Any]],
-        planned: PlannedModel,
-        task: AssemblyTask,
-        seed: int,
-    ) -> bool:
-        record = earlier.get(sample_id(self._plan.track.name, planned.name, task.scene.id, seed))
+    def _settled(self, earlier: Mapping[str, Mapping[str, Any]], sample: Sample) -> bool:
+        record = earlier.get(sample.id)
         if record is None or not self.is_settled(record):
             return False
         self.result.failed += not is_answered(record)
         return True
 
-    async def _work(self, planned: PlannedModel, queue: deque[tuple[AssemblyTask, int]]) -> None:
+    async def _work(self, planned: PlannedModel, queue: deque[Sample]) -> None:
         while queue and self.result.reason is None and planned.name not in self.result.stopped:
-            task, seed = queue.popleft()
+            sample = queue.popleft()
             self._in_flight += 1
             try:
-                await self._one(planned, task, seed)
+                await self._one(planned, sample)
             except UnavailableError as error:
                 self._stop_model(planned.name, str(error))
             except BudgetReachedError as error:
@@ -143,27 +141,9 @@ class Executor:
             finally:
                 self._in_flight -= 1
 
-    async def _one(self, planned: PlannedModel, task: AssemblyTask, seed: int) -> None:
+    async def _one(self, planned: PlannedModel, sample: Sample) -> None:
         model = self._models[planned.name]
-        track = self._plan.track
-        with self._halt.giving_up():
-            request = await track.request(
-                task, seed, planned.config.params, with_messages=model.needs_messages
-            )
-        answer: Reply | ModelError | None
-        try:
-            answer = await model.ask(request)
-        except (UnavailableError, BudgetReachedError):
-            raise
-        except ModelError as error:
-            answer = error
-        sample = sample_id(track.name, planned.name, task.scene.id, seed)
-        text = answer.text if isinstance(answer, Reply) else None
-        record = judged(
-            to_record(sample, track.name, planned.name, task, request, answer, self._plan.template),
-            track.judge(task, text),
-            track.rules.parser,
-        )
+        record = await self._samples.record(sample, model, planned.config.params)
         await self._writer.put(record)
         self.result.settled += is_final(record)
         self.result.failed += is_final(record) and not is_answered(record)

@@ -13,7 +13,7 @@ from typing import Any
 from phyblock.datasets import Dataset
 from phyblock.run.models import PlannedModel
 from phyblock.specs import SuiteSpec
-from phyblock.tasks import Pictures, Prompt
+from phyblock.tasks import AnyTrack
 
 __all__ = ["make_manifest"]
 
@@ -25,14 +25,11 @@ def make_manifest(
     suite: SuiteSpec,
     models: Sequence[PlannedModel],
     dataset: Dataset,
-    prompt: Prompt | None,
-    pictures: Pictures | None,
+    tracks: Sequence[AnyTrack],
     limit: int | None,
 ) -> dict[str, Any]:
     """The manifest; `identity` digests what decides the results, so that only the same run goes
     on in a folder. Limits, prices, tables and paths are no part of it.
-
-    `prompt` and `pictures` are None when every model is a recording.
     """
     inputs: dict[str, Any] = {
         "format": _FORMAT,
@@ -42,8 +39,7 @@ def make_manifest(
             for m in models
         ],
         "dataset": {"name": dataset.name, "sha256": dataset.sha256},
-        "prompt": prompt and {"name": prompt.name, "version": prompt.version},
-        "pictures": pictures and _pictures_digest(pictures, dataset),
+        "tracks": {track.name: track.identity() for track in tracks},
         "limit": limit,
     }
     canonical = json.dumps(inputs, sort_keys=True, separators=(",", ":"))
@@ -71,8 +67,3 @@ def _identity(model: PlannedModel) -> dict[str, object]:
     for path in sorted((*folder.glob("*.json"), *folder.glob("records.jsonl"))):
         digest.update(f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
     return {**model.config.identity(), "recording": digest.hexdigest()}
-
-
-def _pictures_digest(pictures: Pictures, dataset: Dataset) -> str:
-    keys = [pictures.keys(task) for task in dataset.tasks]
-    return hashlib.sha256(json.dumps(keys).encode()).hexdigest()

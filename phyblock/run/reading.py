@@ -7,18 +7,27 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import NoneType
-from typing import Any
+from typing import Any, ClassVar
 
 import yaml
 
 from phyblock.errors import Problem, StoreError
 
-__all__ = ["MANIFEST", "RECORDS", "RecordLines", "read_manifest", "read_records"]
+__all__ = [
+    "MANIFEST",
+    "RECORDS",
+    "TURNS",
+    "Lines",
+    "RecordLines",
+    "TurnLines",
+    "read_manifest",
+    "read_records",
+    "read_turns",
+]
 
 MANIFEST = "run.yaml"
 RECORDS = "records.jsonl"
-_HINT = "restore the file from a copy, or remove this line: its sample is then run again"
-
+TURNS = "turns.jsonl"
 _MANIFEST_HINT = "run.yaml is written by `phyblock run` and never edited: restore it from a copy"
 
 _Fields = Mapping[str, Any]
@@ -35,6 +44,7 @@ _RECORD: _Fields = {
     **{"seed": int, "n_blocks": int, "levels": list, "scores": list},
     **{"reply": _REPLY, "error": {"kind": str}},
 }
+_TURN: _Fields = {"sample": str, "turn": int, "reply": _REPLY}
 _SCORE: _Fields = {"criterion": str, "setting": str, "tp": int, "fp": int, "fn": int}
 
 
@@ -58,17 +68,22 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     return manifest
 
 
-class RecordLines:
-    """Every record of a folder with where it stands, one at a time, oldest first.
+class Lines:
+    """Every object of a file of JSON lines with where it stands, one at a time, oldest first.
 
-    A last line without its newline is a record all the same when it is whole; else, as a kill
+    A last line without its newline counts all the same when it is whole; else, as a kill
     leaves it behind, it ends the iteration: `is_cut` is then set. `lacks_newline` says that the
-    last record needs one. `whole_bytes` is the size of the records passed so far. Any other line
-    that is not a record is a StoreError naming file and line.
+    last one needs one. `whole_bytes` is the size of the lines passed so far. Any other line
+    that is not what the file holds is a StoreError naming file and line.
     """
 
+    file = ""
+    noun = ""
+    hint = ""
+    fields: ClassVar[_Fields] = {}
+
     def __init__(self, folder: Path) -> None:
-        self.path = folder / RECORDS
+        self.path = folder / self.file
         self.is_cut = False
         self.lacks_newline = False
         self.whole_bytes = 0
@@ -82,19 +97,84 @@ class RecordLines:
                     if self.lacks_newline and not _is_json(line):
                         self.is_cut = True
                         return
-                    record = _parse(where, line)
+                    found = self._parse(where, line)
                     self.whole_bytes += len(line)
-                    yield where, record
+                    yield where, found
         except FileNotFoundError:
             return
         except OSError as error:
             problem = Problem(str(self.path), f"cannot be read: {error.strerror}")
             raise StoreError(problem) from error
 
+    def check(self, found: object) -> str | None:
+        """Dotted name of the first field that is missing or of the wrong type, or None."""
+        return _first_wrong(found, self.fields)
+
+    def _parse(self, where: str, line: bytes) -> dict[str, Any]:
+        is_not = f"is not a {self.noun}"
+        try:
+            found = json.loads(line)
+        except json.JSONDecodeError as error:
+            where = f"{where}:{error.colno}"
+            raise StoreError(Problem(where, f"{is_not}: {error.msg}", hint=self.hint)) from error
+        except UnicodeDecodeError as error:
+            raise StoreError(Problem(where, f"{is_not}: not UTF-8", hint=self.hint)) from error
+        wrong = self.check(found)
+        if wrong is not None:
+            message = f"{is_not}: missing or of the wrong type"
+            raise StoreError(Problem(where, message, wrong, hint=self.hint))
+        return dict(found)
+
+
+class RecordLines(Lines):
+    """The records of a run folder."""
+
+    file = RECORDS
+    noun = "record"
+    hint = "restore the file from a copy, or remove this line: its sample is then run again"
+    fields: ClassVar[_Fields] = _RECORD
+
+    def check(self, found: object) -> str | None:
+        """As of any line, and of every score."""
+        wrong = super().check(found)
+        if wrong is not None:
+            return wrong
+        assert isinstance(found, dict)
+        scores = found["scores"]
+        below = ((i, _first_wrong(score, _SCORE)) for i, score in enumerate(scores))
+        return next((f"scores[{i}].{n}".rstrip(".") for i, n in below if n is not None), None)
+
+
+class TurnLines(Lines):
+    """The answered turns of a run folder's episodes, finished or not."""
+
+    file = TURNS
+    noun = "turn"
+    hint = (
+        "restore the file from a copy, or remove this line and those of the same sample below it: "
+        "these turns are then asked again"
+    )
+    fields: ClassVar[_Fields] = _TURN
+
 
 def read_records(folder: Path) -> dict[str, dict[str, Any]]:
     """The newest record of every sample, by sample id, in order of first appearance."""
     return {record["sample"]: record for _, record in RecordLines(folder)}
+
+
+def read_turns(folder: Path) -> dict[str, list[dict[str, Any]]]:
+    """The replies of every episode that has begun, by sample id, in the order of its turns.
+
+    Raises StoreError where a turn is missing.
+    """
+    found: dict[str, dict[int, dict[str, Any]]] = {}
+    for where, line in TurnLines(folder):
+        turns = found.setdefault(line["sample"], {})
+        if line["turn"] > len(turns):
+            message = f"is turn {line['turn']} of a sample of which {len(turns)} turns are there"
+            raise StoreError(Problem(where, message, "turn", hint=TurnLines.hint))
+        turns[line["turn"]] = line["reply"]
+    return {sample: [turns[n] for n in sorted(turns)] for sample, turns in found.items()}
 
 
 def _is_json(line: bytes) -> bool:
@@ -103,21 +183,6 @@ def _is_json(line: bytes) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _parse(where: str, line: bytes) -> dict[str, Any]:
-    try:
-        record = json.loads(line)
-    except json.JSONDecodeError as error:
-        where = f"{where}:{error.colno}"
-        raise StoreError(Problem(where, f"is not a record: {error.msg}", hint=_HINT)) from error
-    except UnicodeDecodeError as error:
-        raise StoreError(Problem(where, "is not a record: not UTF-8", hint=_HINT)) from error
-    wrong = _first_wrong(record, _RECORD)
-    if wrong is not None:
-        message = "is not a record: missing or of the wrong type"
-        raise StoreError(Problem(where, message, wrong, hint=_HINT))
-    return dict(record)
 
 
 def _first_wrong(found: object, wanted: _Fields) -> str | None:
@@ -132,6 +197,4 @@ def _first_wrong(found: object, wanted: _Fields) -> str | None:
             below = None if isinstance(value, kind) else ""
         if below is not None:
             return f"{name}.{below}".rstrip(".")
-    scores = found.get("scores", ())
-    wrong = ((i, _first_wrong(score, _SCORE)) for i, score in enumerate(scores))
-    return next((f"scores[{i}].{name}".rstrip(".") for i, name in wrong if name is not None), None)
+    return None

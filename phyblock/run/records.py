@@ -2,64 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime, timezone
 from typing import Any
 
-from phyblock.datasets import AssemblyTask
 from phyblock.errors import ModelError, RefusedError, RetryableError, SampleError
-from phyblock.models.base import Image, Reply, Request
-from phyblock.scoring import Score
-from phyblock.tasks import Judgement, Outcome
+from phyblock.models.base import Image, Message, Reply, Request
+from phyblock.tasks import Item, Outcome
 
-__all__ = ["is_answered", "is_final", "judged", "to_record"]
+__all__ = ["about_prompt", "is_answered", "is_final", "judged", "to_record"]
 
 
 def to_record(
     sample: str,
     track: str,
     model: str,
-    task: AssemblyTask,
-    request: Request,
+    item: Item,
+    seed: int,
     answer: Reply | ModelError | None,
-    template: str,
 ) -> dict[str, Any]:
     """The record of a sample before it is judged; None is a reply that a recording lacks."""
     reply = answer if isinstance(answer, Reply) else None
-    scene = task.scene
+    scene = item.scene
     return {
         "sample": sample,
         "track": track,
         "model": model,
+        "key": item.key,
         "scene": scene.id,
         "levels": list(scene.levels),
         "parents": list(scene.parents),
         "n_blocks": len(scene),
-        "seed": request.seed,
+        "seed": seed,
         "outcome": None,
         "reply": None if reply is None else asdict(reply),
         "error": _error(answer) if isinstance(answer, ModelError) else None,
-        "prompt": _prompt(request, template) if request.messages else None,
+        "prompt": None,
         "parse": None,
         "scores": [],
         "time": datetime.now(timezone.utc).isoformat(timespec="seconds"),
     }
 
 
-def judged(record: dict[str, Any], judgement: Judgement, parser: str) -> dict[str, Any]:
-    """The record with its outcome, parse and scores, whether they are its first or new ones."""
-    parsed = judgement.parsed
+def judged(record: dict[str, Any], is_read: bool, fields: Mapping[str, Any]) -> dict[str, Any]:
+    """The record with its outcome and what the track says of it, the first time or anew."""
+    return {**record, "outcome": _outcome(record, is_read), **fields}
+
+
+def about_prompt(request: Request, template: str, digest: str) -> dict[str, Any]:
+    """What a record says of a prompt that stands in `prompts.jsonl` under `digest`."""
     return {
-        **record,
-        "outcome": _outcome(record, parsed.rule is not None),
-        "parse": {
-            "parser": parser,
-            "rule": parsed.rule,
-            "plan": list(parsed.plan.steps),
-            "dropped": list(parsed.dropped),
-        },
-        "scores": [_score(score) for score in judgement.scores],
+        "template": template,
+        "version": request.prompt_version,
+        "messages": digest,
+        "images": [_picture(part) for part in _pictures(request.messages)],
     }
 
 
@@ -101,33 +98,15 @@ def _error(error: ModelError) -> dict[str, Any]:
     }
 
 
-def _prompt(request: Request, template: str) -> dict[str, Any]:
-    images = [part for message in request.messages for part in message.parts]
-    return {
-        "template": template,
-        "version": request.prompt_version,
-        "images": [
-            {
-                "label": part.label,
-                "sha256": part.sha256,
-                "width_px": part.width_px,
-                "height_px": part.height_px,
-            }
-            for part in images
-            if isinstance(part, Image)
-        ],
-    }
+def _pictures(messages: Sequence[Message]) -> Iterator[Image]:
+    for message in messages:
+        yield from (part for part in message.parts if isinstance(part, Image))
 
 
-def _score(score: Score) -> dict[str, Any]:
+def _picture(picture: Image) -> dict[str, Any]:
     return {
-        "criterion": score.criterion,
-        "matcher": score.matcher,
-        "setting": score.setting,
-        "tp": score.counts.tp,
-        "fp": score.counts.fp,
-        "fn": score.counts.fn,
-        "errors": score.errors,
-        "placed": None if score.vertices is None else list(score.vertices),
-        "why": None if score.step_errors is None else list(score.step_errors),
+        "label": picture.label,
+        "sha256": picture.sha256,
+        "width_px": picture.width_px,
+        "height_px": picture.height_px,
     }

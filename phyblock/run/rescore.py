@@ -15,10 +15,11 @@ from phyblock.datasets import AssemblyTask
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.files import atomic_write
 from phyblock.parsing import PlanParser
-from phyblock.run.plan import open_dataset, planning_rules
+from phyblock.run.data import open_dataset
 from phyblock.run.reading import MANIFEST, RECORDS, read_manifest, read_records
 from phyblock.run.records import judged
 from phyblock.run.select import select_tasks
+from phyblock.run.tracks import planning_rules
 from phyblock.scoring import Matcher
 from phyblock.specs import SuiteSpec
 from phyblock.tasks import FullPlanning
@@ -54,7 +55,8 @@ def rescore(
                         hint=hint)
             )  # fmt: skip
         text = None if record["reply"] is None else record["reply"]["text"]
-        records.append(judged(record, track.judge(task, text), suite.parser))
+        judgement = track.judge(task, text)
+        records.append(judged(record, judgement.is_read, judgement.fields()))
     target = out or folder / "scores" / f"{suite.parser}-{suite.scoring.matchers[0]}"
     identity = f"{manifest['identity']} scored by {suite.parser}, {suite.scoring.matchers[0]}"
     scored = {**manifest, "identity": identity, "suite": suite.model_dump(mode="json")}

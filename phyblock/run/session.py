@@ -23,7 +23,7 @@ from phyblock.resources import reply_cache_file
 from phyblock.run.events import ModelNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.plan import RunPlan
-from phyblock.run.reading import RecordLines, read_records
+from phyblock.run.reading import RecordLines, TurnLines, read_records
 from phyblock.run.store import RunStore
 
 __all__ = ["SERVERS", "Session", "check_ready"]
@@ -144,22 +144,31 @@ class Session:
     async def _close(self) -> None:
         for model in self._models.values():
             await model.aclose()
-        if self._plan.pictures is not None:
-            self._plan.pictures.close()
+        for track in self._plan.tracks:
+            track.close()
         for resource in (self._cache, self._store):
             if resource is not None:
                 resource.close()
 
 
 def _spent_usd(folder: Path) -> float:
-    """What the run cost so far: of every line, also of those that later ones replaced."""
-    return sum(_billed_usd(record) for _, record in RecordLines(folder))
+    """What the run cost so far: of every line, also of those that later ones replaced.
+
+    Replies of episodes are counted where each was written when it came, as turns.
+    """
+    turns = sum(_billed_usd(turn["reply"]) for _, turn in TurnLines(folder))
+    return turns + sum(_record_usd(record) for _, record in RecordLines(folder))
 
 
-def _billed_usd(record: Mapping[str, Any]) -> float:
-    """What a limit counted for a record, else its reply's cost unless that was paid elsewhere."""
-    reply = record["reply"] or {}
-    billed_usd: float | None = (reply or record["error"] or {}).get("billed_usd")
+def _record_usd(record: Mapping[str, Any]) -> float:
+    reply = {} if "turns" in record else record["reply"] or {}
+    failed = (record["error"] or {}).get("billed_usd") or 0.0
+    return _billed_usd(reply) if reply else failed
+
+
+def _billed_usd(reply: Mapping[str, Any]) -> float:
+    """What a limit counted for a reply, else its cost unless that was paid elsewhere."""
+    billed_usd: float | None = reply.get("billed_usd")
     if billed_usd is None and not reply.get("cached"):
         billed_usd = reply.get("cost_usd")
     return billed_usd or 0.0

@@ -1,4 +1,4 @@
-"""Writing a run: `run.yaml`, written first and never changed, and `records.jsonl`.
+"""Writing a run: `run.yaml`, written first and never changed, and the files that grow.
 
 A record counts only when it is appended and synced, so a kill at any moment loses nothing that was
 written; a line that a kill cut short is dropped when the run is opened again. A later record of a
@@ -7,13 +7,9 @@ sample replaces an earlier one.
 
 from __future__ import annotations
 
-import contextlib
 import fcntl
-import json
 import os
-import threading
-from collections.abc import Iterable, Mapping
-from io import FileIO
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -21,7 +17,9 @@ import yaml
 
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
-from phyblock.run.reading import MANIFEST, RECORDS, RecordLines, read_manifest
+from phyblock.run.appending import AppendFile
+from phyblock.run.prompts import PromptFile, PromptLines
+from phyblock.run.reading import MANIFEST, Lines, RecordLines, TurnLines, read_manifest
 
 __all__ = ["RunStore", "holds_run"]
 
@@ -37,7 +35,10 @@ _NOT_IDENTITY = (
 
 
 class RunStore:
-    """A run folder opened for writing; one process at a time."""
+    """A run folder opened for writing; one process at a time.
+
+    `records` and `turns` are synced line by line; `prompts` hold what could be made again.
+    """
 
     def __init__(self, folder: Path, manifest: Mapping[str, Any]) -> None:
         """Open `folder` for the run that `manifest` describes, creating it when it is new.
@@ -46,17 +47,17 @@ class RunStore:
         identity differs), or is being written by another process.
         """
         self.folder = folder
-        self._writing = threading.Lock()
         self._lock: IO[str] | None = None
-        self._file: FileIO | None = None
+        self._files: list[AppendFile] = []
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._lock = (folder / _LOCK).open("w")
             self._acquire()
             self._claim(manifest)
-            # Unbuffered: a write that failed must not be tried again behind our back.
-            self._file = FileIO(folder / RECORDS, "a")
-            self._drop_cut_line()
+            self.records = self._open(RecordLines(folder))
+            self.turns = self._open(TurnLines(folder))
+            known = PromptLines(folder)
+            self.prompts = PromptFile(self._open(known, sync=False), known.digests)
         except OSError as error:
             self.close()
             hint = "choose another folder with --out"
@@ -72,39 +73,25 @@ class RunStore:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def append(self, records: Iterable[Mapping[str, Any]]) -> None:
-        """Write records, a line each, and wait until they are on disk.
-
-        Raises StoreError when the disk refuses; what was written before stays whole.
-        """
-        data = b"".join(_line(record) for record in records)
-        with self._writing:
-            self._append(data)
-
-    def _append(self, data: bytes) -> None:
-        assert self._file is not None, "the store is closed"
-        size = self._file.seek(0, os.SEEK_END)
-        try:
-            written = 0
-            while written < len(data):
-                written += self._file.write(data[written:])
-            os.fsync(self._file.fileno())
-        except OSError as error:
-            # Where even this fails, what is left is an unfinished line: the next start drops it.
-            with contextlib.suppress(OSError):
-                self._file.truncate(size)
-            hint = "free some space and give the same command again: it goes on from here"
-            path = self.folder / RECORDS
-            problem = Problem(str(path), f"cannot be written: {error.strerror}", hint=hint)
-            raise StoreError(problem) from error
-
     def close(self) -> None:
         """Release the files and the lock, once what is being written is written."""
-        with self._writing:
-            for handle in (self._file, self._lock):
-                if handle is not None:
-                    handle.close()
-            self._file = self._lock = None
+        for file in self._files:
+            file.close()
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+    def _open(self, lines: Lines, *, sync: bool = True) -> AppendFile:
+        """Open a file for appending, rid of a line that a kill cut short."""
+        file = AppendFile(lines.path, sync=sync)
+        self._files.append(file)
+        for _ in lines:
+            pass
+        if lines.is_cut:
+            os.truncate(lines.path, lines.whole_bytes)
+        elif lines.lacks_newline:
+            file.end_line()
+        return file
 
     def _acquire(self) -> None:
         assert self._lock is not None
@@ -121,16 +108,6 @@ class RunStore:
         path = self.folder / MANIFEST
         text = yaml.safe_dump(dict(manifest), sort_keys=False, allow_unicode=True, width=100)
         atomic_write(path, text)
-
-    def _drop_cut_line(self) -> None:
-        lines = RecordLines(self.folder)
-        for _ in lines:
-            pass
-        assert self._file is not None
-        if lines.is_cut:
-            os.truncate(lines.path, lines.whole_bytes)
-        elif lines.lacks_newline:
-            self._file.write(b"\n")
 
 
 def holds_run(folder: Path, manifest: Mapping[str, Any]) -> bool:
@@ -152,21 +129,22 @@ def holds_run(folder: Path, manifest: Mapping[str, Any]) -> bool:
     raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=hint))
 
 
-def _line(record: Mapping[str, Any]) -> bytes:
-    text = json.dumps(record, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-    return text.encode("utf-8", "replace") + b"\n"
-
-
 def _changed(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
     """Dotted names of the parts in which two manifests differ and that make them two runs."""
-    names: list[str] = []
-    for part in ("suite", "models", "dataset", "prompt", "limit"):
-        old, new = found.get(part), wanted.get(part)
-        if isinstance(old, dict) and isinstance(new, dict):
-            keys = [key for key in new if f"{part}.{key}" not in _NOT_IDENTITY]
-            names += [f"{part}.{key}" for key in keys if old.get(key) != new[key]]
-        elif old != new:
-            names.append(part)
-    # Other scenes of the same data have another digest, too.
+    old, new = dict(_parts(found)), dict(_parts(wanted))
+    names = [name for name in new if name not in _NOT_IDENTITY and old.get(name) != new[name]]
+    # Other scenes of the same data have other digests, too.
     chosen = {"suite.levels", "limit"} & set(names)
-    return [name for name in names if not (chosen and name == "dataset.sha256")]
+    return [name for name in names if not (chosen and name.endswith("sha256"))]
+
+
+def _parts(manifest: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Dotted names and values of what a run is made of, digests of pictures left out."""
+    for part in ("suite", "models", "dataset", "limit"):
+        value = manifest.get(part)
+        if isinstance(value, dict):
+            yield from ((f"{part}.{key}", below) for key, below in value.items())
+        else:
+            yield part, value
+    for track, about in manifest.get("tracks", {}).items():
+        yield from ((f"{track}.{k}", below) for k, below in about.items() if k != "pictures")

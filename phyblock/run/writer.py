@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Mapping
 from typing import Any
 
-from phyblock.run.store import RunStore
+from phyblock.run.appending import AppendFile
 
 __all__ = ["RecordWriter"]
 
@@ -14,8 +14,8 @@ __all__ = ["RecordWriter"]
 class RecordWriter:
     """Appends records off the event loop; `put` returns when its record is synced."""
 
-    def __init__(self, store: RunStore) -> None:
-        self._store = store
+    def __init__(self, file: AppendFile) -> None:
+        self._file = file
         self._waiting: list[tuple[Mapping[str, Any], asyncio.Future[None]]] = []
         self._flusher: asyncio.Task[None] | None = None
 
@@ -37,7 +37,7 @@ class RecordWriter:
             batch, self._waiting = self._waiting, []
             failure: Exception | None = None
             try:
-                await asyncio.to_thread(self._store.append, [record for record, _ in batch])
+                await asyncio.to_thread(self._file.append, [record for record, _ in batch])
             except Exception as error:
                 # Whatever it is, those who wait must hear of it, or they wait for ever.
                 failure = error

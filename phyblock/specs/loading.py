@@ -35,21 +35,17 @@ _BARE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
 class LoadedSuite:
     """A suite and the file it was read from.
 
-    `dataset_path` is the absolute folder of the data set.
+    `dataset_path` is the absolute folder of the data set, `questions_path` that of the questions
+    where the suite has the vqa track; `templates` the absolute paths of prompts that are files, by
+    track.
     """
 
     suite: SuiteSpec
     path: Path
     dataset_path: Path
     source: YamlSource = field(repr=False, compare=False)
-    template: Path | None = None
-
-    @property
-    def prompt_path(self) -> Path:
-        """The absolute path of the prompt template; ValueError when the prompt is a word."""
-        if self.template is None:
-            raise ValueError(f"prompt {self.suite.prompt!r} is not a template file")
-        return self.template
+    questions_path: Path | None = None
+    templates: Mapping[str, Path] = field(default_factory=dict)
 
     def where(self, *path: str | int) -> str:
         """Place ("file:line:col" or "--set ...") of a field, for errors found later."""
@@ -145,50 +141,71 @@ def _rule_place(source: YamlSource, reads: tuple[str, ...]) -> str:
 
 
 def _locate(suite: SuiteSpec, path: Path, source: YamlSource, data_dir: Path) -> LoadedSuite:
-    problems: list[Problem] = []
-    dataset = _dataset_path(suite, path, source, data_dir, problems)
-    template = None
-    if suite.prompt not in PROMPT_WORDS:
-        template = _expand(suite.prompt, ("prompt",), path, source, problems)
-        if template is not None and not template.is_file():
-            problems.append(_absent(source, ("prompt",), template, "no such file"))
-    if dataset is None or problems:
-        raise SpecError(sort_problems(problems))
-    return LoadedSuite(suite, path, dataset, source, template)
+    finder = _Finder(path, source, data_dir)
+    scenes = suite.dataset
+    is_bundled = scenes.format == "builtin"
+    dataset = finder.data(scenes.path or BUILTIN_DATASET, ("dataset", "path"), is_bundled)
+    questions = None
+    if "vqa" in suite.tracks:
+        is_bundled = suite.vqa.format == "builtin"
+        questions = finder.data(suite.vqa.path, ("vqa", "path"), is_bundled)
+    prompts: dict[str, tuple[str, FieldPath]] = {
+        "full_planning": (suite.prompt, ("prompt",)),
+        "vqa": (suite.vqa.prompt, ("vqa", "prompt")),
+        "step_planning": (suite.steps.prompt, ("steps", "prompt")),
+    }
+    found = {
+        track: finder.file(*prompts[track])
+        for track in suite.tracks
+        if prompts[track][0] not in PROMPT_WORDS
+    }
+    if dataset is None or finder.problems:
+        raise SpecError(sort_problems(finder.problems))
+    templates: dict[str, Path] = {track: file for track, file in found.items() if file is not None}
+    return LoadedSuite(suite, path, dataset, source, questions, templates)
 
 
-def _dataset_path(
-    suite: SuiteSpec, path: Path, source: YamlSource, data_dir: Path, problems: list[Problem]
-) -> Path | None:
-    at = ("dataset", "path")
-    text = suite.dataset.path or BUILTIN_DATASET
-    if suite.dataset.format == "builtin" and _BARE_NAME.match(text):
-        folder = data_dir.absolute() / text
-        if not folder.is_dir():
-            names = sorted(p.name for p in data_dir.glob("*/"))
-            allowed = f"a bundled data set ({', '.join(names)}), or the path of a folder"
-            hint = did_you_mean(text, names) or f"for a folder beside the suite write ./{text}"
-            problems.append(
-                Problem(source.where(at), "is not a bundled data set", dotted(at), show(text),
-                        allowed, hint)
-            )  # fmt: skip
-        return folder
-    found = _expand(text, at, path, source, problems)
-    if found is not None and not found.is_dir():
-        problems.append(_absent(source, at, found, "no such folder"))
-    return found
+class _Finder:
+    """Resolves the paths of one suite and gathers what is wrong with them."""
 
+    def __init__(self, path: Path, source: YamlSource, data_dir: Path) -> None:
+        self.problems: list[Problem] = []
+        self._path = path
+        self._source = source
+        self._data_dir = data_dir
 
-def _expand(
-    text: str, at: FieldPath, path: Path, source: YamlSource, problems: list[Problem]
-) -> Path | None:
-    base = Path.cwd() if source.is_overridden(at) else path.parent
-    try:
-        return expand(text, base)
-    except ValueError as error:
-        problems.append(Problem(source.where(at), str(error), dotted(at), show(text)))
-        return None
+    def data(self, text: str, at: FieldPath, may_be_bundled: bool) -> Path | None:
+        """The folder of data: a bundled set by its name, or a path."""
+        if may_be_bundled and _BARE_NAME.match(text):
+            folder = self._data_dir.absolute() / text
+            if not folder.is_dir():
+                names = sorted(p.name for p in self._data_dir.glob("*/"))
+                allowed = f"a bundled data set ({', '.join(names)}), or the path of a folder"
+                hint = did_you_mean(text, names) or f"for a folder beside the suite write ./{text}"
+                self._complain(at, "is not a bundled data set", show(text), allowed, hint)
+            return folder
+        found = self._expand(text, at)
+        if found is not None and not found.is_dir():
+            self._complain(at, "no such folder", str(found))
+        return found
 
+    def file(self, text: str, at: FieldPath) -> Path | None:
+        """A file that must be there."""
+        found = self._expand(text, at)
+        if found is not None and not found.is_file():
+            self._complain(at, "no such file", str(found))
+        return found
 
-def _absent(source: YamlSource, at: FieldPath, path: Path, message: str) -> Problem:
-    return Problem(source.where(at), message, dotted(at), str(path))
+    def _expand(self, text: str, at: FieldPath) -> Path | None:
+        base = Path.cwd() if self._source.is_overridden(at) else self._path.parent
+        try:
+            return expand(text, base)
+        except ValueError as error:
+            self._complain(at, str(error), show(text))
+            return None
+
+    def _complain(
+        self, at: FieldPath, message: str, found: str, allowed: str = "", hint: str = ""
+    ) -> None:
+        where = self._source.where(at)
+        self.problems.append(Problem(where, message, dotted(at), found, allowed, hint))

@@ -22,6 +22,7 @@ from phyblock.specs.fields import (
     refuse,
 )
 from phyblock.specs.rules import broken_rules, read_dotted
+from phyblock.specs.tracks import SECTIONS, StepsSpec, TrackName, VqaSpec
 
 __all__ = [
     "BASELINES",
@@ -56,7 +57,7 @@ Setting = Literal["A", "B"]
 Matcher = Literal["optimal", "paper"]
 Picture = Literal["goal", "candidates"]
 Background = Literal["checkerboard", "white", "light-wood", "dark-wood", "concrete", "lawn"]
-Table = Literal["assembly", "table1", "errors", "published"]
+Table = Literal["assembly", "table1", "table2", "table3", "errors", "published"]
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
 
 
@@ -191,8 +192,10 @@ class SuiteSpec(Section):
         description="Short name: small letters, digits and hyphens; runs are filed under it."
     )
     description: str = Field(default="", description="One line on what the suite is for.")
-    tracks: UniqueSome[Literal["full_planning"]] = Field(
-        default=("full_planning",), description="Tasks to run."
+    tracks: UniqueSome[TrackName] = Field(
+        default=("full_planning",),
+        description="full_planning: a whole plan in one reply. step_planning: step by step in the "
+        "simulator. vqa: multiple-choice questions.",
     )
     dataset: DatasetSpec = Field(default_factory=DatasetSpec, description="Which scenes are run.")
     levels: UniqueSome[Level] = Field(default=(1, 2, 3, 4), description="Difficulty levels.")
@@ -215,6 +218,13 @@ class SuiteSpec(Section):
     images: ImagesSpec = Field(
         default_factory=ImagesSpec, description="Which pictures a model is shown."
     )
+    vqa: VqaSpec = Field(
+        default_factory=VqaSpec,
+        description="The questions of the vqa track, and how they are shown.",
+    )
+    steps: StepsSpec = Field(
+        default_factory=StepsSpec, description="The rules of the step_planning track."
+    )
     parser: Literal["steps", "official"] = Field(
         default="steps",
         description="steps: reads the step list and records the rule that matched. official: the "
@@ -230,8 +240,9 @@ class SuiteSpec(Section):
         description="Bounds of a run; they change how fast results come, not what they are.",
     )
     tables: Unique[Table] = Field(
-        default=("assembly", "table1", "errors"),
-        description="Tables to write; published compares with the paper's numbers.",
+        default=("assembly", "table1", "table2", "table3", "errors"),
+        description="Tables to write, as far as they belong to a track of the suite; published "
+        "compares with the paper's numbers.",
     )
 
     @model_validator(mode="after")
@@ -244,11 +255,15 @@ class SuiteSpec(Section):
     def identity(self) -> dict[str, Any]:
         """What determines the results, as JSON-able data.
 
-        Leaves out description, limits and tables, and paths (the data set's, the template's): a
-        run stores the hashes of what stands there, which say more and survive a move.
+        Leaves out description, limits and tables, sections of tracks that are not run, and paths
+        (of data and templates): a run stores the hashes of what stands there, which say more and
+        survive a move.
         """
-        spec = self.model_dump(mode="json", exclude={"description", "limits", "tables"})
-        del spec["dataset"]["path"]
-        if self.prompt not in PROMPT_WORDS:
-            spec["prompt"] = "template"
+        idle = {section for track, section in SECTIONS.items() if track not in self.tracks}
+        spec = self.model_dump(mode="json", exclude={"description", "limits", "tables", *idle})
+        for section in ("dataset", "vqa"):
+            spec.get(section, {}).pop("path", None)
+        for part in (spec, *(spec[name] for name in SECTIONS.values() if name in spec)):
+            if part["prompt"] not in PROMPT_WORDS:
+                part["prompt"] = "template"
         return spec

@@ -16,6 +16,7 @@ from phyblock.models import (
     Model,
     ModelConfig,
     ModelEvent,
+    PlanSubject,
     Reply,
     ReplyCache,
     Request,
@@ -67,7 +68,7 @@ def make_request(
     )
     messages = (Message("system", ("You assemble blocks.",)), Message("user", user))
     given = {"temperature": 0.5, "top_p": 0.9, "max_tokens": 128, **params}
-    return Request(key, seed, messages, given, "prompt-1", SCENE, CANDIDATES)
+    return Request(key, seed, messages, given, "prompt-1", PlanSubject(SCENE, CANDIDATES))
 
 
 def make_model(

@@ -27,7 +27,7 @@ from phyblock.models import (
     Usage,
     reply_key,
 )
-from tests.models.factory import SCENE, make_request, picture
+from tests.models.factory import make_request, picture
 
 CONFIG = ModelConfig("m", "litellm", "openai/m", api_base="http://localhost:1/v1")
 REPLY = Reply("Step1: Move block with index 3", "red", usage=Usage(10, 5, 2), latency_s=1.5)
@@ -46,7 +46,7 @@ messages = st.lists(
 ).map(tuple)
 requests = st.builds(
     lambda seed, content, given_params, version: Request(
-        "000", seed, content, given_params, version, SCENE, make_request().candidates
+        "000", seed, content, given_params, version, make_request().subject
     ),
     st.integers(),
     messages,

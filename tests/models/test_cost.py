@@ -18,6 +18,7 @@ from phyblock.models import (
     Image,
     Message,
     ModelConfig,
+    PlanSubject,
     Price,
     Reply,
     ReplyCache,
@@ -83,7 +84,7 @@ def test_what_is_not_known_is_not_nothing(usage: Usage) -> None:
 
 
 def request_of(*parts: str | Image, **params: object) -> Request:
-    return Request("0", 0, (Message("user", parts),), params, "v", SCENE, CANDIDATES)
+    return Request("0", 0, (Message("user", parts),), params, "v", PlanSubject(SCENE, CANDIDATES))
 
 
 @pytest.mark.parametrize(

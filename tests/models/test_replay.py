@@ -74,7 +74,7 @@ def test_a_folder_that_is_missing_or_empty_is_an_error_at_the_start(tmp_path: Pa
 
 def record(model: str, scene: str, seed: int, **fields: object) -> str:
     reply = {**asdict(Reply(STEPS, "red", usage=Usage(7, 5), cost_usd=0.5, seed_sent=False))}
-    whole = {"model": model, "scene": scene, "seed": seed, "reply": reply, "error": None}
+    whole = {"model": model, "key": scene, "seed": seed, "reply": reply, "error": None}
     return json.dumps({**whole, **fields}) + "\n"
 
 
@@ -85,7 +85,7 @@ def test_a_run_of_our_own_is_matched_by_model_key_and_seed(tmp_path: Path) -> No
         + record("m", "007", 2, reply=asdict(Reply("first")))
         + record("m", "007", 2, reply=asdict(Reply("last")))
         + record("m", "008", 1, reply=None)
-        + '{"model": "m", "scene": "009"'
+        + '{"model": "m", "key": "009"'
     )
     model = replay(tmp_path)
     assert not model.needs_messages

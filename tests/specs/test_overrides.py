@@ -151,7 +151,7 @@ def test_paths_in_a_file_start_at_the_file(folder: Path) -> None:
     path.write_text(SUITE + text, encoding="utf-8")
     loaded = load(folder)
     assert loaded.dataset_path == folder / "official"
-    assert loaded.prompt_path == folder / "suites" / "p.j2"
+    assert loaded.templates["full_planning"] == folder / "suites" / "p.j2"
     assert loaded.where("dataset", "path") == f"{path}:4:35"
 
 
@@ -170,8 +170,7 @@ def test_a_bare_name_is_a_bundled_data_set(folder: Path) -> None:
 
 
 def test_a_prompt_that_is_a_word_has_no_path(folder: Path) -> None:
-    with pytest.raises(ValueError, match="'default' is not a template file"):
-        _ = load(folder).prompt_path
+    assert load(folder).templates == {}
 
 
 def test_a_section_left_empty_in_the_file_can_be_filled(folder: Path) -> None:

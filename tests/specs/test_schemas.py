@@ -96,7 +96,7 @@ BROKEN = [
     ("sampling", {"max_tokens": "5"}),
     ("limits", {"timeout_s": 0}),
     ("limits", {"max_cost_usd": -1}),
-    ("tables", ["table2"]),
+    ("tables", ["table9"]),
     ("dataset", {"format": "x"}),
     ("dataset", {"path": ""}),
 ]

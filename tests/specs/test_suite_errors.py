@@ -94,7 +94,7 @@ BAD = [
     (HEAD + "limits: {max_concurrency: 0}\n", "3:27", "limits.max_concurrency", "range", "1", ""),
     (HEAD + "limits: {timeout_s: .inf}\n", "3:21", "limits.timeout_s", "type", "finite", ""),
     (HEAD + "limits: {max_cost_usd: -1}\n", "3:24", "limits.max_cost_usd", "range", "least 0", ""),
-    (HEAD + "tables: [table2]\n", "3:10", "tables[0]", "choices", "published", "table1"),
+    (HEAD + "tables: [tabel1]\n", "3:10", "tables[0]", "choices", "published", "table1"),
     (HEAD + "description: [a]\n", "3:14", "description", "wrong type", "text", ""),
     (HEAD + "description: sk-abcdefgh12345678\n", "3:14", "description", "looks like a key", "",
      "api_key_env"),

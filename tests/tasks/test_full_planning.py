@@ -79,7 +79,7 @@ def test_a_request_holds_the_question_and_the_seed(task: AssemblyTask, tmp_path:
     try:
         asked = asyncio.run(track.request(task, 7, {"top_p": 0.5}, with_messages=True))
         bare = asyncio.run(track.request(task, 7, {}, with_messages=False))
-        outline, real = track.outline(task)
+        ((outline, real),) = track.outlines(task)
     finally:
         pictures.close()
     (message,) = asked.messages

@@ -1,0 +1,74 @@
+"""A file of JSON lines that is only ever appended to."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import threading
+from collections.abc import Iterable, Mapping
+from io import FileIO
+from pathlib import Path
+from typing import Any
+
+from phyblock.errors import Problem, StoreError
+
+__all__ = ["AppendFile"]
+
+
+class AppendFile:
+    """Lines that are on disk when `append` returns; safe to call from several threads.
+
+    Raises OSError when the file cannot be opened.
+    """
+
+    def __init__(self, path: Path, *, sync: bool = True) -> None:
+        """Without `sync` lines survive the death of the process, not that of the machine."""
+        self._path = path
+        self._sync = sync
+        self._writing = threading.Lock()
+        # Unbuffered: a write that failed must not be tried again behind our back.
+        self._file: FileIO | None = FileIO(path, "a")
+
+    def append(self, lines: Iterable[Mapping[str, Any]]) -> None:
+        """Write objects, a line each, and wait until they are on disk.
+
+        Raises StoreError when the disk refuses; what was written before stays whole.
+        """
+        data = b"".join(_line(line) for line in lines)
+        with self._writing:
+            self._append(data)
+
+    def end_line(self) -> None:
+        """Write the newline that the last line lacks."""
+        assert self._file is not None
+        self._file.write(b"\n")
+
+    def close(self) -> None:
+        """Close the file, once what is being written is written."""
+        with self._writing:
+            if self._file is not None:
+                self._file.close()
+                self._file = None
+
+    def _append(self, data: bytes) -> None:
+        assert self._file is not None, "the file is closed"
+        size = self._file.seek(0, os.SEEK_END)
+        try:
+            written = 0
+            while written < len(data):
+                written += self._file.write(data[written:])
+            if self._sync:
+                os.fsync(self._file.fileno())
+        except OSError as error:
+            # Where even this fails, what is left is an unfinished line: the next start drops it.
+            with contextlib.suppress(OSError):
+                self._file.truncate(size)
+            hint = "free some space and give the same command again: it goes on from here"
+            problem = Problem(str(self._path), f"cannot be written: {error.strerror}", hint=hint)
+            raise StoreError(problem) from error
+
+
+def _line(line: Mapping[str, Any]) -> bytes:
+    text = json.dumps(line, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return text.encode("utf-8", "replace") + b"\n"

@@ -1,0 +1,184 @@
+"""One sample from request to record, whether it asks once or plays an episode."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, TypeVar
+
+from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
+from phyblock.models import Halt, Model, Reply, Request, Usage
+from phyblock.run.prompts import PromptFile
+from phyblock.run.records import about_prompt, judged, to_record
+from phyblock.run.writer import RecordWriter
+from phyblock.tasks import AnyTrack, Episode, EpisodeTrack, Item, SingleTrack
+
+__all__ = ["Sample", "SampleRunner"]
+
+_N = TypeVar("_N", int, float)
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One item of a track, asked of one model with one seed."""
+
+    track: AnyTrack
+    model: str
+    item: Item
+    seed: int
+
+    @property
+    def id(self) -> str:
+        """Its name inside the run."""
+        return f"{self.track.name}/{self.model}/{self.item.key}/s{self.seed}"
+
+
+class SampleRunner:
+    """Turns samples into records; answered turns of episodes are on disk before the next is asked.
+
+    `earlier` are the replies of episodes that an earlier run began, by sample id.
+    """
+
+    def __init__(
+        self,
+        turns: RecordWriter,
+        prompts: PromptFile,
+        halt: Halt,
+        earlier: Mapping[str, Sequence[Mapping[str, Any]]],
+    ) -> None:
+        self._turns = turns
+        self._prompts = prompts
+        self._halt = halt
+        self._earlier = earlier
+
+    async def record(
+        self, sample: Sample, model: Model, params: Mapping[str, object]
+    ) -> dict[str, Any]:
+        """Ask, and say what came of it.
+
+        Raises UnavailableError, BudgetReachedError and HaltedError as models do, and what making
+        a prompt or writing a turn raises.
+        """
+        if isinstance(sample.track, EpisodeTrack):
+            return await self._play(sample, sample.track, model, params)
+        return await self._ask(sample, sample.track, model, params)
+
+    async def _ask(
+        self,
+        sample: Sample,
+        track: SingleTrack[Any],
+        model: Model,
+        params: Mapping[str, object],
+    ) -> dict[str, Any]:
+        with self._halt.giving_up():
+            request = await track.request(
+                sample.item, sample.seed, params, with_messages=model.needs_messages
+            )
+        answer = await _answer(model.ask(request))
+        record = self._begin(sample, answer)
+        record["prompt"] = self._prompt(track, request)
+        judgement = track.judge(sample.item, answer.text if isinstance(answer, Reply) else None)
+        return judged(record, judgement.is_read, judgement.fields())
+
+    async def _play(
+        self,
+        sample: Sample,
+        track: EpisodeTrack[Any],
+        model: Model,
+        params: Mapping[str, object],
+    ) -> dict[str, Any]:
+        episode = track.start(sample.item, sample.seed, params, with_messages=model.needs_messages)
+        stored = [_reply(raw) for raw in self._earlier.get(sample.id, ())]
+        turns: list[dict[str, Any]] = []
+        replies: list[Reply] = []
+        answer: Reply | ModelError | None = None
+        while (request := await self._next(episode)) is not None:
+            turn = {"prompt": self._prompt(track, request)}
+            if len(replies) < len(stored):
+                answer = stored[len(replies)]
+            else:
+                answer = await _answer(model.ask(request))
+                if isinstance(answer, Reply):
+                    number = len(replies)
+                    line = {"sample": sample.id, "turn": number, "reply": asdict(answer)}
+                    await self._turns.put(line)
+            if not isinstance(answer, Reply):
+                break
+            turns.append({"reply": asdict(answer), **turn})
+            replies.append(answer)
+            episode.take(request, answer)
+        failed = answer if isinstance(answer, ModelError) else None
+        return self._ended(sample, episode, turns, replies, failed)
+
+    def _ended(
+        self,
+        sample: Sample,
+        episode: Episode,
+        turns: Sequence[Mapping[str, Any]],
+        replies: Sequence[Reply],
+        failed: ModelError | None,
+    ) -> dict[str, Any]:
+        record = self._begin(sample, failed)
+        record["reply"] = asdict(_pooled(replies)) if replies else None
+        record["prompt"] = turns[0]["prompt"] if turns else None
+        fields = episode.fields()
+        told = zip(turns, fields["turns"], strict=True)
+        fields["turns"] = [{"n": n, **turn, **more} for n, (turn, more) in enumerate(told, 1)]
+        return judged(record, episode.is_read, fields)
+
+    async def _next(self, episode: Episode) -> Request | None:
+        with self._halt.giving_up():
+            return await episode.request()
+
+    def _prompt(self, track: AnyTrack, request: Request) -> dict[str, Any] | None:
+        if not request.messages:
+            return None
+        return about_prompt(request, track.template, self._prompts.keep(request.messages))
+
+    def _begin(self, sample: Sample, answer: Reply | ModelError | None) -> dict[str, Any]:
+        name, item = sample.track.name, sample.item
+        record = to_record(sample.id, name, sample.model, item, sample.seed, answer)
+        return {**record, **sample.track.about(item)}
+
+
+async def _answer(asked: Awaitable[Reply | None]) -> Reply | ModelError | None:
+    """The reply, or the error that is this sample's alone."""
+    try:
+        return await asked
+    except (UnavailableError, BudgetReachedError):
+        raise
+    except ModelError as error:
+        return error
+
+
+def _reply(raw: Mapping[str, Any]) -> Reply:
+    return Reply(**{**raw, "usage": Usage(**raw["usage"])})
+
+
+def _pooled(replies: Sequence[Reply]) -> Reply:
+    """What an episode's replies took together, with the text of the last one."""
+    usage = Usage(
+        *(
+            _sum(getattr(reply.usage, name) for reply in replies)
+            for name in ("prompt_tokens", "completion_tokens", "reasoning_tokens")
+        )
+    )
+    billed = [reply.billed_usd for reply in replies if reply.billed_usd is not None]
+    return Reply(
+        replies[-1].text,
+        usage=usage,
+        cost_usd=_sum(reply.cost_usd for reply in replies),
+        billed_usd=sum(billed) if billed else None,
+        latency_s=sum(reply.latency_s for reply in replies),
+        provider_model=replies[-1].provider_model,
+        attempts=sum(reply.attempts for reply in replies),
+        cached=all(reply.cached for reply in replies),
+        seed_sent=all(reply.seed_sent for reply in replies),
+    )
+
+
+def _sum(values: Iterable[_N | None]) -> _N | None:
+    """The sum, or None where one is not known."""
+    found = list(values)
+    known = [value for value in found if value is not None]
+    return sum(known[1:], known[0]) if known and len(known) == len(found) else None
