@@ -1,0 +1,143 @@
+"""A building site: blocks put at their goal poses, let go, and looked at from one place.
+
+A partly built structure is always tried afresh, every block at its goal pose, so that no step is
+judged by the drift of the ones before it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+
+from phyblock.domain.question import QuestionPicture
+from phyblock.domain.scene import Block, Scene
+from phyblock.sim.outcomes import quat_xyzw_to_euler_deg
+from phyblock.sim.pictures import PictureStyle
+from phyblock.sim.stability import DEFAULT_TRIAL, Trial, movement
+from phyblock.sim.steps import DEFAULT_REST
+from phyblock.sim.world import Physics, Pose, World
+
+__all__ = ["ONE_SETTING", "Settled", "Site", "settle", "state_picture"]
+
+ONE_SETTING = Trial(physics=DEFAULT_TRIAL.physics[:1])
+"""A trial that costs half as much as the default and decides nothing that a score rests on."""
+
+_POSITION_DIGITS = 4
+_ANGLE_DIGITS = 2
+_COLLAPSE_S = 3.0
+"""How long fallen blocks are given to come to rest [s]."""
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What became of blocks that were let go.
+
+    `fallen` are the orders of those that passed the trial's limits, or did so in the fall of
+    others; `blocks` all of them, at their goal poses but for the fallen, which lie where they came
+    to rest.
+    """
+
+    fallen: tuple[int, ...]
+    blocks: tuple[Block, ...]
+
+    @property
+    def stands(self) -> bool:
+        """Whether every block stayed where it was put."""
+        return not self.fallen
+
+
+class Site:
+    """Worlds kept open to try one state after another; a context manager."""
+
+    def __init__(self, trial: Trial = DEFAULT_TRIAL) -> None:
+        self.trial = trial
+        self._stack = contextlib.ExitStack()
+        self._worlds: dict[Physics, World] = {}
+
+    def __enter__(self) -> Site:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release the worlds; the next trial opens new ones."""
+        self._worlds.clear()
+        self._stack.close()
+
+    def settle(self, blocks: Sequence[Block]) -> Settled:
+        """Let blocks go at their goal poses; they fall when they do under any of the settings."""
+        fallen: set[int] = set()
+        shown: tuple[Block, ...] = ()
+        for physics in self.trial.physics:
+            moved, lying = self._try(blocks, physics)
+            fallen.update(moved)
+            shown = shown or lying
+        return Settled(tuple(sorted(fallen)), shown or tuple(blocks))
+
+    def _try(
+        self, blocks: Sequence[Block], physics: Physics
+    ) -> tuple[tuple[int, ...], tuple[Block, ...]]:
+        """The orders that fell under one setting, and if any did, the blocks as they lie then."""
+        world = self._world(physics)
+        world.place_all(blocks)
+        try:
+            self._wait(world, self.trial.duration_s)
+            fallen = movement(blocks, world.poses(), self.trial).fallen
+            if not fallen:
+                return (), ()
+            self._wait(world, _COLLAPSE_S)
+            poses = world.poses()
+            fallen = (*fallen, *movement(blocks, poses, self.trial).fallen)
+            return fallen, tuple(_lying(block, poses[block.order], fallen) for block in blocks)
+        finally:
+            for block in reversed(blocks):
+                world.remove(block.order)
+
+    def _world(self, physics: Physics) -> World:
+        if physics not in self._worlds:
+            self._worlds[physics] = self._stack.enter_context(World(physics))
+        return self._worlds[physics]
+
+    def _wait(self, world: World, limit_s: float) -> None:
+        """Simulate until nothing has moved for a while, but no longer than `limit_s` [s]."""
+        rest = DEFAULT_REST
+        quiet_s = 0.0
+        for _ in range(round(limit_s / rest.every_s)):
+            world.step(rest.every_s)
+            is_quiet = world.fastest_m_s() < rest.speed_m_s
+            quiet_s = quiet_s + rest.every_s if is_quiet else 0.0
+            if quiet_s >= rest.quiet_s - rest.every_s / 2:
+                return
+
+
+def settle(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Settled:
+    """As `Site.settle`, in worlds of its own: the same in every process."""
+    with Site(trial) as site:
+        return site.settle(blocks)
+
+
+def state_picture(
+    scene: Scene, blocks: Sequence[Block], style: PictureStyle, label: str = "current"
+) -> QuestionPicture:
+    """The recipe of a picture of blocks on the ground, seen exactly as the goal picture is."""
+    view_deg = (style.azimuth_deg, style.elevation_deg)
+    return QuestionPicture(label, tuple(blocks), view_deg, framed=scene.blocks)
+
+
+def _lying(block: Block, pose: Pose, fallen: Collection[int]) -> Block:
+    """A fallen block at a pose, rounded to 0.1 mm and 0.01 degrees; any other as it is."""
+    if block.order not in fallen:
+        return block
+    x, y, z = (round(float(place), _POSITION_DIGITS) + 0.0 for place in pose.position_m)
+    euler = quat_xyzw_to_euler_deg(pose.quat_xyzw)
+    a, b, c = (round(angle, _ANGLE_DIGITS) + 0.0 for angle in euler)
+    return dataclasses.replace(block, position_m=(x, y, z), euler_deg=(a, b, c))
