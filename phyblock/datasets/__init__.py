@@ -1,20 +1,25 @@
 """Readers of the data formats: the project's own and the official PhyBlock layout."""
 
-from phyblock.datasets.base import AssemblyTask, Dataset
+from phyblock.datasets.base import AssemblyTask, Dataset, QuestionSet, QuestionTask
 from phyblock.datasets.builtin import SCENES_FILE, read_builtin
 from phyblock.datasets.official import official_prompt, read_official, recorded_models
+from phyblock.datasets.questions import QUESTIONS_FILE, read_questions
 from phyblock.datasets.salvage import Fault, Salvage, SalvagedTask, salvage
 
 __all__ = [
+    "QUESTIONS_FILE",
     "SCENES_FILE",
     "AssemblyTask",
     "Dataset",
     "Fault",
+    "QuestionSet",
+    "QuestionTask",
     "Salvage",
     "SalvagedTask",
     "official_prompt",
     "read_builtin",
     "read_official",
+    "read_questions",
     "recorded_models",
     "salvage",
 ]

@@ -5,12 +5,13 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from phyblock.domain import CandidateSet, Scene
+from phyblock.domain import CandidateSet, Question, Scene
 
-__all__ = ["AssemblyTask", "Dataset"]
+__all__ = ["AssemblyTask", "Dataset", "QuestionSet", "QuestionTask"]
 
 
 @dataclass(frozen=True)
@@ -42,3 +43,43 @@ class Dataset:
         """Hex digest of the scenes and candidate sets, whatever the format they came in."""
         content = [[asdict(task.scene), asdict(task.candidates)] for task in self.tasks]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class QuestionTask:
+    """A question; `files` are pictures by label that the data set brings, instead of recipes."""
+
+    question: Question
+    files: Mapping[str, Path] = field(default_factory=dict)
+
+    @property
+    def key(self) -> str:
+        """The id of the question."""
+        return self.question.id
+
+    @property
+    def scene(self) -> Scene:
+        """The scene as the question shows it."""
+        return self.question.scene
+
+
+@dataclass(frozen=True)
+class QuestionSet:
+    """Questions in the order of the file; `root` is the folder they were read from."""
+
+    name: str
+    root: Path
+    tasks: tuple[QuestionTask, ...]
+
+    @functools.cached_property
+    def sha256(self) -> str:
+        """Hex digest of the questions with their scenes and of the picture files' bytes."""
+        content = [[asdict(task.question), _digests(task.files)] for task in self.tasks]
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _digests(files: Mapping[str, Path]) -> dict[str, str]:
+    return {
+        label: hashlib.sha256(path.read_bytes()).hexdigest()
+        for label, path in sorted(files.items())
+    }

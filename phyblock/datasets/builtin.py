@@ -46,9 +46,10 @@ def read_builtin(folder: Path) -> Dataset:
     return Dataset(folder.name, folder, tuple(sorted(tasks, key=lambda task: task.scene.id)))
 
 
-def scene_lines(path: Path) -> list[str]:
-    """The lines of a data set file; DataError when it cannot be read."""
-    text = read_text(path, f"a folder with {SCENES_FILE}, or the name of a bundled data set")
+def scene_lines(path: Path, allowed: str = "") -> list[str]:
+    """The lines of a data set file; DataError, with what is allowed, when it cannot be read."""
+    allowed = allowed or f"a folder with {SCENES_FILE}, or the name of a bundled data set"
+    text = read_text(path, allowed)
     # Not splitlines(): a JSON string may hold U+2028 and other line ends of Unicode.
     return text.removesuffix("\n").split("\n") if text else []
 

@@ -34,7 +34,7 @@ class SceneReader(RawReader):
         entries = self.items(raw, "blocks")
         if len(entries) > MAX_BLOCKS:
             self.complain("blocks", "are too many", len(entries), f"at most {MAX_BLOCKS}")
-        found = [self._block(entry, f"blocks[{i}]") for i, entry in enumerate(entries)]
+        found = [self.block(entry, f"blocks[{i}]") for i, entry in enumerate(entries)]
         if len(self.problems) == before:
             whole = tuple(cast(Block, block) for block in found)
             self._check_orders(whole)
@@ -42,6 +42,21 @@ class SceneReader(RawReader):
             if strict_layers and len(self.problems) == before:
                 self.check_layers(whole)
         return whole if len(self.problems) == before else ()
+
+    def block(self, entry: object, at: str) -> Block | None:
+        """One block, alone; None after a complaint."""
+        raw = self.mapping(entry, at)
+        order = self.integer(self.get(raw, "order", f"{at}."), f"{at}.order", 1)
+        kind, color = self._kind(raw, at)
+        layer = self.integer(self.get(raw, "layer", f"{at}."), f"{at}.layer", 1)
+        position = self.vector(self.get(raw, "position", f"{at}."), f"{at}.position")
+        euler = self._euler(raw, at)
+        depend = self._depend(self.get(raw, "depend", f"{at}."), f"{at}.depend")
+        if order is None or kind is None or color is None or layer is None:
+            return None
+        if position is None or euler is None or depend is None:
+            return None
+        return Block(order, kind, color, position, euler, depend, layer)
 
     def candidates(self, raw: object) -> CandidateSet:
         """A candidate set: at most 16, no two alike; empty after a complaint."""
@@ -76,20 +91,6 @@ class SceneReader(RawReader):
                     [block.type, block.color, list(block.euler_deg)],
                     "every type, color and orientation that the scene uses",
                 )
-
-    def _block(self, entry: object, at: str) -> Block | None:
-        raw = self.mapping(entry, at)
-        order = self.integer(self.get(raw, "order", f"{at}."), f"{at}.order", 1)
-        kind, color = self._kind(raw, at)
-        layer = self.integer(self.get(raw, "layer", f"{at}."), f"{at}.layer", 1)
-        position = self.vector(self.get(raw, "position", f"{at}."), f"{at}.position")
-        euler = self._euler(raw, at)
-        depend = self._depend(self.get(raw, "depend", f"{at}."), f"{at}.depend")
-        if order is None or kind is None or color is None or layer is None:
-            return None
-        if position is None or euler is None or depend is None:
-            return None
-        return Block(order, kind, color, position, euler, depend, layer)
 
     def _candidate(self, entry: object, at: str) -> Candidate | None:
         raw = self.mapping(entry, at)
