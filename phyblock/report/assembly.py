@@ -7,7 +7,8 @@ import pandas as pd
 
 from phyblock.report.cells import METRICS, cell_scores, micro_averages, with_levels
 from phyblock.report.design import OVERALL, Design
-from phyblock.report.load import Run
+from phyblock.report.intervals import INTERVALS, intervals_frame
+from phyblock.report.load import Run, once_per_run
 from phyblock.report.outcomes import FAILURES, WITHOUT_REPLY
 
 __all__ = ["ASSEMBLY_COLUMNS", "assembly_frame", "headline_cells", "level_column", "table1_frame"]
@@ -17,7 +18,7 @@ _GROUP = ("model", "track", "level")
 _PLURALS = {"parse_failure": "parse_failures", "api_error": "api_errors", "refusal": "refusals"}
 _OUTCOMES = {outcome: _PLURALS.get(outcome, outcome) for outcome in FAILURES}
 _SPREAD = tuple(f"{metric}_{what}" for metric in METRICS for what in ("mean", "sd"))
-_COUNTS = ("n", *_OUTCOMES.values(), "tp", "fp", "fn", "seeds")
+_COUNTS = ("n", *_OUTCOMES.values(), "tp", "fp", "fn", "seeds", "n_scenes", "n_clusters")
 
 ASSEMBLY_COLUMNS = (
     *_CELL,
@@ -30,17 +31,23 @@ ASSEMBLY_COLUMNS = (
     *METRICS,
     "seeds",
     *_SPREAD,
+    "n_scenes",
+    "n_clusters",
+    *INTERVALS,
     "seed_note",
 )
 """Columns of `assembly.csv`."""
 
 
+@once_per_run
 def assembly_frame(run: Run) -> pd.DataFrame:
     """Every model, track, setting, matcher and level, in the suite's order, in `ASSEMBLY_COLUMNS`.
 
     `n` samples are scored of `expected`; tp, fp, fn are sums over them and precision, recall, f1
     the micro averages in [0, 1], NaN where undefined. `*_mean` and `*_sd` (ddof = 1) are taken
-    over the micro averages of the `seeds` single seeds. A cell in which no sample has a reply has
+    over the micro averages of the `seeds` single seeds; `*_lo`, `*_hi` bound a 95 % interval and
+    `*_se` is its standard error, from resampling the `n_clusters` base scenes that the `n_scenes`
+    scenes were made from (see `intervals_frame`). A cell in which no sample has a reply has
     counts, if the suite counts empty plans, but no metrics: nothing was measured. `matcher` is ""
     for a Level-1 criterion that knows none.
     """
@@ -50,8 +57,10 @@ def assembly_frame(run: Run) -> pd.DataFrame:
         .join(micro_averages(scores, _CELL), on=list(_CELL))
         .join(_over_seeds(scores), on=list(_CELL))
         .join(_outcomes(run), on=list(_GROUP))
+        .join(intervals_frame(run), on=list(_CELL))
     )
-    frame.loc[frame["replied"].fillna(0) == 0, [*METRICS, *_SPREAD]] = np.nan
+    measured = [*METRICS, *_SPREAD, *INTERVALS]
+    frame.loc[frame["replied"].fillna(0) == 0, measured] = np.nan
     frame[list(_COUNTS)] = frame[list(_COUNTS)].fillna(0).astype("int64")
     notes = _seed_notes(run)
     frame["seed_note"] = [notes.get(model, "") for model in frame["model"]]

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.report.design import OVERALL
-from phyblock.report.load import Run
+from phyblock.report.load import Run, once_per_run
 
 __all__ = ["METRICS", "cell_scores", "micro_averages", "with_levels"]
 
@@ -28,6 +28,7 @@ def with_levels(frame: pd.DataFrame, run: Run) -> pd.DataFrame:
     )
 
 
+@once_per_run
 def cell_scores(run: Run) -> pd.DataFrame:
     """Scores by level, each level under its criterion alone, without those the run leaves out.
 

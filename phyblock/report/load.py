@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import functools
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,7 +15,7 @@ from phyblock.report.design import Design, read_design
 from phyblock.report.flat import TEXTS, flat_record, flat_scores, frame_of
 from phyblock.run.reading import MANIFEST, RecordLines, read_manifest
 
-__all__ = ["Frames", "Run", "frames_of", "load_run"]
+__all__ = ["Frames", "Run", "frames_of", "load_run", "once_per_run"]
 
 
 class Frames(NamedTuple):
@@ -41,6 +42,20 @@ class Run:
     records: pd.DataFrame = field(repr=False)
     scores: pd.DataFrame = field(repr=False)
     is_cut: bool = False
+    _made: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False, init=False)
+
+
+def once_per_run(make: Callable[[Run], pd.DataFrame]) -> Callable[[Run], pd.DataFrame]:
+    """A function of a run that works once and returns copies of its frame after that."""
+
+    @functools.wraps(make)
+    def made(run: Run) -> pd.DataFrame:
+        name = f"{make.__module__}.{make.__qualname__}"
+        if name not in run._made:
+            run._made[name] = make(run)
+        return run._made[name].copy()
+
+    return made
 
 
 def load_run(path: str | Path, *, texts: bool = True) -> Run:

@@ -5,7 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-__all__ = ["NO_VALUE", "SPREAD", "Column", "TextTable", "number", "spread"]
+__all__ = [
+    "NO_VALUE",
+    "SPREAD",
+    "Column",
+    "TextTable",
+    "between",
+    "level_name",
+    "number",
+    "spread",
+]
 
 NO_VALUE = "–"  # noqa: RUF001
 """What stands in a cell that has no value; it is not a zero."""
@@ -44,3 +53,15 @@ def number(value: float, digits: int = 1, *, signed: bool = False) -> str:
 def spread(mean: float, sd: float) -> str:
     """`47.1 ± 1.2`; the mean alone where there is no standard deviation."""
     return number(mean) if math.isnan(sd) else f"{number(mean)}{SPREAD}{number(sd)}"
+
+
+def between(lo: float, hi: float, *, signed: bool = False) -> str:
+    """`[44.0, 50.3]`; `NO_VALUE` where there is no interval."""
+    if math.isnan(lo) or math.isnan(hi):
+        return NO_VALUE
+    return f"[{number(lo, signed=signed)}, {number(hi, signed=signed)}]"
+
+
+def level_name(level: str) -> str:
+    """`Level-3` or `Overall`."""
+    return f"Level-{level}" if level.isdigit() else level.capitalize()

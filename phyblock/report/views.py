@@ -18,7 +18,7 @@ from phyblock.report.comparison import (
 from phyblock.report.design import OVERALL, Design
 from phyblock.report.load import Run
 from phyblock.report.outcomes import HEADINGS, OUTCOMES
-from phyblock.report.text_table import NO_VALUE, Column, TextTable, number, spread
+from phyblock.report.text_table import NO_VALUE, Column, TextTable, level_name, number, spread
 from phyblock.scoring import ERROR_TYPES, ErrorType
 
 __all__ = ["coverage_view", "errors_view", "published_view", "table1_view"]
@@ -42,7 +42,7 @@ def table1_view(table: pd.DataFrame, run: Run) -> TextTable:
     design = run.design
     cells = [level_column(level, metric) for level in design.levels for metric in METRICS]
     columns = [
-        Column(_METRIC_NAMES[metric], _level_name(level))
+        Column(_METRIC_NAMES[metric], level_name(level))
         for level in design.levels
         for metric in METRICS
     ]
@@ -105,10 +105,6 @@ def _how(design: Design) -> str:
     )
 
 
-def _level_name(level: str) -> str:
-    return "Overall" if level == OVERALL else f"Level-{level}"
-
-
 def _of_suite(design: Design) -> str:
     return f", suite {design.suite.name}" if design.suite.name else ""
 
@@ -120,7 +116,7 @@ def errors_view(table: pd.DataFrame, run: Run) -> TextTable:
     rows = [
         (
             row["model"] if row["level"] == design.levels[0] else "",
-            _level_name(row["level"]),
+            level_name(row["level"]),
             str(row["n"]),
             str(row["wrong_steps"]),
             *(
@@ -151,7 +147,7 @@ def published_view(table: pd.DataFrame, run: Run) -> TextTable:
         _MODEL,
         Column("Metric", is_text=True),
         *(
-            Column(name, _level_name(level))
+            Column(name, level_name(level))
             for level in PUBLISHED_LEVELS
             for name in ("Paper", "Ours", "Diff")
         ),
@@ -197,11 +193,15 @@ def _difference_notes(table: pd.DataFrame, design: Design) -> list[str]:
 def coverage_view(table: pd.DataFrame, run: Run) -> TextTable:
     """Outcomes, tokens, cost and time out of `coverage_frame`.
 
-    Tokens, latency, cached and requests are left out where no model has any.
+    Tokens, latency, cached and requests are left out where no model has any, and the track where
+    there is one.
     """
     counts = {"expected": "Expected", "not_run": "Not run"}
     counts |= {outcome: HEADINGS[outcome] for outcome in OUTCOMES}
     parts: list[tuple[Column, list[str]]] = [(_MODEL, list(table["model"]))]
+    if len(run.design.suite.tracks) > 1:
+        tracks = [track.replace("_", " ") for track in table["track"]]
+        parts.append((Column("Track", is_text=True), tracks))
     parts += [
         (Column(heading), [str(count) for count in table[name]]) for name, heading in counts.items()
     ]

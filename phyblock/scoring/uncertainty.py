@@ -41,7 +41,7 @@ Metric = Callable[[Floats], Floats]
 """
 
 CONFIDENCE = 0.95
-RESAMPLES = 10_000
+RESAMPLES = 2_000
 _CHUNK = 500
 
 
@@ -78,9 +78,9 @@ class Estimate:
     """A measured value, or an array of them, with its uncertainty.
 
     `value` is of all units, `se` the standard deviation over resamples, `lo` and `hi` bound the
-    interval, `p` is two-sided against zero and agrees with the interval: below 1 - `CONFIDENCE`
-    exactly where zero lies outside. All are of one shape; NaN where there is no value, and in all
-    but `value` with fewer than two clusters.
+    interval, `p` is two-sided against zero and agrees with the interval. `n_clusters` are behind
+    each value. All are of one shape; NaN where there is no value, and in all but `value` with
+    fewer than two clusters.
     """
 
     value: Floats
@@ -88,7 +88,7 @@ class Estimate:
     lo: Floats
     hi: Floats
     p: Floats
-    n_clusters: int
+    n_clusters: NDArray[np.intp]
 
 
 def bootstrap(
@@ -96,7 +96,9 @@ def bootstrap(
     clusters: Clusters,
     metric: Metric,
     rng: np.random.Generator,
+    *,
     resamples: int = RESAMPLES,
+    n_clusters: ArrayLike | None = None,
 ) -> Estimate:
     """Estimate `metric` of the summed `counts`, with a percentile interval.
 
@@ -104,22 +106,38 @@ def bootstrap(
     sums, (*cells,) as a rule. All cells see the same resamples, so that a metric that subtracts
     one cell from another is a paired comparison. Percentiles are widened for few clusters
     (Hesterberg, *What teachers should know about the bootstrap*, The American Statistician 69,
-    2015), so that the interval of a mean is as wide as Student's.
+    2015), so that the interval of a mean is as wide as Student's. `n_clusters`, of the result's
+    shape, says how many clusters are behind each value where some cells lack units.
     """
     given = np.asarray(counts, dtype=np.float64)
     value = _measure(metric, given.sum(axis=0))
-    draws = _draws(given, clusters, metric, rng, resamples) if clusters.size > 1 else None
-    if draws is None:
-        none = np.full(value.shape, np.nan)
-        return Estimate(value, none, none, none, none, clusters.size)
-    tail = _adjusted((1 - CONFIDENCE) / 2, clusters.size)
-    undefined = np.isnan(value) | np.isnan(draws).all(axis=0)
-    # Where nothing is defined, zeros keep numpy from warning; they are blanked below.
-    draws = np.where(undefined, 0.0, draws)
-    lo, hi = np.nanquantile(draws, [tail, 1 - tail], axis=0)
-    found = (np.nanstd(draws, axis=0, ddof=1), lo, hi, _p_value(draws, clusters.size))
-    se, lo, hi, p = (np.where(undefined, np.nan, one) for one in found)
-    return Estimate(value, se, lo, hi, p, clusters.size)
+    behind = np.broadcast_to(
+        np.asarray(clusters.size if n_clusters is None else n_clusters, dtype=np.intp), value.shape
+    )
+    flat = given.reshape(len(given), -1)
+    draws = np.concatenate(
+        [
+            _measure(metric, (weights @ flat).reshape(len(weights), *given.shape[1:]))
+            for weights in resample_weights(clusters, rng, resamples)
+        ]
+    )
+    unknown = np.isnan(value) | np.isnan(draws).all(axis=0) | (behind < 2)
+    spread = np.full((4, *value.shape), np.nan)
+    for n in np.unique(behind[~unknown]):
+        cells = (behind == n) & ~unknown
+        spread[:, cells] = _spread(draws[:, cells], int(n))
+    se, lo, hi, p = spread
+    return Estimate(value, se, lo, hi, p, behind)
+
+
+def _spread(draws: Floats, n: int) -> Floats:
+    """Standard error, interval and p value, shape (4, cells), of draws (resamples, cells)."""
+    # The share of resamples to cut off on a side, for n clusters.
+    tail = float(ndtr(np.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 - CONFIDENCE) / 2)))
+    whole = not np.isnan(draws).any()
+    quantile, std = (np.quantile, np.std) if whole else (np.nanquantile, np.nanstd)
+    lo, hi = quantile(draws, [tail, 1 - tail], axis=0)
+    return np.stack([std(draws, axis=0, ddof=1), lo, hi, _p_value(draws, n)])
 
 
 def resample_weights(
@@ -137,26 +155,9 @@ def resample_weights(
         yield weights
 
 
-def _draws(
-    counts: Floats, clusters: Clusters, metric: Metric, rng: np.random.Generator, resamples: int
-) -> Floats:
-    flat = counts.reshape(len(counts), -1)
-    return np.concatenate(
-        [
-            _measure(metric, (weights @ flat).reshape(len(weights), *counts.shape[1:]))
-            for weights in resample_weights(clusters, rng, resamples)
-        ]
-    )
-
-
 def _measure(metric: Metric, sums: Floats) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(metric(sums), dtype=np.float64)
-
-
-def _adjusted(tail: float, n: int) -> float:
-    """The share of resamples to cut off on a side, for `n` clusters."""
-    return float(ndtr(np.sqrt(n / (n - 1)) * stdtrit(n - 1, tail)))
 
 
 def _p_value(draws: Floats, n: int) -> Floats:

@@ -61,7 +61,9 @@ def test_counts_a_whole_number_of_times_as_large_change_nothing(
     counts: np.ndarray, times: int
 ) -> None:
     for metric in (precision_of, recall_of, f1_of):
-        once, often = (bootstrap(counts * k, alone(6), metric, rng(), 200) for k in (1, times))
+        once, often = (
+            bootstrap(counts * k, alone(6), metric, rng(), resamples=200) for k in (1, times)
+        )
         for name in ("value", "se", "lo", "hi", "p"):
             a, b = getattr(once, name), getattr(often, name)
             assert np.allclose(a, b, equal_nan=True)
@@ -69,7 +71,7 @@ def test_counts_a_whole_number_of_times_as_large_change_nothing(
 
 @given(hnp.arrays(np.int64, (8, 3), elements=st.integers(0, 9)))
 def test_an_interval_holds_its_median_draw_and_stays_in_the_range_of_f1(counts: np.ndarray) -> None:
-    found = bootstrap(counts, alone(8), f1_of, rng(), 400)
+    found = bootstrap(counts, alone(8), f1_of, rng(), resamples=400)
     if np.isnan(found.value):
         assert all(np.isnan([found.se, found.lo, found.hi, found.p]))
     else:
@@ -80,7 +82,9 @@ def test_an_interval_holds_its_median_draw_and_stays_in_the_range_of_f1(counts: 
 def test_nothing_differs_from_itself(counts: np.ndarray) -> None:
     counts[0] = (1, 0, 0)
     pair = np.stack([counts, counts], axis=1)
-    found = bootstrap(pair, alone(8), lambda sums: np.diff(f1_of(sums))[..., 0], rng(), 200)
+    found = bootstrap(
+        pair, alone(8), lambda sums: np.diff(f1_of(sums))[..., 0], rng(), resamples=200
+    )
     assert (found.value, found.se, found.lo, found.hi, found.p) == (0, 0, 0, 0, 1)
 
 
@@ -90,8 +94,8 @@ def test_a_difference_and_its_opposite_mirror_each_other() -> None:
     def difference(sums: Floats) -> Floats:
         return f1_of(sums)[..., 0] - f1_of(sums)[..., 1]
 
-    one = bootstrap(counts, clusters, difference, rng(), 2000)
-    other = bootstrap(counts[:, ::-1], clusters, difference, rng(), 2000)
+    one = bootstrap(counts, clusters, difference, rng(), resamples=2000)
+    other = bootstrap(counts[:, ::-1], clusters, difference, rng(), resamples=2000)
     assert one.value == -other.value
     assert one.lo == pytest.approx(-other.hi)
     assert one.p == pytest.approx(other.p)
@@ -100,7 +104,7 @@ def test_a_difference_and_its_opposite_mirror_each_other() -> None:
 def test_standard_error_and_interval_agree_with_scipy_for_lone_scenes() -> None:
     right = rng(1).binomial(10, 0.3, size=80)
     counts = np.stack([right, 10 - right, 10 - right], axis=1)
-    ours = bootstrap(counts, alone(80), f1_of, rng(2), 20_000)
+    ours = bootstrap(counts, alone(80), f1_of, rng(2), resamples=20_000)
     theirs = stats.bootstrap(
         (right,), lambda x, axis: x.mean(axis=axis) / 10, method="percentile", n_resamples=20_000
     )
@@ -113,7 +117,7 @@ def test_standard_error_and_interval_agree_with_scipy_for_lone_scenes() -> None:
 @pytest.mark.parametrize("n", [3, 5, 12])
 def test_few_clusters_give_intervals_as_wide_as_students(n: int) -> None:
     x = rng(n).normal(100, 1, n)
-    found = bootstrap(np.stack([x, np.ones(n)], 1), alone(n), ratio_of, rng(), 20_000)
+    found = bootstrap(np.stack([x, np.ones(n)], 1), alone(n), ratio_of, rng(), resamples=20_000)
     se = x.std(ddof=1) / np.sqrt(n)
     # Draws reach no further than the least and the greatest value.
     lo = max(x.mean() + stats.t.ppf(0.025, n - 1) * se, x.min())
@@ -121,7 +125,7 @@ def test_few_clusters_give_intervals_as_wide_as_students(n: int) -> None:
 
 
 def test_no_interval_comes_from_a_single_base_scene() -> None:
-    found = bootstrap([[1, 1, 0]] * 4, Clusters.of([["a"]] * 4), f1_of, rng())
+    found = bootstrap([[1, 1, 0]] * 4, Clusters.of([["a"]] * 4), f1_of, rng(), resamples=10_000)
     assert found.value == pytest.approx(2 / 3)
     assert all(np.isnan([found.se, found.lo, found.hi, found.p]))
     assert found.n_clusters == 1
@@ -136,7 +140,7 @@ def test_macro_means_are_recomputed_in_every_resample() -> None:
     counts = np.zeros((40, 2, 2))
     counts[:30, 0] = [[n % 3 == 0, 1] for n in range(30)]
     counts[30:, 1] = [[1, 1]] * 10
-    found = bootstrap(counts, alone(40), lambda sums: ratio_of(sums).mean(axis=-1), rng())
+    found = bootstrap(counts, alone(40), lambda sums: ratio_of(sums).mean(axis=-1), rng(), resamples=10_000)
     assert found.value == pytest.approx((1 / 3 + 1) / 2)
     assert found.se == pytest.approx(np.sqrt(1 / 3 * 2 / 3 / 30) / 2, rel=0.06)
 
@@ -174,8 +178,8 @@ def test_recorded_scenes_of_common_origin_double_the_naive_standard_error(
     counts, clusters, naive = official
     gpt_4o = counts["gpt-4o"]
     assert clusters.size == 150
-    assert 100 * bootstrap(gpt_4o, naive, f1_of, rng()).se == pytest.approx(1.3, abs=0.1)
-    assert 100 * bootstrap(gpt_4o, clusters, f1_of, rng()).se == pytest.approx(2.7, abs=0.1)
+    assert 100 * bootstrap(gpt_4o, naive, f1_of, rng(), resamples=10_000).se == pytest.approx(1.3, abs=0.1)
+    assert 100 * bootstrap(gpt_4o, clusters, f1_of, rng(), resamples=10_000).se == pytest.approx(2.7, abs=0.1)
 
 
 def test_recorded_models_are_compared_in_pairs(
@@ -183,7 +187,7 @@ def test_recorded_models_are_compared_in_pairs(
 ) -> None:
     counts, clusters, _ = official
     pair = np.stack([counts["gpt-4o"], counts["gemini-2.0-flash"]], axis=1)
-    found = bootstrap(pair, clusters, lambda s: f1_of(s)[..., 0] - f1_of(s)[..., 1], rng())
+    found = bootstrap(pair, clusters, lambda s: f1_of(s)[..., 0] - f1_of(s)[..., 1], rng(), resamples=10_000)
     assert 100 * found.value == pytest.approx(-0.5, abs=0.1)
     assert 100 * found.se == pytest.approx(2.2, abs=0.1)
     assert found.p > 0.5
@@ -196,7 +200,7 @@ def covered(world: World, worlds: int) -> float:
     hits = 0
     for _ in range(worlds):
         counts, clusters, _ = world.draw(draw)
-        found = bootstrap(counts[:, 0], clusters, f1_of, draw, 500)
+        found = bootstrap(counts[:, 0], clusters, f1_of, draw, resamples=500)
         hits += bool(found.lo <= truth <= found.hi)
     return hits / worlds
 

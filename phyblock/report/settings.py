@@ -1,0 +1,92 @@
+"""Setting A against setting B: what orientation costs a model, on the same replies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from phyblock.report.design import OVERALL
+from phyblock.report.intervals import count_cube, resampler
+from phyblock.report.load import Run, once_per_run
+from phyblock.report.text_table import Column, TextTable, between, level_name, number
+from phyblock.scoring.uncertainty import Floats, bootstrap, f1_of
+
+__all__ = ["settings_frame", "settings_view"]
+
+_COLUMNS = ("model", "level", "f1_a", "f1_b", "difference", "lo", "hi", "n_scenes", "n_clusters")
+
+
+@once_per_run
+def settings_frame(run: Run) -> pd.DataFrame:
+    """One row a model and level: F1 in A and in B, B minus A with a 95 % interval; in [0, 1].
+
+    Headline matcher, first assembly track, the criterion of each level. Paired: a reply is scored
+    under both. Empty where the run has one setting.
+    """
+    design = run.design
+    parts = []
+    for level in design.levels if {"A", "B"} <= set(design.suite.settings) else ():
+        cube = count_cube(run, level, ["track", "matcher", "model", "setting"])
+        matcher = design.matchers(design.criterion(level))[0]
+        kept = {
+            (model, setting): place
+            for place, (track, by, model, setting) in enumerate(cube.cells)
+            if track in design.tracks[:1] and by == matcher
+        }
+        models = [m for m in design.model_names if (m, "A") in kept and (m, "B") in kept]
+        if not models:
+            continue
+        both = np.array([[kept[model, setting] for setting in "AB"] for model in models])
+        n_clusters = cube.clusters_of(cube.present[:, both[:, 0]])
+        found = bootstrap(
+            cube.counts[:, both],
+            cube.clusters,
+            _both_and_difference,
+            resampler(),
+            n_clusters=np.repeat(n_clusters[:, None], 3, axis=1),
+        )
+        part = pd.DataFrame({"model": models, "level": level})
+        part["f1_a"], part["f1_b"], part["difference"] = found.value.T
+        part["lo"], part["hi"] = found.lo[:, 2], found.hi[:, 2]
+        part["n_scenes"] = cube.present[:, both[:, 0]].sum(axis=0)
+        part["n_clusters"] = n_clusters
+        parts.append(part)
+    table = pd.concat(parts) if parts else pd.DataFrame(columns=list(_COLUMNS))
+    order = {name: place for place, name in enumerate(design.model_names)}
+    return table.sort_values("model", key=lambda names: names.map(order), kind="stable")[
+        list(_COLUMNS)
+    ].reset_index(drop=True)
+
+
+def _both_and_difference(sums: Floats) -> Floats:
+    f1 = f1_of(sums)
+    return np.concatenate([f1, np.diff(f1, axis=-1)], axis=-1)
+
+
+def settings_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """F1 in A, in B and the difference with its interval out of `settings_frame`, by level."""
+    design = run.design
+    cells = {(row["model"], row["level"]): row for row in table.to_dict("records")}
+    rows = []
+    for model in dict.fromkeys(table["model"]):
+        row = [model]
+        for level in design.levels:
+            cell = cells[model, level]
+            row += [number(100 * cell["f1_a"]), number(100 * cell["f1_b"])]
+            row.append(between(100 * cell["lo"], 100 * cell["hi"], signed=True))
+        rows.append(tuple(row))
+    columns = [
+        Column(name, level_name(level))
+        for level in design.levels
+        for name in ("A", "B", "B - A, 95 % CI")
+    ]
+    scenes = max((cells[m, OVERALL]["n_clusters"] for m in {r[0] for r in rows}), default=0)
+    return TextTable(
+        "F1 in setting A (with orientation) and in setting B (without), in percent",
+        (Column("Model", is_text=True), *columns),
+        tuple(rows),
+        (
+            f"Matcher {design.matcher}; the difference is paired, its interval from resampling "
+            f"{scenes} base scenes.",
+        ),
+    )
