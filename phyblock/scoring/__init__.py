@@ -24,6 +24,17 @@ from phyblock.scoring.steps import (
     gated,
     placed_counts,
 )
+from phyblock.scoring.vqa import (
+    Accuracy,
+    Answered,
+    LetterRates,
+    MacroAccuracy,
+    chance,
+    circular,
+    letter_rates,
+    macro_accuracy,
+    subtask_accuracies,
+)
 
 __all__ = [
     "ERROR_TYPES",
@@ -32,6 +43,8 @@ __all__ = [
     "MATCHERS",
     "MOVE_OUTCOMES",
     "SETTINGS",
+    "Accuracy",
+    "Answered",
     "Assembly",
     "AssemblyScorer",
     "Counts",
@@ -39,7 +52,9 @@ __all__ = [
     "ErrorType",
     "Gating",
     "Goal",
+    "LetterRates",
     "Level1Criterion",
+    "MacroAccuracy",
     "Match",
     "Matcher",
     "Move",
@@ -47,11 +62,16 @@ __all__ = [
     "Score",
     "Setting",
     "attempted_counts",
+    "chance",
+    "circular",
     "count_errors",
     "gated",
+    "letter_rates",
     "level1_counts",
+    "macro_accuracy",
     "match_plan",
     "micro",
     "placed_counts",
     "step_errors",
+    "subtask_accuracies",
 ]

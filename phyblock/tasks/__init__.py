@@ -3,6 +3,7 @@
 from phyblock.tasks.full_planning import FullPlanning, PlanJudgement, PlanningRules
 from phyblock.tasks.pictures import PicturePolicy, Pictures
 from phyblock.tasks.prompts import OfficialPrompt, Prompt, TemplatePrompt
+from phyblock.tasks.studio import Drawing, Studio
 from phyblock.tasks.track import (
     AnyTrack,
     Episode,
@@ -16,6 +17,7 @@ from phyblock.tasks.track import (
 
 __all__ = [
     "AnyTrack",
+    "Drawing",
     "Episode",
     "EpisodeTrack",
     "FullPlanning",
@@ -29,6 +31,7 @@ __all__ = [
     "PlanningRules",
     "Prompt",
     "SingleTrack",
+    "Studio",
     "TemplatePrompt",
     "Track",
 ]

@@ -18,7 +18,8 @@ FRAGMENTS = st.sampled_from(
         "Answer", "Final answer", "answer is", "The answer is", "option", "Option ", "picture ",
         "not", "I choose", "is correct", "cube", "arch", "the", "\\boxed{", "}", "<answer>",
         "</answer>", '{"answer": "', '"}', "**", "*", "`", "wait", "so", "答案是", "选",
-        "Ответ:", "<think>",        "</think>", "→", "or", "and", "must be", "\x00", "\u2028", "Ｂ", "½", "I cannot", "<img2>",
+        "Ответ:", "<think>", "</think>", "→", "or", "and", "must be", "\x00", "\u2028", "Ｂ", "½",
+        "I cannot", "<img2>",
     ]
 )  # fmt: skip
 TEXTS = st.one_of(

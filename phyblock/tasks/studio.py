@@ -1,0 +1,186 @@
+"""Where pictures are made: worker processes, and a cache on disk by content."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import io
+import os
+import signal
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from multiprocessing import get_context, parent_process
+from pathlib import Path
+from typing import TypeVar
+
+from PIL import Image as PillowImage
+
+from phyblock.errors import Problem, SimulationError, StoreError
+from phyblock.files import atomic_write
+from phyblock.models.base import Image
+
+__all__ = ["Drawing", "Studio", "to_image"]
+
+_Result = TypeVar("_Result")
+_KEPT = 128
+"""Samples whose pictures stay in memory: more than are under way at once."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A picture to be made: what it shows, the digest of what decides it, and how to make it.
+
+    `make` runs in a worker process: a `partial` of a function of a module.
+    """
+
+    label: str
+    key: str
+    make: Callable[[], bytes]
+
+
+class Studio:
+    """Makes pictures once and keeps them in `folder` by content.
+
+    `workers` processes render; they start with the first picture that is not in the cache.
+    `rendered` counts the files made in this object's lifetime.
+    """
+
+    def __init__(self, folder: Path, workers: int) -> None:
+        self.rendered = 0
+        self._folder = folder
+        self._workers = workers
+        self._pool: ProcessPoolExecutor | None = None
+        self._making: dict[str, asyncio.Task[bytes]] = {}
+        self._recent: OrderedDict[str, tuple[Image, ...]] = OrderedDict()
+
+    def recalled(self, name: str) -> tuple[Image, ...] | None:
+        """Pictures that are still in memory under a name."""
+        if name in self._recent:
+            self._recent.move_to_end(name)
+        return self._recent.get(name)
+
+    def remembered(self, name: str, images: tuple[Image, ...]) -> tuple[Image, ...]:
+        """The pictures, now in memory under a name; those unused for longest make room."""
+        self._recent[name] = images
+        if len(self._recent) > _KEPT:
+            self._recent.popitem(last=False)
+        return images
+
+    async def images(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
+        """Pictures from the cache or made now, at the same time; raises as `image`."""
+        return tuple(await asyncio.gather(*(self.image(drawing) for drawing in drawings)))
+
+    def outlined(
+        self, drawings: Sequence[Drawing], size_px: tuple[int, int]
+    ) -> tuple[tuple[Image, ...], bool]:
+        """Pictures as far as they are at hand, and whether all are; nothing is rendered.
+
+        Where one is not made yet, empty ones of `size_px` stand in for all.
+        """
+        kept = [image for drawing in drawings if (image := self.kept(drawing)) is not None]
+        if len(kept) == len(drawings):
+            return tuple(kept), True
+        return tuple(Image(b"", drawing.label, *size_px) for drawing in drawings), False
+
+    def kept(self, drawing: Drawing) -> Image | None:
+        """A picture from the cache, or None where it is not there."""
+        data = _whole_png(self._path(drawing.key))
+        return None if data is None else to_image(data, drawing.label)
+
+    async def image(self, drawing: Drawing) -> Image:
+        """A picture from the cache, or made now.
+
+        Raises StoreError when the cache folder cannot be written, SimulationError when a worker
+        was killed.
+        """
+        path = self._path(drawing.key)
+        if (kept := self.kept(drawing)) is not None:
+            return kept
+        if drawing.key not in self._making:
+            self._making[drawing.key] = asyncio.create_task(self._draw(path, drawing))
+            self._making[drawing.key].add_done_callback(_take_note)
+        # Shielded: others may wait for the same picture when one waiter is cancelled.
+        return to_image(await asyncio.shield(self._making[drawing.key]), drawing.label)
+
+    async def _draw(self, path: Path, drawing: Drawing) -> bytes:
+        try:
+            data = await self.work_out(drawing.make)
+            self.rendered += 1
+            path.parent.mkdir(parents=True, exist_ok=True)
+            atomic_write(path, data)
+        except OSError as error:
+            hint = "name another cache folder with PHYBLOCK_CACHE"
+            problem = Problem(str(path), f"cannot be written: {error.strerror}", hint=hint)
+            raise StoreError(problem) from error
+        finally:
+            del self._making[drawing.key]
+        return data
+
+    async def work_out(self, work: Callable[[], _Result]) -> _Result:
+        """What `work`, a `partial` of a function of a module, gives in a worker process."""
+        if self._pool is None:
+            self._pool = ProcessPoolExecutor(
+                self._workers, get_context("spawn"), initializer=_start_worker
+            )
+        try:
+            with _workers_without_interrupts():
+                done = asyncio.get_running_loop().run_in_executor(self._pool, work)
+            return await done
+        except BrokenProcessPool as error:
+            raise SimulationError("a process that draws pictures was killed") from error
+
+    def _path(self, key: str) -> Path:
+        return self._folder / key[:2] / f"{key}.png"
+
+    def close(self) -> None:
+        """Stop the worker processes."""
+        if self._pool is not None:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+            self._pool = None
+
+
+@contextlib.contextmanager
+def _workers_without_interrupts() -> Iterator[None]:
+    """Processes that start here never see Ctrl-C, not even while they import."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _take_note(drawn: asyncio.Task[bytes]) -> None:
+    # Of a failure that every waiter was cancelled before: asyncio would print it otherwise.
+    if not drawn.cancelled():
+        drawn.exception()
+
+
+def to_image(data: bytes, label: str) -> Image:
+    """An encoded picture as it is sent."""
+    with PillowImage.open(io.BytesIO(data)) as picture:
+        return Image(data, label, *picture.size)
+
+
+def _whole_png(path: Path) -> bytes | None:
+    """The bytes of a picture in the cache; None when it is not there, or not whole."""
+    data = path.read_bytes() if path.is_file() else b""
+    is_whole = data.startswith(b"\x89PNG\r\n\x1a\n") and data.endswith(b"IEND\xaeB`\x82")
+    return data if is_whole else None
+
+
+def _start_worker() -> None:
+    # Ctrl-C reaches the whole process group; only the runner decides what to do about it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """A runner that is killed tells its workers nothing: without this they would stay for ever."""
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
