@@ -90,11 +90,12 @@ class TemplatePrompt:
         self, pictures: Sequence[Image], facts: Mapping[str, object]
     ) -> tuple[Message, ...]:
         """A system message, when that block gives text, and a user message with the pictures."""
-        texts = {name: self._render(name, facts) for name in _BLOCKS}
+        texts = {name: self.text(name, facts) for name in _BLOCKS}
         system = (Message("system", (texts["system"],)),) if texts["system"] else ()
         return (*system, Message("user", (*pictures, texts["user"])))
 
-    def _render(self, block: str, facts: Mapping[str, object]) -> str:
+    def text(self, block: str, facts: Mapping[str, object]) -> str:
+        """What a block of the template says, "" for one that it lacks; raises PromptError."""
         if block not in self._template.blocks:
             return ""
         context = self._template.new_context(dict(facts))
