@@ -101,7 +101,7 @@ def _overall(errors: TextTable) -> TextTable:
 
 def _answered(coverage: TextTable) -> TextTable:
     """Samples and the outcomes that occurred; tokens and costs stay in the file."""
-    always = ("Model", "Expected", "OK")
+    always = ("Model", "Track", "Expected", "OK")
     told = ("Not run", *HEADINGS.values())
     dropped = tuple(
         column.name

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pandas as pd
 
-from phyblock.report.design import OVERALL
 from phyblock.report.load import Run
 from phyblock.report.outcomes import OUTCOMES
 
@@ -13,8 +12,9 @@ __all__ = ["coverage_frame"]
 _TOKENS = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
 _COUNTS = ("recorded", *OUTCOMES, "replies", "tokens_unknown", "cost_unknown", "cached", "attempts")
 
+_ROW = ["model", "track"]
 _COLUMNS = (
-    "model",
+    *_ROW,
     "expected",
     "recorded",
     "not_run",
@@ -31,7 +31,7 @@ _COLUMNS = (
 
 
 def coverage_frame(run: Run) -> pd.DataFrame:
-    """One row a model, over all assembly tracks.
+    """One row a model and track.
 
     `expected` samples are `recorded` + `not_run`; the outcomes split `recorded`. Of the `replies`
     (samples that hold one): token sums of those that tell, with `tokens_unknown` that do not;
@@ -40,12 +40,12 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     `latency_s` the mean over replies for which a request was sent, so neither `cached` ones nor
     recordings; `attempts` the sum of requests sent for them, not for samples without a reply.
     """
-    records = run.records[run.records["track"].isin(run.design.tracks)]
+    records = run.records[run.records["track"].isin(run.design.suite.tracks)]
     replied = records["finish"].notna()
     cached = records["cached"].fillna(False).astype("bool")
     paid = replied & ~cached
     attempts = records["attempts"].fillna(0).astype("int64")
-    facts = records[["model", *_TOKENS]].assign(
+    facts = records[[*_ROW, *_TOKENS]].assign(
         recorded=1,
         **{name: (records["outcome"] == name).astype("int64") for name in OUTCOMES},
         replies=replied.astype("int64"),
@@ -56,14 +56,19 @@ def coverage_frame(run: Run) -> pd.DataFrame:
         attempts=attempts,
         latency_s=records["latency_s"].where(attempts > 0),
     )
-    groups = facts.groupby("model")
+    groups = facts.groupby(_ROW)
     sums = groups[list(_COUNTS)].sum()
     known = groups[[*_TOKENS, "cost_usd"]].sum(min_count=1)
-    table = pd.DataFrame({"model": list(run.design.model_names)})
-    table["expected"] = run.design.expected(OVERALL) * len(run.design.tracks)
-    table = table.join(sums, on="model").join(known, on="model")
+    design = run.design
+    rows = [
+        (model, track, design.samples(track))
+        for model in design.model_names
+        for track in design.suite.tracks
+    ]
+    table = pd.DataFrame(rows, columns=[*_ROW, "expected"])
+    table = table.join(sums, on=_ROW).join(known, on=_ROW)
+    table = table.join(groups["latency_s"].mean(), on=_ROW)
     table[list(_COUNTS)] = table[list(_COUNTS)].fillna(0).astype("int64")
     table.loc[(table["replies"] > 0) & (table["replies"] == table["cached"]), "cost_usd"] = 0.0
     table["not_run"] = table["expected"] - table["recorded"]
-    table["latency_s"] = table["model"].map(groups["latency_s"].mean())
     return table[list(_COLUMNS)]

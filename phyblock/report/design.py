@@ -39,7 +39,7 @@ class _Suite(_Part):
     settings: tuple[str, ...] = Field(min_length=1)
     seeds: tuple[int, ...] = Field(min_length=1)
     scoring: _Scoring
-    tables: tuple[str, ...] = ("assembly", "table1", "errors", "published")
+    tables: tuple[str, ...] = ("assembly", "table1", "table2", "table3", "errors", "published")
 
 
 class _Model(_Part):
@@ -50,12 +50,14 @@ class _Model(_Part):
 class Design(_Part):
     """The plan of a run as its `run.yaml` states it; the rows and columns of every table.
 
-    `scenes_by_level` counts the scenes of each level (one scene may be of several), `scenes` all
-    distinct ones. The first matcher and the first setting are the headline.
+    `items` counts what each track asks about; `scenes_by_level` counts the scenes of each level
+    (one scene may be of several), `scenes` all distinct ones. The first matcher and the first
+    setting are the headline.
     """
 
     suite: _Suite
     models: tuple[_Model, ...]
+    items: dict[str, int]
     scenes_by_level: dict[int, int]
     scenes: int
 
@@ -81,6 +83,10 @@ class Design(_Part):
     def tracks(self) -> tuple[str, ...]:
         """The assembly tracks of the suite."""
         return tuple(track for track in self.suite.tracks if track in ASSEMBLY_TRACKS)
+
+    def samples(self, track: str) -> int:
+        """Samples that a complete run holds of one model in a track."""
+        return self.items.get(track, 0) * len(self.suite.seeds)
 
     @property
     def levels(self) -> tuple[str, ...]:

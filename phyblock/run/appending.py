@@ -19,7 +19,7 @@ __all__ = ["AppendFile"]
 class AppendFile:
     """Lines that are on disk when `append` returns; safe to call from several threads.
 
-    Raises OSError when the file cannot be opened.
+    The file is made with the first line.
     """
 
     def __init__(self, path: Path, *, sync: bool = True) -> None:
@@ -27,8 +27,7 @@ class AppendFile:
         self._path = path
         self._sync = sync
         self._writing = threading.Lock()
-        # Unbuffered: a write that failed must not be tried again behind our back.
-        self._file: FileIO | None = FileIO(path, "a")
+        self._file: FileIO | None = None
 
     def append(self, lines: Iterable[Mapping[str, Any]]) -> None:
         """Write objects, a line each, and wait until they are on disk.
@@ -41,8 +40,8 @@ class AppendFile:
 
     def end_line(self) -> None:
         """Write the newline that the last line lacks."""
-        assert self._file is not None
-        self._file.write(b"\n")
+        with FileIO(self._path, "a") as file:
+            file.write(b"\n")
 
     def close(self) -> None:
         """Close the file, once what is being written is written."""
@@ -52,9 +51,12 @@ class AppendFile:
                 self._file = None
 
     def _append(self, data: bytes) -> None:
-        assert self._file is not None, "the file is closed"
-        size = self._file.seek(0, os.SEEK_END)
+        size = 0
         try:
+            if self._file is None:
+                # Unbuffered: a write that failed must not be tried again behind our back.
+                self._file = FileIO(self._path, "a")
+            size = self._file.seek(0, os.SEEK_END)
             written = 0
             while written < len(data):
                 written += self._file.write(data[written:])
@@ -62,8 +64,9 @@ class AppendFile:
                 os.fsync(self._file.fileno())
         except OSError as error:
             # Where even this fails, what is left is an unfinished line: the next start drops it.
-            with contextlib.suppress(OSError):
-                self._file.truncate(size)
+            if self._file is not None:
+                with contextlib.suppress(OSError):
+                    self._file.truncate(size)
             hint = "free some space and give the same command again: it goes on from here"
             problem = Problem(str(self._path), f"cannot be written: {error.strerror}", hint=hint)
             raise StoreError(problem) from error

@@ -50,6 +50,7 @@ def make_manifest(
         **inputs,
         "suite": suite.model_dump(mode="json"),
         "dataset": {**inputs["dataset"], "format": suite.dataset.format, "root": str(dataset.root)},
+        "items": {track.name: len(track.items) for track in tracks},
         "scenes": len(scenes),
         "scenes_by_level": {
             level: sum(level in scene.levels for scene in scenes) for level in suite.levels

@@ -37,7 +37,8 @@ def rescore(
     """Score a run again, with another parser or headline matcher, into a run folder of its own.
 
     The new folder (`<run>/scores/<parser>-<matcher>` when `out` is None) holds a manifest and
-    records like any run, so that tables and notebooks read it. `data` is where the data set is now,
+    records like any run, so that tables and notebooks read it. Parser and matcher are those of
+    plans: records of other tracks are taken over as they are. `data` is where the data set is now,
     if it has moved. Raises StoreError for a folder that is no run or cannot be written, DataError
     when the data set is not what the run was made on.
     """
@@ -47,6 +48,9 @@ def rescore(
     track = FullPlanning(planning_rules(suite))
     records = []
     for record in read_records(folder).values():
+        if record["track"] != track.name:
+            records.append(record)
+            continue
         task = tasks.get(record["scene"])
         if task is None:
             where, hint = str(folder / RECORDS), "the file was changed: restore it from a copy"
