@@ -1,0 +1,111 @@
+"""The files of a run folder: appended whole, read whole, each prompt once."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.errors import StoreError
+from phyblock.models import Image, Message
+from phyblock.run.appending import AppendFile
+from phyblock.run.prompts import PromptFile, PromptLines, read_prompts
+from phyblock.run.reading import TurnLines, read_turns
+from tests.workspace import Workspace
+
+REPLY = {
+    "text": "Move(1)",
+    "usage": {"prompt_tokens": 1, "completion_tokens": None},
+    "cost_usd": None,
+    "cached": False,
+}
+values = st.dictionaries(st.text(max_size=5), st.text(max_size=5) | st.integers(), max_size=4)
+
+
+@given(st.lists(st.lists(values, max_size=3), max_size=5))
+def test_what_is_appended_is_what_is_read(
+    tmp_path_factory: pytest.TempPathFactory, batches: list[list[dict[str, Any]]]
+) -> None:
+    path = tmp_path_factory.mktemp("files") / "lines.jsonl"
+    file = AppendFile(path)
+    for batch in batches:
+        file.append(batch)
+    file.close()
+    lines = path.read_bytes().splitlines() if path.exists() else []
+    assert [json.loads(line) for line in lines] == [line for batch in batches for line in batch]
+
+
+def test_a_full_disk_is_an_error_that_leaves_whole_lines() -> None:
+    file = AppendFile(Path("/dev/full"))
+    with pytest.raises(StoreError, match="No space left on device"):
+        file.append([{"a": 1}])
+    file.close()
+
+
+def turn_lines(folder: Path, *numbers: int) -> None:
+    lines = [{"sample": "s", "turn": n, "reply": {**REPLY, "text": f"Move({n})"}} for n in numbers]
+    text = "".join(json.dumps(line) + "\n" for line in lines)
+    (folder / "turns.jsonl").write_text(text, encoding="utf-8")
+
+
+def test_turns_are_read_in_their_order_and_a_later_line_counts(tmp_path: Path) -> None:
+    turn_lines(tmp_path, 0, 1, 0, 2)
+    assert [reply["text"] for reply in read_turns(tmp_path)["s"]] == [
+        "Move(0)",
+        "Move(1)",
+        "Move(2)",
+    ]
+
+
+def test_a_turn_that_is_missing_is_an_error_at_the_next(tmp_path: Path) -> None:
+    turn_lines(tmp_path, 0, 2)
+    with pytest.raises(StoreError, match="is turn 2 of a sample of which 1"):
+        read_turns(tmp_path)
+
+
+def test_a_turn_that_a_kill_cut_short_is_not_there(tmp_path: Path) -> None:
+    turn_lines(tmp_path, 0, 1)
+    path = tmp_path / "turns.jsonl"
+    path.write_bytes(path.read_bytes()[:-9])
+    lines = TurnLines(tmp_path)
+    assert len(list(lines)) == 1
+    assert lines.is_cut
+    assert len(read_turns(tmp_path)["s"]) == 1
+
+
+def test_a_prompt_is_kept_once_without_its_pictures(tmp_path: Path) -> None:
+    picture = Image(b"\x89PNG secret", "goal", 8, 8)
+    messages = (Message("system", ("Be brief.",)), Message("user", (picture, "Which?")))
+    path = tmp_path / "prompts.jsonl"
+    for _ in range(2):
+        known = PromptLines(tmp_path)
+        list(known)
+        file = AppendFile(path)
+        prompts = PromptFile(file, known.digests)
+        digests = {prompts.keep(messages) for _ in range(3)}
+        file.close()
+    (digest,) = digests
+    assert len(path.read_text(encoding="utf-8").splitlines()) == 1
+    assert "secret" not in path.read_text(encoding="utf-8")
+    assert read_prompts(tmp_path)[digest] == [
+        {"role": "system", "parts": ["Be brief."]},
+        {"role": "user", "parts": [{"image": "goal"}, "Which?"]},
+    ]
+
+
+def test_every_record_names_a_prompt_that_is_there(tmp_path: Path, pictures_dir: Path) -> None:
+    made = Workspace(tmp_path, pictures_dir)
+    made.write_scenes()
+    made.write_suite(models=["random", "oracle"])
+    assert made.run().code == 0
+    prompts = read_prompts(made.out)
+    assert {record["prompt"]["messages"] for record in made.records()} == set(prompts)
+    for digest, messages in prompts.items():
+        canonical = json.dumps(messages, sort_keys=True, separators=(",", ":"))
+        assert hashlib.sha256(canonical.encode()).hexdigest() == digest
+    assert not (made.out / "turns.jsonl").exists()
