@@ -1,0 +1,34 @@
+/* Small helpers. Every text goes in as a text node: nothing a model said is ever read as markup. */
+"use strict";
+
+/** An element with attributes (on* are listeners) and children; text stays text. */
+function el(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else made.setAttribute(name, value === true ? "" : value);
+  }
+  made.append(...children.flat().filter((child) => child !== null && child !== undefined));
+  return made;
+}
+
+const Words = (() => {
+  const names = {
+    full_planning: "Full planning", step_planning: "Step planning", vqa: "VQA",
+    ok: "OK", parse_failure: "Unparsed", refusal: "Refusal", truncated: "Truncated",
+    api_error: "API error", missing: "Missing",
+    shape_not_in_gt: "Shape not in GT", overflow: "Overflow",
+    incorrect_orientation: "Incorrect orientation", dependency_not_met: "Dependency not met",
+    invalid: "No such candidate", done: "Says it is done", placed: "Placed",
+    unreadable: "Unreadable", complete: "Complete",
+    semi_cylinder: "semi-cylinder",
+    cuboid1: "cuboid 1", cuboid2: "cuboid 2", cuboid3: "cuboid 3",
+  };
+  /** What people call a name of the data. */
+  const named = (name) => names[name] || String(name).replaceAll("_", " ");
+  const percent = (share) => (share === null || share === undefined ? "–" : (100 * share).toFixed(1));
+  const count = (n, noun) => `${n.toLocaleString("en")} ${noun}${n === 1 ? "" : "s"}`;
+  const block = (one) => `${one.color} ${named(one.type)}`;
+  return { named, percent, count, block };
+})();

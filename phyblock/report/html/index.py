@@ -1,0 +1,161 @@
+"""The index of all samples: what filters and the list need, as columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from phyblock.report.design import Design
+from phyblock.run.reading import RecordLines
+from phyblock.scoring import ERROR_TYPES
+
+__all__ = ["Item", "Place", "SampleIndex", "read_places"]
+
+
+class Place(NamedTuple):
+    """Where the newest record of a sample stands in `records.jsonl` [bytes], and what sorts it."""
+
+    track: str
+    key: str
+    model: str
+    seed: int
+    start: int
+
+
+class Item(NamedTuple):
+    """What samples of one track are about."""
+
+    track: str
+    key: str
+
+
+def read_places(folder: Path, design: Design) -> list[Place]:
+    """Every sample once: by track, item, then model in the suite's order, and seed.
+
+    Raises StoreError for a line that is no record.
+    """
+    lines = RecordLines(folder)
+    found: dict[str, Place] = {}
+    start = 0
+    for _, record in lines:
+        found[record["sample"]] = Place(
+            record["track"], item_key(record), record["model"], record["seed"], start
+        )
+        start = lines.whole_bytes
+    tracks = {name: n for n, name in enumerate(design.suite.tracks)}
+    models = {name: n for n, name in enumerate(design.model_names)}
+    return sorted(
+        found.values(),
+        key=lambda place: (
+            tracks.get(place.track, len(tracks)),
+            place.key,
+            models.get(place.model, len(models)),
+            place.model,
+            place.seed,
+        ),
+    )
+
+
+def item_key(record: Mapping[str, Any]) -> str:
+    """The name of a record's item inside its track; of older records, that of the scene."""
+    return str(record.get("key", record["scene"]))
+
+
+@dataclass
+class _Names:
+    """Distinct values in the order they came, by number."""
+
+    numbers: dict[Any, int] = field(default_factory=dict)
+
+    def number(self, value: Any) -> int:
+        return self.numbers.setdefault(value, len(self.numbers))
+
+    @property
+    def values(self) -> list[Any]:
+        return list(self.numbers)
+
+
+class SampleIndex:
+    """Columns over all samples, and over the items that they are about."""
+
+    def __init__(self, design: Design) -> None:
+        self._design = design
+        self.scenes = _Names()
+        self._items = _Names()
+        self._tracks, self._models, self._outcomes = _Names(), _Names(), _Names()
+        self._subtasks = _Names()
+        self._seeds: set[int] = set()
+        self._about: dict[str, list[Any]] = {"scene": [], "levels": [], "subtask": []}
+        names = ("track", "model", "item", "seed", "outcome", "correct")
+        self._rows: dict[str, list[Any]] = {name: [] for name in names}
+        self._scores: dict[str, dict[str, list[int | None]]] = {
+            setting: {name: [] for name in ("tp", "fp", "fn", "wrong")}
+            for setting in design.suite.settings
+        }
+
+    @property
+    def items(self) -> list[Item]:
+        """The items in the order of their numbers."""
+        return self._items.values
+
+    def add(self, record: Mapping[str, Any]) -> None:
+        """Append the sample of a record."""
+        item = Item(record["track"], item_key(record))
+        if item not in self._items.numbers:
+            self._add_item(record)
+        answer = record.get("answer")
+        self._seeds.add(record["seed"])
+        row = {
+            "track": self._tracks.number(record["track"]),
+            "model": self._models.number(record["model"]),
+            "item": self._items.number(item),
+            "seed": record["seed"],
+            "outcome": self._outcomes.number(record["outcome"]),
+            "correct": None if answer is None else int(answer["correct"]),
+        }
+        for name, value in row.items():
+            self._rows[name].append(value)
+        for setting, columns in self._scores.items():
+            for name, value in self._score(record, setting).items():
+                columns[name].append(value)
+
+    def _add_item(self, record: Mapping[str, Any]) -> None:
+        question = record.get("question") or {}
+        subtask = question.get("subtask")
+        self._about["scene"].append(self.scenes.number(record["scene"]))
+        self._about["levels"].append(record["levels"])
+        self._about["subtask"].append(None if subtask is None else self._subtasks.number(subtask))
+
+    def _score(self, record: Mapping[str, Any], setting: str) -> dict[str, int | None]:
+        """Counts under a setting by the headline matcher, and a bit for each type of wrong step."""
+        scores = [score for score in record["scores"] if score["setting"] == setting]
+        headline = [score for score in scores if score.get("matcher") == self._design.matcher]
+        for score in headline or scores:
+            errors = score.get("errors") or {}
+            wrong = sum(1 << n for n, name in enumerate(ERROR_TYPES) if errors.get(name))
+            return {**{name: score[name] for name in ("tp", "fp", "fn")}, "wrong": wrong}
+        return dict.fromkeys(("tp", "fp", "fn", "wrong"))
+
+    def columns(self, questions: Mapping[Item, int]) -> dict[str, Any]:
+        """The index as the page takes it; `questions` numbers the items that have a question."""
+        items = self.items
+        return {
+            "tracks": self._tracks.values,
+            "models": self._models.values,
+            "outcomes": self._outcomes.values,
+            "subtasks": self._subtasks.values,
+            "scenes": self.scenes.values,
+            "seeds": sorted(self._seeds),
+            "settings": list(self._scores),
+            "matcher": self._design.matcher,
+            "error_types": list(ERROR_TYPES),
+            "items": {
+                "key": [item.key for item in items],
+                **self._about,
+                "question": [questions.get(item, -1) for item in items],
+            },
+            "rows": {**self._rows, "scores": self._scores},
+        }
+

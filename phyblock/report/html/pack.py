@@ -1,0 +1,69 @@
+"""Data as scripts: a page that was opened from disk may load scripts, but not fetch files.
+
+A script calls `phyblockTake(build, name, text)` with its data as JSON text. Text it stays until
+the page parses it, so nothing that a model said is ever read as code.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+__all__ = ["Pack", "write_script"]
+
+_CHUNK_CHARACTERS = 300_000
+_IN_QUOTES = str.maketrans({"\\": "\\\\", "'": "\\'"})
+
+
+class Pack:
+    """Entries of one kind in numbered scripts of about 300 kB, written as they fill.
+
+    `starts` holds the number of the first entry of every script.
+    """
+
+    def __init__(self, folder: Path, kind: str, build: str) -> None:
+        self.starts: list[int] = []
+        self._folder = folder
+        self._kind = kind
+        self._build = build
+        self._entries: list[str] = []
+        self._size = 0
+        self._count = 0
+
+    def add(self, entry: object) -> int:
+        """Append an entry and say its number; raises OSError where the disk refuses."""
+        text = _to_json(entry)
+        if self._entries and self._size + len(text) > _CHUNK_CHARACTERS:
+            self._flush()
+        self._entries.append(text)
+        self._size += len(text)
+        self._count += 1
+        return self._count - 1
+
+    def close(self) -> None:
+        """Write what is left."""
+        if self._entries:
+            self._flush()
+
+    def _flush(self) -> None:
+        name = f"{self._kind}-{len(self.starts)}"
+        _write(self._folder, name, self._build, f"[{','.join(self._entries)}]")
+        self.starts.append(self._count - len(self._entries))
+        self._entries, self._size = [], 0
+
+
+def write_script(folder: Path, name: str, build: str, data: Mapping[str, object]) -> None:
+    """Write one object as the script `<name>.js`; raises OSError where the disk refuses."""
+    _write(folder, name, build, _to_json(data))
+
+
+def _to_json(data: object) -> str:
+    # ASCII: a page from disk has no header that tells an encoding, and lone surrogates survive.
+    return json.dumps(data, ensure_ascii=True, separators=(",", ":"), allow_nan=False)
+
+
+def _write(folder: Path, name: str, build: str, text: str) -> None:
+    quoted = text.translate(_IN_QUOTES)
+    script = f"phyblockTake('{build}','{name}','{quoted}')\n"
+    (folder / f"{name}.js").write_text(script, encoding="ascii")

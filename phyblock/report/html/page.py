@@ -1,0 +1,102 @@
+"""The page itself: a template filled in, with style and scripts of its own inside."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+
+from phyblock.report.html.headline import Headline
+from phyblock.report.text_table import Column, TextTable
+
+__all__ = ["Figure", "render_page"]
+
+_SCRIPTS = (
+    *("dom.js", "data.js", "solid.js", "list.js", "steps.js", "stage.js", "detail.js"),
+    *("tracks.js", "app.js"),
+)
+_STYLES = ("base.css", "results.css", "samples.css")
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture beside the page: its address seen from there, and what it shows."""
+
+    address: str
+    title: str
+
+
+def render_page(
+    *,
+    about: Mapping[str, Any],
+    headlines: Sequence[Headline],
+    figures: Sequence[Figure],
+    tables: Sequence[TextTable],
+    folder: str,
+    build: str,
+) -> str:
+    """HTML of the report; every text is escaped, and only scripts of our own may run.
+
+    `about` says what the run was (title, facts: pairs of name and text); `folder` is where the
+    page finds its data.
+    """
+    environment = jinja2.Environment(
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    script = "\n".join(_asset(name) for name in _SCRIPTS)
+    style = "\n".join(_asset(name) for name in _STYLES)
+    template = environment.from_string(_asset("page.html.j2"))
+    return template.render(
+        about=about,
+        headlines=headlines,
+        figures=figures,
+        tables=[(table, _groups(table.columns)) for table in tables],
+        folder=folder,
+        build=build,
+        script=script,
+        style=style,
+        policy=_policy(script, style),
+    )
+
+
+def _policy(script: str, style: str) -> str:
+    """Content security: what is in the page by its digest, data and pictures from beside it."""
+    return "; ".join(
+        [
+            "default-src 'none'",
+            f"script-src '{_digest(script)}' 'self'",
+            f"style-src '{_digest(style)}'",
+            "img-src 'self'",
+            "base-uri 'none'",
+            "form-action 'none'",
+        ]
+    )
+
+
+def _digest(text: str) -> str:
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+
+
+def _asset(name: str) -> str:
+    return (files("phyblock.report.html") / "assets" / name).read_text(encoding="utf-8")
+
+
+def _groups(columns: Sequence[Column]) -> list[tuple[str, int]]:
+    """Group headings with how many neighboring columns each spans; [] where there is none."""
+    if not any(column.group for column in columns):
+        return []
+    spans: list[tuple[str, int]] = []
+    for column in columns:
+        if spans and spans[-1][0] == column.group:
+            spans[-1] = (column.group, spans[-1][1] + 1)
+        else:
+            spans.append((column.group, 1))
+    return spans

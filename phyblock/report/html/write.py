@@ -1,0 +1,129 @@
+"""Writing the report of a run: the page, and the folder of data beside it."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+from phyblock.errors import Problem, StoreError
+from phyblock.files import atomic_write
+from phyblock.report.html.drawable import kit, scene_entry
+from phyblock.report.html.headline import assembly_headline
+from phyblock.report.html.index import Item, SampleIndex, read_places
+from phyblock.report.html.pack import Pack, write_script
+from phyblock.report.html.page import Figure, render_page
+from phyblock.report.html.samples import pack_prompts, pack_samples, pictures_sent
+from phyblock.report.html.sent import keep_pictures
+from phyblock.report.html.sources import Sources, open_sources
+from phyblock.report.load import Run
+from phyblock.report.write import TablesWritten
+
+__all__ = ["REPORT_FILE", "write_report"]
+
+REPORT_FILE = "report.html"
+_FOLDER = "report"
+_PICTURES = "pictures"
+_TABLES = ("errors", "published", "coverage")
+
+
+def write_report(written: TablesWritten, data: Path | None = None) -> Path:
+    """Write `report.html` and `report/` of a run whose tables were written; the page's path.
+
+    Goals, candidates and assemblies are drawn by the page from the scenes: `data` is where the
+    data set is now, if it has moved; where it cannot be read, the page says so and shows the rest.
+    Pictures that were sent lie beside the page as far as the picture cache has them. Raises
+    DataError for a `data` that is not what the run was made on, StoreError where the folder cannot
+    be written.
+    """
+    run = written.run
+    sources = open_sources(run.manifest, run.design, data)
+    path = run.path / REPORT_FILE
+    build = uuid4().hex[:12]
+    folder = run.path / _FOLDER
+    with _as_store_error(path):
+        (folder / build).mkdir(parents=True)
+        _write_data(run, sources, folder, build)
+        atomic_write(path, _page(written, build))
+        # A page of an earlier build that is still open says that it was written again.
+        for old in folder.iterdir():
+            if old.name not in (build, _PICTURES):
+                shutil.rmtree(old)
+    return path
+
+
+def _write_data(run: Run, sources: Sources, folder: Path, build: str) -> None:
+    kinds = ("records", "scenes", "questions", "prompts")
+    packs = {kind: Pack(folder / build, kind, build) for kind in kinds}
+    places = read_places(run.path, run.design)
+    sent: dict[str, str] = {}
+    if sources.tasks and pictures_sent(run.path, places):
+        sent = keep_pictures(folder / _PICTURES, run.manifest["suite"], sources.tasks.values())
+    addresses = {digest: f"{_FOLDER}/{_PICTURES}/{name}" for digest, name in sent.items()}
+    prompts = pack_prompts(run.path, packs["prompts"])
+    index = SampleIndex(run.design)
+    pack_samples(run.path, places, index, packs["records"], prompts, addresses)
+    questions: dict[Item, int] = {}
+    for scene in index.scenes.values if sources.tasks else ():
+        task = sources.tasks[scene]
+        packs["scenes"].add(scene_entry(task.scene, task.candidates))
+    for pack in packs.values():
+        pack.close()
+    content: dict[str, Any] = {
+        **index.columns(questions),
+        "starts": {kind: pack.starts for kind, pack in packs.items()},
+        "kit": kit(),
+        "no_scenes": sources.lacking,
+        "subtask_names": {},
+    }
+    write_script(folder / build, "index", build, content)
+
+
+def _page(written: TablesWritten, build: str) -> str:
+    run = written.run
+    headline = assembly_headline(run)
+    return render_page(
+        about=_about(run),
+        headlines=[headline] if headline else [],
+        figures=_figures(run.path),
+        tables=[written.views[name] for name in _TABLES if name in written.views],
+        folder=f"{_FOLDER}/{build}",
+        build=build,
+    )
+
+
+def _about(run: Run) -> dict[str, Any]:
+    manifest, design = run.manifest, run.design
+    suite = manifest["suite"]
+    versions = manifest.get("versions") or {}
+    facts = {
+        "Data": (manifest.get("dataset") or {}).get("name"),
+        "Scenes": f"{design.scenes:,}",
+        "Models": f"{len(design.model_names)}",
+        "Seeds": f"{len(design.suite.seeds)}",
+        "Samples": f"{len(run.records):,}",
+        "Made": str(manifest.get("created", ""))[:10],
+        "phyblock": versions.get("phyblock"),
+        "Run": str(manifest["identity"])[:12],
+    }
+    return {
+        "title": design.suite.name or run.path.name,
+        "description": suite.get("description") or "",
+        "facts": [(name, text) for name, text in facts.items() if text],
+    }
+
+
+def _figures(folder: Path) -> list[Figure]:
+    found = sorted((folder / "figures").glob("*.svg"))
+    return [Figure(f"figures/{path.name}", path.stem.replace("-", " ")) for path in found]
+
+
+@contextlib.contextmanager
+def _as_store_error(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise StoreError(Problem(str(path), f"cannot be written: {error.strerror}")) from error
