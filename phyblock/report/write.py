@@ -13,17 +13,19 @@ from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
 from phyblock.report.assembly import assembly_frame, table1_frame
 from phyblock.report.comparison import published_frame
+from phyblock.report.cost import cost_frame, cost_view
 from phyblock.report.coverage import coverage_frame
 from phyblock.report.errors import errors_frame
 from phyblock.report.latex import to_latex
 from phyblock.report.load import Run, load_run
 from phyblock.report.markdown import to_markdown
+from phyblock.report.seeds import intervals_table, intervals_view, table5_frame, table5_view
+from phyblock.report.settings import settings_frame, settings_view
 from phyblock.report.text_table import TextTable
 from phyblock.report.views import coverage_view, errors_view, published_view, table1_view
 
 __all__ = ["TablesWritten", "write_tables"]
 
-_IN_LATEX = ("table1", "errors")
 _View = Callable[[pd.DataFrame, Run], TextTable]
 
 
@@ -32,7 +34,8 @@ class TablesWritten:
     """What `write_tables` made.
 
     `frames` and `views` (as text, ready to print) go by table name: those of assembly (frame
-    only), table1, errors and published that were asked for, and coverage in any case.
+    only), table1, errors and published that were asked for, and coverage in any case; with table1
+    come intervals, table5 (of several seeds) and settings (of both settings), with coverage cost.
     """
 
     folder: Path
@@ -52,11 +55,7 @@ def write_tables(path: str | Path, tables: Sequence[str] | None = None) -> Table
     frames, views = _tables(run, run.design.suite.tables if tables is None else tables)
     texts = {f"{name}.csv": _csv(frame, name) for name, frame in frames.items()}
     texts |= {f"{name}.md": to_markdown(view) for name, view in views.items()}
-    texts |= {
-        f"{name}.tex": to_latex(view, f"phyblock-{name}")
-        for name, view in views.items()
-        if name in _IN_LATEX
-    }
+    texts |= {f"{name}.tex": to_latex(view, f"phyblock-{name}") for name, view in views.items()}
     folder = run.path / "tables"
     with _as_store_error(folder):
         folder.mkdir(exist_ok=True)
@@ -65,20 +64,47 @@ def write_tables(path: str | Path, tables: Sequence[str] | None = None) -> Table
     return TablesWritten(folder, tuple(folder / name for name in texts), frames, views, run)
 
 
-_MAKERS: dict[str, tuple[Callable[[Run], pd.DataFrame], _View | None]] = {
-    "assembly": (assembly_frame, None),
-    "table1": (table1_frame, table1_view),
-    "errors": (errors_frame, errors_view),
-    "coverage": (coverage_frame, coverage_view),
-    "published": (published_frame, published_view),
+@dataclass(frozen=True)
+class _Maker:
+    """How a table is made; `track` is the one it needs, "" where it takes any.
+
+    `comes_with` names the table that it accompanies, where it has rows at all.
+    """
+
+    frame: Callable[[Run], pd.DataFrame]
+    view: _View | None
+    track: str = ""
+    comes_with: str = ""
+
+
+_MAKERS: dict[str, _Maker] = {
+    "assembly": _Maker(assembly_frame, None, "full_planning"),
+    "table1": _Maker(table1_frame, table1_view, "full_planning"),
+    "intervals": _Maker(intervals_table, intervals_view, "full_planning", "table1"),
+    "table5": _Maker(table5_frame, table5_view, "full_planning", "table1"),
+    "settings": _Maker(settings_frame, settings_view, "full_planning", "table1"),
+    "errors": _Maker(errors_frame, errors_view, "full_planning"),
+    "coverage": _Maker(coverage_frame, coverage_view),
+    "cost": _Maker(cost_frame, cost_view, "", "coverage"),
+    "published": _Maker(published_frame, published_view, "full_planning"),
 }
 
 
 def _tables(run: Run, names: Sequence[str]) -> tuple[dict[str, pd.DataFrame], dict[str, TextTable]]:
     wanted = {"coverage", *names}
-    makers = {name: maker for name, maker in _MAKERS.items() if name in wanted}
-    frames = {name: frame(run) for name, (frame, _) in makers.items()}
-    views = {name: view(frames[name], run) for name, (_, view) in makers.items() if view}
+    tracks = ("", *run.design.suite.tracks)
+    makers = {
+        name: maker
+        for name, maker in _MAKERS.items()
+        if maker.track in tracks and (name in wanted or maker.comes_with in wanted)
+    }
+    frames = {name: maker.frame(run) for name, maker in makers.items()}
+    frames = {name: frame for name, frame in frames.items() if name in wanted or len(frame)}
+    views = {
+        name: maker.view(frames[name], run)
+        for name, maker in makers.items()
+        if maker.view and name in frames
+    }
     return frames, views
 
 

@@ -107,13 +107,17 @@ def bootstrap(
     one cell from another is a paired comparison. Percentiles are widened for few clusters
     (Hesterberg, *What teachers should know about the bootstrap*, The American Statistician 69,
     2015), so that the interval of a mean is as wide as Student's. `n_clusters`, of the result's
-    shape, says how many clusters are behind each value where some cells lack units.
+    shape, says how many clusters are behind each value where some cells lack units. Without units
+    there is no value.
     """
     given = np.asarray(counts, dtype=np.float64)
     value = _measure(metric, given.sum(axis=0))
     behind = np.broadcast_to(
         np.asarray(clusters.size if n_clusters is None else n_clusters, dtype=np.intp), value.shape
     )
+    if not len(given):
+        none = np.full(value.shape, np.nan)
+        return Estimate(none, none, none, none, none, behind)
     flat = given.reshape(len(given), -1)
     draws = np.concatenate(
         [

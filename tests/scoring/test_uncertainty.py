@@ -131,6 +131,12 @@ def test_no_interval_comes_from_a_single_base_scene() -> None:
     assert found.n_clusters == 1
 
 
+def test_nothing_measured_is_no_value() -> None:
+    found = bootstrap(np.zeros((0, 2, 3)), Clusters.of([]), f1_of, rng())
+    assert found.value.shape == (2,)
+    assert np.isnan([found.value, found.se, found.lo, found.hi, found.p]).all()
+
+
 def test_a_unit_without_a_base_scene_is_refused() -> None:
     with pytest.raises(ValueError, match="needs a base scene"):
         Clusters.of([["a"], []])

@@ -1,0 +1,43 @@
+"""`phyblock compare`: models on the same samples, and whether their difference can be told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from phyblock.cli.console import make_console, print_view, shown_path
+from phyblock.cli.names import split_names
+from phyblock.report.compare import compare_models, compare_runs
+from phyblock.report.compare_view import compare_view, flipped_lines, write_comparison
+from phyblock.report.load import load_run
+
+__all__ = ["command"]
+
+
+@click.command("compare")
+@click.argument("run", type=click.Path(path_type=Path))
+@click.argument("other", type=click.Path(path_type=Path), required=False)
+@click.option("--models", metavar="A,B", help="Only these models; of two runs, A of the first.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for CSV, Markdown and LaTeX.")
+def command(run: Path, other: Path | None, models: str | None, out: Path | None) -> None:
+    """Compare the models of the folder RUN with one another, or those of RUN with OTHER's.
+
+    Pairs of samples of the same scene and seed; intervals from resampling base scenes; p values
+    with Holm's correction.
+    """
+    names = split_names(models)
+    first = load_run(run, texts=False)
+    found = (
+        compare_models(first, names)
+        if other is None
+        else compare_runs(first, load_run(other, texts=False), names)
+    )
+    console = make_console()
+    print_view(console, compare_view(found))
+    if found.table[["a", "b"]].drop_duplicates().shape[0] == 1:
+        for line in flipped_lines(found):
+            console.print(line, markup=False, soft_wrap=True)
+    if out is not None:
+        write_comparison(found, out)
+        console.print(f"Written to {shown_path(out)}", markup=False, soft_wrap=True)

@@ -1,0 +1,114 @@
+"""A comparison as a table that a person reads, and as files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from phyblock.errors import Problem, StoreError
+from phyblock.files import atomic_write
+from phyblock.report.compare import COMPARE_RESAMPLES, Comparison
+from phyblock.report.latex import to_latex
+from phyblock.report.markdown import to_markdown
+from phyblock.report.text_table import NO_VALUE, Column, TextTable, between, level_name, number
+
+__all__ = ["compare_view", "flipped_lines", "p_text", "write_comparison"]
+
+_LEAST_P = 0.001
+
+
+def compare_view(found: Comparison) -> TextTable:
+    """A row a pair and level; the level is left out where there is but one."""
+    table = found.table
+    one_level = table["level"].nunique() == 1
+    columns = [
+        Column("A", is_text=True),
+        Column("B", is_text=True),
+        *([] if one_level else [Column("Level", is_text=True)]),
+        *(Column(name, "F1 (%)") for name in ("A", "B", "A - B", "SE", "95 % CI")),
+        Column("p (Holm)"),
+        Column("Verdict", is_text=True),
+        *(Column(name, "Samples") for name in ("A better", "B better", "same")),
+    ]
+    rows = []
+    previous: tuple[str, str] = ("", "")
+    for row in table.to_dict("records"):
+        pair = (row["a"], row["b"])
+        rows.append(
+            (
+                *(pair if pair != previous else ("", "")),
+                *([] if one_level else [level_name(row["level"])]),
+                number(row["f1_a"]),
+                number(row["f1_b"]),
+                number(row["difference"], signed=True),
+                number(row["se"]),
+                between(row["lo"], row["hi"], signed=True),
+                p_text(row["p_holm"]),
+                row["verdict"],
+                *(str(row[name]) for name in ("better", "worse", "same")),
+            )
+        )
+        previous = pair
+    return TextTable(
+        "Models compared on the same samples", tuple(columns), tuple(rows), _notes(found)
+    )
+
+
+def _notes(found: Comparison) -> tuple[str, ...]:
+    table = found.table
+    most = table.loc[table["n_scenes"].idxmax()] if len(table) else None
+    notes = [f"{found.how}; micro averages over the samples that both have."]
+    if most is not None:
+        notes.append(
+            f"{most['n_samples']} samples of {most['n_scenes']} scenes from {most['n_clusters']} "
+            f"base scenes, which were resampled {COMPARE_RESAMPLES:,} times."
+        )
+    notes.append(
+        f"p values are corrected for {table['p'].notna().sum()} comparisons (Holm); “cannot tell” "
+        "stands where p is 0.05 or more."
+    )
+    return tuple(notes)
+
+
+def p_text(p: float) -> str:
+    """A p value with three decimals; `< 0.001` where it is less."""
+    if pd.isna(p):
+        return NO_VALUE
+    return f"< {_LEAST_P}" if p < _LEAST_P else f"{p:.3f}"
+
+
+def flipped_lines(found: Comparison) -> tuple[str, ...]:
+    """For each side of each pair, the samples that it alone got wholly right, as sentences."""
+    lines = []
+    several = found.flipped["seed"].nunique() > 1
+    for (a, b), flips in found.flipped.groupby(["a", "b"], sort=False):
+        for side, other in ((a, b), (b, a)):
+            rows = flips[flips["right"] == side]
+            names = [
+                f"{scene} (seed {seed})" if several else str(scene)
+                for scene, seed in zip(rows["scene"], rows["seed"], strict=True)
+            ]
+            if names:
+                lines.append(
+                    f"{side} is right where {other} is not, {len(names)}: {', '.join(names)}"
+                )
+    return tuple(lines)
+
+
+def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:
+    """Write comparison.csv, .md, .tex and flipped.csv into `folder`; StoreError if it cannot be."""
+    view = compare_view(found)
+    texts = {
+        "comparison.csv": found.table.to_csv(index=False, float_format="%.6f", lineterminator="\n"),
+        "comparison.md": to_markdown(view),
+        "comparison.tex": to_latex(view, "phyblock-comparison"),
+        "flipped.csv": found.flipped.to_csv(index=False, float_format="%.2f", lineterminator="\n"),
+    }
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in texts.items():
+            atomic_write(folder / name, text)
+    except OSError as error:
+        raise StoreError(Problem(str(folder), f"cannot be written: {error.strerror}")) from error
+    return tuple(folder / name for name in texts)

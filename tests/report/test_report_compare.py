@@ -1,0 +1,148 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from hypothesis import given
+
+from phyblock.errors import SpecError
+from phyblock.report import Run
+from phyblock.report.compare import Side, compare, compare_models, compare_runs
+from phyblock.report.compare_view import compare_view, flipped_lines, p_text, write_comparison
+from tests.report.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
+
+Records = list[dict[str, Any]]
+
+
+def plans(model: str, right: dict[str, int], seeds: tuple[int, ...] = (0,)) -> Records:
+    """Plans of four steps of which `right[scene]` place a block; goals have four blocks."""
+    return [
+        record(model, scene, seed, [score(tp, 4 - tp, 4 - tp)])
+        for scene, tp in right.items()
+        for seed in seeds
+    ]
+
+
+def one_seed(*records: dict[str, Any], **facts: Any) -> Run:
+    wanted = {"seeds": [0], "settings": ["A"], "matchers": ["optimal"], **facts}
+    return run_of(records, manifest(**wanted))
+
+
+@laws
+@given(record_lists())
+def test_turning_a_pair_round_turns_all_that_it_says_round(records: Records) -> None:
+    run = run_of(records, manifest())
+    one, other = (
+        compare_models(run, names).table for names in (["alpha", "beta"], ["beta", "alpha"])
+    )
+    assert (one["better"] == other["worse"]).all()
+    for name, sign in (("difference", -1), ("se", 1), ("p_holm", 1), ("n_samples", 1)):
+        pd.testing.assert_series_equal(one[name], sign * other[name], check_names=False)
+    pd.testing.assert_series_equal(one["lo"], -other["hi"], check_names=False)
+
+
+def test_only_samples_that_both_have_are_compared() -> None:
+    run = one_seed(
+        *plans("alpha", {"000": 4, "001": 2, "002": 0}),
+        *plans("beta", {"001": 4, "002": 0, "003": 4}),
+        record("beta", "000", outcome="missing", scores=[score(0, 0, 4)]),
+    )
+    row = compare_models(run).table.set_index("level").loc["overall"]
+    assert (row["n_samples"], row["n_scenes"], row["n_clusters"]) == (2, 2, 2)
+    assert (row["f1_a"], row["f1_b"], row["difference"]) == (25, 50, -25)
+    assert (row["better"], row["worse"], row["same"]) == (0, 1, 1)
+
+
+def test_flipped_samples_are_those_that_one_side_alone_got_right() -> None:
+    run = one_seed(
+        *plans("alpha", {"000": 4, "001": 2, "002": 4, "003": 1}),
+        *plans("beta", {"000": 4, "001": 4, "002": 3, "003": 0}),
+    )
+    found = compare_models(run)
+    flipped = found.flipped[["scene", "right", "f1_a", "f1_b"]].to_records(index=False).tolist()
+    assert flipped == [("002", "alpha", 100, 75), ("001", "beta", 50, 100)]
+    assert flipped_lines(found) == (
+        "alpha is right where beta is not, 1: 002",
+        "beta is right where alpha is not, 1: 001",
+    )
+
+
+def test_what_cannot_be_told_is_said() -> None:
+    same = dict.fromkeys(LEVELS, 2)
+    run = one_seed(*plans("alpha", same), *plans("beta", same))
+    verdicts = compare_models(run).table.set_index("level")["verdict"]
+    assert verdicts["overall"] == "cannot tell"
+    lone = one_seed(*plans("alpha", {"000": 4}), *plans("beta", {"000": 0}))
+    verdicts = compare_models(lone).table.set_index("level")["verdict"]
+    assert verdicts["overall"] == "cannot tell: a single base scene"
+    assert verdicts["3"] == "nothing to compare"
+
+
+def test_a_clear_difference_is_told_and_corrected_for_the_number_of_pairs() -> None:
+    scenes = [f"{n:03}" for n in range(40)]
+    three = {"alpha": 4, "beta": 2, "gamma": 2}
+    records = [
+        one
+        for model, tp in three.items()
+        for place, scene in enumerate(scenes)
+        for one in plans(model, {scene: max(0, tp - place % 2)})
+    ]
+    table = compare_models(one_seed(*records, models=list(three))).table.set_index(["a", "b"])
+    assert table.loc[("alpha", "beta"), "verdict"] == "alpha is better"
+    assert table.loc[("beta", "gamma"), "verdict"] == "cannot tell"
+    p = table.loc[("alpha", "beta"), "p"]
+    assert table.loc[("alpha", "beta"), "p_holm"] == pytest.approx(3 * p)
+
+
+def test_two_runs_are_compared_by_the_models_they_share_or_by_two_named() -> None:
+    first = one_seed(*plans("alpha", {"000": 4, "001": 2}), models=["alpha"])
+    second = run_of(
+        [*plans("alpha", {"000": 1, "001": 1}), *plans("beta", {"000": 4, "001": 4})],
+        manifest(seeds=[0]),
+    )
+    second = Run(Path("other"), second.manifest, second.design, second.records, second.scores)
+    shared = compare_runs(first, second).table.set_index("level")
+    assert shared.loc["overall", ["a", "b"]].tolist() == ["alpha (run)", "alpha (other)"]
+    assert shared.loc["overall", "difference"] == 50
+    named = compare_runs(first, second, ["alpha", "beta"]).table.set_index("level")
+    assert named.loc["overall", "difference"] == -25
+    with pytest.raises(SpecError, match="has no such model"):
+        compare_runs(first, second, ["beta", "alpha"])
+
+
+def test_runs_that_cannot_be_compared_are_refused() -> None:
+    first = one_seed(*plans("alpha", {"000": 4}), models=["alpha"])
+    other = record("alpha", "000", scores=[score(4, 0, 5)]) | {"n_blocks": 9}
+    with pytest.raises(SpecError, match="other blocks in 1 scenes, the first 000"):
+        compare_runs(first, one_seed(other, models=["alpha"]))
+    with pytest.raises(SpecError, match="was not scored as run was, by optimal"):
+        compare_runs(first, one_seed(models=["alpha"], matchers=["paper"]))
+    with pytest.raises(SpecError, match="no model in common"):
+        compare_runs(first, one_seed(models=["beta"]))
+    with pytest.raises(SpecError, match="needs two models"):
+        compare_models(first)
+
+
+def test_levels_are_rows_of_one_pair_alone() -> None:
+    run = one_seed(*plans("alpha", {"000": 4, "001": 1}), *plans("beta", {"000": 4, "001": 2}))
+    sides = [Side(name, name, run) for name in ("alpha", "beta")]
+    one = compare_view(compare([(sides[0], sides[1])], ["2", "overall"]))
+    assert [row[:3] for row in one.rows] == [("alpha", "beta", "Level-2"), ("", "", "Overall")]
+    assert "Level" not in [
+        column.name for column in compare_view(compare([(sides[0], sides[1])], ["overall"])).columns
+    ]
+
+
+def test_a_comparison_is_written_and_p_values_are_readable(tmp_path: Path) -> None:
+    run = one_seed(*plans("alpha", {"000": 4, "001": 1}), *plans("beta", {"000": 4, "001": 2}))
+    files = write_comparison(compare_models(run), tmp_path / "out")
+    assert [file.name for file in files] == [
+        "comparison.csv",
+        "comparison.md",
+        "comparison.tex",
+        "flipped.csv",
+    ]
+    assert len(pd.read_csv(files[0])) == 5
+    assert (p_text(0.0004), p_text(0.05), p_text(float("nan"))) == ("< 0.001", "0.050", "\u2013")
