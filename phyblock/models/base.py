@@ -64,12 +64,14 @@ class StepSubject:
     """The next step is asked for.
 
     `valid` are the candidates that would be placed now, in ascending order; empty when the goal
-    is complete. `last_failed` is the candidate whose move failed last, if the last move did.
+    is complete. `exact` are those of them that are also turned as the goal is. `last_failed` is
+    the candidate whose move failed last, if the last move did.
     """
 
     scene: Scene
     candidates: CandidateSet
     valid: tuple[int, ...]
+    exact: tuple[int, ...]
     last_failed: int | None = None
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from phyblock.domain import Block, CandidateSet
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.models.base import PlanSubject, Reply, Request, Subject, Usage
+from phyblock.models.base import PlanSubject, Reply, Request, StepSubject, Subject, Usage
 from phyblock.models.config import ModelConfig
 
 __all__ = ["BASELINES", "BaselineModel"]
@@ -105,10 +105,45 @@ def _turned(candidates: CandidateSet, block: Block, rng: np.random.Generator) ->
     return wrong[int(rng.integers(len(wrong)))] if wrong else None
 
 
+def _random_step(subject: StepSubject, rng: np.random.Generator) -> str:
+    return _step(int(rng.integers(1, len(subject.candidates) + 1)))
+
+
+def _oracle_step(subject: StepSubject, rng: np.random.Generator) -> str:
+    """One of the right moves, so that every valid order can come; Done where there is none."""
+    moves = subject.exact or subject.valid
+    return _step(moves[int(rng.integers(len(moves)))] if moves else None)
+
+
+def _unoriented_step(subject: StepSubject, rng: np.random.Generator) -> str:
+    """A right move, but with the block turned wrongly wherever there is such a candidate."""
+    index = subject.exact[int(rng.integers(len(subject.exact)))] if subject.exact else None
+    if index is None:
+        return _oracle_step(subject, rng)
+    kind, candidates = subject.candidates[index].kind, subject.candidates
+    looks = {block.look for block in subject.scene.blocks}
+    wrong = [
+        n
+        for n in range(1, len(candidates) + 1)
+        if candidates[n].kind == kind and candidates[n].look not in looks
+    ]
+    return _step(wrong[int(rng.integers(len(wrong)))] if wrong else index)
+
+
+def _repeated_step(subject: StepSubject, rng: np.random.Generator) -> str:
+    """Any move at random until one fails, then that one for ever."""
+    return _random_step(subject, rng) if subject.last_failed is None else _step(subject.last_failed)
+
+
+def _step(index: int | None) -> str:
+    return "Next plan: Done" if index is None else f"Next plan: Move({index})"
+
+
 BASELINES: Mapping[str, Mapping[type[Subject], Rule[Any]]] = {
-    "random": {PlanSubject: _random_plan},
+    "random": {PlanSubject: _random_plan, StepSubject: _random_step},
     "all-candidates": {PlanSubject: _all_candidates},
-    "oracle": {PlanSubject: _oracle_plan},
-    "oracle-no-orientation": {PlanSubject: _unoriented_plan},
+    "oracle": {PlanSubject: _oracle_plan, StepSubject: _oracle_step},
+    "oracle-no-orientation": {PlanSubject: _unoriented_plan, StepSubject: _unoriented_step},
+    "repeat": {StepSubject: _repeated_step},
 }
 """Baselines by name, each with its rule for every subject that it knows."""

@@ -20,6 +20,10 @@ from phyblock.tasks import (
     Pictures,
     PlanningRules,
     Prompt,
+    StepLimits,
+    StepPlanning,
+    StepPrompt,
+    StepRules,
     TemplatePrompt,
 )
 
@@ -81,6 +85,43 @@ def _planning_prompt(loaded: LoadedSuite) -> Prompt:
     return TemplatePrompt(path, path.stem)
 
 
+def _step_planning(context: _Context) -> StepPlanning:
+    suite = context.loaded.suite
+    tasks = select_tasks(context.dataset.tasks, suite.levels, context.limit)
+    rules = _step_rules(suite)
+    if not context.with_prompts:
+        return StepPlanning(rules, items=tasks)
+    if suite.images.source == "dataset":
+        where = context.loaded.where("images", "source")
+        message = "step planning draws every state, so the goal must be drawn as well"
+        hint = "render the pictures: --set images.source=render"
+        raise SpecError(Problem(where, message, "images.source", "dataset", hint=hint))
+    steps = suite.steps
+    path = context.loaded.templates.get("step_planning")
+    template = (
+        TemplatePrompt(bundled("prompts", "step_planning.j2"), "default")
+        if path is None
+        else TemplatePrompt(path, path.stem)
+    )
+    shown = (steps.feedback, steps.history, steps.memory, steps.cot, steps.gating)
+    prompt = StepPrompt(template, *shown)
+    pictures = Pictures(cache_dir() / "pictures", _policy(suite), _render_workers())
+    return StepPlanning(rules, prompt, pictures, tasks)
+
+
+def _step_rules(suite: SuiteSpec) -> StepRules:
+    """How a suite plays episodes."""
+    steps = suite.steps
+    limits = StepLimits(
+        steps.max_steps,
+        steps.max_failures,
+        steps.max_repeats,
+        steps.max_episode_tokens,
+        steps.max_episode_usd,
+    )
+    return StepRules(suite.settings, steps.gating, steps.physics, steps.samples, limits)
+
+
 def _check_composites(dataset: Dataset, tasks: Sequence[AssemblyTask]) -> None:
     """Raise DataError when the data set has no picture of a scene."""
     lacking = [task.key for task in tasks if task.composite is None]
@@ -101,4 +142,7 @@ def _render_workers() -> int:
     return min(_RENDER_WORKERS, os.cpu_count() or 1)
 
 
-_TRACKS: Mapping[str, Callable[[_Context], AnyTrack]] = {"full_planning": _full_planning}
+_TRACKS: Mapping[str, Callable[[_Context], AnyTrack]] = {
+    "full_planning": _full_planning,
+    "step_planning": _step_planning,
+}

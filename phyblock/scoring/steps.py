@@ -110,9 +110,11 @@ class Assembly:
         numbers = range(1, len(self.candidates) + 1)
         return tuple(n for n in numbers if any(self._goal.choices(n, m) for m in self._frontier))
 
-    def ready(self) -> tuple[int, ...]:
-        """The goal vertices that can be placed next in the world as shown, in file order."""
-        return self._goal.graph.ready(self.placed)
+    def exact_moves(self) -> tuple[int, ...]:
+        """The right moves that look just like a block that can be placed in the world as shown."""
+        ready = self._goal.graph.ready(self.placed)
+        looks = {self.scene.blocks[vertex].look for vertex in ready}
+        return tuple(n for n in self.right_moves() if self.candidates[n].look in looks)
 
     def move(self, index: int) -> Move:
         """Try to place a candidate; a wrong move changes nothing and says what is wrong.

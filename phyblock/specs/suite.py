@@ -37,7 +37,7 @@ __all__ = [
     "SuiteSpec",
 ]
 
-BASELINES = ("random", "all-candidates", "oracle", "oracle-no-orientation")
+BASELINES = ("random", "all-candidates", "oracle", "oracle-no-orientation", "repeat")
 """Models that are built in; no models file may use their names."""
 RECORDED = "recorded"
 """The word that stands for every folder of recorded replies."""
@@ -57,7 +57,9 @@ Setting = Literal["A", "B"]
 Matcher = Literal["optimal", "paper"]
 Picture = Literal["goal", "candidates"]
 Background = Literal["checkerboard", "white", "light-wood", "dark-wood", "concrete", "lawn"]
-Table = Literal["assembly", "table1", "table2", "table3", "errors", "published"]
+Table = Literal[
+    "assembly", "table1", "table2", "table3", "endings", "progress", "errors", "published"
+]
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
 
 
@@ -207,8 +209,8 @@ class SuiteSpec(Section):
     seeds: UniqueSome[Seed] = Field(default=(0,), description="Each seed repeats every question.")
     models: ModelNames = Field(
         description="Names from models.yaml or built-in baselines (random, all-candidates, "
-        "oracle, oracle-no-orientation); or the word recorded: every folder of recorded replies "
-        "in the official data."
+        "oracle, oracle-no-orientation, repeat); or the word recorded: every folder of recorded "
+        "replies in the official data."
     )
     prompt: Prompt = Field(
         default="default",
@@ -240,7 +242,7 @@ class SuiteSpec(Section):
         description="Bounds of a run; they change how fast results come, not what they are.",
     )
     tables: Unique[Table] = Field(
-        default=("assembly", "table1", "table2", "table3", "errors"),
+        default=("assembly", "table1", "table2", "table3", "endings", "progress", "errors"),
         description="Tables to write, as far as they belong to a track of the suite; published "
         "compares with the paper's numbers.",
     )

@@ -77,8 +77,11 @@ class StepsSpec(Section):
         description="aov: a block can be placed when all it rests on is. layer: when all lower "
         "layers are complete, as in the official code.",
     )
-    physics: Literal["off", "strict"] = Field(
-        default="off", description="strict: a structure that collapses ends the episode."
+    physics: Literal["off", "settle", "strict"] = Field(
+        default="settle",
+        description="off: placed blocks stay where they are. settle: every new state is simulated; "
+        "what would fall is recorded and held. strict: a structure that collapses ends the "
+        "episode.",
     )
     feedback: Literal["none", "success", "error_type"] = Field(
         default="success", description="What the model is told of each of its steps."
@@ -102,7 +105,9 @@ class StepsSpec(Section):
         default=5, description="Failed steps in a row that end an episode; null: no bound."
     )
     max_repeats: Count | None = Field(
-        default=3, description="Times that the same step may fail in a row; null: no bound."
+        default=3,
+        description="Failures in a row of one and the same step that end an episode; null: no "
+        "bound.",
     )
     max_episode_tokens: Count | None = Field(
         default=None, description="Tokens of an episode, prompts included; null: no bound."

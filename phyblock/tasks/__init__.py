@@ -3,6 +3,9 @@
 from phyblock.tasks.full_planning import FullPlanning, PlanJudgement, PlanningRules
 from phyblock.tasks.pictures import PicturePolicy, Pictures
 from phyblock.tasks.prompts import OfficialPrompt, Prompt, TemplatePrompt
+from phyblock.tasks.step_planning import StepPlanning
+from phyblock.tasks.step_prompt import StepPrompt
+from phyblock.tasks.step_rules import ENDINGS, Ending, StepLimits, StepRules
 from phyblock.tasks.studio import Drawing, Studio
 from phyblock.tasks.track import (
     AnyTrack,
@@ -16,8 +19,10 @@ from phyblock.tasks.track import (
 )
 
 __all__ = [
+    "ENDINGS",
     "AnyTrack",
     "Drawing",
+    "Ending",
     "Episode",
     "EpisodeTrack",
     "FullPlanning",
@@ -31,6 +36,10 @@ __all__ = [
     "PlanningRules",
     "Prompt",
     "SingleTrack",
+    "StepLimits",
+    "StepPlanning",
+    "StepPrompt",
+    "StepRules",
     "Studio",
     "TemplatePrompt",
     "Track",
