@@ -15,9 +15,9 @@ from phyblock import report
 from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.estimate_view import show_estimate
 from phyblock.cli.files import find_models_file, find_suite
+from phyblock.cli.names import split_names
 from phyblock.cli.progress import ProgressView
 from phyblock.cli.summary import print_summary
-from phyblock.errors import Problem, SpecError
 from phyblock.resources import bundled
 from phyblock.run.estimate import Estimate, estimate
 from phyblock.run.execute import Executor, RunResult
@@ -74,7 +74,7 @@ def command(
     path = find_suite(suite)
     loaded = load_suite(path, sets, data_dir=bundled("benchmarks", "data"))
     known = load_models(find_models_file(models_file, path))
-    plan = make_plan(loaded, known, only=_names(models), limit=limit)
+    plan = make_plan(loaded, known, only=split_names(models), limit=limit)
     folder = out or Path("results") / plan.folder_name
     if dry_run:
         show_estimate(console, plan, estimate(plan, folder, use_cache=not no_cache))
@@ -88,16 +88,6 @@ def command(
     result = asyncio.run(_run(session, view))
     print_summary(console, report.write_tables(folder, plan.suite.tables))
     return _conclude(console, folder, result, view.cost_text)
-
-
-def _names(models: str | None) -> list[str]:
-    if models is None:
-        return []
-    names = [name.strip() for name in models.split(",")]
-    if not all(names):
-        allowed = "names separated by single commas"
-        raise SpecError(Problem("--models", "holds an empty name", "", repr(models), allowed))
-    return names
 
 
 async def _run(opened: Session, view: ProgressView) -> RunResult:
