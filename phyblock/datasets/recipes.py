@@ -23,6 +23,8 @@ from phyblock.domain import (
 __all__ = ["LABELS", "RecipeReader"]
 
 LABELS = ("scene", "block", *LETTERS)
+MARK_LETTERS = (*LETTERS, "X")
+"""Places are marked A to D where they are the options, X where the text speaks of one."""
 _RECIPE_FIELDS = ("label", "view", "without", "poses", "swap", "add", "marks", "framed")
 
 
@@ -118,7 +120,7 @@ class RecipeReader(SceneReader):
 
     def _mark(self, entry: Any, at: str) -> Mark:
         raw = self.mapping(entry, at)
-        letter = self.choice(self.get(raw, "letter", f"{at}."), f"{at}.letter", tuple(LETTERS))
+        letter = self.choice(self.get(raw, "letter", f"{at}."), f"{at}.letter", MARK_LETTERS)
         place = self.vector(self.get(raw, "position", f"{at}."), f"{at}.position")
         return Mark(letter or "", place or (0.0, 0.0, 0.0))
 

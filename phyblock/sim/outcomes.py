@@ -1,0 +1,227 @@
+"""What follows when a block is taken away, pushed or put down: settled poses, and who moved.
+
+An outcome counts only where every setting names the same blocks, and names them clearly: each
+either stayed where it was or moved far. Time step, solver and friction all vary, because which
+blocks fall changes with the time step alone in one removal of twenty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.domain.blocks import Euler, quat_xyzw_to_matrix
+from phyblock.domain.scene import Block
+from phyblock.sim.world import Physics, Pose, World
+
+__all__ = [
+    "DEFAULT_LIMITS",
+    "OUTCOME_SETTINGS",
+    "Limits",
+    "Outcome",
+    "Push",
+    "after",
+    "after_removal",
+    "holds",
+    "moved_orders",
+    "quat_xyzw_to_euler_deg",
+]
+
+OUTCOME_SETTINGS: tuple[Physics, ...] = (
+    Physics(1 / 240, 50, 0.35),
+    Physics(1 / 480, 100, 0.35),
+    Physics(1 / 300, 80, 0.30),
+    Physics(1 / 200, 50, 0.40),
+)
+"""What every outcome is tried under; the first gives the settled poses."""
+
+_EVERY_S = 0.05
+_QUIET_S = 0.4
+_QUIET_M_S = 0.005
+_LONGEST_S = 5.0
+_POSITION_DIGITS = 4
+_ANGLE_DIGITS = 2
+
+
+@dataclass(frozen=True)
+class Limits:
+    """A block stayed within `still_m` [m] and `still_deg` [degrees], or it moved past the others.
+
+    What lies between is not clear, and no question is asked about it.
+    """
+
+    still_m: float = 0.004
+    still_deg: float = 4.0
+    moved_m: float = 0.02
+    moved_deg: float = 20.0
+
+
+DEFAULT_LIMITS = Limits()
+
+
+@dataclass(frozen=True)
+class Push:
+    """A block pushed along the floor's plane: `direction` is a unit vector (x, y).
+
+    It is moved at `speed_m_s` [m/s] over `distance_m` [m], free to tip and to rise.
+    """
+
+    order: int
+    direction: tuple[float, float]
+    distance_m: float = 0.05
+    speed_m_s: float = 0.1
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What followed: `moved` are the orders of the blocks that did not stay.
+
+    `settled` are all blocks at their final poses under the first setting, rounded to 0.1 mm and
+    0.01 degrees. `is_clear` says whether all settings agree, with a margin, and all came to rest;
+    where it is False the rest means nothing.
+    """
+
+    moved: tuple[int, ...]
+    settled: tuple[Block, ...]
+    is_clear: bool
+
+
+_UNCLEAR = Outcome((), (), False)
+
+
+def after(
+    blocks: Sequence[Block],
+    push: Push | None = None,
+    settings: Sequence[Physics] = OUTCOME_SETTINGS,
+    limits: Limits = DEFAULT_LIMITS,
+) -> Outcome:
+    """Let blocks go where they are, or push one of them, and see what follows."""
+    found: tuple[int, ...] | None = None
+    first: dict[int, Pose] = {}
+    for physics in settings:
+        poses = _settle(blocks, physics, push)
+        if poses is None:
+            return _UNCLEAR
+        moved = moved_orders(blocks, poses, limits)
+        if moved is None or moved != (moved if found is None else found):
+            return _UNCLEAR
+        found, first = moved, first or poses
+    still = set(first) - set(found or ())
+    settled = [b if b.order in still else _at(b, first[b.order]) for b in blocks]
+    return Outcome(found or (), tuple(settled), True)
+
+
+def after_removal(
+    blocks: Sequence[Block], order: int, settings: Sequence[Physics] = OUTCOME_SETTINGS
+) -> Outcome:
+    """What follows when the block with this order is taken away at once."""
+    return after([block for block in blocks if block.order != order], settings=settings)
+
+
+def holds(
+    blocks: Sequence[Block],
+    settings: Sequence[Physics] = OUTCOME_SETTINGS,
+    limits: Limits = DEFAULT_LIMITS,
+) -> bool | None:
+    """Whether all blocks stay where they are; None where the settings, or the limits, differ.
+
+    As `after`, but it ends as soon as a block has clearly left its place.
+    """
+    verdicts = set()
+    for physics in settings:
+        verdicts.add(_holds(blocks, physics, limits))
+        if len(verdicts) > 1 or None in verdicts:
+            return None
+    return verdicts.pop()
+
+
+def moved_orders(
+    blocks: Sequence[Block], poses: dict[int, Pose], limits: Limits = DEFAULT_LIMITS
+) -> tuple[int, ...] | None:
+    """Orders of the blocks that are elsewhere in `poses`; None when that is not clear of one."""
+    moved = []
+    for block in blocks:
+        start, end = Pose.goal(block), poses[block.order]
+        distance_m, angle_deg = end.distance_m(start), end.angle_deg(start)
+        if distance_m > limits.moved_m or angle_deg > limits.moved_deg:
+            moved.append(block.order)
+        elif distance_m > limits.still_m or angle_deg > limits.still_deg:
+            return None
+    return tuple(moved)
+
+
+def quat_xyzw_to_euler_deg(quat_xyzw: NDArray[np.float64]) -> Euler:
+    """Extrinsic x-y-z angles [degrees] of a unit quaternion (x, y, z, w)."""
+    rotation = quat_xyzw_to_matrix(quat_xyzw)
+    pitch = np.arcsin(np.clip(-rotation[2, 0], -1.0, 1.0))
+    if abs(rotation[2, 0]) > 1 - 1e-9:
+        roll, yaw = 0.0, np.arctan2(-rotation[0, 1], rotation[1, 1])
+    else:
+        roll = np.arctan2(rotation[2, 1], rotation[2, 2])
+        yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
+    x, y, z = (float(np.degrees(angle)) for angle in (roll, pitch, yaw))
+    return (x, y, z)
+
+
+class _PushedWorld(World):
+    """A world in which a block's velocity across the floor can be set."""
+
+    def __enter__(self) -> _PushedWorld:
+        super().__enter__()
+        return self
+
+    def drive(self, order: int, velocity_m_s: tuple[float, float]) -> None:
+        """Give a block this velocity in x and y; how it rises and turns is left as it is."""
+        bullet, client = self._open()
+        body = self._body(order)
+        linear, _ = bullet.getBaseVelocity(body, physicsClientId=client)
+        velocity = (*velocity_m_s, linear[2])
+        bullet.resetBaseVelocity(body, linearVelocity=velocity, physicsClientId=client)
+
+
+def _settle(blocks: Sequence[Block], physics: Physics, push: Push | None) -> dict[int, Pose] | None:
+    """Poses once all is at rest; None when that takes too long."""
+    with _PushedWorld(physics) as world:
+        world.place_all(blocks)
+        if push is not None:
+            _push(world, push)
+        quiet_s = 0.0
+        for _ in range(round(_LONGEST_S / _EVERY_S)):
+            world.step(_EVERY_S)
+            quiet_s = quiet_s + _EVERY_S if world.fastest_m_s() < _QUIET_M_S else 0.0
+            if quiet_s >= _QUIET_S - _EVERY_S / 2:
+                return world.poses()
+    return None
+
+
+def _holds(blocks: Sequence[Block], physics: Physics, limits: Limits) -> bool | None:
+    loose = Limits(limits.moved_m, limits.moved_deg, limits.moved_m, limits.moved_deg)
+    with World(physics) as world:
+        world.place_all(blocks)
+        quiet_s = 0.0
+        for _ in range(round(_LONGEST_S / _EVERY_S)):
+            world.step(_EVERY_S)
+            if moved_orders(blocks, world.poses(), loose):
+                return False
+            quiet_s = quiet_s + _EVERY_S if world.fastest_m_s() < _QUIET_M_S else 0.0
+            if quiet_s >= _QUIET_S - _EVERY_S / 2:
+                return True if moved_orders(blocks, world.poses(), limits) == () else None
+    return None
+
+
+def _push(world: _PushedWorld, push: Push) -> None:
+    x, y = (part * push.speed_m_s for part in push.direction)
+    for _ in range(round(push.distance_m / push.speed_m_s / world.physics.time_step_s)):
+        world.drive(push.order, (x, y))
+        world.step(world.physics.time_step_s)
+
+
+def _at(block: Block, pose: Pose) -> Block:
+    """The block at a pose, with angles and places as they are written."""
+    x, y, z = (round(float(place), _POSITION_DIGITS) + 0.0 for place in pose.position_m)
+    euler = quat_xyzw_to_euler_deg(pose.quat_xyzw)
+    a, b, c = (round(angle, _ANGLE_DIGITS) + 0.0 for angle in euler)
+    return replace(block, position_m=(x, y, z), euler_deg=(a, b, c))
