@@ -17,6 +17,7 @@ from phyblock.cli.estimate_view import show_estimate
 from phyblock.cli.files import find_models_file, find_suite
 from phyblock.cli.names import split_names
 from phyblock.cli.progress import ProgressView
+from phyblock.cli.report import show_page
 from phyblock.cli.summary import print_summary
 from phyblock.resources import bundled
 from phyblock.run.estimate import Estimate, estimate
@@ -86,7 +87,9 @@ def command(
     view = ProgressView(console, plan.suite.name)
     session = Session(plan, folder, view, use_cache=not no_cache, retry_failed=retry_failed)
     result = asyncio.run(_run(session, view))
-    print_summary(console, report.write_tables(folder, plan.suite.tables))
+    written = report.write_tables(folder, plan.suite.tables)
+    print_summary(console, written)
+    show_page(console, report.write_report(written))
     return _conclude(console, folder, result, view.cost_text)
 
 

@@ -29,4 +29,4 @@ def command(
     The new scores go to RUN/scores/PARSER-MATCHER (or --out); RUN itself stays as it is.
     """
     chosen = cast("PlanParser | None", parser), cast("Matcher | None", matcher)
-    show_tables(rescore(run, *chosen, out, data))
+    show_tables(rescore(run, *chosen, out, data), data)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from phyblock.report.coverage import coverage_frame
     from phyblock.report.design import Design, read_design
     from phyblock.report.errors import errors_frame
+    from phyblock.report.html import write_report
     from phyblock.report.latex import to_latex
     from phyblock.report.load import Run, load_run
     from phyblock.report.markdown import to_markdown
@@ -46,6 +47,7 @@ __all__ = [
     "table1_frame",
     "to_latex",
     "to_markdown",
+    "write_report",
     "write_tables",
 ]
 
@@ -66,6 +68,7 @@ _HOMES = {
     "load_run": "load",
     "to_markdown": "markdown",
     "TablesWritten": "write",
+    "write_report": "html",
     "write_tables": "write",
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -107,7 +108,7 @@ def _row(name: str, kind: Kind, cells: pd.DataFrame, run: Run, published: dict[s
     return Row(name, kind, tuple(shown), strip)
 
 
-def _cell(row: dict[str, float], metric: str, several: bool) -> Cell:
+def _cell(row: Mapping[Hashable, float], metric: str, several: bool) -> Cell:
     name = f"{metric}_mean" if several else metric
     value = 100 * row[name]
     if math.isnan(value):
@@ -127,7 +128,7 @@ def _bounds(value: float, low: float, high: float) -> tuple[float, float]:
 
 def _published_f1(run: Run) -> dict[str, float]:
     """What the paper's Table 1 prints as overall F1 of the run's models [%]."""
-    if PUBLISHED_SETTING != run.design.setting:
+    if run.design.setting != PUBLISHED_SETTING:
         return {}
     frame = published_frame(run)
     frame = frame[(frame["level"] == OVERALL) & (frame["metric"] == "f1")]

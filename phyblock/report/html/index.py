@@ -11,7 +11,7 @@ from phyblock.report.design import Design
 from phyblock.run.reading import RecordLines
 from phyblock.scoring import ERROR_TYPES
 
-__all__ = ["Item", "Place", "SampleIndex", "read_places"]
+__all__ = ["Item", "Place", "SampleIndex", "item_key", "read_places"]
 
 
 class Place(NamedTuple):
@@ -82,8 +82,7 @@ class SampleIndex:
 
     def __init__(self, design: Design) -> None:
         self._design = design
-        self.scenes = _Names()
-        self._items = _Names()
+        self._scenes, self._items = _Names(), _Names()
         self._tracks, self._models, self._outcomes = _Names(), _Names(), _Names()
         self._subtasks = _Names()
         self._seeds: set[int] = set()
@@ -94,6 +93,11 @@ class SampleIndex:
             setting: {name: [] for name in ("tp", "fp", "fn", "wrong")}
             for setting in design.suite.settings
         }
+
+    @property
+    def scenes(self) -> list[str]:
+        """Ids of the scenes in the order of their numbers."""
+        return self._scenes.values
 
     @property
     def items(self) -> list[Item]:
@@ -124,7 +128,7 @@ class SampleIndex:
     def _add_item(self, record: Mapping[str, Any]) -> None:
         question = record.get("question") or {}
         subtask = question.get("subtask")
-        self._about["scene"].append(self.scenes.number(record["scene"]))
+        self._about["scene"].append(self._scenes.number(record["scene"]))
         self._about["levels"].append(record["levels"])
         self._about["subtask"].append(None if subtask is None else self._subtasks.number(subtask))
 
@@ -146,7 +150,7 @@ class SampleIndex:
             "models": self._models.values,
             "outcomes": self._outcomes.values,
             "subtasks": self._subtasks.values,
-            "scenes": self.scenes.values,
+            "scenes": self.scenes,
             "seeds": sorted(self._seeds),
             "settings": list(self._scores),
             "matcher": self._design.matcher,
@@ -158,4 +162,3 @@ class SampleIndex:
             },
             "rows": {**self._rows, "scores": self._scores},
         }
-

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from phyblock.report.html.index import Place, SampleIndex
+from phyblock.datasets import QuestionTask
+from phyblock.report.html.index import Item, Place, SampleIndex, item_key
 from phyblock.report.html.pack import Pack
 from phyblock.run.prompts import PromptLines
 from phyblock.run.reading import RECORDS
+from phyblock.tasks.question_pictures import Shown
+from phyblock.tasks.vqa import asked
 
-__all__ = ["pack_prompts", "pack_samples", "pictures_sent"]
+__all__ = ["pack_prompts", "pack_samples", "pictures_sent", "questions_asked"]
 
 _IN_INDEX = frozenset(
     {
@@ -44,12 +47,28 @@ def pack_samples(
         pack.add(_entry(record, prompts, pictures))
 
 
-def pictures_sent(folder: Path, places: Iterable[Place]) -> bool:
+def pictures_sent(folder: Path, places: Sequence[Place]) -> bool:
     """Whether the first record of any track tells of a picture that was sent."""
-    first = {place.track: place for place in reversed(list(places))}
+    first = {place.track: place for place in reversed(places)}
     return any(
         (record.get("prompt") or {}).get("images") for record in _records(folder, first.values())
     )
+
+
+def questions_asked(
+    folder: Path, places: Sequence[Place], questions: Mapping[str, QuestionTask]
+) -> dict[Item, Shown]:
+    """The question of every item that is one, as it was shown; {} without `questions`."""
+    if not questions:
+        return {}
+    first = {Item(place.track, place.key): place for place in reversed(places)}
+    asked_first = [place for place in first.values() if place.track == "vqa"]
+    shown = {}
+    for record in _records(folder, sorted(asked_first, key=lambda place: place.start)):
+        about = record["question"]
+        task = asked(questions[about["id"]], about["rotation"])
+        shown[Item(record["track"], item_key(record))] = task.shown
+    return shown
 
 
 def _records(folder: Path, places: Iterable[Place]) -> Iterable[dict[str, Any]]:

@@ -2,40 +2,86 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import errno
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from phyblock.datasets import AssemblyTask
 from phyblock.files import atomic_write
+from phyblock.models import Image
 from phyblock.resources import cache_dir
 from phyblock.sim import PictureStyle
 from phyblock.tasks import PicturePolicy, Pictures
+from phyblock.tasks.question_pictures import QuestionPictures, Shown
 
-__all__ = ["keep_pictures"]
+__all__ = ["PictureShelf"]
 
 _DIGITS = 24
+_MOST_COPIED_BYTES = 256 * 2**20
 
 
-def keep_pictures(
-    folder: Path, suite: Mapping[str, Any], tasks: Iterable[AssemblyTask]
-) -> dict[str, str]:
-    """Put the pictures of tasks that are at hand into `folder`; file names by digest.
+class PictureShelf:
+    """A folder of pictures named by digest; `names` are those that are there.
 
-    Nothing is rendered: a picture that is not in the cache is left out. Raises OSError where the
-    disk refuses.
+    Nothing is rendered: a picture that is not in the cache is left out. Pictures are hard links
+    into the cache; on a file system where that is not possible they are copied, up to 256 MiB.
     """
-    images = suite["images"]
-    style = PictureStyle(size_px=images["size_px"], background=images["background"])
-    policy = PicturePolicy(images["source"], images["layout"], tuple(images["order"]), style)
-    pictures = Pictures(cache_dir() / "pictures", policy, 1)
-    kept = {}
-    for task in tasks:
-        found, are_real = pictures.outline(task)
-        for image in found if are_real else ():
+
+    def __init__(self, folder: Path, suite: Mapping[str, Any]) -> None:
+        """Keep pictures in `folder`, which may hold some, drawn as `suite` says."""
+        self.names: dict[str, str] = {}
+        self._folder = folder
+        self._cache = cache_dir() / "pictures"
+        self._suite = suite
+        images = suite["images"]
+        self._style = PictureStyle(size_px=images["size_px"], background=images["background"])
+        self._room = _MOST_COPIED_BYTES
+
+    def add_scenes(self, tasks: Iterable[AssemblyTask]) -> None:
+        """Keep goals and candidates; raises OSError where the disk refuses."""
+        images = self._suite["images"]
+        order = tuple(images["order"])
+        policy = PicturePolicy(images["source"], images["layout"], order, self._style)
+        pictures = Pictures(self._cache, policy, 1)
+        is_drawn = images["source"] == "render"
+        for task in tasks:
+            found, are_real = pictures.outline(task)
+            if are_real:
+                self._keep(found, pictures.keys(task) if is_drawn else ())
+
+    def add_questions(self, questions: Iterable[Shown]) -> None:
+        """Keep the pictures of questions; raises OSError where the disk refuses."""
+        options_as = self._suite["vqa"]["options_as"]
+        pictures = QuestionPictures(self._cache, self._style, options_as, 1)
+        for shown in questions:
+            found, are_real = pictures.outline(shown)
+            if are_real:
+                self._keep(found, pictures.keys(shown))
+
+    def _keep(self, images: Sequence[Image], keys: Sequence[str]) -> None:
+        self._folder.mkdir(parents=True, exist_ok=True)
+        cached: list[Path | None] = [self._cache / key[:2] / f"{key}.png" for key in keys]
+        cached = cached or [None] * len(images)
+        for image, source in zip(images, cached, strict=True):
             name = f"{image.sha256[:_DIGITS]}.png"
-            if not (folder / name).exists():
-                folder.mkdir(parents=True, exist_ok=True)
-                atomic_write(folder / name, image.data)
-            kept[image.sha256] = name
-    return kept
+            path = self._folder / name
+            if path.exists() or self._put(path, image.data, source):
+                self.names[image.sha256] = name
+
+    def _put(self, path: Path, data: bytes, source: Path | None) -> bool:
+        """Link or copy a picture; False where it would have to be copied and there is no room."""
+        if source is not None and source.is_file():
+            try:
+                os.link(source, path)
+            except OSError as error:
+                if error.errno not in (errno.EXDEV, errno.EPERM, errno.EMLINK, errno.ENOTSUP):
+                    raise
+            else:
+                return True
+        self._room -= len(data)
+        if self._room < 0:
+            return False
+        atomic_write(path, data)
+        return True

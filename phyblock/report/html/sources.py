@@ -1,4 +1,4 @@
-"""What a report takes from outside the run folder: the scenes that were asked about.
+"""What a report takes from outside the run folder: the scenes and questions that were asked about.
 
 Without them the page still shows every reply, plan and score; it cannot draw.
 """
@@ -10,51 +10,71 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from phyblock.datasets import AssemblyTask, Dataset
+from phyblock.datasets import AssemblyTask, Dataset, QuestionTask, read_questions
 from phyblock.errors import DataError, Problem
 from phyblock.report.design import Design
+from phyblock.resources import bundled
 from phyblock.run.data import open_dataset
 from phyblock.run.select import select_tasks
 
 __all__ = ["Sources", "open_sources"]
 
 _HINT = "name the folder where it is now with --data"
+_CHANGED = "is not the data set that the run was made on, or it was changed since"
 
 
 @dataclass(frozen=True)
 class Sources:
-    """Tasks by scene id; where there are none, `lacking` says why in a sentence."""
+    """Tasks by scene id, questions by id; where there are none, `lacking` says why."""
 
     tasks: Mapping[str, AssemblyTask] = field(default_factory=dict)
+    questions: Mapping[str, QuestionTask] = field(default_factory=dict)
     lacking: str = ""
 
 
 def open_sources(manifest: Mapping[str, Any], design: Design, data: Path | None) -> Sources:
-    """The scenes of a run, from `data` or from where the run found them.
+    """The scenes of a run, from `data` or from where the run found them, and its questions.
 
     Raises DataError when `data` is given and is not what the run was made on.
     """
     recorded = manifest.get("dataset") or {}
     try:
         dataset = _dataset(manifest, design, data or Path(recorded.get("root", "")))
+        tasks = {task.scene.id: task for task in dataset.tasks}
+        return Sources(tasks, _questions(manifest, dataset))
     except DataError as error:
         if data is not None:
             raise
-        said = "; ".join(f"{problem.where}: {problem.message}" for problem in error.problems[:1])
+        said = f"{error.problems[0].where}: {error.problems[0].message}"
         how = "phyblock report RUN --data FOLDER draws it from where it is now"
         return Sources(lacking=f"Nothing can be drawn without the data set ({said}); {how}.")
-    return Sources({task.scene.id: task for task in dataset.tasks})
 
 
 def _dataset(manifest: Mapping[str, Any], design: Design, root: Path) -> Dataset:
+    """All tasks of the data set, of which those of the run are known to be the run's."""
     recorded = manifest.get("dataset") or {}
     if not root.is_dir():
         raise DataError(Problem(str(root), "the data set of the run is not there", hint=_HINT))
     dataset = open_dataset(recorded.get("format", "builtin"), root)
     tasks = select_tasks(dataset.tasks, design.suite.levels, manifest.get("limit"))
-    chosen = replace(dataset, tasks=tasks)
-    if chosen.sha256 != recorded.get("sha256"):
-        message = "is not the data set that the run was made on, or it was changed since"
+    chosen = replace(dataset, tasks=tasks).sha256
+    if chosen != recorded.get("sha256"):
         wanted = str(recorded.get("sha256"))
-        raise DataError(Problem(str(root), message, "sha256", chosen.sha256, wanted, _HINT))
-    return chosen
+        raise DataError(Problem(str(root), _CHANGED, "sha256", chosen, wanted, _HINT))
+    return dataset
+
+
+def _questions(manifest: Mapping[str, Any], dataset: Dataset) -> dict[str, QuestionTask]:
+    """The questions of the vqa track, by id; {} for a run without it."""
+    recorded = (manifest.get("tracks") or {}).get("vqa")
+    if recorded is None:
+        return {}
+    named = manifest["suite"]["vqa"]["path"]
+    known = bundled("benchmarks", "data", named)
+    root = known if known.is_dir() else Path(named)
+    if not root.is_dir():
+        raise DataError(Problem(str(root), "the questions of the run are not there"))
+    questions = read_questions(root, dataset)
+    if questions.sha256 != recorded["questions"]:
+        raise DataError(Problem(str(root), _CHANGED, "sha256", questions.sha256))
+    return {task.question.id: task for task in questions.tasks}

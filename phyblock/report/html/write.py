@@ -4,23 +4,30 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
+from phyblock.domain import SUBTASK_NAMES
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
-from phyblock.report.html.drawable import kit, scene_entry
+from phyblock.report.html.drawable import kit, question_entry, scene_entry
 from phyblock.report.html.headline import assembly_headline
 from phyblock.report.html.index import Item, SampleIndex, read_places
 from phyblock.report.html.pack import Pack, write_script
 from phyblock.report.html.page import Figure, render_page
-from phyblock.report.html.samples import pack_prompts, pack_samples, pictures_sent
-from phyblock.report.html.sent import keep_pictures
+from phyblock.report.html.samples import (
+    pack_prompts,
+    pack_samples,
+    pictures_sent,
+    questions_asked,
+)
+from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.sources import Sources, open_sources
 from phyblock.report.load import Run
 from phyblock.report.write import TablesWritten
+from phyblock.tasks.question_pictures import Shown
 
 __all__ = ["REPORT_FILE", "write_report"]
 
@@ -59,17 +66,20 @@ def _write_data(run: Run, sources: Sources, folder: Path, build: str) -> None:
     kinds = ("records", "scenes", "questions", "prompts")
     packs = {kind: Pack(folder / build, kind, build) for kind in kinds}
     places = read_places(run.path, run.design)
-    sent: dict[str, str] = {}
-    if sources.tasks and pictures_sent(run.path, places):
-        sent = keep_pictures(folder / _PICTURES, run.manifest["suite"], sources.tasks.values())
-    addresses = {digest: f"{_FOLDER}/{_PICTURES}/{name}" for digest, name in sent.items()}
+    asked = questions_asked(run.path, places, sources.questions)
+    pictures = {}
+    if pictures_sent(run.path, places):
+        pictures = _keep_pictures(run, sources, asked, folder / _PICTURES)
     prompts = pack_prompts(run.path, packs["prompts"])
     index = SampleIndex(run.design)
-    pack_samples(run.path, places, index, packs["records"], prompts, addresses)
-    questions: dict[Item, int] = {}
-    for scene in index.scenes.values if sources.tasks else ():
+    pack_samples(run.path, places, index, packs["records"], prompts, pictures)
+    for scene in index.scenes if sources.tasks else ():
         task = sources.tasks[scene]
         packs["scenes"].add(scene_entry(task.scene, task.candidates))
+    questions = {
+        item: packs["questions"].add(question_entry(shown.question))
+        for item, shown in asked.items()
+    }
     for pack in packs.values():
         pack.close()
     content: dict[str, Any] = {
@@ -77,9 +87,24 @@ def _write_data(run: Run, sources: Sources, folder: Path, build: str) -> None:
         "starts": {kind: pack.starts for kind, pack in packs.items()},
         "kit": kit(),
         "no_scenes": sources.lacking,
-        "subtask_names": {},
+        "subtask_names": SUBTASK_NAMES,
     }
     write_script(folder / build, "index", build, content)
+
+
+def _keep_pictures(
+    run: Run, sources: Sources, asked: Mapping[Item, Shown], folder: Path
+) -> dict[str, str]:
+    """Addresses of the pictures at hand as seen from the page, by digest."""
+    shelf = PictureShelf(folder, run.manifest["suite"])
+    if set(run.design.suite.tracks) - {"vqa"}:
+        shelf.add_scenes(sources.tasks[scene] for scene in _scenes(run) if sources.tasks)
+    shelf.add_questions(asked.values())
+    return {digest: f"{_FOLDER}/{_PICTURES}/{name}" for digest, name in shelf.names.items()}
+
+
+def _scenes(run: Run) -> list[str]:
+    return list(run.records.loc[run.records["track"] != "vqa", "scene"].unique())
 
 
 def _page(written: TablesWritten, build: str) -> str:

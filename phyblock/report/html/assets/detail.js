@@ -156,8 +156,8 @@ const Detail = (() => {
   function parsed(parse) {
     if (!parse) return null;
     const rule = parse.rule ? `read by the rule ${parse.rule}` : "nothing could be read";
-    const read = parse.plan || parse.letters || (parse.move === undefined ? [] : [parse.move]);
-    const values = Array.isArray(read) ? read.join(" → ") : String(read);
+    const read = [parse.plan, parse.letters, parse.move].find((one) => one !== null && one !== undefined);
+    const values = Array.isArray(read) ? read.join(" → ") : String(read ?? "");
     const dropped = parse.dropped && parse.dropped.length ? `; dropped, no such candidate: ${parse.dropped.join(", ")}` : "";
     return el("p", { class: "parsed" }, values ? el("b", { class: "number plan" }, values) : null,
       el("span", { class: "muted" }, ` ${rule}${dropped}${parse.parser ? `, parser ${parse.parser}` : ""}`));

@@ -20,8 +20,10 @@ const Words = (() => {
     api_error: "API error", missing: "Missing",
     shape_not_in_gt: "Shape not in GT", overflow: "Overflow",
     incorrect_orientation: "Incorrect orientation", dependency_not_met: "Dependency not met",
-    invalid: "No such candidate", done: "Says it is done", placed: "Placed",
-    unreadable: "Unreadable", complete: "Complete",
+    invalid: "No such candidate", done: "Done", placed: "Placed",
+    completed: "goal completed", collapsed: "it collapsed", unanswered: "no answer came",
+    max_steps: "step limit", max_failures: "too many failures in a row",
+    max_repeats: "the same failure again and again", max_tokens: "token limit", max_cost: "cost limit",
     semi_cylinder: "semi-cylinder",
     cuboid1: "cuboid 1", cuboid2: "cuboid 2", cuboid3: "cuboid 3",
   };

@@ -70,27 +70,16 @@ const Steps = (() => {
     });
   }
 
+  /** The states of an episode: one for each step, by the reply that decided it. */
   function ofTurns(scene, setting, turns) {
     let now = new Set();
-    return turns.map((turn) => {
-      const move = turn.parse ? turn.parse.move : null;
+    return turns.filter((turn) => turn.outcome !== null).map((turn) => {
       const isPlaced = turn.outcome === "placed";
-      const vertex = isPlaced && turn.placed !== null ? turn.placed : null;
-      const step = { number: move, vertex, why: isPlaced ? null : turn.outcome, before: now, turn };
-      if (isPlaced) now = afterTurn(now, turn);
-      return describe(scene, setting, { ...step, after: now });
+      const step = { number: turn.parse ? turn.parse.move : null, before: now, turn };
+      now = new Set(turn.world || now);
+      const vertex = isPlaced ? turn.placed : null;
+      return describe(scene, setting, { ...step, vertex, why: isPlaced ? null : turn.outcome, after: now });
     });
-  }
-
-  /** The world after a turn; earlier blocks may have changed places for it to succeed. */
-  function afterTurn(now, turn) {
-    const next = new Set(now);
-    for (const [from, to] of turn.swapped || []) {
-      next.delete(from);
-      next.add(to);
-    }
-    if (turn.placed !== null) next.add(turn.placed);
-    return next;
   }
 
   function describe(scene, setting, step) {
@@ -100,6 +89,8 @@ const Steps = (() => {
     let text = "";
     if (step.vertex !== null) text = `Placed as block ${scene.blocks[step.vertex].order} of the goal.`;
     else if (isNumber && step.why) text = reason(scene, setting, step.number, step.why, step.before);
+    if (step.turn?.swapped?.length) text += " Blocks that look alike changed places for it.";
+    if (step.turn?.fallen?.length) text += ` Let go, these blocks fall: ${step.turn.fallen.join(", ")}.`;
     const expected = ready.length && step.why !== "done" ? listed(scene, setting, ready) : "";
     return { ...step, text, expected, ready };
   }

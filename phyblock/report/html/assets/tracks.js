@@ -12,7 +12,7 @@ const Question = (() => {
       { view: one.view, framed: one.framed.length ? one.framed : one.blocks, marks: one.marks, grid: true }, "goal");
   }
 
-  /** The question as it stands in the data: pictures, text, options, the right one, evidence. */
+  /** The question as it was shown: pictures, text, options, the right one; and its evidence. */
   function about(question, sample) {
     const shown = question.pictures.filter((one) => !LETTERS.includes(one.label));
     return el("section", { class: "card question" },
@@ -20,23 +20,22 @@ const Question = (() => {
       el("p", { class: "asked" }, question.text),
       shown.length ? el("div", { class: "pictures" }, shown.map((one) =>
         el("figure", {}, drawn(question, one.label), shown.length > 1 ? el("figcaption", { class: "muted" }, one.label) : null))) : null,
-      options(question, sample),
+      options(question),
       Detail.folded("Evidence", el("pre", { class: "text" }, JSON.stringify(question.evidence, null, 2))));
   }
 
-  /** Options as they were shown to the model, which may have turned them round. */
-  function options(question, sample) {
-    const rotation = sample.record.question?.rotation || 0;
-    const n = question.options.length;
-    const right = sample.record.answer?.right || "";
-    return el("ol", { class: "options" }, question.options.map((_, i) => {
-      const from = (i + rotation) % n;
-      const option = question.options[from];
-      const isRight = right.length === 1 && right === LETTERS[i];
+  function options(question) {
+    const { answer } = question;
+    return el("ol", { class: "options" }, question.options.map((option, i) => {
+      const place = answer.indexOf(LETTERS[i]);
+      const isRight = answer.length === 1 && place === 0;
+      const mark = answer.length > 1 ? `${place + 1}.` : "✓";
       return el("li", { class: isRight ? "right" : "" },
         el("span", { class: "letter" }, LETTERS[i]),
-        isPicture(option) ? drawn(question, LETTERS[from]) : el("span", {}, option),
-        isRight ? el("span", { class: "mark", title: "The right answer" }, "✓") : null);
+        isPicture(option) ? drawn(question, LETTERS[i]) : el("span", {}, option),
+        isRight || answer.length > 1
+          ? el("span", { class: "mark", title: answer.length > 1 ? "Place in the right order" : "The right answer" }, mark)
+          : null);
     }));
   }
 
@@ -49,29 +48,42 @@ const Question = (() => {
         el("span", { class: `verdict ${given.correct ? "right" : "wrong"}` }, given.correct ? "✓ Right" : "✗ Wrong"),
         el("span", { class: "fact" }, "Answered ", el("b", { class: "number" }, said)),
         el("span", { class: "fact" }, "Right is ", el("b", { class: "number" }, given.right)),
+        notes(sample.record.question),
         sample.outcome === "ok" ? null : el("span", { class: "chip" }, Words.named(sample.outcome))));
+  }
+
+  function notes(shown) {
+    const told = [];
+    if (shown?.rotation) told.push(`options rotated by ${shown.rotation}`);
+    if (shown?.blind) told.push("sent without pictures");
+    if (shown?.wrong_image) told.push("sent with pictures of another scene");
+    return told.length ? el("span", { class: "fact muted" }, told.join("; ")) : null;
   }
 
   return { about, answer };
 })();
 
 const Turns = (() => {
-  /** Every turn with what was said, folded but for its head. */
+  /** Every reply of an episode, folded but for what became of it. */
   function cards(record) {
     return el("section", { class: "card" }, el("h3", {}, "Turns"),
-      el("ol", { class: "turns" }, record.turns.map((turn, i) => {
-        const isPlaced = turn.outcome === "placed";
-        return el("li", {}, el("details", {},
-          el("summary", {}, el("span", { class: "number" }, `${i + 1}`),
-            el("span", { class: `verdict ${isPlaced ? "right" : "wrong"}` },
-              `${isPlaced ? "✓" : "✗"} ${Words.named(turn.outcome)}`),
-            el("span", { class: "muted" }, turn.parse && turn.parse.move !== null ? `said ${turn.parse.move}` : "")),
-          Detail.parsed(turn.parse),
-          turn.reply?.reasoning ? Detail.folded("Reasoning", el("pre", { class: "text" }, turn.reply.reasoning)) : null,
-          el("pre", { class: "text reply" }, turn.reply?.text || "(empty)"),
-          turn.feedback ? el("p", { class: "muted" }, turn.feedback) : null,
-          Detail.promptCard(turn.prompt)));
-      })));
+      el("ol", { class: "turns" }, record.turns.map((turn) => el("li", {}, el("details", {},
+        el("summary", {}, ...head(turn)),
+        Detail.parsed(turn.parse),
+        turn.reply?.reasoning ? Detail.folded("Reasoning", el("pre", { class: "text" }, turn.reply.reasoning)) : null,
+        el("pre", { class: "text reply" }, turn.reply?.text || "(empty)"),
+        Detail.promptCard(turn.prompt))))));
+  }
+
+  function head(turn) {
+    const move = turn.parse?.move;
+    const said = move === null || move === undefined ? "" : `said ${move}`;
+    const number = el("span", { class: "number" }, String(turn.step || turn.n));
+    // Of several replies to a step, one speaks for all.
+    if (turn.outcome === null) return [number, el("span", { class: "muted" }, `outvoted, ${said}`)];
+    const isPlaced = turn.outcome === "placed";
+    return [number, el("span", { class: `verdict ${isPlaced ? "right" : "wrong"}` },
+      `${isPlaced ? "✓" : "✗"} ${Words.named(turn.outcome)}`), el("span", { class: "muted" }, said)];
   }
 
   return { cards };
