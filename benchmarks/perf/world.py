@@ -1,11 +1,12 @@
-"""The block world's speed: scenes generated, verified, audited and rendered a second.
+"""The block world's speed: scenes generated, verified, audited and rendered a second; memory.
 
-    python benchmarks/perf/world.py [--count 40] [--jobs 1 2]
+    python benchmarks/perf/world.py [--count 40] [--jobs 1 2] [--memory 1000]
 
-First the rate of each kind of work with each number of processes, over the same scenes; then what
-one scene costs in CPU time in this process, at 4, 12 and 22 blocks. A verified scene is one whose
-every state of its building order was simulated; an audited one was measured as any foreign scene
-is. A rendered scene is a composite of 512 pixel pictures, none of them on disk before.
+First the rate of each kind of work with each number of processes, over the same scenes. Then what
+one scene costs in CPU time in this process, at 4, 12 and 22 blocks. Last the resident memory of
+all processes together while --memory scenes are generated (0: not measured; a thousand take about
+four minutes). A scene is verified by all checks of `phyblock scenes verify`, and audited as any
+foreign scene is. A rendered scene is a composite of 512 pixel pictures, none on disk before.
 """
 
 from __future__ import annotations
@@ -17,21 +18,29 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
+import psutil
+
+from phyblock.datasets import read_builtin
 from phyblock.domain import Scene
-from phyblock.generate import accept, designed_scenes, make_candidates
+from phyblock.generate import make_candidates
 from phyblock.generate.audit import audit_scene
+from phyblock.generate.compositions import beside
 from phyblock.generate.production import Order, produce, shares
 from phyblock.generate.sketch import make_scene
+from phyblock.generate.verify import SCENE_CHECKS
 from phyblock.generate.workers import Workers, open_workers
+from phyblock.resources import bundled
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
 
 SIZES = (4, 12, 22)
 STYLE = PictureStyle()
-APART_M = 0.4
+APART_UNITS = 2.0
+MEMORY_AFTER = (50, 100, 250, 500)
 
 
-def verify(scene: Scene) -> None:
-    accept(scene)
+def verify(scene: Scene) -> int:
+    candidates = make_candidates(scene)
+    return sum(len(tuple(find(scene, candidates))) for find in SCENE_CHECKS.values())
 
 
 def audit(scene: Scene) -> int:
@@ -52,17 +61,14 @@ def run_all(workers: Workers, work: Callable[[Scene], Any], scenes: Iterable[Sce
         pass
 
 
+@functools.cache
 def of_size(blocks: int) -> Scene:
-    """A sound structure of that many blocks, cut from designs that stand side by side."""
-    designs = [s for s in designed_scenes() if s.level >= 3]
-    taken = [
-        replace(b, position_m=(b.position_m[0] + APART_M * i, *b.position_m[1:]))
-        for i, scene in enumerate(designs[-2:])
-        for b in scene.blocks
-    ][:blocks]
-    numbered = [replace(b, order=n, depend=(), layer=1) for n, b in enumerate(taken, 1)]
+    """A sound structure of that many blocks: the first of two scenes that stand side by side."""
+    tasks = read_builtin(bundled("benchmarks", "data", "phyblock-400")).tasks
+    large = [task.scene.blocks for task in tasks if task.scene.level == 4]
+    taken = [replace(block, depend=(), layer=1) for block in beside(large[:2], APART_UNITS)]
     level = 2 if blocks < 6 else 3 if blocks < 13 else 4
-    return make_scene(f"size-{blocks}", (level,), numbered)
+    return make_scene(f"size-{blocks}", (level,), taken[:blocks])
 
 
 def timed(work: Callable[[], Any], clock: Callable[[], float]) -> tuple[Any, float]:
@@ -107,13 +113,28 @@ def show_costs() -> None:
         print(f"{f'{len(scene)} blocks':<24}" + "".join(f"{cost:>12.2f}" for cost in costs))
 
 
+def show_memory(count: int, jobs: int) -> None:
+    print(f"\nMB resident, all of {jobs} processes, after n scenes")
+    with open_workers(jobs) as workers:
+        order = Order(2, "kit", shares(count))
+        for number, _ in enumerate(produce(order, workers), 1):
+            if number in MEMORY_AFTER or number == count:
+                here = psutil.Process()
+                tree = [here, *here.children(recursive=True)]
+                megabytes = sum(process.memory_info().rss for process in tree) / 1e6
+                print(f"{number:>6}{megabytes:>18.0f}", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=40)
     parser.add_argument("--jobs", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--memory", type=int, default=1000, metavar="SCENES")
     options = parser.parse_args()
     show_rates(options.count, options.jobs)
     show_costs()
+    if options.memory:
+        show_memory(options.memory, max(options.jobs))
 
 
 if __name__ == "__main__":

@@ -98,5 +98,5 @@ def test_render_names_views_backgrounds_and_kinds(data: Path, tmp_path: Path) ->
 
 
 def test_a_data_set_that_is_not_there_is_refused_with_the_bundled_ones() -> None:
-    with pytest.raises(DataError, match="phyblock-mini"):
+    with pytest.raises(DataError, match="phyblock-400"):
         scenes("stats", "nowhere")

@@ -237,7 +237,7 @@ def test_a_dumped_file_loads_equal(
 
 
 def load_naming(folder: Path, models: str, *overrides: str) -> LoadedSuite:
-    (folder / "data" / "phyblock-mini").mkdir(parents=True)
+    (folder / "data" / "phyblock-400").mkdir(parents=True)
     path = folder / "s.yaml"
     path.write_text(f"name: s\nmodels:\n{models}", encoding="utf-8")
     return load_suite(path, overrides, data_dir=folder / "data")

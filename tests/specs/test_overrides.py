@@ -16,7 +16,7 @@ SUITE = "name: s\nmodels: [oracle]\nimages: {size_px: 256}\n"
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "suites").mkdir()
     (tmp_path / "suites" / "s.yaml").write_text(SUITE, encoding="utf-8")
-    (tmp_path / "data" / "phyblock-mini").mkdir(parents=True)
+    (tmp_path / "data" / "phyblock-400").mkdir(parents=True)
     (tmp_path / "official").mkdir()
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -164,9 +164,9 @@ def test_variables_and_home_are_expanded(folder: Path, monkeypatch: pytest.Monke
 
 
 def test_a_bare_name_is_a_bundled_data_set(folder: Path) -> None:
-    assert load(folder).dataset_path == folder / "data" / "phyblock-mini"
-    named = load(folder, "dataset.path=phyblock-mini")
-    assert named.dataset_path == folder / "data" / "phyblock-mini"
+    assert load(folder).dataset_path == folder / "data" / "phyblock-400"
+    named = load(folder, "dataset.path=phyblock-400")
+    assert named.dataset_path == folder / "data" / "phyblock-400"
 
 
 def test_a_prompt_that_is_a_word_has_no_path(folder: Path) -> None:

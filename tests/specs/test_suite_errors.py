@@ -16,7 +16,7 @@ HEAD = "name: s\nmodels: [oracle]\n"
 @pytest.fixture
 def data_dir(tmp_path: Path) -> Path:
     folder = tmp_path / "data"
-    (folder / "phyblock-mini").mkdir(parents=True)
+    (folder / "phyblock-400").mkdir(parents=True)
     return folder
 
 
@@ -105,8 +105,8 @@ BAD = [
     (HEAD + "dataset: {format: official, path: null}\n", "3:35", "dataset.path", "checkout", "",
      "--set dataset.path=FOLDER"),
     (HEAD + "dataset: {path: ''}\n", "3:17", "dataset.path", "is empty", "", ""),
-    (HEAD + "dataset: {path: phyblock-mni}\n", "3:17", "dataset.path", "bundled data set",
-     "phyblock-mini", "did you mean phyblock-mini?"),
+    (HEAD + "dataset: {path: phyblock-40}\n", "3:17", "dataset.path", "bundled data set",
+     "phyblock-400", "did you mean phyblock-400?"),
     (HEAD + "dataset: {path: ./none}\n", "3:17", "dataset.path", "no such folder", "", ""),
     (HEAD + "dataset: {path: $PHYBLOCK_UNSET/x}\n", "3:17", "dataset.path",
      "variable PHYBLOCK_UNSET is not set", "", ""),

@@ -29,7 +29,7 @@ CoreDumper.yaml_implicit_resolvers = CoreLoader.yaml_implicit_resolvers
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("suites")
-    (folder / "data" / "phyblock-mini").mkdir(parents=True)
+    (folder / "data" / "phyblock-400").mkdir(parents=True)
     return folder
 
 
