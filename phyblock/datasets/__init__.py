@@ -3,6 +3,7 @@
 from phyblock.datasets.base import AssemblyTask, Dataset, QuestionSet, QuestionTask
 from phyblock.datasets.builtin import SCENES_FILE, read_builtin
 from phyblock.datasets.official import official_prompt, read_official, recorded_models
+from phyblock.datasets.official_questions import read_official_questions
 from phyblock.datasets.questions import QUESTIONS_FILE, read_questions
 from phyblock.datasets.salvage import Fault, Salvage, SalvagedTask, salvage
 
@@ -19,6 +20,7 @@ __all__ = [
     "official_prompt",
     "read_builtin",
     "read_official",
+    "read_official_questions",
     "read_questions",
     "recorded_models",
     "salvage",

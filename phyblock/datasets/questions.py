@@ -27,7 +27,7 @@ from phyblock.domain import (
 )
 from phyblock.errors import DataError, Problem
 
-__all__ = ["QUESTIONS_FILE", "read_question_line", "read_questions"]
+__all__ = ["QUESTIONS_FILE", "QuestionReader", "read_question_line", "read_questions"]
 
 QUESTIONS_FILE = "questions.jsonl"
 
@@ -60,7 +60,7 @@ def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
 
 def read_question_line(path: Path, number: int, line: str, scenes: Mapping[str, Scene]) -> Question:
     """The question in one line; raises DataError with everything that is wrong with it."""
-    reader = _QuestionReader(f"{path}:{number}")
+    reader = QuestionReader(f"{path}:{number}")
     raw = reader.mapping(parse_json(line, path, number))
     name = reader.name(reader.get(raw, "id"), "id")
     subtask = reader.choice(reader.get(raw, "subtask"), "subtask", SUBTASKS)
@@ -86,7 +86,7 @@ def read_question_line(path: Path, number: int, line: str, scenes: Mapping[str, 
     )
 
 
-class _QuestionReader(RecipeReader):
+class QuestionReader(RecipeReader):
     """Reads the fields of a question, and collects what is wrong with them."""
 
     def scene(self, raw: object, scenes: Mapping[str, Scene]) -> Scene | None:

@@ -8,9 +8,17 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from phyblock.domain import Block, CandidateSet
+from phyblock.domain import LETTERS, Block, CandidateSet
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.models.base import PlanSubject, Reply, Request, StepSubject, Subject, Usage
+from phyblock.models.base import (
+    ChoiceSubject,
+    PlanSubject,
+    Reply,
+    Request,
+    StepSubject,
+    Subject,
+    Usage,
+)
 from phyblock.models.config import ModelConfig
 
 __all__ = ["BASELINES", "BaselineModel"]
@@ -139,11 +147,44 @@ def _step(index: int | None) -> str:
     return "Next plan: Done" if index is None else f"Next plan: Move({index})"
 
 
+def _random_choice(subject: ChoiceSubject, rng: np.random.Generator) -> str:
+    n = len(subject.question.options)
+    if subject.question.subtask == "OR":
+        return _choice(int(index) for index in rng.permutation(n))
+    return _choice([int(rng.integers(n))])
+
+
+def _oracle_choice(subject: ChoiceSubject, _: np.random.Generator) -> str:
+    return _choice(subject.question.answer)
+
+
+def _majority_choice(subject: ChoiceSubject, _: np.random.Generator) -> str:
+    return _choice(subject.guesses["majority"])
+
+
+def _text_choice(subject: ChoiceSubject, _: np.random.Generator) -> str:
+    return _choice(subject.guesses["text-only"])
+
+
+def _choice(indices: Iterable[int]) -> str:
+    return "Answer: " + ", ".join(LETTERS[index] for index in indices)
+
+
 BASELINES: Mapping[str, Mapping[type[Subject], Rule[Any]]] = {
-    "random": {PlanSubject: _random_plan, StepSubject: _random_step},
+    "random": {
+        PlanSubject: _random_plan,
+        StepSubject: _random_step,
+        ChoiceSubject: _random_choice,
+    },
     "all-candidates": {PlanSubject: _all_candidates},
-    "oracle": {PlanSubject: _oracle_plan, StepSubject: _oracle_step},
+    "oracle": {
+        PlanSubject: _oracle_plan,
+        StepSubject: _oracle_step,
+        ChoiceSubject: _oracle_choice,
+    },
     "oracle-no-orientation": {PlanSubject: _unoriented_plan, StepSubject: _unoriented_step},
     "repeat": {StepSubject: _repeated_step},
+    "majority": {ChoiceSubject: _majority_choice},
+    "text-only": {ChoiceSubject: _text_choice},
 }
 """Baselines by name, each with its rule for every subject that it knows."""

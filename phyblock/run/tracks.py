@@ -10,6 +10,7 @@ from phyblock.datasets import AssemblyTask, Dataset, official_prompt
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.resources import bundled, cache_dir
 from phyblock.run.select import select_tasks
+from phyblock.run.vqa import open_vqa
 from phyblock.sim import PictureStyle
 from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tasks import (
@@ -25,6 +26,7 @@ from phyblock.tasks import (
     StepPrompt,
     StepRules,
     TemplatePrompt,
+    Vqa,
 )
 
 __all__ = ["open_tracks", "planning_rules"]
@@ -109,6 +111,14 @@ def _step_planning(context: _Context) -> StepPlanning:
     return StepPlanning(rules, prompt, pictures, tasks)
 
 
+def _vqa(context: _Context) -> Vqa:
+    asks = context.with_prompts
+    workers = _render_workers()
+    return open_vqa(
+        context.loaded, context.dataset, context.limit, with_prompts=asks, workers=workers
+    )
+
+
 def _step_rules(suite: SuiteSpec) -> StepRules:
     """How a suite plays episodes."""
     steps = suite.steps
@@ -145,4 +155,5 @@ def _render_workers() -> int:
 _TRACKS: Mapping[str, Callable[[_Context], AnyTrack]] = {
     "full_planning": _full_planning,
     "step_planning": _step_planning,
+    "vqa": _vqa,
 }

@@ -37,11 +37,19 @@ __all__ = [
     "SuiteSpec",
 ]
 
-BASELINES = ("random", "all-candidates", "oracle", "oracle-no-orientation", "repeat")
+BASELINES = (
+    "random",
+    "all-candidates",
+    "oracle",
+    "oracle-no-orientation",
+    "repeat",
+    "majority",
+    "text-only",
+)
 """Models that are built in; no models file may use their names."""
 RECORDED = "recorded"
 """The word that stands for every folder of recorded replies."""
-BUILTIN_DATASET = "phyblock-mini"
+BUILTIN_DATASET = "phyblock-400"
 """The bundled data set that is used when a suite names none."""
 PROMPT_WORDS = ("default", "official")
 
@@ -101,7 +109,7 @@ class DatasetSpec(Section):
     path: str | None = Field(
         default=None,
         min_length=1,
-        description="builtin: the name of a bundled data set (phyblock-mini when left out) or a "
+        description="builtin: the name of a bundled data set (phyblock-400 when left out) or a "
         "folder that holds scenes.jsonl (write ./name for a folder beside the suite). official: "
         "the checkout's folder. Relative to the suite file, or to the working directory when "
         "given by --set; ~ and $VARIABLES are expanded.",
@@ -209,8 +217,8 @@ class SuiteSpec(Section):
     seeds: UniqueSome[Seed] = Field(default=(0,), description="Each seed repeats every question.")
     models: ModelNames = Field(
         description="Names from models.yaml or built-in baselines (random, all-candidates, "
-        "oracle, oracle-no-orientation, repeat); or the word recorded: every folder of recorded "
-        "replies in the official data."
+        "oracle, oracle-no-orientation, repeat, majority, text-only); or the word recorded: every "
+        "folder of recorded replies in the official data."
     )
     prompt: Prompt = Field(
         default="default",

@@ -3,6 +3,7 @@
 from phyblock.tasks.full_planning import FullPlanning, PlanJudgement, PlanningRules
 from phyblock.tasks.pictures import PicturePolicy, Pictures
 from phyblock.tasks.prompts import OfficialPrompt, Prompt, TemplatePrompt
+from phyblock.tasks.question_pictures import QuestionPictures, Shown
 from phyblock.tasks.step_planning import StepPlanning
 from phyblock.tasks.step_prompt import StepPrompt
 from phyblock.tasks.step_rules import ENDINGS, Ending, StepLimits, StepRules
@@ -17,10 +18,13 @@ from phyblock.tasks.track import (
     SingleTrack,
     Track,
 )
+from phyblock.tasks.vqa import AskedQuestion, ChoiceJudgement, Vqa, VqaRules
 
 __all__ = [
     "ENDINGS",
     "AnyTrack",
+    "AskedQuestion",
+    "ChoiceJudgement",
     "Drawing",
     "Ending",
     "Episode",
@@ -35,6 +39,8 @@ __all__ = [
     "PlanJudgement",
     "PlanningRules",
     "Prompt",
+    "QuestionPictures",
+    "Shown",
     "SingleTrack",
     "StepLimits",
     "StepPlanning",
@@ -43,4 +49,6 @@ __all__ = [
     "Studio",
     "TemplatePrompt",
     "Track",
+    "Vqa",
+    "VqaRules",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -58,7 +58,10 @@ class OfficialPrompt:
 
 
 class TemplatePrompt:
-    """A Jinja template with a block `user` and, if wanted, a block `system`.
+    """A Jinja template with a block `user` and, if wanted, blocks `system` and `caption`.
+
+    `caption` is rendered for each picture, with its `label` and its `number` from 1, and stands
+    before it.
 
     Raises PromptError, naming file and line, when the template cannot be read, is not valid,
     has no user block, or uses a name that is not there.
@@ -92,7 +95,16 @@ class TemplatePrompt:
         """A system message, when that block gives text, and a user message with the pictures."""
         texts = {name: self.text(name, facts) for name in _BLOCKS}
         system = (Message("system", (texts["system"],)),) if texts["system"] else ()
-        return (*system, Message("user", (*pictures, texts["user"])))
+        return (*system, Message("user", (*self._captioned(pictures, facts), texts["user"])))
+
+    def _captioned(
+        self, pictures: Sequence[Image], facts: Mapping[str, object]
+    ) -> Iterator[str | Image]:
+        for number, picture in enumerate(pictures, 1):
+            about = {**facts, "label": picture.label, "number": number}
+            if caption := self.text("caption", about):
+                yield caption
+            yield picture
 
     def text(self, block: str, facts: Mapping[str, object]) -> str:
         """What a block of the template says, "" for one that it lacks; raises PromptError."""
