@@ -45,6 +45,7 @@ class _Suite(_Part):
 class _Model(_Part):
     name: str
     published: str | None = None
+    size_b: float | None = None
 
 
 class Design(_Part):

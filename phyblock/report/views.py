@@ -21,11 +21,11 @@ from phyblock.report.outcomes import HEADINGS, OUTCOMES
 from phyblock.report.text_table import NO_VALUE, Column, TextTable, level_name, number, spread
 from phyblock.scoring import ERROR_TYPES, ErrorType
 
-__all__ = ["coverage_view", "errors_view", "published_view", "table1_view"]
+__all__ = ["ERROR_NAMES", "coverage_view", "errors_view", "published_view", "table1_view"]
 
 _MODEL = Column("Model", is_text=True)
 _METRIC_NAMES = dict(zip(METRICS, ("Prec", "Rec", "F1"), strict=True))
-_ERROR_NAMES: dict[ErrorType, str] = {
+ERROR_NAMES: dict[ErrorType, str] = {
     "shape_not_in_gt": "Shape not in GT",
     "overflow": "Overflow",
     "incorrect_orientation": "Incorrect orientation",
@@ -112,7 +112,7 @@ def _of_suite(design: Design) -> str:
 def errors_view(table: pd.DataFrame, run: Run) -> TextTable:
     """Error types out of `errors_frame`: a count and a share (%) a type."""
     design = run.design
-    pairs = [Column(kind, _ERROR_NAMES[name]) for name in ERROR_TYPES for kind in ("n", "%")]
+    pairs = [Column(kind, ERROR_NAMES[name]) for name in ERROR_TYPES for kind in ("n", "%")]
     rows = [
         (
             row["model"] if row["level"] == design.levels[0] else "",

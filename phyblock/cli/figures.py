@@ -1,0 +1,31 @@
+"""`phyblock figures`: a run's figures, drawn again from its records."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from phyblock.cli.console import make_console, shown_path
+from phyblock.report.figures import FIGURES, write_figures
+from phyblock.report.load import load_run
+
+__all__ = ["command"]
+
+
+@click.command("figures")
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option(
+    "--only", "names", multiple=True, type=click.Choice(FIGURES), help="Only this figure; repeat."
+)
+def command(run: Path, names: tuple[str, ...]) -> None:
+    """Draw the figures of the folder RUN into RUN/figures, as SVG and PNG.
+
+    Figures that the run has no numbers for are left out.
+    """
+    files = write_figures(load_run(run, texts=False), names or FIGURES)
+    console = make_console()
+    for file in files:
+        console.print(shown_path(file), markup=False, soft_wrap=True)
+    if not files:
+        console.print("The run has no numbers for a figure.")

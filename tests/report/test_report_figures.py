@@ -1,0 +1,147 @@
+from __future__ import annotations
+
+import io
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+
+from phyblock.errors import StoreError
+from phyblock.report.figures import FIGURES, write_figures
+from phyblock.report.figures.style import COLORS
+from phyblock.report.figures.tracks import accuracy_by_subtask, step_progress
+from phyblock.report.load import load_run
+from tests.report.factory import LEVELS, manifest, record, score, write_run
+
+matplotlib = pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+PLANNING = {"f1-levels", "f1-radar", "settings", "error-types", "f1-size", "f1-cost", "scenes"}
+
+
+def planned(model: str, tp: int) -> list[dict[str, Any]]:
+    return [
+        record(
+            model,
+            scene,
+            0,
+            [
+                score(tp, 4 - tp, 4 - tp),
+                score(min(tp + 1, 4), 0, 1, setting="B"),
+                score(tp, 1, 1, criterion="selection"),
+                score(tp, 1, 1, criterion="selection", setting="B"),
+            ],
+            cost_usd=0.01,
+            attempts=1,
+        )
+        for scene in LEVELS
+    ]
+
+
+def folder_of(path: Path, *more: dict[str, Any], **facts: Any) -> Path:
+    made = manifest(seeds=[0], matchers=["optimal"], **facts)
+    for model, size_b in zip(made["models"], (7.0, None), strict=False):
+        model["size_b"] = size_b
+    made["suite"]["tracks"] = ["full_planning", "vqa", "step_planning"]
+    return write_run(path, [*planned("alpha", 3), *planned("beta", 1), *more], made)
+
+
+def asked(model: str, subtask: str, *correct: bool) -> list[dict[str, Any]]:
+    return [
+        record(model, "000")
+        | {
+            "sample": f"vqa/{model}/{subtask}-{n}/s0",
+            "track": "vqa",
+            "question": {"id": f"{subtask}-{n}", "subtask": subtask, "category": ""},
+            "answer": {"right": "A", "given": "A" if right else None, "correct": right},
+        }
+        for n, right in enumerate(correct)
+    ]
+
+
+def episode(model: str, scene: str, *placed: int | None) -> dict[str, Any]:
+    turns = [{"n": n, "placed": vertex} for n, vertex in enumerate(placed, 1)]
+    sample = f"step_planning/{model}/{scene}/s0"
+    return record(model, scene) | {"sample": sample, "track": "step_planning", "turns": turns}
+
+
+def test_every_figure_is_drawn_and_drawing_again_gives_the_same_bytes(tmp_path: Path) -> None:
+    more = [*asked("alpha", "SH", True, False), *asked("beta", "OR", True)]
+    more += [episode("alpha", "000", 0, 1, 2, 3), episode("beta", "000", None, 0)]
+    run = load_run(folder_of(tmp_path / "run", *more), texts=False)
+    first = {file: file.read_bytes() for file in write_figures(run)}
+    assert [file.stem for file in first][::2] == list(FIGURES)
+    assert {file: file.read_bytes() for file in write_figures(run)} == first
+    for file, data in first.items():
+        if file.suffix == ".svg":
+            assert re.search(rb"<svg[^>]*width=\"[\d.]+pt\"", data)
+            assert b"<dc:date>" not in data
+        else:
+            with Image.open(io.BytesIO(data)) as picture:
+                assert picture.width >= 1200
+                assert len(picture.convert("RGB").resize((200, 100)).getcolors(20000) or []) > 20
+
+
+def test_what_a_run_has_no_numbers_for_is_not_drawn(tmp_path: Path) -> None:
+    run = load_run(write_run(tmp_path / "run", [], manifest()), texts=False)
+    assert write_figures(run) == ()
+    drawn = {file.stem for file in write_figures(load_run(folder_of(tmp_path / "other")))}
+    assert drawn == PLANNING
+
+
+def test_a_figure_takes_no_style_of_the_user_and_leaves_none(tmp_path: Path) -> None:
+    run = load_run(folder_of(tmp_path / "run"))
+    (file, _) = write_figures(run, ["f1-levels"])
+    plain = file.read_bytes()
+    with matplotlib.rc_context({"font.size": 30, "axes.facecolor": "red"}):
+        write_figures(run, ["f1-levels"])
+        assert matplotlib.rcParams["font.size"] == 30
+    assert file.read_bytes() == plain
+
+
+def test_drawing_opens_no_window_and_imports_no_pyplot(tmp_path: Path) -> None:
+    had = "matplotlib.pyplot" in sys.modules
+    write_figures(load_run(folder_of(tmp_path / "run")))
+    assert ("matplotlib.pyplot" in sys.modules) == had
+
+
+def test_accuracy_by_subtask_by_hand(tmp_path: Path) -> None:
+    more = [*asked("alpha", "SH", True, True, False, True), *asked("beta", "OR", False)]
+    table = accuracy_by_subtask(load_run(folder_of(tmp_path / "run", *more)))
+    assert table.loc["alpha", "SH"] == 75
+    assert table.loc["beta", "OR"] == 0
+    assert table.notna().to_numpy().sum() == 2
+
+
+def test_an_episode_that_ended_keeps_what_it_built(tmp_path: Path) -> None:
+    more = [episode("alpha", "000", 0, None, 1, 2), episode("alpha", "001", 0)]
+    table = step_progress(load_run(folder_of(tmp_path / "run", *more)))
+    assert table["alpha"].tolist() == [0, 25, 25, 37.5, 50]
+
+
+def test_colors_differ_in_lightness_or_hue_for_readers_who_see_no_red_or_green() -> None:
+    # Vienot, Brettel and Mollon 1999: how protanopes and deuteranopes see linear RGB.
+    views = {
+        "protanope": ((0.11238, 0.88762, 0), (0.11238, 0.88762, 0), (0.00401, -0.00401, 1)),
+        "deuteranope": ((0.29275, 0.70725, 0), (0.29275, 0.70725, 0), (-0.02234, 0.02234, 1)),
+    }
+    linear = [[(int(color[n : n + 2], 16) / 255) ** 2.2 for n in (1, 3, 5)] for color in COLORS]
+    for rows in views.values():
+        seen = [
+            [
+                max(0.0, sum(a * b for a, b in zip(row, color, strict=True))) ** (1 / 2.2)
+                for row in rows
+            ]
+            for color in linear
+        ]
+        for place, one in enumerate(seen):
+            for other in seen[place + 1 :]:
+                assert max(abs(a - b) for a, b in zip(one, other, strict=True)) > 0.06
+
+
+def test_a_folder_that_cannot_be_written_is_said_so(tmp_path: Path) -> None:
+    run = load_run(folder_of(tmp_path / "run"))
+    (run.path / "figures").write_text("in the way")
+    with pytest.raises(StoreError, match="cannot be written"):
+        write_figures(run)
