@@ -8,6 +8,7 @@ import platform
 from collections.abc import Sequence
 from datetime import datetime, timezone
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 from phyblock.datasets import Dataset
@@ -27,9 +28,12 @@ def make_manifest(
     dataset: Dataset,
     tracks: Sequence[AnyTrack],
     limit: int | None,
+    questions: Path | None = None,
 ) -> dict[str, Any]:
     """The manifest; `identity` digests what decides the results, so that only the same run goes
     on in a folder. Limits, prices, tables and paths are no part of it.
+
+    `questions` is where those of the vqa track are.
     """
     inputs: dict[str, Any] = {
         "format": _FORMAT,
@@ -50,6 +54,7 @@ def make_manifest(
         **inputs,
         "suite": suite.model_dump(mode="json"),
         "dataset": {**inputs["dataset"], "format": suite.dataset.format, "root": str(dataset.root)},
+        "questions": questions and {"format": suite.vqa.format, "root": str(questions)},
         "items": {track.name: len(track.items) for track in tracks},
         "scenes": len(scenes),
         "scenes_by_level": {

@@ -77,7 +77,7 @@ def make_plan(
     selected = replace(dataset, tasks=tasks)
     if not any(track.items for track in tracks):
         raise SpecError(_nothing(loaded, dataset, limit))
-    manifest = make_manifest(suite, models, selected, tracks, limit)
+    manifest = make_manifest(suite, models, selected, tracks, limit, loaded.questions_path)
     return RunPlan(suite, models, selected, tracks, manifest)
 
 

@@ -13,7 +13,6 @@ from pathlib import Path
 __all__ = ["Pack", "write_script"]
 
 _CHUNK_CHARACTERS = 300_000
-_IN_QUOTES = str.maketrans({"\\": "\\\\", "'": "\\'"})
 
 
 class Pack:
@@ -64,6 +63,6 @@ def _to_json(data: object) -> str:
 
 
 def _write(folder: Path, name: str, build: str, text: str) -> None:
-    quoted = text.translate(_IN_QUOTES)
+    quoted = text.replace("\\", "\\\\").replace("'", "\\'")
     script = f"phyblockTake('{build}','{name}','{quoted}')\n"
     (folder / f"{name}.js").write_text(script, encoding="ascii")

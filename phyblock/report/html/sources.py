@@ -10,12 +10,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from phyblock.datasets import AssemblyTask, Dataset, QuestionTask, read_questions
+from phyblock.datasets import AssemblyTask, Dataset, QuestionTask
 from phyblock.errors import DataError, Problem
 from phyblock.report.design import Design
-from phyblock.resources import bundled
 from phyblock.run.data import open_dataset
 from phyblock.run.select import select_tasks
+from phyblock.run.vqa import open_questions
 
 __all__ = ["Sources", "open_sources"]
 
@@ -66,15 +66,10 @@ def _dataset(manifest: Mapping[str, Any], design: Design, root: Path) -> Dataset
 
 def _questions(manifest: Mapping[str, Any], dataset: Dataset) -> dict[str, QuestionTask]:
     """The questions of the vqa track, by id; {} for a run without it."""
-    recorded = (manifest.get("tracks") or {}).get("vqa")
+    recorded = manifest.get("questions")
     if recorded is None:
         return {}
-    named = manifest["suite"]["vqa"]["path"]
-    known = bundled("benchmarks", "data", named)
-    root = known if known.is_dir() else Path(named)
-    if not root.is_dir():
-        raise DataError(Problem(str(root), "the questions of the run are not there"))
-    questions = read_questions(root, dataset)
-    if questions.sha256 != recorded["questions"]:
-        raise DataError(Problem(str(root), _CHANGED, "sha256", questions.sha256))
+    questions = open_questions(recorded["format"], Path(recorded["root"]), dataset)
+    if questions.sha256 != manifest["tracks"]["vqa"]["questions"]:
+        raise DataError(Problem(str(questions.root), _CHANGED, "sha256", questions.sha256))
     return {task.question.id: task for task in questions.tasks}

@@ -132,7 +132,7 @@ const Stage = (() => {
             fresh: scene.blocks[step.vertex] || null,
           });
         } else if (offered) {
-          Solid.draw(canvas, [Solid.onTheFloor(offered)], { view: HOME, size: THUMB_PX, minDistance: 0.55 });
+          Solid.draw(canvas, [Solid.onTheFloor(offered)], { view: HOME, size: THUMB_PX, minDistance: 0.4 });
         }
       }
     }, { rootMargin: "200px" });
