@@ -23,7 +23,7 @@ from phyblock.sim.renderer import renderer
 from phyblock.sim.stage import Prop, stage
 from phyblock.sim.textures import Background, floor, shadow
 
-__all__ = ["COLOR_RGB", "SUPERSAMPLE", "DrawnBlock", "Shot", "picture", "shoot"]
+__all__ = ["COLOR_RGB", "SUPERSAMPLE", "DrawnBlock", "Shot", "empty_ground", "picture", "shoot"]
 
 SUPERSAMPLE = 2
 
@@ -114,11 +114,18 @@ def shoot(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> Shot:
 
 
 def picture(
-    blocks: Sequence[DrawnBlock], camera: Camera, background: Background, size_px: int
+    blocks: Sequence[DrawnBlock],
+    camera: Camera,
+    background: Background,
+    size_px: int,
+    ground: NDArray[np.float32] | None = None,
 ) -> Image.Image:
-    """Blocks on their floor, anti-aliased, an RGB image of `size_px` squared."""
+    """Blocks on their floor, anti-aliased, an RGB image of `size_px` squared.
+
+    `ground` is the floor as `empty_ground` gives it, for those who draw it often.
+    """
     large_px = size_px * SUPERSAMPLE
-    image = floor(background, camera, large_px)
+    image = floor(background, camera, large_px) if ground is None else ground.copy()
     if blocks:
         shot = shoot(blocks, camera, large_px)
         triangles = [block.triangles_m for block in blocks]
@@ -126,6 +133,11 @@ def picture(
         np.copyto(image, shot.rgb, where=shot.block[..., None] >= 0)
     pixels = np.rint(image, out=image).astype(np.uint8)
     return Image.fromarray(pixels).resize((size_px, size_px), Image.Resampling.BOX)
+
+
+def empty_ground(background: Background, camera: Camera, size_px: int) -> NDArray[np.float32]:
+    """The floor of a picture of `size_px` squared, before it is scaled down."""
+    return floor(background, camera, size_px * SUPERSAMPLE)
 
 
 def light_direction(camera: Camera) -> NDArray[np.float64]:

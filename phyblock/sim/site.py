@@ -12,15 +12,19 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 
+from PIL import Image
+
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.outcomes import quat_xyzw_to_euler_deg
 from phyblock.sim.pictures import PictureStyle
+from phyblock.sim.question_pictures import question_camera
+from phyblock.sim.render import DrawnBlock, empty_ground, picture
 from phyblock.sim.stability import DEFAULT_TRIAL, Trial, movement
 from phyblock.sim.steps import DEFAULT_REST
 from phyblock.sim.world import Physics, Pose, World
 
-__all__ = ["ONE_SETTING", "Settled", "Site", "settle", "state_picture"]
+__all__ = ["ONE_SETTING", "Lookout", "Settled", "Site", "settle", "state_picture"]
 
 ONE_SETTING = Trial(physics=DEFAULT_TRIAL.physics[:1])
 """A trial that costs half as much as the default and decides nothing that a score rests on."""
@@ -141,3 +145,18 @@ def _lying(block: Block, pose: Pose, fallen: Collection[int]) -> Block:
     euler = quat_xyzw_to_euler_deg(pose.quat_xyzw)
     a, b, c = (round(angle, _ANGLE_DIGITS) + 0.0 for angle in euler)
     return dataclasses.replace(block, position_m=(x, y, z), euler_deg=(a, b, c))
+
+
+class Lookout:
+    """The place that a scene's goal is seen from; draws `state_picture`s as images, quickly."""
+
+    def __init__(self, scene: Scene, style: PictureStyle) -> None:
+        self._style = style
+        self._camera = question_camera(state_picture(scene, scene.blocks, style), style)
+        self._ground = empty_ground(style.background, self._camera, style.size_px)
+
+    def image(self, blocks: Sequence[Block]) -> Image.Image:
+        """The blocks on the ground, an RGB image of the style's size."""
+        drawn = [DrawnBlock(b.type, b.color, b.position_m, b.euler_deg) for b in blocks]
+        style = self._style
+        return picture(drawn, self._camera, style.background, style.size_px, self._ground)

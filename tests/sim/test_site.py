@@ -18,7 +18,7 @@ from phyblock.sim.site import ONE_SETTING, Site, settle, state_picture
 from phyblock.sim.stability import DEFAULT_TRIAL, Trial
 
 STYLE = PictureStyle(128)
-MINI = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-mini"
+BUILT_IN = read_builtin(Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400").tasks
 
 
 def seesaw() -> Scene:
@@ -33,7 +33,7 @@ def seesaw() -> Scene:
 
 def test_what_stands_stays_where_it_was_put() -> None:
     with Site() as site:
-        for task in read_builtin(MINI).tasks[:6]:
+        for task in BUILT_IN[::80]:
             found = site.settle(task.scene.blocks)
             assert found.stands
             assert found.blocks == task.scene.blocks
@@ -56,7 +56,7 @@ def test_an_empty_ground_stands() -> None:
 
 @pytest.mark.parametrize("trial", [ONE_SETTING, DEFAULT_TRIAL], ids=["one", "default"])
 def test_a_site_gives_the_same_verdict_whatever_was_tried_on_it_before(trial: Trial) -> None:
-    structures = [task.scene.blocks for task in read_builtin(MINI).tasks[:3]]
+    structures = [task.scene.blocks for task in BUILT_IN[::150]]
     structures += [seesaw().blocks[:2], structures[0][:1], seesaw().blocks]
     with Site(trial) as site:
         first = [site.settle(blocks) for blocks in structures]
@@ -80,13 +80,13 @@ def test_a_site_opens_again_after_it_was_closed() -> None:
 
 
 def test_a_finished_structure_is_seen_as_in_the_goal_picture() -> None:
-    scene = read_builtin(MINI).tasks[0].scene
+    scene = BUILT_IN[0].scene
     assert question_png(state_picture(scene, scene.blocks, STYLE), STYLE) == goal_png(scene, STYLE)
 
 
 def test_blocks_keep_their_place_in_the_picture_as_more_are_placed() -> None:
     """What the next block does not touch or shade is the same pixel by pixel."""
-    scene = read_builtin(MINI).tasks[0].scene
+    scene = BUILT_IN[0].scene
     pictures = [
         np.asarray(Image.open(io.BytesIO(question_png(state_picture(scene, done, STYLE), STYLE))))
         for done in (scene.blocks[:count] for count in range(len(scene) + 1))

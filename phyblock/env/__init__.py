@@ -1,0 +1,17 @@
+"""PhyBlock as a Gymnasium environment: importing this package registers `PhyBlock-v0`.
+
+Needs the optional dependency: pip install 'phyblock[gym]'.
+"""
+
+from __future__ import annotations
+
+import gymnasium
+
+from phyblock.env.environment import DONE, PhyBlockEnv
+from phyblock.env.scenes import read_tasks
+
+__all__ = ["DONE", "ENV_ID", "PhyBlockEnv", "read_tasks"]
+
+ENV_ID = "PhyBlock-v0"
+
+gymnasium.register(ENV_ID, entry_point="phyblock.env.environment:PhyBlockEnv")

@@ -1,0 +1,246 @@
+"""The Gymnasium environment: its interface, its rules, its pictures."""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import phyblock.env
+from phyblock.datasets import AssemblyTask, read_builtin
+from phyblock.domain import Block, Candidate, CandidateSet, Scene
+from phyblock.env import DONE, PhyBlockEnv, read_tasks
+from phyblock.errors import DataError
+from phyblock.scoring import SETTINGS, Setting
+
+ROOT = Path(__file__).parents[2]
+SOME = read_tasks("phyblock-400")[::20]
+
+
+def rollout(env: PhyBlockEnv, seed: int, steps: int = 30) -> list[Any]:
+    """Everything that a random agent sees."""
+    observation, info = env.reset(seed=seed)
+    env.action_space.seed(seed)
+    seen: list[Any] = [(observation, info)]
+    for _ in range(steps):
+        observation, *rest = env.step(env.action_space.sample())
+        seen.append((observation, *rest))
+        if rest[1] or rest[2]:
+            observation, info = env.reset()
+            seen.append((observation, info))
+    return seen
+
+
+def solve(env: PhyBlockEnv, info: dict[str, Any]) -> tuple[float, dict[str, Any]]:
+    total, ended = 0.0, False
+    while not ended:
+        _, reward, ended, cut, info = env.step(info["right_moves"][0])
+        assert reward == 1
+        assert not cut
+        total += reward
+    return total, info
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"size_px": 128}, {"observe": "state"}, {"observe": "state", "physics": "strict"}],
+    ids=["pictures", "state", "strict"],
+)
+def test_gymnasium_finds_nothing_wrong(options: dict[str, Any]) -> None:
+    env = gymnasium.make(phyblock.env.ENV_ID, render_mode="rgb_array", **options)
+    check_env(env.unwrapped)
+    env.close()
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_an_agent_that_knows_finishes_every_scene_in_as_many_steps_as_blocks(
+    setting: Setting,
+) -> None:
+    env = PhyBlockEnv(SOME, setting=setting, physics="off", observe="state")
+    for task in SOME:
+        _, info = env.reset(options={"scene": task.scene.id})
+        total, info = solve(env, info)
+        assert info["is_complete"]
+        assert total == info["step"] == len(task.scene)
+    env.close()
+
+
+def test_the_same_seed_gives_the_same_episodes() -> None:
+    first, second = (rollout(PhyBlockEnv(SOME, observe="state"), 7) for _ in range(2))
+    assert len(first) == len(second)
+    for one, other in zip(first, second, strict=True):
+        assert one[1:] == other[1:]
+        assert all(np.array_equal(one[0][name], other[0][name]) for name in one[0])
+    scenes = {seen[-1]["scene"] for seen in first}
+    assert len(scenes) > 1
+
+
+def test_every_observation_lies_in_its_space() -> None:
+    env = PhyBlockEnv(SOME, observe="state", max_steps=5)
+    assert all(seen[0] in env.observation_space for seen in rollout(env, 3, 60))
+
+
+def test_a_random_agent_ends_within_the_limits() -> None:
+    env = PhyBlockEnv(SOME, observe="state", physics="off", max_steps=9, max_failures=4)
+    env.reset(seed=1)
+    failures = 0
+    for _ in range(400):
+        _, reward, ended, cut, info = env.step(1 + int(env.np_random.integers(16)))
+        failures = 0 if reward else failures + 1
+        assert info["step"] <= 9
+        assert failures <= 4
+        assert cut == ((info["step"] == 9 or failures == 4) and not ended)
+        if ended or cut:
+            env.reset()
+            failures = 0
+
+
+def test_done_ends_and_a_wrong_move_changes_nothing() -> None:
+    env = PhyBlockEnv(SOME[:1], size_px=128)
+    observation, info = env.reset()
+    wrong = next(n for n in range(1, 17) if n not in info["right_moves"])
+    after, reward, ended, cut, told = env.step(wrong)
+    assert (reward, ended, cut, told["placed"]) == (0, False, False, ())
+    assert told["outcome"] not in ("placed", "begun", "done")
+    assert np.array_equal(after["current"], observation["current"])
+    _, reward, ended, cut, told = env.step(DONE)
+    assert (reward, ended, cut, told["outcome"]) == (0, True, False, "done")
+
+
+def test_a_finished_assembly_looks_like_the_goal() -> None:
+    env = PhyBlockEnv(SOME[:1], size_px=128, physics="off", render_mode="rgb_array")
+    observation, info = env.reset()
+    assert not np.array_equal(observation["current"], observation["goal"])
+    solve(env, info)
+    picture = env.render()
+    assert picture is not None
+    assert np.array_equal(picture, observation["goal"])
+
+
+def test_what_is_observed_can_be_written_to_without_harm() -> None:
+    env = PhyBlockEnv(SOME[:1], size_px=128)
+    observation, _ = env.reset()
+    kept = observation["goal"].copy()
+    observation["goal"][:] = 0
+    again, _ = env.reset()
+    assert np.array_equal(again["goal"], kept)
+
+
+def test_without_a_render_mode_nothing_is_rendered() -> None:
+    env = PhyBlockEnv(SOME[:1], observe="state")
+    env.reset()
+    assert env.render() is None
+
+
+def seesaw() -> AssemblyTask:
+    """The bar tips unless the second cube is there before it; nothing says so but physics."""
+    blocks = (
+        Block(1, "cube", "red", (0, 0, 0.025), (0, 0, 0), (), 1),
+        Block(2, "cube", "blue", (0.11, 0, 0.025), (0, 0, 0), (), 1),
+        Block(3, "cuboid3", "yellow", (0.055, 0, 0.0625), (0, 0, 0), (1,), 2),
+    )
+    numbered = tuple(Candidate(b.type, b.color, b.euler_deg) for b in blocks)
+    return AssemblyTask(Scene("seesaw", (2,), blocks, ("seesaw",)), CandidateSet(numbered))
+
+
+@pytest.mark.parametrize(
+    ("physics", "fallen", "ended"),
+    [("off", (), False), ("settle", (3,), False), ("strict", (3,), True)],
+)
+def test_what_physics_does_with_what_cannot_stand(
+    physics: Any, fallen: tuple[int, ...], ended: bool
+) -> None:
+    env = PhyBlockEnv([seesaw()], physics=physics, size_px=128)
+    env.reset()
+    env.step(1)
+    observation, reward, has_ended, _, info = env.step(3)
+    assert (reward, info["fallen"], has_ended) == (1, fallen, ended)
+    held = PhyBlockEnv([seesaw()], physics="off", size_px=128)
+    held.reset()
+    held.step(1)
+    expected = held.step(3)[0]["current"]
+    assert np.array_equal(observation["current"], expected) == (physics != "strict")
+    env.close()
+
+
+def test_under_strict_physics_another_order_stands() -> None:
+    env = PhyBlockEnv([seesaw()], physics="strict", observe="state")
+    env.reset()
+    for action in (1, 2, 3):
+        _, reward, ended, _, info = env.step(action)
+        assert reward == 1
+    assert ended
+    assert info["is_complete"]
+    env.close()
+
+
+def test_an_invalid_candidate_is_told() -> None:
+    env = PhyBlockEnv([seesaw()], observe="state")
+    env.reset()
+    assert env.step(16)[-1]["outcome"] == "invalid"
+    with pytest.raises(ValueError, match="outside"):
+        env.step(17)
+
+
+@pytest.mark.parametrize(
+    ("data", "scene"), [("no-such-set", None), ("phyblock-400", "no-such-scene")]
+)
+def test_what_is_not_there_is_said(data: str, scene: str | None) -> None:
+    with pytest.raises(DataError, match="no such"):
+        PhyBlockEnv(data, scene)
+
+
+def test_scenes_come_from_folders_and_checkouts(official_checkout: Path) -> None:
+    folder = ROOT / "benchmarks" / "data" / "phyblock-400"
+    assert read_tasks(folder) == read_builtin(folder).tasks == read_tasks("phyblock-400")
+    assert len(read_tasks(official_checkout)) == 400
+
+
+def makers(count: int, **options: Any) -> list[partial[PhyBlockEnv]]:
+    tasks = read_tasks("phyblock-400")[:count]
+    return [partial(PhyBlockEnv, [task], **options) for task in tasks]
+
+
+def test_sixty_four_scenes_run_as_a_vector() -> None:
+    envs = gymnasium.vector.SyncVectorEnv(makers(64, observe="state", physics="off"))
+    _, infos = envs.reset(seed=0)
+    total = np.zeros(64)
+    for _ in range(12):
+        actions = np.array([moves[0] if moves else DONE for moves in infos["right_moves"]])
+        observations, rewards, _, _, infos = envs.step(actions)
+        total += rewards
+    assert observations["placed"].shape == (64, 16)
+    assert (total >= 4).all()
+    envs.close()
+
+
+@pytest.mark.slow
+def test_scenes_run_in_processes_of_their_own() -> None:
+    envs = gymnasium.vector.AsyncVectorEnv(makers(4, size_px=128), context="spawn")
+    first, _ = envs.reset(seed=0)
+    assert first["goal"].shape == (4, 128, 128, 3)
+    assert len({picture.tobytes() for picture in first["goal"]}) == 4
+    envs.step(np.array([1, 2, 3, 0]))
+    envs.close()
+
+
+def blocks_of_code() -> list[str]:
+    text = (ROOT / "docs" / "environment.md").read_text(encoding="utf-8")
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+
+
+@pytest.mark.parametrize("place", range(len(blocks_of_code())))
+def test_what_the_docs_show_runs(place: int, capsys: pytest.CaptureFixture[str]) -> None:
+    code = blocks_of_code()[place]
+    body = [line for line in code.splitlines() if line and not line.startswith(("import", "from"))]
+    assert len(body) <= 10
+    exec(compile(code, f"docs/environment.md block {place}", "exec"), {})
+    if place == 1:
+        complete, total, blocks = capsys.readouterr().out.split()
+        assert (complete, float(total)) == ("True", float(blocks))
