@@ -7,7 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from phyblock.domain.blocks import BLOCK_TYPES, COLORS
+from phyblock.domain.blocks import (
+    BLOCK_TYPES,
+    COLORS,
+    SHAPES,
+    BlockType,
+    Euler,
+    euler_deg_to_quat_xyzw,
+    quat_xyzw_to_matrix,
+)
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.generate.poses import POSES
@@ -22,11 +30,10 @@ from phyblock.generate.questions.pictured import (
 )
 from phyblock.generate.questions.seeing import GOAL_VIEW
 from phyblock.generate.questions.wording import slots_of
-from phyblock.sim.outcomes import OUTCOME_SETTINGS, holds
+from phyblock.sim.outcomes import OUTCOME_SETTINGS, Setting, holds
 from phyblock.sim.question_pictures import BLOCK_LABEL
 from phyblock.sim.seeing import Top, is_apart, is_inside, seen, seen_order, visible_tops
 from phyblock.sim.support import bounds_m, drop_height_m
-from phyblock.sim.world import Physics
 
 __all__ = ["AffordanceMaker"]
 
@@ -37,9 +44,29 @@ _STEP_PX = 8
 _LEAST_RISE = 0.6
 _FLAT_RISE = 0.99
 _FLAT_GAP_M, _SLOPED_GAP_M = 0.0015, 0.03
-_SHIFT_M = 0.006
+_SHIFT_M = 0.008
+_OFF_CENTER_M = 0.001
 _LIFT_M = 0.6
 _APART_PX = 20.0
+
+
+def _balanced() -> list[tuple[BlockType, Euler]]:
+    """Poses whose center of mass is under the middle of what is seen from above.
+
+    Of others, such as a wedge, nobody could say what "its middle" is.
+    """
+    found = []
+    for block_type in BLOCK_TYPES:
+        for euler in POSES[block_type].values():
+            block = Block(1, block_type, "red", (0.0, 0.0, 0.0), euler, (), 1)
+            rotation = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(euler))
+            center = rotation @ np.array(SHAPES[block_type].center_of_mass_m)
+            if np.abs(center - bounds_m(block).mean(axis=0))[:2].max() < _OFF_CENTER_M:
+                found.append((block_type, euler))
+    return found
+
+
+_BALANCED = _balanced()
 
 
 class AffordanceMaker:
@@ -93,8 +120,7 @@ def _marked(shown: QuestionPicture, letter: str) -> tuple[float, float, float]:
 
 
 def _drawn_block(scene: Scene, rng: np.random.Generator) -> Block:
-    block_type = pick(rng, BLOCK_TYPES)
-    euler = pick(rng, tuple(POSES[block_type].values()))
+    block_type, euler = pick(rng, _BALANCED)
     order = max(block.order for block in scene.blocks) + 1
     return Block(order, block_type, pick(rng, COLORS), (0.0, 0.0, 0.0), euler, (), 1)
 
@@ -130,7 +156,7 @@ def _surely(
     wants_right: bool,
     wants_wrong: bool,
 ) -> bool | None:
-    """Whether it stays at a place, and likewise 6 mm off in every direction; None if unsure."""
+    """Whether it stays at a place, and likewise 8 mm off in every direction; None if unsure."""
     x, y, z = place_m
     first = _verdict(scene, block, place_m, OUTCOME_SETTINGS[:1])
     if first is None or not (wants_right if first else wants_wrong):
@@ -142,7 +168,7 @@ def _surely(
 
 
 def _verdict(
-    scene: Scene, block: Block, place_m: tuple[float, float, float], settings: Sequence[Physics]
+    scene: Scene, block: Block, place_m: tuple[float, float, float], settings: Sequence[Setting]
 ) -> bool | None:
     return holds((*scene.blocks, _put(scene, block, place_m)), settings)
 

@@ -45,11 +45,12 @@ _COUNT = (
     "The block marked X disappears. How many other blocks move or fall?",
 )
 _WHICH = (
-    "If the block marked X is removed, which of the blocks marked A, B, C and D moves or falls?",
-    "Suppose the block marked X is taken out. Exactly one of the blocks marked A to D does not"
-    " stay where it is. Which one?",
-    "The block marked X is taken away. Which one of the marked blocks A, B, C and D loses its"
-    " place?",
+    "If the block marked X is removed, at which of the marked places A to D does the block there"
+    " move or fall?",
+    "Suppose the block marked X is taken out. Exactly one of the blocks at the places A, B, C and D"
+    " does not stay where it is. At which place?",
+    "The block marked X is taken away. Which of the marked places A to D is on a block that moves"
+    " or falls?",
 )
 _GONE = (
     "What is likely to happen if the {block} is taken away? Choose the picture that shows the"
@@ -68,12 +69,13 @@ _NEXT = (
     " is let go.",
 )
 _PUSHED = (
-    "A finger slowly pushes the block marked X {direction} by 5 cm, the side of a cube, as seen in"
-    " the picture. Which picture shows the scene after everything has come to rest?",
-    "The block marked X is slid slowly {direction} by one side of a cube (5 cm), as seen in the"
-    " picture. Which of the four pictures shows the result?",
+    "A finger slowly pushes the block marked X {direction} by 4.4 cm, a little less than the"
+    " side of a cube, as seen in the picture. Which picture shows the scene after everything has"
+    " come to rest?",
+    "The block marked X is slid slowly {direction} by 4.4 cm, a little less than the side of a"
+    " cube, as seen in the picture. Which of the four pictures shows the result?",
     "What does the scene look like after the block marked X was pushed slowly {direction}, as seen"
-    " in the picture, by 5 cm, the side of a cube?",
+    " in the picture, by 4.4 cm, a little less than the side of a cube?",
 )
 _STAYS = (
     "The block in the second picture is put down on the structure in the first, turned as it is"
