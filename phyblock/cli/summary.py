@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ from rich.console import Console
 from phyblock import report
 from phyblock.cli.console import print_view, shown_path, width_of
 from phyblock.report.outcomes import HEADINGS
-from phyblock.report.text_table import number
+from phyblock.report.text_table import NO_VALUE, number
 
 if TYPE_CHECKING:
     from phyblock.report import TablesWritten, TextTable
@@ -31,6 +32,8 @@ def print_summary(console: Console, written: TablesWritten) -> None:
     views = written.views
     if (table1 := views.get("table1")) is not None:
         _print_table1(console, table1)
+    if "table2" in views:
+        _print_table2(console, views["table2"])
     if "errors" in views:
         errors = _overall(views["errors"])
         if width_of(errors) > console.width:
@@ -56,6 +59,22 @@ def _print_table1(console: Console, table1: TextTable) -> None:
             table1, rows=tuple(tuple(c.partition(" ± ")[0] for c in row) for row in table1.rows)
         )
     print_view(console, table1)
+
+
+def _print_table2(console: Console, table2: TextTable) -> None:
+    """The columns that were asked, or averages alone where those do not fit."""
+    notes = table2.notes[:-1]
+    asked = [
+        i
+        for i in range(len(table2.columns))
+        if any(row[i] != NO_VALUE for row in table2.rows if not row[0].startswith(" "))
+    ]
+    table2 = _with_columns(table2, asked)
+    if width_of(table2) > console.width:
+        names = [column.name for column in table2.columns]
+        table2 = _with_columns(table2, [i for i, n in enumerate(names) if n in ("Model", "Avg")])
+        notes = ("Averages alone, to fit; every subtask is in tables/table2.md.", *notes)
+    print_view(console, replace(table2, notes=notes))
 
 
 def _print_failures(console: Console, written: TablesWritten) -> None:
@@ -113,7 +132,10 @@ def _answered(coverage: TextTable) -> TextTable:
 
 
 def _without(view: TextTable, names: tuple[str, ...]) -> TextTable:
-    kept = [i for i, column in enumerate(view.columns) if column.name not in names]
+    return _with_columns(view, [i for i, c in enumerate(view.columns) if c.name not in names])
+
+
+def _with_columns(view: TextTable, kept: Sequence[int]) -> TextTable:
     return replace(
         view,
         columns=tuple(view.columns[i] for i in kept),

@@ -1,4 +1,4 @@
-"""The models of the paper's Table 1 and how their names are spelled elsewhere; pure.
+"""The models of the paper's Tables 1 and 2 and how their names are spelled elsewhere; pure.
 
 A name is read as its tokens: runs of letters and runs of digits, in lower case, so that case and
 separators make no difference. Release dates and a few words without meaning for the weights are
@@ -43,6 +43,13 @@ _SPELLINGS: dict[str, tuple[str, ...]] = {
     "Random": (),
 }
 
+_OTHER_SPELLINGS: dict[str, tuple[str, ...]] = {
+    "GPT-4.1": (),
+    "GPT-o3": ("o3",),
+    "Qwen2.5-VL-72B-Instruct": ("qwen2.5-vl-72b",),
+}
+"""Models that Table 2 alone has a row of."""
+
 PUBLISHED_NAMES: tuple[str, ...] = tuple(_SPELLINGS)
 """Row names of Table 1, in its order."""
 
@@ -54,7 +61,7 @@ _RELEASE = re.compile(r"(?<=[-_./ @])(?:latest|00[0-9])$")
 
 
 def match_published(name: str) -> str | None:
-    """The row of Table 1 that a folder of recorded replies or a model name stands for.
+    """The row of Table 1 or 2 that a folder of recorded replies or a model name stands for.
 
     Folders before the last slash (a provider, an owner) are ignored. None where the name is
     unknown or could mean more than one row: "claude-3-5" names two models, "gemini-2.0" four.
@@ -71,5 +78,7 @@ def _tokens(name: str) -> tuple[str, ...]:
 
 
 _ROWS: dict[tuple[str, ...], str] = {
-    _tokens(spelling): row for row, more in _SPELLINGS.items() for spelling in (row, *more)
+    _tokens(spelling): row
+    for row, more in (_SPELLINGS | _OTHER_SPELLINGS).items()
+    for spelling in (row, *more)
 }

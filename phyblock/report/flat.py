@@ -45,6 +45,11 @@ _RECORD_TYPES: dict[str, str] = {
     "rule": "object",
     "plan": "object",
     "dropped": "object",
+    "question": "object",
+    "subtask": "object",
+    "rotation": "Int64",
+    "right": "object",
+    "given": "object",
     "time": "object",
 }
 
@@ -89,6 +94,7 @@ def flat_record(record: Mapping[str, Any]) -> dict[str, Any]:
         "template": prompt.get("template"),
         "prompt_version": prompt.get("version"),
         **{name: parse.get(name) for name in ("parser", "rule", "plan", "dropped")},
+        **_question(record),
         "time": record.get("time"),
     }
 
@@ -104,6 +110,18 @@ _REPLY = (
     "seed_sent",
 )
 _USAGE = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
+
+
+def _question(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Which question it is, the letters that are right and those given; for other tracks None."""
+    question, answer = record.get("question") or {}, record.get("answer") or {}
+    return {
+        "question": question.get("id"),
+        "subtask": question.get("subtask"),
+        "rotation": question.get("rotation"),
+        "right": answer.get("right"),
+        "given": answer.get("given"),
+    }
 
 
 def flat_scores(record: Mapping[str, Any]) -> list[dict[str, Any]]:

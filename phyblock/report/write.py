@@ -15,14 +15,25 @@ from phyblock.report.assembly import assembly_frame, table1_frame
 from phyblock.report.comparison import published_frame
 from phyblock.report.cost import cost_frame, cost_view
 from phyblock.report.coverage import coverage_frame
+from phyblock.report.episodes import endings_frame, moves_frame, progress_frame
 from phyblock.report.errors import errors_frame
 from phyblock.report.latex import to_latex
 from phyblock.report.load import Run, load_run
 from phyblock.report.markdown import to_markdown
+from phyblock.report.questions import letters_frame, questions_frame
 from phyblock.report.seeds import intervals_table, intervals_view, table5_frame, table5_view
 from phyblock.report.settings import settings_frame, settings_view
+from phyblock.report.table3 import (
+    endings_view,
+    moves_view,
+    progress_view,
+    step_scores_frame,
+    table3_frame,
+    table3_view,
+)
 from phyblock.report.text_table import TextTable
 from phyblock.report.views import coverage_view, errors_view, published_view, table1_view
+from phyblock.report.vqa import letters_view, table2_frame, table2_view
 
 __all__ = ["TablesWritten", "write_tables"]
 
@@ -83,6 +94,14 @@ _MAKERS: dict[str, _Maker] = {
     "intervals": _Maker(intervals_table, intervals_view, "full_planning", "table1"),
     "table5": _Maker(table5_frame, table5_view, "full_planning", "table1"),
     "settings": _Maker(settings_frame, settings_view, "full_planning", "table1"),
+    "table2": _Maker(table2_frame, table2_view, "vqa"),
+    "letters": _Maker(letters_frame, letters_view, "vqa", "table2"),
+    "questions": _Maker(questions_frame, None, "vqa", "table2"),
+    "table3": _Maker(table3_frame, table3_view, "step_planning"),
+    "step_scores": _Maker(step_scores_frame, None, "step_planning", "table3"),
+    "endings": _Maker(endings_frame, endings_view, "step_planning"),
+    "moves": _Maker(moves_frame, moves_view, "step_planning", "endings"),
+    "progress": _Maker(progress_frame, progress_view, "step_planning"),
     "errors": _Maker(errors_frame, errors_view, "full_planning"),
     "coverage": _Maker(coverage_frame, coverage_view),
     "cost": _Maker(cost_frame, cost_view, "", "coverage"),
@@ -109,7 +128,7 @@ def _tables(run: Run, names: Sequence[str]) -> tuple[dict[str, pd.DataFrame], di
 
 
 def _csv(frame: pd.DataFrame, name: str) -> str:
-    decimals = "%.1f" if name == "table1" else "%.6f"
+    decimals = "%.1f" if name in ("table1", "table2", "table3") else "%.6f"
     return frame.to_csv(index=False, float_format=decimals, lineterminator="\n")
 
 
