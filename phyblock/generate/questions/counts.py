@@ -11,7 +11,13 @@ from phyblock.domain.question import Question, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.generate.questions.base import Draft, UnfairError
 from phyblock.generate.questions.referring import SHAPE_WORDS
-from phyblock.generate.questions.seeing import COUNTED, are_seen, require_seen, shown_blocks
+from phyblock.generate.questions.seeing import (
+    COUNTED,
+    are_seen,
+    require_seen,
+    require_shapes_seen,
+    shown_blocks,
+)
 from phyblock.generate.questions.static import StaticMaker, draft, index_of, shuffled, window
 from phyblock.generate.questions.wording import slots_of
 from phyblock.sim.support import GROUND, support_graph
@@ -40,6 +46,8 @@ class NumberMaker(StaticMaker):
         kinds = [(f"{color} blocks", "color") for color in colors]
         kinds += [(word, "shape") for word in _TYPES_OF]
         kinds += [(f"{color} {word}", "both") for color in colors for word in _TYPES_OF]
+        if not _shapes_are_seen(scene.blocks):
+            kinds = [(what, kind) for what, kind in kinds if kind == "color"]
         for what, kind in shuffled(kinds, rng):
             counted = _fitting(what, scene.blocks)
             values = window(range(1, 8), len(counted), rng)
@@ -52,7 +60,10 @@ class NumberMaker(StaticMaker):
         """Counts the blocks that fit the words."""
         blocks = shown_blocks(question)
         require_seen(blocks, _orders(blocks), COUNTED)
-        return index_of(question, str(len(_fitting(slots_of(question)["what"], blocks))))
+        what = slots_of(question)["what"]
+        if not what.endswith(" blocks"):
+            require_shapes_seen(blocks)
+        return index_of(question, str(len(_fitting(what, blocks))))
 
 
 class _WholeMaker(StaticMaker):
@@ -60,16 +71,22 @@ class _WholeMaker(StaticMaker):
 
     subtask: Subtask
     drafts_a_scene = _TRIES
-    least: float = COUNTED
 
-    def __init__(self, values: Sequence[int], count: Callable[[Sequence[Block]], int]) -> None:
-        self._values, self._count = values, count
+    def __init__(
+        self,
+        values: Sequence[int],
+        count: Callable[[Sequence[Block]], int],
+        require: Callable[[Sequence[Block]], None],
+    ) -> None:
+        self._values, self._count, self._require = values, count, require
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """The same question with windows of options that differ."""
-        if not are_seen(scene.blocks, _orders(scene.blocks), self.least):
+        try:
+            self._require(scene.blocks)
+            right = self._count(scene.blocks)
+        except UnfairError:
             return
-        right = self._count(scene.blocks)
         for _ in range(_TRIES):
             values = window(self._values, right, rng)
             if values is not None:
@@ -80,7 +97,7 @@ class _WholeMaker(StaticMaker):
         """Counts anew."""
         blocks = shown_blocks(question)
         slots_of(question)
-        require_seen(blocks, _orders(blocks), self.least)
+        self._require(blocks)
         return index_of(question, str(self._count(blocks)))
 
 
@@ -90,7 +107,7 @@ class CountMaker(_WholeMaker):
     subtask: Subtask = "OC"
 
     def __init__(self) -> None:
-        super().__init__(range(2, 18), len)
+        super().__init__(range(2, 18), len, _require_counted)
 
 
 class LayerMaker(_WholeMaker):
@@ -99,7 +116,7 @@ class LayerMaker(_WholeMaker):
     subtask: Subtask = "LC"
 
     def __init__(self) -> None:
-        super().__init__(range(2, 9), _layers)
+        super().__init__(range(2, 9), _layers, _require_counted)
 
 
 class TypeMaker(_WholeMaker):
@@ -108,7 +125,19 @@ class TypeMaker(_WholeMaker):
     subtask: Subtask = "TC"
 
     def __init__(self) -> None:
-        super().__init__(range(2, 9), _types)
+        super().__init__(range(2, 9), _types, require_shapes_seen)
+
+
+def _require_counted(blocks: Sequence[Block]) -> None:
+    require_seen(blocks, _orders(blocks), COUNTED)
+
+
+def _shapes_are_seen(blocks: Sequence[Block]) -> bool:
+    try:
+        require_shapes_seen(blocks)
+    except UnfairError:
+        return False
+    return True
 
 
 def _fitting(what: str, blocks: Sequence[Block]) -> list[Block]:

@@ -11,9 +11,9 @@ from phyblock.domain.question import Question, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.generate.questions.base import Draft, UnfairError
 from phyblock.generate.questions.coloring import recolored
-from phyblock.generate.questions.measures import offset_m, top_m
+from phyblock.generate.questions.measures import top_m
 from phyblock.generate.questions.referring import Feature, names, resolve_one
-from phyblock.generate.questions.seeing import NAMED, require_seen, shown_blocks
+from phyblock.generate.questions.seeing import NAMED, center_m, require_seen, shown_blocks
 from phyblock.generate.questions.static import (
     StaticMaker,
     draft,
@@ -44,7 +44,7 @@ _LADDERS: tuple[tuple[float, ...], ...] = (
 """Values in centimeters that stand together as options: each at least 20 % from the next."""
 _EXACT_CM = 0.1
 _TRIES = 4
-_SIDE_M = 0.01
+_SIDE_M = 0.001
 
 
 def _top(one: Block, other: Block | None) -> float:
@@ -59,7 +59,10 @@ def _bottom(one: Block, other: Block | None) -> float:
 
 def _apart(one: Block, other: Block | None) -> float:
     assert other is not None
-    return float(np.hypot(*offset_m(one, other)[:2]))
+    x, y, _ = np.abs(center_m(one) - center_m(other)).tolist()
+    if min(x, y) > _SIDE_M:
+        raise UnfairError("the blocks stand askew, so that their distance cannot be counted")
+    return float(max(x, y))
 
 
 def _rise(one: Block, other: Block | None) -> float:

@@ -16,7 +16,7 @@ from phyblock.generate.questions.referring import Feature, names, resolve_one
 from phyblock.generate.questions.seeing import (
     NAMED,
     center_m,
-    picture_columns,
+    outermost,
     require_seen,
     shown_blocks,
 )
@@ -51,7 +51,6 @@ _ABOVE_M = 0.015
 _LEVEL_M = 0.005
 _TRIES = 5
 _EXTREMES = ("farthest left", "farthest right", "highest")
-_COLUMN_GAP = 0.12
 _HEIGHT_GAP_M = 0.024
 _NEARER = 0.75
 """The nearest block is at most this share of the next one's distance away."""
@@ -85,7 +84,7 @@ class PositionMaker(StaticMaker):
             require_seen(blocks, [block.order for block in seen], NAMED)
             if anchor:
                 return (named.index(_nearest(anchor, named)),)
-            return (named.index(_outermost(slots["extreme"], named, blocks)),)
+            return (named.index(_extreme(slots["extreme"], named, blocks)),)
         one, other = (resolve_one(slots[name], blocks) for name in ("block", "other"))
         require_seen(blocks, [one.order, other.order], NAMED)
         corners = set(question.options) == set(_CORNERS)
@@ -121,10 +120,8 @@ def _of_four(
     anchor, four = chosen[0], chosen[1:]
     kind = pick((*_EXTREMES, "nearest"), rng)
     try:
-        if kind == "nearest":
-            right = _nearest(anchor, four)
-        else:
-            right = _outermost(kind, four, scene.blocks)
+        is_near = kind == "nearest"
+        right = _nearest(anchor, four) if is_near else _extreme(kind, four, scene.blocks)
     except UnfairError:
         return
     ranked = [right, *(block for block in four if block is not right)]
@@ -165,17 +162,17 @@ def _nearest(anchor: Block, blocks: Sequence[Block]) -> Block:
     return ranked[0]
 
 
-def _outermost(extreme: str, blocks: Sequence[Block], scene: Sequence[Block]) -> Block:
+def _extreme(extreme: str, blocks: Sequence[Block], scene: Sequence[Block]) -> Block:
     """The one of `blocks` that is clearly farthest to a side, or reaches highest."""
     if extreme == "highest":
-        reach, gap = {b.order: top_m(b) for b in blocks}, _HEIGHT_GAP_M
-    elif extreme in _EXTREMES:
-        sign = -1 if extreme == "farthest left" else 1
-        columns = picture_columns(scene)
-        reach, gap = {b.order: sign * columns[b.order] for b in blocks}, _COLUMN_GAP
-    else:
+        ranked = sorted(blocks, key=lambda block: -top_m(block))
+        if top_m(ranked[0]) - top_m(ranked[1]) < _HEIGHT_GAP_M:
+            raise UnfairError("two blocks are about as high")
+        return ranked[0]
+    if extreme not in _EXTREMES:
         raise UnfairError(f"{extreme!r} is no place")
-    ranked = sorted(blocks, key=lambda block: -reach[block.order])
-    if reach[ranked[0].order] - reach[ranked[1].order] < gap:
+    orders = [block.order for block in blocks]
+    order = outermost(orders, scene, to_left=extreme == "farthest left")
+    if order is None:
         raise UnfairError(f"two blocks are about the {extreme}")
-    return ranked[0]
+    return blocks[orders.index(order)]

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import Question, Subtask
-from phyblock.domain.scene import Scene
-from phyblock.generate.questions.base import Draft
+from phyblock.domain.scene import Block, Scene
+from phyblock.generate.questions.base import Draft, UnfairError
 from phyblock.generate.questions.coloring import recolored
+from phyblock.generate.questions.measures import height_m
 from phyblock.generate.questions.referring import SHAPE_WORDS, Feature, resolve_one, shape_word
 from phyblock.generate.questions.seeing import NAMED, STUDIED, require_seen, shown_blocks
 from phyblock.generate.questions.static import (
@@ -28,6 +29,8 @@ __all__ = ["ColorMaker", "ShapeMaker"]
 
 _BY_LOOKS: tuple[Feature, ...] = ("color", "side", "layer", "support")
 _BY_SHAPE: tuple[Feature, ...] = ("type", "side", "layer", "support")
+_LYING_M = 0.03
+"""A half cylinder that lies on its flat face is lower than this."""
 
 
 class ShapeMaker(StaticMaker):
@@ -38,6 +41,8 @@ class ShapeMaker(StaticMaker):
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """One a block that shows enough of itself."""
         for block in shuffled(seen_blocks(scene, STUDIED), rng):
+            if _hides_its_shape(block, scene.blocks):
+                continue
             shown = recolored(scene, rng)
             again = next(b for b in shown.blocks if b.order == block.order)
             name = name_one(again, shown, _BY_LOOKS, rng)
@@ -51,6 +56,8 @@ class ShapeMaker(StaticMaker):
         blocks = shown_blocks(question)
         block = resolve_one(slots_of(question)["block"], blocks)
         require_seen(blocks, [block.order], STUDIED)
+        if _hides_its_shape(block, blocks):
+            raise UnfairError("a half cylinder that stands and carries looks like a cylinder")
         return index_of(question, shape_word(block.type))
 
 
@@ -77,3 +84,9 @@ class ColorMaker(StaticMaker):
         block = resolve_one(slots_of(question)["block"], blocks)
         require_seen(blocks, [block.order], NAMED)
         return index_of(question, block.color)
+
+
+def _hides_its_shape(block: Block, blocks: Sequence[Block]) -> bool:
+    """Whether it is a standing half cylinder with something on its half disc."""
+    is_standing = block.type == "semi_cylinder" and height_m(block) > _LYING_M
+    return is_standing and any(block.order in other.depend for other in blocks)

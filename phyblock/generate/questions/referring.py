@@ -8,14 +8,14 @@ from its words alone.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from phyblock.domain.blocks import COLORS, BlockType, Color
 from phyblock.domain.scene import Block
 from phyblock.generate.questions.base import UnfairError
-from phyblock.generate.questions.seeing import picture_columns
+from phyblock.generate.questions.seeing import outermost
 from phyblock.sim.support import bounds_m
 
 __all__ = ["SHAPE_WORDS", "Feature", "names", "resolve", "resolve_one", "shape_word"]
@@ -41,9 +41,12 @@ _NOUNS: dict[str, tuple[BlockType, ...]] = {
     **_SIZED,
     "block": tuple(block_type for types in SHAPE_WORDS.values() for block_type in types),
 }
+_ALIKE: tuple[frozenset[BlockType], ...] = (
+    frozenset({"cube", "cuboid1"}),
+    frozenset({"cylinder", "semi_cylinder"}),
+)
+"""Types that a reader may take for one another when part of a block is hidden."""
 _SIDES = ("leftmost", "rightmost", "topmost")
-_SIDE_GAP = 0.1
-"""So much further out, of half the picture's width, is a block that is called leftmost."""
 _TOP_GAP_M = 0.02
 _SIMPLE = rf"(?:(?:{'|'.join(COLORS)}) )?(?:{'|'.join(_NOUNS)})"
 _PATTERN = re.compile(
@@ -77,24 +80,26 @@ def shape_word(block_type: BlockType) -> str:
     return next(word for word, types in SHAPE_WORDS.items() if block_type in types)
 
 
-def resolve(text: str, blocks: Sequence[Block]) -> tuple[int, ...]:
+def resolve(text: str, blocks: Sequence[Block], loosely: bool = False) -> tuple[int, ...]:
     """Orders of the blocks that an expression fits, of those that stand in the picture.
 
     None when what it says is too close to call: two blocks about as far to the left, or two
-    blocks of that color and type in one layer. Raises UnfairError for words that are no expression.
+    blocks of that color and type in one layer. `loosely` is how someone reads who takes cubes for
+    short rectangular prisms, half cylinders for cylinders, and the other way round. Raises
+    UnfairError for words that are no expression.
     """
     found = _PATTERN.fullmatch(text.removeprefix("the "))
     if found is None:
         raise UnfairError(f"{text!r} names no block")
     words = found.groupdict()
-    fitting = [block for block in blocks if _fits(block, words["color"], words["noun"])]
+    fitting = [block for block in blocks if _fits(block, words, loosely)]
     if words["layer"] is not None:
         layers = [block.layer for block in fitting]
         if len(set(layers)) < len(layers):
             return ()
         fitting = [block for block in fitting if block.layer == int(words["layer"])]
     if words["support"] is not None:
-        below = resolve(words["support"], blocks)
+        below = resolve(words["support"], blocks, loosely)
         fitting = [b for b in fitting if len(below) == 1 and set(b.depend) == set(below)]
     if words["side"] is not None:
         fitting = _outermost(fitting, blocks, words["side"])
@@ -102,10 +107,12 @@ def resolve(text: str, blocks: Sequence[Block]) -> tuple[int, ...]:
 
 
 def resolve_one(text: str, blocks: Sequence[Block]) -> Block:
-    """The one block that an expression fits; UnfairError when there is none, or several."""
-    orders = resolve(text, blocks)
+    """The one block that an expression fits, even loosely; UnfairError otherwise."""
+    orders, loose = resolve(text, blocks), resolve(text, blocks, loosely=True)
     if len(orders) != 1:
         raise UnfairError(f"{text!r} fits {len(orders)} blocks")
+    if loose != orders:
+        raise UnfairError(f"{text!r} may be taken for another block")
     return next(block for block in blocks if block.order == orders[0])
 
 
@@ -114,7 +121,8 @@ def names(block: Block, blocks: Sequence[Block], features: Sequence[Feature]) ->
     found: list[_Expression] = []
     for expression in _expressions(block, blocks, features):
         is_longer = any(_is_part(shorter, expression) for shorter in found)
-        if not is_longer and resolve(expression.text, blocks) == (block.order,):
+        readings = (resolve(expression.text, blocks, loosely) for loosely in (False, True))
+        if not is_longer and all(reading == (block.order,) for reading in readings):
             found.append(expression)
     return tuple(expression.text for expression in found)
 
@@ -162,8 +170,11 @@ def _is_part(shorter: _Expression, longer: _Expression) -> bool:
     return fits and all(short is None or short == long for short, long in pairs)
 
 
-def _fits(block: Block, color: str | None, noun: str) -> bool:
-    return block.type in _NOUNS[noun] and color in (None, block.color)
+def _fits(block: Block, words: Mapping[str, str | None], loosely: bool) -> bool:
+    types = set(_NOUNS[words["noun"] or "block"])
+    if loosely:
+        types = types.union(*(alike for alike in _ALIKE if alike & types))
+    return block.type in types and words["color"] in (None, block.color)
 
 
 def _outermost(fitting: list[Block], blocks: Sequence[Block], side: str) -> list[Block]:
@@ -172,13 +183,10 @@ def _outermost(fitting: list[Block], blocks: Sequence[Block], side: str) -> list
         return []
     if side == "topmost":
         reach = {b.order: float(bounds_m(b)[1, 2]) for b in fitting}
-        gap = _TOP_GAP_M
-    else:
-        sign = -1 if side == "leftmost" else 1
-        columns = picture_columns(blocks)
-        reach = {b.order: sign * columns[b.order] for b in fitting}
-        gap = _SIDE_GAP
-    ranked = sorted(fitting, key=lambda b: -reach[b.order])
-    if len(ranked) > 1 and reach[ranked[0].order] - reach[ranked[1].order] < gap:
-        return []
-    return ranked[:1]
+        ranked = sorted(fitting, key=lambda b: -reach[b.order])
+        is_clear = len(ranked) < 2 or (
+            reach[ranked[0].order] - reach[ranked[1].order] >= _TOP_GAP_M
+        )
+        return ranked[:1] if is_clear else []
+    order = outermost([b.order for b in fitting], blocks, to_left=side == "leftmost")
+    return [block for block in fitting if block.order == order]

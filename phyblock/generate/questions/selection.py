@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,17 +38,19 @@ _WORD = re.compile(r"[\w.]+")
 
 @dataclass(frozen=True)
 class Pooled:
-    """A draft in the pool; `text_key` is equal for questions that ask the same of one scene."""
+    """A draft in the pool; `identity` is equal for questions that ask the same of one scene."""
 
     draft: Draft
     option_texts: tuple[str, ...]
 
     @property
-    def text_key(self) -> Hashable:
-        """Scene, colors, question and options."""
-        colors = tuple(block.color for block in self.draft.scene.blocks)
-        told = frozenset(self.option_texts)
-        return (self.draft.scene.id, colors, self.draft.text, told)
+    def identity(self) -> Hashable:
+        """Scene, colors, what is asked about and pictures, but not the words around them."""
+        draft = self.draft
+        colors = tuple(block.color for block in draft.scene.blocks)
+        slots = tuple(sorted((name, str(slot)) for name, slot in _slots(draft).items()))
+        options = frozenset(o for o in draft.options if not isinstance(o, str))
+        return (draft.scene.id, colors, draft.kind, slots, draft.pictures, options)
 
 
 def select(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list[Pooled]:
@@ -64,8 +66,8 @@ def select(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list
         chosen = left[best]
         left[best] = left[-1]
         left.pop()
-        if chosen.text_key not in keys:
-            keys.add(chosen.text_key)
+        if chosen.identity not in keys:
+            keys.add(chosen.identity)
             taken.append(chosen)
             tally.add(chosen)
     return taken
@@ -127,5 +129,9 @@ def _right_and_wrong(one: Pooled) -> Iterator[tuple[Hashable, int, float]]:
 
 
 def _slot_words(draft: Draft) -> set[str]:
-    slots = draft.evidence.get("slots", {})
-    return {word for slot in slots.values() for word in _WORD.findall(str(slot))}
+    return {word for slot in _slots(draft).values() for word in _WORD.findall(str(slot))}
+
+
+def _slots(draft: Draft) -> Mapping[str, object]:
+    slots: Mapping[str, object] = draft.evidence.get("slots", {})
+    return slots

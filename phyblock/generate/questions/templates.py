@@ -55,7 +55,7 @@ TEMPLATES: Mapping[str, str] = {
     "ap-top-1": "If {scale}, how high above the ground is the top of the {block}?",
     "ap-top-2": "Take as scale that {scale}. At what height is the highest point of the {block}?",
     "ap-bottom-1": "If {scale}, how high above the ground is the lowest point of the {block}?",
-    "ap-bottom-2": "Take as scale that {scale}. At what height does the {block} begin?",
+    "ap-bottom-2": "Take as scale that {scale}. At what height is the lowest point of the {block}?",
     "ap-apart-1": (
         "If {scale}, how far apart are the middles of the {block} and the {other}, "
         "measured along the ground?"
