@@ -129,7 +129,8 @@ def _step_rules(suite: SuiteSpec) -> StepRules:
         steps.max_episode_tokens,
         steps.max_episode_usd,
     )
-    return StepRules(suite.settings, steps.gating, steps.physics, steps.samples, limits)
+    accepts = steps.setting or suite.settings[0]
+    return StepRules(accepts, suite.settings, steps.gating, steps.physics, steps.samples, limits)
 
 
 def _check_composites(dataset: Dataset, tasks: Sequence[AssemblyTask]) -> None:

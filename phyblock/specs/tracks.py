@@ -72,6 +72,11 @@ class VqaSpec(Section):
 class StepsSpec(Section):
     """The rules of the step_planning track: the simulator, what is shown, when it ends."""
 
+    setting: Literal["A", "B"] | None = Field(
+        default=None,
+        description="By which the simulator lets a step succeed; null: by the first of settings. "
+        "With B, blocks that are turned wrongly are placed, and count as wrong in A.",
+    )
     gating: Literal["aov", "layer"] = Field(
         default="aov",
         description="aov: a block can be placed when all it rests on is. layer: when all lower "

@@ -68,7 +68,7 @@ class StepEpisode:
         self._params = params
         self._rules = rules
         self._desk = desk
-        self._assembly = Assembly(task.scene, task.candidates, rules.settings[0], rules.gating)
+        self._assembly = Assembly(task.scene, task.candidates, rules.accepts, rules.gating)
         self._tally = Tally()
         self._past: list[PastStep] = []
         self._turns: list[dict[str, Any]] = []
@@ -146,7 +146,7 @@ class StepEpisode:
                 for setting in self._rules.settings
                 for score in self._scores(setting, len(attempts))
             ],
-            "setting": self._rules.settings[0],
+            "setting": self._rules.accepts,
             "ending": self.ending or "unanswered",
             "outcomes": self.outcomes,
             "progress": [sum(placed[: count + 1]) for count in range(len(placed))],

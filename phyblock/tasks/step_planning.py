@@ -94,7 +94,7 @@ class StepPlanning:
         Each step is taken to have placed a block. Only the first requests can be the real ones.
         """
         rules = self.rules
-        assembly = Assembly(item.scene, item.candidates, rules.settings[0], rules.gating)
+        assembly = Assembly(item.scene, item.candidates, rules.accepts, rules.gating)
         subject = StepSubject(item.scene, item.candidates, assembly.right_moves(), ())
         for step in range(rules.limits.max_steps(len(item.scene))):
             for sample in range(rules.samples):

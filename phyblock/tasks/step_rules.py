@@ -51,9 +51,10 @@ class StepLimits:
 class StepRules:
     """How episodes are played and scored.
 
-    The simulator lets a move succeed under the first of `settings`; scores are counted under all.
+    The simulator lets a move succeed under `accepts`; scores are counted under all `settings`.
     """
 
+    accepts: Setting = "A"
     settings: tuple[Setting, ...] = ("A", "B")
     gating: Gating = "aov"
     physics: StepPhysics = "off"
