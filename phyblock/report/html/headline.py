@@ -9,18 +9,27 @@ from typing import Literal
 
 import pandas as pd
 
+from phyblock.domain import CATEGORIES
 from phyblock.report.assembly import assembly_frame, headline_cells
 from phyblock.report.cells import METRICS
 from phyblock.report.comparison import PUBLISHED_SETTING, published_frame, published_table
 from phyblock.report.design import OVERALL
 from phyblock.report.load import Run
+from phyblock.report.questions import OVERALL_CELL, questions_frame
 from phyblock.report.text_table import NO_VALUE, number
+from phyblock.report.vqa import published_cells
 
-__all__ = ["HUMAN_ACCURACY", "Cell", "Headline", "Row", "assembly_headline"]
+__all__ = ["HUMAN_ACCURACY", "Cell", "Headline", "Row", "assembly_headline", "vqa_headline"]
 
 HUMAN_ACCURACY = 94.7
 """Human experts [%]: 378.83 points on 400 tasks of planning and VQA (paper, appendix)."""
 
+_CATEGORY_NAMES = {
+    "object_property": "Property",
+    "object_relationship": "Relationship",
+    "scene_understanding": "Scene",
+    "dynamic_reasoning": "Dynamics",
+}
 _HUMAN_NOTE = (
     "Human experts scored 378.83 of 400 tasks drawn from planning and VQA together (paper, "
     "appendix): an accuracy, shown for scale."
@@ -73,15 +82,10 @@ def assembly_headline(run: Run) -> Headline | None:
         return None
     cells = headline_cells(assembly_frame(run), design)
     published = _published_f1(run)
-    kinds: dict[str, Kind] = {
-        model["name"]: "baseline" if model.get("kind") == "baseline" else "model"
-        for model in run.manifest["models"]
-    }
     rows = [
-        _row(name, kinds.get(name, "model"), cells[cells["model"] == name], run, published)
-        for name in design.model_names
+        _row(name, kind, cells[cells["model"] == name], run, published)
+        for name, kind in _kinds(run).items()
     ]
-    rows.sort(key=lambda row: row.kind == "baseline")
     names = [_level_name(level) for level in design.levels]
     columns = (*names, "Precision", "Recall", *(("Published",) if published else ()))
     return Headline(
@@ -93,6 +97,56 @@ def assembly_headline(run: Run) -> Headline | None:
         names[-1],
         {"Random": _published_random(OVERALL), "Human": HUMAN_ACCURACY},
     )
+
+
+def vqa_headline(run: Run) -> Headline | None:
+    """Accuracy by category and overall; None for a run without questions."""
+    if "vqa" not in run.design.suite.tracks:
+        return None
+    found = {(row["model"], row["cell"]): row for row in questions_frame(run).to_dict("records")}
+    cells = (*CATEGORIES, OVERALL_CELL)
+    several = len(run.design.suite.seeds) > 1
+    rows = []
+    for name, kind in _kinds(run).items():
+        shown = [_accuracy(found[name, cell], several) for cell in cells]
+        overall = shown[-1].value
+        strip = None if overall is None else (overall, overall, overall)
+        rows.append(Row(name, kind, tuple(shown), strip))
+    printed = published_cells("Random")
+    random = tuple(_plain(printed[cell]) for cell in cells)
+    human = tuple(Cell("") for _ in CATEGORIES)
+    rows += [
+        Row("Random, published", "reference", random),
+        Row("Human experts, published", "reference", (*human, _plain(HUMAN_ACCURACY))),
+    ]
+    seeds = len(run.design.suite.seeds)
+    how = f"Accuracy in percent{f'; mean of {seeds} seeds, ± their sd' if several else ''}."
+    macro = "A category is the unweighted mean of its four subtasks, overall that of the categories"
+    return Headline(
+        "VQA",
+        (*_CATEGORY_NAMES.values(), "Overall"),
+        tuple(rows),
+        (f"{how} {macro}.", _HUMAN_NOTE),
+        len(CATEGORIES),
+        "Overall",
+        {"Random": printed[OVERALL_CELL], "Human": HUMAN_ACCURACY},
+    )
+
+
+def _accuracy(row: Mapping[Hashable, float], several: bool) -> Cell:
+    value = 100 * row["accuracy_mean" if several else "accuracy"]
+    if math.isnan(value):
+        return Cell(NO_VALUE)
+    sd = 100 * row["accuracy_sd"]
+    return Cell(number(value), value, f"± {number(sd)}" if several and not math.isnan(sd) else "")
+
+
+def _kinds(run: Run) -> dict[str, Kind]:
+    """Which models are baselines; these come last."""
+    kinds = {model["name"]: model.get("kind") for model in run.manifest["models"]}
+    baselines = [name for name in run.design.model_names if kinds.get(name) == "baseline"]
+    models = [name for name in run.design.model_names if name not in baselines]
+    return {**dict.fromkeys(models, "model"), **dict.fromkeys(baselines, "baseline")}
 
 
 def _row(name: str, kind: Kind, cells: pd.DataFrame, run: Run, published: dict[str, float]) -> Row:

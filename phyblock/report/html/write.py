@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -12,8 +12,9 @@ from uuid import uuid4
 from phyblock.domain import SUBTASK_NAMES
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
+from phyblock.report.figures import write_figures
 from phyblock.report.html.drawable import kit, question_entry, scene_entry
-from phyblock.report.html.headline import assembly_headline
+from phyblock.report.html.headline import assembly_headline, vqa_headline
 from phyblock.report.html.index import Item, SampleIndex, read_places
 from phyblock.report.html.pack import Pack, write_script
 from phyblock.report.html.page import Figure, render_page
@@ -34,11 +35,23 @@ __all__ = ["REPORT_FILE", "write_report"]
 REPORT_FILE = "report.html"
 _FOLDER = "report"
 _PICTURES = "pictures"
-_TABLES = ("errors", "published", "coverage")
+_FIGURES = {
+    "f1-levels": "F1 by level",
+    "f1-radar": "F1 by level, as in the paper",
+    "settings": "Setting A against setting B",
+    "error-types": "Wrong steps by type",
+    "f1-size": "F1 by model size",
+    "f1-cost": "F1 by cost",
+    "vqa-subtasks": "VQA accuracy by subtask",
+    "step-progress": "Blocks placed, turn by turn",
+    "scenes": "The scenes of the run by level",
+}
+_NOT_SHOWN = ("table1",)
+"""Tables that a headline table replaces."""
 
 
 def write_report(written: TablesWritten, data: Path | None = None) -> Path:
-    """Write `report.html` and `report/` of a run whose tables were written; the page's path.
+    """Write figures, `report.html` and `report/` of a run whose tables were; the page's path.
 
     Goals, candidates and assemblies are drawn by the page from the scenes: `data` is where the
     data set is now, if it has moved; where it cannot be read, the page says so and shows the rest.
@@ -48,13 +61,14 @@ def write_report(written: TablesWritten, data: Path | None = None) -> Path:
     """
     run = written.run
     sources = open_sources(run.manifest, run.design, data)
+    figures = write_figures(run)
     path = run.path / REPORT_FILE
     build = uuid4().hex[:12]
     folder = run.path / _FOLDER
     with _as_store_error(path):
         (folder / build).mkdir(parents=True)
         _write_data(run, sources, folder, build)
-        atomic_write(path, _page(written, build))
+        atomic_write(path, _page(written, figures, build))
         # A page of an earlier build that is still open says that it was written again.
         for old in folder.iterdir():
             if old.name not in (build, _PICTURES):
@@ -107,14 +121,14 @@ def _scenes(run: Run) -> list[str]:
     return list(run.records.loc[run.records["track"] != "vqa", "scene"].unique())
 
 
-def _page(written: TablesWritten, build: str) -> str:
+def _page(written: TablesWritten, figures: Sequence[Path], build: str) -> str:
     run = written.run
-    headline = assembly_headline(run)
+    headlines = [assembly_headline(run), vqa_headline(run)]
     return render_page(
         about=_about(run),
-        headlines=[headline] if headline else [],
-        figures=_figures(run.path),
-        tables=[written.views[name] for name in _TABLES if name in written.views],
+        headlines=[headline for headline in headlines if headline],
+        figures=_figures(figures),
+        tables=[view for name, view in written.views.items() if name not in _NOT_SHOWN],
         folder=f"{_FOLDER}/{build}",
         build=build,
     )
@@ -141,9 +155,12 @@ def _about(run: Run) -> dict[str, Any]:
     }
 
 
-def _figures(folder: Path) -> list[Figure]:
-    found = sorted((folder / "figures").glob("*.svg"))
-    return [Figure(f"figures/{path.name}", path.stem.replace("-", " ")) for path in found]
+def _figures(files: Sequence[Path]) -> list[Figure]:
+    return [
+        Figure(f"{path.parent.name}/{path.name}", _FIGURES.get(path.stem, path.stem))
+        for path in files
+        if path.suffix == ".svg"
+    ]
 
 
 @contextlib.contextmanager

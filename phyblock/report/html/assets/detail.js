@@ -29,12 +29,11 @@ const Detail = (() => {
 
   function build(loaded, scene, question) {
     const several = loaded.length > 1;
-    const all = columns(loaded.map((sample) => [several ? heading(sample) : null, ...texts(sample)]));
+    const all = columns(loaded.map((sample) => [
+      several ? heading(sample) : null, question ? Question.answer(sample) : null, ...texts(sample)]));
     if (question) {
       player = null;
-      const answers = columns(loaded.map((sample) =>
-        [several ? heading(sample) : null, Question.answer(sample)]));
-      return [Question.about(question, loaded[0]), answers, all];
+      return [Question.about(question, loaded[0]), all];
     }
     return [assembly(loaded, scene, several), scene ? candidates(scene) : null, all].filter(Boolean);
   }

@@ -4,7 +4,7 @@
 const List = (() => {
   const ROW_PX = 46;
   const SPARE = 6;
-  const SORTS = { scene: "Scene", model: "Model", worst: "Worst first", best: "Best first" };
+  const SORTS = { scene: "Name", model: "Model", worst: "Worst first", best: "Best first" };
   const state = { track: 0, setting: "", sort: "scene", chosen: -1 };
   const filters = {};
   let rows = [];

@@ -26,7 +26,7 @@ const Question = (() => {
 
   function options(question) {
     const { answer } = question;
-    return el("ol", { class: "options" }, question.options.map((option, i) => {
+    return el("ol", { class: question.options.every(isPicture) ? "options pictured" : "options" }, question.options.map((option, i) => {
       const place = answer.indexOf(LETTERS[i]);
       const isRight = answer.length === 1 && place === 0;
       const mark = answer.length > 1 ? `${place + 1}.` : "✓";
