@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain.blocks import SHAPES, orientation_class
+from phyblock.domain.blocks import SHAPES, BlockType, Euler, orientation_class
 from phyblock.domain.scene import Block
 from phyblock.generate.questions.seeing import center_m, picture_axes
 from phyblock.sim.support import bounds_m
@@ -65,8 +66,20 @@ def vertical_turns_deg(block: Block, other: Block) -> tuple[int, ...]:
     """
     if block.type != other.type:
         return ()
+    return _turns_deg(block.type, block.euler_deg, other.euler_deg)
+
+
+@functools.lru_cache(maxsize=4096)
+def _turns_deg(block_type: BlockType, euler_deg: Euler, other_deg: Euler) -> tuple[int, ...]:
+    wanted = np.array(orientation_class(block_type, euler_deg))
+    roll, pitch, yaw = other_deg
     turns = sorted(range(-180 + _STEP_DEG, 181, _STEP_DEG), key=lambda turn: (abs(turn), -turn))
-    return tuple(t for t in turns if _look_alike(block, turned_about_vertical(other, t)))
+    found = []
+    for turn in turns:
+        turned = orientation_class(block_type, (roll, pitch, _yaw_deg(yaw, turn)))
+        if np.abs(wanted - np.array(turned)).max() < _SAME:
+            found.append(turn)
+    return tuple(found)
 
 
 def turned_about_vertical(block: Block, angle_deg: float) -> Block:
@@ -76,15 +89,9 @@ def turned_about_vertical(block: Block, angle_deg: float) -> Block:
     turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     x, y, z = (about + turn @ (np.array(block.position_m) - about)).tolist()
     roll, pitch, yaw = block.euler_deg
-    euler_deg = (roll, pitch, round((yaw + angle_deg) % 360, 6))
+    euler_deg = (roll, pitch, _yaw_deg(yaw, angle_deg))
     return replace(block, position_m=(round(x, 6), round(y, 6), round(z, 6)), euler_deg=euler_deg)
 
 
-def _look_alike(block: Block, other: Block) -> bool:
-    """Whether the two are oriented alike up to the symmetry of the type."""
-    one, two = (np.array(_class(each)) for each in (block, other))
-    return bool(np.abs(one - two).max() < _SAME)
-
-
-def _class(block: Block) -> tuple[float, ...]:
-    return orientation_class(block.type, block.euler_deg)
+def _yaw_deg(yaw_deg: float, turn_deg: float) -> float:
+    return round((yaw_deg + turn_deg) % 360, 6)
