@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from phyblock.report.design import OVERALL
 from phyblock.report.intervals import count_cube, resampler
 from phyblock.report.load import Run, once_per_run
 from phyblock.report.text_table import Column, TextTable, between, level_name, number
@@ -51,11 +50,15 @@ def settings_frame(run: Run) -> pd.DataFrame:
         part["n_scenes"] = cube.present[:, both[:, 0]].sum(axis=0)
         part["n_clusters"] = n_clusters
         parts.append(part)
-    table = pd.concat(parts) if parts else pd.DataFrame(columns=list(_COLUMNS))
-    order = {name: place for place, name in enumerate(design.model_names)}
-    return table.sort_values("model", key=lambda names: names.map(order), kind="stable")[
-        list(_COLUMNS)
-    ].reset_index(drop=True)
+    if not parts:
+        return pd.DataFrame(columns=list(_COLUMNS))
+    found = pd.concat(parts).set_index(["model", "level"])
+    models = [name for name in design.model_names if name in set(found.index.get_level_values(0))]
+    cells = pd.MultiIndex.from_product([models, design.levels], names=["model", "level"])
+    table = found.reindex(cells).reset_index()[list(_COLUMNS)]
+    sizes = ["n_scenes", "n_clusters"]
+    table[sizes] = table[sizes].fillna(0).astype("int64")
+    return table
 
 
 def _both_and_difference(sums: Floats) -> Floats:
@@ -80,7 +83,7 @@ def settings_view(table: pd.DataFrame, run: Run) -> TextTable:
         for level in design.levels
         for name in ("A", "B", "B - A, 95 % CI")
     ]
-    scenes = max((cells[m, OVERALL]["n_clusters"] for m in {r[0] for r in rows}), default=0)
+    scenes = int(table["n_clusters"].max())
     return TextTable(
         "F1 in setting A (with orientation) and in setting B (without), in percent",
         (Column("Model", is_text=True), *columns),

@@ -12,7 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import StoreError
-from phyblock.report import Column, TextTable, to_latex, to_markdown, write_tables
+from phyblock.report import Column, TextTable, load_run, to_latex, to_markdown, write_tables
+from phyblock.report.compare import compare_models
+from phyblock.report.compare_view import write_comparison
 from phyblock.report.text_table import NO_VALUE, number, spread
 from tests.report.factory import laws, manifest, record, record_lists, score, write_run
 
@@ -102,7 +104,17 @@ def test_numbers_as_they_are_shown(shown: str, text: str) -> None:
 
 def records_of(model: str) -> list[dict[str, Any]]:
     return [
-        record(model, scene, seed, [score(seed + 1, 1, 1), score(3, 0, 1, criterion="selection")])
+        record(
+            model,
+            scene,
+            seed,
+            [
+                score(seed + 1, 1, 1),
+                score(seed + 2, 1, 0, setting="B"),
+                score(3, 0, 1, criterion="selection"),
+                score(4, 0, 0, criterion="selection", setting="B"),
+            ],
+        )
         for scene in ("000", "002", "003")
         for seed in (0, 1)
     ]
@@ -111,14 +123,14 @@ def records_of(model: str) -> list[dict[str, Any]]:
 def test_all_tables_are_written(tmp_path: Path) -> None:
     facts = manifest(models=[("alpha", "GPT-4o"), "beta"])
     written = write_tables(write_run(tmp_path / "run", records_of("alpha"), facts))
-    names = ["assembly", "table1", "errors", "coverage", "published"]
+    names = ["assembly", "table1", "intervals", "table5", "settings", "errors"]
+    names += ["coverage", "cost", "published"]
     assert list(written.frames) == names
     assert list(written.views) == names[1:]
     assert {file.name for file in written.folder.iterdir()} == {
         *(f"{name}.csv" for name in names),
         *(f"{name}.md" for name in names[1:]),
-        "table1.tex",
-        "errors.tex",
+        *(f"{name}.tex" for name in names[1:]),
     }
     assert set(written.files) == set(written.folder.iterdir())
 
@@ -127,17 +139,19 @@ def test_only_the_tables_that_the_suite_asks_for_are_written(tmp_path: Path) -> 
     facts = manifest(models=[("alpha", "GPT-4o")])
     facts["suite"]["tables"] = ["errors"]
     written = write_tables(write_run(tmp_path / "run", [], facts))
-    assert {file.stem for file in written.files} == {"errors", "coverage"}
+    assert {file.stem for file in written.files} == {"errors", "coverage", "cost"}
 
 
-@pytest.mark.parametrize(("asked", "made"), [(["table1"], {"table1"}), ([], set())])
+@pytest.mark.parametrize(
+    ("asked", "made"), [(["table1"], {"table1", "intervals", "table5"}), ([], set())]
+)
 def test_tables_asked_for_by_name_are_written_whatever_the_suite_says(
     tmp_path: Path, asked: list[str], made: set[str]
 ) -> None:
     folder = write_run(tmp_path / "run", [], manifest(models=[("alpha", "GPT-4o")]))
     written = write_tables(folder, asked)
-    assert set(written.frames) == {"coverage", *made}
-    assert {file.stem for file in written.folder.iterdir()} == {"coverage", *made}
+    assert set(written.frames) == {"coverage", "cost", *made}
+    assert {file.stem for file in written.folder.iterdir()} == {"coverage", "cost", *made}
 
 
 def test_csv_files_hold_numbers_and_empty_cells(tmp_path: Path) -> None:
@@ -219,14 +233,19 @@ def test_latex_compiles_inside_any_document(tmp_path: Path) -> None:
     folder = write_run(
         tmp_path / "run",
         [one for model in models for one in records_of(model)],
-        manifest(models=models),
+        manifest(models=[(models[0], "GPT-4.1"), *models[1:]]),
     )
     written = write_tables(folder)
+    write_comparison(compare_models(load_run(folder)), folder / "tables")
+    inputs = "".join(
+        rf"\input{{tables/{file.stem}}}" for file in sorted((folder / "tables").glob("*.tex"))
+    )
+    assert inputs.count("input") == 9
     for number_of_columns in ("onecolumn", "twocolumn"):
         document = (
             rf"\documentclass[{number_of_columns}]{{article}}"
-            r"\usepackage{booktabs}\usepackage{graphicx}\begin{document}"
-            r"\input{tables/table1}\input{tables/errors}\end{document}"
+            rf"\usepackage{{booktabs}}\usepackage{{graphicx}}\begin{{document}}"
+            rf"{inputs}\end{{document}}"
         )
         (folder / "paper.tex").write_text(document)
         command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
