@@ -20,6 +20,7 @@ _VERBS = {
     "models": "List models with kinds, prices and keys; check one.",
     "validate": "Check suites, models files and data sets.",
     "scenes": "Make, check, show and draw scenes.",
+    "vqa": "Make, check and show questions about scenes.",
     "cache": "Show or clear the reply cache.",
     "init": "Lay out a working folder: a suite, models.yaml, prompts.",
 }

@@ -37,20 +37,20 @@ def make_questions(
     wanted: Mapping[Subtask, int],
     seed: int,
     workers: Workers,
-    told: Callable[[Subtask], None] = lambda _: None,
+    told: Callable[[Subtask, int], None] = lambda _, __: None,
 ) -> Iterator[Question]:
     """The questions, subtask by subtask; the same for the same arguments, whatever the workers.
 
     Drafts of a scene depend on seed, subtask and scene alone; what is taken of them, and which
-    letter is right, on seed and subtask. `told` hears of every scene that was asked. Raises
-    DataError when the scenes give too few.
+    letter is right, on seed and subtask. `told` hears of every scene that was asked, and of
+    how many there are to ask. Raises DataError when the scenes give too few.
     """
     for subtask, count in wanted.items():
         pool: list[Pooled] = []
         tasks = [(subtask, seed, scene) for scene in _tried(subtask, scenes, seed)]
         for drafts in workers.map(_drafts, tasks):
             pool += [Pooled(draft, _texts(draft.options)) for draft in drafts]
-            told(subtask)
+            told(subtask, len(tasks))
         rng = _rng(seed, subtask, "choice")
         taken = select(pool, count, rng)
         if len(taken) < count:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import chain
 
-from phyblock.domain.question import LETTERS, Question, Subtask
+from phyblock.domain.question import LETTERS, Question
 from phyblock.errors import PhyblockError
 from phyblock.generate.questions.base import UnfairError
 from phyblock.generate.questions.makers import MAKERS
@@ -33,18 +33,13 @@ def problem_of(question: Question) -> str | None:
 
 
 def verify_questions(
-    questions: Sequence[Question], workers: Workers, told: Callable[[Subtask], None]
+    questions: Sequence[Question], workers: Workers
 ) -> Iterator[tuple[Question, str | None]]:
-    """Each question with what is wrong with it, in their order; `told` hears of each."""
+    """Each question with what is wrong with it, scene by scene, so that pictures are shared."""
     by_scene = sorted(questions, key=lambda question: question.scene.id)
     batches = [by_scene[i : i + _BATCH] for i in range(0, len(by_scene), _BATCH)]
-    found: dict[int, str | None] = {}
     answers = chain.from_iterable(workers.map(_problems, batches))
-    for question, problem in zip(by_scene, answers, strict=True):
-        found[id(question)] = problem
-        told(question.subtask)
-    for question in questions:
-        yield question, found[id(question)]
+    yield from zip(by_scene, answers, strict=True)
 
 
 def _problems(questions: Sequence[Question]) -> list[str | None]:

@@ -1,0 +1,105 @@
+"""`phyblock vqa generate`: questions from a seed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import cast
+
+import click
+from rich.progress import Progress, TaskID
+
+from phyblock.cli.console import make_console, shown_path
+from phyblock.cli.scenes_data import read_data_set
+from phyblock.cli.scenes_work import jobs_option, ray_option
+from phyblock.cli.vqa_data import DEFAULT_SCENES
+from phyblock.domain import SUBTASKS, Subtask
+from phyblock.generate.questions.production import PER_SUBTASK, make_questions
+from phyblock.generate.questions.writing import check_place, write_questions
+from phyblock.generate.workers import open_workers
+
+__all__ = ["command"]
+
+
+def _subtasks(ctx: click.Context, param: click.Parameter, value: str) -> tuple[Subtask, ...]:
+    words = SUBTASKS if value == "all" else tuple(value.upper().split(","))
+    unknown = [word for word in words if word not in SUBTASKS]
+    if unknown or len(set(words)) < len(words):
+        known = ",".join(SUBTASKS)
+        raise click.BadParameter(f"{value!r}: give all, or some of {known}", ctx, param)
+    return cast(tuple[Subtask, ...], words)
+
+
+@click.command("generate")
+@click.option(
+    "--data",
+    default=DEFAULT_SCENES,
+    show_default=True,
+    metavar="PATH",
+    help="Scenes that are asked about: a folder or a bundled set.",
+)
+@click.option(
+    "--subtasks",
+    default="all",
+    show_default=True,
+    callback=_subtasks,
+    metavar="NAMES",
+    help="Subtasks like SH,CO,VP.",
+)
+@click.option(
+    "--per-subtask",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Questions of each subtask; by default 150, of ordering and affordance 50.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    metavar="S",
+    help="Another seed gives other questions.",
+)
+@jobs_option
+@ray_option
+@click.option(
+    "--out", type=click.Path(path_type=Path), required=True, metavar="DIR", help="Folder to write."
+)
+@click.option("--replace", is_flag=True, help="Replace questions that are in the folder.")
+def command(
+    data: str,
+    subtasks: tuple[Subtask, ...],
+    per_subtask: int | None,
+    seed: int,
+    jobs: int,
+    ray_address: str | None,
+    out: Path,
+    replace: bool,
+) -> None:
+    """Make questions, each with an answer that is derived, and their data card.
+
+    The same scenes, subtasks, numbers and seed give the same files, whatever runs the work.
+    """
+    check_place(out, replace)
+    wanted = {subtask: per_subtask or PER_SUBTASK[subtask] for subtask in subtasks}
+    scenes = [task.scene for task in read_data_set(data).tasks]
+    console = make_console(stderr=True)
+    with (
+        open_workers(jobs, ray_address) as workers,
+        Progress(console=console, transient=True, disable=not console.is_terminal) as progress,
+    ):
+        bars: dict[Subtask, TaskID] = {}
+
+        def told(subtask: Subtask, total: int) -> None:
+            if subtask not in bars:
+                bars[subtask] = progress.add_task(f"drafting {subtask}", total=total)
+            progress.advance(bars[subtask])
+
+        questions = list(make_questions(scenes, wanted, seed, workers, told))
+    made_by = f"phyblock vqa generate --data {data} --seed {seed} --out {out.name}"
+    if len(subtasks) < len(SUBTASKS):
+        made_by += f" --subtasks {','.join(subtasks)}"
+    if per_subtask is not None:
+        made_by += f" --per-subtask {per_subtask}"
+    write_questions(out, questions, {scene.id: scene for scene in scenes}, made_by)
+    told_of = f"{len(questions)} questions in {len(subtasks)} subtasks"
+    click.echo(f"{told_of}: {shown_path(out)}")
