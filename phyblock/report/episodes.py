@@ -90,18 +90,15 @@ def endings_frame(run: Run) -> pd.DataFrame:
         mine = episodes[episodes["model"] == model]
         whole = mine[mine["ending"] == "completed"]
         counts: Counter[str] = Counter(mine["ending"].tolist())
-        rows.append(
-            {
-                "model": model,
-                "n": len(mine),
-                "expected": run.design.samples(TRACK),
-                **{name: counts[name] for name in ENDINGS},
-                "completion": len(whole) / len(mine) if len(mine) else np.nan,
-                "steps": mine["steps"].mean(),
-                "steps_to_finish": whole["steps"].mean(),
-                "detour": whole["steps"].sum() / whole["n_blocks"].sum() if len(whole) else np.nan,
-            }
-        )
+        row: dict[str, Any] = {"model": model, "n": len(mine)}
+        row["expected"] = run.design.samples(TRACK)
+        row |= {name: counts[name] for name in ENDINGS}
+        row["completion"] = len(whole) / len(mine) if len(mine) else np.nan
+        row["steps"] = mine["steps"].mean()
+        row["steps_to_finish"] = whole["steps"].mean()
+        fewest = whole["n_blocks"].sum()
+        row["detour"] = whole["steps"].sum() / fewest if fewest else np.nan
+        rows.append(row)
     return pd.DataFrame(rows)
 
 
