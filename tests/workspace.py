@@ -159,14 +159,17 @@ class Workspace:
         )
         return Done(done.returncode, done.stdout, done.stderr)
 
-    def run(self, *args: str | Path, **options: Any) -> Done:
-        """`phyblock run suite.yaml --out out`, and what more is given."""
-        return self.phyblock("run", "suite.yaml", "--out", self.out, *args, **options)
+    def run(self, *args: str | Path, page: bool = False, **options: Any) -> Done:
+        """`phyblock run suite.yaml --out out`, and what more is given; figures and page take
+        seconds, so they are made where a test is about them.
+        """
+        less = () if page else ("--no-report",)
+        return self.phyblock("run", "suite.yaml", "--out", self.out, *less, *args, **options)
 
     def start(self, *args: str | Path) -> subprocess.Popen[str]:
         """Start `run` and return at once; the process leads a group of its own."""
         return subprocess.Popen(
-            [*COMMAND, "run", "suite.yaml", "--out", str(self.out), *map(str, args)],
+            [*COMMAND, "run", "suite.yaml", "--out", str(self.out), "--no-report", *map(str, args)],
             cwd=self.root,
             env=self.env,
             stdin=subprocess.DEVNULL,

@@ -53,6 +53,7 @@ _INTERRUPTED = 130
 @click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
 @click.option("--dry-run", is_flag=True, help="Print calls, tokens and dollars; call nothing.")
 @click.option("--retry-failed", is_flag=True, help="Ask again where a request was rejected.")
+@click.option("--no-report", is_flag=True, help="Write tables alone, no figures and no page.")
 @click.option("--yes", is_flag=True, help="Do not ask before spending money.")
 def command(
     suite: str,
@@ -64,6 +65,7 @@ def command(
     no_cache: bool,
     dry_run: bool,
     retry_failed: bool,
+    no_report: bool,
     yes: bool,
 ) -> int:
     """Run SUITE: a YAML file, or a bundled suite (quick, full, paper-table1, paper-random).
@@ -89,7 +91,8 @@ def command(
     result = asyncio.run(_run(session, view))
     written = report.write_tables(folder, plan.suite.tables)
     print_summary(console, written)
-    show_page(console, report.write_report(written))
+    if not no_report:
+        show_page(console, report.write_report(written))
     return _conclude(console, folder, result, view.cost_text)
 
 
