@@ -1,4 +1,4 @@
-"""Small question sets for tests of the VQA track: every subtask, answers that only tests believe."""
+"""Small question sets for tests of the VQA track: every subtask, right answers drawn at random."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def question(subtask: str, scene: Raw, number: int, rng: np.random.Generator) ->
     if subtask in WITH_PICTURES:
         made["options"] = [f"<img{i}>" for i in range(1, 5)]
         made["pictures"] += [
-            {"label": letter, "view": [45 + 60 * place, 22 + number % 3], "framed": True}
+            {"label": letter, "view": [45 + 35 * place, 25 + number], "framed": True}
             for place, letter in enumerate(LETTERS)
         ]
     if subtask == "OR":

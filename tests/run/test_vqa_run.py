@@ -1,0 +1,252 @@
+"""Whole runs of the VQA track against a local server: pictures, modes, tables, bad input."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import re
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from phyblock.datasets import read_builtin, read_questions
+from phyblock.domain import LETTERS, SUBTASKS, Question
+from phyblock.report import published_table
+from phyblock.sim import PictureStyle
+from phyblock.sim.question_pictures import question_png
+from tests.servers.chassis import Running, Seen
+from tests.servers.openai_chat import OpenAIChat
+from tests.vqa_set import questions, vqa_suite, write_questions
+from tests.workspace import Done, Raw, Workspace
+
+FEW = ["SH", "VP", "OR", "AD"]
+
+
+class Answering(OpenAIChat):
+    """Answers as a function of what it was shown says."""
+
+    def __init__(self, answer: Callable[[Seen], str]) -> None:
+        super().__init__()
+        self._answer = answer
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        body = super().reply(seen, ending)
+        body["choices"][0]["message"]["content"] = self._answer(seen)
+        return body
+
+
+def a_cube(seen: Seen) -> str:
+    """The letter of the cube wherever it stands; else A."""
+    found = re.search(r"^([A-D])\. cube$", str(seen.parts[-1]), re.MULTILINE)
+    return f"It looks like a cube.\n\nAnswer: {found[1] if found else 'A'}"
+
+
+def run_with(
+    workspace: Workspace,
+    server: OpenAIChat,
+    *args: str,
+    models: tuple[str, ...] = ("alpha",),
+    seeds: tuple[int, ...] = (0,),
+    **fields: Any,
+) -> Done:
+    write_questions(workspace.root / "questions")
+    with Running(server) as running:
+        workspace.write_models(running.url, *models)
+        workspace.write_suite(
+            **{**vqa_suite(**fields), "models": list(models), "seeds": list(seeds)}
+        )
+        return workspace.run(*args)
+
+
+def pictures_of(workspace: Workspace) -> dict[str, tuple[Question, dict[str, str]]]:
+    """By question, the digest of each of its pictures by label, drawn here."""
+    scenes = read_builtin(workspace.root / "data")
+    found = read_questions(workspace.root / "questions", scenes)
+    style = PictureStyle(size_px=128)
+    return {
+        task.key: (
+            task.question,
+            {
+                picture.label: hashlib.sha256(question_png(picture, style)).hexdigest()
+                for picture in task.question.pictures
+            },
+        )
+        for task in found.tasks
+    }
+
+
+def shown(seen: Seen) -> list[tuple[str, str]]:
+    """Caption and digest of each picture in the order in which they arrived."""
+    parts = seen.parts[:-1]
+    pairs = [(parts[i], parts[i + 1]) for i in range(0, len(parts), 2)]
+    for caption, picture in pairs:
+        assert isinstance(caption, str)
+        assert isinstance(picture, tuple)
+        assert picture[0] == "image/png"
+    return [(str(caption), picture[1]) for caption, picture in pairs]
+
+
+def table(workspace: Workspace, name: str) -> list[Raw]:
+    text = workspace.tables()[f"{name}.csv"].decode()
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_pictures_arrive_in_order_each_with_its_caption(workspace: Workspace) -> None:
+    server = Answering(a_cube)
+    done = run_with(workspace, server, subtasks=FEW)
+    assert (done.code, done.err) == (0, "")
+    drawn = pictures_of(workspace)
+    by_text = {question.text: (question, labels) for question, labels in drawn.values()}
+    assert server.requests == 16
+    for seen in server.seen:
+        found = re.search(r"^Question: (.*)$", str(seen.parts[-1]), re.MULTILINE)
+        assert found is not None
+        question, labels = by_text[found[1]]
+        captions = {
+            "scene": "First picture:" if len(labels) > 1 else "Picture:",
+            "block": "Second picture, one block by itself:",
+            **{letter: f"Picture {letter}:" for letter in LETTERS},
+        }
+        order = [label for label in ("scene", "block", *LETTERS) if label in labels]
+        assert shown(seen) == [(captions[label], labels[label]) for label in order]
+        assert len(order) == {"SH": 1, "VP": 5, "OR": 4, "AD": 2}[question.subtask]
+    for record in workspace.records():
+        question = drawn[record["question"]["id"]][0]
+        assert record["answer"]["right"] == question.answer_letters
+        assert record["answer"]["correct"] == (
+            record["answer"]["given"] == record["answer"]["right"]
+        )
+        assert record["outcome"] == ("parse_failure" if question.subtask == "OR" else "ok")
+
+
+def test_circular_runs_count_a_question_once_and_only_if_all_rotations_are_right(
+    workspace: Workspace,
+) -> None:
+    server = Answering(a_cube)
+    done = run_with(workspace, server, circular=True, subtasks=["SH", "CO"], per_subtask=3)
+    assert (done.code, done.err) == (0, "")
+    assert server.requests == 24
+    made = {one["id"]: one for one in questions()}
+    records = workspace.records()
+    assert Counter(record["question"]["rotation"] for record in records) == dict.fromkeys(
+        range(4), 6
+    )
+    is_cube = {
+        name: made[name]["options"][LETTERS.index(made[name]["answer"])] == "cube"
+        for name in {record["question"]["id"] for record in records}
+    }
+    assert all(
+        record["answer"]["correct"] == is_cube[record["question"]["id"]] for record in records
+    )
+    cells = {row["cell"]: row for row in table(workspace, "questions")}
+    for subtask in ("SH", "CO"):
+        right = [held for name, held in is_cube.items() if name.startswith(subtask.lower())]
+        assert float(cells[subtask]["accuracy"]) == pytest.approx(sum(right) / 3, abs=1e-6)
+        assert int(cells[subtask]["n"]) == int(cells[subtask]["expected"]) == 12
+    assert "circular" in done.out
+    assert "[circular]" in workspace.tables()["table2.tex"].decode().replace("{", "").replace(
+        "}", ""
+    )
+
+
+def test_one_letter_for_every_rotation_is_never_right_in_a_circular_run(
+    workspace: Workspace,
+) -> None:
+    server = Answering(lambda _: "B")
+    run_with(workspace, server, circular=True, subtasks=["VP", "AD"], per_subtask=2)
+    cells = {row["cell"]: row for row in table(workspace, "questions")}
+    for subtask in ("VP", "AD"):
+        assert float(cells[subtask]["accuracy"]) == 0.0
+        assert float(cells[subtask]["each_rotation"]) == 0.25
+
+
+def test_a_blind_run_sends_no_picture(workspace: Workspace) -> None:
+    server = Answering(a_cube)
+    done = run_with(workspace, server, blind=True, per_subtask=1)
+    assert (done.code, server.requests) == (0, 16)
+    assert all(len(seen.parts) == 1 for seen in server.seen)
+    assert "[blind]" in " ".join(done.out.split())
+
+
+def test_wrong_pictures_are_those_of_another_scene_and_the_same_for_all_models(
+    workspace: Workspace,
+) -> None:
+    wrong = Answering(a_cube)
+    two = ("alpha", "beta")
+    done = run_with(workspace, wrong, models=two, wrong_image=True, subtasks=["SH", "VP"])
+    assert done.code == 0
+    assert "[pictures of another scene]" in " ".join(done.out.split())
+    drawn = pictures_of(workspace)
+    by_text = {question.text: (question, labels) for question, labels in drawn.values()}
+    sent: dict[str, set[tuple[str, ...]]] = {}
+    for seen in wrong.seen:
+        text = str(seen.parts[-1])
+        question, labels = next(v for k, v in by_text.items() if f"Question: {k}\n" in text)
+        digests = tuple(digest for _, digest in shown(seen))
+        sent.setdefault(question.id, set()).add(digests)
+        assert not set(digests) & set(labels.values())
+        others = [set(o.values()) for q, o in drawn.values() if q.subtask == question.subtask]
+        assert set(digests) in others
+    assert len(sent) == 8
+    assert all(len(variants) == 1 for variants in sent.values())
+
+
+def test_table_2_of_the_baselines(workspace: Workspace) -> None:
+    made = questions(per_subtask=24)
+    write_questions(workspace.root / "questions", made)
+    workspace.write_suite(**{**vqa_suite(blind=True), "models": ["random", "majority", "oracle"]})
+    done = workspace.run()
+    assert (done.code, done.err) == (0, "")
+    rows = {(row["model"], row["source"]): row for row in table(workspace, "table2")}
+    assert {rows["oracle", "run"][subtask] for subtask in (*SUBTASKS, "overall")} == {"100.0"}
+    printed = published_table(2).set_index(["model", "subtask", "category"])["value"]
+    for subtask in SUBTASKS:
+        chance = 100 / 24 if subtask == "OR" else 25.0
+        three_errors = 3 * (chance * (100 - chance) / 24) ** 0.5
+        assert abs(float(rows["random", "run"][subtask]) - chance) <= three_errors
+        value = printed.xs("Random", level="model").xs(subtask, level="subtask").item()
+        assert float(rows["random", "published"][subtask]) == value
+    assert ("oracle", "published") not in rows
+    letters = {row["model"]: row for row in table(workspace, "letters")}
+    assert letters["oracle"]["n"] == "360"
+    assert all(letters["oracle"][f"right_{x}"] == letters["oracle"][f"given_{x}"] for x in "abcd")
+
+
+BAD = [
+    ({"answer": "E"}, "answer"),
+    ({"options": ["cube", "arch", "cube", "cuboid"]}, r"options\[2\]"),
+    ({"scene_id": "t9"}, "scene_id"),
+    ({"options": ["<img1>", "<img2>", "<img3>", "<img4>"]}, "pictures"),
+]
+
+
+@pytest.mark.parametrize(("change", "field"), BAD)
+def test_a_broken_question_is_one_error_with_file_and_line(
+    workspace: Workspace, change: Raw, field: str
+) -> None:
+    made = questions(subtasks=["SH"])
+    write_questions(workspace.root / "questions", [*made[:2], {**made[2], **change}, made[3]])
+    workspace.write_suite(**vqa_suite())
+    done = workspace.run("--dry-run")
+    assert done.code == 2
+    (error,) = done.errors
+    assert re.search(rf"questions\.jsonl:3: {field}: ", error)
+
+
+def test_a_set_of_questions_that_is_not_there_is_said_so(workspace: Workspace) -> None:
+    (workspace.root / "questions").mkdir()
+    workspace.write_suite(**vqa_suite())
+    done = workspace.run("--dry-run")
+    assert done.code == 2
+    assert "holds no questions" in done.errors[0]
+
+
+def test_a_baseline_of_plans_has_no_rule_for_questions(workspace: Workspace) -> None:
+    write_questions(workspace.root / "questions")
+    workspace.write_suite(**{**vqa_suite(), "models": ["all-candidates"]})
+    done = workspace.run("--dry-run")
+    assert done.code == 2
+    assert "has no rule for vqa" in done.errors[0]
