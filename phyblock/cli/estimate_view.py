@@ -17,14 +17,17 @@ _HEADINGS = (
     *("model", "kind", "samples", "done", "cached", "calls"),
     *("tokens in", "out", "cost", "at most"),
 )
+_ITEMS = {"full_planning": "scene", "step_planning": "episode", "vqa": "question"}
 
 
 def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> None:
     """Print what each model would take, and the sum."""
+    items = [_counted(len(track.items), _ITEMS[track.name]) for track in plan.tracks]
     console.print(
-        f"{plan.suite.name}: {_counted(len(plan.dataset.tasks), 'scene')} of {plan.dataset.name}, "
+        f"{plan.suite.name}: {', '.join(items)} of {plan.dataset.name}, "
         f"{_counted(len(plan.suite.seeds), 'seed')}, {_counted(len(plan.models), 'model')}",
         highlight=False,
+        soft_wrap=True,
     )
     cells = [
         (
