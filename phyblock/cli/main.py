@@ -15,6 +15,7 @@ _VERBS = {
     "run": "Run a suite, or go on where it stopped.",
     "score": "Read and score stored replies again; calls no model.",
     "report": "Write a run's tables again from its records.",
+    "tables": "Print a run's tables; beside the paper's with --paper.",
     "figures": "Draw a run's figures, as SVG and PNG.",
     "compare": "Compare models on the same samples: difference, interval, verdict.",
     "models": "List models with kinds, prices and keys; check one.",

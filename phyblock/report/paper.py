@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import pandas as pd
 
+from phyblock.domain import CATEGORIES
+from phyblock.report.cells import METRICS
 from phyblock.report.comparison import published_frame, published_table
 from phyblock.report.design import OVERALL
 from phyblock.report.load import Run
+from phyblock.report.questions import CELLS
 from phyblock.report.seeds import table5_frame
+from phyblock.report.table3 import table3_frame
 from phyblock.report.text_table import Column, TextTable, level_name, number
 from phyblock.report.views import published_view
+from phyblock.report.vqa import table2_frame
 
 __all__ = ["PAPER_TABLES", "PaperTable", "beside", "paper_table5_frame", "paper_table5_view"]
 
@@ -95,8 +100,82 @@ def paper_table5_view(table: pd.DataFrame, run: Run) -> TextTable:
     return TextTable("Our numbers beside the paper's Table 5 (%)", columns, tuple(rows), (note,))
 
 
+def paper_table2_frame(run: Run) -> pd.DataFrame:
+    """Accuracies by subtask, category and overall beside the paper's Table 2."""
+    return _interleaved(table2_frame(run), CELLS) if "vqa" in run.design.suite.tracks else _NOTHING
+
+
+def paper_table3_frame(run: Run) -> pd.DataFrame:
+    """Precision, recall and F1 of step planning beside the paper's Table 3."""
+    cells = [f"placed_{metric}" for metric in METRICS]
+    asked = "step_planning" in run.design.suite.tracks
+    return _interleaved(table3_frame(run), cells) if asked else _NOTHING
+
+
+def _interleaved(table: pd.DataFrame, cells: Sequence[str]) -> pd.DataFrame:
+    """Cells of a table in which a published row may follow that of a model."""
+    sources = table.to_dict("records")
+    ours = {row["model"]: row for row in sources if row["source"] == "run"}
+    rows = [
+        (row["model"], row["published_name"], cell, row[cell], ours[row["model"]][cell])
+        for row in sources
+        if row["source"] == "published"
+        for cell in cells
+    ]
+    names = ["model", "published_name", "cell", "published", "ours"]
+    found = pd.DataFrame(rows, columns=names).astype({"published": "float64", "ours": "float64"})
+    return found.assign(difference=found["ours"] - found["published"])
+
+
+def _cells_view(table: pd.DataFrame, run: Run, *, number_in_paper: int, note: str) -> TextTable:
+    """Three rows a model: published, ours, difference; a column a cell."""
+    cells = list(dict.fromkeys(table["cell"]))
+    rows = []
+    for model, part in table.groupby("model", sort=False):
+        by_cell = part.set_index("cell").to_dict()
+        label = f"{model} ({part['published_name'].iloc[0]})"
+        for head, kind, signed in (
+            (label, "published", False),
+            ("", "ours", False),
+            ("", "difference", True),
+        ):
+            values = (number(by_cell[kind][cell], signed=signed) for cell in cells)
+            rows.append((head, _KINDS[kind], *values))
+    columns = [Column(_CELL_NAMES.get(cell, cell)) for cell in cells]
+    suite = f", suite {run.design.suite.name}" if run.design.suite.name else ""
+    return TextTable(
+        f"Our numbers beside the paper's Table {number_in_paper}{suite} (%)",
+        (Column("Model", is_text=True), Column("", is_text=True), *columns),
+        tuple(rows),
+        (note,),
+    )
+
+
+def paper_table2_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Out of `paper_table2_frame`."""
+    note = (
+        "Averages are unweighted means. The questions are our own: the paper's are not published."
+    )
+    return _cells_view(table, run, number_in_paper=2, note=note)
+
+
+def paper_table3_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Out of `paper_table3_frame`."""
+    note = f"Setting {run.design.setting}; precision is over the blocks that were placed."
+    return _cells_view(table, run, number_in_paper=3, note=note)
+
+
+_KINDS = {"published": "paper", "ours": "ours", "difference": "difference"}
+_CELL_NAMES: dict[str, str] = {**dict.fromkeys(CATEGORIES, "Avg"), "overall": "Overall"}
+_CELL_NAMES |= {"placed_precision": "Prec", "placed_recall": "Rec", "placed_f1": "F1"}
+_NOTHING = pd.DataFrame(
+    columns=["model", "published_name", "cell", "published", "ours", "difference"]
+)
+
 PAPER_TABLES: dict[int, PaperTable] = {
     1: PaperTable(published_frame, published_view),
+    2: PaperTable(paper_table2_frame, paper_table2_view),
+    3: PaperTable(paper_table3_frame, paper_table3_view),
     5: PaperTable(paper_table5_frame, paper_table5_view),
 }
 """By the number of the table in the paper."""

@@ -52,10 +52,10 @@ def settings_frame(run: Run) -> pd.DataFrame:
         parts.append(part)
     if not parts:
         return pd.DataFrame(columns=list(_COLUMNS))
-    found = pd.concat(parts).set_index(["model", "level"])
-    models = [name for name in design.model_names if name in set(found.index.get_level_values(0))]
+    known = pd.concat(parts).set_index(["model", "level"])
+    models = [name for name in design.model_names if name in set(known.index.get_level_values(0))]
     cells = pd.MultiIndex.from_product([models, design.levels], names=["model", "level"])
-    table = found.reindex(cells).reset_index()[list(_COLUMNS)]
+    table = known.reindex(cells).reset_index()[list(_COLUMNS)]
     sizes = ["n_scenes", "n_clusters"]
     table[sizes] = table[sizes].fillna(0).astype("int64")
     return table

@@ -35,7 +35,7 @@ from phyblock.report.text_table import TextTable
 from phyblock.report.views import coverage_view, errors_view, published_view, table1_view
 from phyblock.report.vqa import letters_view, table2_frame, table2_view
 
-__all__ = ["TablesWritten", "write_tables"]
+__all__ = ["TablesWritten", "make_tables", "table_names", "write_tables"]
 
 _View = Callable[[pd.DataFrame, Run], TextTable]
 
@@ -63,7 +63,7 @@ def write_tables(path: str | Path, tables: Sequence[str] | None = None) -> Table
     for a broken run (see `load_run`) or a folder that cannot be written.
     """
     run = load_run(path, texts=False)
-    frames, views = _tables(run, run.design.suite.tables if tables is None else tables)
+    frames, views = make_tables(run, run.design.suite.tables if tables is None else tables)
     texts = {f"{name}.csv": _csv(frame, name) for name, frame in frames.items()}
     texts |= {f"{name}.md": to_markdown(view) for name, view in views.items()}
     texts |= {f"{name}.tex": to_latex(view, f"phyblock-{name}") for name, view in views.items()}
@@ -109,7 +109,16 @@ _MAKERS: dict[str, _Maker] = {
 }
 
 
-def _tables(run: Run, names: Sequence[str]) -> tuple[dict[str, pd.DataFrame], dict[str, TextTable]]:
+def table_names(run: Run) -> tuple[str, ...]:
+    """Tables that the tracks of a run have."""
+    tracks = ("", *run.design.suite.tracks)
+    return tuple(name for name, maker in _MAKERS.items() if maker.track in tracks)
+
+
+def make_tables(
+    run: Run, names: Sequence[str]
+) -> tuple[dict[str, pd.DataFrame], dict[str, TextTable]]:
+    """Frames and views by name: of `names`, of what comes with them, and of coverage."""
     wanted = {"coverage", *names}
     tracks = ("", *run.design.suite.tracks)
     makers = {

@@ -53,22 +53,25 @@ def asked(model: str, subtask: str, *correct: bool) -> list[dict[str, Any]]:
         | {
             "sample": f"vqa/{model}/{subtask}-{n}/s0",
             "track": "vqa",
-            "question": {"id": f"{subtask}-{n}", "subtask": subtask, "category": ""},
+            "question": {"id": f"{subtask}-{n}", "subtask": subtask, "rotation": 0},
             "answer": {"right": "A", "given": "A" if right else None, "correct": right},
         }
         for n, right in enumerate(correct)
     ]
 
 
-def episode(model: str, scene: str, *placed: int | None) -> dict[str, Any]:
-    turns = [{"n": n, "placed": vertex} for n, vertex in enumerate(placed, 1)]
+def episode(model: str, scene: str, *progress: int) -> dict[str, Any]:
+    """An episode of a goal of four blocks, so many of which are placed after each step."""
+    more = {"outcomes": ["placed"] * len(progress), "progress": list(progress)}
     sample = f"step_planning/{model}/{scene}/s0"
-    return record(model, scene) | {"sample": sample, "track": "step_planning", "turns": turns}
+    return (
+        record(model, scene) | {"sample": sample, "track": "step_planning", "ending": "done"} | more
+    )
 
 
 def test_every_figure_is_drawn_and_drawing_again_gives_the_same_bytes(tmp_path: Path) -> None:
     more = [*asked("alpha", "SH", True, False), *asked("beta", "OR", True)]
-    more += [episode("alpha", "000", 0, 1, 2, 3), episode("beta", "000", None, 0)]
+    more += [episode("alpha", "000", 1, 2, 3, 4), episode("beta", "000", 0, 1)]
     run = load_run(folder_of(tmp_path / "run", *more), texts=False)
     first = {file: file.read_bytes() for file in write_figures(run)}
     assert [file.stem for file in first][::2] == list(FIGURES)
@@ -115,7 +118,7 @@ def test_accuracy_by_subtask_by_hand(tmp_path: Path) -> None:
 
 
 def test_an_episode_that_ended_keeps_what_it_built(tmp_path: Path) -> None:
-    more = [episode("alpha", "000", 0, None, 1, 2), episode("alpha", "001", 0)]
+    more = [episode("alpha", "000", 1, 1, 2, 3), episode("alpha", "001", 1)]
     table = step_progress(load_run(folder_of(tmp_path / "run", *more)))
     assert table["alpha"].tolist() == [0, 25, 25, 37.5, 50]
 

@@ -1,15 +1,14 @@
-"""Figures of the other tracks: questions by subtask, step planning by turn."""
+"""Figures of the other tracks: questions by subtask, step planning by step."""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
-from phyblock.domain.question import CATEGORIES, SUBTASKS
+from phyblock.domain import CATEGORIES, SUBTASKS
+from phyblock.report.episodes import progress_frame
 from phyblock.report.figures.style import (
     COLORS,
     GRID,
@@ -22,7 +21,7 @@ from phyblock.report.figures.style import (
     new_figure,
 )
 from phyblock.report.load import Run
-from phyblock.run.reading import RecordLines
+from phyblock.report.questions import questions_frame
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,15 +33,14 @@ _DARK = 55.0
 
 
 def accuracy_by_subtask(run: Run) -> pd.DataFrame:
-    """Share of right answers [%], a row a model, a column a subtask; NaN for what was not asked."""
-    right: dict[tuple[str, str], list[bool]] = defaultdict(list)
-    for record in _newest(run, "vqa"):
-        if record["outcome"] not in run.design.outcomes_left_out:
-            subtask = record["question"]["subtask"]
-            right[record["model"], subtask].append(bool(record["answer"]["correct"]))
-    rows = [name for name in run.design.model_names if any(name == model for model, _ in right)]
-    table = [[100 * _mean(right.get((model, name))) for name in SUBTASKS] for model in rows]
-    return pd.DataFrame(table, index=rows, columns=list(SUBTASKS), dtype="float64")
+    """Share of right answers [%], a row a model, a column a subtask; NaN for what was not asked.
+
+    As in `questions_frame`; models that answered nothing have no row.
+    """
+    frame = questions_frame(run)
+    table = 100 * frame.pivot(index="model", columns="cell", values="accuracy")
+    table = table.reindex(index=list(run.design.model_names), columns=list(SUBTASKS))
+    return table.astype("float64").dropna(how="all").rename_axis(index=None, columns=None)
 
 
 def vqa_heat_map(run: Run) -> Figure | None:
@@ -82,31 +80,23 @@ def vqa_heat_map(run: Run) -> Figure | None:
 
 
 def step_progress(run: Run) -> pd.DataFrame:
-    """Share of the goal's blocks that stand after each turn [%], mean over episodes.
+    """Share of the goal's blocks that stand after each step [%], mean over episodes.
 
-    A row a turn from 0, a column a model. An episode that has ended keeps what it built.
+    A row a step from 0, a column a model. An episode that has ended keeps what it built.
     """
-    built: dict[str, list[list[float]]] = defaultdict(list)
-    for record in _newest(run, "step_planning"):
-        if record["outcome"] not in run.design.outcomes_left_out:
-            placed = [turn.get("placed") is not None for turn in record.get("turns") or ()]
-            share = 100 * np.cumsum([0, *placed]) / record["n_blocks"]
-            built[record["model"]].append(list(share))
-    longest = max((len(one) for shares in built.values() for one in shares), default=0)
-    models = [name for name in run.design.model_names if name in built]
-    columns = {
-        model: np.mean([one + one[-1:] * (longest - len(one)) for one in built[model]], axis=0)
-        for model in models
-    }
-    return pd.DataFrame(columns, index=pd.RangeIndex(longest, name="turn"), columns=models)
+    frame = progress_frame(run)
+    table = 100 * frame.pivot(index="step", columns="model", values="blocks")
+    table = table.reindex(columns=[name for name in run.design.model_names if name in table])
+    start = pd.DataFrame(0.0, index=[0], columns=table.columns)
+    return pd.concat([start, table]).rename_axis(index="step", columns=None)
 
 
 def progress_by_turn(run: Run) -> Figure | None:
-    """How far the structure is after each turn, a line a model; None without an episode."""
+    """How far the structure is after each step, a line a model; None without an episode."""
     if "step_planning" not in run.design.suite.tracks:
         return None
     table = step_progress(run)
-    if table.empty:
+    if not len(table.columns):
         return None
     last = table.iloc[-1].sort_values(ascending=False, kind="stable")
     figure = new_figure(3.6)
@@ -123,7 +113,7 @@ def progress_by_turn(run: Run) -> Figure | None:
             label=model if named else "_other",
             zorder=3 if named else 1,
         )
-    ax.set(ylim=(0, 102), xlim=(0, None), xlabel="Turn", ylabel="Blocks of the goal placed (%)")
+    ax.set(ylim=(0, 102), xlim=(0, None), xlabel="Step", ylabel="Blocks of the goal placed (%)")
     ax.locator_params(axis="x", integer=True)
     bare_axes([ax], "y")
     ax.spines["bottom"].set_color(GRID)
@@ -133,13 +123,3 @@ def progress_by_turn(run: Run) -> Figure | None:
     name = f"Suite {run.design.suite.name}, " if run.design.suite.name else ""
     headed(figure, "Progress by step", f"{name}mean over episodes; one that ended keeps its blocks")
     return figure
-
-
-def _newest(run: Run, track: str) -> list[Mapping[str, Any]]:
-    """The newest record of every sample of a track."""
-    found = {r["sample"]: r for _, r in RecordLines(run.path) if r["track"] == track}
-    return [found[sample] for sample in sorted(found)]
-
-
-def _mean(values: list[bool] | None) -> float:
-    return float(np.mean(values)) if values else float("nan")

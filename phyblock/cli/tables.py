@@ -1,0 +1,62 @@
+"""`phyblock tables`: a run's tables in the terminal, or as Markdown, LaTeX or CSV to paste."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from phyblock.cli.console import make_console, print_view
+from phyblock.errors import Problem, SpecError
+from phyblock.report import TextTable, to_latex, to_markdown
+from phyblock.report.load import load_run
+from phyblock.report.paper import PAPER_TABLES
+from phyblock.report.write import make_tables, table_names
+
+__all__ = ["command"]
+
+
+@click.command("tables")
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option("--paper", is_flag=True, help="Published, ours and difference: Tables 1, 2, 3, 5.")
+@click.option("--only", "names", multiple=True, metavar="NAME", help="Only this table; repeat.")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["text", "md", "tex"]),
+    default="text",
+    show_default=True,
+    help="How to print them.",
+)
+def command(run: Path, paper: bool, names: tuple[str, ...], form: str) -> None:
+    """Print all tables of the folder RUN; nothing is written.
+
+    With --paper, those of the paper's tables in which a model of the run has a row.
+    """
+    loaded = load_run(run, texts=False)
+    if paper:
+        views = {}
+        for number, table in PAPER_TABLES.items():
+            frame = table.frame(loaded)
+            if len(frame):
+                views[f"paper{number}"] = table.view(frame, loaded)
+    else:
+        views = make_tables(loaded, names or table_names(loaded))[1]
+    if unknown := [name for name in names if name not in views]:
+        allowed = ", ".join(views if paper else table_names(loaded))
+        raise SpecError(
+            Problem(str(run), "has no such table", "--only", ", ".join(unknown), allowed)
+        )
+    for name, view in views.items():
+        if not names or name in names:
+            _print(name, view, form)
+    if not views:
+        click.echo("No model of the run has a row in the paper's tables.")
+
+
+def _print(name: str, view: TextTable, form: str) -> None:
+    if form == "text":
+        print_view(make_console(), view)
+    else:
+        text = to_markdown(view) if form == "md" else to_latex(view, f"phyblock-{name}")
+        click.echo(text)
