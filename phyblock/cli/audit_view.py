@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
-from phyblock.cli.console import plain_table
+from phyblock.cli.console import counted, plain_table
 from phyblock.generate.audit import CHECKS, Check, Finding, SceneAudit
 from phyblock.generate.audit_set import Audit, Copied
 
@@ -48,8 +48,8 @@ def print_changes(console: Console, copied: Copied, folder: str) -> None:
     for scene, reason in copied.left_out.items():
         console.print(f"{scene} stays out: {reason}", markup=False)
     console.print(
-        f"{copied.scenes} scenes in {folder}, {scenes} of them changed: "
-        f"{fields['depend']} dependencies and {fields['layer']} layers of blocks",
+        f"{counted(copied.scenes, 'scene')} in {folder}, {scenes} of them changed: dependencies of "
+        f"{counted(fields['depend'], 'block')}, layers of {fields['layer']}",
         markup=False,
         soft_wrap=True,
     )
@@ -106,9 +106,9 @@ def _print_totals(console: Console, audit: Audit) -> None:
     told = [
         f"{count} scenes read; {audit.without(*CHECKS)} with no finding",
         f"{audit.without('unstable')} stand when finished, {steps} at every step as well",
-        f"dependencies: {_share(audit.shared, audit.declared)} of those declared are contacts "
-        f"(precision), {_share(audit.shared, audit.contacts)} of the contacts are declared "
-        f"(recall); {exact} scenes exact",
+        f"{_share(audit.shared, audit.declared)} dependencies are contacts (precision)",
+        f"{_share(audit.shared, audit.contacts)} contacts are declared (recall)",
+        f"{exact} declare their contacts and nothing else",
     ]
     for line in told:
         console.print(line, markup=False, soft_wrap=True)
@@ -119,7 +119,7 @@ def _exact(audit: Audit) -> int:
 
 
 def _share(part: int, whole: int) -> str:
-    return f"{part / whole:.3f} ({part} of {whole})" if whole else "none"
+    return f"{part} of {whole} ({part / whole:.3f})" if whole else "no"
 
 
 def _some(scenes: Sequence[str], count: int = 24) -> str:

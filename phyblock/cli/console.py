@@ -66,16 +66,24 @@ def width_of(view: TextTable) -> int:
     return sum(width + 2 for width in widths)
 
 
-def plain_table(headings: Sequence[str], rows: Sequence[Sequence[str]], *, numbers: int) -> Table:
-    """A small table whose last `numbers` columns are aligned to the right."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+def plain_table(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], *, numbers: int, tight: bool = False
+) -> Table:
+    """A small table whose last `numbers` columns are aligned to the right.
+
+    With `tight` one space stands between columns, not three, and words are never broken.
+    """
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=0 if tight else (0, 1))
     for position, heading in enumerate(headings):
         right = position >= len(headings) - numbers
+        cells = [row[position] for row in rows]
+        words = [word for cell in cells for word in cell.split()]
+        kept = cells if position == 0 else words if tight else []
         table.add_column(
             heading,
             justify="right" if right else "left",
             no_wrap=position == 0,
-            min_width=max((len(row[0]) for row in rows), default=0) if position == 0 else None,
+            min_width=max((len(part) for part in kept), default=0),
             overflow="fold",
         )
     for row in rows:

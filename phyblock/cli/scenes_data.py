@@ -12,6 +12,9 @@ from phyblock.resources import bundled
 
 __all__ = ["find_data_set", "find_scenes", "read_data_set"]
 
+_OFFICIAL = "data"
+"""The folder of an official checkout that holds its scenes."""
+
 
 def find_data_set(name: str) -> Path:
     """The folder that `name` means: a data set, a checkout, or the name of a bundled set.
@@ -19,7 +22,7 @@ def find_data_set(name: str) -> Path:
     Raises DataError that lists the bundled sets when there is no such folder.
     """
     path = Path(name)
-    if path.is_dir():
+    if (path / SCENES_FILE).is_file() or (path / _OFFICIAL).is_dir():
         return path
     if path.name == SCENES_FILE and path.is_file():
         return path.parent
@@ -29,7 +32,8 @@ def find_data_set(name: str) -> Path:
     allowed = (
         f"a folder with {SCENES_FILE}, an official checkout, or a bundled set: {', '.join(names)}"
     )
-    raise DataError(Problem(name, "there is no such data set", allowed=allowed))
+    message = "holds no data set" if path.is_dir() else "there is no such data set"
+    raise DataError(Problem(name, message, allowed=allowed))
 
 
 def read_data_set(name: str) -> Dataset:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import cast
 
 import click
 
 from phyblock.cli.console import shown_path
+from phyblock.cli.scenes_work import jobs_option, ray_option, tracked
 from phyblock.generate.card import card
 from phyblock.generate.draft import Palette
 from phyblock.generate.production import Order, produce, shares
@@ -31,13 +31,46 @@ def _levels(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int
 
 
 @click.command("generate")
-@click.option("--count", type=click.IntRange(1), default=400, show_default=True, metavar="N")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S")
-@click.option("--levels", default="1,2,3,4", show_default=True, callback=_levels)
-@click.option("--palette", type=click.Choice(["kit", "full"]), default="kit", show_default=True)
-@click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
-@click.option("--ray", "ray_address", metavar="ADDRESS", help="A Ray cluster, or: local.")
-@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder to write.")
+@click.option(
+    "--count",
+    type=click.IntRange(1),
+    default=400,
+    show_default=True,
+    metavar="N",
+    help="How many scenes.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    metavar="S",
+    help="Another seed gives other scenes.",
+)
+@click.option(
+    "--levels",
+    default="1,2,3,4",
+    show_default=True,
+    callback=_levels,
+    metavar="LEVELS",
+    help="Levels to make, in the proportions of the built-in set.",
+)
+@click.option(
+    "--palette",
+    type=click.Choice(["kit", "full"]),
+    default="kit",
+    show_default=True,
+    help="The kit's twelve pairs of type and color, or all forty.",
+)
+@jobs_option
+@ray_option
+@click.option(
+    *("--out", "-o"),
+    type=click.Path(path_type=Path),
+    required=True,
+    metavar="DIR",
+    help="Folder to write.",
+)
 @click.option("--replace", is_flag=True, help="Replace a data set that is in the folder.")
 def command(
     count: int,
@@ -58,11 +91,9 @@ def command(
     with (
         open_workers(jobs, ray_address) as workers,
         open_writer(out, kind, replace) as writer,
-        click.progressbar(length=count, label="scenes", file=sys.stderr) as bar,
     ):
-        for scene in produce(order, workers):
+        for scene in tracked(produce(order, workers), count, "Making"):
             writer.add(scene)
-            bar.update(1)
         chosen = ",".join(map(str, levels))
         made_by = f"phyblock scenes generate --count {count} --seed {seed} --levels {chosen}"
         made_by += f" --palette {palette} --out {out.name}"

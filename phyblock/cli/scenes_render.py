@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import click
 
-from phyblock.cli.console import make_console, shown_path
+from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.scenes_data import find_scenes, read_data_set
+from phyblock.cli.scenes_work import write_file
 from phyblock.datasets import AssemblyTask
-from phyblock.errors import Problem, StoreError
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
 from phyblock.sim.assembly import animation, filmstrip_png
 from phyblock.sim.camera import VIEWS
@@ -21,6 +22,12 @@ __all__ = ["command"]
 
 _Drawing = tuple[str, Callable[[], bytes]]
 """A file's name, and how its bytes are made."""
+
+
+def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+    if value is not None and math.isnan(value):
+        raise click.BadParameter("nan is no angle", ctx, param)
+    return value
 
 
 @click.command("render")
@@ -40,9 +47,19 @@ _Drawing = tuple[str, Callable[[], bytes]]
     show_default=True,
     help="Where the scene is seen from.",
 )
-@click.option("--azimuth", type=float, metavar="DEG", help="0 looks from +x, 90 from +y.")
 @click.option(
-    "--elevation", type=click.FloatRange(1, 90), metavar="DEG", help="90 looks straight down."
+    "--azimuth",
+    type=click.FloatRange(-360, 360),
+    callback=_finite,
+    metavar="DEG",
+    help="0 looks from +x, 90 from +y.",
+)
+@click.option(
+    "--elevation",
+    type=click.FloatRange(1, 90),
+    callback=_finite,
+    metavar="DEG",
+    help="90 looks straight down.",
 )
 @click.option(
     "--background",
@@ -80,21 +97,22 @@ def command(
     """
     read = read_data_set(data)
     tasks = find_scenes(read, scenes) if scenes else read.tasks
-    styles = list(_styles(view, azimuth, elevation, background, size))
+    styles = _styles(view, azimuth, elevation, background, size)
     wanted = [name for name, is_wanted in extras.items() if is_wanted]
     count = 0
     for task in tasks:
-        for name, style in styles:
+        for name, style in styles.items():
             for what, make in _drawings(task, style, wanted):
-                _write(out / f"{task.scene.id}-{name}{what}", make())
+                write_file(out / f"{task.scene.id}-{name}{what}", make())
                 count += 1
-    make_console().print(f"{count} files in {shown_path(out)}", markup=False)
+    make_console().print(f"{counted(count, 'file')} in {shown_path(out)}", markup=False)
 
 
 def _styles(
     view: str, azimuth: float | None, elevation: float | None, background: str, size: int
-) -> Iterator[tuple[str, PictureStyle]]:
-    """Every style asked for, with its part of the file names."""
+) -> dict[str, PictureStyle]:
+    """Every style asked for, by its part of the file names."""
+    styles = {}
     floors: tuple[Background, ...] = tuple(b for b in BACKGROUNDS if background in (b, "all"))
     for name in VIEWS if view == "all" else (view,):
         around, above = VIEWS[name]
@@ -103,7 +121,8 @@ def _styles(
             above = above if elevation is None else elevation
             name = f"{around:g}-{above:g}"
         for floor in floors:
-            yield f"{name}-{floor}", PictureStyle(size, floor, around, above)
+            styles[f"{name}-{floor}"] = PictureStyle(size, floor, around, above)
+    return styles
 
 
 def _drawings(task: AssemblyTask, style: PictureStyle, extras: list[str]) -> Iterator[_Drawing]:
@@ -120,11 +139,3 @@ def _drawings(task: AssemblyTask, style: PictureStyle, extras: list[str]) -> Ite
         "webp": (".webp", lambda: animation(scene, style, "webp")),
     }
     yield from (makers[name] for name in extras)
-
-
-def _write(path: Path, data: bytes) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(data)
-    except OSError as error:
-        raise StoreError(Problem(str(path), f"cannot be written: {error.strerror}")) from error

@@ -20,8 +20,8 @@ __all__ = ["command"]
 def command(data: str, scene: str) -> None:
     """Show the facts of SCENE in the data set PATH: blocks, layers, dependencies, candidates.
 
-    "seen" is the share of a block that no other hides in the default goal picture; the candidate
-    is the number that stands for the block.
+    "on" names the blocks below, "pick" the candidate that stands for the block, "seen" the share
+    of it that no other hides in the default goal picture.
     """
     (task,) = find_scenes(read_data_set(data), (scene,))
     console = make_console()
@@ -31,8 +31,8 @@ def command(data: str, scene: str) -> None:
     told = f"scene {task.scene.id} · level {levels} · {len(task.scene)} blocks · {layers} layers"
     console.print(f"{told} · made from {parents}", markup=False, soft_wrap=True)
     headings = ("block", "type", "color", "on", "position mm", "euler deg")
-    numbers = ("layer", "candidate", "seen")
-    console.print(plain_table((*headings, *numbers), _blocks(task), numbers=3))
+    numbers = ("layer", "pick", "seen")
+    console.print(plain_table((*headings, *numbers), _blocks(task), numbers=3, tight=True))
     offered = ("candidate", "type", "color", "euler deg", "needed")
     console.print(plain_table(offered, _candidates(task), numbers=1))
 

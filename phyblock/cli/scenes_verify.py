@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 
 import click
 
-from phyblock.cli.console import make_console, plain_table, shown_path
-from phyblock.datasets import AssemblyTask, read_builtin
-from phyblock.errors import Problem
+from phyblock.cli.console import make_console, plain_table
+from phyblock.cli.scenes_data import find_data_set
+from phyblock.cli.scenes_work import jobs_option, ray_option, tracked
+from phyblock.datasets import SCENES_FILE, AssemblyTask, read_builtin
+from phyblock.errors import DataError, Problem
 from phyblock.generate.verify import (
     SCENE_CHECKS,
     check_duplicates,
@@ -20,26 +21,35 @@ from phyblock.generate.verify import (
     verify_scenes,
 )
 from phyblock.generate.workers import open_workers
-from phyblock.resources import bundled
 
 __all__ = ["command"]
 
 _Row = tuple[str, int, int]
-_DEFAULT = "phyblock-400"
 
 
 @click.command("verify")
-@click.argument("folder", type=click.Path(path_type=Path), required=False)
-@click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Processes.")
-@click.option("--ray", "ray_address", metavar="ADDRESS", help="A Ray cluster, or: local.")
-@click.option("--limit", type=click.IntRange(1), metavar="N", help="The first N scenes alone.")
-def command(folder: Path | None, jobs: int, ray_address: str | None, limit: int | None) -> None:
-    """Check every scene of FOLDER (by default the built-in set) against geometry and physics.
+@click.argument("data", metavar="[PATH]", default="phyblock-400")
+@jobs_option
+@ray_option
+@click.option(
+    "--limit",
+    type=click.IntRange(1),
+    metavar="M",
+    help="Simulate the first M scenes alone; the rest is checked for duplicates and the like.",
+)
+def command(data: str, jobs: int, ray_address: str | None, limit: int | None) -> None:
+    """Check every scene of PATH against geometry and physics, down to the last number.
+
+    PATH is a folder with scenes.jsonl or a bundled set, by default the built-in phyblock-400.
+    For data sets made elsewhere there is: phyblock scenes audit.
 
     Contacts, layers, overlaps, gaps, stability of the whole at two time steps and of every step,
     candidates, duplicates, parents and checksums. Exit code 1 when anything fails.
     """
-    where = folder or bundled("benchmarks", "data", _DEFAULT)
+    where = find_data_set(data)
+    if not (where / SCENES_FILE).is_file():
+        hint = f"phyblock scenes audit {data}"
+        raise DataError(Problem(data, f"has no {SCENES_FILE} to verify", hint=hint))
     tasks = read_builtin(where).tasks
     rows, problems = _check_scenes(tasks[:limit], jobs, ray_address)
     rows_of_set, problems_of_set = _check_set(where, tasks)
@@ -50,7 +60,7 @@ def command(folder: Path | None, jobs: int, ray_address: str | None, limit: int 
     for problem in failures:
         click.echo(f"failed: {problem}", err=True)
     verdict = f"{len(failures)} failures" if failures else "all checks passed"
-    console.print(f"{shown_path(where)}: {verdict}", markup=False, soft_wrap=True)
+    console.print(f"{data}: {verdict}", markup=False, soft_wrap=True)
     if failures:
         raise click.exceptions.Exit(1)
 
@@ -60,12 +70,9 @@ def _check_scenes(
 ) -> tuple[list[_Row], list[Problem]]:
     passed = dict.fromkeys(SCENE_CHECKS, 0)
     problems: list[Problem] = []
-    with (
-        open_workers(jobs, ray_address) as workers,
-        click.progressbar(length=len(tasks), label="scenes", file=sys.stderr) as bar,
-    ):
-        for found in verify_scenes(((task.scene, task.candidates) for task in tasks), workers):
-            bar.update(1)
+    with open_workers(jobs, ray_address) as workers:
+        verified = verify_scenes(((task.scene, task.candidates) for task in tasks), workers)
+        for found in tracked(verified, len(tasks), "Verifying"):
             for name, wrong in found.items():
                 passed[name] += not wrong
                 problems += wrong

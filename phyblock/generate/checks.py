@@ -104,11 +104,12 @@ def dependency_problems(scene: Scene) -> Iterator[Problem]:
     """Declared dependencies that are not the contacts that carry."""
     below = support_graph(scene.blocks)
     for i, block in enumerate(scene.blocks):
-        rests_on = sorted(below[block.order] - {GROUND})
-        if rests_on != sorted(block.depend):
-            field = f"blocks[{i}].depend"
-            found, allowed = str(list(block.depend) or [GROUND]), str(rests_on or [GROUND])
-            yield Problem(scene.id, "differs from the contacts", field, found, allowed)
+        touched = below[block.order]
+        if touched - {GROUND} != set(block.depend):
+            field, found = f"blocks[{i}].depend", str(list(block.depend) or [GROUND])
+            allowed = str(sorted(touched - {GROUND}) or [GROUND]) if touched else ""
+            message = "differs from the contacts" if touched else "touches nothing below it"
+            yield Problem(scene.id, message, field, found, allowed)
 
 
 def step_problems(scene: Scene) -> Iterator[Problem]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import multiprocessing
+import socket
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -21,6 +22,7 @@ _AHEAD = 4
 """Tasks under way for each process, so that none waits and memory stays flat."""
 _RAY_AHEAD = 64
 _RAY_RETRIES = 5
+_RAY_PATIENCE_S = 10.0
 
 
 class Workers(Protocol):
@@ -91,17 +93,34 @@ def _ray(jobs: int, address: str) -> Iterator[Workers]:
     except ModuleNotFoundError as error:
         hint = "pip install 'phyblock[ray]'"
         raise InputError(Problem("--ray", "Ray is not installed", hint=hint)) from error
+    unreachable = InputError(
+        Problem(
+            *("--ray", "no such cluster", "", address),
+            allowed="local, auto, or the HOST:PORT of a running cluster",
+        )
+    )
+    if address not in ("local", "auto") and not _answers(address):
+        raise unreachable
     try:
         if address == "local":
             ray.init(num_cpus=jobs, include_dashboard=False, log_to_driver=False)
         else:
             ray.init(address=address, log_to_driver=False)
     except (ConnectionError, ValueError, RuntimeError) as error:
-        allowed = "local, auto, or the address of a running cluster"
-        raise InputError(
-            Problem("--ray", "no such cluster", found=address, allowed=allowed)
-        ) from error
+        raise unreachable from error
     try:
         yield _Ray(ray)
     finally:
         ray.shutdown()
+
+
+def _answers(address: str) -> bool:
+    """Whether something listens at HOST:PORT; Ray itself would wait for minutes."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not (host and port.isdigit()):
+        return False
+    try:
+        socket.create_connection((host, int(port)), _RAY_PATIENCE_S).close()
+    except (OSError, OverflowError, UnicodeError):
+        return False
+    return True

@@ -7,6 +7,7 @@ import io
 import json
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner
 from PIL import Image
@@ -32,9 +33,9 @@ def data(tmp_path: Path) -> Path:
     return folder
 
 
-def scenes(*args: object) -> str:
+def scenes(*args: object, columns: int = 160) -> str:
     """What the command prints."""
-    done = CliRunner(env={"COLUMNS": "160"}).invoke(
+    done = CliRunner(env={"COLUMNS": str(columns)}).invoke(
         phyblock, ["scenes", *map(str, args)], standalone_mode=False, catch_exceptions=False
     )
     return done.stdout
@@ -65,6 +66,9 @@ def test_an_audit_says_what_cannot_be_read(data: Path) -> None:
 def test_an_audit_refuses_to_write_over_before_it_works(data: Path) -> None:
     with pytest.raises(StoreError, match="already there"):
         scenes("audit", data, "--fix", data)
+    for option in (("--pictures", data / "scenes.jsonl"), ("--csv", data / "scenes.jsonl" / "x")):
+        with pytest.raises(StoreError, match=r"scenes\.jsonl: cannot be made"):
+            scenes("audit", data, *option)
 
 
 def test_show_prints_the_facts(data: Path) -> None:
@@ -95,6 +99,28 @@ def test_render_names_views_backgrounds_and_kinds(data: Path, tmp_path: Path) ->
     assert len(list((tmp_path / "all").iterdir())) == 6 * 4
     scenes("render", data, "t1", "--out", tmp_path / "one", "--size", 128, "--azimuth", 20)
     assert [path.name for path in (tmp_path / "one").iterdir()] == ["t1-20-22-checkerboard.png"]
+
+
+def test_views_that_turn_out_the_same_are_drawn_once(data: Path, tmp_path: Path) -> None:
+    words = ("--size", 128, "--view", "all", "--azimuth", 30, "--elevation", 30)
+    assert "1 file in" in scenes("render", data, "t1", "--out", tmp_path / "out", *words)
+
+
+@pytest.mark.parametrize("option", ["--azimuth", "--elevation"])
+def test_an_angle_that_is_no_number_is_refused(data: Path, tmp_path: Path, option: str) -> None:
+    with pytest.raises(click.BadParameter, match="nan is no angle"):
+        scenes("render", data, "t1", "--out", tmp_path / "out", option, "nan")
+
+
+def test_the_facts_of_a_scene_fit_a_narrow_terminal() -> None:
+    told = scenes("show", "phyblock-400", "l4-007-street", columns=80)
+    assert "semi_cylinder" in told
+    assert max(map(len, told.splitlines()[1:])) <= 80
+
+
+def test_a_folder_that_holds_no_data_set_is_refused_with_what_would_do(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"holds no data set\n.*scenes\.jsonl, an official"):
+        scenes("show", tmp_path, "t1")
 
 
 def test_a_data_set_that_is_not_there_is_refused_with_the_bundled_ones() -> None:

@@ -1,0 +1,64 @@
+"""What the verbs that work through many scenes share: processes, progress, writing files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TypeVar
+
+import click
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from phyblock.cli.console import make_console
+from phyblock.errors import Problem, StoreError
+
+__all__ = ["jobs_option", "make_folder", "ray_option", "tracked", "write_file"]
+
+T = TypeVar("T")
+_LINE_EVERY = 25
+
+jobs_option = click.option(
+    *("--jobs", "-j"),
+    type=click.IntRange(1, 256),
+    default=os.cpu_count() or 1,
+    show_default="all processors",
+    metavar="N",
+    help="Processes.",
+)
+ray_option = click.option(
+    *("--ray", "ray_address"),
+    metavar="ADDRESS",
+    help="Work on this Ray cluster; local: on one of N workers here.",
+)
+
+
+def tracked(items: Iterable[T], total: int, doing: str) -> Iterator[T]:
+    """The items; a progress bar on a terminal, a line now and then elsewhere, on standard error."""
+    console = make_console(stderr=True)
+    columns = (TextColumn(doing), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    hidden = not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=hidden) as progress:
+        bar = progress.add_task("", total=total)
+        for count, item in enumerate(items, 1):
+            progress.advance(bar)
+            if hidden and count % _LINE_EVERY == 0:
+                console.print(f"{count} of {total} scenes")
+            yield item
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it; StoreError where the disk refuses."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(Problem(str(folder), f"cannot be made: {error.strerror}")) from error
+
+
+def write_file(path: Path, content: str | bytes) -> None:
+    """Write a file and the folders above it; StoreError where the disk refuses."""
+    make_folder(path.parent)
+    try:
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+    except OSError as error:
+        raise StoreError(Problem(str(path), f"cannot be written: {error.strerror}")) from error
