@@ -34,6 +34,9 @@ def print_summary(console: Console, written: TablesWritten) -> None:
         _print_table1(console, table1)
     if "table2" in views:
         _print_table2(console, views["table2"])
+    for name in ("table3", "endings"):
+        if name in views:
+            print_view(console, _narrowed(console, views[name]))
     if "errors" in views:
         errors = _overall(views["errors"])
         if width_of(errors) > console.width:
@@ -46,6 +49,12 @@ def print_summary(console: Console, written: TablesWritten) -> None:
     if "published" in written.frames:
         _print_comparison(console, written)
     console.print(f"Tables are in {shown_path(written.folder)}", soft_wrap=True, markup=False)
+
+
+def _narrowed(console: Console, view: TextTable) -> TextTable:
+    """A table of episodes without its notes, and without side metrics where it is too wide."""
+    view = replace(view, notes=())
+    return _without(view, _SIDE_METRICS) if width_of(view) > console.width else view
 
 
 def _print_table1(console: Console, table1: TextTable) -> None:

@@ -1,0 +1,191 @@
+"""Step planning from end to end: at a local server, with faults, killed and gone on."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import random
+import signal
+import time
+from typing import Any
+
+import pytest
+
+from tests.servers.chassis import ISSUE_MIX, Faults, Running, Seen
+from tests.servers.step_agent import StepAgent, said, told_history
+from tests.workspace import Workspace
+
+AT_ONCE = 4
+FEW = ("--limit", "3")
+VOLATILE = ("time", "latency_s", "attempts", "cached")
+
+
+def prepare(workspace: Workspace, url: str, **fields: Any) -> None:
+    workspace.write_models(url, "alpha")
+    suite = {
+        "tracks": ["step_planning"],
+        "models": ["alpha"],
+        "images": {"size_px": 128, "layout": "separate"},
+        "limits": {"max_concurrency": AT_ONCE, "max_attempts": 8},
+        "steps": {"physics": "off"},
+        **fields,
+    }
+    workspace.write_suite(**suite)
+
+
+def stable(value: Any) -> Any:
+    """A record without what differs between two runs of the same replies."""
+    if isinstance(value, dict):
+        return {k: stable(v) for k, v in value.items() if k not in VOLATILE}
+    return [stable(v) for v in value] if isinstance(value, list) else value
+
+
+def by_sample(records: list[dict[str, Any]]) -> dict[str, Any]:
+    return {record["sample"]: stable(record) for record in records}
+
+
+def pictures(seen: Seen) -> list[str]:
+    return [part[1] for part in seen.parts if not isinstance(part, str)]
+
+
+def turns_on_disk(workspace: Workspace) -> list[dict[str, Any]]:
+    with contextlib.suppress(FileNotFoundError):
+        lines = (workspace.out / "turns.jsonl").read_bytes().split(b"\n")[:-1]
+        return [json.loads(line) for line in lines]
+    return []
+
+
+def test_baselines_give_table_3(workspace: Workspace) -> None:
+    prepare(workspace, "http://nowhere", models=["oracle", "random", "repeat"])
+    done = workspace.run()
+    assert (done.code, done.err) == (0, "")
+    table = workspace.tables()["table3.csv"].decode().splitlines()
+    assert table[1].startswith("oracle,run,,100.0,100.0,100.0,100.0,100.0,100.0,100.0,1.0,5")
+    assert [line.split(",")[0] for line in table] == ["model", "oracle", "random", "repeat"]
+    endings = {r["model"]: set() for r in workspace.records()}  # type: ignore[var-annotated]
+    for record in workspace.records():
+        endings[record["model"]].add(record["ending"])
+    assert endings["oracle"] == {"completed"}
+    assert endings["repeat"] == {"max_repeats"}
+    assert "Step-by-step planning" in done.out
+
+
+def test_the_server_sees_goal_candidates_current_picture_and_history(workspace: Workspace) -> None:
+    with Running(StepAgent()) as running:
+        prepare(workspace, running.url)
+        assert workspace.run().code == 0
+        seen = running.server.seen
+    records = workspace.records()
+    assert sum(len(record["turns"]) for record in records) == len(seen)
+    answers = {one.sample: one for one in seen}
+    for record in records:
+        mine = [answers[turn["reply"]["reasoning"]] for turn in record["turns"]]
+        assert all(isinstance(part, tuple) for one in mine for part in one.parts[:3])
+        assert all(isinstance(one.parts[3], str) for one in mine)
+        assert {len(one.parts) for one in mine} == {4}
+        goals = {tuple(pictures(one)[:2]) for one in mine}
+        assert len(goals) == 1
+        operations: list[str] = []
+        world: list[int] = []
+        current: dict[tuple[int, ...], str] = {}
+        for one, turn in zip(mine, record["turns"], strict=True):
+            labels = [image["label"] for image in turn["prompt"]["images"]]
+            assert labels == ["goal", "candidates", "current"]
+            assert [image["sha256"] for image in turn["prompt"]["images"]] == pictures(one)
+            assert told_history(one) == operations
+            assert current.setdefault(tuple(world), pictures(one)[2]) == pictures(one)[2]
+            assert turn["reply"]["text"] == said(one)
+            move = turn["parse"]["move"]
+            operations.append(f"Move({move})" if move else "(no operation)")
+            world = turn["world"]
+        assert len(set(current.values())) == len(current)
+
+
+def test_history_as_turns_is_a_conversation(workspace: Workspace) -> None:
+    with Running(StepAgent()) as running:
+        steps = {"history": "turns", "memory": 2, "physics": "off", "feedback": "error_type"}
+        prepare(workspace, running.url, steps=steps)
+        assert workspace.run(*FEW).code == 0
+        longest = max(running.server.seen, key=lambda one: len(one.raw["messages"]))
+    roles = [message["role"] for message in longest.raw["messages"]]
+    assert roles == ["system", "user", "assistant", "user", "assistant", "user"]
+    kinds = [
+        [part["type"] for part in message["content"]]
+        for message in longest.raw["messages"]
+        if message["role"] == "user"
+    ]
+    assert kinds == [["image_url"] * 3 + ["text"], ["image_url", "text"], ["image_url", "text"]]
+
+
+def test_faults_change_nothing(workspace: Workspace) -> None:
+    found = []
+    for faults in (Faults(), ISSUE_MIX):
+        with Running(StepAgent(Faults(**{**vars(faults), "retry_after": "0"}))) as running:
+            prepare(workspace, running.url)
+            workspace.out = workspace.root / f"out{len(found)}"
+            assert workspace.run("--no-cache", *FEW).code == 0
+            found.append(by_sample(workspace.records()))
+    assert found[0] == found[1]
+
+
+def test_samples_of_a_step_are_asked_apart(workspace: Workspace) -> None:
+    with Running(StepAgent()) as running:
+        prepare(workspace, running.url, steps={"samples": 3, "physics": "off"})
+        assert workspace.run(*FEW).code == 0
+        seeds = {one.seed for one in running.server.seen}
+    assert seeds == {0, 1, 2}
+    for record in workspace.records():
+        assert len(record["turns"]) == 3 * len(record["outcomes"])
+
+
+@pytest.mark.parametrize(
+    ("kills", "seeds", "physics"),
+    [(2, 2, "off"), pytest.param(12, 16, "settle", marks=pytest.mark.slow)],
+)
+def test_a_killed_run_goes_on_in_the_middle_of_episodes(
+    workspace: Workspace, kills: int, seeds: int, physics: str
+) -> None:
+    """No answered turn is asked again, cache or not, and records are those of a quiet run."""
+    draw = random.Random(kills)
+    with Running(StepAgent(Faults(latency_s=0.03))) as running:
+        server = running.server
+        prepare(workspace, running.url, seeds=list(range(seeds)), steps={"physics": physics})
+        middle = 0
+        for _ in range(kills):
+            target = len(server.seen) + draw.randrange(3, 5 * seeds)
+            with workspace.start("--no-cache") as process:
+                while process.poll() is None and len(server.seen) < target:
+                    time.sleep(0.002)
+                time.sleep(draw.random() / 20)
+                process.kill()
+                process.communicate()
+            assert process.returncode == -signal.SIGKILL
+            while server.at_once:
+                time.sleep(0.02)
+            kept = turns_on_disk(workspace)
+            finished = {r["sample"] for r in workspace.records()} if kept else set()
+            middle += len({turn["sample"] for turn in kept} - finished)
+            answered = {turn["reply"]["reasoning"] for turn in kept}
+            asked = len(server.seen)
+            assert len({one.sample for one in server.seen} - answered) <= AT_ONCE * kills
+            running_total = (asked, answered)
+        assert middle > 0, "no kill fell into an episode"
+        done = workspace.run("--no-cache")
+        assert (done.code, done.err) == (0, "")
+        asked, answered = running_total
+        assert answered.isdisjoint(one.sample for one in server.seen[asked:])
+        killed = by_sample(workspace.records())
+
+        workspace.out = workspace.root / "quiet"
+        assert workspace.run("--no-cache").code == 0
+        quiet = by_sample(workspace.records())
+    assert killed == quiet
+
+
+def test_a_model_that_refuses_leaves_episodes_without_steps(workspace: Workspace) -> None:
+    with Running(StepAgent(Faults(mode="policy"))) as running:
+        prepare(workspace, running.url)
+        workspace.run(*FEW)
+    for record in workspace.records():
+        assert (record["outcome"], record["ending"]) == ("refusal", "unanswered")
+        assert record["turns"] == []
