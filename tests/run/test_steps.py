@@ -48,9 +48,10 @@ def pictures(seen: Seen) -> list[str]:
     return [part[1] for part in seen.parts if not isinstance(part, str)]
 
 
-def turns_on_disk(workspace: Workspace) -> list[dict[str, Any]]:
+def on_disk(workspace: Workspace, name: str) -> list[dict[str, Any]]:
+    """The whole lines of a file of the run, if it is there yet."""
     with contextlib.suppress(FileNotFoundError):
-        lines = (workspace.out / "turns.jsonl").read_bytes().split(b"\n")[:-1]
+        lines = (workspace.out / name).read_bytes().split(b"\n")[:-1]
         return [json.loads(line) for line in lines]
     return []
 
@@ -162,8 +163,8 @@ def test_a_killed_run_goes_on_in_the_middle_of_episodes(
             assert process.returncode == -signal.SIGKILL
             while server.at_once:
                 time.sleep(0.02)
-            kept = turns_on_disk(workspace)
-            finished = {r["sample"] for r in workspace.records()} if kept else set()
+            kept = on_disk(workspace, "turns.jsonl")
+            finished = {record["sample"] for record in on_disk(workspace, "records.jsonl")}
             middle += len({turn["sample"] for turn in kept} - finished)
             answered = {turn["reply"]["reasoning"] for turn in kept}
             asked = len(server.seen)
