@@ -1,8 +1,8 @@
-"""The block library: types, colours, sizes, symmetries, mass, and the one Euler conversion.
+"""The block library: types, colors, sizes, symmetries, mass, and the one Euler conversion.
 
-Eight types in five colours (paper, appendix A.1), base unit 5 cm. Body frames are fixed here and
-used by the geometry in `phyblock.sim`: boxes and the cylinder are centred, the semi-cylinder and
-the triangle have their origin at the centre of the flat (hypotenuse) face, the arch at the centre
+Eight types in five colors (paper, appendix A.1), base unit 5 cm. Body frames are fixed here and
+used by the geometry in `phyblock.sim`: boxes and the cylinder are centered, the semi-cylinder and
+the triangle have their origin at the center of the flat (hypotenuse) face, the arch at the center
 of its bounding box.
 """
 
@@ -62,7 +62,7 @@ KIT_PALETTE: tuple[tuple[BlockType, Color], ...] = (
     ("semi_cylinder", "yellow"),
     ("triangle", "orange"),
 )
-"""The twelve type-colour pairs of the official kit."""
+"""The twelve type-color pairs of the official kit."""
 
 
 @dataclass(frozen=True)

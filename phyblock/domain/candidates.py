@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass
 
-from phyblock.domain.blocks import BlockType, Color, Euler, orientation_class
-from phyblock.domain.scene import Kind, Look, Scene
+from phyblock.domain.blocks import BlockType, Color, Euler
+from phyblock.domain.scene import Look, Oriented, Scene
 
 __all__ = ["MAX_CANDIDATES", "Candidate", "CandidateSet"]
 
@@ -14,22 +13,12 @@ MAX_CANDIDATES = 16
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """One block of the dictionary: a type, a colour and an orientation [degrees]."""
+class Candidate(Oriented):
+    """One block of the dictionary: a type, a color and an orientation [degrees]."""
 
     type: BlockType
     color: Color
     euler_deg: Euler
-
-    @property
-    def kind(self) -> Kind:
-        """Type and colour."""
-        return (self.type, self.color)
-
-    @functools.cached_property
-    def look(self) -> Look:
-        """Type, colour and orientation class."""
-        return (self.type, self.color, orientation_class(self.type, self.euler_deg))
 
 
 @dataclass(frozen=True)

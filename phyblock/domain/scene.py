@@ -8,16 +8,34 @@ from dataclasses import dataclass
 from phyblock.domain.aov import AOVGraph
 from phyblock.domain.blocks import BlockType, Color, Euler, orientation_class
 
-__all__ = ["Block", "Kind", "Look", "Scene"]
+__all__ = ["Block", "Kind", "Look", "Oriented", "Scene"]
 
 Kind = tuple[BlockType, Color]
-"""What setting B compares: type and colour."""
+"""What setting B compares: type and color."""
 Look = tuple[BlockType, Color, tuple[float, ...]]
-"""What setting A compares: type, colour, and orientation up to the block's own symmetry."""
+"""What setting A compares: type, color, and orientation up to the block's own symmetry."""
+
+
+class Oriented:
+    """What settings B and A see of anything that has a type, a color and an orientation."""
+
+    type: BlockType
+    color: Color
+    euler_deg: Euler
+
+    @property
+    def kind(self) -> Kind:
+        """Type and color."""
+        return (self.type, self.color)
+
+    @functools.cached_property
+    def look(self) -> Look:
+        """Type, color and orientation class."""
+        return (self.type, self.color, orientation_class(self.type, self.euler_deg))
 
 
 @dataclass(frozen=True)
-class Block:
+class Block(Oriented):
     """One block of a goal structure, at its goal pose.
 
     `order` is its 1-based number in the scene; `position_m` the origin of its body frame in the
@@ -32,16 +50,6 @@ class Block:
     euler_deg: Euler
     depend: tuple[int, ...]
     layer: int
-
-    @property
-    def kind(self) -> Kind:
-        """Type and colour."""
-        return (self.type, self.color)
-
-    @functools.cached_property
-    def look(self) -> Look:
-        """Type, colour and orientation class."""
-        return (self.type, self.color, orientation_class(self.type, self.euler_deg))
 
 
 @dataclass(frozen=True)
