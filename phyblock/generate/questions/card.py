@@ -56,7 +56,7 @@ What was unfair became a rule for all:
   rotation is asked about {studied:.0%}; where blocks or layers are counted, every block of the
   scene shows {counted:.0%};
 * where shapes or types are counted, every block shows {shaped:.0%} of itself and covers
-  {area:.2%} of the picture: a short rectangular prism far away was taken for a cube;
+  {area:.1%} of the picture: a short rectangular prism far away was taken for a cube;
 * a name has to fit one block even for a reader who takes cubes for short rectangular prisms, or
   half cylinders for cylinders: "the blue cube" beside blue short prisms is refused;
 * the shape of a half cylinder that stands upright and carries something is not asked for: seen
@@ -66,8 +66,10 @@ What was unfair became a rule for all:
 * left, right, in front and behind are offered in pairs ("behind and to the left"), because the
   view is oblique and a block is rarely only to the left; each part has to be clear by 3 cm;
 * "nearest" needs at most three quarters of the distance of the next block;
-* distances along the ground are asked for only along the edges of blocks, where they can be
-  counted in block lengths, and all lengths are multiples of 2.5 cm; values are at least 20 % apart;
+* distances along the ground are asked for only within one structure and along the edges of
+  blocks, where they can be counted in block lengths; between structures that stand apart depth
+  could only be guessed;
+* all lengths are multiples of 2.5 cm; values are at least 20 % apart;
 * the scale that the text gives is a block that can be seen in the picture;
 * the height of a block is asked for as its own ("from its lowest to its highest point"), because
   "tall" was taken for how high it stands;

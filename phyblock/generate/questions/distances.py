@@ -108,6 +108,8 @@ class DistanceMaker(StaticMaker):
         rule = question.wording.split("-")[1] if question.wording else ""
         if rule not in _RULES:
             raise UnfairError(f"the wording {question.wording!r} asks for no length")
+        if rule == "apart" and not _are_joined(named[0], named[-1], blocks):
+            raise UnfairError("the blocks are parts of structures that stand apart")
         right_cm = _grid_cm(_RULES[rule](named[0], named[-1]))
         values = sorted(float(option.removesuffix(" cm")) for option in question.options)
         if any(high < 1.2 * low for low, high in itertools.pairwise(values)):
@@ -128,6 +130,8 @@ def _of_blocks(
             slots = {"block": named[one.order], "scale": scale}
             if rule in ("apart", "rise"):
                 slots["other"] = named[other.order]
+            if rule == "apart" and not _are_joined(one, other, scene.blocks):
+                continue
             try:
                 right = _grid_cm(_RULES[rule](one, other))
             except UnfairError:
@@ -140,6 +144,18 @@ def _of_blocks(
                 yield draft(
                     scene, f"ap-{rule}", rng, slots, options, options[0], rule, length_cm=right
                 )
+
+
+def _are_joined(one: Block, other: Block, blocks: Sequence[Block]) -> bool:
+    """Whether the two belong to one structure, by what rests on what above the ground."""
+    reached, waiting = {one.order}, [one.order]
+    while waiting:
+        order = waiting.pop()
+        touching = {b.order for b in blocks if order in b.depend}
+        touching.update(*(b.depend for b in blocks if b.order == order))
+        waiting += sorted(touching - reached)
+        reached |= touching
+    return other.order in reached
 
 
 def _grid_cm(length_m: float) -> float:

@@ -44,9 +44,9 @@ NAMED = 0.4
 """The least visible share of a block that is named in a question or an option."""
 STUDIED = 0.55
 """The least visible share of a block whose shape, size or orientation is asked about."""
-SHAPED = 0.35
+SHAPED = 0.28
 """The least visible share of every block where shapes are counted,"""
-SHAPED_AREA = 0.0055
+SHAPED_AREA = 0.004
 """and the least share of the picture that it covers."""
 _SIZE_PX = 256
 _MIDDLE_GAP = 0.1
