@@ -12,6 +12,8 @@ _VERBS = {
     "generate": "Make questions about a data set's scenes from a seed.",
     "verify": "Derive every answer again and compare.",
     "show": "Show a question, and draw its pictures to a file.",
+    "audit": "Look for what could be answered without looking; write a sheet for a human check.",
+    "write": "Ask a model for further wordings of the questions.",
 }
 
 

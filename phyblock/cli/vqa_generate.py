@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import cast
 
 import click
 from rich.progress import Progress, TaskID
@@ -12,21 +11,13 @@ from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.scenes_data import read_data_set
 from phyblock.cli.scenes_work import jobs_option, ray_option
 from phyblock.cli.vqa_data import DEFAULT_SCENES
+from phyblock.cli.vqa_subtasks import subtasks_option
 from phyblock.domain import SUBTASKS, Subtask
 from phyblock.generate.questions.production import PER_SUBTASK, make_questions
 from phyblock.generate.questions.writing import check_place, write_questions
 from phyblock.generate.workers import open_workers
 
 __all__ = ["command"]
-
-
-def _subtasks(ctx: click.Context, param: click.Parameter, value: str) -> tuple[Subtask, ...]:
-    words = SUBTASKS if value == "all" else tuple(value.upper().split(","))
-    unknown = [word for word in words if word not in SUBTASKS]
-    if unknown or len(set(words)) < len(words):
-        known = ",".join(SUBTASKS)
-        raise click.BadParameter(f"{value!r}: give all, or some of {known}", ctx, param)
-    return cast(tuple[Subtask, ...], words)
 
 
 @click.command("generate")
@@ -37,14 +28,7 @@ def _subtasks(ctx: click.Context, param: click.Parameter, value: str) -> tuple[S
     metavar="PATH",
     help="Scenes that are asked about: a folder or a bundled set.",
 )
-@click.option(
-    "--subtasks",
-    default="all",
-    show_default=True,
-    callback=_subtasks,
-    metavar="NAMES",
-    help="Subtasks like SH,CO,VP.",
-)
+@subtasks_option
 @click.option(
     "--per-subtask",
     type=click.IntRange(1),

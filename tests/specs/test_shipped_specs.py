@@ -44,7 +44,8 @@ def test_a_shipped_file_is_valid_by_the_schema_it_names(path: Path) -> None:
 
 @pytest.mark.parametrize("path", SUITES, ids=lambda path: path.stem)
 def test_a_shipped_suite_loads_and_its_models_are_known(path: Path, tmp_path: Path) -> None:
-    (tmp_path / "phyblock-400").mkdir()
+    for name in ("phyblock-400", "phyblock-vqa"):
+        (tmp_path / name).mkdir()
     overrides = [f"dataset.path={tmp_path}"] if path.stem in OFFICIAL_ONLY else []
     loaded = load_suite(path, overrides, data_dir=tmp_path)
     assert loaded.suite.name == path.stem
@@ -93,7 +94,8 @@ def test_the_list_is_that_of_the_papers_tables(official_dir: Path) -> None:
 
 
 def test_full_holds_the_models_of_table_1(tmp_path: Path) -> None:
-    (tmp_path / "phyblock-400").mkdir()
+    for name in ("phyblock-400", "phyblock-vqa"):
+        (tmp_path / name).mkdir()
     models = load_models(ROOT / "models.yaml")
     suite = load_suite(ROOT / "benchmarks" / "full.yaml", data_dir=tmp_path).suite
     rows = [models[name].published for name in suite.models if name in models]

@@ -1,0 +1,215 @@
+"""`phyblock vqa audit`: a question set held against shortcuts, and a sheet for a human check."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from phyblock.cli.console import counted, make_console, plain_table, shown_path
+from phyblock.cli.scenes_work import make_folder, tracked
+from phyblock.cli.vqa_data import DEFAULT_QUESTIONS, DEFAULT_SCENES, read_question_set
+from phyblock.domain import LETTERS, SUBTASK_NAMES, Question
+from phyblock.errors import Problem, StoreError
+from phyblock.generate.questions.audit import (
+    BALANCE,
+    GUESSABLE,
+    SubtaskAudit,
+    audit_questions,
+    duplicates_of,
+)
+from phyblock.generate.questions.sheet import sheet_html
+from phyblock.sim import PictureStyle
+from phyblock.sim.question_pictures import question_png
+
+__all__ = ["command"]
+
+_PER_SUBTASK = 5
+
+
+@click.command("audit")
+@click.argument("questions", metavar="[PATH]", default=DEFAULT_QUESTIONS)
+@click.option(
+    "--data",
+    default=DEFAULT_SCENES,
+    show_default=True,
+    metavar="PATH",
+    help="The scenes that the questions are about.",
+)
+@click.option(
+    "--sheet",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Write an HTML page for a human check: pictures, questions, answers behind a fold.",
+)
+@click.option(
+    "--per-subtask",
+    type=click.IntRange(1),
+    default=_PER_SUBTASK,
+    show_default=True,
+    metavar="N",
+    help="Questions of each subtask on the sheet, spread over the set.",
+)
+@click.option(
+    "--size",
+    type=click.IntRange(128, 2048),
+    default=512,
+    show_default=True,
+    metavar="PX",
+    help="Side of each picture on the sheet.",
+)
+@click.option(
+    "--no-text-probe", is_flag=True, help="Leave out the classifier, which needs scikit-learn."
+)
+def command(
+    questions: str,
+    data: str,
+    sheet: Path | None,
+    per_subtask: int,
+    size: int,
+    no_text_probe: bool,
+) -> None:
+    """Audit the questions of PATH: what could be answered without looking, and what cannot be seen.
+
+    PATH is a folder with questions.jsonl or a bundled set, by default the built-in phyblock-vqa.
+    By subtask: how often each letter is right; what the most frequent answer and a classifier of
+    the texts alone reach on questions they were not trained on; options that read alike and
+    repeated questions; the least visible block that is named; how questions cluster by scene.
+    The exit code is 0 whatever is found.
+    """
+    if sheet is not None:
+        make_folder(sheet.parent)
+    asked = [task.question for task in read_question_set(questions, data).tasks]
+    console = make_console()
+    audits = list(
+        tracked(
+            audit_questions(asked, with_text_probe=not no_text_probe),
+            len({question.subtask for question in asked}),
+            "Auditing",
+        )
+    )
+    _print_guessing(console, audits)
+    _print_contents(console, audits)
+    _print_findings(console, audits, asked)
+    if sheet is not None:
+        chosen = _spread(asked, per_subtask)
+        _write_sheet(sheet, f"Questions of {questions}", chosen, PictureStyle(size))
+        console.print(f"{counted(len(chosen), 'question')} in {shown_path(sheet)}", markup=False)
+
+
+def _print_guessing(console: Console, audits: Sequence[SubtaskAudit]) -> None:
+    rows = [
+        (
+            one.subtask,
+            SUBTASK_NAMES[one.subtask],
+            str(one.n),
+            *(_letters(one)),
+            *(_percent(value) for value in (one.chance, one.majority, one.text_only)),
+        )
+        for one in audits
+    ]
+    headings = ("", "subtask", "n", *LETTERS, "chance", "majority", "text only")
+    console.print(plain_table(headings, rows, numbers=8))
+    console.print(
+        "Letters: share of questions where it is right [%]; of ordering, where its picture comes "
+        "first. Guesses: accuracy [%] on questions about other base scenes than those learned "
+        "from.",
+        style="dim",
+    )
+    console.print()
+
+
+def _letters(one: SubtaskAudit) -> list[str]:
+    counts = {
+        letter: sum(n for answer, n in one.letters.items() if answer[0] == letter)
+        for letter in LETTERS
+    }
+    return [_percent(counts[letter] / one.n) for letter in LETTERS]
+
+
+def _print_contents(console: Console, audits: Sequence[SubtaskAudit]) -> None:
+    rows = [
+        (
+            one.subtask,
+            str(one.values),
+            str(len(one.ambiguous)),
+            str(len(one.duplicates)),
+            str(one.named),
+            "" if one.least_seen is None else _percent(one.least_seen[0]),
+            str(one.scenes),
+            str(one.bases),
+            str(one.most_of_a_scene),
+        )
+        for one in audits
+    ]
+    headings = (
+        "",
+        "answers",
+        "alike",
+        "repeats",
+        "named",
+        "least seen",
+        "scenes",
+        "base scenes",
+        "most of one",
+    )
+    console.print(plain_table(headings, rows, numbers=8))
+    console.print(
+        "answers: different right answers; alike: options that read alike; named: blocks that "
+        "words name, and the least that one of them shows of itself [%]; most of one: questions "
+        "about the scene with most.",
+        style="dim",
+    )
+    console.print()
+
+
+def _print_findings(
+    console: Console, audits: Sequence[SubtaskAudit], asked: Sequence[Question]
+) -> None:
+    low, high = (round(100 * bound) for bound in BALANCE)
+    findings = []
+    for one in audits:
+        if not one.is_balanced:
+            findings.append(f"{one.subtask}: a letter is right outside of {low} to {high} %")
+        for name, reached in (("majority", one.majority), ("text only", one.text_only)):
+            if reached is not None and reached > GUESSABLE:
+                findings.append(f"{one.subtask}: {name} reaches {_percent(reached)} %")
+        if one.hidden and one.least_seen is not None:
+            findings.append(
+                f"{one.subtask}: {counted(one.hidden, 'named block')} hardly to be seen, the least "
+                f"in {one.least_seen[1]}"
+            )
+        findings += [f"{name}: options read alike" for name in one.ambiguous]
+    findings += [f"{name}: repeats {first}" for name, first in duplicates_of(asked).items()]
+    for finding in findings:
+        console.print(finding, style="red", markup=False, soft_wrap=True)
+    verdict = counted(len(findings), "finding") if findings else "nothing to find fault with"
+    console.print(f"{counted(len(asked), 'question')}, {verdict}", markup=False)
+
+
+def _spread(asked: Sequence[Question], per_subtask: int) -> list[Question]:
+    """So many questions of each subtask, evenly over those that there are."""
+    by_subtask: dict[str, list[Question]] = {}
+    for question in asked:
+        by_subtask.setdefault(question.subtask, []).append(question)
+    return [
+        group[place * len(group) // count]
+        for group in by_subtask.values()
+        for count in (min(per_subtask, len(group)),)
+        for place in range(count)
+    ]
+
+
+def _write_sheet(path: Path, title: str, chosen: Sequence[Question], style: PictureStyle) -> None:
+    pieces = sheet_html(title, chosen, lambda recipe: question_png(recipe, style))
+    try:
+        with path.open("w", encoding="utf-8") as file:
+            file.writelines(pieces)
+    except OSError as error:
+        raise StoreError(Problem(str(path), f"cannot be written: {error.strerror}")) from error
+
+
+def _percent(share: float | None) -> str:
+    return "" if share is None else f"{100 * share:.1f}"
