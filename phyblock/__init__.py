@@ -1,6 +1,7 @@
 """phyblock: declarative runner for PhyBlock, 3D block assembly for vision-language models.
 
-`load_run(path)` opens a run folder for notebooks; its `.records` is a DataFrame, a row a sample.
+`load_run(path)` opens a run folder for notebooks: `.records` is a DataFrame, a row a sample,
+`.tables` maps names to DataFrames, `.summary()` and `.compare(other)` say what came out.
 """
 
 from __future__ import annotations
@@ -8,7 +9,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from phyblock.report import Run, load_run
+    from phyblock.report.notebook import LoadedRun as Run
+    from phyblock.report.notebook import load_run
 
 __all__ = ["Run", "load_run"]
 
@@ -16,7 +18,7 @@ __all__ = ["Run", "load_run"]
 def __getattr__(name: str) -> object:
     # pandas takes most of a second to import: only those who ask for it pay.
     if name in __all__:
-        from phyblock import report
+        from phyblock.report import notebook
 
-        return getattr(report, name)
+        return notebook.LoadedRun if name == "Run" else notebook.load_run
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -18,6 +18,8 @@ _VERBS = {
     "tables": "Print a run's tables; beside the paper's with --paper.",
     "figures": "Draw a run's figures, as SVG and PNG.",
     "compare": "Compare models on the same samples: difference, interval, verdict.",
+    "export": "Write a run for Inspect AI, Hugging Face datasets, or as CSV or Parquet.",
+    "episode": "Show a step-planning episode, as text or as a GIF.",
     "models": "List models with kinds, prices and keys; check one.",
     "validate": "Check suites, models files and data sets.",
     "scenes": "Make, check, show and draw scenes.",

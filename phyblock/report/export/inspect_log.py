@@ -1,0 +1,193 @@
+"""A run as Inspect AI logs, one a track and model, which `inspect view` opens."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from phyblock.errors import Problem, SpecError
+from phyblock.report.export.rows import newest_records, prompt_text
+from phyblock.report.load import Run
+from phyblock.run.prompts import read_prompts
+from phyblock.scoring import Counts, micro
+
+if TYPE_CHECKING:
+    from inspect_ai.log import EvalLog, EvalMetric, EvalSample
+    from inspect_ai.scorer import Score
+
+__all__ = ["inspect_log", "to_inspect"]
+
+_UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
+
+
+def to_inspect(run: Run, folder: Path) -> tuple[Path, ...]:
+    """Write TRACK_MODEL.eval for each track and model that has a record.
+
+    Raises SpecError where the `inspect_ai` package is not installed.
+    """
+    try:
+        from inspect_ai.log import write_eval_log
+    except ImportError as error:
+        hint = "pip install 'phyblock[inspect]'"
+        raise SpecError(
+            Problem("--to inspect", "needs the package inspect_ai", hint=hint)
+        ) from error
+    prompts = read_prompts(run.path)
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for record in newest_records(run):
+        groups.setdefault((record["track"], record["model"]), []).append(record)
+    files = []
+    for (track, model), records in groups.items():
+        files.append(folder / f"{track}_{_UNSAFE.sub('-', model)}.eval")
+        write_eval_log(inspect_log(run, records, prompts), str(files[-1]))
+    return tuple(files)
+
+
+def inspect_log(
+    run: Run, records: Sequence[Mapping[str, Any]], prompts: Mapping[str, Any]
+) -> EvalLog:
+    """The log of one track and model: a sample a record, its seed the epoch.
+
+    Scores are named SETTING-MATCHER-CRITERION and hold tp, fp, fn and f1; the metrics of the
+    log are micro averages over all samples that tables count. A question's score is `answer`: C or
+    I, with accuracy.
+    """
+    from inspect_ai.log import EvalConfig, EvalDataset, EvalLog, EvalResults, EvalSpec
+
+    track, model = records[0]["track"], records[0]["model"]
+    seeds = run.design.suite.seeds
+    name = f"phyblock/{track}"
+    digest = hashlib.sha256(f"{run.manifest['identity']} {track} {model}".encode()).hexdigest()[:22]
+    counted = [r for r in records if r["outcome"] not in run.design.outcomes_left_out]
+    samples = [_sample(record, prompts, seeds) for record in records]
+    keys = sorted({str(sample.id) for sample in samples})
+    return EvalLog(
+        status="success",
+        eval=EvalSpec(
+            eval_id=digest,
+            run_id=digest,
+            task_id=digest,
+            created=min(record["time"] for record in records),
+            task=name,
+            dataset=EvalDataset(
+                name=str(run.manifest.get("dataset", {}).get("name") or run.design.suite.name),
+                samples=len(keys),
+                sample_ids=list(keys),
+            ),
+            model=model,
+            config=EvalConfig(epochs=len(seeds)),
+            metadata={"suite": run.design.suite.name, "run": run.manifest["identity"]},
+        ),
+        results=EvalResults(
+            total_samples=len(samples),
+            completed_samples=sum(record["reply"] is not None for record in records),
+            scores=_results(counted),
+        ),
+        samples=samples,
+    )
+
+
+def _sample(
+    record: Mapping[str, Any], prompts: Mapping[str, Any], seeds: Sequence[int]
+) -> EvalSample:
+    from inspect_ai.log import EvalError, EvalSample
+    from inspect_ai.model import ChatMessageAssistant, ChatMessageUser, ModelOutput
+
+    text = prompt_text(record, prompts) or ""
+    reply, error = record["reply"], record["error"]
+    question = record.get("question") or {}
+    output = ModelOutput(model=record["model"])
+    messages: list[Any] = [ChatMessageUser(content=text)]
+    if reply is not None:
+        output = ModelOutput.from_content(record["model"], reply["text"])
+        output.usage = _usage(reply)
+        messages.append(ChatMessageAssistant(content=reply["text"], model=record["model"]))
+    kept = ("sample", "scene", "levels", "parents", "n_blocks", "outcome", "parse", "question")
+    about = {name: record[name] for name in kept if name in record}
+    about |= {name: record[name] for name in ("turns", "ending", "progress") if name in record}
+    said = None if error is None else str(error.get("message"))
+    return EvalSample(
+        id=question.get("id") or record["scene"],
+        epoch=list(seeds).index(record["seed"]) + 1 if record["seed"] in seeds else 1,
+        input=text,
+        target=(record.get("answer") or {}).get("right") or "",
+        messages=messages,
+        output=output,
+        scores=_scores(record),
+        metadata=about,
+        total_time=None if reply is None else reply.get("latency_s"),
+        error=None if said is None else EvalError(message=said, traceback="", traceback_ansi=""),
+    )
+
+
+def _usage(reply: Mapping[str, Any]) -> Any:
+    from inspect_ai.model import ModelUsage
+
+    usage = reply.get("usage") or {}
+    sent, said = usage.get("prompt_tokens") or 0, usage.get("completion_tokens") or 0
+    return ModelUsage(
+        input_tokens=sent,
+        output_tokens=said,
+        total_tokens=sent + said,
+        reasoning_tokens=usage.get("reasoning_tokens"),
+        total_cost=reply.get("cost_usd"),
+    )
+
+
+def _name(score: Mapping[str, Any]) -> str:
+    parts = (score["setting"], score.get("matcher") or "", score["criterion"])
+    return "-".join(part for part in parts if part)
+
+
+def _scores(record: Mapping[str, Any]) -> dict[str, Score]:
+    from inspect_ai.scorer import CORRECT, INCORRECT, Score
+
+    plan = (record.get("parse") or {}).get("plan")
+    said = None if plan is None else " ".join(map(str, plan))
+    found = {}
+    for score in record["scores"]:
+        counts = Counts(score["tp"], score["fp"], score["fn"])
+        value = {"tp": counts.tp, "fp": counts.fp, "fn": counts.fn, "f1": counts.f1 or 0.0}
+        found[_name(score)] = Score(value=value, answer=said)
+    if answer := record.get("answer"):
+        value_of = CORRECT if answer["correct"] else INCORRECT
+        found["answer"] = Score(value=value_of, answer=answer["given"])
+    return found
+
+
+def _results(records: Sequence[Mapping[str, Any]]) -> list[Any]:
+    from inspect_ai.log import EvalScore
+
+    counts: dict[str, list[Counts]] = {}
+    for record in records:
+        for score in record["scores"]:
+            one = Counts(score["tp"], score["fp"], score["fn"])
+            counts.setdefault(_name(score), []).append(one)
+    found = []
+    for name, all_counts in counts.items():
+        total = micro(all_counts)
+        metrics = {"f1": total.f1, "precision": total.precision, "recall": total.recall}
+        found.append(
+            EvalScore(
+                name=name,
+                scorer=name,
+                scored_samples=len(all_counts),
+                metrics=_metrics({k: v for k, v in metrics.items() if v is not None}),
+            )
+        )
+    answers = [record["answer"]["correct"] for record in records if record.get("answer")]
+    if answers:
+        accuracy = _metrics({"accuracy": sum(answers) / len(answers)})
+        found.append(
+            EvalScore(name="answer", scorer="answer", scored_samples=len(answers), metrics=accuracy)
+        )
+    return found
+
+
+def _metrics(values: Mapping[str, float]) -> dict[str, EvalMetric]:
+    from inspect_ai.log import EvalMetric
+
+    return {name: EvalMetric(name=name, value=value) for name, value in values.items()}

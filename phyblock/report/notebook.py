@@ -1,0 +1,137 @@
+"""A run in a notebook: frames, tables, a summary, a comparison, and how it is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from html import escape
+from pathlib import Path
+
+import pandas as pd
+
+from phyblock.report.compare import Comparison, compare_models, compare_runs
+from phyblock.report.design import OVERALL
+from phyblock.report.load import Run
+from phyblock.report.load import load_run as load_frames
+from phyblock.report.text_table import NO_VALUE, TextTable, between, number
+from phyblock.report.write import make_tables, table_names
+
+__all__ = ["LoadedRun", "Tables", "load_run"]
+
+
+class Tables(Mapping[str, pd.DataFrame]):
+    """The tables of a run by name, each made when it is first asked for."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._names = table_names(run)
+
+    def __getitem__(self, name: str) -> pd.DataFrame:
+        if name not in self._names:
+            raise KeyError(f"{name}; there are: {', '.join(self._names)}")
+        return make_tables(self._run, [name])[0][name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def view(self, name: str) -> TextTable | None:
+        """The table as people read it, for `to_markdown` and `to_latex`; None where it is not."""
+        self[name]
+        return make_tables(self._run, [name])[1].get(name)
+
+    def __repr__(self) -> str:
+        return f"<tables: {', '.join(self._names)}>"
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedRun(Run):
+    """A run folder in a notebook.
+
+    `records` has one row a sample and `scores` one row a score (see `Run`); `tables` maps the names
+    of tables to data frames.
+    """
+
+    @property
+    def tables(self) -> Tables:
+        """Data frames by table name, as the files in `tables/` hold them."""
+        return Tables(self)
+
+    def summary(self) -> pd.DataFrame:
+        """One row a model: samples, answered, and the headline of each track with its interval [%].
+
+        `f1`, `f1_lo`, `f1_hi` are of full planning overall (headline setting and matcher),
+        `vqa` the macro accuracy, `steps_f1` that of step planning; only of tracks that were run.
+        """
+        counts = self.tables["coverage"].groupby("model", sort=False)
+        table = counts[["expected", "ok"]].sum()
+        table = table.reindex(list(self.design.model_names))
+        if self.design.tracks:
+            cells = self.tables["intervals"]
+            overall = cells[cells["level"] == OVERALL].set_index("model")
+            for name, column in {"f1": "f1", "f1_lo": "lo", "f1_hi": "hi"}.items():
+                table[name] = overall[column]
+        for track, name, source, column in (
+            ("vqa", "vqa", "table2", OVERALL),
+            ("step_planning", "steps_f1", "table3", "placed_f1"),
+        ):
+            if track in self.design.suite.tracks:
+                rows = self.tables[source]
+                table[name] = rows[rows["source"] == "run"].set_index("model")[column]
+        return table
+
+    def compare(self, other: Run | None = None, models: Sequence[str] = ()) -> Comparison:
+        """The models of this run with one another, or with those of `other`; see `Comparison`.
+
+        Raises SpecError for names that are not there or runs that cannot be compared.
+        """
+        if other is None:
+            return compare_models(self, models)
+        return compare_runs(self, other, models)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the headline of every model."""
+        name = self.design.suite.name or self.path.name
+        summary = self.summary()
+        heads = ["Model", *(_HEADS[column] for column in summary.columns if column in _HEADS)]
+        lines = []
+        for model, row in zip(summary.index, summary.to_dict("records"), strict=True):
+            cells = []
+            for column in summary.columns:
+                if column in _HEADS:
+                    text = f"{row[column]:,}" if column in _WHOLE else number(row[column])
+                    if column == "f1" and text != NO_VALUE:
+                        text += f" {between(row['f1_lo'], row['f1_hi'])}"
+                    cells.append(f'<td style="text-align:right">{escape(text)}</td>')
+            lines.append(
+                f'<tr><th style="text-align:left">{escape(str(model))}</th>{"".join(cells)}</tr>'
+            )
+        head = "".join(f"<th>{escape(text)}</th>" for text in heads)
+        return (
+            f"<p><b>{escape(name)}</b>, {len(self.records):,} samples in "
+            f"<code>{escape(str(self.path))}</code></p>"
+            f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+        )
+
+
+_WHOLE = ("expected", "ok")
+_HEADS = {
+    "expected": "Samples",
+    "ok": "Answered",
+    "f1": "F1 (%), 95 % CI",
+    "vqa": "VQA (%)",
+    "steps_f1": "Step F1 (%)",
+}
+
+
+def load_run(path: str | Path, *, texts: bool = True) -> LoadedRun:
+    """Read a run folder for a notebook; without `texts` the replies' texts are left on disk.
+
+    Raises StoreError for a folder that is no run or a broken one.
+    """
+    run = load_frames(path, texts=texts)
+    return LoadedRun(
+        **{field.name: getattr(run, field.name) for field in fields(run) if field.init}
+    )

@@ -1,0 +1,60 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import phyblock
+from phyblock.errors import SpecError
+from phyblock.report import to_markdown
+from tests.report.factory import LEVELS, manifest, record, score, write_run
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> phyblock.Run:
+    records = [
+        record(model, scene, seed, [score(tp, 1, 4 - tp), score(tp, 0, 1, setting="B")])
+        for model, tp in (("alpha", 3), ("beta", 1))
+        for scene in LEVELS
+        for seed in (0, 1)
+    ]
+    facts = manifest(models=["alpha", "beta", "<b>gamma</b>"])
+    return phyblock.load_run(write_run(tmp_path / "run", records, facts))
+
+
+def test_tables_are_frames_by_name(run: phyblock.Run) -> None:
+    assert {"assembly", "table1", "intervals", "coverage"} <= set(run.tables)
+    table = run.tables["table1"].set_index("model")
+    assert table.loc["alpha", "overall_f1"] == pytest.approx(75)
+    assert len(run.tables) == len(list(run.tables))
+    view = run.tables.view("table1")
+    assert view is not None
+    assert "| alpha" in to_markdown(view)
+    assert run.tables.view("assembly") is None
+    with pytest.raises(KeyError, match=r"table9; there are: .*table1"):
+        run.tables["table9"]
+
+
+def test_the_summary_has_a_row_a_model_with_its_interval(run: phyblock.Run) -> None:
+    summary = run.summary()
+    assert summary.index.tolist() == ["alpha", "beta", "<b>gamma</b>"]
+    assert summary.loc["alpha", ["expected", "ok"]].tolist() == [10, 10]
+    row = summary.loc["beta"]
+    assert row["f1_lo"] <= row["f1"] <= row["f1_hi"]
+    assert summary.loc[["<b>gamma</b>"], "f1"].isna().all()
+
+
+def test_models_and_runs_are_compared(run: phyblock.Run) -> None:
+    assert run.compare().table["verdict"].tolist()[0] == "alpha is better"
+    same = run.compare(run, ["alpha", "alpha"])
+    assert set(same.table["difference"].dropna()) == {0}
+    with pytest.raises(SpecError, match="no such model"):
+        run.compare(models=["delta", "alpha"])
+
+
+def test_a_notebook_shows_escaped_names_and_aligned_numbers(run: phyblock.Run) -> None:
+    html = run._repr_html_()
+    assert "<b>gamma</b>" not in html
+    assert "&lt;b&gt;gamma&lt;/b&gt;" in html
+    assert "75.0 [" in html
+    assert html.count("<tr>") == 4
