@@ -73,7 +73,7 @@ class AffordanceMaker:
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    scenes_tried = 190
+    scenes_tried = 160
     drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -170,7 +170,7 @@ def _surely(
 def _verdict(
     scene: Scene, block: Block, place_m: tuple[float, float, float], settings: Sequence[Setting]
 ) -> bool | None:
-    return holds((*scene.blocks, _put(scene, block, place_m)), settings)
+    return holds((*scene.blocks, _put(scene, block, place_m)), block.order, settings)
 
 
 def _put(scene: Scene, block: Block, place_m: tuple[float, float, float]) -> Block:

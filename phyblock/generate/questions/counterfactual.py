@@ -51,7 +51,7 @@ class CounterfactualMaker:
     """Kinds: `cf-count` (texts), `cf-which` (marked blocks), `cf-picture` (settled scenes)."""
 
     subtask: Subtask = "CF"
-    scenes_tried = 240
+    scenes_tried = 170
     drafts_a_scene = 3
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:

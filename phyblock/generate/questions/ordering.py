@@ -34,7 +34,7 @@ class OrderingMaker:
     """Kinds: `or-build` and `or-apart`."""
 
     subtask: Subtask = "OR"
-    scenes_tried = 120
+    scenes_tried = 90
     drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:

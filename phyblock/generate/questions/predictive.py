@@ -61,7 +61,7 @@ class PredictiveMaker:
     """Kinds: `pd-next` (the next step) and `pd-push` (the settled scene after a push)."""
 
     subtask: Subtask = "PD"
-    scenes_tried = 220
+    scenes_tried = 200
     drafts_a_scene = 2
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -159,7 +159,9 @@ def _first_fit(
             continue
         if shown_pixels(picture, seen(picture))[block.order] < _LEAST_SHOWN:
             continue
-        if holds(picture.blocks) is stays and are_told_apart([*before, *chosen, picture]):
+        if holds(picture.blocks, block.order) is stays and are_told_apart(
+            [*before, *chosen, picture]
+        ):
             chosen.append(picture)
             used.add(block.order)
     return chosen
@@ -178,7 +180,7 @@ def _can_follow(scene: Scene, shown: QuestionPicture, option: QuestionPicture) -
         raise UnfairError(f"picture {option.label} does not add one block")
     goal = next((b for b in scene.blocks if b.order == added[0].order), None)
     is_ready = goal is not None and are_alike(goal, added[0]) and set(goal.depend) <= placed
-    stays = holds(option.blocks)
+    stays = holds(option.blocks, added[0].order)
     if stays is not is_ready:
         raise UnfairError(f"picture {option.label}: the graph and the simulation disagree")
     return is_ready

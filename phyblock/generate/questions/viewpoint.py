@@ -31,7 +31,7 @@ from phyblock.generate.questions.pictured import (
 from phyblock.generate.questions.seeing import GOAL_VIEW
 from phyblock.generate.questions.wording import slots_of
 from phyblock.generate.symmetry import Symmetry, fingerprint, transformed
-from phyblock.sim.outcomes import OUTCOME_SETTINGS, after
+from phyblock.sim.outcomes import OUTCOME_SETTINGS, holds
 from phyblock.sim.seeing import seen, shown_pixels
 from phyblock.sim.support import bounds_m, drop_height_m, find_overlaps
 
@@ -58,7 +58,7 @@ class ViewpointMaker:
     """Kinds: `vp-color` and `vp-form`, which match versions of one block; `vp-side`."""
 
     subtask: Subtask = "VP"
-    scenes_tried = 260
+    scenes_tried = 180
     drafts_a_scene = 2
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -144,12 +144,10 @@ def _let_down(
     placed = replace(version, position_m=lowered)
     if abs(bounds_m(placed)[0, 2] - bounds_m(model)[0, 2]) > 0.0005:
         return None
-    if (
-        find_overlaps((*rest, placed))
-        or after((*rest, placed), settings=OUTCOME_SETTINGS[:1]).moved
-    ):
+    if find_overlaps((*rest, placed)):
         return None
-    return placed
+    stays = holds((*rest, placed), placed.order, OUTCOME_SETTINGS[:1])
+    return placed if stays else None
 
 
 def _told_apart(
