@@ -78,9 +78,11 @@ def read_question_line(path: Path, number: int, line: str, scenes: Mapping[str, 
         category = category_of(cast(Subtask, subtask))
         reader.choice(raw.get("category", category), "category", (category,))
     evidence = reader.mapping(raw.get("evidence", {}), "evidence") if raw is not MISSING else {}
+    wording = raw.get("wording", "") if raw is not MISSING else ""
+    if not isinstance(wording, str):
+        reader.complain("wording", "is no text", wording, "the name of a template, or none")
     reader.raise_if_broken()
     assert scene is not None
-    wording = str(raw.get("wording", ""))
     return Question(
         name, cast(Subtask, subtask), scene, text, options, answer, pictures, wording, evidence
     )
@@ -140,7 +142,7 @@ class QuestionReader(RecipeReader):
         self, options: tuple[str, ...], pictures: tuple[QuestionPicture, ...]
     ) -> None:
         """Complain about option pictures that are missing, and about those nothing shows."""
-        labels = {picture.label for picture in pictures if picture.label in LETTERS}
+        labels = {picture.label for picture in pictures} & set(LETTERS)
         wanted = set(LETTERS) if any(map(is_picture_option, options)) else set()
         if options and labels != wanted:
             missing, spare = sorted(wanted - labels), sorted(labels - wanted)

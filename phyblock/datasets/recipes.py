@@ -63,7 +63,8 @@ class RecipeReader(SceneReader):
                 self.complain(f"{at}.{name}", "is not known", allowed=", ".join(_RECIPE_FIELDS))
         blocks = self._drawn(raw, scene, at)
         marks = tuple(
-            self._mark(one, f"{at}.marks[{i}]") for i, one in enumerate(raw.get("marks", []))
+            self._mark(one, f"{at}.marks[{i}]")
+            for i, one in enumerate(self._optional(raw, "marks", at))
         )
         framed = self._framed(raw.get("framed"), scene, f"{at}.framed")
         if not blocks:
@@ -71,8 +72,8 @@ class RecipeReader(SceneReader):
         return QuestionPicture(label, blocks, view, marks, framed)
 
     def _drawn(self, raw: Any, scene: Scene, at: str) -> tuple[Block, ...]:
-        without = raw.get("without", [])
-        known = {block.order for block in scene.blocks}
+        without = self._optional(raw, "without", at)
+        known = [block.order for block in scene.blocks]
         for order in without:
             if order not in known:
                 self.complain(f"{at}.without", "names no block", order, _orders(scene))
@@ -90,7 +91,8 @@ class RecipeReader(SceneReader):
     def _swapped(self, block: Block, raw: Any, at: str) -> Block:
         if raw is None:
             return block
-        raw = self.mapping(raw, f"{at}.{block.order}")
+        at = f"{at}.{block.order}"
+        raw = self.mapping(raw, at)
         kind = self.choice(self.get(raw, "type", f"{at}."), f"{at}.type", BLOCK_TYPES)
         color = self.choice(self.get(raw, "color", f"{at}."), f"{at}.color", COLORS)
         if kind is None or color is None:
@@ -118,6 +120,10 @@ class RecipeReader(SceneReader):
         """The whole scene for true; else the blocks given."""
         return scene.blocks if raw is True else self._added(raw, at)
 
+    def _optional(self, raw: Any, name: str, at: str) -> list[Any]:
+        """The entries of a list that may be left out."""
+        return self.items(raw[name], f"{at}.{name}") if name in raw else []
+
     def _mark(self, entry: Any, at: str) -> Mark:
         raw = self.mapping(entry, at)
         letter = self.choice(self.get(raw, "letter", f"{at}."), f"{at}.letter", MARK_LETTERS)
@@ -125,7 +131,10 @@ class RecipeReader(SceneReader):
         return Mark(letter or "", place or (0.0, 0.0, 0.0))
 
     def _view(self, raw: Any, at: str) -> tuple[float, float]:
-        whole = self.vector([*raw, 0.0] if isinstance(raw, list) else raw, at)
+        is_pair = isinstance(raw, list) and len(raw) == 2
+        whole = self.vector([*raw, 0.0], at) if is_pair else None
+        if not is_pair and raw is not MISSING:
+            self.complain(at, "is no view", raw, "azimuth and elevation [degrees]")
         if whole is None:
             return (0.0, 1.0)
         if not 1 <= whole[1] <= 90:
@@ -136,7 +145,8 @@ class RecipeReader(SceneReader):
         """An object whose names are orders of blocks of the scene."""
         known = {str(block.order): block.order for block in scene.blocks}
         found = {}
-        for name, value in (self.mapping(raw, at) or {}).items() if raw is not MISSING else ():
+        entries = self.mapping(raw, at)
+        for name, value in () if entries is MISSING else entries.items():
             if name in known:
                 found[known[name]] = value
             else:

@@ -1,0 +1,206 @@
+"""The reader of questions: what is sound reads back, what is broken is named with its line."""
+
+from __future__ import annotations
+
+import copy
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from phyblock.datasets import Dataset, QuestionTask, read_builtin, read_questions
+from phyblock.domain import Block, Mark, QuestionPicture
+from phyblock.errors import DataError, Problem
+from tests.datasets.broken import sound_scene, with_value, without, write_scenes
+
+QUESTION: dict[str, Any] = {
+    "id": "co-001",
+    "subtask": "CO",
+    "category": "object_property",
+    "scene_id": "s1",
+    "wording": "co-1",
+    "question": "What is the color of the cube?",
+    "options": ["red", "blue", "green", "yellow"],
+    "answer": "B",
+    "colors": {"1": "blue"},
+    "pictures": [{"label": "scene", "view": [45, 22]}],
+    "evidence": {"slots": {"block": "cube"}},
+}
+
+
+@pytest.fixture
+def scenes(tmp_path: Path) -> Dataset:
+    return read_builtin(write_scenes(tmp_path, sound_scene()))
+
+
+def write(folder: Path, *questions: Any) -> Path:
+    folder.mkdir(exist_ok=True)
+    text = "".join(json.dumps(question) + "\n" for question in questions)
+    (folder / "questions.jsonl").write_text(text, encoding="utf-8")
+    return folder
+
+
+def read_one(folder: Path, scenes: Dataset, question: Any) -> QuestionTask:
+    (task,) = read_questions(write(folder, question), scenes).tasks
+    return task
+
+
+def test_a_sound_question_is_read(tmp_path: Path, scenes: Dataset) -> None:
+    task = read_one(tmp_path / "q", scenes, QUESTION)
+    question = task.question
+    assert (task.key, question.answer, question.answer_letters) == ("co-001", (1,), "B")
+    assert [block.color for block in task.scene.blocks] == ["blue", "red"]
+    assert question.pictures == (QuestionPicture("scene", task.scene.blocks, (45.0, 22.0)),)
+    assert question.category == "object_property"
+    assert not task.files
+
+
+def test_a_picture_is_the_scene_but_for_what_its_recipe_says(
+    tmp_path: Path, scenes: Dataset
+) -> None:
+    added = sound_scene()["blocks"][0] | {"order": 9, "position": [0.2, 0, 0.025]}
+    recipe = {
+        "label": "scene",
+        "view": [90, 30],
+        "without": [1],
+        "poses": {"2": {"position": [0, 0, 0.1], "euler": [0, 0, 45]}},
+        "swap": {"2": {"type": "cuboid2", "color": "green"}},
+        "add": [added],
+        "marks": [{"letter": "A", "position": [0, 0, 0.1]}],
+        "framed": True,
+    }
+    task = read_one(tmp_path / "q", scenes, QUESTION | {"pictures": [recipe]})
+    (picture,) = task.question.pictures
+    assert picture.blocks == (
+        Block(2, "cuboid2", "green", (0, 0, 0.1), (0, 0, 45), (1,), 2),
+        Block(9, "cube", "red", (0.2, 0, 0.025), (0, 0, 0), (), 1),
+    )
+    assert picture.marks == (Mark("A", (0, 0, 0.1)),)
+    assert picture.framed == task.scene.blocks
+
+
+def test_an_order_is_read_as_four_indices(tmp_path: Path, scenes: Dataset) -> None:
+    pictures = [{"label": letter, "view": [45, 22]} for letter in "ABCD"]
+    options = [f"<img{i}>" for i in range(1, 5)]
+    changes = {"subtask": "OR", "category": "dynamic_reasoning", "options": options}
+    question = QUESTION | changes | {"answer": "BADC", "pictures": pictures}
+    assert read_one(tmp_path / "q", scenes, question).question.answer == (1, 0, 3, 2)
+
+
+def test_the_digest_follows_the_content(tmp_path: Path, scenes: Dataset) -> None:
+    one = read_questions(write(tmp_path / "a", QUESTION), scenes)
+    same = read_questions(write(tmp_path / "b", QUESTION), scenes)
+    other = read_questions(write(tmp_path / "c", QUESTION | {"answer": "A"}), scenes)
+    assert one.sha256 == same.sha256 != other.sha256
+
+
+PICTURE_OPTIONS = ["<img1>", "<img2>", "<img3>", "<img4>"]
+BROKEN = {
+    "a scene that is not there": ({"scene_id": "s9"}, "scene_id", '"s9"'),
+    "an answer outside the options": ({"answer": "E"}, "answer", '"E"'),
+    "an order for one answer": ({"answer": "BADC"}, "answer", '"BADC"'),
+    "two equal options": ({"options": ["red", "blue", "Red ", "green"]}, "options[2]", '"Red "'),
+    "three options": ({"options": ["red", "blue", "green"]}, "options", "3"),
+    "an unknown subtask": ({"subtask": "XX"}, "subtask", '"XX"'),
+    "another category": ({"category": "dynamic_reasoning"}, "category", '"dynamic_reasoning"'),
+    "a blank text": ({"question": " "}, "question", '" "'),
+    "a color of no block": ({"colors": {"7": "red"}}, "colors", '"7"'),
+    "an unknown color": ({"colors": {"1": "pink"}}, "colors.1", '"pink"'),
+    "pictures that are missing": ({"options": PICTURE_OPTIONS}, "pictures", '["A", "B", "C", "D"]'),
+}
+BROKEN_PICTURES = {
+    "a view from below": ({"view": [45, 0]}, "pictures[0].view", "[45, 0]"),
+    "a view with one angle": ({"view": [45]}, "pictures[0].view", "[45]"),
+    "an unknown label": ({"label": "E"}, "pictures[0].label", '"E"'),
+    "no such block": ({"without": [3]}, "pictures[0].without", "3"),
+    "a pose of no block": ({"poses": {"3": {}}}, "pictures[0].poses", '"3"'),
+    "a type that is not known": (
+        {"swap": {"1": {"type": "ball", "color": "red"}}},
+        "pictures[0].swap.1.type",
+        '"ball"',
+    ),
+    "a block added twice": ({"add": [sound_scene()["blocks"][0]]}, "pictures[0].add", "1"),
+    "nothing to draw": ({"without": [1, 2]}, "pictures[0]", ""),
+    "a misspelled field": ({"widthout": [1]}, "pictures[0].widthout", ""),
+    "a mark of no letter": (
+        {"marks": [{"letter": "E", "position": [0, 0, 0]}]},
+        "pictures[0].marks[0].letter",
+        '"E"',
+    ),
+}
+
+
+@pytest.mark.parametrize(("change", "field", "found"), BROKEN.values(), ids=BROKEN)
+def test_what_is_wrong_is_named_with_its_line(
+    tmp_path: Path, scenes: Dataset, change: dict[str, Any], field: str, found: str
+) -> None:
+    folder = write(tmp_path / "q", QUESTION, QUESTION | {"id": "co-002"} | change)
+    with pytest.raises(DataError) as caught:
+        read_questions(folder, scenes)
+    (problem,) = caught.value.problems
+    assert problem.where == f"{folder / 'questions.jsonl'}:2"
+    assert (problem.field, problem.found) == (field, found)
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "found"), BROKEN_PICTURES.values(), ids=BROKEN_PICTURES
+)
+def test_what_is_wrong_in_a_picture_is_named(
+    tmp_path: Path, scenes: Dataset, change: dict[str, Any], field: str, found: str
+) -> None:
+    question = copy.deepcopy(QUESTION)
+    question["pictures"][0] |= change
+    with pytest.raises(DataError) as caught:
+        read_questions(write(tmp_path / "q", question), scenes)
+    assert [(one.field, one.found) for one in caught.value.problems] == [(field, found)]
+
+
+def test_a_number_that_is_used_twice_is_told(tmp_path: Path, scenes: Dataset) -> None:
+    folder = write(tmp_path / "q", QUESTION, QUESTION | {"id": "co-002"}, QUESTION)
+    with pytest.raises(DataError, match=r"questions.jsonl:3: id: is used by line 1 already"):
+        read_questions(folder, scenes)
+
+
+@pytest.mark.parametrize("field", ["id", "subtask", "scene_id", "question", "options", "answer"])
+def test_a_missing_field_is_told(tmp_path: Path, scenes: Dataset, field: str) -> None:
+    with pytest.raises(DataError, match=rf"questions.jsonl:1: {field}: is missing"):
+        read_questions(write(tmp_path / "q", without(QUESTION, field)), scenes)
+
+
+WHOLE = QUESTION | {
+    "pictures": [
+        {
+            "label": "scene",
+            "view": [45, 22],
+            "without": [1],
+            "poses": {},
+            "swap": {},
+            "add": [sound_scene()["blocks"][0] | {"order": 9}],
+            "marks": [{"letter": "A", "position": [0, 0, 0]}],
+            "framed": True,
+        }
+    ]
+}
+
+
+@pytest.mark.parametrize("value", [None, 3, "text", [], {}, [[]], [{}], {"1": 3}, {"1": []}])
+@pytest.mark.parametrize("field", [*WHOLE, *(f"pictures.0.{f}" for f in WHOLE["pictures"][0])])
+def test_values_of_any_kind_are_read_or_refused(
+    tmp_path: Path, scenes: Dataset, field: str, value: object
+) -> None:
+    folder = write(tmp_path / "q", with_value(WHOLE, field, value))
+    problems: tuple[Problem, ...] = ()
+    try:
+        (task,) = read_questions(folder, scenes).tasks
+        assert task.question.answer == (1,)
+    except DataError as error:
+        problems = error.problems
+    assert all(one.where.startswith(str(folder)) for one in problems)
+
+
+def test_an_empty_file_and_no_file_are_told(tmp_path: Path, scenes: Dataset) -> None:
+    with pytest.raises(DataError, match="holds no questions"):
+        read_questions(write(tmp_path / "q"), scenes)
+    with pytest.raises(DataError, match=r"a folder with questions\.jsonl"):
+        read_questions(tmp_path, scenes)
