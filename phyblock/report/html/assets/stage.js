@@ -56,8 +56,10 @@ const Stage = (() => {
     const slider = el("input", {
       type: "range", min: 0, max: player.last, step: 1, id: "scrub", "aria-label": "Step",
       oninput: () => {
+        // Stopping tells all listeners, who put the slider back to where the player is.
+        const at = Number(slider.value);
         player.stop();
-        player.seek(Number(slider.value));
+        player.seek(at);
       },
     });
     const where = el("output", { class: "number" });

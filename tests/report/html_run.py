@@ -1,0 +1,67 @@
+"""A run of all three tracks with its report, small enough to be made for every test session."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from tests.vqa_set import questions, write_questions
+from tests.workspace import Raw, Workspace
+
+HOSTILE = (
+    "<script>window.hacked = 1</script><img src=x onerror='window.hacked = 2'>"
+    "</pre></script><!--<script>\u2028'\\');window.hacked = 3//\ud83d\n"
+    "Step1: Move block with index 1"
+)
+HOSTILE_SAMPLE = "full_planning/random/t3/s0"
+SUBTASKS = ("SH", "OR", "AD")
+
+
+def make_run(root: Path, pictures: Path) -> Workspace:
+    """Two baselines on five scenes and six questions, in all tracks, with two seeds.
+
+    One reply says `HOSTILE`, one is missing.
+    """
+    workspace = Workspace(root, pictures)
+    workspace.write_scenes()
+    write_questions(root / "questions", questions(per_subtask=2, subtasks=SUBTASKS))
+    workspace.write_suite(
+        tracks=["full_planning", "vqa", "step_planning"],
+        vqa={"path": "./questions", "subtasks": list(SUBTASKS)},
+        steps={"physics": "off"},
+        seeds=[0, 1],
+    )
+    done = workspace.run()
+    assert done.code == 0, done.err
+    rewrite(workspace.out)
+    done = workspace.phyblock("report", workspace.out)
+    assert done.code == 0, done.err
+    assert "The report is out/report.html" in done.out
+    return workspace
+
+
+def rewrite(folder: Path) -> None:
+    """Put a hostile reply and a missing one into the records of a run."""
+    path = folder / "records.jsonl"
+    lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    for record in lines:
+        if record["sample"] == HOSTILE_SAMPLE:
+            record["reply"]["text"] = record["reply"]["reasoning"] = HOSTILE
+            record["parse"]["rule"] = HOSTILE
+        if record["sample"] == "full_planning/random/t4/s0":
+            record.update(reply=None, outcome="missing", scores=[], parse=None)
+    path.write_text("".join(json.dumps(record) + "\n" for record in lines), encoding="utf-8")
+
+
+def many(records: list[Raw], model: str, copies: int) -> list[Raw]:
+    """Records of `copies` models, each with the replies of `model`."""
+    return [
+        {
+            **record,
+            "model": f"{model}-{copy}",
+            "sample": record["sample"].replace(f"/{model}/", f"/{model}-{copy}/"),
+        }
+        for copy in range(copies)
+        for record in records
+        if record["model"] == model
+    ]

@@ -1,0 +1,431 @@
+"""The report in a real browser, opened from disk: every view, the keyboard, hostile replies."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import yaml
+
+from phyblock.report import write_report, write_tables
+from tests.report.html_run import HOSTILE, HOSTILE_SAMPLE, make_run, many
+from tests.workspace import Workspace
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Locator, LocatorAssertions, Page
+
+FLAGS = [
+    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update"),
+]
+CHROMIUMS = ("chromium", "chromium-browser", "google-chrome")
+
+
+def expect(locator: Locator) -> LocatorAssertions:
+    """What is waited for; the page forbids the `eval` that other ways of waiting need."""
+    from playwright.sync_api import expect as expected
+
+    return expected(locator)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A headless Chromium; skips where there is none."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    found = next(filter(None, map(shutil.which, CHROMIUMS)), None)
+    if found is None:
+        pytest.skip("no Chromium: apt-get install chromium")
+    with playwright.sync_playwright() as started:
+        running = started.chromium.launch(executable_path=found, args=FLAGS)
+        yield running
+        running.close()
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+    return make_run(tmp_path_factory.mktemp("page"), pictures_dir)
+
+
+class Visit:
+    """A page that was opened from disk, and all that it complained of or asked for."""
+
+    def __init__(self, page: Page, path: Path) -> None:
+        self.page = page
+        self.path = path
+        self.complaints: list[str] = []
+        self.requests: list[str] = []
+        page.on("console", lambda message: self.complaints.append(message.text))
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("dialog", lambda dialog: self.complaints.append(dialog.message))
+        page.on("request", lambda request: self.requests.append(request.url))
+
+    def open(self, view: str = "results") -> Page:
+        self.page.goto(f"{self.path.as_uri()}#{view}")
+        if view.startswith("samples"):
+            self.page.wait_for_selector("#list .row")
+        return self.page
+
+    def count(self) -> str:
+        return self.page.inner_text("#list-status")
+
+    def show(self, sample: str) -> None:
+        self.page.goto(f"{self.path.as_uri()}#samples?s={sample.replace('/', '%2F')}")
+        self.page.wait_for_selector("#detail .card")
+
+
+@pytest.fixture
+def visit(browser: Browser, made: Workspace) -> Iterator[Visit]:
+    page = browser.new_page(viewport={"width": 1400, "height": 1000}, color_scheme="light")
+    visit = Visit(page, made.out / "report.html")
+    yield visit
+    page.close()
+    assert visit.complaints == []
+    assert all(url.startswith("file://") for url in visit.requests)
+
+
+def painted(page: Page, selector: str) -> int:
+    """How many pixels of a canvas are drawn."""
+    script = """canvas => {
+        const copy = new OffscreenCanvas(canvas.width, canvas.height);
+        const context = copy.getContext("2d", { willReadFrequently: true });
+        context.drawImage(canvas, 0, 0);
+        const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
+        return new Uint32Array(data.buffer).filter(pixel => pixel >>> 24).length;
+    }"""
+    count: int = page.eval_on_selector(selector, script)
+    return count
+
+
+def test_results_stand_in_the_page_before_anything_is_loaded(visit: Visit) -> None:
+    page = visit.open()
+    assert page.inner_text("h1") == "trial"
+    heads = page.locator(".headline h2").all_inner_texts()
+    assert {"Full planning", "VQA"} <= set(heads)
+    first = page.locator(".headline").first.inner_text()
+    assert "Random, published" in first
+    assert "94.7" in first
+    assert not any("/report/" in url for url in visit.requests)
+    for picture in page.locator(".figures img").all():
+        picture.scroll_into_view_if_needed()
+        picture.evaluate("image => image.decode()")
+    page.get_by_text("Coverage, suite trial").click()
+    assert page.get_by_text("Expected").first.is_visible()
+
+
+def test_a_column_sorts_the_models_of_its_table(visit: Visit) -> None:
+    page = visit.open()
+    # Baselines alone: a body of models that is empty stays empty, and the order of others too.
+    page.locator(".headline th button").first.click()
+    assert page.locator(".headline th[aria-sort=descending]").count() == 1
+    page.locator(".headline th button").first.click()
+    assert page.locator(".headline th[aria-sort=ascending]").count() == 1
+
+
+def test_filters_narrow_the_list(visit: Visit) -> None:
+    page = visit.open("samples")
+    assert visit.count() == "20 samples"
+    page.select_option("#filter-model", label="oracle")
+    assert visit.count() == "10 samples"
+    page.select_option("#filter-seed", label="Seed 1")
+    assert visit.count() == "5 samples"
+    page.select_option("#filter-level", label="Level 3")
+    assert visit.count() == "2 samples"
+    page.fill("#search", "T4")
+    assert visit.count() == "1 sample"
+    page.select_option("#filter-error", label="Overflow")
+    assert visit.count() == "No sample passes these filters."
+    for name in ("model", "seed", "level", "error"):
+        page.select_option(f"#filter-{name}", label="All")
+    page.fill("#search", "")
+    page.select_option("#filter-outcome", label="Missing")
+    assert page.locator(".row-name").all_inner_texts() == ["t4"]
+    page.select_option("#filter-outcome", label="All")
+    page.select_option("#filter-sort", label="Best first")
+    assert page.locator(".row-model").first.inner_text().startswith("oracle")
+    page.select_option("#filter-setting", label="B")
+    page.locator(".row").first.click()
+    expect(page.locator("#detail .facts").first).to_contain_text("Setting B")
+
+
+def test_a_sample_shows_everything_about_it(visit: Visit) -> None:
+    visit.show("full_planning/oracle/t5/s0")
+    page = visit.page
+    assert page.inner_text("#sample-title .title-key") == "t5"
+    assert page.locator(".cells li").count() == 16
+    assert page.locator(".cells li.needed .cell-uses").all_inner_texts() == [
+        f"\N{MULTIPLICATION SIGN}{times}" for times in (1, 1, 2)
+    ]
+    assert painted(page, "canvas.goal") > 1000
+    assert painted(page, ".cells canvas") > 100
+    assert painted(page, "canvas.stage") > 1000
+    assert "F1 100.0" in page.inner_text(".facts")
+    assert page.locator(".strip button.right").count() == 4
+    assert "read by the rule" in page.inner_text(".parsed")
+    page.get_by_text("Prompt as sent").click()
+    page.locator(".prompt pre").first.wait_for()
+    picture = page.locator(".prompt img").first
+    picture.scroll_into_view_if_needed()
+    picture.evaluate("image => image.decode()")
+    assert picture.evaluate("image => image.naturalWidth") > 256
+    page.get_by_text("Facts", exact=True).click()
+    assert page.get_by_text("Answered by").is_visible()
+
+
+def test_wrong_steps_say_why_and_what_was_possible(visit: Visit) -> None:
+    visit.show("full_planning/random/t5/s0")
+    page = visit.page
+    wrong = page.locator(".strip button.wrong").first
+    why = wrong.locator(".strip-what").inner_text()
+    wrong.click()
+    said = page.inner_text(".said")
+    assert why in said
+    assert "Possible here (outlined): 3 (blue cube)." in said
+
+
+def test_play_scrub_and_keys_move_through_the_steps(visit: Visit) -> None:
+    visit.show("full_planning/oracle/t5/s0")
+    page = visit.page
+    where = page.locator(".controls output")
+    assert where.inner_text() == "End"
+    page.locator("#scrub").fill("0")
+    assert where.inner_text() == "Step 0 of 4"
+    empty = painted(page, "canvas.stage")
+    page.keyboard.press("Tab")
+    page.locator("#detail").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    assert where.inner_text() == "Step 2 of 4"
+    assert page.locator(".strip [aria-current=true]").get_attribute("data-step") == "2"
+    assert painted(page, "canvas.stage") > empty
+    page.keyboard.press(" ")
+    assert page.inner_text("#play") == "Pause"
+    expect(where).to_have_text("End")
+    expect(page.locator("#play")).to_have_text("Play")
+    page.locator("#play").click()
+    expect(where).to_have_text("Step 1 of 4")
+    page.locator("#play").click()
+    assert page.inner_text("#play") == "Play"
+
+
+def test_a_drag_turns_the_drawing(visit: Visit) -> None:
+    visit.show("full_planning/oracle/t5/s0")
+    page = visit.page
+    before = page.eval_on_selector("canvas.stage", "canvas => canvas.toDataURL()")
+    box = page.locator("canvas.stage").bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 100, box["y"] + 100)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 160, box["y"] + 80)
+    page.mouse.up()
+    assert page.eval_on_selector("canvas.stage", "canvas => canvas.toDataURL()") != before
+    page.locator("canvas.stage").dblclick()
+    assert page.eval_on_selector("canvas.stage", "canvas => canvas.toDataURL()") == before
+
+
+def test_keys_and_buttons_go_through_the_list(visit: Visit) -> None:
+    page = visit.open("samples")
+    title = page.locator("#sample-title")
+    first = title.inner_text()
+    page.keyboard.press("j")
+    expect(title).not_to_have_text(first)
+    second = title.inner_text()
+    page.keyboard.press("k")
+    assert title.inner_text() == first
+    page.locator("#next").click()
+    assert title.inner_text() == second
+    assert page.locator(".row[aria-selected=true]").count() == 1
+    page.keyboard.press("/")
+    page.keyboard.type("jk")
+    assert page.input_value("#search") == "jk"
+    assert title.inner_text() == second
+
+
+def test_two_models_stand_side_by_side(visit: Visit) -> None:
+    visit.show("full_planning/random/t5/s1")
+    page = visit.page
+    page.select_option("#compare", "oracle")
+    expect(page.locator("canvas.stage")).to_have_count(2)
+    assert page.locator(".built figcaption").all_inner_texts() == ["random", "oracle"]
+    assert page.locator("ol.strip").count() == 2
+    assert "with=oracle" in page.url
+    page.keyboard.press("Escape")
+    page.locator("#next").click()
+    expect(page.locator("#sample-title")).to_contain_text("oracle")
+    expect(page.locator("canvas.stage")).to_have_count(1)
+    assert page.input_value("#compare") == ""
+
+
+def test_an_address_leads_back_to_the_same_view(visit: Visit) -> None:
+    page = visit.open("samples?s=full_planning%2Frandom%2Ft5%2Fs1&with=oracle")
+    expect(page.locator("canvas.stage")).to_have_count(2)
+    assert page.inner_text("#sample-title .title-key") == "t5"
+    assert page.input_value("#compare") == "oracle"
+
+
+def test_dark_and_light(visit: Visit) -> None:
+    page = visit.open("samples")
+    paper = "getComputedStyle(document.documentElement).backgroundColor"
+    light = page.evaluate(paper)
+    page.locator("#theme").click()
+    dark = page.evaluate(paper)
+    assert dark != light
+    page.reload()
+    assert page.evaluate(paper) == dark
+    page.locator("#theme").click()
+    assert page.evaluate(paper) == light
+
+
+def test_a_question_with_its_options_and_answer(visit: Visit) -> None:
+    page = visit.open("samples")
+    page.locator("#tracks button[data-track=vqa]").click()
+    assert visit.count() == "24 samples"
+    page.select_option("#filter-subtask", label="SH shape")
+    page.select_option("#filter-model", label="oracle")
+    assert visit.count() == "4 samples"
+    page.select_option("#filter-answer", label="Wrong")
+    assert visit.count() == "No sample passes these filters."
+    visit.show("vqa/oracle/sh-000/s0")
+    page.locator(".asked").wait_for()
+    assert page.inner_text(".asked").startswith("A question of kind SH")
+    assert page.locator(".options li").count() == 4
+    assert page.locator(".options li.right").count() == 1
+    assert "✓ Right" in page.inner_text(".answer")
+    assert painted(page, ".pictures canvas") > 1000
+    visit.show("vqa/oracle/or-000/s0")
+    expect(page.locator(".options canvas")).to_have_count(4)
+    places = [mark.inner_text() for mark in page.locator(".options .mark").all()]
+    assert sorted(places) == ["1.", "2.", "3.", "4."]
+
+
+def test_an_episode_turn_by_turn(visit: Visit) -> None:
+    visit.show("step_planning/oracle/t5/s0")
+    page = visit.page
+    assert page.locator(".turns > li").count() == 4
+    assert "goal completed" in page.inner_text(".facts")
+    page.locator(".turns summary").first.click()
+    assert "Move(" in page.locator(".turns .reply").first.inner_text()
+    page.locator(".turns").get_by_text("Prompt as sent").first.click()
+    page.locator(".turns .prompt pre").first.wait_for()
+    page.locator("#scrub").fill("1")
+    assert "Turn 1" in page.inner_text(".said")
+
+
+def test_a_hostile_reply_does_nothing(visit: Visit) -> None:
+    visit.show(HOSTILE_SAMPLE)
+    page = visit.page
+    reply = page.locator("pre.reply").inner_text()
+    assert reply == HOSTILE
+    assert page.locator("#detail script, #detail img").count() == 0
+    assert page.evaluate("window.hacked") is None
+
+
+def test_even_markup_in_the_page_may_run_nothing(browser: Browser, made: Workspace) -> None:
+    page = browser.new_page()
+    page.goto((made.out / "report.html").as_uri())
+    refused: list[str] = []
+    page.on("console", lambda message: refused.append(message.text))
+    page.evaluate(
+        """() => {
+            document.body.insertAdjacentHTML("beforeend", "<img src=x onerror='window.hacked=1'>");
+            const script = document.createElement("script");
+            script.textContent = "window.hacked = 2";
+            document.body.append(script);
+        }"""
+    )
+    page.wait_for_timeout(200)
+    assert page.evaluate("window.hacked") is None
+    assert sum("Content Security Policy" in text for text in refused) >= 2
+    page.close()
+
+
+def test_a_narrow_window_shows_list_or_sample(browser: Browser, made: Workspace) -> None:
+    page = browser.new_page(viewport={"width": 400, "height": 800})
+    visit = Visit(page, made.out / "report.html")
+    visit.open("samples")
+    assert not page.locator("#detail").is_visible()
+    page.locator(".row").first.click()
+    page.locator("canvas.stage").wait_for()
+    assert not page.locator("#list").is_visible()
+    wide = "document.documentElement.scrollWidth <= innerWidth"
+    assert page.evaluate(wide)
+    page.locator("#back").click()
+    assert page.locator("#list").is_visible()
+    visit.open("results")
+    assert page.evaluate(wide)
+    assert visit.complaints == []
+    page.close()
+
+
+def test_a_page_without_its_folder_says_so(
+    browser: Browser, made: Workspace, tmp_path: Path
+) -> None:
+    shutil.copy(made.out / "report.html", tmp_path)
+    page = browser.new_page()
+    page.goto(f"{(tmp_path / 'report.html').as_uri()}#samples")
+    page.locator("#detail .notice").wait_for()
+    assert "belongs beside this page" in page.inner_text("#detail")
+    page.close()
+
+
+def test_a_report_without_the_data_set_still_shows_replies(
+    browser: Browser, made: Workspace, tmp_path: Path
+) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(made.out, folder)
+    manifest = yaml.safe_load((folder / "run.yaml").read_text())
+    manifest["dataset"]["root"] = "gone"
+    (folder / "run.yaml").write_text(yaml.safe_dump(manifest))
+    write_report(write_tables(folder))
+    page = browser.new_page()
+    visit = Visit(page, folder / "report.html")
+    visit.show("full_planning/oracle/t5/s0")
+    assert "Nothing can be drawn without the data set" in page.inner_text("#detail")
+    assert page.locator(".strip button.right").count() == 4
+    assert "Step1" in page.inner_text("pre.reply")
+    page.close()
+    assert visit.complaints == []
+
+
+@pytest.mark.slow
+def test_twenty_thousand_records_keep_memory_bounded(
+    browser: Browser, made: Workspace, tmp_path: Path
+) -> None:
+    folder = _large_run(made, tmp_path / "run")
+    write_report(write_tables(folder))
+    page = browser.new_page(viewport={"width": 1400, "height": 1000})
+    visit = Visit(page, folder / "report.html")
+    visit.open("samples")
+    assert visit.count() == "20,000 samples"
+    for step in range(60):
+        page.evaluate(f"document.querySelector('#list').scrollTop = {step * 15_000}")
+        page.wait_for_timeout(30)
+        page.locator(".row").nth(8).click()
+        expect(page.locator("#detail pre.reply")).to_have_count(1)
+        assert page.locator(".row").count() < 60
+    assert page.evaluate("Data.chunksKept()") <= 24
+    page.close()
+    assert visit.complaints == []
+
+
+def _large_run(made: Workspace, folder: Path) -> Path:
+    """2,000 models on the planning track alone, with replies of some kilobytes."""
+    facts: dict[str, Any] = yaml.safe_load((made.out / "run.yaml").read_text())
+    records = [record for record in made.records() if record["track"] == "full_planning"]
+    for record in records:
+        if record["reply"]:
+            record["reply"]["text"] += " The base is wide." * 150
+    copied = many(records, "oracle", 2000)
+    facts["suite"]["tracks"] = ["full_planning"]
+    facts["models"] = [
+        {**facts["models"][0], "name": name}
+        for name in dict.fromkeys(record["model"] for record in copied)
+    ]
+    folder.mkdir()
+    (folder / "run.yaml").write_text(yaml.safe_dump(facts))
+    lines = (json.dumps(record) + "\n" for record in copied)
+    (folder / "records.jsonl").write_text("".join(lines))
+    return folder
