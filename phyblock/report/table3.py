@@ -17,6 +17,7 @@ from phyblock.tasks import ENDINGS
 
 __all__ = [
     "COUNTED",
+    "ENDING_NAMES",
     "endings_view",
     "moves_view",
     "progress_view",
@@ -31,7 +32,7 @@ _OURS, _PUBLISHED = "run", "published"
 _MODEL = Column("Model", is_text=True)
 _METRICS = dict(zip(METRICS, ("Prec", "Rec", "F1"), strict=True))
 _GROUPS = {"placed": "Placed blocks", "attempted": "All attempted moves"}
-_ENDINGS = {
+ENDING_NAMES = {
     "completed": "Completed",
     "done": "Said Done",
     "collapsed": "Collapsed",
@@ -42,6 +43,7 @@ _ENDINGS = {
     "max_cost": "Cost limit",
     "unanswered": "Unanswered",
 }
+"""What people read in the place of each ending."""
 _OUTCOMES = {
     "placed": "Placed",
     "shape_not_in_gt": "Shape not in GT",
@@ -187,7 +189,7 @@ def _notes(table: pd.DataFrame, run: Run) -> list[str]:
 def endings_view(table: pd.DataFrame, run: Run) -> TextTable:
     """How episodes ended, out of `endings_frame`; ways in which none ended are left out."""
     ways = [name for name in ENDINGS if table[name].sum() or name in ("completed", "done")]
-    columns = [Column(_ENDINGS[name]) for name in ways]
+    columns = [Column(ENDING_NAMES[name]) for name in ways]
     rows = tuple(
         (
             row["model"],

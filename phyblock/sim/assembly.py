@@ -18,7 +18,7 @@ from phyblock.sim.compose import ink_on, to_png
 from phyblock.sim.pictures import PictureStyle, drawn, goal_camera
 from phyblock.sim.render import picture
 
-__all__ = ["animation", "filmstrip_png", "step_images"]
+__all__ = ["animated", "animation", "filmstrip_png", "step_images"]
 
 _MOST_COLUMNS = 6
 _GAP = 0.02
@@ -70,25 +70,37 @@ def animation(scene: Scene, style: PictureStyle, kind: Literal["gif", "webp"] = 
     """
     images = step_images(scene, style)
     times = [_STEP_MS] * (len(images) - 1) + [_END_MS]
+    return animated(images, times, kind, images[-1])
+
+
+def animated(
+    images: Sequence[Image.Image],
+    times_ms: Sequence[int],
+    kind: Literal["gif", "webp"],
+    colorful: Image.Image,
+) -> bytes:
+    """Images shown for so long each [ms], over and over.
+
+    A GIF takes its 256 colors from `colorful`, once for all images, so that nothing flickers.
+    """
+    options: dict[str, bool | int] = {"lossless": True}
     if kind == "gif":
-        images = _one_palette(images)
+        images, options = _one_palette(images, colorful), {"disposal": 1, "optimize": False}
     buffer = io.BytesIO()
-    options = {"disposal": 1, "optimize": False} if kind == "gif" else {"lossless": True}
     images[0].save(
         buffer,
         kind.upper(),
         save_all=True,
         append_images=images[1:],
-        duration=times,
+        duration=list(times_ms),
         loop=0,
         **options,
     )
     return buffer.getvalue()
 
 
-def _one_palette(images: Sequence[Image.Image]) -> list[Image.Image]:
-    """The images in the colors of the last, which holds every block: nothing flickers."""
-    palette = images[-1].quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+def _one_palette(images: Sequence[Image.Image], colorful: Image.Image) -> list[Image.Image]:
+    palette = colorful.quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
     return [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
 
 

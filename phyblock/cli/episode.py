@@ -1,0 +1,154 @@
+"""`phyblock episode`: one step-planning episode, as text or as moving pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from phyblock.cli.console import make_console, print_view, shown_path
+from phyblock.datasets import AssemblyTask
+from phyblock.domain import Block
+from phyblock.errors import DataError, Problem, StoreError
+from phyblock.files import atomic_write
+from phyblock.report.table3 import ENDING_NAMES
+from phyblock.report.text_table import Column, TextTable
+from phyblock.run.data import open_dataset
+from phyblock.run.reading import RECORDS, read_manifest, read_records
+from phyblock.sim import PictureStyle
+from phyblock.sim.film import FilmStep, Tone, episode_gif, episode_images, episode_sheet
+from phyblock.sim.site import settle
+
+__all__ = ["command"]
+
+_TRACK = "step_planning"
+_SIZE_PX = 256
+
+
+@click.command("episode")
+@click.argument("run", type=click.Path(path_type=Path))
+@click.argument("sample")
+@click.option("--gif", type=click.Path(path_type=Path, dir_okay=False), help="Animated GIF.")
+@click.option("--sheet", type=click.Path(path_type=Path, dir_okay=False), help="PNG of all steps.")
+@click.option(
+    "--size",
+    type=click.IntRange(128, 1024),
+    default=_SIZE_PX,
+    show_default=True,
+    help="Edge of each of a frame's three pictures [pixels].",
+)
+@click.option(
+    "--data",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Where the run's data set is now, if it was moved.",
+)
+def command(
+    run: Path, sample: str, gif: Path | None, sheet: Path | None, size: int, data: Path | None
+) -> None:
+    """Show the episode SAMPLE of the folder RUN: every step, wrong ones too.
+
+    SAMPLE is as in records.jsonl (step_planning/MODEL/SCENE/sSEED); a part of it will do where
+    only one episode has it.
+    """
+    record = _find(run, sample)
+    console = make_console()
+    print_view(console, _as_text(record))
+    if gif is None and sheet is None:
+        return
+    task = _task(run, record, data)
+    steps = list(_film(record, task))
+    images = episode_images(task.scene, task.candidates, steps, PictureStyle(size))
+    for path, make in ((gif, episode_gif), (sheet, episode_sheet)):
+        if path is not None:
+            _write(path, make(images))
+            console.print(f"{len(images)} frames in {shown_path(path)}", markup=False)
+
+
+def _find(run: Path, sample: str) -> dict[str, Any]:
+    """The one episode that `sample` means; StoreError with the others when there is not one."""
+    read_manifest(run)
+    episodes = {k: r for k, r in read_records(run).items() if r["track"] == _TRACK}
+    found = [sample] if sample in episodes else [name for name in episodes if sample in name]
+    if len(found) == 1:
+        return episodes[found[0]]
+    message = "holds no such episode" if not found else f"holds {len(found)} such episodes"
+    names = ", ".join((found or list(episodes))[:5])
+    problem = Problem(str(run / RECORDS), message, "sample", sample, names or "none at all")
+    raise StoreError(problem)
+
+
+def _task(run: Path, record: Mapping[str, Any], data: Path | None) -> AssemblyTask:
+    about = read_manifest(run)["dataset"]
+    root = data or Path(about["root"])
+    hint = "name the folder where it is now with --data"
+    if not root.is_dir():
+        raise DataError(Problem(str(root), "the data set of the run is not there", hint=hint))
+    tasks = {task.scene.id: task for task in open_dataset(about["format"], root).tasks}
+    if record["scene"] not in tasks:
+        message = "holds no such scene"
+        raise DataError(Problem(str(root), message, "scene", record["scene"], hint=hint))
+    return tasks[record["scene"]]
+
+
+def _steps(record: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The turns that a step was taken with: one of each vote."""
+    return [turn for turn in record["turns"] if turn["outcome"] is not None]
+
+
+def _operation(turn: Mapping[str, Any]) -> str:
+    move = turn["parse"]["move"]
+    if move is None:
+        return "(no operation)"
+    return "Done" if move == "Done" else f"Move({move})"
+
+
+def _as_text(record: Mapping[str, Any]) -> TextTable:
+    columns = ("Step", "Operation", "Outcome", "Rule", "Placed")
+    rows = tuple(
+        (
+            str(turn["step"]),
+            _operation(turn),
+            turn["outcome"].replace("_", " "),
+            (turn["parse"]["rule"] or "none").replace("_", " "),
+            f"{len(turn['world'])} of {record['n_blocks']}",
+        )
+        for turn in _steps(record)
+    )
+    return TextTable(
+        f"{record['sample']}: {_ending(record)}",
+        tuple(Column(name, is_text=name not in ("Step", "Placed")) for name in columns),
+        rows,
+    )
+
+
+def _film(record: Mapping[str, Any], task: AssemblyTask) -> Iterator[FilmStep]:
+    """A frame for the empty ground, one a step, and one for how it ended."""
+    yield FilmStep(f"{record['model']}, {task.scene.id}", "plain", None, ())
+    blocks: tuple[Block, ...] = ()
+    for turn in _steps(record):
+        blocks = tuple(task.scene.blocks[vertex] for vertex in turn["world"])
+        tone: Tone = {"placed": "good", "done": "plain"}.get(turn["outcome"], "bad")  # type: ignore[assignment]
+        told = turn["outcome"].replace("_", " ")
+        move = turn["parse"]["move"]
+        caption = f"{turn['step']}. {_operation(turn)}" + ("" if told == "done" else f": {told}")
+        yield FilmStep(caption, tone, move if isinstance(move, int) else None, blocks)
+    if record["ending"] == "collapsed":
+        blocks = settle(blocks).blocks
+    tone = "good" if record["ending"] == "completed" else "bad"
+    placed = record["progress"][-1] if record["progress"] else 0
+    caption = f"{_ending(record)}: {placed} of {record['n_blocks']} blocks"
+    yield FilmStep(caption, tone, None, blocks)
+
+
+def _ending(record: Mapping[str, Any]) -> str:
+    return ENDING_NAMES[record["ending"]]
+
+
+def _write(path: Path, data: bytes) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        atomic_write(path, data)
+    except OSError as error:
+        raise StoreError(Problem(str(path), f"cannot be written: {error.strerror}")) from error
