@@ -105,7 +105,7 @@ def dependency_problems(scene: Scene) -> Iterator[Problem]:
     below = support_graph(scene.blocks)
     for i, block in enumerate(scene.blocks):
         touched = below[block.order]
-        if touched - {GROUND} != set(block.depend):
+        if not touched or touched - {GROUND} != set(block.depend):
             field, found = f"blocks[{i}].depend", str(list(block.depend) or [GROUND])
             allowed = str(sorted(touched - {GROUND}) or [GROUND]) if touched else ""
             message = "differs from the contacts" if touched else "touches nothing below it"

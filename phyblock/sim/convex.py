@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from phyblock.sim.geometry import ConvexPiece
 
-__all__ = ["Axes", "contact_extent", "drop_m", "moved", "separating_axes"]
+__all__ = ["Axes", "Extent", "contact_extent", "drop_m", "moved", "separating_axes"]
 
 _PATCH_DEPTH_M = 0.0005
 _LINE_M = 0.001
@@ -76,26 +76,37 @@ def drop_m(axes: Axes) -> float | None:
     return meets if meets < leaves else None
 
 
+class Extent(NamedTuple):
+    """How large a contact is: an area [m2], or a line's length [m] where one piece is an edge.
+
+    `is_rim`: the line runs along the border of the other's face, less than a millimeter inside.
+    """
+
+    area_m2: float = 0.0
+    length_m: float = 0.0
+    is_rim: bool = False
+
+
 def contact_extent(
     first: ConvexPiece, second: ConvexPiece, direction: NDArray[np.float64]
-) -> tuple[float, float]:
-    """Area [m2] and length [m] of the contact of two touching pieces.
+) -> Extent:
+    """How large the contact of two touching pieces is.
 
-    `direction` is the unit contact normal, from the first to the second. The length counts only
+    `direction` is the unit contact normal, from the first to the second. A line counts only
     where one of the two touches with an edge, as a cylinder that lies on a facet's edge does, and
-    that edge lies inside the other's face: two edges that meet carry nothing.
+    the other with a face.
     """
     basis = _plane_basis(direction)
     lower = _patch(first.vertices_m, direction, basis)
     upper = _patch(second.vertices_m, -direction, basis)
     shared = _clip(lower, upper) if len(upper) > 2 else _clip(upper, lower)
     if len(shared) < 2:
-        return 0.0, 0.0
+        return Extent()
     if len(lower) > 2 and len(upper) > 2:
-        return _area(shared), 0.0
-    if _depth_inside(shared.mean(axis=0), lower if len(lower) > 2 else upper) < _LINE_M:
-        return 0.0, 0.0
-    return 0.0, float(np.linalg.norm(shared - shared[0], axis=1).max())
+        return Extent(area_m2=_area(shared))
+    depth_m = _depth_inside(shared.mean(axis=0), lower if len(lower) > 2 else upper)
+    length_m = float(np.linalg.norm(shared - shared[0], axis=1).max())
+    return Extent(length_m=length_m, is_rim=depth_m < _LINE_M)
 
 
 def _plane_basis(direction: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -101,20 +101,23 @@ def support_graph(
 
     B rests on A when they are within `tolerance_m` [m], the contact normal is within 45 degrees
     of vertical and points up from A to B, and the contact is an area, or an edge lying on a face.
+    An edge that lies along the border of a face carries only what nothing else carries.
     """
     solids = [_solid(block) for block in blocks]
     rests_on: dict[int, set[int]] = {solid.order: set() for solid in solids}
     for solid in solids:
         if abs(solid.bottom_m) <= tolerance_m:
             rests_on[solid.order].add(GROUND)
+    on_rims: dict[int, set[int]] = {solid.order: set() for solid in solids}
     for first, second in _near_pairs(solids, tolerance_m):
         for one, other, axes in _piece_pairs(first, second):
-            rise = _contact_rise(one, other, axes, tolerance_m)
+            rise, is_rim = _contact_rise(one, other, axes, tolerance_m)
+            carried = on_rims if is_rim else rests_on
             if rise > 0:
-                rests_on[second.order].add(first.order)
+                carried[second.order].add(first.order)
             elif rise < 0:
-                rests_on[first.order].add(second.order)
-    return {order: frozenset(below) for order, below in rests_on.items()}
+                carried[first.order].add(second.order)
+    return {order: frozenset(below or on_rims[order]) for order, below in rests_on.items()}
 
 
 def drop_height_m(block: Block, blocks: Sequence[Block]) -> float:
@@ -165,16 +168,24 @@ def _piece_pairs(first: _Solid, second: _Solid) -> Iterator[tuple[ConvexPiece, C
             yield one, other, separating_axes(one, other)
 
 
-def _contact_rise(first: ConvexPiece, second: ConvexPiece, axes: Axes, tolerance_m: float) -> float:
-    """Vertical part of the contact normal from first to second; 0.0 when neither rests."""
+def _contact_rise(
+    first: ConvexPiece, second: ConvexPiece, axes: Axes, tolerance_m: float
+) -> tuple[float, bool]:
+    """Vertical part of the contact normal from first to second, and whether it is a rim's.
+
+    0.0 when neither rests on the other.
+    """
     if not -_MAX_CONTACT_OVERLAP_M <= axes.gap_m <= tolerance_m:
-        return 0.0
+        return 0.0, False
+    rim = 0.0
     touching = axes.gaps_m > axes.gap_m - tolerance_m
     for direction in axes.directions[touching & (np.abs(axes.directions[:, 2]) >= _MIN_VERTICAL)]:
-        area_m2, length_m = contact_extent(first, second, direction)
-        if area_m2 > _MIN_AREA_M2 or length_m > _MIN_LENGTH_M:
-            return float(direction[2])
-    return 0.0
+        extent = contact_extent(first, second, direction)
+        if extent.area_m2 > _MIN_AREA_M2 or extent.length_m > _MIN_LENGTH_M:
+            if not extent.is_rim:
+                return float(direction[2]), False
+            rim = float(direction[2])
+    return rim, True
 
 
 def _clearance_m(solid: _Solid, solids: Sequence[_Solid]) -> float:

@@ -88,3 +88,11 @@ def test_what_falls_midway_is_refused_though_it_stands_in_the_end() -> None:
     sketch.pair("cube", 2.8)
     problems = physics_problems(make_scene("beam", (1,), sketch.blocks))
     assert [problem.message for problem in problems] == ["blocks 2, 3 fall at step 3"]
+
+
+def test_a_block_that_touches_nothing_is_refused_though_it_declares_nothing() -> None:
+    scene = gate()
+    x, y, _ = scene.blocks[2].position_m
+    lifted = with_block(scene, 2, position_m=(x, y, 0.5), depend=(), layer=1)
+    fields = [problem.field for problem in physics_problems(lifted)]
+    assert "blocks[2].depend" in fields

@@ -138,6 +138,26 @@ def test_a_cylinder_on_its_ridge_rests_on_what_it_lies_on() -> None:
     assert support_graph([plank, log])[2] == {1}
 
 
+def crests(*heights_m: float) -> list[Block]:
+    """Domes on slabs side by side along y, their crests at these heights."""
+    domes = []
+    for i, height_m in enumerate(heights_m):
+        place = (0.0, -0.025 + 0.05 * i, height_m - 0.025)
+        domes.append(block(i + 1, "semi_cylinder", place))
+    return domes
+
+
+def test_a_slab_whose_edges_lie_on_two_crests_rests_on_both() -> None:
+    slab = block(3, "cuboid1", (0.0, 0.0, 0.0375))
+    assert support_graph([*crests(0.025, 0.025), slab])[3] == {1, 2}
+
+
+def test_an_edge_along_a_rim_carries_nothing_beside_a_face_that_does() -> None:
+    dome, cube = crests(0.05)[0], block(2, "cube", (0.0, 0.025, 0.025))
+    slab = block(3, "cuboid1", (0.0, 0.0, 0.0625))
+    assert support_graph([dome, cube, slab])[3] == {2}
+
+
 def test_a_plank_rests_on_both_its_posts_and_nothing_under_the_arch() -> None:
     posts = [block(i, "cube", (0.0, y, 0.025)) for i, y in ((1, -0.05), (2, 0.05))]
     plank = block(3, "cuboid3", (0.0, 0.0, 0.0625), (0.0, 0.0, 90.0))
