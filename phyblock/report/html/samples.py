@@ -66,8 +66,9 @@ def questions_asked(
     shown = {}
     for record in _records(folder, sorted(asked_first, key=lambda place: place.start)):
         about = record["question"]
-        task = asked(questions[about["id"]], about["rotation"])
-        shown[Item(record["track"], item_key(record))] = task.shown
+        if about["id"] in questions:
+            task = asked(questions[about["id"]], about["rotation"])
+            shown[Item(record["track"], item_key(record))] = task.shown
     return shown
 
 

@@ -12,7 +12,7 @@ from uuid import uuid4
 from phyblock.domain import SUBTASK_NAMES
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
-from phyblock.report.figures import write_figures
+from phyblock.report.figures import FIGURES, write_figures
 from phyblock.report.html.drawable import kit, question_entry, scene_entry
 from phyblock.report.html.headline import assembly_headline, vqa_headline
 from phyblock.report.html.index import Item, SampleIndex, read_places
@@ -50,25 +50,31 @@ _NOT_SHOWN = ("table1",)
 """Tables that a headline table replaces."""
 
 
-def write_report(written: TablesWritten, data: Path | None = None) -> Path:
+def write_report(
+    written: TablesWritten, data: Path | None = None, figures: Sequence[str] = FIGURES
+) -> Path:
     """Write figures, `report.html` and `report/` of a run whose tables were; the page's path.
 
     Goals, candidates and assemblies are drawn by the page from the scenes: `data` is where the
     data set is now, if it has moved; where it cannot be read, the page says so and shows the rest.
-    Pictures that were sent lie beside the page as far as the picture cache has them. Raises
-    DataError for a `data` that is not what the run was made on, StoreError where the folder cannot
-    be written.
+    Pictures that were sent lie beside the page as far as the picture cache has them. `figures`
+    names those to draw. Raises DataError for a `data` that is not what the run was made on,
+    StoreError where the folder cannot be written.
     """
     run = written.run
     sources = open_sources(run.manifest, run.design, data)
-    figures = write_figures(run)
+    drawn = write_figures(run, figures)
     path = run.path / REPORT_FILE
     build = uuid4().hex[:12]
     folder = run.path / _FOLDER
     with _as_store_error(path):
         (folder / build).mkdir(parents=True)
-        _write_data(run, sources, folder, build)
-        atomic_write(path, _page(written, figures, build))
+        try:
+            _write_data(run, sources, folder, build)
+            atomic_write(path, _page(written, drawn, build))
+        except BaseException:
+            shutil.rmtree(folder / build, ignore_errors=True)
+            raise
         # A page of an earlier build that is still open says that it was written again.
         for old in folder.iterdir():
             if old.name not in (build, _PICTURES):
@@ -88,8 +94,8 @@ def _write_data(run: Run, sources: Sources, folder: Path, build: str) -> None:
     index = SampleIndex(run.design)
     pack_samples(run.path, places, index, packs["records"], prompts, pictures)
     for scene in index.scenes if sources.tasks else ():
-        task = sources.tasks[scene]
-        packs["scenes"].add(scene_entry(task.scene, task.candidates))
+        task = sources.tasks.get(scene)
+        packs["scenes"].add(task and scene_entry(task.scene, task.candidates))
     questions = {
         item: packs["questions"].add(question_entry(shown.question))
         for item, shown in asked.items()
@@ -112,8 +118,10 @@ def _keep_pictures(
     """Addresses of the pictures at hand as seen from the page, by digest."""
     shelf = PictureShelf(folder, run.manifest["suite"])
     if set(run.design.suite.tracks) - {"vqa"}:
-        shelf.add_scenes(sources.tasks[scene] for scene in _scenes(run) if sources.tasks)
-    shelf.add_questions(asked.values())
+        known = (sources.tasks.get(scene) for scene in _scenes(run))
+        shelf.add_scenes(task for task in known if task is not None)
+    if asked:
+        shelf.add_questions(asked.values())
     return {digest: f"{_FOLDER}/{_PICTURES}/{name}" for digest, name in shelf.names.items()}
 
 

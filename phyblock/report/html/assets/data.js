@@ -1,4 +1,4 @@
-/* The run's data: an index of all samples, and chunks that <script> tags bring when they are needed
+/* The run's data: an index of all samples, and chunks that script tags bring when they are needed
    (a page opened from disk may not fetch). Chunks that were not used for long are dropped. */
 "use strict";
 

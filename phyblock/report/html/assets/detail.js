@@ -51,7 +51,7 @@ const Detail = (() => {
       el("figure", { class: "built" }, el("figcaption", {}, several ? loaded[i].model : "Built"), panel ? panel.canvas : null),
       several ? null : el("div", { class: "about-step" }, stages[i])]);
     return el("section", { class: "card" },
-      scene ? null : el("p", { class: "notice" }, Data.index.no_scenes),
+      scene ? null : el("p", { class: "notice" }, Data.index.no_scenes || "The data set has no such scene."),
       el("div", { class: several ? "sides two" : "sides" }, scene ? goal(scene, loaded[0]) : null,
         scene ? built : stages.map((parts) => el("div", {}, parts))),
       several && scene ? el("div", { class: "columns two" }, stages.map((parts) => el("div", {}, parts))) : null,
