@@ -63,7 +63,9 @@ class SubtaskAudit:
 
     @property
     def is_balanced(self) -> bool:
-        """Whether every letter is right about as often as the others."""
+        """Whether every letter is right about as often as the others; orders are not judged."""
+        if self.subtask == "OR":
+            return True
         low, high = self.letter_shares
         return BALANCE[0] <= low and high <= BALANCE[1]
 
@@ -137,7 +139,7 @@ def _audit(
         subtask=subtask,
         n=len(questions),
         letters=dict(sorted(Counter(q.answer_letters for q in questions).items())),
-        values=len({q.options[q.answer[0]] for q in questions}),
+        values=len({q.answer if subtask == "OR" else q.options[q.answer[0]] for q in questions}),
         majority=_accuracy("majority", questions, guesses),
         text_only=_accuracy("text-only", questions, guesses) if with_text_probe else None,
         chance=sum(chances) / len(chances),

@@ -33,7 +33,8 @@ ol { list-style: upper-alpha; padding-left: 1.6rem; margin: .8rem 0; }
 summary { cursor: pointer; color: #888; } details { margin-top: .8rem; }
 details pre { background: var(--soft); padding: .6rem; overflow-x: auto; white-space: pre-wrap; }
 label { margin-right: 1rem; white-space: nowrap; } .check { margin-top: .6rem; font-size: .9rem; }
-nav a { margin-right: .8rem; white-space: nowrap; }
+nav { display: flex; flex-wrap: wrap; gap: .1rem .9rem; }
+.check b { color: #888; font-weight: 400; margin-right: .5rem; }
 #out { width: 100%; height: 6rem; }
 """
 _SCRIPT = """
@@ -120,7 +121,8 @@ def _check(question: Question) -> str:
         f'<label><input type="radio" name="fair-{name}" value="{word}"> {word}</label>'
         for word in ("fair", "unfair")
     )
+    asked = f"<b>your answer</b>{mine}" if mine else ""
     return (
-        f'<div class="check">{mine}{fair}'
+        f'<div class="check">{asked}<b>is it</b>{fair}'
         f'<label>note <input type="text" name="note-{name}"></label></div>'
     )
