@@ -9,31 +9,33 @@ from typing import Literal
 
 import pandas as pd
 
-from phyblock.domain import CATEGORIES
 from phyblock.report.assembly import assembly_frame, headline_cells
 from phyblock.report.cells import METRICS
 from phyblock.report.comparison import PUBLISHED_SETTING, published_frame, published_table
 from phyblock.report.design import OVERALL
 from phyblock.report.load import Run
-from phyblock.report.questions import OVERALL_CELL, questions_frame
 from phyblock.report.text_table import NO_VALUE, number
-from phyblock.report.vqa import published_cells
 
-__all__ = ["HUMAN_ACCURACY", "Cell", "Headline", "Row", "assembly_headline", "vqa_headline"]
+__all__ = [
+    "HUMAN_ACCURACY",
+    "HUMAN_NOTE",
+    "Cell",
+    "Headline",
+    "Kind",
+    "Row",
+    "assembly_headline",
+    "kinds_of",
+    "plain",
+]
 
 HUMAN_ACCURACY = 94.7
 """Human experts [%]: 378.83 points on 400 tasks of planning and VQA (paper, appendix)."""
 
-_CATEGORY_NAMES = {
-    "object_property": "Property",
-    "object_relationship": "Relationship",
-    "scene_understanding": "Scene",
-    "dynamic_reasoning": "Dynamics",
-}
-_HUMAN_NOTE = (
+HUMAN_NOTE = (
     "Human experts scored 378.83 of 400 tasks drawn from planning and VQA together (paper, "
     "appendix): an accuracy, shown for scale."
 )
+"""What stands under every table that shows it."""
 Kind = Literal["model", "baseline", "reference"]
 
 
@@ -84,7 +86,7 @@ def assembly_headline(run: Run) -> Headline | None:
     published = _published_f1(run)
     rows = [
         _row(name, kind, cells[cells["model"] == name], run, published)
-        for name, kind in _kinds(run).items()
+        for name, kind in kinds_of(run).items()
     ]
     names = [_level_name(level) for level in design.levels]
     columns = (*names, "Precision", "Recall", *(("Published",) if published else ()))
@@ -92,56 +94,14 @@ def assembly_headline(run: Run) -> Headline | None:
         "Full planning" if design.tracks[0] == "full_planning" else design.tracks[0],
         columns,
         (*rows, *_references(run, has_published=bool(published))),
-        (_how(run), _HUMAN_NOTE),
+        (_how(run), HUMAN_NOTE),
         len(names) - 1,
         names[-1],
         {"Random": _published_random(OVERALL), "Human": HUMAN_ACCURACY},
     )
 
 
-def vqa_headline(run: Run) -> Headline | None:
-    """Accuracy by category and overall; None for a run without questions."""
-    if "vqa" not in run.design.suite.tracks:
-        return None
-    found = {(row["model"], row["cell"]): row for row in questions_frame(run).to_dict("records")}
-    cells = (*CATEGORIES, OVERALL_CELL)
-    several = len(run.design.suite.seeds) > 1
-    rows = []
-    for name, kind in _kinds(run).items():
-        shown = [_accuracy(found[name, cell], several) for cell in cells]
-        overall = shown[-1].value
-        strip = None if overall is None else (overall, overall, overall)
-        rows.append(Row(name, kind, tuple(shown), strip))
-    printed = published_cells("Random")
-    random = tuple(_plain(printed[cell]) for cell in cells)
-    human = tuple(Cell("") for _ in CATEGORIES)
-    rows += [
-        Row("Random, published", "reference", random),
-        Row("Human experts, published", "reference", (*human, _plain(HUMAN_ACCURACY))),
-    ]
-    seeds = len(run.design.suite.seeds)
-    how = f"Accuracy in percent{f'; mean of {seeds} seeds, ± their sd' if several else ''}."
-    macro = "A category is the unweighted mean of its four subtasks, overall that of the categories"
-    return Headline(
-        "VQA",
-        (*_CATEGORY_NAMES.values(), "Overall"),
-        tuple(rows),
-        (f"{how} {macro}.", _HUMAN_NOTE),
-        len(CATEGORIES),
-        "Overall",
-        {"Random": printed[OVERALL_CELL], "Human": HUMAN_ACCURACY},
-    )
-
-
-def _accuracy(row: Mapping[Hashable, float], several: bool) -> Cell:
-    value = 100 * row["accuracy_mean" if several else "accuracy"]
-    if math.isnan(value):
-        return Cell(NO_VALUE)
-    sd = 100 * row["accuracy_sd"]
-    return Cell(number(value), value, f"± {number(sd)}" if several and not math.isnan(sd) else "")
-
-
-def _kinds(run: Run) -> dict[str, Kind]:
+def kinds_of(run: Run) -> dict[str, Kind]:
     """Which models are baselines; these come last."""
     kinds = {model["name"]: model.get("kind") for model in run.manifest["models"]}
     baselines = [name for name in run.design.model_names if kinds.get(name) == "baseline"]
@@ -156,7 +116,7 @@ def _row(name: str, kind: Kind, cells: pd.DataFrame, run: Run, published: dict[s
     overall = by_level[OVERALL]
     shown += [_cell(overall, metric, several) for metric in METRICS[:2]]
     if published:
-        shown.append(_plain(published.get(name, math.nan)))
+        shown.append(plain(published.get(name, math.nan)))
     f1, low, high = (100 * overall.get(f"f1{end}", math.nan) for end in ("", "_lo", "_hi"))
     strip = None if math.isnan(f1) else (f1, *_bounds(f1, low, high))
     return Row(name, kind, tuple(shown), strip)
@@ -172,7 +132,8 @@ def _cell(row: Mapping[Hashable, float], metric: str, several: bool) -> Cell:
     return Cell(number(value), value, below)
 
 
-def _plain(value: float) -> Cell:
+def plain(value: float) -> Cell:
+    """A percentage with nothing under it."""
     return Cell(NO_VALUE) if math.isnan(value) else Cell(number(value), value)
 
 
@@ -198,8 +159,8 @@ def _published_random(level: str, metric: str = "f1") -> float:
 
 def _references(run: Run, *, has_published: bool) -> tuple[Row, ...]:
     levels = run.design.levels
-    random = [_plain(_published_random(level)) for level in levels]
-    random += [_plain(_published_random(OVERALL, metric)) for metric in METRICS[:2]]
+    random = [plain(_published_random(level)) for level in levels]
+    random += [plain(_published_random(OVERALL, metric)) for metric in METRICS[:2]]
     human = [Cell("") for _ in random]
     human[len(levels) - 1] = Cell(number(HUMAN_ACCURACY), HUMAN_ACCURACY)
     blank = [Cell("")] if has_published else []

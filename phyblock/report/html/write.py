@@ -14,7 +14,8 @@ from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
 from phyblock.report.figures import FIGURES, write_figures
 from phyblock.report.html.drawable import kit, question_entry, scene_entry
-from phyblock.report.html.headline import assembly_headline, vqa_headline
+from phyblock.report.html.headline import assembly_headline
+from phyblock.report.html.headline_tracks import steps_headline, vqa_headline
 from phyblock.report.html.index import Item, SampleIndex, read_places
 from phyblock.report.html.pack import Pack, write_script
 from phyblock.report.html.page import Figure, render_page
@@ -131,7 +132,7 @@ def _scenes(run: Run) -> list[str]:
 
 def _page(written: TablesWritten, figures: Sequence[Path], build: str) -> str:
     run = written.run
-    headlines = [assembly_headline(run), vqa_headline(run)]
+    headlines = [assembly_headline(run), vqa_headline(run), steps_headline(run)]
     return render_page(
         about=_about(run),
         headlines=[headline for headline in headlines if headline],

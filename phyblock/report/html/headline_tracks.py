@@ -1,0 +1,119 @@
+"""The headline tables of questions and of episodes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping
+
+from phyblock.domain import CATEGORIES
+from phyblock.report.html.headline import (
+    HUMAN_ACCURACY,
+    HUMAN_NOTE,
+    Cell,
+    Headline,
+    Row,
+    kinds_of,
+    plain,
+)
+from phyblock.report.load import Run
+from phyblock.report.questions import OVERALL_CELL, questions_frame
+from phyblock.report.table3 import table3_frame
+from phyblock.report.text_table import NO_VALUE, number
+from phyblock.report.vqa import published_cells
+
+__all__ = ["steps_headline", "vqa_headline"]
+
+_CATEGORY_NAMES = {
+    "object_property": "Property",
+    "object_relationship": "Relationship",
+    "scene_understanding": "Scene",
+    "dynamic_reasoning": "Dynamics",
+}
+_STEP_CELLS = {
+    "placed_precision": "Precision",
+    "placed_recall": "Recall",
+    "placed_f1": "F1",
+    "attempted_f1": "F1 of attempts",
+    "completion": "Completed",
+}
+
+
+def vqa_headline(run: Run) -> Headline | None:
+    """Accuracy by category and overall; None for a run without questions."""
+    if "vqa" not in run.design.suite.tracks:
+        return None
+    found = {(row["model"], row["cell"]): row for row in questions_frame(run).to_dict("records")}
+    cells = (*CATEGORIES, OVERALL_CELL)
+    several = len(run.design.suite.seeds) > 1
+    rows = []
+    for name, kind in kinds_of(run).items():
+        shown = [_accuracy(found[name, cell], several) for cell in cells]
+        overall = shown[-1].value
+        strip = None if overall is None else (overall, overall, overall)
+        rows.append(Row(name, kind, tuple(shown), strip))
+    printed = published_cells("Random")
+    random = tuple(plain(printed[cell]) for cell in cells)
+    human = tuple(Cell("") for _ in CATEGORIES)
+    rows += [
+        Row("Random, published", "reference", random),
+        Row("Human experts, published", "reference", (*human, plain(HUMAN_ACCURACY))),
+    ]
+    seeds = len(run.design.suite.seeds)
+    how = f"Accuracy in percent{f'; mean of {seeds} seeds, ± their sd' if several else ''}."
+    macro = "A category is the unweighted mean of its four subtasks, overall that of the categories"
+    return Headline(
+        "VQA",
+        (*_CATEGORY_NAMES.values(), "Overall"),
+        tuple(rows),
+        (f"{how} {macro}.", HUMAN_NOTE),
+        len(CATEGORIES),
+        "Overall",
+        {"Random": printed[OVERALL_CELL], "Human": HUMAN_ACCURACY},
+    )
+
+
+def _accuracy(row: Mapping[Hashable, float], several: bool) -> Cell:
+    value = 100 * row["accuracy_mean" if several else "accuracy"]
+    if math.isnan(value):
+        return Cell(NO_VALUE)
+    sd = 100 * row["accuracy_sd"]
+    return Cell(number(value), value, f"± {number(sd)}" if several and not math.isnan(sd) else "")
+
+
+def steps_headline(run: Run) -> Headline | None:
+    """Scores of the blocks placed, as in Table 3, with F1 over all attempts and goals completed.
+
+    None for a run without episodes.
+    """
+    if "step_planning" not in run.design.suite.tracks:
+        return None
+    table = table3_frame(run).to_dict("records")
+    ours = {row["model"]: row for row in table if row["source"] == "run"}
+    printed = [row for row in table if row["source"] == "published"]
+    rows = []
+    for name, kind in kinds_of(run).items():
+        shown = [_mean(ours[name], cell) for cell in _STEP_CELLS]
+        f1 = ours[name]["placed_f1"]
+        rows.append(Row(name, kind, tuple(shown), None if math.isnan(f1) else (f1, f1, f1)))
+    rows += [
+        Row(
+            f"{row['published_name']}, published",
+            "reference",
+            tuple(plain(row.get(cell, math.nan)) for cell in _STEP_CELLS),
+        )
+        for row in printed
+    ]
+    note = (
+        f"Percent, setting {run.design.setting}. Precision, recall and F1 are of the blocks that "
+        "were placed, as in the paper's Table 3; F1 of attempts counts every move that placed "
+        "nothing as wrong; completed are episodes that placed the whole goal."
+    )
+    names = tuple(_STEP_CELLS.values())
+    return Headline("Step planning", names, tuple(rows), (note,), names.index("F1"), "F1", {})
+
+
+def _mean(row: Mapping[Hashable, float], cell: str) -> Cell:
+    value, sd = row[cell], row.get(f"{cell}_sd", math.nan)
+    if math.isnan(value):
+        return Cell(NO_VALUE)
+    return Cell(number(value), value, "" if math.isnan(sd) else f"± {number(sd)}")
