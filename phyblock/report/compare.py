@@ -122,7 +122,8 @@ def compare(pairs: Sequence[tuple[Side, Side]], levels: Sequence[str]) -> Compar
     parts: list[pd.DataFrame] = []
     flips: list[pd.DataFrame] = []
     for level in levels:
-        samples = {label: _samples(side, level, design) for label, side in sides.items()}
+        of_run = {id(run): _samples(run, level, design) for run in runs}
+        samples = {label: of_run[id(side.run)][side.model] for label, side in sides.items()}
         joined = [
             pd.concat([samples[a], samples[b]], axis=1, join="inner", keys=["a", "b"])
             for a, b in labels
@@ -159,19 +160,19 @@ def _check_alike(run: Run, first: Run) -> None:
         raise SpecError(Problem(str(run.path), message, "scenes", found))
 
 
-def _samples(side: Side, level: str, design: Design) -> pd.DataFrame:
-    """Counts by (scene, seed) of one model at one level."""
-    scores = cell_scores(side.run)
+def _samples(run: Run, level: str, design: Design) -> dict[str, pd.DataFrame]:
+    """Counts by (scene, seed) at one level, by model."""
+    scores = cell_scores(run)
     criterion = design.criterion(level)
     kept = scores[
-        (scores["model"] == side.model)
-        & (scores["level"] == level)
+        (scores["level"] == level)
         & scores["track"].isin(design.tracks[:1])
         & (scores["criterion"] == criterion)
         & (scores["setting"] == design.setting)
         & (scores["matcher"] == design.matchers(criterion)[0])
-    ]
-    return kept.set_index(["scene", "seed"])[_COUNTS]
+    ].set_index(["scene", "seed"])
+    parts = {str(model): part[_COUNTS] for model, part in kept.groupby("model", sort=False)}
+    return {model: parts.get(model, kept.iloc[:0][_COUNTS]) for model in run.design.model_names}
 
 
 def _differences(
