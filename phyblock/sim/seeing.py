@@ -44,10 +44,15 @@ _STYLE = PictureStyle(SEEN_PX)
 
 
 class Top(NamedTuple):
-    """A point of a surface [m], rounded to 0.1 mm, and the z of the surface's unit normal."""
+    """A point of a block's surface [m], rounded to 0.1 mm, and where it lies on the block.
+
+    `rise` is the z of the surface's unit normal, `off_center_m` how far the point is from the
+    vertical line through the middle of the block.
+    """
 
     position_m: tuple[float, float, float]
     rise: float
+    off_center_m: float
 
 
 @functools.lru_cache(maxsize=48)
@@ -186,4 +191,6 @@ def _hit(block: DrawnBlock, camera: Camera, pixel: tuple[int, int]) -> Top | Non
     nearest = int(np.argmin(np.where(met, away, np.inf)))
     x, y, z = (round(float(part), 4) + 0.0 for part in camera.eye_m + away[nearest] * ray)
     normal = np.cross(one[nearest], two[nearest])
-    return Top((x, y, z), float(normal[2] / np.linalg.norm(normal)))
+    middle = (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1))) / 2
+    off_center_m = float(np.hypot(x - middle[0], y - middle[1]))
+    return Top((x, y, z), float(normal[2] / np.linalg.norm(normal)), off_center_m)

@@ -37,17 +37,18 @@ from phyblock.sim.support import bounds_m, drop_height_m
 
 __all__ = ["AffordanceMaker"]
 
-_BLOCKS_TRIED = 4
-_PLACES_TRIED = 30
-_WRONG = 3
-_STEP_PX = 8
+_BLOCKS_TRIED = 6
+_PLACES_TRIED = 40
+_STEP_PX = 5
 _LEAST_RISE = 0.6
 _FLAT_RISE = 0.99
 _FLAT_GAP_M, _SLOPED_GAP_M = 0.0015, 0.03
-_SHIFT_M = 0.008
+_SHIFTS_M = ((0.007, 0.0), (-0.007, 0.0), (0.0, 0.007), (0.0, -0.007))
+_CENTRAL_M = 0.022
+_CENTRAL_TRIED = 8
 _OFF_CENTER_M = 0.001
 _LIFT_M = 0.6
-_APART_PX = 20.0
+_APART_PX = 18.0
 
 
 def _balanced() -> list[tuple[BlockType, Euler]]:
@@ -73,7 +74,7 @@ class AffordanceMaker:
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    scenes_tried = 160
+    scenes_tried = 400
     drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -125,46 +126,52 @@ def _drawn_block(scene: Scene, rng: np.random.Generator) -> Block:
     return Block(order, block_type, pick(rng, COLORS), (0.0, 0.0, 0.0), euler, (), 1)
 
 
-def _places(
-    scene: Scene, block: Block, tops: Sequence[Top], plain: QuestionPicture
-) -> list[Mark] | None:
-    """The right place and three wrong ones, apart in the picture; None when there are too few."""
-    right: list[Mark] = []
-    wrong: list[Mark] = []
-    tried = 0
-    for top in tops:
-        mark = Mark("A", top.position_m)
-        if not is_apart(plain, mark, [*right, *wrong], _APART_PX):
-            continue
-        if not is_inside(replace(plain, marks=(mark,))) or not _is_met(scene, block, top):
-            continue
-        tried += 1
-        verdict = _surely(scene, block, top.position_m, len(right) < 1, len(wrong) < _WRONG)
-        if verdict is not None:
-            (right if verdict else wrong).append(mark)
-        if right and len(wrong) == _WRONG:
-            return [*right, *wrong]
-        if tried == _PLACES_TRIED:
-            break
-    return None
+def _places(scene: Scene, block: Block, tops: Sequence[Top], plain: QuestionPicture) -> list[Mark]:
+    """The right place and three wrong ones, apart in the picture; none where there are too few.
+
+    The right one is looked for first and on a flat top near the middle of a block: elsewhere it is
+    rare. Wrong ones may be anywhere.
+    """
+    central = [t for t in tops if t.off_center_m < _CENTRAL_M and t.rise >= _FLAT_RISE]
+    chosen = _first_sure(scene, block, central[:_CENTRAL_TRIED], True, [], plain)
+    if not chosen:
+        return []
+    chosen += _first_sure(scene, block, tops[:_PLACES_TRIED], False, chosen, plain)
+    return chosen if len(chosen) == len(LETTERS) else []
 
 
-def _surely(
+def _first_sure(
     scene: Scene,
     block: Block,
-    place_m: tuple[float, float, float],
-    wants_right: bool,
-    wants_wrong: bool,
-) -> bool | None:
-    """Whether it stays at a place, and likewise 8 mm off in every direction; None if unsure."""
+    tops: Sequence[Top],
+    stays: bool,
+    others: Sequence[Mark],
+    plain: QuestionPicture,
+) -> list[Mark]:
+    """The first place where it surely stays, or as many where it surely does not as are wanted."""
+    found: list[Mark] = []
+    wanted = 1 if stays else len(LETTERS) - 1
+    for top in tops:
+        mark = Mark("A", top.position_m)
+        is_fit = (
+            len(found) < wanted
+            and is_apart(plain, mark, [*others, *found], _APART_PX)
+            and is_inside(replace(plain, marks=(mark,)))
+            and _is_met(scene, block, top)
+        )
+        if is_fit and _is_sure(scene, block, top.position_m, stays):
+            found.append(mark)
+    return found
+
+
+def _is_sure(scene: Scene, block: Block, place_m: tuple[float, float, float], stays: bool) -> bool:
+    """Whether it stays, or does not, at a place and likewise 7 mm off in every direction."""
     x, y, z = place_m
-    first = _verdict(scene, block, place_m, OUTCOME_SETTINGS[:1])
-    if first is None or not (wants_right if first else wants_wrong):
-        return None
-    for dx, dy in ((_SHIFT_M, 0.0), (-_SHIFT_M, 0.0), (0.0, _SHIFT_M), (0.0, -_SHIFT_M)):
-        if _verdict(scene, block, (x + dx, y + dy, z), OUTCOME_SETTINGS[:1]) != first:
-            return None
-    return first if _verdict(scene, block, place_m, OUTCOME_SETTINGS[1:]) == first else None
+    places = [place_m, *((x + dx, y + dy, z) for dx, dy in _SHIFTS_M)]
+    quick = OUTCOME_SETTINGS[:1]
+    if any(_verdict(scene, block, place, quick) is not stays for place in places):
+        return False
+    return _verdict(scene, block, place_m, OUTCOME_SETTINGS[1:]) is stays
 
 
 def _verdict(
