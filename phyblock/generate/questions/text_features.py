@@ -2,6 +2,7 @@
 
 These are the shortcuts that multiple-choice questions are known for: words that are right often,
 the largest or the middle number, the option that shares most with the others, the longest one.
+Letters are left out: how often each is right is counted, not learned.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from phyblock.domain.question import Question
 __all__ = ["option_features"]
 
 _WORD = re.compile(r"[a-z]+|\d+(?:\.\d+)?")
+_CROSSED = 0.25
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
@@ -30,7 +32,6 @@ def option_features(question: Question) -> list[Mapping[str, float]]:
             **_likeness(words, i),
             **_rank("number", numbers, i),
             **_rank("length", lengths, i),
-            f"letter {i}": 1.0,
             "asked about": float(len(asked.intersection(words[i]))),
         }
         for i in range(len(question.options))
@@ -40,7 +41,7 @@ def option_features(question: Question) -> list[Mapping[str, float]]:
 def _word_features(words: Sequence[str], asked: set[str]) -> dict[str, float]:
     pairs = [" ".join(pair) for pair in itertools.pairwise(words)]
     features = {f"option {word}": 1.0 for word in [*words, *pairs, " ".join(words)]}
-    crossed = {f"asked {one} option {' '.join(words)}": 0.5 for one in asked}
+    crossed = {f"asked {one} option {' '.join(words)}": _CROSSED for one in asked}
     return features | crossed
 
 
