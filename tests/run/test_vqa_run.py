@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
+import json
 import re
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
 import pytest
+from PIL import Image as PillowImage
 
 from phyblock.datasets import read_builtin, read_questions
 from phyblock.domain import LETTERS, SUBTASKS, Question
@@ -250,3 +252,35 @@ def test_a_baseline_of_plans_has_no_rule_for_questions(workspace: Workspace) -> 
     done = workspace.run("--dry-run")
     assert done.code == 2
     assert "has no rule for vqa" in done.errors[0]
+
+
+def test_pictures_of_official_files_are_sent_byte_for_byte(workspace: Workspace) -> None:
+    folder = workspace.root / "questions"
+    folder.mkdir()
+    entry = {
+        "scene_id": "t1",
+        "question": "What comes next?",
+        "options": ["<img1>", "<img2>", "<img3>", "<img4>"],
+        "answer": 4,
+    }
+    (folder / "PD.json").write_text(json.dumps([entry]), encoding="utf-8")
+    digests = {}
+    for name in ("t1", *(f"pd-001/img{i}" for i in range(1, 5))):
+        path = folder / "images" / f"{name}.png"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        PillowImage.new("RGB", (40, 30), (8 * len(digests), 90, 120)).save(path)
+        digests[name] = hashlib.sha256(path.read_bytes()).hexdigest()
+    server = Answering(lambda _: "D")
+    with Running(server) as running:
+        workspace.write_models(running.url, "alpha")
+        fields = vqa_suite(format="official", circular=True)
+        workspace.write_suite(**{**fields, "models": ["alpha"]})
+        done = workspace.run()
+    assert (done.code, done.err) == (0, "")
+    first, *others = digests.values()
+    sent = [tuple(digest for _, digest in shown(seen)) for seen in server.seen]
+    turned = {(first, *others[by:], *others[:by]) for by in range(4)}
+    assert len(sent) == len(turned) == 4
+    assert set(sent) == turned
+    right = {record["answer"]["right"] for record in workspace.records()}
+    assert right == set(LETTERS)
