@@ -7,6 +7,7 @@ import json
 import random
 import signal
 import time
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -190,3 +191,31 @@ def test_a_model_that_refuses_leaves_episodes_without_steps(workspace: Workspace
     for record in workspace.records():
         assert (record["outcome"], record["ending"]) == ("refusal", "unanswered")
         assert record["turns"] == []
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"tracks": ["full_planning", "step_planning"], "models": ["repeat"]}, "has no rule for"),
+        ({"models": ["all-candidates"]}, "has no rule for step_planning"),
+        ({"steps": {"max_steps": 0}}, "steps.max_steps"),
+    ],
+)
+def test_what_cannot_be_played_is_said(
+    workspace: Workspace, fields: dict[str, Any], message: str
+) -> None:
+    prepare(workspace, "http://nowhere", **fields)
+    done = workspace.run("--dry-run")
+    assert (done.code, len(done.errors)) == (2, 1)
+    assert message in done.errors[0]
+
+
+def test_a_goal_that_is_not_drawn_is_no_match_for_states_that_are(
+    workspace: Workspace, official_checkout: Path
+) -> None:
+    official = {"format": "official", "path": str(official_checkout)}
+    prepare(workspace, "http://nowhere", dataset=official, images={"source": "dataset"})
+    done = workspace.run("--dry-run")
+    assert (done.code, len(done.errors)) == (2, 1)
+    assert "step planning draws every state" in done.errors[0]
+    assert "images.source=render" in done.errors[0]

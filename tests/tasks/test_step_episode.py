@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -18,11 +19,12 @@ from phyblock.datasets import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Block, Candidate, CandidateSet, Scene
 from phyblock.models import BASELINES
 from phyblock.models.base import Reply, Request, StepSubject, Usage
-from phyblock.parsing.move import parse_move
-from phyblock.scoring import SETTINGS, Setting
+from phyblock.parsing.move import MOVE_PROBLEMS, parse_move
+from phyblock.scoring import MOVE_OUTCOMES, SETTINGS, Setting
 from phyblock.tasks import ENDINGS, StepLimits, StepPlanning, StepRules
 from phyblock.tasks.step_episode import StepEpisode
 from phyblock.tasks.step_rules import Tally, majority
+from tests.parsing.test_move_parser import REPLIES
 
 BUILT_IN = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400"
 OPEN = StepLimits(failures=None, repeats=None)
@@ -162,6 +164,17 @@ def test_limits_end_an_episode(limits: StepLimits, agent: Agent, ending: str, st
 def test_completing_with_the_last_step_is_completing() -> None:
     fields, _ = play(tower("red"), scripted("Move(1)"), StepRules(limits=StepLimits(steps=1)))
     assert fields["ending"] == "completed"
+
+
+def test_no_hostile_reply_stops_an_episode() -> None:
+    """Each of them has its named outcome, and what follows is played as if it had not been."""
+    allowed = {*MOVE_OUTCOMES, *MOVE_PROBLEMS, "done"}
+    for text, _ in REPLIES:
+        fields, _ = play(tower("red", "blue"), scripted(text, "Move(1)", "Move(3)"))
+        assert set(fields["outcomes"]) <= allowed, text
+        expected = "done" if fields["outcomes"][0] == "done" else "completed"
+        assert fields["ending"] == expected, text
+        json.dumps(fields, allow_nan=False)
 
 
 @given(st.lists(st.sampled_from(["Move(1)", "Move(3)", "Move(6)", "?", "Move(40)"]), max_size=60))
