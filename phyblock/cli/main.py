@@ -20,6 +20,7 @@ _VERBS = {
     "compare": "Compare models on the same samples: difference, interval, verdict.",
     "export": "Write a run for Inspect AI, Hugging Face datasets, or as CSV or Parquet.",
     "episode": "Show a step-planning episode, as text or as a GIF.",
+    "export-data": "Write questions with pictures for VLMEvalKit or Hugging Face.",
     "models": "List models with kinds, prices and keys; check one.",
     "validate": "Check suites, models files and data sets.",
     "scenes": "Make, check, show and draw scenes.",

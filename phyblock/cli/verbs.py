@@ -14,7 +14,8 @@ __all__ = ["Verbs"]
 class Verbs(click.Group):
     """A group whose verbs' names and help texts are known without importing any of them.
 
-    `verbs` maps a name to its help; the verb is `command` in the module `prefix` + name.
+    `verbs` maps a name to its help; the verb is `command` in the module `prefix` + name, with
+    underscores for hyphens.
     """
 
     def __init__(self, *, verbs: Mapping[str, str], prefix: str, **options: Any) -> None:
@@ -32,7 +33,7 @@ class Verbs(click.Group):
         del ctx
         if cmd_name not in self._verbs:
             return None
-        command = importlib.import_module(f"{self._prefix}{cmd_name}").command
+        command = importlib.import_module(f"{self._prefix}{cmd_name.replace('-', '_')}").command
         assert isinstance(command, click.Command)
         return command
 
