@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["PUBLISHED_NAMES", "match_published"]
+__all__ = ["PUBLISHED_NAMES", "TABLE2_NAMES", "match_published"]
 
 _SPELLINGS: dict[str, tuple[str, ...]] = {
     "Claude-3.5 Haiku": (),
@@ -48,10 +48,11 @@ _OTHER_SPELLINGS: dict[str, tuple[str, ...]] = {
     "GPT-o3": ("o3",),
     "Qwen2.5-VL-72B-Instruct": ("qwen2.5-vl-72b",),
 }
-"""Models that Table 2 alone has a row of."""
 
 PUBLISHED_NAMES: tuple[str, ...] = tuple(_SPELLINGS)
 """Row names of Table 1, in its order."""
+TABLE2_NAMES: tuple[str, ...] = tuple(_OTHER_SPELLINGS)
+"""Names that Table 2 has a row of and Table 1 has not."""
 
 _TOKEN = re.compile(r"[a-z]+|[0-9]+|[^\W_]+")
 _MONTH, _DAY = "(?:0[1-9]|1[0-2])", "(?:0[1-9]|[12][0-9]|3[01])"
