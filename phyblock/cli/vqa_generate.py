@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -12,7 +13,9 @@ from phyblock.cli.scenes_data import read_data_set
 from phyblock.cli.scenes_work import jobs_option, ray_option
 from phyblock.cli.vqa_data import DEFAULT_SCENES
 from phyblock.cli.vqa_subtasks import subtasks_option
-from phyblock.domain import SUBTASKS, Subtask
+from phyblock.domain import SUBTASKS, Question, Subtask
+from phyblock.errors import SpecError
+from phyblock.generate.questions.audit import SubtaskAudit, audit_questions
 from phyblock.generate.questions.production import PER_SUBTASK, make_questions
 from phyblock.generate.questions.writing import check_place, write_questions
 from phyblock.generate.workers import open_workers
@@ -84,6 +87,15 @@ def command(
         made_by += f" --subtasks {','.join(subtasks)}"
     if per_subtask is not None:
         made_by += f" --per-subtask {per_subtask}"
-    write_questions(out, questions, {scene.id: scene for scene in scenes}, made_by)
+    originals = {scene.id: scene for scene in scenes}
+    write_questions(out, questions, originals, made_by, _audits(questions))
     told_of = f"{len(questions)} questions in {len(subtasks)} subtasks"
     click.echo(f"{told_of}: {shown_path(out)}")
+
+
+def _audits(questions: Sequence[Question]) -> list[SubtaskAudit]:
+    """The audit for the data card; without the probe of the texts where scikit-learn is not."""
+    try:
+        return list(audit_questions(questions))
+    except SpecError:
+        return list(audit_questions(questions, with_text_probe=False))

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
+from phyblock.generate.questions.audit import SubtaskAudit
 from phyblock.generate.questions.seeing import COUNTED, NAMED, SHAPED, SHAPED_AREA, STUDIED
 
 __all__ = ["question_card"]
@@ -93,12 +94,29 @@ last column is the share of the most frequent right option text.
 `questions.jsonl` holds one question a line; docs/vqa.md describes the fields.
 """
 
+_AUDIT_TEXT = """
+## Audit
 
-def question_card(name: str, questions: Sequence[Question], made_by: str, audit: str = "") -> str:
-    """Markdown text of the card of a set of questions called `name`.
+From `phyblock vqa audit`:
 
-    `audit` is a section that is taken in as it is.
-    """
+| subtask | letters | chance | majority | text only | alike | repeats | named | least seen | most | base scenes |
+|---|---|---|---|---|---|---|---|---|---|---|
+{rows}
+
+Letters: the rarest and the most frequent. Majority and text only: accuracy of the most frequent
+answer and of a classifier of the texts, on questions about other base scenes than those they were
+told the answers of; both stay under chance where answers are even, because what was frequent among
+the others is then rare among those held out. Alike: questions with options that read alike.
+Repeats: questions that ask what another asks. Named: blocks that words name, and the least that
+one of them shows of itself. Most: questions about the scene with most; base scenes: the scenes
+asked about are made from so many.
+"""  # noqa: E501
+
+
+def question_card(
+    name: str, questions: Sequence[Question], made_by: str, audits: Sequence[SubtaskAudit] = ()
+) -> str:
+    """Markdown text of the card of a set of questions called `name`."""
     by_subtask = {s: [q for q in questions if q.subtask == s] for s in SUBTASKS}
     return _TEXT.format(
         name=name,
@@ -112,8 +130,24 @@ def question_card(name: str, questions: Sequence[Question], made_by: str, audit:
         shaped=SHAPED,
         area=SHAPED_AREA,
         rows="\n".join(_row(found) for found in by_subtask.values() if found),
-        audit=f"\n{audit.strip()}\n\n" if audit else "\n",
+        audit=_audit_text(audits) if audits else "",
     )
+
+
+def _audit_text(audits: Sequence[SubtaskAudit]) -> str:
+    return _AUDIT_TEXT.format(rows="\n".join(map(_audit_row, audits)))
+
+
+def _audit_row(audit: SubtaskAudit) -> str:
+    low, high = audit.letter_shares
+    seen = "" if audit.least_seen is None else f"{audit.least_seen[0]:.0%}"
+    text_only = "" if audit.text_only is None else f"{audit.text_only:.0%}"
+    cells = [
+        *(audit.subtask, f"{low:.0%} to {high:.0%}", f"{audit.chance:.0%}"),
+        *(f"{audit.majority:.0%}", text_only, len(audit.ambiguous), len(audit.duplicates)),
+        *(audit.named or "", seen, audit.most_of_a_scene, audit.bases),
+    ]
+    return f"| {' | '.join(map(str, cells))} |"
 
 
 def _row(questions: Sequence[Question]) -> str:

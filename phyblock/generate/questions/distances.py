@@ -111,7 +111,10 @@ class DistanceMaker(StaticMaker):
         if rule == "apart" and not _are_joined(named[0], named[-1], blocks):
             raise UnfairError("the blocks are parts of structures that stand apart")
         right_cm = _grid_cm(_RULES[rule](named[0], named[-1]))
-        values = sorted(float(option.removesuffix(" cm")) for option in question.options)
+        try:
+            values = sorted(float(option.removesuffix(" cm")) for option in question.options)
+        except ValueError as error:
+            raise UnfairError("some option is no length in centimeters") from error
         if any(high < 1.2 * low for low, high in itertools.pairwise(values)):
             raise UnfairError("two values are less than 20 % apart")
         return index_of(question, _shown(right_cm))

@@ -9,6 +9,7 @@ from pathlib import Path
 from phyblock.domain.question import Question
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
+from phyblock.generate.questions.audit import SubtaskAudit
 from phyblock.generate.questions.card import question_card
 from phyblock.generate.questions.records import question_line
 
@@ -31,16 +32,16 @@ def write_questions(
     questions: Sequence[Question],
     originals: Mapping[str, Scene],
     made_by: str,
-    audit: str = "",
+    audits: Sequence[SubtaskAudit] = (),
 ) -> None:
     """Write the questions, sorted as they are, with card and checksums; StoreError if it cannot.
 
     `originals` are the scenes as stored, by id; `made_by` is the command that makes the same
-    files; `audit` is a table in Markdown that the card takes in.
+    files; `audits` are told of in the card.
     """
     lines = "".join(f"{question_line(q, originals[q.scene.id])}\n" for q in questions)
     files = {
-        _CARD_FILE: question_card(folder.name, questions, made_by, audit).encode(),
+        _CARD_FILE: question_card(folder.name, questions, made_by, audits).encode(),
         QUESTIONS_FILE: lines.encode(),
     }
     sums = "".join(f"{hashlib.sha256(d).hexdigest()}  {name}\n" for name, d in files.items())
