@@ -85,6 +85,7 @@ def select_questions(
         for name in SUBTASKS
         if name in subtasks
     ]
+    groups = [group for group in groups if group]
     sizes = [
         len(group) if per_subtask is None else min(per_subtask, len(group)) for group in groups
     ]
