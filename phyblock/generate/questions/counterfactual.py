@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from phyblock.generate.questions.pictured import (
 from phyblock.generate.questions.referring import names, resolve_one
 from phyblock.generate.questions.seeing import COUNTED, GOAL_VIEW, NAMED, are_seen, require_seen
 from phyblock.generate.questions.wording import slots_of
-from phyblock.sim.outcomes import Outcome, Push, after, after_removal
+from phyblock.sim.outcomes import OUTCOME_SETTINGS, Outcome, Push, after, after_removal
 from phyblock.sim.seeing import block_mark, is_apart, seen, seen_order
 
 __all__ = ["OUTCOME_TEXTS", "CounterfactualMaker", "marked_order"]
@@ -44,7 +45,9 @@ OUTCOME_TEXTS = (
 TAKEN = "X"
 """The letter of the block that is taken away or pushed."""
 _ALL_SEEN = 0.12
-_REMOVALS_TRIED = 6
+_REMOVALS_TRIED = 5
+_OTHERS_TRIED = 4
+_TOPPLED_M = 0.06
 
 
 class CounterfactualMaker:
@@ -60,11 +63,11 @@ class CounterfactualMaker:
         if len(scene) < 4 or not are_seen(scene.blocks, orders, _ALL_SEEN):
             return
         taken = shuffled(rng, [o for o in orders if are_seen(scene.blocks, (o,), NAMED)])
-        outcomes = {order: after_removal(scene.blocks, order) for order in taken[:_REMOVALS_TRIED]}
-        clear = {order: one for order, one in outcomes.items() if one.is_clear}
         makers = shuffled(rng, (_count, _which, _pictured))
-        for number, order in enumerate(clear):
-            yield from makers[number % 3](scene, order, clear, rng)
+        for number, order in enumerate(taken[:_REMOVALS_TRIED]):
+            outcome = after_removal(scene.blocks, order)
+            if outcome.is_clear:
+                yield from makers[number % 3](scene, order, outcome, rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """By simulating the removal again."""
@@ -104,11 +107,9 @@ def _taken(question: Question, slots: Mapping[str, str]) -> int:
     return marked_order(picture_of(question, "scene"), TAKEN)
 
 
-def _count(
-    scene: Scene, order: int, clear: dict[int, Outcome], rng: np.random.Generator
-) -> Iterator[Draft]:
+def _count(scene: Scene, order: int, outcome: Outcome, rng: np.random.Generator) -> Iterator[Draft]:
     """How many others do not stay."""
-    moved = clear[order].moved
+    moved = outcome.moved
     plain = state(scene, scene.blocks, GOAL_VIEW)
     mark = block_mark(plain, seen(plain), order, TAKEN)
     if mark is None or not are_seen(scene.blocks, moved, COUNTED):
@@ -121,11 +122,9 @@ def _count(
     yield draft(scene, rng, "cf-count", options, [shown], str(number), facts=facts)
 
 
-def _which(
-    scene: Scene, order: int, clear: dict[int, Outcome], rng: np.random.Generator
-) -> Iterator[Draft]:
+def _which(scene: Scene, order: int, outcome: Outcome, rng: np.random.Generator) -> Iterator[Draft]:
     """One of four marked blocks that does not stay."""
-    moved = clear[order].moved
+    moved = outcome.moved
     plain = state(scene, scene.blocks, GOAL_VIEW)
     shot = seen(plain)
     taken = block_mark(plain, shot, order, TAKEN)
@@ -147,7 +146,7 @@ def _which(
 
 
 def _pictured(
-    scene: Scene, order: int, clear: dict[int, Outcome], rng: np.random.Generator
+    scene: Scene, order: int, outcome: Outcome, rng: np.random.Generator
 ) -> Iterator[Draft]:
     """The settled scene among others of which some also lack the block."""
     block = next(b for b in scene.blocks if b.order == order)
@@ -155,18 +154,18 @@ def _pictured(
     if not found:
         return
     plain = state(scene, scene.blocks, GOAL_VIEW)
-    right = state(scene, clear[order].settled, GOAL_VIEW)
+    right = state(scene, outcome.settled, GOAL_VIEW)
     chosen = [right]
-    for wrong in (*_same_gone(scene, order, clear[order], rng), *_other_gone(order, clear)):
+    for wrong in chain(_same_gone(scene, order, outcome, rng), _other_gone(scene, order, rng)):
         tried = [*chosen, state(scene, wrong, GOAL_VIEW)]
         if are_told_apart([plain, *tried]) and _are_clear(scene, tried):
             chosen = tried
         if len(chosen) == 4:
             if not any(_lacks_only(scene, one, order) for one in chosen[1:]):
                 return
-            facts = {"removed": order, "moved": list(clear[order].moved)}
+            facts = {"removed": order, "moved": list(outcome.moved)}
             slots = {"block": pick(rng, found[:2])}
-            value = "falls" if clear[order].moved else "stays"
+            value = "falls" if outcome.moved else "stays"
             yield draft(scene, rng, "cf-picture", chosen, [plain], value, slots, facts)
             return
 
@@ -186,31 +185,34 @@ def _lacks_only(scene: Scene, picture: QuestionPicture, order: int) -> bool:
 
 def _same_gone(
     scene: Scene, order: int, outcome: Outcome, rng: np.random.Generator
-) -> list[tuple[Block, ...]]:
+) -> Iterator[tuple[Block, ...]]:
     """Wrong outcomes without the right block: nothing falls, only a part falls, or too much."""
     rest = tuple(block for block in scene.blocks if block.order != order)
     if not outcome.moved:
-        return _toppled(rest, rng)
+        yield from _toppled(rest, rng)
+        return
+    yield rest
     settled = {block.order: block for block in outcome.settled}
-    parts = [rest]
     for top in shuffled(rng, outcome.moved)[:2]:
-        parts.append(tuple(b if b.order == top else settled[b.order] for b in rest))
-    return parts
+        yield tuple(b if b.order == top else settled[b.order] for b in rest)
 
 
-def _toppled(rest: Sequence[Block], rng: np.random.Generator) -> list[tuple[Block, ...]]:
+def _toppled(rest: Sequence[Block], rng: np.random.Generator) -> Iterator[tuple[Block, ...]]:
     """The rest after a block that carries nothing was pushed off."""
     carrying = {order for block in rest for order in block.depend}
     tops = [b for b in rest if b.order not in carrying and b.depend]
-    found = []
     for block in shuffled(rng, tops)[:2]:
         direction = pick(rng, ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)))
-        outcome = after(rest, Push(block.order, direction, 0.06))
+        push = Push(block.order, direction, _TOPPLED_M)
+        outcome = after(rest, push, OUTCOME_SETTINGS[:1])
         if outcome.is_clear and outcome.moved:
-            found.append(outcome.settled)
-    return found
+            yield outcome.settled
 
 
-def _other_gone(order: int, clear: dict[int, Outcome]) -> list[tuple[Block, ...]]:
-    """What the removal of other blocks leaves."""
-    return [outcome.settled for other, outcome in clear.items() if other != order]
+def _other_gone(scene: Scene, order: int, rng: np.random.Generator) -> Iterator[tuple[Block, ...]]:
+    """What the removal of other blocks leaves; no answer hangs on it, so one setting will do."""
+    others = [block.order for block in scene.blocks if block.order != order]
+    for other in shuffled(rng, others)[:_OTHERS_TRIED]:
+        outcome = after_removal(scene.blocks, other, OUTCOME_SETTINGS[:1])
+        if outcome.is_clear:
+            yield outcome.settled

@@ -6,8 +6,9 @@ block waits for another that is not there yet or is out of place, and it moves w
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -32,8 +33,15 @@ from phyblock.generate.questions.pictured import (
 from phyblock.generate.questions.seeing import GOAL_VIEW
 from phyblock.generate.questions.wording import slots_of
 from phyblock.sim.camera import view_axes
-from phyblock.sim.outcomes import Outcome, Push, after, after_removal, holds
-from phyblock.sim.seeing import block_mark, is_inside, seen, shown_pixels
+from phyblock.sim.outcomes import (
+    OUTCOME_SETTINGS,
+    Outcome,
+    Push,
+    after,
+    after_removal,
+    holds,
+)
+from phyblock.sim.seeing import block_mark, seen, shown_pixels
 from phyblock.sim.support import bounds_m, drop_height_m
 
 __all__ = ["PredictiveMaker"]
@@ -155,7 +163,7 @@ def _first_fit(
         if len(chosen) == wanted:
             break
         picture = state(scene, (*base, block), GOAL_VIEW)
-        if block.order in used or not is_inside(picture):
+        if block.order in used:
             continue
         if shown_pixels(picture, seen(picture))[block.order] < _LEAST_SHOWN:
             continue
@@ -203,7 +211,7 @@ def _push(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         if not outcome.is_clear or block.order not in outcome.moved:
             continue
         wrong = _misjudged(scene, push, outcome, rng)
-        options = _distinct(scene, plain, [outcome.settled, *wrong], push)
+        options = _distinct(scene, plain, chain([outcome.settled], wrong), push)
         if len(options) == 4:
             facts = {"pushed": block.order, "moved": list(outcome.moved)}
             slots = {"direction": direction}
@@ -223,22 +231,26 @@ def _pushed(picture: QuestionPicture, order: int, direction: str) -> Push:
 def _misjudged(
     scene: Scene, push: Push, outcome: Outcome, rng: np.random.Generator
 ) -> Iterator[tuple[Block, ...]]:
-    """Wrong outcomes: the others stay, it carries too few or too many along, it goes elsewhere."""
+    """Wrong outcomes: the others stay, it carries too few or too many along, it goes elsewhere.
+
+    No answer hangs on them, so one setting will do.
+    """
+    quick = OUTCOME_SETTINGS[:1]
     slid = _slid(scene, push, {push.order})
     if outcome.moved != (push.order,):
         yield slid
     back = replace(push, direction=(-push.direction[0], -push.direction[1]))
-    opposite = after(scene.blocks, back)
+    opposite = after(scene.blocks, back, quick)
     if opposite.is_clear:
         yield opposite.settled
     carried = _above(scene, push.order)
     if len(carried) > 1:
         yield _slid(scene, push, carried)
     for other in shuffled(rng, [b for b in scene.blocks if b.order != push.order])[:3]:
-        elsewhere = after(scene.blocks, replace(push, order=other.order))
+        elsewhere = after(scene.blocks, replace(push, order=other.order), quick)
         if elsewhere.is_clear and elsewhere.moved:
             yield elsewhere.settled
-    gone = after_removal(scene.blocks, push.order)
+    gone = after_removal(scene.blocks, push.order, quick)
     if gone.is_clear and gone.moved:
         settled = {block.order: block for block in (*slid, *gone.settled)}
         yield tuple(settled[block.order] for block in scene.blocks)
@@ -271,7 +283,7 @@ def _above(scene: Scene, order: int) -> set[int]:
 
 
 def _distinct(
-    scene: Scene, plain: QuestionPicture, states: Sequence[Sequence[Block]], push: Push
+    scene: Scene, plain: QuestionPicture, states: Iterable[Sequence[Block]], push: Push
 ) -> list[QuestionPicture]:
     """Pictures of the states, four at most, that tell different stories in different pixels."""
     chosen: list[QuestionPicture] = []
@@ -283,11 +295,11 @@ def _distinct(
         except UnfairError:
             story = None
         is_new = story is not None and story not in stories
-        if len(chosen) < 4 and is_new and are_told_apart([plain, *chosen, picture]):
+        if is_new and are_told_apart([plain, *chosen, picture]):
             chosen.append(picture)
             stories.append(story)
-        elif not chosen:
-            return []
+        if len(chosen) in (0, 4):
+            break
     return chosen
 
 
