@@ -32,6 +32,11 @@ from phyblock.report.table3 import (
     table3_view,
 )
 from phyblock.report.text_table import TextTable
+from phyblock.report.track_intervals import (
+    step_intervals,
+    track_intervals_view,
+    vqa_intervals,
+)
 from phyblock.report.views import coverage_view, errors_view, published_view, table1_view
 from phyblock.report.vqa import letters_view, table2_frame, table2_view
 
@@ -95,9 +100,11 @@ _MAKERS: dict[str, _Maker] = {
     "table5": _Maker(table5_frame, table5_view, "full_planning", "table1"),
     "settings": _Maker(settings_frame, settings_view, "full_planning", "table1"),
     "table2": _Maker(table2_frame, table2_view, "vqa"),
+    "vqa_intervals": _Maker(vqa_intervals, track_intervals_view, "vqa", "table2"),
     "letters": _Maker(letters_frame, letters_view, "vqa", "table2"),
     "questions": _Maker(questions_frame, None, "vqa", "table2"),
     "table3": _Maker(table3_frame, table3_view, "step_planning"),
+    "step_intervals": _Maker(step_intervals, track_intervals_view, "step_planning", "table3"),
     "step_scores": _Maker(step_scores_frame, None, "step_planning", "table3"),
     "endings": _Maker(endings_frame, endings_view, "step_planning"),
     "moves": _Maker(moves_frame, moves_view, "step_planning", "endings"),
