@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping
 
 from phyblock.domain import CATEGORIES
 from phyblock.report.html.headline import (
@@ -15,6 +14,7 @@ from phyblock.report.html.headline import (
     kinds_of,
     plain,
 )
+from phyblock.report.html.headline_intervals import answer_bounds, step_bounds
 from phyblock.report.load import Run
 from phyblock.report.questions import OVERALL_CELL, questions_frame
 from phyblock.report.table3 import table3_frame
@@ -29,6 +29,7 @@ _CATEGORY_NAMES = {
     "scene_understanding": "Scene",
     "dynamic_reasoning": "Dynamics",
 }
+_BELOW = "Below values stand 95 % intervals, from resampling the base scenes."
 _STEP_CELLS = {
     "placed_precision": "Precision",
     "placed_recall": "Recall",
@@ -44,13 +45,16 @@ def vqa_headline(run: Run) -> Headline | None:
         return None
     found = {(row["model"], row["cell"]): row for row in questions_frame(run).to_dict("records")}
     cells = (*CATEGORIES, OVERALL_CELL)
-    several = len(run.design.suite.seeds) > 1
+    seeds = len(run.design.suite.seeds)
+    measured = "accuracy_mean" if seeds > 1 else "accuracy"
+    bounds = answer_bounds(run)
     rows = []
     for name, kind in kinds_of(run).items():
-        shown = [_accuracy(found[name, cell], several) for cell in cells]
-        overall = shown[-1].value
-        strip = None if overall is None else (overall, overall, overall)
-        rows.append(Row(name, kind, tuple(shown), strip))
+        values = [100 * found[name, cell][measured] for cell in cells]
+        shown = [_cell(v, bounds.get((name, c))) for v, c in zip(values, cells, strict=True)]
+        rows.append(
+            Row(name, kind, tuple(shown), _strip(values[-1], bounds.get((name, cells[-1]))))
+        )
     printed = published_cells("Random")
     random = tuple(plain(printed[cell]) for cell in cells)
     human = tuple(Cell("") for _ in CATEGORIES)
@@ -58,26 +62,17 @@ def vqa_headline(run: Run) -> Headline | None:
         Row("Random, published", "reference", random),
         Row("Human experts, published", "reference", (*human, plain(HUMAN_ACCURACY))),
     ]
-    seeds = len(run.design.suite.seeds)
-    how = f"Accuracy in percent{f'; mean of {seeds} seeds, ± their sd' if several else ''}."
+    how = f"Accuracy in percent{f', mean of {seeds} seeds' if seeds > 1 else ''}."
     macro = "A category is the unweighted mean of its four subtasks, overall that of the categories"
     return Headline(
         "VQA",
         (*_CATEGORY_NAMES.values(), "Overall"),
         tuple(rows),
-        (f"{how} {macro}.", HUMAN_NOTE),
+        (f"{how} {macro}. {_BELOW if bounds else ''}".strip(), HUMAN_NOTE),
         len(CATEGORIES),
         "Overall",
         {"Random": printed[OVERALL_CELL], "Human": HUMAN_ACCURACY},
     )
-
-
-def _accuracy(row: Mapping[Hashable, float], several: bool) -> Cell:
-    value = 100 * row["accuracy_mean" if several else "accuracy"]
-    if math.isnan(value):
-        return Cell(NO_VALUE)
-    sd = 100 * row["accuracy_sd"]
-    return Cell(number(value), value, f"± {number(sd)}" if several and not math.isnan(sd) else "")
 
 
 def steps_headline(run: Run) -> Headline | None:
@@ -90,11 +85,12 @@ def steps_headline(run: Run) -> Headline | None:
     table = table3_frame(run).to_dict("records")
     ours = {row["model"]: row for row in table if row["source"] == "run"}
     printed = [row for row in table if row["source"] == "published"]
+    bounds = step_bounds(run)
     rows = []
     for name, kind in kinds_of(run).items():
-        shown = [_mean(ours[name], cell) for cell in _STEP_CELLS]
-        f1 = ours[name]["placed_f1"]
-        rows.append(Row(name, kind, tuple(shown), None if math.isnan(f1) else (f1, f1, f1)))
+        shown = [_cell(ours[name][cell], bounds.get((name, cell))) for cell in _STEP_CELLS]
+        strip = _strip(ours[name]["placed_f1"], bounds.get((name, "placed_f1")))
+        rows.append(Row(name, kind, tuple(shown), strip))
     rows += [
         Row(
             f"{row['published_name']}, published",
@@ -106,14 +102,17 @@ def steps_headline(run: Run) -> Headline | None:
     note = (
         f"Percent, setting {run.design.setting}. Precision, recall and F1 are of the blocks that "
         "were placed, as in the paper's Table 3; F1 of attempts counts every move that placed "
-        "nothing as wrong; completed are episodes that placed the whole goal."
+        f"nothing as wrong; completed are episodes that placed the whole goal. {_BELOW}"
     )
     names = tuple(_STEP_CELLS.values())
     return Headline("Step planning", names, tuple(rows), (note,), names.index("F1"), "F1", {})
 
 
-def _mean(row: Mapping[Hashable, float], cell: str) -> Cell:
-    value, sd = row[cell], row.get(f"{cell}_sd", math.nan)
+def _cell(value: float, ends: tuple[float, float] | None) -> Cell:
     if math.isnan(value):
         return Cell(NO_VALUE)
-    return Cell(number(value), value, "" if math.isnan(sd) else f"± {number(sd)}")
+    return Cell(number(value), value, f"{number(ends[0])} to {number(ends[1])}" if ends else "")
+
+
+def _strip(value: float, ends: tuple[float, float] | None) -> tuple[float, float, float] | None:
+    return None if math.isnan(value) else (value, *(ends or (value, value)))
