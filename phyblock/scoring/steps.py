@@ -90,6 +90,8 @@ class Assembly:
         self._goal = Goal(gated(scene, gating), candidates, setting)
         self._frontier = {0}
         self._above = _blocks_above(self._goal)
+        carried = _carried(self._goal)
+        self._roles = [(b.look, carried[v]) for v, b in enumerate(scene.blocks)]
         self._of_kind = {
             index: sum(1 << v for v, block in enumerate(scene.blocks) if block.kind == one.kind)
             for index, one in enumerate(candidates.candidates, 1)
@@ -135,7 +137,13 @@ class Assembly:
         return self._show(index, before)
 
     def _choices(self, index: int, mask: int) -> list[int]:
-        return self._goal.distinct(self._goal.choices(index, mask))
+        """What a candidate can be placed as: of blocks that look alike and carry the same ones,
+        the first, for they are interchangeable.
+        """
+        choices = self._goal.choices(index, mask)
+        if len(choices) < 2:
+            return choices
+        return list({self._roles[v]: v for v in reversed(choices)}.values())
 
     def _show(self, index: int, before: int) -> Move:
         """Bring the world to one of the sets that explain all moves, with the least change."""
@@ -187,6 +195,12 @@ def placed_counts(
 def attempted_counts(placed: Counts, attempts: int) -> Counts:
     """Counts over every attempted move, those that placed nothing being false positives too."""
     return Counts(placed.tp, attempts - placed.tp, placed.fn)
+
+
+def _carried(goal: Goal) -> tuple[int, ...]:
+    """For each vertex, the bit mask of those that directly wait for it."""
+    needed, n = goal.graph.needed_masks, len(goal.graph)
+    return tuple(sum((needed[w] >> v & 1) << w for w in range(n)) for v in range(n))
 
 
 def _blocks_above(goal: Goal) -> tuple[int, ...]:
