@@ -110,11 +110,16 @@ def compare(pairs: Sequence[tuple[Side, Side]], levels: Sequence[str]) -> Compar
     """Compare the sides of each pair at each level on the samples that both have.
 
     Setting, matcher and criteria are the headline ones of the first run. Raises SpecError when
-    another run was not scored so, or has a scene of the same name with other blocks.
+    a run has no full planning, was not scored so, or has other blocks in a scene of the same name.
     """
     design = pairs[0][0].run.design
     sides = {side.label: side for pair in pairs for side in pair}
     runs = list({id(side.run): side.run for side in sides.values()}.values())
+    for run in runs:
+        if not run.design.tracks:
+            found = ", ".join(run.design.suite.tracks)
+            message, allowed = "has no track that is compared", "full_planning"
+            raise SpecError(Problem(str(run.path), message, "tracks", found, allowed))
     for run in runs[1:]:
         _check_alike(run, runs[0])
     parents = pd.concat([parents_of(run) for run in runs]).groupby(level=0).first()

@@ -121,6 +121,10 @@ def test_runs_that_cannot_be_compared_are_refused() -> None:
         compare_runs(first, one_seed(models=["alpha"], matchers=["paper"]))
     with pytest.raises(SpecError, match="no model in common"):
         compare_runs(first, one_seed(models=["beta"]))
+    facts = manifest(seeds=[0])
+    facts["suite"]["tracks"] = ["vqa"]
+    with pytest.raises(SpecError, match="no track that is compared"):
+        compare_models(run_of([], facts))
     with pytest.raises(SpecError, match="needs two models"):
         compare_models(first)
 

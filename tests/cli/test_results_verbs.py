@@ -1,0 +1,70 @@
+"""The verbs that read a finished run: tables, compare, figures, export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from phyblock.cli.main import phyblock
+from phyblock.errors import SpecError, StoreError
+from tests.report.factory import LEVELS, manifest, record, score, write_run
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    records = [
+        record(model, scene, seed, [score(tp, 4 - tp, 4 - tp), score(tp, 0, 1, setting="B")])
+        for model, tp in (("alpha", 4), ("beta", 1))
+        for scene in LEVELS
+        for seed in (0, 1)
+    ]
+    facts = manifest(models=[("alpha", "GPT-4.1"), "beta"])
+    return write_run(tmp_path / "run", records, facts)
+
+
+def call(*words: str | Path) -> Result:
+    return CliRunner().invoke(phyblock, [str(word) for word in words], catch_exceptions=False)
+
+
+def test_tables_print_all_or_one_in_any_form(folder: Path) -> None:
+    everything = call("tables", folder).output
+    for caption in ("Assembly planning", "95 % intervals", "setting A (with orientation)", "seeds"):
+        assert caption in everything
+    one = call("tables", folder, "--only", "table5", "--format", "md").output
+    assert one.startswith("**F1 over 2 seeds (%)")
+    assert r"\begin{tabular}" in call("tables", folder, "--only", "cost", "--format", "tex").output
+    with pytest.raises(SpecError, match="no such table"):
+        call("tables", folder, "--only", "table9")
+    assert not (folder / "tables").exists()
+
+
+def test_tables_beside_the_paper(folder: Path) -> None:
+    output = call("tables", folder, "--paper").output
+    # The paper has this model in its table of seeds alone.
+    assert "beside the paper's Table 1" not in output
+    assert "beside the paper's Table 5" in output
+
+
+def test_compare_says_the_verdict_and_what_flipped(folder: Path, tmp_path: Path) -> None:
+    done = call("compare", folder, "--models", "alpha,beta", "--out", tmp_path / "out")
+    # Five base scenes are too few for five comparisons.
+    assert "cannot tell" in done.output
+    assert "alpha is right where beta is not, 10: 000 (seed 0)" in done.output
+    assert (tmp_path / "out" / "comparison.tex").exists()
+    with pytest.raises(SpecError, match="no such model"):
+        call("compare", folder, "--models", "alpha,delta")
+    with pytest.raises(SpecError, match="empty name"):
+        call("compare", folder, "--models", "alpha,")
+    with pytest.raises(StoreError, match=r"holds no run\.yaml"):
+        call("compare", folder, tmp_path)
+
+
+def test_figures_and_exports_name_what_they_wrote(folder: Path) -> None:
+    done = call("figures", folder, "--only", "f1-levels")
+    assert done.output.split() == [
+        str(folder / "figures" / f"f1-levels.{e}") for e in ("svg", "png")
+    ]
+    done = call("export", folder, "--to", "csv")
+    assert done.output.strip() == str(folder / "export" / "csv" / "records.csv")
