@@ -56,7 +56,7 @@ def run_with(
 ) -> Done:
     write_questions(workspace.root / "questions")
     with Running(server) as running:
-        workspace.write_models(running.url, *models)
+        workspace.write_models(running.url, *models, transport="direct")
         workspace.write_suite(
             **{**vqa_suite(**fields), "models": list(models), "seeds": list(seeds)}
         )
@@ -272,7 +272,7 @@ def test_pictures_of_official_files_are_sent_byte_for_byte(workspace: Workspace)
         digests[name] = hashlib.sha256(path.read_bytes()).hexdigest()
     server = Answering(lambda _: "D")
     with Running(server) as running:
-        workspace.write_models(running.url, "alpha")
+        workspace.write_models(running.url, "alpha", transport="direct")
         fields = vqa_suite(format="official", circular=True)
         workspace.write_suite(**{**fields, "models": ["alpha"]})
         done = workspace.run()

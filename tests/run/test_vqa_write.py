@@ -70,7 +70,7 @@ def write(workspace: Workspace, server: OpenAIChat, *args: str, **change: Any) -
     workspace.write_scenes(SCENE)
     write_questions(workspace.root / "questions", [{**QUESTION, **change}])
     with Running(server) as running:
-        workspace.write_models(running.url, "alpha")
+        workspace.write_models(running.url, "alpha", transport="direct")
         places = ("--questions", "./questions", "--data", "./data", "--out", "found.jsonl")
         return workspace.phyblock("vqa", "write", "--model", "alpha", *places, *args)
 

@@ -110,6 +110,7 @@ def test_the_text_says_question_options_and_form(
         assert isinstance(subject, ChoiceSubject)
         text = text_of(request)
         assert f"Question: {subject.question.text}" in text
+        assert "\n\n\n" not in text
         asked_form = "Answer: W, X, Y, Z" if key.startswith("or") else "Answer: X"
         assert asked_form in text.splitlines()
         if "<img1>" in subject.question.options:
