@@ -5,7 +5,7 @@ from __future__ import annotations
 import string
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.parsing.move import MOVE_PROBLEMS, MOVE_RULES, ParsedMove, parse_move
@@ -196,6 +196,7 @@ texts = st.one_of(
 )
 
 
+@settings(deadline=None)
 @given(texts)
 def test_any_text_has_one_named_outcome(text: str) -> None:
     parsed = parse_move(text)
@@ -205,6 +206,7 @@ def test_any_text_has_one_named_outcome(text: str) -> None:
     assert (parsed.problem == "empty") == (not text.strip())
 
 
+@settings(deadline=None)
 @given(texts)
 def test_a_number_that_was_read_stands_in_the_text(text: str) -> None:
     move = parse_move(text).move
@@ -218,11 +220,13 @@ quiet = st.text(
 )
 
 
+@settings(deadline=None)
 @given(quiet, st.integers(-99, 99), st.sampled_from(["Move({})", "Next plan: Move( {} )"]))
 def test_reasoning_before_the_answer_changes_nothing(before: str, move: int, form: str) -> None:
     assert parse_move(f"{before}\n{form.format(move)}").move == move
 
 
+@settings(deadline=None)
 @given(texts, st.integers(1, 16))
 def test_what_is_thought_aloud_is_no_answer(thoughts: str, move: int) -> None:
     if "think" not in thoughts:

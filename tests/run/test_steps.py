@@ -154,7 +154,7 @@ def test_a_killed_run_goes_on_in_the_middle_of_episodes(
         prepare(workspace, running.url, seeds=list(range(seeds)), steps={"physics": physics})
         middle = 0
         for _ in range(kills):
-            target = len(server.seen) + draw.randrange(3, 5 * seeds)
+            target = len(server.seen) + draw.randrange(3, 15 * seeds // kills)
             with workspace.start("--no-cache") as process:
                 while process.poll() is None and len(server.seen) < target:
                     time.sleep(0.002)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.datasets import AssemblyTask, read_builtin, read_official
@@ -26,8 +26,8 @@ from tests.scoring.cases import Case, cases
 ORDERS = 20
 BUILT_IN = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400"
 
-settings = st.sampled_from(SETTINGS)
-gatings = st.sampled_from(GATINGS)
+any_setting = st.sampled_from(SETTINGS)
+any_gating = st.sampled_from(GATINGS)
 
 
 def solved_number(task_scene: Scene, candidates: CandidateSet) -> list[int]:
@@ -50,7 +50,7 @@ def assert_no_valid_order_fails(
         assert assembly.vertices == tuple(range(len(task.scene)))
 
 
-@pytest.mark.parametrize("setting", SETTINGS)
+@pytest.mark.parametrize("setting", ["A", pytest.param("B", marks=pytest.mark.slow)])
 def test_no_valid_order_of_the_official_scenes_fails(
     official_checkout: Path, setting: Setting
 ) -> None:
@@ -59,7 +59,7 @@ def test_no_valid_order_of_the_official_scenes_fails(
         assert_no_valid_order_fails(task, ORDERS, rng, setting, "aov")
 
 
-@pytest.mark.parametrize("setting", SETTINGS)
+@pytest.mark.parametrize("setting", ["A", pytest.param("B", marks=pytest.mark.slow)])
 def test_no_valid_order_of_the_built_in_scenes_fails(setting: Setting) -> None:
     rng = np.random.default_rng(1)
     for task in read_builtin(BUILT_IN).tasks:
@@ -88,7 +88,8 @@ def right(case: Case, setting: Setting) -> list[int]:
     ]
 
 
-@given(cases(), settings, gatings, st.randoms(use_true_random=False))
+@settings(deadline=None)
+@given(cases(), any_setting, any_gating, st.randoms(use_true_random=False))
 def test_a_valid_order_never_fails_whatever_looks_alike(
     case: Case, setting: Setting, gating: Gating, random: object
 ) -> None:
@@ -103,7 +104,8 @@ def test_a_valid_order_never_fails_whatever_looks_alike(
     assert assembly.is_complete
 
 
-@given(cases(max_steps=14), settings, gatings)
+@settings(deadline=None)
+@given(cases(max_steps=14), any_setting, any_gating)
 def test_the_world_is_always_one_that_can_be_built(
     case: Case, setting: Setting, gating: Gating
 ) -> None:
@@ -125,7 +127,8 @@ def test_the_world_is_always_one_that_can_be_built(
             assert (assembly.vertices, move.vertex, move.swapped) == (before, None, ())
 
 
-@given(cases(max_steps=14), settings)
+@settings(deadline=None)
+@given(cases(max_steps=14), any_setting)
 def test_a_wrong_move_has_the_error_type_of_its_moment(case: Case, setting: Setting) -> None:
     assembly = Assembly(case.scene, case.candidates, setting)
     for index in case.plan.steps:
@@ -142,7 +145,8 @@ def test_a_wrong_move_has_the_error_type_of_its_moment(case: Case, setting: Sett
             assert outcome in ("placed", "dependency_not_met")
 
 
-@given(cases(max_steps=14), settings)
+@settings(deadline=None)
+@given(cases(max_steps=14), any_setting)
 def test_no_more_is_placed_than_the_optimal_matcher_allows(case: Case, setting: Setting) -> None:
     assembly = Assembly(case.scene, case.candidates, setting)
     outcomes = [assembly.move(index).outcome for index in case.plan.steps]
@@ -152,6 +156,7 @@ def test_no_more_is_placed_than_the_optimal_matcher_allows(case: Case, setting: 
     assert outcomes.count("placed") <= match_plan(goal, case.plan, "optimal").counts.tp
 
 
+@settings(deadline=None)
 @given(cases(), st.integers(-(10**9), 10**9))
 def test_a_number_that_no_candidate_has_is_invalid(case: Case, index: int) -> None:
     assembly = Assembly(case.scene, case.candidates, "A")
@@ -224,7 +229,8 @@ def test_what_counts_as_placed_rightly() -> None:
     assert (fallen.tp, fallen.fp, fallen.fn) == (1, 1, 1)
 
 
-@given(cases(max_steps=14), settings)
+@settings(deadline=None)
+@given(cases(max_steps=14), any_setting)
 def test_every_placed_block_is_right_under_the_setting_that_let_it(
     case: Case, setting: Setting
 ) -> None:

@@ -177,6 +177,7 @@ def test_no_hostile_reply_stops_an_episode() -> None:
         json.dumps(fields, allow_nan=False)
 
 
+@settings(deadline=None)
 @given(st.lists(st.sampled_from(["Move(1)", "Move(3)", "Move(6)", "?", "Move(40)"]), max_size=60))
 def test_whatever_is_said_the_default_limits_end_it(texts: list[str]) -> None:
     task = tower("red", "blue", "red", "blue")
@@ -189,6 +190,7 @@ def test_whatever_is_said_the_default_limits_end_it(texts: list[str]) -> None:
     assert tp == fields["outcomes"].count("placed")
 
 
+@settings(deadline=None)
 @given(st.lists(st.sampled_from(["Move(1)", "Move(3)", "Move(6)", "?", "Done"]), max_size=12))
 def test_the_same_replies_lead_to_the_same_requests_and_record(texts: list[str]) -> None:
     task = tower("red", "blue", "red", "blue")
@@ -300,7 +302,7 @@ def test_a_tie_goes_to_what_was_said_first_and_the_unread_have_no_vote() -> None
     assert chosen("?", "") == 0
 
 
-@settings(max_examples=50)
+@settings(max_examples=50, deadline=None)
 @given(st.lists(st.tuples(st.integers(1, 3), st.booleans()), max_size=20))
 def test_a_tally_counts_runs_of_failures(steps: Sequence[tuple[int, bool]]) -> None:
     tally = Tally()

@@ -6,7 +6,7 @@ import asyncio
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.datasets import read_builtin
@@ -89,6 +89,7 @@ def test_turns_are_a_conversation_in_which_every_state_is_seen_once() -> None:
 
 
 @pytest.mark.parametrize("history", ["text", "turns"])
+@settings(deadline=None)
 @given(st.integers(0, 12), st.integers(1, 5))
 def test_memory_bounds_what_is_shown_and_always_ends_with_the_state_as_it_is(
     history: str, n: int, memory: int
