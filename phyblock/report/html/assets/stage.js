@@ -186,7 +186,7 @@ const Stage = (() => {
   function follow(strip, at) {
     const frame = strip.children[at - 1];
     if (!frame) return;
-    const left = frame.offsetLeft - strip.offsetLeft;
+    const left = frame.offsetLeft;
     if (left < strip.scrollLeft || left + frame.offsetWidth > strip.scrollLeft + strip.clientWidth) {
       strip.scrollLeft = left - strip.clientWidth / 2;
     }
