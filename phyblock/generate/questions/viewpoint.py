@@ -15,7 +15,7 @@ from phyblock.domain.blocks import COLORS, BlockType, Euler
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.generate.poses import POSES
-from phyblock.generate.questions.base import Draft
+from phyblock.generate.questions.base import Draft, UnfairError
 from phyblock.generate.questions.pictured import (
     are_told_apart,
     draft,
@@ -41,7 +41,8 @@ View = tuple[float, float]
 Shift = tuple[float, float]
 _TURNS_DEG = (-120.0, -90.0, -60.0, 60.0, 90.0, 120.0, 180.0)
 _ELEVATIONS_DEG = (22.0, 32.0)
-_FRONTS_DEG = (20.0, 110.0, 200.0, 290.0)
+_FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
+"""Straight on: a mirror image of a slanted view can be a true view of the same side."""
 _SIDES: dict[str, float] = {"its right side": 90.0, "its left side": -90.0, "behind": 180.0}
 _BLOCKS_TRIED = 4
 _VERSIONS_TRIED = 8
@@ -74,6 +75,8 @@ class ViewpointMaker:
         slots = slots_of(question)
         shown, options = picture_of(question, "scene"), option_pictures(question)
         if of_kind(question) == "vp-side":
+            if shown.view_deg[0] not in _FRONTS_DEG:
+                raise UnfairError("the first picture is not straight from the front")
             azimuth = shown.view_deg[0] + _SIDES[slots["side_words"]]
             right = [(option.view_deg[0] - azimuth) % 360 == 0 for option in options]
             alike = [same_blocks(shown.blocks, option.blocks) for option in options]
