@@ -1,0 +1,79 @@
+"""The headline tables: the numbers of the tables, baselines behind models, published ones apart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from phyblock.report import Run, assembly_frame, load_run
+from phyblock.report.html.headline import assembly_headline
+from phyblock.report.html.headline_intervals import answer_bounds
+from phyblock.report.html.headline_tracks import steps_headline, vqa_headline
+from phyblock.report.questions import questions_frame
+from phyblock.report.table3 import table3_frame
+from tests.report.factory import manifest, record, run_of, score
+from tests.report.html_run import make_run
+
+
+def planning_run() -> Run:
+    facts = manifest(models=["guess", ("alpha", "GPT-4o")], seeds=[0])
+    facts["models"][0]["kind"] = "baseline"
+    records = [
+        record(model, scene, scores=[score(tp, 1, 2), score(tp + 1, 1, 1, setting="B")])
+        for model, tp in (("guess", 1), ("alpha", 3))
+        for scene in ("001", "002", "003")
+    ]
+    return run_of(records, facts)
+
+
+def test_the_headline_of_plans_says_what_the_tables_say() -> None:
+    run = planning_run()
+    headline = assembly_headline(run)
+    assert headline is not None
+    assert [row.name for row in headline.rows] == [
+        *("alpha", "guess", "Random, published", "Human experts, published"),
+    ]
+    assert [row.kind for row in headline.rows] == ["model", "baseline", "reference", "reference"]
+    frame = assembly_frame(run)
+    frame = frame[(frame["setting"] == "A") & frame["matcher"].isin(["", "optimal"])]
+    for row in headline.rows[:2]:
+        mine = frame[frame["model"] == row.name].set_index("level")
+        overall = row.cells[headline.main]
+        assert headline.columns[headline.main] == headline.strip_name == "Overall F1"
+        assert overall.value == pytest.approx(100 * mine.loc["overall", "f1"])
+        assert row.strip is not None
+        assert row.strip[0] == overall.value
+        ends = [100 * mine.loc["overall", f"f1_{end}"] for end in ("lo", "hi")]
+        assert overall.below == "{:.1f} to {:.1f}".format(*ends)
+        assert len(row.cells) == len(headline.columns)
+    assert headline.rows[0].cells[-1].value is not None
+    assert headline.rows[1].cells[-1].text == "–"  # noqa: RUF001
+    assert headline.rows[-1].cells[headline.main].value == 94.7
+    assert headline.references == {"Random": 8.8, "Human": 94.7}
+
+
+def test_a_run_has_headlines_of_its_own_tracks_alone() -> None:
+    run = planning_run()
+    assert vqa_headline(run) is None
+    assert steps_headline(run) is None
+
+
+def test_headlines_of_questions_and_episodes(
+    tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path
+) -> None:
+    made = make_run(tmp_path_factory.mktemp("headline"), pictures_dir)
+    run = load_run(made.out, texts=False)
+    answers, steps = vqa_headline(run), steps_headline(run)
+    assert answers is not None
+    assert steps is not None
+    accuracy = questions_frame(run).set_index(["model", "cell"])["accuracy_mean"]
+    for row in answers.rows[:2]:
+        # Subtasks that were not asked leave means without a value.
+        assert [cell.text for cell in row.cells] == ["–"] * 5  # noqa: RUF001
+        assert accuracy[row.name].drop(["SH", "OR", "AD"]).isna().all()
+    assert answer_bounds(run) == {}
+    table = table3_frame(run).set_index("model")
+    for row in steps.rows[:2]:
+        assert row.cells[steps.main].value == pytest.approx(table.loc[row.name, "placed_f1"])
+    assert {row.name: row.cells[-1].value for row in steps.rows}["oracle"] == 100
