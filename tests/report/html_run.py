@@ -54,14 +54,14 @@ def rewrite(folder: Path) -> None:
 
 
 def many(records: list[Raw], model: str, copies: int) -> list[Raw]:
-    """Records of `copies` models, each with the replies of `model`."""
-    return [
-        {
-            **record,
-            "model": f"{model}-{copy}",
-            "sample": record["sample"].replace(f"/{model}/", f"/{model}-{copy}/"),
-        }
-        for copy in range(copies)
-        for record in records
-        if record["model"] == model
-    ]
+    """Copies of a model's records, as those of ten models on further scenes."""
+    made = []
+    for copy in range(copies):
+        name, suffix = f"{model}-{copy % 10}", f"-{copy // 10}"
+        for record in records:
+            if record["model"] == model:
+                key = record["key"] + suffix
+                sample = f"{record['track']}/{name}/{key}/s{record['seed']}"
+                about = {"sample": sample, "model": name, "key": key, "scene": key}
+                made.append({**record, **about})
+    return made

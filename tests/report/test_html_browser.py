@@ -395,13 +395,13 @@ def test_twenty_thousand_records_keep_memory_bounded(
     browser: Browser, made: Workspace, tmp_path: Path
 ) -> None:
     folder = _large_run(made, tmp_path / "run")
-    write_report(write_tables(folder))
+    write_report(write_tables(folder), figures=())
     page = browser.new_page(viewport={"width": 1400, "height": 1000})
     visit = Visit(page, folder / "report.html")
     visit.open("samples")
     assert visit.count() == "20,000 samples"
-    for step in range(60):
-        page.evaluate(f"document.querySelector('#list').scrollTop = {step * 15_000}")
+    for step in range(40):
+        page.evaluate(f"document.querySelector('#list').scrollTop = {step * 22_000}")
         page.wait_for_timeout(30)
         page.locator(".row").nth(8).click()
         expect(page.locator("#detail pre.reply")).to_have_count(1)
@@ -412,7 +412,7 @@ def test_twenty_thousand_records_keep_memory_bounded(
 
 
 def _large_run(made: Workspace, folder: Path) -> Path:
-    """2,000 models on the planning track alone, with replies of some kilobytes."""
+    """Ten models on a thousand scenes in the planning track, with replies of some kilobytes."""
     facts: dict[str, Any] = yaml.safe_load((made.out / "run.yaml").read_text())
     records = [record for record in made.records() if record["track"] == "full_planning"]
     for record in records:
