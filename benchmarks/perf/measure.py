@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,20 +27,21 @@ class Cost:
 
 def run_measured(command: Sequence[str], env: Mapping[str, str]) -> Cost:
     """Run a command to its end; exits with its output when it fails."""
-    start = time.perf_counter()
-    process = subprocess.Popen(
-        command, env=dict(env), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    )
-    root = psutil.Process(process.pid)
-    peak = 0
-    cpu: dict[int, float] = {}
-    while process.poll() is None:
-        peak = max(peak, _sample(root, cpu))
-        time.sleep(_EVERY_S)
-    wall_s = time.perf_counter() - start
-    output = process.stdout.read() if process.stdout else ""
-    if process.returncode:
-        sys.exit(f"{' '.join(command)} failed ({process.returncode}):\n{output}")
+    # Into a file: nobody reads a pipe meanwhile, and a full one would hold the command up.
+    with tempfile.TemporaryFile("w+") as output:
+        start = time.perf_counter()
+        process = subprocess.Popen(command, env=dict(env), stdout=output, stderr=subprocess.STDOUT)
+        root = psutil.Process(process.pid)
+        peak = 0
+        cpu: dict[int, float] = {}
+        while process.poll() is None:
+            peak = max(peak, _sample(root, cpu))
+            time.sleep(_EVERY_S)
+        wall_s = time.perf_counter() - start
+        if process.returncode:
+            output.seek(0)
+            said = output.read()
+            sys.exit(f"{' '.join(command)} failed ({process.returncode}):\n{said}")
     return Cost(wall_s, sum(cpu.values()), peak / 1e6)
 
 
