@@ -8,6 +8,7 @@ from typing import Any
 
 from phyblock.report import NO_VALUE
 from phyblock.report.outcomes import FAILURES
+from phyblock.run.records import paid_usd
 from phyblock.scoring import Counts
 
 __all__ = ["Tally"]
@@ -45,10 +46,9 @@ class Tally:
         self.cached += reply["cached"]
         usage = reply["usage"]
         self.tokens += (usage["prompt_tokens"] or 0) + (usage["completion_tokens"] or 0)
-        if reply["cost_usd"] is None:
-            self.unpriced += 1
-        elif not reply["cached"]:
-            self.cost_usd += reply["cost_usd"]
+        paid = paid_usd(record)
+        self.unpriced += paid is None
+        self.cost_usd += paid or 0.0
 
     @property
     def cost_text(self) -> str:

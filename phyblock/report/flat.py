@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import pandas as pd
 
+from phyblock.run.records import paid_usd
 from phyblock.scoring import ERROR_TYPES
 
 __all__ = ["TEXTS", "flat_record", "flat_scores", "frame_of"]
@@ -31,6 +32,7 @@ _RECORD_TYPES: dict[str, str] = {
     "completion_tokens": "Int64",
     "reasoning_tokens": "Int64",
     "cost_usd": "float64",
+    "paid_usd": "float64",
     "latency_s": "float64",
     "provider_model": "object",
     "attempts": "Int64",
@@ -88,6 +90,7 @@ def flat_record(record: Mapping[str, Any]) -> dict[str, Any]:
         "n_blocks": record.get("n_blocks"),
         **{name: reply.get(name) for name in _REPLY},
         **{name: (reply.get("usage") or {}).get(name) for name in _USAGE},
+        "paid_usd": paid_usd(record) if reply else None,
         "error_kind": error.get("kind"),
         "error_status": error.get("status"),
         "error_message": error.get("message"),

@@ -11,7 +11,7 @@ from phyblock.errors import ModelError, RefusedError, RetryableError, SampleErro
 from phyblock.models.base import Image, Message, Reply, Request
 from phyblock.tasks import Item, Outcome
 
-__all__ = ["about_prompt", "is_answered", "is_final", "judged", "to_record"]
+__all__ = ["about_prompt", "is_answered", "is_final", "judged", "paid_usd", "to_record"]
 
 
 def to_record(
@@ -69,6 +69,17 @@ def is_answered(record: Mapping[str, Any]) -> bool:
     """Whether the model answered, if only by refusing; a recording may have no reply to give."""
     error = record["error"]
     return error is None or error["kind"] == "refused"
+
+
+def paid_usd(record: Mapping[str, Any]) -> float | None:
+    """What the run paid for a record's replies [US dollars]; None where a price is not known.
+
+    Replies from the cache were paid for elsewhere; an episode can hold both kinds.
+    """
+    turns = record.get("turns") or ()
+    replies = [turn["reply"] for turn in turns] if turns else [record["reply"]]
+    paid = [reply["cost_usd"] for reply in replies if reply is not None and not reply["cached"]]
+    return None if None in paid else sum(paid)
 
 
 def _outcome(record: dict[str, Any], readable: bool) -> Outcome:

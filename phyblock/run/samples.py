@@ -156,7 +156,10 @@ def _reply(raw: Mapping[str, Any]) -> Reply:
 
 
 def _pooled(replies: Sequence[Reply]) -> Reply:
-    """What an episode's replies took together, with the text of the last one."""
+    """What an episode's replies took together, with the text of the last one.
+
+    It is cut off or refused where every one of them is.
+    """
     usage = Usage(
         *(
             _sum(getattr(reply.usage, name) for reply in replies)
@@ -164,8 +167,10 @@ def _pooled(replies: Sequence[Reply]) -> Reply:
         )
     )
     billed = [reply.billed_usd for reply in replies if reply.billed_usd is not None]
+    ends = {reply.finish for reply in replies}
     return Reply(
         replies[-1].text,
+        finish=ends.pop() if len(ends) == 1 else "stop",
         usage=usage,
         cost_usd=_sum(reply.cost_usd for reply in replies),
         billed_usd=sum(billed) if billed else None,

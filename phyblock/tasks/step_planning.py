@@ -91,7 +91,8 @@ class StepPlanning:
     def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
         """As many requests as an episode can have, made without rendering.
 
-        Each step is taken to have placed a block. Only the first requests can be the real ones.
+        Each step is taken to have placed a block. Only the first request can be a real one, and
+        with several samples none, since their seeds are not those of the run.
         """
         rules = self.rules
         assembly = Assembly(item.scene, item.candidates, rules.accepts, rules.gating)
@@ -109,17 +110,18 @@ class StepPlanning:
     def _outline(
         self, item: AssemblyTask, request: Request, past: Sequence[PastStep]
     ) -> tuple[Request, bool]:
+        is_real = not past and self.rules.samples == 1
         if self._sight is None:
-            return request, not past
+            return request, is_real
         pictures = self._sight.pictures
-        fixed, real = pictures.outline(item)
+        fixed, is_fixed_real = pictures.outline(item)
         drawing = self._drawing(self._sight, item, ())
         side = pictures.policy.style.size_px
         (current,), is_current_real = pictures.outlined((drawing,), (side, side))
         messages = self._messages(self._sight, item, fixed, current, past)
         version = self._sight.prompt.template.version
-        is_real = real and is_current_real and not past
-        return replace(request, messages=messages, prompt_version=version), is_real
+        request = replace(request, messages=messages, prompt_version=version)
+        return request, is_real and is_fixed_real and is_current_real
 
     async def _write(
         self,

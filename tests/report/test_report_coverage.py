@@ -5,6 +5,7 @@ from typing import Any
 import pandas as pd
 from hypothesis import given
 
+from phyblock.cli.tally import Tally
 from phyblock.report import coverage_frame
 from phyblock.report.outcomes import HEADINGS, OUTCOMES
 from phyblock.report.text_table import NO_VALUE
@@ -61,6 +62,19 @@ def test_an_unknown_cost_is_never_shown_as_zero() -> None:
         "dear": "$1,234.50",
         "unasked": NO_VALUE,
     }
+
+
+def test_an_episode_that_is_partly_from_the_cache_cost_what_was_asked_anew() -> None:
+    facts = manifest(models=["alpha"])
+    one = record("alpha", cost_usd=0.75)
+    priced = [(0.5, True), (0.25, False)]
+    turns = [{"reply": {**one["reply"], "cost_usd": usd, "cached": old}} for usd, old in priced]
+    run = run_of([{**one, "turns": turns}], facts)
+    assert coverage_frame(run)[["cost_usd", "cost_unknown"]].values.tolist() == [[0.25, 0]]
+    assert run.records["cost_usd"].tolist() == [0.75]
+    tally = Tally(1)
+    tally.add({**one, "turns": turns}, fresh=True)
+    assert (tally.cost_usd, tally.unpriced) == (0.25, 0)
 
 
 def test_replies_from_the_cache_cost_this_run_nothing() -> None:

@@ -193,6 +193,16 @@ def test_a_model_that_refuses_leaves_episodes_without_steps(workspace: Workspace
         assert record["turns"] == []
 
 
+@pytest.mark.parametrize(("mode", "outcome"), [("length", "truncated"), ("filtered", "refusal")])
+def test_an_episode_of_which_no_reply_is_whole_is_no_parse_failure(
+    workspace: Workspace, mode: str, outcome: str
+) -> None:
+    with Running(StepAgent(Faults(mode=mode))) as running:
+        prepare(workspace, running.url)
+        assert workspace.run(*FEW).code == 0
+    assert {record["outcome"] for record in workspace.records()} == {outcome}
+
+
 @pytest.mark.parametrize(
     ("fields", "message"),
     [

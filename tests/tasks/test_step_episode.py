@@ -328,5 +328,8 @@ def test_outlines_are_as_many_as_an_episode_can_have() -> None:
     track = StepPlanning(StepRules(samples=2))
     outlines = list(track.outlines(tower("red", "blue")))
     assert len(outlines) == 2 * 4
+    assert not any(is_real for _, is_real in outlines), "seeds of samples are not those of runs"
+    once = StepPlanning(StepRules()).outlines(tower("red", "blue"))
+    assert [is_real for _, is_real in once] == [True, False, False, False]
     few = replace(StepRules(), limits=StepLimits(steps=1))
     assert len(list(StepPlanning(few).outlines(tower("red", "blue")))) == 1
