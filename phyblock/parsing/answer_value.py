@@ -10,11 +10,11 @@ import re
 import unicodedata
 from collections.abc import Sequence
 
-__all__ = ["CONTRADICTION", "ChoiceReader", "OrderReader", "Reader"]
+__all__ = ["CONTRADICTION", "EDGES", "LETTERS", "ChoiceReader", "plain", "unmarked"]
 
 CONTRADICTION = ""
 
-_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _MARKUP = re.compile(
     r"\\(?:text|textbf|mathrm|mathbf|boxed)\s{0,2}\{|\\[()\[\]]|[*_~`$\"\u201c\u201d\u00ab\u00bb]"
     r"|(?<!\w)['\u2018\u2019]|['\u2018\u2019](?!\w)"
@@ -46,7 +46,7 @@ _NEGATION = re.compile(
 )
 _SENTENCE_END = re.compile(r"[.!?。](?:\s|\Z)")
 _ARTICLES = re.compile(r"^(?:the|an|a)\s")
-_EDGES = " \t\n.,:;!?()[]{}<>-\u2013\u2014。，"  # noqa: RUF001
+EDGES = " \t\n.,:;!?()[]{}<>-\u2013\u2014。，"  # noqa: RUF001
 _NUMBERED = re.compile(
     r"(?:the\s)?(?:option|choice|alternative)\s{0,2}(?:number\s{1,2}|no\.?\s{0,2}|#)?"
     r"\(?(?P<number>\d{1,2})(?![\d.,]?\d)",
@@ -59,7 +59,27 @@ _ORDINAL = re.compile(
     re.IGNORECASE,
 )
 _ORDINALS = {"first": 1, "second": 2, "third": 3, "fourth": 4}
-_DIGITS = re.compile(r"(?<![\d.])\d{1,6}(?:\.\d{1,6})?(?![\d])")
+_DIGITS = re.compile(r"(?<![\w.,/])\d{1,6}(?:\.\d{1,6})?(?![\d/]|[.,]\d)")
+_UNIT = re.compile(r"(?P<space>\s?)(?P<unit>[a-z\"]*)")
+_LENGTHS = re.compile(r"(?:[mdk]?m|(?:milli|deci|kilo)?met\w+|in|inch\w*|ft|feet|foot|\")\Z")
+_SPELLED = (
+    (re.compile(r"(?<=[a-z])-(?=[a-z])"), " "),
+    (re.compile(r"\b(?:counter|anti) ?clockwise\b"), "counterclockwise"),
+    (re.compile(r" ?°"), " degrees"),
+)
+"""Ways of writing that tell no options apart."""
+_HEDGE = re.compile(
+    r"(?:(?:most|very|almost)\s)?(?:probably|likely|certainly|surely|clearly|definitely|therefore"
+    r"|thus|hence|indeed|simply|obviously|evidently|actually)[\s,]{1,3}",
+    re.IGNORECASE,
+)
+_TAKEN_BACK = re.compile(
+    r"[)\]]?\s?\?\s{0,3}(?:no|wait|or|hmm+|actually)\b"
+    r"|(?:(?!because|since|as\b|while|but|not)[^.,;\n]){0,40}?"
+    r"\b(?:and|or)\s{1,2}(?:option\s)?[(\[]?[A-Z][)\]]",
+    re.IGNORECASE,
+)
+_COUNTS = re.compile(r"(?<![a-z])\d|\b(?:half|twice|once|quarter)\b")
 _WORD_NUMBERS = {
     **{"zero": "0", "one": "1", "two": "2", "three": "3", "four": "4", "five": "5", "six": "6"},
     **{"seven": "7", "eight": "8", "nine": "9", "ten": "10", "eleven": "11", "twelve": "12"},
@@ -70,17 +90,21 @@ class ChoiceReader:
     """Reads one option out of a short text, given the options shown, the first one being A."""
 
     def __init__(self, options: Sequence[str]) -> None:
-        self.letters = _LETTERS[: len(options)]
+        self.letters = LETTERS[: len(options)]
         self._texts = [plain(option) for option in options]
         self._numbers = [_only_number(text) for text in self._texts]
-        self._has_digits = any(re.search(r"\d", text) for text in self._texts)
+        self._unit = _unit(self._texts[0]) if self._texts else ""
+        self._has_digits = any(_COUNTS.search(text) for text in self._texts)
         by_length = sorted({text for text in self._texts if text}, key=len, reverse=True)
         alternatives = "|".join(re.escape(text) for text in by_length) or r"(?!)"
-        self._any_text = re.compile(rf"(?<!\w)(?:{alternatives})(?!\w)")
+        # "5 cm" is not in "7.5 cm", and a half cylinder is no cylinder.
+        self._any_text = re.compile(
+            rf"(?<!\w)(?<!\d[.,/])(?<!half )(?<!semi )(?:{alternatives})(?!\w|[.,/]\d)"
+        )
 
     def read(self, text: str) -> str | None:
         """What a text names by letter, else by the option's text, else by its number."""
-        value = _unmarked(text)
+        value = unmarked(text)
         found = self.letter(value)
         if found is None:
             value = _SENTENCE_END.split(value, maxsplit=1)[0]
@@ -89,16 +113,13 @@ class ChoiceReader:
 
     def letter(self, text: str) -> str | None:
         """What a text names when it begins with a letter that is no word."""
-        value = _unmarked(text)
-        lead = _LEAD.match(value)
-        head = _LETTER.match(value, lead.end()) if lead else None
-        named = (
-            lead is not None and head is not None and not lead["is"] and lead["noun"] != "answer"
-        )
-        head = head or _LETTER.match(value)
+        value = _HEDGE.sub("", unmarked(text), count=1)
+        head, named = _head(value)
         if head is None:
             return None
         rest = value[head.end() :]
+        if _TAKEN_BACK.match(rest):
+            return CONTRADICTION
         after = rest[len(_closers(rest)) :]
         if _is_word(head, rest, after, named=named) and plain(after) != self._text_of(head):
             return None
@@ -116,7 +137,7 @@ class ChoiceReader:
 
     def option_text(self, text: str, *, exact: bool = False) -> str | None:
         """What a text names by the words of an option: all of it, its beginning, or a part."""
-        value = plain(_unmarked(text))
+        value = plain(unmarked(text))
         found = self._exact(value)
         if found is not None or exact:
             return found
@@ -132,7 +153,7 @@ class ChoiceReader:
 
     def number(self, text: str) -> str | None:
         """What a text names by the option's number, where numbers cannot mean anything else."""
-        value = _unmarked(text).strip()
+        value = unmarked(text).strip()
         ordinal = _ORDINAL.search(value)
         if ordinal:
             word = ordinal["word"].lower()
@@ -144,7 +165,7 @@ class ChoiceReader:
 
     def exact(self, text: str) -> str | None:
         """What a whole text is: a letter alone, a letter with its option, or an option alone."""
-        value = _unmarked(text)
+        value = unmarked(text)
         head, _ = _head(value)
         if head is not None:
             after = plain(value[head.end() :])
@@ -170,92 +191,38 @@ class ChoiceReader:
         return self.letters[self._texts.index(option)]
 
     def _by_number(self, value: str) -> str | None:
-        """`5` for `5 cm`: where every option has a number of its own and the text has just one."""
-        known = self._numbers
-        if None in known or len(set(known)) < len(known):
+        """`5` for `5 cm`: where every option has a number and one alone that of the text."""
+        found = list(_DIGITS.finditer(value))
+        if None in self._numbers or len({float(number.group()) for number in found}) != 1:
             return None
-        found = {float(number) for number in _DIGITS.findall(value)}
-        hits = [i for i, number in enumerate(known) if number in found]
-        return self.letters[hits[0]] if len(found) == 1 and hits else None
+        if any(self._is_of_other_unit(value, number.end()) for number in found):
+            return None
+        hits = [i for i, number in enumerate(self._numbers) if number == float(found[0].group())]
+        return self.letters[hits[0]] if len(hits) == 1 else None
+
+    def _is_of_other_unit(self, value: str, end: int) -> bool:
+        """Whether what follows a number makes it another one: `10 mm` beside `10 cm`, or `3D`."""
+        follows = _UNIT.match(value, end)
+        assert follows is not None
+        if self._unit:
+            return follows["unit"] != self._unit and bool(_LENGTHS.match(follows["unit"]))
+        return bool(follows["unit"]) and not follows["space"]
 
     def _nth(self, number: int) -> str:
         return self.letters[number - 1] if 1 <= number <= len(self.letters) else CONTRADICTION
 
 
-_BETWEEN = (
-    r"(?:[\s,;>|/.:()\[\]{}<=\-\u2010-\u2015→⇒➔➜、\uff0c]"
-    r"|\b(?:and|then|to|first|next|finally|lastly|followed|by)\b){1,16}"
-)
-_ARROW = re.compile(r"\\(?:long)?(?:right)?(?:arrow|to)\b")
-_THING = r"(?:(?:picture|image|option|figure|stage|step|photo|frame|img)\s{0,2}[(\[<]{0,1})?"
-
-
-class OrderReader:
-    """Reads an order of all `n` options out of a short text, by letters or by numbers from 1."""
-
-    def __init__(self, n: int) -> None:
-        self.letters = _LETTERS[:n]
-        one_letter = rf"{_THING}([{self.letters}])"
-        one_number = rf"{_THING}([1-{n}])"
-        guard = r"(?<![A-Za-z0-9'])"
-        stop = r"(?![A-Za-z0-9']|\s?[,\->\u2192]\s?(?:\d|[A-Za-z](?![A-Za-z])))"
-        ways = [
-            between.join([one] * n)
-            for one in (one_letter, one_number)
-            for between in ("", _BETWEEN)
-        ]
-        self._order = re.compile(rf"{guard}(?:{'|'.join(ways)}){stop}", re.IGNORECASE)
-        self._item = re.compile(
-            rf"^[\s>*+\-]{{0,6}}(?:step\s)?([1-{n}])(?:st|nd|rd|th)?\s?[.):\-]{{1,2}}\s{{0,3}}"
-            rf"[(\[]?{_THING}([{self.letters}])(?![A-Za-z0-9'])",
-            re.IGNORECASE | re.MULTILINE,
-        )
-
-    def read(self, text: str) -> str | None:
-        """The order in a text; a contradiction where it holds two."""
-        found = self.orders(text)
-        if not found:
-            return self.listed(text)
-        return found[0] if len(set(found)) == 1 else CONTRADICTION
-
-    def exact(self, text: str) -> str | None:
-        """The order that a whole text is."""
-        value = _unmarked(_ARROW.sub(" > ", text)).strip(_EDGES)
-        match = self._order.fullmatch(value)
-        return self._letters(match) if match else None
-
-    def orders(self, text: str) -> list[str]:
-        """All orders in a text, each naming every option once."""
-        value = _unmarked(_ARROW.sub(" > ", text))
-        found = (self._letters(match) for match in self._order.finditer(value))
-        return [order for order in found if order]
-
-    def listed(self, text: str) -> str | None:
-        """The order in the last numbered list of letters."""
-        items = [(int(m[1]), m[2].upper()) for m in self._item.finditer(_unmarked(text))]
-        last = items[-len(self.letters) :]
-        numbers = "".join(letter for _, letter in last)
-        in_turn = [number for number, _ in last] == list(range(1, len(self.letters) + 1))
-        return numbers if in_turn and set(numbers) == set(self.letters) else None
-
-    def _letters(self, match: re.Match[str]) -> str | None:
-        given = "".join(group for group in match.groups() if group).upper()
-        if given[0].isdigit():
-            given = "".join(self.letters[int(digit) - 1] for digit in given)
-        return given if set(given) == set(self.letters) else None
-
-
-Reader = ChoiceReader | OrderReader
-
-
 def plain(text: str) -> str:
     """A text as options are compared: no case, no markup, no article, digits for numbers."""
     value = _SPACE.sub(" ", unicodedata.normalize("NFKC", text).casefold())
-    value = _ARTICLES.sub("", _MARKUP.sub("", value).strip(_EDGES))
+    for spelled, as_usual in _SPELLED:
+        value = spelled.sub(as_usual, value)
+    value = _ARTICLES.sub("", _MARKUP.sub("", value).strip(EDGES))
     return " ".join(_WORD_NUMBERS.get(word, word) for word in value.split(" "))
 
 
-def _unmarked(text: str) -> str:
+def unmarked(text: str) -> str:
+    """A text without markup."""
     return _MARKUP.sub("", text).strip()
 
 
@@ -288,3 +255,10 @@ def _is_word(head: re.Match[str], rest: str, after: str, *, named: bool) -> bool
 def _only_number(text: str) -> float | None:
     found = _DIGITS.findall(text)
     return float(found[0]) if len(found) == 1 else None
+
+
+def _unit(text: str) -> str:
+    """What stands behind the number of an option: `cm` of `5 cm`."""
+    number = _DIGITS.search(text)
+    follows = _UNIT.match(text, number.end()) if number else None
+    return follows["unit"] if follows else ""

@@ -152,6 +152,32 @@ OF_OTHER_OPTIONS = [
     (OUTCOMES, "The answer is B: only the red arch falls, because it rests on that block alone.", "B"),
 ]  # fmt: skip
 
+ROUNDS = ("half cylinder", "cylinder", "arch", "cube")
+NO_HALF = ("cylinder", "arch", "cube", "rectangular prism")
+TURNS = ("90 degrees clockwise", "90 degrees counterclockwise", "0 degrees", "180 degrees")
+TURNED_DOWN = [
+    "Option A is wrong.", "It is not option A.", "Option A shows a cube, which does not match.",
+    "A: incorrect. The block is round.", "A. No, that is a cube.", "A is wrong", "C is incorrect.",
+    "C isn't it", "B) not round", "B cannot be it", "Answer: B? No, C.", "Answer: A) cube and B) arch",
+]  # fmt: skip
+NEARLY_OPTIONS = [
+    (LENGTHS, "Answer: 7.5 cm", None), (LENGTHS, "12.5 cm", None), (LENGTHS, "Answer: 10 mm", None),
+    (LENGTHS, "10 inches", None), (LENGTHS, "10 centimeters", "B"), (LENGTHS, "Answer: 0.10 m", None),
+    (COUNTS, "Answer: 2.5", None), (COUNTS, "1/2", None), (COUNTS, "3D view", None),
+    (ROUNDS, "It is a half-cylinder.", "A"), (ROUNDS, "Half-cylinder", "A"), (ROUNDS, "cylinder", "B"),
+    (NO_HALF, "It is a half-cylinder.", None), (NO_HALF, "Answer: half cylinder", None),
+    (NO_HALF, "a semi-cylinder", None), (NO_HALF, "rectangular-prism", "D"),
+    (TURNS, "90° counter-clockwise", "B"), (TURNS, "It is turned 90 degrees anticlockwise.", "B"),
+    (TURNS, "Answer: 180°", "D"), (TURNS, "Answer: 90°", None), (TURNS, "90° clockwise", "A"),
+    (PICTURES, "There are 2 red blocks in the picture.", None), (PICTURES, "Option 2", "B"),
+    (PICTURES, "Picture A differs in the green block.", None), (PICTURES, "Answer: 2", "B"),
+    (SHAPES, "The answer is probably B.", "B"), (SHAPES, "The answer is most likely (B).", "B"),
+    (SHAPES, "B, not C", "B"), (SHAPES, "B is the one that is not solid.", "B"),
+    (OUTCOMES, "A. Nothing moves", "A"),
+    (SHAPES, "A is wrong: the block is hollow. It must be B.", "B"),
+    (SHAPES, "Option B fits. I looked at nothing else, not even twice.", "B"),
+]  # fmt: skip
+
 
 def letters_of(text: str, options: tuple[str, ...], *, is_ordering: bool = False) -> str | None:
     parsed = parse_answer(text, options, is_ordering)
@@ -173,6 +199,18 @@ def test_a_reply_that_names_no_one_option_is_a_parse_failure(text: str) -> None:
 
 @pytest.mark.parametrize(("options", "text", "letters"), OF_OTHER_OPTIONS)
 def test_options_of_every_kind_are_read(
+    options: tuple[str, ...], text: str, letters: str | None
+) -> None:
+    assert letters_of(text, options) == letters
+
+
+@pytest.mark.parametrize("text", TURNED_DOWN)
+def test_an_option_that_is_turned_down_is_not_chosen(text: str) -> None:
+    assert parse_answer(text, SHAPES, False) == ParsedAnswer(None, None)
+
+
+@pytest.mark.parametrize(("options", "text", "letters"), NEARLY_OPTIONS)
+def test_what_is_nearly_an_option_is_none_and_spellings_do_not_matter(
     options: tuple[str, ...], text: str, letters: str | None
 ) -> None:
     assert letters_of(text, options) == letters

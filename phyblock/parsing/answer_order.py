@@ -1,0 +1,71 @@
+"""What a short piece of a reply names as an order of pictures; results as in `answer_value`."""
+
+from __future__ import annotations
+
+import re
+
+from phyblock.parsing.answer_value import CONTRADICTION, EDGES, LETTERS, unmarked
+
+__all__ = ["OrderReader"]
+
+_BETWEEN = (
+    r"(?:[\s,;>|/.:()\[\]{}<=\-\u2010-\u2015→⇒➔➜、\uff0c]"
+    r"|\b(?:and|then|to|first|next|finally|lastly|followed|by)\b){1,16}"
+)
+_ARROW = re.compile(r"\\(?:long)?(?:right)?(?:arrow|to)\b")
+_THING = r"(?:(?:picture|image|option|figure|stage|step|photo|frame|img)\s{0,2}[(\[<]{0,1})?"
+
+
+class OrderReader:
+    """Reads an order of all `n` options out of a short text, by letters or by numbers from 1."""
+
+    def __init__(self, n: int) -> None:
+        self.letters = LETTERS[:n]
+        one_letter = rf"{_THING}([{self.letters}])"
+        one_number = rf"{_THING}([1-{n}])"
+        guard = r"(?<![A-Za-z0-9'])"
+        stop = r"(?![A-Za-z0-9']|\s?[,\->\u2192]\s?(?:\d|[A-Za-z](?![A-Za-z])))"
+        ways = [
+            between.join([one] * n)
+            for one in (one_letter, one_number)
+            for between in ("", _BETWEEN)
+        ]
+        self._order = re.compile(rf"{guard}(?:{'|'.join(ways)}){stop}", re.IGNORECASE)
+        self._item = re.compile(
+            rf"^[\s>*+\-]{{0,6}}(?:step\s)?([1-{n}])(?:st|nd|rd|th)?\s?[.):\-]{{1,2}}\s{{0,3}}"
+            rf"[(\[]?{_THING}([{self.letters}])(?![A-Za-z0-9'])",
+            re.IGNORECASE | re.MULTILINE,
+        )
+
+    def read(self, text: str) -> str | None:
+        """The order in a text; a contradiction where it holds two."""
+        found = self.orders(text)
+        if not found:
+            return self.listed(text)
+        return found[0] if len(set(found)) == 1 else CONTRADICTION
+
+    def exact(self, text: str) -> str | None:
+        """The order that a whole text is."""
+        value = unmarked(_ARROW.sub(" > ", text)).strip(EDGES)
+        match = self._order.fullmatch(value)
+        return self._letters(match) if match else None
+
+    def orders(self, text: str) -> list[str]:
+        """All orders in a text, each naming every option once."""
+        value = unmarked(_ARROW.sub(" > ", text))
+        found = (self._letters(match) for match in self._order.finditer(value))
+        return [order for order in found if order]
+
+    def listed(self, text: str) -> str | None:
+        """The order in the last numbered list of letters."""
+        items = [(int(m[1]), m[2].upper()) for m in self._item.finditer(unmarked(text))]
+        last = items[-len(self.letters) :]
+        numbers = "".join(letter for _, letter in last)
+        in_turn = [number for number, _ in last] == list(range(1, len(self.letters) + 1))
+        return numbers if in_turn and set(numbers) == set(self.letters) else None
+
+    def _letters(self, match: re.Match[str]) -> str | None:
+        given = "".join(group for group in match.groups() if group).upper()
+        if given[0].isdigit():
+            given = "".join(self.letters[int(digit) - 1] for digit in given)
+        return given if set(given) == set(self.letters) else None

@@ -1,0 +1,117 @@
+"""How replies state an answer, correct themselves, turn an option down, or say that they cannot."""
+
+from __future__ import annotations
+
+import re
+
+__all__ = [
+    "BOX",
+    "BRANDED",
+    "CHOSEN",
+    "CONCLUDED",
+    "IS_REJECTED",
+    "IS_RIGHT",
+    "JSON",
+    "LABEL",
+    "LEADING",
+    "LINE",
+    "ORDER",
+    "REJECTS",
+    "REVISED",
+    "SENTENCE",
+    "TAG",
+    "UNSURE",
+]
+
+_WORDS = (
+    r"answer|antwort|l(?:ö|oe)sung|respuesta|resposta|r[ée]ponse|risposta|ответ|答案|回答|答え|解答|正解"
+    r"|정답|답|jawaban|cevap|odpowied[źz]|antwoord|svar|đáp án"
+)
+_IS = r"(?::|=|\bis\b|\bist\b|\bes\b|\best\b|\bè\b|\bé\b|是|为|為|は|은|는|[\-\u2013\u2014](?=\s))"
+_QUALIFIED = (
+    r"(?:(?:my|the|your|final|correct|best|right|so|thus|therefore|overall|la|le|die|el|a)"
+    r"\s{1,3}){0,4}"
+)
+_VALUE = r"[ \t*_`#>]{0,8}\n?[ \t]{0,4}(?=(?P<value>[^\n]{1,240}))"
+LINE = re.compile(
+    rf"^[ \t>*_#`\-]{{0,12}}(?P<lead>{_QUALIFIED}(?:{_WORDS})(?:\s(?:choice|option|key))?)"
+    rf"[ \t]?[*_`]{{0,3}}[ \t]{{0,2}}(?:{_IS}|(?=[*_ ]{{0,4}}\n))[ \t*_`]{{0,6}}:?{_VALUE}",
+    re.IGNORECASE | re.MULTILINE,
+)
+SENTENCE = re.compile(
+    rf"(?<![a-z])(?P<lead>(?:final\s)?(?:{_WORDS}))"
+    rf"(?:\s(?:choice|option|key|correcta|correcte|correta|corretta))?"
+    rf"(?:\sto\s(?:the|this|your)\squestion)?[ \t*_`]{{0,4}}"
+    rf"(?:{_IS}|\bwould be\b|\bshould be\b|\bmust be\b)[ \t*_`:]{{0,6}}{_VALUE}",
+    re.IGNORECASE,
+)
+CHOSEN = re.compile(
+    r"(?:\bI(?:['\u2019]ll|['\u2019]d| will| would| am going to)?"
+    r" (?:choose|pick|select|go with|answer)"
+    r"|\bmy (?:choice|pick|guess|selection) (?:is|would be)"
+    r"|\b(?:correct|right|best) (?:option|choice|one|picture|image|letter|place|match)"
+    r" (?:is|would be|must be|should be)"
+    r"|应?(?:该)?选(?:择|项)?(?:是|为)?)[ \t*_`:]{0,6}(?=(?P<value>[^\n]{1,80}))",
+    re.IGNORECASE,
+)
+IS_RIGHT = re.compile(
+    r"(?<![A-Za-z0-9'\-])(?P<value>[A-Z])[)\]*_`\"]{0,4}(?:\s?[(:][^()\n]{1,60}\))?"
+    r"\s{1,2}(?:is|must be|seems|appears to be) (?:therefore |clearly |definitely |likely )?"
+    r"(?:the )?(?:most )?"
+    r"(?:correct|right|best|likely|plausible|answer|only (?:one|option|correct))\b"
+)
+ORDER = re.compile(
+    rf"\b(?:order|ordering|sequence|arrangement)(?:\s(?:of|in)\s[^\n.:]{{1,60}}?)?[ \t*_`]{{0,4}}"
+    rf"(?::|=|\bis\b|\bwould be\b|\bshould be\b|\bmust be\b)[ \t*_`:]{{0,6}}{_VALUE}",
+    re.IGNORECASE,
+)
+CONCLUDED = re.compile(
+    r"\b(?i:(?:it|this|that|which|answer|option|choice|picture|image|place)"
+    r"(?: must be| has to be| should be| is|['\u2019]s| leaves| matches| corresponds to)"
+    r"(?: (?:the |with )?(?:option|picture|image|choice|place))?)[ *_`]{0,4}"
+    r"(?P<value>\(?[A-Z]\)?)[*_`]{0,3}(?=[\s.!,;]{0,3}(?:\Z|\n|[.!;]))",
+)
+TAG = re.compile(r"<(?:final_)?answer>\s{0,20}(?P<value>[^<>]{1,400})", re.IGNORECASE)
+BOX = re.compile(r"\\boxed\s{0,2}\{(?P<value>[^\n]{1,80}?)\}{1,3}(?=[^}]|\Z)")
+JSON = re.compile(
+    r"[\"'](?:final[_ ]?)?(?:answer|choice|option|selected_option|order|ordering|letter)[\"']"
+    r"\s{0,4}:\s{0,4}(?P<value>\[[^\[\]]{1,120}\]|\"[^\"\n]{0,200}\"|'[^'\n]{0,200}'|\d{1,4}\b)",
+    re.IGNORECASE,
+)
+REVISED = re.compile(
+    r"\b(?:wait|actually|instead|rather|however|but|correct(?:ion|ed|ing)|revis\w+|mistake\w*|wrong"
+    r"|incorrect|re-?(?:check|think|consider|examin|evaluat|look|assess)\w*|second thought|hmm+|no,"
+    r"|final(?:ly)?|therefore|thus|hence|so|overall|conclusion|conclude|doch|aber|sondern|因此|所以|但)\b"
+    r"|因此|所以|但是?|不过",
+    re.IGNORECASE,
+)
+UNSURE = re.compile(
+    r"\b(?:cannot|can['\u2019]?t|could not|couldn['\u2019]t|unable to|not able to|impossible to"
+    r"|not possible to|insufficient|not enough|don['\u2019]t know|do not know"
+    r"|i['\u2019]m sorry|i am sorry|i apologi[sz]e|no (?:image|picture)|not sure|unclear"
+    r"|none of the|neither)\b|无法|抱歉|не могу",
+    re.IGNORECASE,
+)
+BRANDED = re.compile(
+    r"\((?P<a>[A-Z])\)|\*\*\(?(?P<b>[A-Z])[).:]?\*\*"
+    r"|\b(?:[Oo]ption|[Cc]hoice|[Pp]icture|[Ii]mage|[Ll]etter|[Pp]osition|[Ss]pot|[Ll]ocation)s?"
+    r"[ *_`(\"']{1,4}(?P<c>[A-Z])(?![A-Za-z0-9'\-])"
+)
+LABEL = re.compile(r"(?:^|\n|\s)[*_(\[]{0,3}(?P<letter>[A-Z])[)\].:]")
+LEADING = re.compile(
+    r"[\s*_`(\[\"']{0,6}(?P<letter>[A-Za-z])(?:[)\]*_`\"']{1,4}|(?=[\s.,:;\u2013\u2014!-])|[.,:;])"
+)
+IS_REJECTED = re.compile(
+    r"[)\]}*_`\"']{0,3}(?:\s{1,2}(?:is|was|seems|looks|would be|can be|does|can|could)\b"
+    r"(?:\s(?:also|clearly|definitely|certainly|thus|therefore))?\s{0,2}"
+    r"|\s{0,2}[:.)\u2013\u2014-]\s{0,3})"
+    r"(?:(?i:incorrect|wrong|false\b|impossible|unlikely|excluded|eliminated|ruled out|out\b)"
+    r"|(?i:not)\b(?!\s(?:option\s)?\(?[A-Z]\b)|(?i:no)\b(?!\s[a-z]))"
+    r"|[)\]}*_`\"']{0,3}\s{1,2}(?:isn['\u2019]t|doesn['\u2019]t|can['\u2019]t|cannot|differs)\b",
+)
+"""What stands behind a letter that a reply begins with to turn it down."""
+REJECTS = re.compile(
+    r"\b(?:not|no|neither|nor|never|none|cannot|wrong|incorrect|impossible|except|differs?|lacks?"
+    r"|unlike|exclud\w+|eliminat\w+|rul(?:e|es|ed|ing) out|mismatch\w*)\b|n['\u2019]t\b",
+    re.IGNORECASE,
+)
