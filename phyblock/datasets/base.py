@@ -6,8 +6,9 @@ import functools
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import Any
 
 from phyblock.domain import CandidateSet, Question, Scene
 
@@ -41,8 +42,7 @@ class Dataset:
     @functools.cached_property
     def sha256(self) -> str:
         """Hex digest of the scenes and candidate sets, whatever the format they came in."""
-        content = [[asdict(task.scene), asdict(task.candidates)] for task in self.tasks]
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        return _digest([[task.scene, task.candidates] for task in self.tasks])
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,7 @@ class QuestionSet:
     @functools.cached_property
     def sha256(self) -> str:
         """Hex digest of the questions with their scenes and of the picture files' bytes."""
-        content = [[asdict(task.question), _digests(task.files)] for task in self.tasks]
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        return _digest([[task.question, _digests(task.files)] for task in self.tasks])
 
 
 def _digests(files: Mapping[str, Path]) -> dict[str, str]:
@@ -83,3 +82,13 @@ def _digests(files: Mapping[str, Path]) -> dict[str, str]:
         label: hashlib.sha256(path.read_bytes()).hexdigest()
         for label, path in sorted(files.items())
     }
+
+
+def _digest(content: object) -> str:
+    text = json.dumps(content, sort_keys=True, default=_fields)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _fields(one: Any) -> dict[str, object]:
+    """A dataclass as JSON takes it; `asdict` would copy all that is in it as well."""
+    return {each.name: getattr(one, each.name) for each in fields(one)}

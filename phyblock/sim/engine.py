@@ -15,6 +15,7 @@ from phyblock.errors import SimulationError
 __all__ = ["client", "connect", "load", "version"]
 
 
+@functools.cache
 def version() -> str:
     """Version of the installed PyBullet, without importing it."""
     return importlib.metadata.version("pybullet")

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import importlib.metadata
 import io
 import json
 import math
@@ -16,6 +15,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import astuple, dataclass
 
 import numpy as np
+import PIL
 from PIL import Image
 
 from phyblock.domain.blocks import SHAPES, BlockType, Color, Euler
@@ -180,7 +180,7 @@ def _key(kind: str, style: PictureStyle, content: Iterable[object]) -> str:
         "render_version": RENDER_VERSION,
         "renderer": renderer(),
         "pybullet": engine.version(),
-        "pillow": importlib.metadata.version("pillow"),
+        "pillow": PIL.__version__,
         "style": [style.size_px, style.background, style.azimuth_deg, style.elevation_deg],
         "content": list(content),
     }

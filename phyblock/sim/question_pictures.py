@@ -7,11 +7,12 @@ machine, and the key names everything that the bytes depend on.
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, replace
+from dataclasses import fields, replace
+
+import PIL
 
 from phyblock.domain.blocks import SHAPES
 from phyblock.domain.question import QuestionPicture
@@ -90,12 +91,12 @@ def question_key(picture_recipe: QuestionPicture, style: PictureStyle) -> str:
         "render_version": [RENDER_VERSION, QUESTION_RENDER_VERSION],
         "renderer": renderer(),
         "pybullet": engine.version(),
-        "pillow": importlib.metadata.version("pillow"),
+        "pillow": PIL.__version__,
         "style": [style.size_px, style.background],
         "view": list(picture_recipe.view_deg),
         "alone": _is_alone(picture_recipe),
-        "blocks": [astuple(block) for block in drawn_blocks(picture_recipe)],
-        "framed": [astuple(block) for block in _drawn(picture_recipe.framed)],
+        "blocks": _told(drawn_blocks(picture_recipe)),
+        "framed": _told(_drawn(picture_recipe.framed)),
         "marks": [[mark.letter, *mark.position_m] for mark in picture_recipe.marks],
     }
     text = json.dumps(parts, sort_keys=True, allow_nan=False)
@@ -108,3 +109,8 @@ def _is_alone(picture_recipe: QuestionPicture) -> bool:
 
 def _drawn(blocks: Sequence[Block]) -> list[DrawnBlock]:
     return [DrawnBlock(b.type, b.color, b.position_m, b.euler_deg) for b in blocks]
+
+
+def _told(blocks: Sequence[DrawnBlock]) -> list[list[object]]:
+    """All fields of each block; `astuple` would copy what is in them as well."""
+    return [[getattr(block, field.name) for field in fields(block)] for block in blocks]

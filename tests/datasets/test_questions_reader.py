@@ -204,3 +204,25 @@ def test_an_empty_file_and_no_file_are_told(tmp_path: Path, scenes: Dataset) -> 
         read_questions(write(tmp_path / "q"), scenes)
     with pytest.raises(DataError, match=r"a folder with questions\.jsonl"):
         read_questions(tmp_path, scenes)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("question", "Which color has the cube?"),
+        ("options", ["red", "blue", "yellow", "green"]),
+        ("answer", "C"),
+        ("colors", {"1": "green"}),
+        ("pictures", [{"label": "scene", "view": [45, 22], "without": [2]}]),
+        ("evidence", {"slots": {"block": "blue cube"}}),
+        ("wording", "co-2"),
+    ],
+)
+def test_the_digest_of_a_set_follows_every_field(
+    tmp_path: Path, scenes: Dataset, field: str, value: Any
+) -> None:
+    digests = [
+        read_questions(write(tmp_path / name, question), scenes).sha256
+        for name, question in (("a", QUESTION), ("b", QUESTION), ("c", {**QUESTION, field: value}))
+    ]
+    assert digests[0] == digests[1] != digests[2]
