@@ -29,7 +29,7 @@ __all__ = ["command"]
     help="How to print them.",
 )
 def command(run: Path, paper: bool, names: tuple[str, ...], form: str) -> None:
-    """Print all tables of the folder RUN; nothing is written.
+    """Print all tables of the folder RUN that have rows; nothing is written.
 
     With --paper, those of the paper's tables in which a model of the run has a row.
     """
@@ -41,7 +41,8 @@ def command(run: Path, paper: bool, names: tuple[str, ...], form: str) -> None:
             if len(frame):
                 views[f"paper{number}"] = table.view(frame, loaded)
     else:
-        views = make_tables(loaded, names or table_names(loaded))[1]
+        frames, views = make_tables(loaded, names or table_names(loaded))
+        views = {name: view for name, view in views.items() if name in names or len(frames[name])}
     if unknown := [name for name in names if name not in views]:
         allowed = ", ".join(views if paper else table_names(loaded))
         raise SpecError(

@@ -83,13 +83,12 @@ def settings_view(table: pd.DataFrame, run: Run) -> TextTable:
         for level in design.levels
         for name in ("A", "B", "B - A, 95 % CI")
     ]
-    scenes = int(table["n_clusters"].max())
+    note = f"Matcher {design.matcher}; the difference is paired"
+    if len(table):
+        note += f", its interval from resampling {table['n_clusters'].max()} base scenes"
     return TextTable(
         "F1 in setting A (with orientation) and in setting B (without), in percent",
         (Column("Model", is_text=True), *columns),
         tuple(rows),
-        (
-            f"Matcher {design.matcher}; the difference is paired, its interval from resampling "
-            f"{scenes} base scenes.",
-        ),
+        (f"{note}.",),
     )

@@ -40,6 +40,17 @@ def test_tables_print_all_or_one_in_any_form(folder: Path) -> None:
     assert not (folder / "tables").exists()
 
 
+def test_tables_without_rows_are_printed_only_when_asked_for(tmp_path: Path) -> None:
+    records = [record("alpha", scene, 0, [score(1, 1, 1)]) for scene in LEVELS]
+    folder = write_run(tmp_path / "run", records, manifest(seeds=[0], settings=["A"]))
+    everything = call("tables", folder).output
+    assert "Assembly planning" in everything
+    assert "setting A (with orientation)" not in everything
+    one = call("tables", folder, "--only", "settings").output
+    assert "setting A (with orientation)" in one
+    assert "nan" not in one
+
+
 def test_tables_beside_the_paper(folder: Path) -> None:
     output = call("tables", folder, "--paper").output
     # The paper has this model in its table of seeds alone.
@@ -55,6 +66,8 @@ def test_compare_says_the_verdict_and_what_flipped(folder: Path, tmp_path: Path)
     assert (tmp_path / "out" / "comparison.tex").exists()
     with pytest.raises(SpecError, match="no such model"):
         call("compare", folder, "--models", "alpha,delta")
+    with pytest.raises(SpecError, match="a model twice"):
+        call("compare", folder, "--models", "alpha,alpha")
     with pytest.raises(SpecError, match="empty name"):
         call("compare", folder, "--models", "alpha,")
     with pytest.raises(StoreError, match=r"holds no run\.yaml"):
