@@ -9,8 +9,9 @@ import pandas as pd
 
 from phyblock.report.design import OVERALL
 from phyblock.report.load import Run, once_per_run
+from phyblock.report.outcomes import WITHOUT_REPLY
 
-__all__ = ["METRICS", "cell_scores", "micro_averages", "with_levels"]
+__all__ = ["METRICS", "cell_scores", "measured", "micro_averages", "with_levels"]
 
 METRICS = ("precision", "recall", "f1")
 
@@ -38,6 +39,15 @@ def cell_scores(run: Run) -> pd.DataFrame:
     scores = with_levels(scores, run)
     criteria = {level: run.design.criterion(level) for level in run.design.levels}
     return scores[scores["criterion"] == scores["level"].map(criteria)]
+
+
+def measured(scores: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
+    """Scores without the groups of `keys` in which no sample has a reply.
+
+    Where empty plans count, such a group has counts, but nothing was measured.
+    """
+    replied = scores.assign(replied=~scores["outcome"].isin(WITHOUT_REPLY))
+    return scores[replied.groupby(list(keys))["replied"].transform("any").astype(bool)]
 
 
 def micro_averages(scores: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.errors import Problem, SpecError
-from phyblock.report.cells import cell_scores
+from phyblock.report.cells import measured
 from phyblock.report.design import OVERALL, Design
 from phyblock.report.intervals import parents_of, resampler
 from phyblock.report.load import Run
@@ -103,14 +103,18 @@ def _checked(run: Run, models: Sequence[str]) -> Sequence[str]:
     if unknown := [name for name in models if name not in known]:
         where, found, allowed = str(run.path), ", ".join(unknown), ", ".join(known)
         raise SpecError(Problem(where, "has no such model", "--models", found, allowed))
+    if twice := [name for name in dict.fromkeys(models) if models.count(name) > 1]:
+        problem = Problem(str(run.path), "is given a model twice", "--models", ", ".join(twice))
+        raise SpecError(problem)
     return models or known
 
 
 def compare(pairs: Sequence[tuple[Side, Side]], levels: Sequence[str]) -> Comparison:
     """Compare the sides of each pair at each level on the samples that both have.
 
-    Setting, matcher and criteria are the headline ones of the first run. Raises SpecError when
-    a run has no full planning, was not scored so, or has other blocks in a scene of the same name.
+    Setting, matcher, criteria and what becomes of missing replies are those of the first run.
+    Raises SpecError when a run has no full planning, was not scored so, or has other blocks in a
+    scene of the same name.
     """
     design = pairs[0][0].run.design
     sides = {side.label: side for pair in pairs for side in pair}
@@ -121,7 +125,7 @@ def compare(pairs: Sequence[tuple[Side, Side]], levels: Sequence[str]) -> Compar
             message, allowed = "has no track that is compared", "full_planning"
             raise SpecError(Problem(str(run.path), message, "tracks", found, allowed))
     for run in runs[1:]:
-        _check_alike(run, runs[0])
+        _check_alike(run, runs[0], levels)
     parents = pd.concat([parents_of(run) for run in runs]).groupby(level=0).first()
     labels = [(a.label, b.label) for a, b in pairs]
     parts: list[pd.DataFrame] = []
@@ -145,11 +149,15 @@ def compare(pairs: Sequence[tuple[Side, Side]], levels: Sequence[str]) -> Compar
     return Comparison(table, flipped.reset_index(drop=True), how)
 
 
-def _check_alike(run: Run, first: Run) -> None:
+def _check_alike(run: Run, first: Run, levels: Sequence[str]) -> None:
     suite, wanted = run.design.suite, first.design
+    known = ("aov", suite.scoring.level1)
+    needed = (wanted.criterion(level) for level in levels)
+    unknown = next((criterion for criterion in needed if criterion not in known), "aov")
     for what, names, name in (
         ("settings", suite.settings, wanted.setting),
         ("scoring.matchers", suite.scoring.matchers, wanted.matcher),
+        ("scoring.level1", known, unknown),
     ):
         if name not in names:
             hint = "phyblock score reads stored replies again under other rules"
@@ -166,16 +174,21 @@ def _check_alike(run: Run, first: Run) -> None:
 
 
 def _samples(run: Run, level: str, design: Design) -> dict[str, pd.DataFrame]:
-    """Counts by (scene, seed) at one level, by model."""
-    scores = cell_scores(run)
+    """Counts by (scene, seed) at one level, by model; of models with a reply at the level."""
     criterion = design.criterion(level)
+    scores = run.scores
     kept = scores[
-        (scores["level"] == level)
-        & scores["track"].isin(design.tracks[:1])
+        scores["track"].isin(design.tracks[:1])
         & (scores["criterion"] == criterion)
         & (scores["setting"] == design.setting)
         & (scores["matcher"] == design.matchers(criterion)[0])
-    ].set_index(["scene", "seed"])
+        & ~scores["outcome"].isin(design.outcomes_left_out)
+    ]
+    if level != OVERALL:
+        records = run.records
+        of_level = [int(level) in levels for levels in records["levels"]]
+        kept = kept[kept["sample"].isin(records["sample"][of_level])]
+    kept = measured(kept, ["model"]).set_index(["scene", "seed"])
     parts = {str(model): part[_COUNTS] for model, part in kept.groupby("model", sort=False)}
     return {model: parts.get(model, kept.iloc[:0][_COUNTS]) for model in run.design.model_names}
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.report.cells import METRICS, cell_scores
+from phyblock.report.cells import METRICS, cell_scores, measured
 from phyblock.report.load import Run, once_per_run
 from phyblock.scoring.uncertainty import (
     Clusters,
@@ -71,9 +71,13 @@ def resampler() -> np.random.Generator:
 
 
 def count_cube(run: Run, level: str, by: Sequence[str]) -> CountCube:
-    """Scores of a level as counts tp, fp, fn of every scene in the cells that `by` names."""
+    """Scores of a level as counts tp, fp, fn of every scene in the cells that `by` names.
+
+    Without the models that have no reply at the level.
+    """
     scores = cell_scores(run)
-    return CountCube(scores[scores["level"] == level], parents_of(run), by, _COUNTS)
+    scores = measured(scores[scores["level"] == level], ["model", "track"])
+    return CountCube(scores, parents_of(run), by, _COUNTS)
 
 
 def parents_of(run: Run) -> pd.Series[Any]:

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.report import ASSEMBLY_COLUMNS, assembly_frame, errors_frame, table1_frame
+from phyblock.report.settings import settings_frame
 from phyblock.report.views import table1_view
 from phyblock.scoring import ERROR_TYPES, Counts, micro
 from tests.report.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
@@ -321,3 +322,13 @@ def test_error_types_by_hand() -> None:
     assert table.loc["overall", "overflow_share"] == 0.5
     assert table.loc["overall", "n"] == 2
     assert table.loc["4", "n"] == 0
+
+
+def test_settings_are_not_compared_where_a_model_has_no_reply() -> None:
+    both = [score(2, 1, 1), score(3, 1, 1, setting="B")]
+    records = [record("alpha", scene, 0, both) for scene in LEVELS]
+    records += [record("beta", scene, 0, both, outcome="api_error") for scene in LEVELS]
+    frame = settings_frame(run_of(records, manifest(seeds=[0], missing="count")))
+    assert set(frame["model"]) == {"alpha"}
+    overall = frame.set_index("level").loc["overall"]
+    assert (overall["f1_a"], overall["f1_b"]) == pytest.approx((2 / 3, 3 / 4))

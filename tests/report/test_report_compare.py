@@ -55,6 +55,18 @@ def test_only_samples_that_both_have_are_compared() -> None:
     assert (row["better"], row["worse"], row["same"]) == (0, 1, 1)
 
 
+def test_a_model_without_any_reply_is_not_compared_though_empty_plans_count() -> None:
+    silent = [
+        record("beta", scene, outcome="api_error", scores=[score(0, 0, 4)]) for scene in LEVELS
+    ]
+    run = one_seed(*plans("alpha", dict.fromkeys(LEVELS, 3)), *silent, missing="count")
+    assert set(compare_models(run).table["verdict"]) == {"nothing to compare"}
+    some = record("beta", "000", scores=[score(3, 1, 1)])
+    run = one_seed(*plans("alpha", dict.fromkeys(LEVELS, 3)), some, *silent[1:], missing="count")
+    row = compare_models(run).table.set_index("level").loc["overall"]
+    assert (row["n_samples"], row["better"], row["same"]) == (5, 4, 1)
+
+
 def test_flipped_samples_are_those_that_one_side_alone_got_right() -> None:
     run = one_seed(
         *plans("alpha", {"000": 4, "001": 2, "002": 4, "003": 1}),
@@ -127,6 +139,31 @@ def test_runs_that_cannot_be_compared_are_refused() -> None:
         compare_models(run_of([], facts))
     with pytest.raises(SpecError, match="needs two models"):
         compare_models(first)
+
+
+def test_level_1_is_compared_by_one_criterion_alone() -> None:
+    first = one_seed(*plans("alpha", {"001": 4, "002": 2}), models=["alpha"])
+    other = one_seed(
+        *plans("alpha", {"001": 4, "002": 4}), models=["alpha", "beta"], level1="membership"
+    )
+    with pytest.raises(SpecError, match="was not scored as run was, by selection"):
+        compare_runs(first, other)
+    second = one_seed(*plans("alpha", {"001": 4, "002": 4}), models=["alpha"], levels=[2, 3])
+    table = compare_runs(first, second).table.set_index("level")
+    assert table.index.tolist() == ["2", "3", "overall"]
+    assert table.loc["overall", "difference"] == -25
+
+
+def test_the_first_runs_policy_on_missing_replies_holds_for_both() -> None:
+    def of(missing: str, failed: str) -> Run:
+        lost = record("alpha", failed, outcome="missing", scores=[score(0, 0, 4)])
+        right = {scene: 4 for scene in ("000", "001", "002") if scene != failed}
+        return one_seed(*plans("alpha", right), lost, models=["alpha"], missing=missing)
+
+    for missing, samples in (("skip", 1), ("count", 3)):
+        other = of("count" if missing == "skip" else "skip", "001")
+        row = compare_runs(of(missing, "000"), other).table.set_index("level").loc["overall"]
+        assert (row["n_samples"], row["difference"]) == (samples, 0)
 
 
 def test_levels_are_rows_of_one_pair_alone() -> None:
