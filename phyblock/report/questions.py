@@ -21,7 +21,16 @@ from phyblock.scoring import (
     subtask_accuracies,
 )
 
-__all__ = ["CELLS", "OVERALL_CELL", "Showing", "letters_frame", "questions_frame", "showing"]
+__all__ = [
+    "CELLS",
+    "OVERALL_CELL",
+    "Showing",
+    "letters_frame",
+    "questions_counted",
+    "questions_frame",
+    "showing",
+    "subtasks_of",
+]
 
 _TRACK = "vqa"
 OVERALL_CELL = "overall"
@@ -86,6 +95,29 @@ def questions_frame(run: Run) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(_COLUMNS))
 
 
+@once_per_run
+def questions_counted(run: Run) -> pd.DataFrame:
+    """The questions behind `questions_frame`: model, subtask, scene, question, seed, correct, n.
+
+    One row a model, question and seed, `correct` 0 or 1, `n` 1; with rotations it is right only if
+    each of them is. Subtasks in which a model said nothing are left out.
+    """
+    records = run.records[run.records["track"] == _TRACK]
+    keys = ["model", "subtask", "scene", "question", "seed"]
+    rows = records[keys].assign(
+        correct=records["given"].eq(records["right"]).fillna(False).astype("int64"),
+        left_out=records["outcome"].isin(run.design.outcomes_left_out),
+        replied=~records["outcome"].isin(WITHOUT_REPLY),
+    )
+    asked = rows.groupby(keys, sort=True).agg(
+        {"correct": "sum", "left_out": "any", "replied": "any"}
+    )
+    asked["replied"] = asked.groupby(["model", "subtask"])["replied"].transform("any")
+    kept = asked[asked["replied"].astype(bool) & ~asked["left_out"].astype(bool)]
+    correct = (kept["correct"] == showing(run).rotations).astype("int64")
+    return pd.DataFrame({"correct": correct, "n": 1}, index=kept.index).reset_index()
+
+
 def letters_frame(run: Run) -> pd.DataFrame:
     """How often each letter was right and was given [%], by model, without ordering.
 
@@ -119,7 +151,7 @@ def _rows_of(run: Run, model: str) -> list[dict[str, Any]]:
     expected = _expected(run)
     rows: list[dict[str, Any]] = []
     for cell in CELLS:
-        parts = _parts(cell)
+        parts = subtasks_of(cell)
         mine, here = (frame[frame["subtask"].isin(parts)] for frame in (samples, scored))
         known = [seed[cell] for seed in by_seed if not np.isnan(seed[cell])]
         rows.append(
@@ -141,8 +173,8 @@ def _rows_of(run: Run, model: str) -> list[dict[str, Any]]:
     return rows
 
 
-def _parts(cell: str) -> tuple[str, ...]:
-    """The subtasks that a cell stands for."""
+def subtasks_of(cell: str) -> tuple[str, ...]:
+    """The subtasks that one of `CELLS` stands for."""
     if cell == OVERALL_CELL:
         return SUBTASKS
     return next((parts for name, parts in CATEGORIES.items() if name == cell), (cell,))

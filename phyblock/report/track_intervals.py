@@ -10,7 +10,7 @@ import pandas as pd
 from phyblock.domain import CATEGORIES, SUBTASKS
 from phyblock.report.intervals import CountCube, parents_of, resampler
 from phyblock.report.load import Run, once_per_run
-from phyblock.report.questions import CELLS
+from phyblock.report.questions import CELLS, questions_counted, subtasks_of
 from phyblock.report.text_table import Column, TextTable, between, number
 from phyblock.scoring.uncertainty import Floats, bootstrap, f1_of, ratio_of
 
@@ -23,35 +23,28 @@ _COLUMNS = ("model", "cell", "value", "lo", "hi", "se", "n", "n_scenes", "n_clus
 def vqa_intervals(run: Run) -> pd.DataFrame:
     """One row a model and cell of Table 2: value, lo, hi, se [%], n, n_scenes, n_clusters.
 
-    Values are those of `questions_frame`; with rotations a question counts as right where each is.
-    Means over subtasks are taken anew in every resample.
+    Values are those of `questions_frame`; means over subtasks are taken anew in every resample.
+    `n_scenes` and `n_clusters` are behind the cell; a mean has no interval where one of its
+    subtasks has none.
     """
-    records = run.records
-    kept = records[
-        (records["track"] == "vqa") & ~records["outcome"].isin(run.design.outcomes_left_out)
-    ]
-    right = kept.assign(correct=kept["given"].eq(kept["right"]).fillna(False).astype("int64"))
-    keys = ["model", "scene", "subtask", "question", "seed"]
-    asked = right.groupby(keys, sort=True)["correct"].min().reset_index().assign(n=1)
+    asked = questions_counted(run)
     if asked.empty:
         return pd.DataFrame(columns=list(_COLUMNS))
     cube = CountCube(asked, parents_of(run), ["model", "subtask"], ["correct", "n"])
     models = [name for name in run.design.model_names if any(name == m for m, _ in cube.cells)]
-    place = {cell: number for number, cell in enumerate(cube.cells)}
     counts = np.zeros((len(cube.scenes), len(models), len(SUBTASKS), 2))
-    present = np.zeros((len(cube.scenes), len(models)), dtype=bool)
-    for row, model in enumerate(models):
-        for column, subtask in enumerate(SUBTASKS):
-            if (model, subtask) in place:
-                counts[:, row, column] = cube.counts[:, place[model, subtask]]
-                present[:, row] |= cube.present[:, place[model, subtask]]
-    n_clusters = cube.clusters_of(present)
+    for place, (model, subtask) in enumerate(cube.cells):
+        counts[:, models.index(model), SUBTASKS.index(subtask)] = cube.counts[:, place]
+    present = np.asarray(np.any(_of_cells(counts[..., 1] > 0), axis=-1))
+    n_clusters = _clusters_behind(cube, present)
+    least = _clusters_behind(cube, counts[..., 1] > 0)
+    weakest = np.where(_PARTS, least[:, None, :], n_clusters.max()).min(axis=-1)
     found = bootstrap(
         counts,
         cube.clusters,
         _cells_of,
         resampler(),
-        n_clusters=np.repeat(n_clusters[:, None], len(CELLS), axis=1),
+        n_clusters=np.where(weakest < 2, weakest, n_clusters),
     )
     parts = [
         pd.DataFrame(
@@ -59,14 +52,29 @@ def vqa_intervals(run: Run) -> pd.DataFrame:
                 "model": model,
                 "cell": CELLS,
                 **_percent(found.value[row], found.lo[row], found.hi[row], found.se[row]),
-                "n": _numbers(counts[:, row, :, 1].sum(axis=0)),
-                "n_scenes": present[:, row].sum(),
+                "n": _of_cells(counts[:, row, :, 1].sum(axis=0)).sum(axis=-1).astype("int64"),
+                "n_scenes": present[:, row].sum(axis=0),
                 "n_clusters": n_clusters[row],
             }
         )
         for row, model in enumerate(models)
     ]
     return pd.concat(parts, ignore_index=True)[list(_COLUMNS)]
+
+
+_PARTS = np.array([[name in subtasks_of(cell) for name in SUBTASKS] for cell in CELLS])
+"""Which subtasks a cell is made of, shape (cells, subtasks)."""
+
+
+def _of_cells(by_subtask: np.ndarray) -> np.ndarray:
+    """What is known by subtask (..., subtasks) as (..., cells, subtasks), zero where not of it."""
+    return np.asarray(by_subtask[..., None, :] * _PARTS)
+
+
+def _clusters_behind(cube: CountCube, present: np.ndarray) -> np.ndarray:
+    """Base scenes behind each of the columns of `present`, whose first axis are scenes."""
+    flat = present.reshape(len(present), -1)
+    return cube.clusters_of(flat).reshape(present.shape[1:])
 
 
 def _cells_of(sums: Floats) -> Floats:
@@ -77,14 +85,6 @@ def _cells_of(sums: Floats) -> Floats:
         cells[category] = np.mean([accuracy[name] for name in subtasks], axis=0)
     cells["overall"] = np.mean([cells[category] for category in CATEGORIES], axis=0)
     return np.stack([cells[cell] for cell in CELLS], axis=-1)
-
-
-def _numbers(by_subtask: Floats) -> list[int]:
-    """Questions behind each of `CELLS`."""
-    of = dict(zip(SUBTASKS, by_subtask, strict=True))
-    of |= {name: sum(of[one] for one in subtasks) for name, subtasks in CATEGORIES.items()}
-    of["overall"] = by_subtask.sum()
-    return [int(of[cell]) for cell in CELLS]
 
 
 @once_per_run
@@ -142,10 +142,10 @@ def track_intervals_view(table: pd.DataFrame, run: Run) -> TextTable:
         for name in ("%", "95 % CI")
     ]
     suite = f", suite {run.design.suite.name}" if run.design.suite.name else ""
-    note = f"Intervals: base scenes resampled, at most {table['n_clusters'].max()} of them."
+    most = f", at most {table['n_clusters'].max()} of them" if len(table) else ""
     return TextTable(
         f"{what} with 95 % intervals{suite}",
         (Column("Model", is_text=True), *columns),
         tuple(rows),
-        (note,),
+        (f"Intervals: base scenes resampled{most}.",),
     )

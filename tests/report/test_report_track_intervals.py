@@ -18,11 +18,20 @@ def facts() -> dict[str, Any]:
     return made
 
 
-def asked(model: str, scene: str, subtask: str, number: int, right: bool) -> dict[str, Any]:
-    return record(model, scene) | {
-        "sample": f"vqa/{model}/{subtask}-{number}/s0",
+def asked(
+    model: str,
+    scene: str,
+    subtask: str,
+    number: int,
+    right: bool,
+    *,
+    rotation: int = 0,
+    outcome: str = "ok",
+) -> dict[str, Any]:
+    return record(model, scene, outcome=outcome) | {
+        "sample": f"vqa/{model}/{subtask}-{number}-r{rotation}/s0",
         "track": "vqa",
-        "question": {"id": f"{subtask}-{number}", "subtask": subtask, "rotation": 0},
+        "question": {"id": f"{subtask}-{number}", "subtask": subtask, "rotation": rotation},
         "answer": {"right": "A", "given": "A" if right else None, "correct": right},
     }
 
@@ -76,3 +85,50 @@ def test_nothing_asked_is_an_empty_table() -> None:
     empty = run_of([], facts())
     assert vqa_intervals(empty).empty
     assert step_intervals(empty).empty
+
+
+def test_a_question_goes_with_its_rotations_and_is_right_if_all_are() -> None:
+    made = facts()
+    made["suite"]["vqa"] = {"circular": True}
+    records = [
+        asked("alpha", scene, "SH", number, number != 1 or turn != 2, rotation=turn)
+        for number, scene in enumerate(LEVELS)
+        for turn in range(4)
+    ]
+    # Left out with all of its rotations, three of which were right.
+    records[-1] = asked("alpha", "004", "SH", 4, False, rotation=3, outcome="api_error")
+    run = run_of(records, made)
+    cell = vqa_intervals(run).set_index("cell").loc["SH"]
+    wanted = questions_frame(run).set_index(["model", "cell"])["accuracy"]
+    assert cell["value"] == pytest.approx(75) == 100 * wanted["alpha", "SH"]
+    assert (cell["n"], cell["n_scenes"], cell["n_clusters"]) == (4, 4, 4)
+
+
+def test_a_cell_of_one_base_scene_has_no_interval_and_neither_has_a_mean_with_it() -> None:
+    records = [
+        asked("alpha", scene, subtask, number, number % 2 == 0)
+        for subtask in SUBTASKS
+        for number, scene in enumerate(["000"] if subtask == "SH" else LEVELS)
+    ]
+    found = vqa_intervals(run_of(records, facts())).set_index("cell")
+    assert found["value"].notna().all()
+    assert found.loc["SH", ["n_scenes", "n_clusters"]].tolist() == [1, 1]
+    assert found.loc["overall", ["n", "n_scenes", "n_clusters"]].tolist() == [76, 5, 5]
+    without = found.index[found["lo"].isna()].tolist()
+    assert without == ["SH", "object_property", "overall"]
+
+
+@pytest.mark.parametrize("missing", ["count", "skip"])
+def test_where_a_model_said_nothing_nothing_was_measured(missing: str) -> None:
+    made = facts()
+    made["suite"]["scoring"]["missing"] = missing
+    records = [
+        asked(
+            "alpha", scene, subtask, number, False, outcome="ok" if subtask == "SH" else "missing"
+        )
+        for subtask in ("SH", "CO")
+        for number, scene in enumerate(LEVELS)
+    ]
+    found = vqa_intervals(run_of(records, made)).set_index("cell")
+    assert found.loc["SH", "value"] == 0
+    assert np.isnan(found.loc["CO", "value"])
