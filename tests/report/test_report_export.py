@@ -19,11 +19,13 @@ HF = "the package datasets is not installed"
 INSPECT = "the package inspect_ai is not installed"
 
 
-def asked(model: str, seed: int, right: bool) -> dict[str, Any]:
+def asked(model: str, seed: int, right: bool, key: str = "sh-1") -> dict[str, Any]:
+    question = {"id": "sh-1", "subtask": "SH", "category": "object_property"}
     return record(model, "000", seed) | {
-        "sample": f"vqa/{model}/sh-1/s{seed}",
+        "sample": f"vqa/{model}/{key}/s{seed}",
         "track": "vqa",
-        "question": {"id": "sh-1", "subtask": "SH", "category": "object_property", "rotation": 0},
+        "key": key,
+        "question": question | {"rotation": int(key[-1]) if "-r" in key else 0},
         "parse": {"rule": "letter", "letters": "A" if right else "B"},
         "answer": {"right": "A", "given": "A" if right else "B", "correct": right},
     }
@@ -128,6 +130,17 @@ def test_an_inspect_log_opens_with_the_right_scores(folder: Path, tmp_path: Path
     assert vqa.samples[0].target == "A"
     listed = log.list_eval_logs(str(tmp_path / "out"))
     assert len(listed) == 3
+
+
+def test_rotations_of_a_question_are_samples_of_their_own_in_an_inspect_log(tmp_path: Path) -> None:
+    log = pytest.importorskip("inspect_ai.log", reason=INSPECT)
+    records = [asked("alpha", 0, True, key=f"sh-1-r{rotation}") for rotation in range(4)]
+    facts = manifest(models=["alpha"], seeds=[0])
+    facts["suite"]["tracks"] = ["vqa"]
+    run = load_run(write_run(tmp_path / "run", records, facts))
+    (file,) = export_run(run, "inspect", tmp_path / "out")
+    samples = log.read_eval_log(str(file)).samples
+    assert [sample.id for sample in samples] == [f"sh-1-r{rotation}" for rotation in range(4)]
 
 
 @pytest.mark.parametrize(("form", "package"), [("hf", "datasets"), ("inspect", "inspect_ai.log")])

@@ -98,19 +98,29 @@ def _sample(
 
     text = prompt_text(record, prompts) or ""
     reply, error = record["reply"], record["error"]
-    question = record.get("question") or {}
     output = ModelOutput(model=record["model"])
     messages: list[Any] = [ChatMessageUser(content=text)]
     if reply is not None:
         output = ModelOutput.from_content(record["model"], reply["text"])
         output.usage = _usage(reply)
         messages.append(ChatMessageAssistant(content=reply["text"], model=record["model"]))
-    kept = ("sample", "scene", "levels", "parents", "n_blocks", "outcome", "parse", "question")
+    kept = (
+        "sample",
+        "key",
+        "scene",
+        "levels",
+        "parents",
+        "n_blocks",
+        "outcome",
+        "parse",
+        "question",
+    )
     about = {name: record[name] for name in kept if name in record}
     about |= {name: record[name] for name in ("turns", "ending", "progress") if name in record}
     said = None if error is None else str(error.get("message"))
     return EvalSample(
-        id=question.get("id") or record["scene"],
+        # The key tells rotations of one question apart; older records have none.
+        id=str(record.get("key", record["scene"])),
         epoch=list(seeds).index(record["seed"]) + 1 if record["seed"] in seeds else 1,
         input=text,
         target=(record.get("answer") or {}).get("right") or "",
