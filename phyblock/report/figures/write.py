@@ -57,6 +57,8 @@ def write_figures(run: Run, names: Sequence[str] = FIGURES) -> tuple[Path, ...]:
                 for ending, draw in (("svg", svg_bytes), ("png", png_bytes)):
                     files.append(folder / f"{name}.{ending}")
                     atomic_write(files[-1], draw(figure))
+                    # Laid out once: the next format takes what the first has found.
+                    figure.set_layout_engine("none")
     except OSError as error:
         raise StoreError(Problem(str(folder), f"cannot be written: {error.strerror}")) from error
     return tuple(files)
