@@ -235,8 +235,15 @@ class Vqa:
     @functools.cached_property
     def _elsewhere(self) -> dict[str, list[QuestionTask]]:
         """For each question asked, those with like pictures of a scene that shares no parent."""
+        alike: dict[object, list[QuestionTask]] = {}
+        for task in self._questions.tasks:
+            alike.setdefault(_sort_of(Shown(task.question, task.files)), []).append(task)
         return {
-            item.question.id: [task for task in self._questions.tasks if _is_elsewhere(task, item)]
+            item.question.id: [
+                task
+                for task in alike.get(_sort_of(item.shown), ())
+                if not set(_parents(task.question)) & set(_parents(item.question))
+            ]
             for item in self.items
             if not item.rotation
         }
@@ -249,11 +256,13 @@ class Vqa:
             raise SpecError(problem)
 
 
-def _is_elsewhere(task: QuestionTask, item: AskedQuestion) -> bool:
-    other, mine = task.question, item.question
-    if other.subtask != mine.subtask or set(_parents(other)) & set(_parents(mine)):
-        return False
-    return Shown(other, task.files).labels == item.shown.labels
+def _sort_of(shown: Shown) -> tuple[object, ...]:
+    """What pictures must share to stand in for one another: a text may speak of place B."""
+    marks = sorted(
+        (picture.label, *sorted(mark.letter for mark in picture.marks))
+        for picture in shown.question.pictures
+    )
+    return (shown.question.subtask, shown.labels, *marks)
 
 
 def _parents(question: Question) -> tuple[str, ...]:

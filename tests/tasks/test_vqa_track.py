@@ -222,6 +222,22 @@ def test_wrong_pictures_are_of_another_scene_and_depend_on_the_seed_alone(
     assert any(seen[2][key].messages != seen[0][key].messages for key in own)
 
 
+def test_wrong_pictures_have_the_marks_that_the_text_speaks_of(
+    question_set: QuestionSet, pictures_of_vqa: Path
+) -> None:
+    """Of two other questions about places, one marks none: it never stands in."""
+    first, second, third, *_ = [t for t in question_set.tasks if t.question.subtask == "AD"]
+    scene, *rest = second.question.pictures
+    bare = replace(second.question, pictures=(replace(scene, marks=()), *rest))
+    found = QuestionSet("three", question_set.root, (first, replace(second, question=bare), third))
+    track = track_of(found, pictures_of_vqa, VqaRules(wrong_image=True), [first])
+    for seed in range(8):
+        (request,) = ask(track, seed=seed)
+        sent = {image.label: image.data for image in images(request)}
+        shown = {picture.label: picture for picture in third.question.pictures}
+        assert sent == {label: question_png(recipe, STYLE) for label, recipe in shown.items()}
+
+
 def test_wrong_pictures_need_another_scene(question_set: QuestionSet, tmp_path: Path) -> None:
     alone = QuestionSet("one", tmp_path, question_set.tasks[:1])
     with pytest.raises(SpecError, match="about another scene"):
