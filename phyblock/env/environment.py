@@ -7,9 +7,10 @@ and gives a reward of 1; a wrong one changes nothing and gives 0.
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal, cast, get_args
 
 import gymnasium
 import numpy as np
@@ -21,7 +22,7 @@ from phyblock.datasets import AssemblyTask
 from phyblock.domain import MAX_CANDIDATES, Block
 from phyblock.env.scenes import read_tasks
 from phyblock.errors import DataError, Problem
-from phyblock.scoring import Assembly, Gating, Setting
+from phyblock.scoring import GATINGS, SETTINGS, Assembly, Gating, Setting
 from phyblock.sim import PictureStyle, candidates_png
 from phyblock.sim.site import ONE_SETTING, Lookout, Settled, Site
 from phyblock.sim.stability import DEFAULT_TRIAL
@@ -33,7 +34,10 @@ DONE = 0
 """The action that ends the assembly; any other is the number of a candidate."""
 EnvPhysics = Literal["off", "settle", "strict"]
 Observation = dict[str, NDArray[Any]]
+Observe = Literal["pictures", "state"]
 _PICTURES = ("current", "goal", "candidates")
+_KEPT_PICTURES = 64
+"""Of one scene; 50 MB at 512 pixels."""
 _MOST_OF_A_KIND = 255
 
 
@@ -58,7 +62,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
         setting: Setting = "A",
         gating: Gating = "aov",
         physics: EnvPhysics = "settle",
-        observe: Literal["pictures", "state"] = "pictures",
+        observe: Observe = "pictures",
         size_px: int = 512,
         background: Background = "checkerboard",
         max_steps: int | None = None,
@@ -67,10 +71,14 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
     ) -> None:
         """`data` is a data set (see `read_tasks`) or tasks; `scene` plays that one alone.
 
-        Raises DataError for a data set or scene that is not there, ValueError for a size or a
-        background that a `PictureStyle` does not allow.
+        Raises DataError for a data set or scene that is not there, ValueError for an option that
+        is not among those allowed, a limit below 1, or no tasks at all.
         """
+        _check_options(setting=setting, gating=gating, physics=physics, observe=observe)
+        _check_limits(max_steps=max_steps, max_failures=max_failures)
         tasks = read_tasks(data) if isinstance(data, str | Path) else tuple(data)
+        if not tasks:
+            raise ValueError("data holds no tasks")
         self._tasks = {task.scene.id: task for task in tasks}
         self._scene = None if scene is None else self._find(scene).scene.id
         self._setting: Setting = setting
@@ -86,8 +94,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
         self._outcome: str = ""
         self._swapped: tuple[tuple[int, int], ...] = ()
         self._lookout: Lookout | None = None
-        self._pictures: dict[tuple[Block, ...] | str, NDArray[np.uint8]] = {}
-        self._trials: dict[int, Settled] = {}
+        self._pictures: OrderedDict[tuple[Block, ...] | str, NDArray[np.uint8]] = OrderedDict()
         self._site = Site(DEFAULT_TRIAL if physics == "strict" else ONE_SETTING)
         self._begin(self._task)
         self.action_space = spaces.Discrete(MAX_CANDIDATES + 1)
@@ -110,7 +117,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
             raise ValueError(f"action {action} is outside 0..{MAX_CANDIDATES}")
         self._steps += 1
         if action == DONE:
-            self._outcome = "done"
+            self._outcome, self._swapped = "done", ()
             return self._observation(), 0.0, True, False, self._info()
         move = self._assembly.move(int(action))
         self._outcome, self._swapped = move.outcome, move.swapped
@@ -146,7 +153,6 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
             self._task = task
             self._lookout = None
             self._pictures.clear()
-            self._trials.clear()
 
     @property
     def _has_collapsed(self) -> bool:
@@ -158,10 +164,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
         state = tuple(blocks[vertex] for vertex in self._assembly.vertices)
         self._settled = Settled((), state)
         if self._physics != "off":
-            placed = self._assembly.placed
-            if placed not in self._trials:
-                self._trials[placed] = self._site.settle(state)
-            found = self._trials[placed]
+            found = self._site.settle(state)
             is_held = self._physics == "settle"
             self._settled = Settled(found.fallen, state if is_held else found.blocks)
 
@@ -191,18 +194,32 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
         return self._picture(self._settled.blocks)
 
     def _picture(self, blocks: tuple[Block, ...]) -> NDArray[np.uint8]:
-        if blocks not in self._pictures:
-            if self._lookout is None:
-                self._lookout = Lookout(self._task.scene, self._style)
-            self._pictures[blocks] = np.asarray(self._lookout.image(blocks))
-        return self._pictures[blocks]
+        return self._kept_picture(blocks, lambda: self._look().image(blocks))
 
     def _candidates(self) -> NDArray[np.uint8]:
-        if "candidates" not in self._pictures:
-            png = candidates_png(self._task.candidates, self._style)
-            with Image.open(io.BytesIO(png)) as image:
-                self._pictures["candidates"] = np.asarray(image.convert("RGB"))
-        return self._pictures["candidates"]
+        return self._kept_picture("candidates", self._draw_candidates)
+
+    def _kept_picture(
+        self, name: tuple[Block, ...] | str, draw: Callable[[], Image.Image]
+    ) -> NDArray[np.uint8]:
+        """A picture drawn once while it is in use; those unused for longest make room."""
+        if name not in self._pictures:
+            self._pictures[name] = np.asarray(draw())
+            if len(self._pictures) > _KEPT_PICTURES:
+                self._pictures.popitem(last=False)
+        self._pictures.move_to_end(name)
+        return self._pictures[name]
+
+    def _look(self) -> Lookout:
+        if self._lookout is None:
+            self._lookout = Lookout(self._task.scene, self._style)
+        return self._lookout
+
+    def _draw_candidates(self) -> Image.Image:
+        png = candidates_png(self._task.candidates, self._style)
+        with Image.open(io.BytesIO(png)) as image:
+            rgb: Image.Image = image.convert("RGB")
+            return rgb
 
     def _info(self) -> dict[str, Any]:
         """The state in structure; tuples, since arrays of several lengths make no vector."""
@@ -219,6 +236,26 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
             "fallen": self._settled.fallen,
             "is_complete": self._assembly.is_complete,
         }
+
+
+_OPTIONS: Mapping[str, tuple[str, ...]] = {
+    "setting": SETTINGS,
+    "gating": GATINGS,
+    "physics": get_args(EnvPhysics),
+    "observe": get_args(Observe),
+}
+
+
+def _check_options(**options: str) -> None:
+    for name, value in options.items():
+        if value not in _OPTIONS[name]:
+            raise ValueError(f"{name} is {value!r}; allowed: {', '.join(_OPTIONS[name])}")
+
+
+def _check_limits(**limits: int | None) -> None:
+    for name, most in limits.items():
+        if most is not None and most < 1:
+            raise ValueError(f"{name} is {most}; allowed: 1 or more, or None")
 
 
 def _space(observe: str, size_px: int) -> spaces.Dict[Any]:

@@ -1,14 +1,17 @@
 """A building site: blocks put at their goal poses, let go, and looked at from one place.
 
-A partly built structure is always tried afresh, every block at its goal pose, so that no step is
-judged by the drift of the ones before it.
+A partly built structure is always tried with every block at its goal pose, so that no step is
+judged by the drift of the ones before it. Blocks that nothing brings near one another are tried
+apart (as in `steps`), and each arrangement once, wherever on the ground and in whatever colors it
+is met again: a verdict depends on nothing that was tried before.
 """
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Collection, Sequence
+import functools
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 
@@ -21,7 +24,7 @@ from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_camera
 from phyblock.sim.render import DrawnBlock, empty_ground, picture
 from phyblock.sim.stability import DEFAULT_TRIAL, Trial, movement
-from phyblock.sim.steps import DEFAULT_REST
+from phyblock.sim.steps import DEFAULT_REST, groups
 from phyblock.sim.world import Physics, Pose, World
 
 __all__ = ["ONE_SETTING", "Lookout", "Settled", "Site", "settle", "state_picture"]
@@ -29,6 +32,9 @@ __all__ = ["ONE_SETTING", "Lookout", "Settled", "Site", "settle", "state_picture
 ONE_SETTING = Trial(physics=DEFAULT_TRIAL.physics[:1])
 """A trial that costs half as much as the default and decides nothing that a score rests on."""
 
+_KEPT = 65_536
+"""Arrangements and states that are remembered, about 1 kB each."""
+_PLACE_DIGITS = 6
 _POSITION_DIGITS = 4
 _ANGLE_DIGITS = 2
 _COLLAPSE_S = 3.0
@@ -54,12 +60,14 @@ class Settled:
 
 
 class Site:
-    """Worlds kept open to try one state after another; a context manager."""
+    """Worlds kept open to try one state after another, each once; a context manager."""
 
     def __init__(self, trial: Trial = DEFAULT_TRIAL) -> None:
         self.trial = trial
         self._stack = contextlib.ExitStack()
         self._worlds: dict[Physics, World] = {}
+        self._known = functools.lru_cache(_KEPT)(self._settle)
+        self._standing = functools.lru_cache(_KEPT)(self._stand)
 
     def __enter__(self) -> Site:
         return self
@@ -79,21 +87,33 @@ class Site:
 
     def settle(self, blocks: Sequence[Block]) -> Settled:
         """Let blocks go at their goal poses; they fall when they do under any of the settings."""
+        return self._known(tuple(blocks))
+
+    def _settle(self, blocks: tuple[Block, ...]) -> Settled:
+        if all(self._standing(_arrangement(group)) for group in groups(blocks)):
+            return Settled((), blocks)
         fallen: set[int] = set()
         shown: tuple[Block, ...] = ()
         for physics in self.trial.physics:
-            moved, lying = self._try(blocks, physics)
+            moved, lying = self._fall(blocks, physics)
             fallen.update(moved)
             shown = shown or lying
-        return Settled(tuple(sorted(fallen)), shown or tuple(blocks))
+        return Settled(tuple(sorted(fallen)), shown or blocks)
 
-    def _try(
-        self, blocks: Sequence[Block], physics: Physics
+    def _stand(self, blocks: tuple[Block, ...]) -> bool:
+        """Whether blocks, alone in the world, stay where they are under every setting."""
+        for physics in self.trial.physics:
+            with self._placed(blocks, physics) as world:
+                self._wait(world, self.trial.duration_s)
+                if movement(blocks, world.poses(), self.trial).fallen:
+                    return False
+        return True
+
+    def _fall(
+        self, blocks: tuple[Block, ...], physics: Physics
     ) -> tuple[tuple[int, ...], tuple[Block, ...]]:
         """The orders that fell under one setting, and if any did, the blocks as they lie then."""
-        world = self._world(physics)
-        world.place_all(blocks)
-        try:
+        with self._placed(blocks, physics) as world:
             self._wait(world, self.trial.duration_s)
             fallen = movement(blocks, world.poses(), self.trial).fallen
             if not fallen:
@@ -102,14 +122,19 @@ class Site:
             poses = world.poses()
             fallen = (*fallen, *movement(blocks, poses, self.trial).fallen)
             return fallen, tuple(_lying(block, poses[block.order], fallen) for block in blocks)
+
+    @contextlib.contextmanager
+    def _placed(self, blocks: Sequence[Block], physics: Physics) -> Iterator[World]:
+        """A world with these blocks in it for a while."""
+        if physics not in self._worlds:
+            self._worlds[physics] = self._stack.enter_context(World(physics))
+        world = self._worlds[physics]
+        world.place_all(blocks)
+        try:
+            yield world
         finally:
             for block in reversed(blocks):
                 world.remove(block.order)
-
-    def _world(self, physics: Physics) -> World:
-        if physics not in self._worlds:
-            self._worlds[physics] = self._stack.enter_context(World(physics))
-        return self._worlds[physics]
 
     def _wait(self, world: World, limit_s: float) -> None:
         """Simulate until nothing has moved for a while, but no longer than `limit_s` [s]."""
@@ -135,6 +160,27 @@ def state_picture(
     """The recipe of a picture of blocks on the ground, seen exactly as the goal picture is."""
     view_deg = (style.azimuth_deg, style.elevation_deg)
     return QuestionPicture(label, tuple(blocks), view_deg, framed=scene.blocks)
+
+
+def _arrangement(group: Sequence[Block]) -> tuple[Block, ...]:
+    """What decides whether a group stands: the first block at the origin, colors left out."""
+    x, y, _ = group[0].position_m
+    return tuple(
+        Block(
+            number,
+            block.type,
+            "red",
+            (
+                round(block.position_m[0] - x, _PLACE_DIGITS) + 0.0,
+                round(block.position_m[1] - y, _PLACE_DIGITS) + 0.0,
+                block.position_m[2],
+            ),
+            block.euler_deg,
+            (),
+            1,
+        )
+        for number, block in enumerate(group, 1)
+    )
 
 
 def _lying(block: Block, pose: Pose, fallen: Collection[int]) -> Block:

@@ -189,6 +189,48 @@ def test_an_invalid_candidate_is_told() -> None:
 
 
 @pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"setting": "C"}, "setting is 'C'; allowed: A, B"),
+        ({"gating": "height"}, "gating is 'height'"),
+        ({"physics": "strct"}, "allowed: off, settle, strict"),
+        ({"observe": "picture"}, "allowed: pictures, state"),
+        ({"max_steps": 0}, "max_steps is 0"),
+        ({"max_failures": -1}, "max_failures is -1"),
+        ({"data": ()}, "no tasks"),
+    ],
+)
+def test_an_option_that_is_not_allowed_is_said(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        PhyBlockEnv(**{"data": SOME, **options})
+
+
+def test_blocks_change_places_in_the_step_that_says_so_and_not_in_the_next() -> None:
+    env = PhyBlockEnv(SOME, setting="B", physics="off", observe="state")
+    swaps = 0
+    for seed in range(60):
+        _, info = env.reset(seed=seed)
+        while not (info["swapped"] or info["is_complete"]):
+            moves = info["right_moves"]
+            *_, info = env.step(moves[int(env.np_random.integers(len(moves)))])
+        if info["swapped"]:
+            swaps += 1
+            assert env.step(DONE)[-1]["swapped"] == ()
+    assert swaps > 0
+
+
+def test_pictures_that_made_room_are_drawn_again_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+    for kept in (64, 2):
+        monkeypatch.setattr("phyblock.env.environment._KEPT_PICTURES", kept)
+        env = PhyBlockEnv(SOME[:1], size_px=128, physics="off")
+        seen.append([one[0] for one in rollout(env, 5, 12)])
+        assert len(env._pictures) <= kept
+    for one, other in zip(*seen, strict=True):
+        assert all(np.array_equal(one[name], other[name]) for name in one)
+
+
+@pytest.mark.parametrize(
     ("data", "scene"), [("no-such-set", None), ("phyblock-400", "no-such-scene")]
 )
 def test_what_is_not_there_is_said(data: str, scene: str | None) -> None:

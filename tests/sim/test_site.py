@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import itertools
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +16,9 @@ from phyblock.datasets import read_builtin
 from phyblock.domain import Block, Scene
 from phyblock.sim import PictureStyle, check, goal_png
 from phyblock.sim.question_pictures import question_key, question_png
-from phyblock.sim.site import ONE_SETTING, Site, settle, state_picture
+from phyblock.sim.site import ONE_SETTING, Settled, Site, settle, state_picture
 from phyblock.sim.stability import DEFAULT_TRIAL, Trial
+from phyblock.sim.world import World
 
 STYLE = PictureStyle(128)
 BUILT_IN = read_builtin(Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400").tasks
@@ -69,6 +72,50 @@ def test_verdicts_are_those_of_a_full_trial() -> None:
     for count in range(1, 4):
         blocks = scene.blocks[:count]
         assert settle(blocks).fallen == check(blocks).fallen
+
+
+def elsewhere(blocks: Sequence[Block]) -> tuple[Block, ...]:
+    """The same arrangement in another place and in one color."""
+    return tuple(
+        replace(
+            b, color="green", position_m=(b.position_m[0] + 0.3, b.position_m[1], b.position_m[2])
+        )
+        for b in blocks
+    )
+
+
+def test_an_arrangement_is_tried_once_wherever_it_stands(monkeypatch: pytest.MonkeyPatch) -> None:
+    simulated: list[float] = []
+    step = World.step
+
+    def counted(world: World, duration_s: float) -> None:
+        simulated.append(duration_s)
+        step(world, duration_s)
+
+    monkeypatch.setattr(World, "step", counted)
+    blocks = seesaw().blocks
+    with Site(ONE_SETTING) as site:
+        assert site.settle(blocks).stands
+        once = len(simulated)
+        moved = elsewhere(blocks)
+        assert site.settle(moved) == Settled((), moved)
+        assert site.settle(blocks).stands
+        assert len(simulated) == once > 0
+        third = tuple(replace(b, order=b.order + 10) for b in elsewhere(moved))
+        assert site.settle((*blocks, *third)).stands, "two apart are each the one"
+        assert len(simulated) == once
+        assert site.settle(blocks[:2]).fallen == (2,)
+        fell = len(simulated)
+        assert site.settle(blocks[:2]).fallen == (2,)
+        assert len(simulated) == fell > once
+
+
+def test_what_stands_apart_from_what_falls_stays() -> None:
+    bar = seesaw().blocks[:2]
+    far = replace(bar[0], order=3, position_m=(-0.3, 0.0, 0.025))
+    found = settle((*bar, far))
+    assert found.fallen == (2,)
+    assert found.blocks[2] == far
 
 
 def test_a_site_opens_again_after_it_was_closed() -> None:
