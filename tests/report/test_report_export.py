@@ -143,12 +143,20 @@ def test_rotations_of_a_question_are_samples_of_their_own_in_an_inspect_log(tmp_
     assert [sample.id for sample in samples] == [f"sh-1-r{rotation}" for rotation in range(4)]
 
 
-@pytest.mark.parametrize(("form", "package"), [("hf", "datasets"), ("inspect", "inspect_ai.log")])
+@pytest.mark.parametrize(
+    ("form", "package", "extra"),
+    [
+        ("hf", "datasets", "hf"),
+        ("parquet", "pyarrow", "hf"),
+        ("inspect", "inspect_ai.log", "inspect"),
+    ],
+)
 def test_a_missing_package_is_named_with_what_to_install(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, form: str, package: str
+    folder: Path, monkeypatch: pytest.MonkeyPatch, form: str, package: str, extra: str
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(SpecError, match=rf"phyblock\[{form}\]"):
+    name = package.partition(".")[0]
+    with pytest.raises(SpecError, match=rf"(?s)needs the package {name}\b.*phyblock\[{extra}\]"):
         export_run(load_run(folder), form)
 
 

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from phyblock.errors import Problem, SpecError
 from phyblock.files import atomic_write
-from phyblock.report.export.rows import as_json, export_rows
+from phyblock.report.export.rows import as_json, export_rows, needs
 from phyblock.report.load import Run
 
 __all__ = ["EXPORTS", "export_frame", "to_csv", "to_hf", "to_parquet"]
@@ -54,7 +53,11 @@ def to_csv(run: Run, folder: Path) -> tuple[Path, ...]:
 
 
 def to_parquet(run: Run, folder: Path) -> tuple[Path, ...]:
-    """`records.parquet`: a row a sample, lists as lists."""
+    """`records.parquet`: a row a sample, lists as lists.
+
+    Raises SpecError where the `pyarrow` package is not installed.
+    """
+    needs("pyarrow", "hf", "parquet")
     path = folder / "records.parquet"
     export_frame(run).to_parquet(path, index=False, engine="pyarrow")
     return (path,)
@@ -65,11 +68,9 @@ def to_hf(run: Run, folder: Path) -> tuple[Path, ...]:
 
     Raises SpecError where the `datasets` package is not installed.
     """
-    try:
-        from datasets import Dataset, utils  # type: ignore[import-untyped]
-    except ImportError as error:
-        hint = "pip install 'phyblock[hf]'"
-        raise SpecError(Problem("--to hf", "needs the package datasets", hint=hint)) from error
+    needs("datasets", "hf", "hf")
+    from datasets import Dataset, utils  # type: ignore[import-untyped]
+
     (path,) = to_parquet(run, folder)
     dataset = Dataset.from_pandas(export_frame(run), preserve_index=False)
     utils.disable_progress_bars()

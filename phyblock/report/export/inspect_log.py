@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from phyblock.errors import Problem, SpecError
-from phyblock.report.export.rows import newest_records, prompt_text
+from phyblock.report.export.rows import needs, newest_records, prompt_text
 from phyblock.report.load import Run
 from phyblock.run.prompts import read_prompts
 from phyblock.scoring import Counts, micro
@@ -28,13 +27,9 @@ def to_inspect(run: Run, folder: Path) -> tuple[Path, ...]:
 
     Raises SpecError where the `inspect_ai` package is not installed.
     """
-    try:
-        from inspect_ai.log import write_eval_log
-    except ImportError as error:
-        hint = "pip install 'phyblock[inspect]'"
-        raise SpecError(
-            Problem("--to inspect", "needs the package inspect_ai", hint=hint)
-        ) from error
+    needs("inspect_ai.log", "inspect", "inspect")
+    from inspect_ai.log import write_eval_log
+
     prompts = read_prompts(run.path)
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for record in newest_records(run):

@@ -13,9 +13,10 @@ from typing import Any
 
 from phyblock.datasets import QuestionTask
 from phyblock.domain import LETTERS, is_picture_option
-from phyblock.errors import Problem, SpecError, StoreError
+from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
 from phyblock.models.base import Image
+from phyblock.report.export.rows import needs
 from phyblock.tasks import QuestionPictures
 from phyblock.tasks.question_pictures import Shown
 
@@ -105,12 +106,10 @@ def _hugging_face(
     tasks: Sequence[QuestionTask], pictures: QuestionPictures, folder: Path
 ) -> tuple[Path, ...]:
     """A folder for `load_from_disk`, and a Parquet file with pictures inside for `load_dataset`."""
-    try:
-        from datasets import Dataset, Features, Value, utils  # type: ignore[import-untyped]
-        from datasets import Image as HfImage
-    except ImportError as error:
-        hint = "pip install 'phyblock[hf]'"
-        raise SpecError(Problem("--to hf", "needs the package datasets", hint=hint)) from error
+    needs("datasets", "hf", "hf")
+    from datasets import Dataset, Features, Value, utils  # type: ignore[import-untyped]
+    from datasets import Image as HfImage
+
     texts = ("id", "subtask", "category", "scene", "wording", "question", "answer", "evidence")
     features = Features(
         {

@@ -4,18 +4,29 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from importlib import import_module
 from typing import Any
 
+from phyblock.errors import Problem, SpecError
 from phyblock.report.load import Run
 from phyblock.run.prompts import read_prompts
 from phyblock.run.reading import read_records
 
-__all__ = ["as_json", "export_rows", "newest_records", "prompt_text"]
+__all__ = ["as_json", "export_rows", "needs", "newest_records", "prompt_text"]
 
 _REPLY = ("finish", "cost_usd", "latency_s", "provider_model", "attempts", "cached")
 _USAGE = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
 _QUESTION = ("id", "subtask", "category", "rotation")
 _ANSWER = ("right", "given", "correct")
+
+
+def needs(package: str, extra: str, form: str) -> None:
+    """Raise SpecError that names the extra to install where a package of a format is not there."""
+    try:
+        import_module(package)
+    except ImportError as error:
+        name, hint = package.partition(".")[0], f"pip install 'phyblock[{extra}]'"
+        raise SpecError(Problem(f"--to {form}", f"needs the package {name}", hint=hint)) from error
 
 
 def newest_records(run: Run) -> list[dict[str, Any]]:
