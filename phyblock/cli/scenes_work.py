@@ -33,7 +33,7 @@ ray_option = click.option(
 )
 
 
-def tracked(items: Iterable[T], total: int, doing: str) -> Iterator[T]:
+def tracked(items: Iterable[T], total: int, doing: str, noun: str = "scenes") -> Iterator[T]:
     """The items; a progress bar on a terminal, a line now and then elsewhere, on standard error."""
     console = make_console(stderr=True)
     columns = (TextColumn(doing), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
@@ -43,7 +43,7 @@ def tracked(items: Iterable[T], total: int, doing: str) -> Iterator[T]:
         for count, item in enumerate(items, 1):
             progress.advance(bar)
             if hidden and count % _LINE_EVERY == 0:
-                console.print(f"{count} of {total} scenes")
+                console.print(f"{count} of {total} {noun}")
             yield item
 
 

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import click
 from rich.console import Console
 
 from phyblock.cli.console import counted, make_console, plain_table, shown_path
-from phyblock.cli.scenes_work import make_folder, tracked
-from phyblock.cli.vqa_data import DEFAULT_QUESTIONS, DEFAULT_SCENES, read_question_set
-from phyblock.domain import LETTERS, SUBTASK_NAMES, Question
-from phyblock.errors import Problem, StoreError
+from phyblock.cli.scenes_work import make_folder, tracked, write_file
+from phyblock.cli.vqa_data import data_option, questions_argument, read_question_set, size_option
+from phyblock.domain import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
 from phyblock.generate.questions.audit import (
     BALANCE,
     GUESSABLE,
@@ -21,6 +21,7 @@ from phyblock.generate.questions.audit import (
     duplicates_of,
 )
 from phyblock.generate.questions.sheet import sheet_html
+from phyblock.run.vqa import select_questions
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
 
@@ -30,14 +31,8 @@ _PER_SUBTASK = 5
 
 
 @click.command("audit")
-@click.argument("questions", metavar="[PATH]", default=DEFAULT_QUESTIONS)
-@click.option(
-    "--data",
-    default=DEFAULT_SCENES,
-    show_default=True,
-    metavar="PATH",
-    help="The scenes that the questions are about.",
-)
+@questions_argument
+@data_option
 @click.option(
     "--sheet",
     type=click.Path(path_type=Path, dir_okay=False),
@@ -52,14 +47,7 @@ _PER_SUBTASK = 5
     metavar="N",
     help="Questions of each subtask on the sheet, spread over the set.",
 )
-@click.option(
-    "--size",
-    type=click.IntRange(128, 2048),
-    default=512,
-    show_default=True,
-    metavar="PX",
-    help="Side of each picture on the sheet.",
-)
+@size_option
 @click.option(
     "--no-text-probe", is_flag=True, help="Leave out the classifier, which needs scikit-learn."
 )
@@ -81,21 +69,26 @@ def command(
     """
     if sheet is not None:
         make_folder(sheet.parent)
-    asked = [task.question for task in read_question_set(questions, data).tasks]
+    tasks = read_question_set(questions, data).tasks
+    asked = [task.question for task in tasks]
     console = make_console()
     audits = list(
         tracked(
             audit_questions(asked, with_text_probe=not no_text_probe),
             len({question.subtask for question in asked}),
             "Auditing",
+            "subtasks",
         )
     )
     _print_guessing(console, audits)
     _print_contents(console, audits)
     _print_findings(console, audits, asked)
     if sheet is not None:
-        chosen = _spread(asked, per_subtask)
-        _write_sheet(sheet, f"Questions of {questions}", chosen, PictureStyle(size))
+        some = select_questions(tasks, SUBTASKS, range(1, 5), per_subtask, None)
+        chosen = [task.question for task in some]
+        draw = partial(question_png, style=PictureStyle(size))
+        pieces = sheet_html(f"Questions of {questions}", chosen, draw)
+        write_file(sheet, "".join(pieces))
         console.print(f"{counted(len(chosen), 'question')} in {shown_path(sheet)}", markup=False)
 
 
@@ -187,28 +180,6 @@ def _print_findings(
         console.print(finding, style="red", markup=False, soft_wrap=True)
     verdict = counted(len(findings), "finding") if findings else "nothing to find fault with"
     console.print(f"{counted(len(asked), 'question')}, {verdict}", markup=False)
-
-
-def _spread(asked: Sequence[Question], per_subtask: int) -> list[Question]:
-    """So many questions of each subtask, evenly over those that there are."""
-    by_subtask: dict[str, list[Question]] = {}
-    for question in asked:
-        by_subtask.setdefault(question.subtask, []).append(question)
-    return [
-        group[place * len(group) // count]
-        for group in by_subtask.values()
-        for count in (min(per_subtask, len(group)),)
-        for place in range(count)
-    ]
-
-
-def _write_sheet(path: Path, title: str, chosen: Sequence[Question], style: PictureStyle) -> None:
-    pieces = sheet_html(title, chosen, lambda recipe: question_png(recipe, style))
-    try:
-        with path.open("w", encoding="utf-8") as file:
-            file.writelines(pieces)
-    except OSError as error:
-        raise StoreError(Problem(str(path), f"cannot be written: {error.strerror}")) from error
 
 
 def _percent(share: float | None) -> str:

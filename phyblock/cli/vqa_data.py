@@ -1,18 +1,51 @@
-"""Finding the questions that a person means."""
+"""Finding the questions that a person means, and the options that say which they are."""
 
 from __future__ import annotations
 
 from pathlib import Path
+
+import click
 
 from phyblock.cli.scenes_data import read_data_set
 from phyblock.datasets import QUESTIONS_FILE, QuestionSet, read_questions
 from phyblock.errors import DataError, Problem
 from phyblock.resources import bundled
 
-__all__ = ["DEFAULT_QUESTIONS", "DEFAULT_SCENES", "find_questions", "read_question_set"]
+__all__ = [
+    "data_option",
+    "find_questions",
+    "questions_argument",
+    "questions_option",
+    "read_question_set",
+    "size_option",
+]
 
-DEFAULT_QUESTIONS = "phyblock-vqa"
-DEFAULT_SCENES = "phyblock-400"
+_QUESTIONS = "phyblock-vqa"
+_SCENES = "phyblock-400"
+
+questions_argument = click.argument("questions", metavar="[PATH]", default=_QUESTIONS)
+questions_option = click.option(
+    "--questions",
+    default=_QUESTIONS,
+    show_default=True,
+    metavar="PATH",
+    help="A folder with questions, or a bundled set.",
+)
+data_option = click.option(
+    "--data",
+    default=_SCENES,
+    show_default=True,
+    metavar="PATH",
+    help="The scenes that the questions are about: a folder or a bundled set.",
+)
+size_option = click.option(
+    "--size",
+    type=click.IntRange(128, 2048),
+    default=512,
+    show_default=True,
+    metavar="PX",
+    help="Side of each picture.",
+)
 
 
 def find_questions(name: str) -> Path:
@@ -33,7 +66,7 @@ def find_questions(name: str) -> Path:
     raise DataError(Problem(name, "there are no such questions", allowed=allowed))
 
 
-def read_question_set(name: str, scenes: str = DEFAULT_SCENES) -> QuestionSet:
+def read_question_set(name: str, scenes: str = _SCENES) -> QuestionSet:
     """The questions that `name` means, about the scenes of the data set that `scenes` means.
 
     Raises DataError with everything that is wrong in either.

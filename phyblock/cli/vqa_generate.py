@@ -11,7 +11,7 @@ from rich.progress import Progress, TaskID
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.scenes_data import read_data_set
 from phyblock.cli.scenes_work import jobs_option, ray_option
-from phyblock.cli.vqa_data import DEFAULT_SCENES
+from phyblock.cli.vqa_data import data_option
 from phyblock.cli.vqa_subtasks import subtasks_option
 from phyblock.domain import SUBTASKS, Question, Subtask
 from phyblock.errors import SpecError
@@ -24,13 +24,7 @@ __all__ = ["command"]
 
 
 @click.command("generate")
-@click.option(
-    "--data",
-    default=DEFAULT_SCENES,
-    show_default=True,
-    metavar="PATH",
-    help="Scenes that are asked about: a folder or a bundled set.",
-)
+@data_option
 @subtasks_option
 @click.option(
     "--per-subtask",

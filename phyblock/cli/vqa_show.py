@@ -12,7 +12,7 @@ from PIL import Image
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.scenes_work import write_file
-from phyblock.cli.vqa_data import DEFAULT_QUESTIONS, DEFAULT_SCENES, read_question_set
+from phyblock.cli.vqa_data import data_option, questions_option, read_question_set, size_option
 from phyblock.datasets import QuestionSet
 from phyblock.domain import LETTERS, SUBTASK_NAMES, Question
 from phyblock.errors import DataError, Problem
@@ -26,31 +26,12 @@ _GAP_PX = 8
 
 @click.command("show")
 @click.argument("question")
-@click.option(
-    "--questions",
-    default=DEFAULT_QUESTIONS,
-    show_default=True,
-    metavar="PATH",
-    help="A folder with questions, or a bundled set.",
-)
-@click.option(
-    "--data",
-    default=DEFAULT_SCENES,
-    show_default=True,
-    metavar="PATH",
-    help="The scenes that the questions are about.",
-)
+@questions_option
+@data_option
 @click.option(
     "--out", type=click.Path(path_type=Path), metavar="FILE", help="Draw the pictures to this PNG."
 )
-@click.option(
-    "--size",
-    type=click.IntRange(128, 2048),
-    default=512,
-    show_default=True,
-    metavar="PX",
-    help="Side of each picture.",
-)
+@size_option
 @click.option("--blind", is_flag=True, help="Keep answer and evidence to yourself.")
 def command(
     question: str, questions: str, data: str, out: Path | None, size: int, blind: bool

@@ -8,7 +8,7 @@ import click
 
 from phyblock.cli.console import make_console, plain_table
 from phyblock.cli.scenes_work import jobs_option, ray_option, tracked
-from phyblock.cli.vqa_data import DEFAULT_QUESTIONS, DEFAULT_SCENES, read_question_set
+from phyblock.cli.vqa_data import data_option, questions_argument, read_question_set
 from phyblock.domain import SUBTASK_NAMES, SUBTASKS
 from phyblock.generate.questions.verify import verify_questions
 from phyblock.generate.verify import check_sums
@@ -18,14 +18,8 @@ __all__ = ["command"]
 
 
 @click.command("verify")
-@click.argument("questions", metavar="[PATH]", default=DEFAULT_QUESTIONS)
-@click.option(
-    "--data",
-    default=DEFAULT_SCENES,
-    show_default=True,
-    metavar="PATH",
-    help="The scenes that the questions are about.",
-)
+@questions_argument
+@data_option
 @jobs_option
 @ray_option
 def command(questions: str, data: str, jobs: int, ray_address: str | None) -> None:
@@ -40,7 +34,7 @@ def command(questions: str, data: str, jobs: int, ray_address: str | None) -> No
     failures: list[str] = []
     with open_workers(jobs, ray_address) as workers:
         verified = verify_questions(asked, workers)
-        for question, problem in tracked(verified, len(asked), "Verifying"):
+        for question, problem in tracked(verified, len(asked), "Verifying", "questions"):
             good[question.subtask] += problem is None
             if problem is not None:
                 failures.append(f"{question.id}: {problem}")

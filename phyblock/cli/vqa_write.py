@@ -12,7 +12,7 @@ import click
 from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.files import find_models_file
 from phyblock.cli.scenes_work import make_folder, write_file
-from phyblock.cli.vqa_data import DEFAULT_QUESTIONS, DEFAULT_SCENES, read_question_set
+from phyblock.cli.vqa_data import data_option, questions_option, read_question_set
 from phyblock.cli.vqa_subtasks import subtasks_option
 from phyblock.domain import Question, Subtask
 from phyblock.errors import DataError, Problem, SpecError, StoreError
@@ -30,20 +30,8 @@ _AT_ONCE = 8
 
 @click.command("write")
 @click.option("--model", "name", required=True, metavar="NAME", help="A model of models.yaml.")
-@click.option(
-    "--questions",
-    default=DEFAULT_QUESTIONS,
-    show_default=True,
-    metavar="PATH",
-    help="The set whose wordings are paraphrased, and whose answers check them.",
-)
-@click.option(
-    "--data",
-    default=DEFAULT_SCENES,
-    show_default=True,
-    metavar="PATH",
-    help="The scenes that the questions are about.",
-)
+@questions_option
+@data_option
 @subtasks_option
 @click.option(
     *("--count", "count"),

@@ -109,3 +109,20 @@ def test_a_question_that_is_not_there_is_told_with_a_near_one(folder: Path) -> N
 def test_questions_that_are_not_there_are_told() -> None:
     with pytest.raises(DataError, match=r"a folder with questions\.jsonl, or a bundled set"):
         vqa("verify", "no-such-questions")
+
+
+def test_an_audit_says_what_it_finds_and_writes_a_sheet(folder: Path, tmp_path: Path) -> None:
+    found = questions_of(folder / "q")
+    again = {**found[0], "id": "co-009"}
+    text = "".join(json.dumps(one) + "\n" for one in [*found, again])
+    (tmp_path / QUESTION_LINES).write_text(text, encoding="utf-8")
+    sheet = tmp_path / "deep" / "sheet.html"
+    options = ("--no-text-probe", "--sheet", sheet, "--per-subtask", 2, "--size", 128)
+    done = vqa("audit", tmp_path, "--data", folder, *options)
+    assert "co-009: repeats co-001" in done.stdout
+    assert f"4 questions in {sheet}" in done.stdout.replace("\n", "")
+    page = sheet.read_text(encoding="utf-8")
+    shown = [one for one in found if f'<article id="{one["id"]}">' in page]
+    assert [one["subtask"] for one in shown] == ["CO", "CO", "OC", "OC"]
+    assert all(one["question"] in page for one in shown)
+    assert page.count("data:image/png;base64,") == 4
