@@ -74,17 +74,20 @@ def vector_rate(seconds: float, kind: str, **options: Any) -> float:
     makers = [partial(PhyBlockEnv, [task], **options) for task in TASKS[:: len(TASKS) // VECTOR]]
     makers = makers[:VECTOR]
     envs = getattr(gymnasium.vector, kind)(makers)
-    envs.reset(seed=0)
-    # The first step opens a simulator for each scene.
-    *_, infos = envs.step(np.ones(len(makers), dtype=np.int64))
+    _, infos = envs.reset(seed=0)
+    # The first right move opens a simulator for each scene.
+    *_, infos = envs.step(known_actions(infos))
     start, steps = time.perf_counter(), 0
     while time.perf_counter() - start < seconds:
-        actions = np.array([moves[0] if moves else DONE for moves in infos["right_moves"]])
-        *_, infos = envs.step(actions)
+        *_, infos = envs.step(known_actions(infos))
         steps += len(makers)
     taken_s = time.perf_counter() - start
     envs.close()
     return steps / taken_s
+
+
+def known_actions(infos: dict[str, Any]) -> np.ndarray:
+    return np.array([moves[0] if moves else DONE for moves in infos["right_moves"]])
 
 
 def main() -> None:
