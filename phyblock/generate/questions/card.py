@@ -50,7 +50,7 @@ holds the blocks whose color differs from the stored scene.
 
 ## What was refused, and the rules that came of it
 
-Questions were answered by a person from picture and text alone, before the answer was looked up.
+Questions were answered from picture and text alone, before the answer was looked up.
 What was unfair became a rule for all:
 
 * blocks that are named show at least {named:.0%} of themselves, those whose shape, size or
