@@ -20,7 +20,16 @@ from phyblock.scoring.uncertainty import (
     recall_of,
 )
 
-__all__ = ["BOOTSTRAP_SEED", "INTERVALS", "CountCube", "count_cube", "intervals_frame", "resampler"]
+__all__ = [
+    "BOOTSTRAP_SEED",
+    "INTERVALS",
+    "CountCube",
+    "all_metrics",
+    "count_cube",
+    "intervals_frame",
+    "parents_of",
+    "resampler",
+]
 
 BOOTSTRAP_SEED = 20_261_121
 """Seed of every resampling, so that tables made again are the same."""
@@ -112,7 +121,7 @@ def _of_level(run: Run, level: str) -> pd.DataFrame:
     found = bootstrap(
         cube.counts,
         cube.clusters,
-        _all_metrics,
+        all_metrics,
         resampler(),
         n_clusters=np.repeat(n_clusters[:, None], len(METRICS), axis=1),
     )
@@ -121,7 +130,8 @@ def _of_level(run: Run, level: str) -> pd.DataFrame:
     return pd.DataFrame(columns, index=pd.MultiIndex.from_tuples(cube.cells, names=_CELL))
 
 
-def _all_metrics(sums: Floats) -> Floats:
+def all_metrics(sums: Floats) -> Floats:
+    """Precision, recall and F1, in the last axis, of counts (..., [tp, fp, fn])."""
     return np.stack([metric(sums) for metric in (precision_of, recall_of, f1_of)], axis=-1)
 
 

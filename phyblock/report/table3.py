@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.report.cells import METRICS, micro_averages
+from phyblock.report.cells import METRICS, measured, micro_averages
 from phyblock.report.comparison import published_table
 from phyblock.report.episodes import STEP_OUTCOMES, TRACK, endings_frame
 from phyblock.report.load import Run
@@ -60,7 +60,8 @@ _CURVE = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 30, 44)
 def step_scores_frame(run: Run) -> pd.DataFrame:
     """One row a model, setting and way of counting: n, tp, fp, fn, micro averages in [0, 1].
 
-    `*_mean` and `*_sd` (ddof = 1) are taken over the micro averages of single seeds.
+    `*_mean` and `*_sd` (ddof = 1) are taken over the micro averages of single seeds. A model
+    without any reply has counts, if the suite counts empty plans, but no metrics.
     """
     scores = run.scores[
         (run.scores["track"] == TRACK) & ~run.scores["outcome"].isin(run.design.outcomes_left_out)
@@ -79,6 +80,8 @@ def step_scores_frame(run: Run) -> pd.DataFrame:
     ]
     frame = pd.DataFrame(cells, columns=keys)
     frame = frame.join(micro_averages(scores, keys), on=keys).join(pd.DataFrame(parts), on=keys)
+    silent = ~frame["model"].isin(measured(scores, ["model"])["model"])
+    frame.loc[silent, [*METRICS, *parts]] = np.nan
     counts = ["n", "tp", "fp", "fn"]
     frame[counts] = frame[counts].fillna(0).astype("int64")
     return frame

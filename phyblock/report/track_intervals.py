@@ -8,13 +8,14 @@ import numpy as np
 import pandas as pd
 
 from phyblock.domain import CATEGORIES, SUBTASKS
-from phyblock.report.intervals import CountCube, parents_of, resampler
+from phyblock.report.cells import METRICS, measured
+from phyblock.report.intervals import CountCube, all_metrics, parents_of, resampler
 from phyblock.report.load import Run, once_per_run
 from phyblock.report.questions import CELLS, questions_counted, subtasks_of
 from phyblock.report.text_table import Column, TextTable, between, number
-from phyblock.scoring.uncertainty import Floats, bootstrap, f1_of, ratio_of
+from phyblock.scoring.uncertainty import Floats, bootstrap, ratio_of
 
-__all__ = ["step_intervals", "track_intervals_view", "vqa_intervals"]
+__all__ = ["step_intervals", "step_metric_intervals", "track_intervals_view", "vqa_intervals"]
 
 _COLUMNS = ("model", "cell", "value", "lo", "hi", "se", "n", "n_scenes", "n_clusters")
 
@@ -87,32 +88,50 @@ def _cells_of(sums: Floats) -> Floats:
     return np.stack([cells[cell] for cell in CELLS], axis=-1)
 
 
-@once_per_run
 def step_intervals(run: Run) -> pd.DataFrame:
     """One row a model and way of counting: F1 of step planning, columns as `vqa_intervals`.
 
     `cell` is `placed` or `attempted`, in the headline setting, pooled over seeds.
     """
+    table = step_metric_intervals(run)
+    table = table[table["cell"].str.endswith("_f1")].reset_index(drop=True)
+    return table.assign(cell=table["cell"].str.removesuffix("_f1"))
+
+
+@once_per_run
+def step_metric_intervals(run: Run) -> pd.DataFrame:
+    """As `step_intervals`, for every metric: `placed_precision`, ... `attempted_f1`."""
     scores = run.scores
     kept = scores[
         (scores["track"] == "step_planning")
         & (scores["setting"] == run.design.setting)
         & ~scores["outcome"].isin(run.design.outcomes_left_out)
     ]
+    kept = measured(kept, ["model"])
     if kept.empty:
-        return pd.DataFrame(columns=list(_COLUMNS))
+        return pd.DataFrame(columns=list(_COLUMNS)).astype({"cell": "str"})
     cube = CountCube(kept, parents_of(run), ["model", "criterion"], ["tp", "fp", "fn"])
     n_clusters = cube.clusters_of(cube.present)
-    found = bootstrap(cube.counts, cube.clusters, f1_of, resampler(), n_clusters=n_clusters)
-    table = pd.DataFrame(list(cube.cells), columns=["model", "cell"])
-    for name, values in _percent(found.value, found.lo, found.hi, found.se).items():
-        table[name] = values
-    table["n"] = kept.groupby(["model", "criterion"], sort=True).size().to_numpy()
-    table["n_scenes"], table["n_clusters"] = cube.present.sum(axis=0), n_clusters
+    found = bootstrap(
+        cube.counts,
+        cube.clusters,
+        all_metrics,
+        resampler(),
+        n_clusters=np.repeat(n_clusters[:, None], len(METRICS), axis=1),
+    )
+    cells = pd.DataFrame(list(cube.cells), columns=["model", "criterion"])
+    cells["n"] = kept.groupby(["model", "criterion"], sort=True).size().to_numpy()
+    cells["n_scenes"], cells["n_clusters"] = cube.present.sum(axis=0), n_clusters
+    parts = []
+    for place, metric in enumerate(METRICS):
+        ends = (found.value, found.lo, found.hi, found.se)
+        numbers = _percent(*(values[:, place] for values in ends))
+        parts.append(cells.assign(cell=cells["criterion"] + f"_{metric}", **numbers))
     order = {name: place for place, name in enumerate(run.design.model_names)}
-    return table.sort_values("model", key=lambda names: names.map(order), kind="stable")[
-        list(_COLUMNS)
-    ].reset_index(drop=True)
+    table = pd.concat(parts, ignore_index=True).sort_values(
+        "model", key=lambda names: names.map(order), kind="stable"
+    )
+    return table[list(_COLUMNS)].reset_index(drop=True)
 
 
 def _percent(value: Floats, lo: Floats, hi: Floats, se: Floats) -> dict[str, Floats]:

@@ -8,10 +8,10 @@ import pytest
 
 from phyblock.report import Run, assembly_frame, load_run
 from phyblock.report.html.headline import assembly_headline
-from phyblock.report.html.headline_intervals import answer_bounds
 from phyblock.report.html.headline_tracks import steps_headline, vqa_headline
 from phyblock.report.questions import questions_frame
 from phyblock.report.table3 import table3_frame
+from phyblock.report.track_intervals import step_intervals
 from tests.report.factory import manifest, record, run_of, score
 from tests.report.html_run import make_run
 
@@ -72,8 +72,12 @@ def test_headlines_of_questions_and_episodes(
         # Subtasks that were not asked leave means without a value.
         assert [cell.text for cell in row.cells] == ["–"] * 5  # noqa: RUF001
         assert accuracy[row.name].drop(["SH", "OR", "AD"]).isna().all()
-    assert answer_bounds(run) == {}
+    assert not any(cell.below for row in answers.rows for cell in row.cells)
     table = table3_frame(run).set_index("model")
+    intervals = step_intervals(run).set_index(["model", "cell"])
     for row in steps.rows[:2]:
-        assert row.cells[steps.main].value == pytest.approx(table.loc[row.name, "placed_f1"])
+        f1 = row.cells[steps.main]
+        assert f1.value == pytest.approx(table.loc[row.name, "placed_f1"])
+        ends = intervals.loc[(row.name, "placed"), ["lo", "hi"]]
+        assert f1.below == "{:.1f} to {:.1f}".format(*ends)
     assert {row.name: row.cells[-1].value for row in steps.rows}["oracle"] == 100

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import yaml
 from phyblock.report import load_run
 from phyblock.report.episodes import endings_frame, episodes_frame, moves_frame, progress_frame
 from phyblock.report.table3 import step_scores_frame, table3_frame
+from phyblock.report.track_intervals import step_intervals
 from phyblock.report.write import write_tables
 from tests.report.factory import manifest, record
 
@@ -155,3 +157,17 @@ def test_the_tables_say_what_the_simulator_went_by(folder: Path) -> None:
     assert "setting A, gating aov, physics settle" in view.notes[0]
     assert any("Scored of 2 episodes: beta 1." in note for note in view.notes)
     assert view.rows[0][0] == "alpha"
+
+
+def test_a_model_without_any_reply_has_no_metrics(tmp_path: Path) -> None:
+    silent = [
+        episode("beta", scene, "", "unanswered", outcome="api_error") for scene in ("001", "002")
+    ]
+    write(tmp_path, episode("alpha", "001", "pp", "done"), *silent, missing="count")
+    run = load_run(tmp_path)
+    alpha, beta = table3_frame(run).to_dict("records")
+    assert alpha["placed_recall"] == 50
+    assert math.isnan(beta["placed_recall"])
+    assert set(step_intervals(run)["model"]) == {"alpha"}
+    counts = step_scores_frame(run).set_index(["model", "setting", "criterion"])
+    assert counts.loc[("beta", "A", "placed"), ["n", "fn"]].tolist() == [2, 8]

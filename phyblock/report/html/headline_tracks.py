@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import pandas as pd
+
 from phyblock.domain import CATEGORIES
 from phyblock.report.html.headline import (
     HUMAN_ACCURACY,
@@ -14,11 +16,11 @@ from phyblock.report.html.headline import (
     kinds_of,
     plain,
 )
-from phyblock.report.html.headline_intervals import answer_bounds, step_bounds
 from phyblock.report.load import Run
 from phyblock.report.questions import OVERALL_CELL, questions_frame
 from phyblock.report.table3 import table3_frame
 from phyblock.report.text_table import NO_VALUE, number
+from phyblock.report.track_intervals import step_metric_intervals, vqa_intervals
 from phyblock.report.vqa import published_cells
 
 __all__ = ["steps_headline", "vqa_headline"]
@@ -47,7 +49,7 @@ def vqa_headline(run: Run) -> Headline | None:
     cells = (*CATEGORIES, OVERALL_CELL)
     seeds = len(run.design.suite.seeds)
     measured = "accuracy_mean" if seeds > 1 else "accuracy"
-    bounds = answer_bounds(run)
+    bounds = _bounds(vqa_intervals(run))
     rows = []
     for name, kind in kinds_of(run).items():
         values = [100 * found[name, cell][measured] for cell in cells]
@@ -85,7 +87,7 @@ def steps_headline(run: Run) -> Headline | None:
     table = table3_frame(run).to_dict("records")
     ours = {row["model"]: row for row in table if row["source"] == "run"}
     printed = [row for row in table if row["source"] == "published"]
-    bounds = step_bounds(run)
+    bounds = _bounds(step_metric_intervals(run))
     rows = []
     for name, kind in kinds_of(run).items():
         shown = [_cell(ours[name][cell], bounds.get((name, cell))) for cell in _STEP_CELLS]
@@ -106,6 +108,13 @@ def steps_headline(run: Run) -> Headline | None:
     )
     names = tuple(_STEP_CELLS.values())
     return Headline("Step planning", names, tuple(rows), (note,), names.index("F1"), "F1", {})
+
+
+def _bounds(table: pd.DataFrame) -> dict[tuple[str, str], tuple[float, float]]:
+    """Both ends of an interval [%] by model and cell; none where there is no interval."""
+    known = table.dropna(subset=["lo", "hi"])
+    keys = zip(known["model"], known["cell"], strict=True)
+    return dict(zip(keys, zip(known["lo"], known["hi"], strict=True), strict=True))
 
 
 def _cell(value: float, ends: tuple[float, float] | None) -> Cell:
