@@ -12,9 +12,9 @@ from PIL import Image
 from phyblock.errors import StoreError
 from phyblock.report.figures import FIGURES, write_figures
 from phyblock.report.figures.style import COLORS
-from phyblock.report.figures.tracks import accuracy_by_subtask, step_progress
+from phyblock.report.figures.tracks import accuracy_by_subtask, step_progress, vqa_heat_map
 from phyblock.report.load import load_run
-from tests.report.factory import LEVELS, manifest, record, score, write_run
+from tests.report.factory import LEVELS, manifest, record, run_of, score, write_run
 
 matplotlib = pytest.importorskip("matplotlib", reason="matplotlib is not installed")
 PLANNING = {"f1-levels", "f1-radar", "settings", "error-types", "f1-size", "f1-cost", "scenes"}
@@ -148,3 +148,14 @@ def test_a_folder_that_cannot_be_written_is_said_so(tmp_path: Path) -> None:
     (run.path / "figures").write_text("in the way")
     with pytest.raises(StoreError, match="cannot be written"):
         write_figures(run)
+
+
+@pytest.mark.parametrize(
+    ("circular", "said"), [(False, "25, in OR 4"), (True, "0.39, in OR 0.0003")]
+)
+def test_the_heat_map_says_what_guessing_gives(circular: bool, said: str) -> None:
+    facts = manifest(models=["alpha"], seeds=[0])
+    facts["suite"] |= {"tracks": ["vqa"], "vqa": {"circular": circular}}
+    figure = vqa_heat_map(run_of(asked("alpha", "SH", True, False), facts))
+    assert figure is not None
+    assert any(text.get_text().endswith(f"guessing gives {said}") for text in figure.texts)

@@ -21,7 +21,8 @@ from phyblock.report.figures.style import (
     new_figure,
 )
 from phyblock.report.load import Run
-from phyblock.report.questions import questions_frame
+from phyblock.report.questions import questions_frame, showing
+from phyblock.scoring import chance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,7 +76,9 @@ def vqa_heat_map(run: Run) -> Figure | None:
     bar.set_label("Right answers (%)")
     bar.outline.set_visible(False)
     name = f"Suite {run.design.suite.name}, " if run.design.suite.name else ""
-    headed(figure, "Questions by subtask", f"{name}right answers (%); guessing gives 25, in OR 4")
+    guessed = {subtask: 100 * chance(subtask) ** showing(run).rotations for subtask in ("SH", "OR")}
+    guessing = f"guessing gives {guessed['SH']:.2g}, in OR {guessed['OR']:.1g}"
+    headed(figure, "Questions by subtask", f"{name}right answers (%); {guessing}")
     return figure
 
 
