@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import threading
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -37,6 +38,7 @@ _KEPT = 65_536
 _PLACE_DIGITS = 6
 _POSITION_DIGITS = 4
 _ANGLE_DIGITS = 2
+_ONE_AT_A_TIME = threading.Lock()
 _COLLAPSE_S = 3.0
 """How long fallen blocks are given to come to rest [s]."""
 
@@ -113,7 +115,9 @@ class Site:
         self, blocks: tuple[Block, ...], physics: Physics
     ) -> tuple[tuple[int, ...], tuple[Block, ...]]:
         """The orders that fell under one setting, and if any did, the blocks as they lie then."""
-        with self._placed(blocks, physics) as world:
+        # A fresh world: how blocks tumble could depend on what was in a used one before.
+        with World(physics) as world:
+            world.place_all(blocks)
             self._wait(world, self.trial.duration_s)
             fallen = movement(blocks, world.poses(), self.trial).fallen
             if not fallen:
@@ -148,10 +152,15 @@ class Site:
                 return
 
 
+@functools.cache
+def _shared_site(trial: Trial) -> Site:
+    return Site(trial)
+
+
 def settle(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Settled:
-    """As `Site.settle`, in worlds of its own: the same in every process."""
-    with Site(trial) as site:
-        return site.settle(blocks)
+    """As `Site.settle`, at a site that lasts as long as the process; for any thread."""
+    with _ONE_AT_A_TIME:
+        return _shared_site(trial).settle(blocks)
 
 
 def state_picture(

@@ -64,7 +64,11 @@ def test_a_site_gives_the_same_verdict_whatever_was_tried_on_it_before(trial: Tr
     with Site(trial) as site:
         first = [site.settle(blocks) for blocks in structures]
         again = [site.settle(blocks) for blocks in reversed(structures)][::-1]
-    assert first == again == [settle(blocks, trial) for blocks in structures]
+    alone = []
+    for blocks in structures:
+        with Site(trial) as site:
+            alone.append(site.settle(blocks))
+    assert first == again == alone == [settle(blocks, trial) for blocks in structures]
 
 
 def test_verdicts_are_those_of_a_full_trial() -> None:
