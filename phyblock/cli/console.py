@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from itertools import groupby
 from pathlib import Path
-from textwrap import fill
 
 from rich import box
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from phyblock.cli.layout import lay_out
 from phyblock.report import TextTable
 
-__all__ = ["counted", "make_console", "plain_table", "print_view", "shown_path", "width_of"]
+__all__ = ["counted", "make_console", "plain_table", "print_view", "shown_path"]
 
 _PLAIN_WIDTH = 160
-_HEADING_WIDTH = 12
 
 
 def make_console(*, stderr: bool = False) -> Console:
@@ -31,39 +29,17 @@ def make_console(*, stderr: bool = False) -> Console:
 
 
 def print_view(console: Console, view: TextTable) -> None:
-    """Print a table with its caption, group headings and notes."""
-    table = Table(
-        title=Text(view.caption, style="bold"),
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-        collapse_padding=True,
-    )
-    for heading, column in zip(_headings(view), view.columns, strict=True):
-        names = not table.columns
-        table.add_column(
-            Text(heading),
-            justify="left" if column.is_text else "right",
-            no_wrap=names or not column.is_text,
-            # Whatever is cut in a narrow terminal, it is not the name of a model.
-            min_width=max((len(row[0]) for row in view.rows), default=0) if names else None,
-            vertical="bottom",
-        )
-    for row in view.rows:
-        table.add_row(*(Text(cell) for cell in row))
-    console.print(table)
+    """Print a table with its caption and notes; one that is too wide in several pieces."""
+    console.print(Text(view.caption, style="bold"))
+    for lines in lay_out(view, console.width):
+        console.print()
+        for line in lines:
+            console.print(Text(line), soft_wrap=True)
+    if view.notes:
+        console.print()
     for note in view.notes:
         console.print(Text(note, style="dim"))
     console.print()
-
-
-def width_of(view: TextTable) -> int:
-    """Characters that a table takes when nothing in it is cut."""
-    widths = (
-        max(*(len(line) for line in heading.splitlines()), *(len(row[i]) for row in view.rows), 0)
-        for i, heading in enumerate(_headings(view))
-    )
-    return sum(width + 2 for width in widths)
 
 
 def plain_table(
@@ -102,13 +78,3 @@ def shown_path(path: Path) -> str:
         return str(path.resolve().relative_to(Path.cwd()))
     except ValueError:
         return str(path)
-
-
-def _headings(view: TextTable) -> list[str]:
-    """Names of the columns, each group's name above its first; alone, it is broken by words."""
-    headings: list[str] = []
-    for group, members in groupby(view.columns, key=lambda column: column.group):
-        names = [column.name for column in members]
-        above = fill(group, _HEADING_WIDTH) if len(names) == 1 else group
-        headings += [f"{above}\n{names[0]}".lstrip("\n"), *names[1:]]
-    return headings

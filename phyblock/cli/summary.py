@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from phyblock import report
-from phyblock.cli.console import print_view, shown_path, width_of
+from phyblock.cli.console import print_view, shown_path
+from phyblock.cli.layout import width_of
 from phyblock.report.outcomes import HEADINGS
 from phyblock.report.text_table import NO_VALUE, number
 
