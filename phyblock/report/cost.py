@@ -5,6 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from phyblock.report.coverage import coverage_frame
+from phyblock.report.episodes import TRACK as STEP_PLANNING
 from phyblock.report.load import Run
 from phyblock.report.text_table import NO_VALUE, Column, TextTable, number
 
@@ -17,6 +18,7 @@ _TOKENS = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
 def cost_frame(run: Run) -> pd.DataFrame:
     """One row a model and track: replies, mean tokens a reply, dollars and seconds.
 
+    A reply is what a sample got: of step planning, those of a whole episode together.
     Tokens are means over the replies that tell them. `cost_usd` is what the run paid, as in
     `coverage`, and `cost_per_100_usd` what 100 replies cost at the price of those with a known
     one, cached ones included: what another run of the same would cost. Latency [s] is of replies
@@ -63,8 +65,10 @@ def cost_view(table: pd.DataFrame, run: Run) -> TextTable:
         for row in table.to_dict("records")
     ]
     name = f", suite {run.design.suite.name}" if run.design.suite.name else ""
-    notes = ("Replies from the cache cost this run nothing; 100 replies are priced as if asked.",)
-    return TextTable(f"Tokens, cost and latency{name}", columns, tuple(rows), notes)
+    notes = ["Replies from the cache cost this run nothing; 100 replies are priced as if asked."]
+    if (table["track"] == STEP_PLANNING).any():
+        notes.append("Of step planning, a reply is a whole episode: all its steps together.")
+    return TextTable(f"Tokens, cost and latency{name}", columns, tuple(rows), tuple(notes))
 
 
 def _dollars(amount: float) -> str:

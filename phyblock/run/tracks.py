@@ -105,8 +105,8 @@ def _step_planning(context: _Context) -> StepPlanning:
         if path is None
         else TemplatePrompt(path, path.stem)
     )
-    shown = (steps.feedback, steps.history, steps.memory, steps.cot, steps.gating)
-    prompt = StepPrompt(template, *shown)
+    shown = (steps.feedback, steps.history, steps.memory, steps.cot)
+    prompt = StepPrompt(template, *shown, gating=rules.gating, accepts=rules.accepts)
     pictures = Pictures(cache_dir() / "pictures", _policy(suite), _render_workers())
     return StepPlanning(rules, prompt, pictures, tasks)
 

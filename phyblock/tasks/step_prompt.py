@@ -12,7 +12,7 @@ from typing import Literal
 
 from phyblock.models.base import Image, Message
 from phyblock.parsing.move import MoveProblem
-from phyblock.scoring import Gating, MoveOutcome
+from phyblock.scoring import Gating, MoveOutcome, Setting
 from phyblock.tasks.prompts import TemplatePrompt
 
 __all__ = ["FEEDBACKS", "Feedback", "PastStep", "StepOutcome", "StepPrompt"]
@@ -32,7 +32,7 @@ _REASONS: Mapping[str, str] = {
     "shape_not_in_gt": "the goal has no block of this type and color",
     "overflow": "every such block of the goal is already placed",
     "incorrect_orientation": "no such block that is missing has this orientation",
-    "dependency_not_met": "what it rests on is not there yet",
+    "dependency_not_met": "what must be there before it is not there yet",
     "invalid": "no candidate has this number",
 }
 _NO_TEXT = "(no answer)"
@@ -63,7 +63,10 @@ class PastStep:
 
 @dataclass(frozen=True)
 class StepPrompt:
-    """A template with its rules; `memory` is how many earlier steps are shown, None for all."""
+    """A template with its rules; `memory` is how many earlier steps are shown, None for all.
+
+    By `gating` and the setting `accepts` a move succeeds, of which the model is told.
+    """
 
     template: TemplatePrompt
     feedback: Feedback
@@ -71,6 +74,7 @@ class StepPrompt:
     memory: int | None
     cot: bool
     gating: Gating = "aov"
+    accepts: Setting = "A"
 
     def messages(
         self,
@@ -87,6 +91,7 @@ class StepPrompt:
             "max_steps": max_steps,
             "cot": self.cot,
             "gating": self.gating,
+            "setting": self.accepts,
             "n_hidden": hidden,
         }
         facts["answer"] = self.template.text("answer", facts)

@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from phyblock.report import load_run
+from phyblock.report.cost import cost_frame, cost_view
 from phyblock.report.episodes import endings_frame, episodes_frame, moves_frame, progress_frame
 from phyblock.report.table3 import step_scores_frame, table3_frame
 from phyblock.report.track_intervals import step_intervals
@@ -120,6 +121,12 @@ def test_moves_split_the_steps(folder: Path) -> None:
     assert (beta["overflow"], beta["unread"], beta["invalid"]) == (2, 2, 1)
     assert beta["unread_share"] == 0.4
     assert len(episodes_frame(run)) == 3
+
+
+def test_costs_of_episodes_are_said_to_be_of_episodes(folder: Path) -> None:
+    run = load_run(folder)
+    said = cost_view(cost_frame(run), run).notes
+    assert any("whole episode" in note for note in said)
 
 
 def test_progress_is_a_curve_that_keeps_what_was_reached(folder: Path) -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from phyblock.datasets import read_builtin
 from phyblock.models.base import Image, Message, Reply
 from phyblock.resources import bundled
-from phyblock.scoring import MOVE_OUTCOMES
+from phyblock.scoring import MOVE_OUTCOMES, Setting
 from phyblock.sim import PictureStyle
 from phyblock.tasks import (
     PicturePolicy,
@@ -177,3 +177,17 @@ def test_pictures_of_states_are_drawn_and_kept(tmp_path: Path) -> None:
         track.close()
     assert found[0] == found[1]
     assert len({step[2] for step in found[0]}) == len(task.scene)
+
+
+@pytest.mark.parametrize(
+    ("accepts", "needed"),
+    [("A", "same type, color and orientation that"), ("B", "same type and color that")],
+)
+def test_the_model_is_told_what_the_simulator_goes_by(accepts: Setting, needed: str) -> None:
+    prompt = StepPrompt(TEMPLATE, "success", "text", None, cot=True, accepts=accepts)
+    _, user = prompt.messages((GOAL, CANDIDATES), current(1), [], 16, 8)
+    lines = text(user).splitlines()
+    place = next(n for n, line in enumerate(lines) if line.startswith("- Move(N)"))
+    assert needed in lines[place]
+    assert ("counts as a mistake" in lines[place]) == (accepts == "B")
+    assert lines[place + 1].startswith("- Done")
