@@ -62,7 +62,8 @@ def command(
     """
     check_place(out, replace)
     wanted = {subtask: per_subtask or PER_SUBTASK[subtask] for subtask in subtasks}
-    scenes = [task.scene for task in read_data_set(data).tasks]
+    found = read_data_set(data)
+    scenes = [task.scene for task in found.tasks]
     console = make_console(stderr=True)
     with (
         open_workers(jobs, ray_address) as workers,
@@ -82,7 +83,7 @@ def command(
     if per_subtask is not None:
         made_by += f" --per-subtask {per_subtask}"
     originals = {scene.id: scene for scene in scenes}
-    write_questions(out, questions, originals, made_by, _audits(questions))
+    write_questions(out, questions, originals, found.name, made_by, _audits(questions))
     told_of = f"{len(questions)} questions in {len(subtasks)} subtasks"
     click.echo(f"{told_of}: {shown_path(out)}")
 

@@ -58,6 +58,7 @@ def test_questions_are_written_with_card_and_checksums(folder: Path) -> None:
     ]
     card = (folder / "q" / "CARD.md").read_text(encoding="utf-8")
     assert f"phyblock vqa generate --data {folder}" in card
+    assert f"scenes of `{folder.name}`" in card
 
 
 def test_a_folder_is_not_written_over_unasked(folder: Path) -> None:

@@ -51,6 +51,13 @@ def test_a_sample_of_the_answers_is_derived_again(built_in: QuestionSet) -> None
         assert problem_of(task.question) is None, task.key
 
 
+def test_a_place_that_is_not_marked_is_found_out(built_in: QuestionSet) -> None:
+    question = next(t.question for t in built_in.tasks if t.question.subtask == "AD")
+    scene, block = question.pictures
+    bare = replace(question, pictures=(replace(scene, marks=scene.marks[1:]), block))
+    assert problem_of(bare) == "no place A is marked on a block"
+
+
 @pytest.mark.slow
 def test_all_answers_are_derived_again(built_in: QuestionSet) -> None:
     problems = {task.key: problem_of(task.question) for task in built_in.tasks}

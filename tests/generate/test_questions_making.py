@@ -90,7 +90,7 @@ def test_options_without_the_right_one_are_found(questions: list[Question]) -> N
 
 def test_lines_read_back_as_the_questions(questions: list[Question], tmp_path: Path) -> None:
     originals = {scene.id: scene for scene in SCENES}
-    write_questions(tmp_path / "q", questions, originals, "phyblock vqa generate")
+    write_questions(tmp_path / "q", questions, originals, "phyblock-400", "phyblock vqa generate")
     read = [task.question for task in read_questions(tmp_path / "q", DATA).tasks]
     assert read == questions
     sums = (tmp_path / "q" / "SHA256SUMS").read_text(encoding="utf-8").splitlines()

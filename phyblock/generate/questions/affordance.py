@@ -98,13 +98,8 @@ class AffordanceMaker:
             raise UnfairError("the pictures are not of the whole scene and of one block")
         stays = []
         for letter in LETTERS:
-            mark = next((mark for mark in shown.marks if mark.letter == letter), None)
-            if (
-                mark is None
-                or seen_order(shown, seen(replace(shown, marks=())), mark.position_m) is None
-            ):
-                raise UnfairError(f"no place {letter} is marked on a block")
-            verdict = _verdict(question.scene, alone.blocks[0], mark.position_m, OUTCOME_SETTINGS)
+            place_m = _marked(shown, letter)
+            verdict = _verdict(question.scene, alone.blocks[0], place_m, OUTCOME_SETTINGS)
             if verdict is None:
                 raise UnfairError(f"the settings disagree on place {letter}")
             stays.append(verdict)

@@ -13,7 +13,7 @@ __all__ = ["question_card"]
 
 _TEXT = """# {name}
 
-{count} multiple-choice questions about {scenes} scenes of `phyblock-400`, in {subtasks} subtasks
+{count} multiple-choice questions about {scenes} scenes of `{scenes_name}`, in {subtasks} subtasks
 (paper, section 3.3 and appendix A.4), each with an answer that is derived from geometry, from the
 dependency graph or from physics, and derived again by `phyblock vqa verify`. Made by
 
@@ -114,12 +114,17 @@ asked about are made from so many.
 
 
 def question_card(
-    name: str, questions: Sequence[Question], made_by: str, audits: Sequence[SubtaskAudit] = ()
+    name: str,
+    scenes_name: str,
+    questions: Sequence[Question],
+    made_by: str,
+    audits: Sequence[SubtaskAudit] = (),
 ) -> str:
-    """Markdown text of the card of a set of questions called `name`."""
+    """Markdown text of the card of a set of questions called `name` about those scenes."""
     by_subtask = {s: [q for q in questions if q.subtask == s] for s in SUBTASKS}
     return _TEXT.format(
         name=name,
+        scenes_name=scenes_name,
         count=len(questions),
         scenes=len({question.scene.id for question in questions}),
         subtasks=sum(bool(found) for found in by_subtask.values()),

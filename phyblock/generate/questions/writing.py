@@ -31,17 +31,18 @@ def write_questions(
     folder: Path,
     questions: Sequence[Question],
     originals: Mapping[str, Scene],
+    scenes_name: str,
     made_by: str,
     audits: Sequence[SubtaskAudit] = (),
 ) -> None:
     """Write the questions, sorted as they are, with card and checksums; StoreError if it cannot.
 
-    `originals` are the scenes as stored, by id; `made_by` is the command that makes the same
-    files; `audits` are told of in the card.
+    `originals` are the scenes as stored, by id, of the set `scenes_name`; `made_by` is the command
+    that makes the same files; `audits` are told of in the card.
     """
     lines = "".join(f"{question_line(q, originals[q.scene.id])}\n" for q in questions)
     files = {
-        _CARD_FILE: question_card(folder.name, questions, made_by, audits).encode(),
+        _CARD_FILE: question_card(folder.name, scenes_name, questions, made_by, audits).encode(),
         QUESTIONS_FILE: lines.encode(),
     }
     sums = "".join(f"{hashlib.sha256(d).hexdigest()}  {name}\n" for name, d in files.items())
