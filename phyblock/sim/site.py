@@ -25,7 +25,7 @@ from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_camera
 from phyblock.sim.render import DrawnBlock, empty_ground, picture
 from phyblock.sim.stability import DEFAULT_TRIAL, Trial, movement
-from phyblock.sim.steps import DEFAULT_REST, groups
+from phyblock.sim.steps import groups, wait
 from phyblock.sim.world import Physics, Pose, World
 
 __all__ = ["ONE_SETTING", "Lookout", "Settled", "Site", "settle", "state_picture"]
@@ -106,7 +106,7 @@ class Site:
         """Whether blocks, alone in the world, stay where they are under every setting."""
         for physics in self.trial.physics:
             with self._placed(blocks, physics) as world:
-                self._wait(world, self.trial.duration_s)
+                wait(world, self.trial.duration_s)
                 if movement(blocks, world.poses(), self.trial).fallen:
                     return False
         return True
@@ -118,11 +118,11 @@ class Site:
         # A fresh world: how blocks tumble could depend on what was in a used one before.
         with World(physics) as world:
             world.place_all(blocks)
-            self._wait(world, self.trial.duration_s)
+            wait(world, self.trial.duration_s)
             fallen = movement(blocks, world.poses(), self.trial).fallen
             if not fallen:
                 return (), ()
-            self._wait(world, _COLLAPSE_S)
+            wait(world, _COLLAPSE_S)
             poses = world.poses()
             fallen = (*fallen, *movement(blocks, poses, self.trial).fallen)
             return fallen, tuple(_lying(block, poses[block.order], fallen) for block in blocks)
@@ -139,17 +139,6 @@ class Site:
         finally:
             for block in reversed(blocks):
                 world.remove(block.order)
-
-    def _wait(self, world: World, limit_s: float) -> None:
-        """Simulate until nothing has moved for a while, but no longer than `limit_s` [s]."""
-        rest = DEFAULT_REST
-        quiet_s = 0.0
-        for _ in range(round(limit_s / rest.every_s)):
-            world.step(rest.every_s)
-            is_quiet = world.fastest_m_s() < rest.speed_m_s
-            quiet_s = quiet_s + rest.every_s if is_quiet else 0.0
-            if quiet_s >= rest.quiet_s - rest.every_s / 2:
-                return
 
 
 @functools.cache

@@ -20,9 +20,9 @@ from phyblock.sim.stability import (
     verdict,
 )
 from phyblock.sim.support import bounds_m, boxes_near
-from phyblock.sim.world import Physics, World
+from phyblock.sim.world import World
 
-__all__ = ["DEFAULT_REST", "Rest", "check_at_rest", "check_steps", "groups"]
+__all__ = ["DEFAULT_REST", "Rest", "check_at_rest", "check_steps", "groups", "wait"]
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def check_steps(
         with World(physics) as world:
             for count in range(len(blocks)):
                 group = _group_of_last(blocks[: count + 1])
-                found[count].append(_try(world, group, physics, trial, rest))
+                found[count].append(_try(world, group, trial, rest))
     return tuple(verdict(movements, trial) for movements in found)
 
 
@@ -67,7 +67,7 @@ def check_at_rest(
     found = []
     for physics in trial.physics:
         with World(physics) as world:
-            tried = [_try(world, group, physics, trial, rest) for group in groups(blocks)]
+            tried = [_try(world, group, trial, rest) for group in groups(blocks)]
         fallen = tuple(sorted(order for one in tried for order in one.fallen))
         moved_m = max((one.moved_m for one in tried), default=0.0)
         turned_deg = max((one.turned_deg for one in tried), default=0.0)
@@ -98,25 +98,24 @@ def _group_of_last(blocks: Sequence[Block]) -> tuple[Block, ...]:
     return next(group for group in groups(blocks) if blocks[-1] in group)
 
 
-def _try(
-    world: World, group: Sequence[Block], physics: Physics, trial: Trial, rest: Rest | None
-) -> Movement:
+def _try(world: World, group: Sequence[Block], trial: Trial, rest: Rest | None) -> Movement:
     """What becomes of a group, alone in the world for this trial."""
     world.place_all(group)
     if rest is None:
         world.step(trial.duration_s)
     else:
-        _run_until_quiet(world, physics, trial.duration_s, rest)
+        wait(world, trial.duration_s, rest)
     found = movement(group, world.poses(), trial)
     for block in group:
         world.remove(block.order)
     return found
 
 
-def _run_until_quiet(world: World, physics: Physics, duration_s: float, rest: Rest) -> None:
-    every_s = max(rest.every_s, physics.time_step_s)
+def wait(world: World, limit_s: float, rest: Rest = DEFAULT_REST) -> None:
+    """Simulate until all has been quiet for a while, but no longer than `limit_s` [s]."""
+    every_s = max(rest.every_s, world.physics.time_step_s)
     quiet_s = 0.0
-    for _ in range(round(duration_s / every_s)):
+    for _ in range(round(limit_s / every_s)):
         world.step(every_s)
         quiet_s = quiet_s + every_s if world.fastest_m_s() < rest.speed_m_s else 0.0
         if quiet_s >= rest.quiet_s - every_s / 2:
