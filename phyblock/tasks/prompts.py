@@ -84,10 +84,15 @@ class TemplatePrompt:
         except jinja2.TemplateSyntaxError as error:
             where = f"{path}:{error.lineno}"
             raise PromptError(Problem(where, f"is not valid Jinja: {error.message}")) from error
-        if "user" not in self._template.blocks:
+        self.require("user", "and, if wanted, a block system")
+
+    def require(self, block: str, more: str) -> None:
+        """Raise PromptError where the template lacks a block; `more` is told of what is allowed."""
+        if block not in self._template.blocks:
             found = ", ".join(sorted(self._template.blocks)) or "no block"
-            allowed = "{% block user %} ... {% endblock %} and, if wanted, a block system"
-            raise PromptError(Problem(str(path), "has no user block", "", found, allowed))
+            allowed = f"{{% block {block} %}} ... {{% endblock %}} {more}"
+            problem = Problem(str(self._path), f"has no {block} block", "", found, allowed)
+            raise PromptError(problem)
 
     def messages(
         self, pictures: Sequence[Image], facts: Mapping[str, object]

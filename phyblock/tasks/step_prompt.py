@@ -76,6 +76,11 @@ class StepPrompt:
     gating: Gating = "aov"
     accepts: Setting = "A"
 
+    def __post_init__(self) -> None:
+        """Raise PromptError where the template has no text for the turns of a conversation."""
+        if self.history == "turns":
+            self.template.require("turn", "for the later messages of history: turns")
+
     def messages(
         self,
         fixed: Sequence[Image],

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.datasets import read_builtin
+from phyblock.errors import PromptError
 from phyblock.models.base import Image, Message, Reply
 from phyblock.resources import bundled
 from phyblock.scoring import MOVE_OUTCOMES, Setting
@@ -191,3 +192,12 @@ def test_the_model_is_told_what_the_simulator_goes_by(accepts: Setting, needed: 
     assert needed in lines[place]
     assert ("counts as a mistake" in lines[place]) == (accepts == "B")
     assert lines[place + 1].startswith("- Done")
+
+
+def test_a_template_without_turns_is_no_conversation(tmp_path: Path) -> None:
+    path = tmp_path / "mine.j2"
+    path.write_text("{% block user %}Go on.{% endblock %}", encoding="utf-8")
+    template = TemplatePrompt(path, "mine")
+    StepPrompt(template, "success", "text", None, cot=True)
+    with pytest.raises(PromptError, match=r"mine\.j2.*has no turn block"):
+        StepPrompt(template, "success", "turns", None, cot=True)
