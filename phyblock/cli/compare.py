@@ -11,6 +11,7 @@ from phyblock.cli.names import split_names
 from phyblock.report.compare import compare_models, compare_runs
 from phyblock.report.compare_view import compare_view, flipped_lines, write_comparison
 from phyblock.report.load import load_run
+from phyblock.report.measures import MEASURES
 
 __all__ = ["command"]
 
@@ -19,19 +20,22 @@ __all__ = ["command"]
 @click.argument("run", type=click.Path(path_type=Path))
 @click.argument("other", type=click.Path(path_type=Path), required=False)
 @click.option("--models", metavar="A,B", help="Only these models; of two runs, A of the first.")
+@click.option("--track", type=click.Choice(list(MEASURES)), help="[default: the first they have]")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for CSV, Markdown and LaTeX.")
-def command(run: Path, other: Path | None, models: str | None, out: Path | None) -> None:
+def command(
+    run: Path, other: Path | None, models: str | None, track: str | None, out: Path | None
+) -> None:
     """Compare the models of the folder RUN with one another, or those of RUN with OTHER's.
 
-    Pairs of samples of the same scene and seed; intervals from resampling base scenes; p values
-    with Holm's correction.
+    Pairs of samples of the same scene or question and seed; intervals from resampling base scenes;
+    p values with Holm's correction.
     """
     names = split_names(models)
     first = load_run(run, texts=False)
     found = (
-        compare_models(first, names)
+        compare_models(first, names, track or "")
         if other is None
-        else compare_runs(first, load_run(other, texts=False), names)
+        else compare_runs(first, load_run(other, texts=False), names, track or "")
     )
     console = make_console()
     print_view(console, compare_view(found))

@@ -11,19 +11,20 @@ import numpy as np
 import pandas as pd
 
 from phyblock.errors import Problem, SpecError
-from phyblock.report.cells import measured
-from phyblock.report.design import OVERALL, Design
+from phyblock.report.alike import check_alike
 from phyblock.report.intervals import parents_of, resampler
 from phyblock.report.load import Run
-from phyblock.scoring.uncertainty import CONFIDENCE, Clusters, Floats, bootstrap, f1_of, holm
+from phyblock.report.measures import MEASURES, Measure
+from phyblock.scoring.uncertainty import CONFIDENCE, Clusters, Floats, bootstrap, holm
 
 __all__ = ["COMPARE_RESAMPLES", "Comparison", "Side", "compare", "compare_models", "compare_runs"]
 
 COMPARE_RESAMPLES = 10_000
 """More than tables take, for p values that stay fine after Holm's correction."""
 
-_COUNTS = ["tp", "fp", "fn"]
-_FLIPPED = ["a", "b", "scene", "seed", "right", "f1_a", "f1_b"]
+_FLIPPED = ["a", "b", "scene", "item", "seed", "right", "value_a", "value_b"]
+_AT_ONCE = 100
+"""Pairs that are resampled together, which bounds memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,37 +40,42 @@ class Side:
 class Comparison:
     """What `compare` found.
 
-    `table` has one row a pair and level: a, b, level, f1_a, f1_b, difference (a minus b), se, lo,
-    hi [all in percent], p, p_holm (corrected for all rows), verdict, better, worse and same
-    (samples on which a has the higher, lower, same F1), n_samples, n_scenes, n_clusters.
-    `flipped` has one row a pair and sample, of all levels, that one side alone got wholly right:
-    a, b, scene, seed, right (that side's label), f1_a, f1_b [percent]. `how` says what F1 is.
+    `table` has one row a pair and part of the track (levels, categories of questions): a, b, part,
+    value_a, value_b, difference (a minus b), se, lo, hi [all in percent], p, p_holm (corrected for
+    all rows), verdict, better, worse and same (samples on which a has the higher, lower, same
+    value), n_samples, n_scenes, n_clusters. `flipped` has one row a pair and sample that one side
+    alone got wholly right: a, b, scene, item (scene or question), seed, right (that side's label),
+    value_a, value_b [percent]. `name` is what the values are called, `how` says what they are.
     """
 
     table: pd.DataFrame
     flipped: pd.DataFrame
+    name: str
     how: str
 
 
-def compare_models(run: Run, models: Sequence[str] = ()) -> Comparison:
-    """Every pair of models of a run overall; at every level where there are but two.
+def compare_models(run: Run, models: Sequence[str] = (), track: str = "") -> Comparison:
+    """Every pair of models of a run as a whole; in every part where there are but two.
 
-    `models` limits it to those named. Raises SpecError for a name that the run has not, or when
-    fewer than two are left.
+    `models` limits it to those named; `track` is the first of `MEASURES` that the run has, if it is
+    not named. Raises SpecError for a name that the run has not, or when fewer than two are left.
     """
     sides = [Side(name, name, run) for name in _checked(run, models)]
     if len(sides) < 2:
         allowed = f"two of: {', '.join(run.design.model_names)}"
         raise SpecError(Problem(str(run.path), "needs two models to compare", allowed=allowed))
-    levels = run.design.levels if len(sides) == 2 else (OVERALL,)
-    return compare(list(combinations(sides, 2)), levels)
+    track = _shared_track([run], track)
+    parts = MEASURES[track].parts(run.design)
+    return compare(list(combinations(sides, 2)), parts if len(sides) == 2 else parts[-1:], track)
 
 
-def compare_runs(first: Run, second: Run, models: Sequence[str] = ()) -> Comparison:
+def compare_runs(
+    first: Run, second: Run, models: Sequence[str] = (), track: str = ""
+) -> Comparison:
     """Each model that both runs have; or, with two `models`, one of the first and one of the other.
 
-    At every level where that is one pair, else overall. Raises SpecError for names that are not
-    there.
+    In every part where that is one pair, else as a whole; `track` as for `compare_models`. Raises
+    SpecError for names that are not there.
     """
     if len(models) == 2:
         names = [(*_checked(first, models[:1]), *_checked(second, models[1:]))]
@@ -87,8 +93,19 @@ def compare_runs(first: Run, second: Run, models: Sequence[str] = ()) -> Compari
     pairs = [
         (Side(f"{a} ({tags[0]})", a, first), Side(f"{b} ({tags[1]})", b, second)) for a, b in names
     ]
-    levels = [name for name in first.design.levels if name in second.design.levels]
-    return compare(pairs, levels if len(pairs) == 1 else (OVERALL,))
+    track = _shared_track([first, second], track)
+    known = MEASURES[track].parts(second.design)
+    parts = [name for name in MEASURES[track].parts(first.design) if name in known]
+    return compare(pairs, parts if len(pairs) == 1 else parts[-1:], track)
+
+
+def _shared_track(runs: Sequence[Run], wanted: str) -> str:
+    """The track that is compared: `wanted`, else the first one that all runs have."""
+    shared = [name for name in MEASURES if all(name in run.design.suite.tracks for run in runs)]
+    if not shared or (wanted and wanted not in shared):
+        where, allowed = ", ".join(str(run.path) for run in runs), ", ".join(shared) or "none"
+        raise SpecError(Problem(where, "has no such track to compare", "track", wanted, allowed))
+    return wanted or shared[0]
 
 
 def _tags(first: Run, second: Run) -> tuple[str, str]:
@@ -109,153 +126,130 @@ def _checked(run: Run, models: Sequence[str]) -> Sequence[str]:
     return models or known
 
 
-def compare(pairs: Sequence[tuple[Side, Side]], levels: Sequence[str]) -> Comparison:
-    """Compare the sides of each pair at each level on the samples that both have.
+def compare(pairs: Sequence[tuple[Side, Side]], parts: Sequence[str], track: str) -> Comparison:
+    """Compare the sides of each pair in each part of a track on the samples that both have.
 
     Setting, matcher, criteria and what becomes of missing replies are those of the first run.
-    Raises SpecError when a run has no full planning, was not scored so, or has other blocks in a
+    Raises SpecError when a run was not scored so, asked other questions, or has other blocks in a
     scene of the same name.
     """
+    measure = MEASURES[track]
     design = pairs[0][0].run.design
     sides = {side.label: side for pair in pairs for side in pair}
     runs = list({id(side.run): side.run for side in sides.values()}.values())
-    for run in runs:
-        if not run.design.tracks:
-            found = ", ".join(run.design.suite.tracks)
-            message, allowed = "has no track that is compared", "full_planning"
-            raise SpecError(Problem(str(run.path), message, "tracks", found, allowed))
     for run in runs[1:]:
-        _check_alike(run, runs[0], levels)
+        check_alike(run, runs[0], parts, track)
     parents = pd.concat([parents_of(run) for run in runs]).groupby(level=0).first()
     labels = [(a.label, b.label) for a, b in pairs]
-    parts: list[pd.DataFrame] = []
+    tables: list[pd.DataFrame] = []
     flips: list[pd.DataFrame] = []
-    for level in levels:
-        of_run = {id(run): _samples(run, level, design) for run in runs}
-        samples = {label: of_run[id(side.run)][side.model] for label, side in sides.items()}
-        joined = [
-            pd.concat([samples[a], samples[b]], axis=1, join="inner", keys=["a", "b"])
-            for a, b in labels
-        ]
-        parts.append(_differences(labels, joined, parents, level))
-        if level == OVERALL:
-            flips = [_flipped(*pair, both) for pair, both in zip(labels, joined, strict=True)]
-    table = pd.concat(parts, ignore_index=True)
+    for part in parts:
+        of_run = {id(run): measure.samples(run, part, design) for run in runs}
+        samples = {name: of_run[id(side.run)].get(side.model) for name, side in sides.items()}
+        counted = [_paired(samples[a], samples[b], measure) for a, b in labels]
+        tables.append(_differences(labels, counted, parents, part, measure))
+        if part == parts[-1]:
+            flips = [
+                _flipped(*pair, one, measure) for pair, one in zip(labels, counted, strict=True)
+            ]
+    table = pd.concat(tables, ignore_index=True)
     table.insert(list(table).index("p") + 1, "p_holm", holm(table["p"]))
     verdicts = [_verdict(row) for row in table.to_dict("records")]
     table.insert(list(table).index("p_holm") + 1, "verdict", verdicts)
     flipped = pd.concat([pd.DataFrame(columns=_FLIPPED), *(f for f in flips if len(f))])
-    how = f"F1 in setting {design.setting} by the {design.matcher} matcher"
-    return Comparison(table, flipped.reset_index(drop=True), how)
+    how = measure.how(design)
+    return Comparison(table, flipped.reset_index(drop=True), measure.name, how)
 
 
-def _check_alike(run: Run, first: Run, levels: Sequence[str]) -> None:
-    suite, wanted = run.design.suite, first.design
-    known = ("aov", suite.scoring.level1)
-    needed = (wanted.criterion(level) for level in levels)
-    unknown = next((criterion for criterion in needed if criterion not in known), "aov")
-    for what, names, name in (
-        ("settings", suite.settings, wanted.setting),
-        ("scoring.matchers", suite.scoring.matchers, wanted.matcher),
-        ("scoring.level1", known, unknown),
-    ):
-        if name not in names:
-            hint = "phyblock score reads stored replies again under other rules"
-            message = f"was not scored as {first.path} was, by {name}"
-            raise SpecError(Problem(str(run.path), message, what, ", ".join(names), hint=hint))
-    blocks = [
-        one.records.drop_duplicates("scene").set_index("scene")["n_blocks"] for one in (first, run)
-    ]
-    both = pd.concat(blocks, axis=1, join="inner", keys=["first", "other"])
-    if len(differ := both[both["first"] != both["other"]]):
-        message = f"is of other data than {first.path}"
-        found = f"other blocks in {len(differ)} scenes, the first {differ.index[0]}"
-        raise SpecError(Problem(str(run.path), message, "scenes", found))
+@dataclass(frozen=True, eq=False)
+class _Paired:
+    """Samples that two sides both have: a row each in `keys`, and (samples, 2, counts)."""
+
+    keys: pd.DataFrame
+    counts: Floats
 
 
-def _samples(run: Run, level: str, design: Design) -> dict[str, pd.DataFrame]:
-    """Counts by (scene, seed) at one level, by model; of models with a reply at the level."""
-    criterion = design.criterion(level)
-    scores = run.scores
-    kept = scores[
-        scores["track"].isin(design.tracks[:1])
-        & (scores["criterion"] == criterion)
-        & (scores["setting"] == design.setting)
-        & (scores["matcher"] == design.matchers(criterion)[0])
-        & ~scores["outcome"].isin(design.outcomes_left_out)
-    ]
-    if level != OVERALL:
-        records = run.records
-        of_level = [int(level) in levels for levels in records["levels"]]
-        kept = kept[kept["sample"].isin(records["sample"][of_level])]
-    kept = measured(kept, ["model"]).set_index(["scene", "seed"])
-    parts = {str(model): part[_COUNTS] for model, part in kept.groupby("model", sort=False)}
-    return {model: parts.get(model, kept.iloc[:0][_COUNTS]) for model in run.design.model_names}
+def _paired(a: pd.DataFrame | None, b: pd.DataFrame | None, measure: Measure) -> _Paired | None:
+    """None where a side has no sample."""
+    if a is None or b is None:
+        return None
+    both = pd.concat([a, b], axis=1, join="inner", keys=["a", "b"])
+    return _Paired(both.index.to_frame(index=False), measure.counts(both)) if len(both) else None
 
 
 def _differences(
     labels: Sequence[tuple[str, str]],
-    joined: Sequence[pd.DataFrame],
+    paired: Sequence[_Paired | None],
     parents: pd.Series[Any],
-    level: str,
+    part: str,
+    measure: Measure,
 ) -> pd.DataFrame:
     """Rows of `Comparison.table` but for corrected p values and verdicts."""
-    scenes = sorted({scene for both in joined for scene in both.index.get_level_values("scene")})
+    scenes = sorted({scene for one in paired if one for scene in one.keys["scene"]})
     place = {scene: n for n, scene in enumerate(scenes)}
-    origins = [tuple(parents[scene]) or (scene,) for scene in scenes]
-    counts = np.zeros((len(scenes), len(joined), 2, 3))
-    rows: list[dict[str, Any]] = []
-    sizes = []
-    for n, (pair, both) in enumerate(zip(labels, joined, strict=True)):
-        values = _counts(both)
-        present = [place[scene] for scene in both.index.get_level_values("scene")]
-        np.add.at(counts[:, n], present, values)
-        rows.append({"a": pair[0], "b": pair[1], "level": level, **_tally(values)})
-        rows[-1] |= {"n_samples": len(both), "n_scenes": len(set(present))}
-        sizes.append(len({name for s in set(present) for name in origins[s]}))
-    table = pd.DataFrame(rows).assign(n_clusters=sizes)
+    clusters = Clusters.of([tuple(parents[scene]) or (scene,) for scene in scenes])
+    batches = [
+        _resampled(paired[start : start + _AT_ONCE], place, clusters, measure)
+        for start in range(0, len(paired), _AT_ONCE)
+    ]
+    keys = pd.DataFrame(list(labels), columns=["a", "b"]).assign(part=part)
+    return pd.concat([keys, pd.concat(batches, ignore_index=True)], axis=1)
+
+
+def _resampled(
+    paired: Sequence[_Paired | None],
+    place: Mapping[str, int],
+    clusters: Clusters,
+    measure: Measure,
+) -> pd.DataFrame:
+    counts = np.zeros((len(place), len(paired), 2, measure.n_counts))
+    seen = np.zeros((len(place), len(paired)), dtype=bool)
+    for n, one in enumerate(paired):
+        if one:
+            rows = [place[scene] for scene in one.keys["scene"]]
+            np.add.at(counts[:, n], rows, one.counts)
+            seen[rows, n] = True
+    totals = counts.sum(axis=0)
+    whole = measure.whole(totals)
+    sizes = clusters.behind(seen)
     found = bootstrap(
         counts,
-        Clusters.of(origins),
-        _difference,
+        clusters,
+        lambda sums: _difference(whole(sums)),
         resampler(),
         resamples=COMPARE_RESAMPLES,
         n_clusters=sizes,
     )
-    totals = f1_of(counts.sum(axis=0))
-    numbers = {"f1_a": totals[:, 0], "f1_b": totals[:, 1], "difference": found.value}
+    values = whole(totals)
+    numbers = {"value_a": values[:, 0], "value_b": values[:, 1], "difference": found.value}
     numbers |= {"se": found.se, "lo": found.lo, "hi": found.hi}
-    measured = pd.DataFrame({name: 100 * values for name, values in numbers.items()})
-    keys, tallies = table[["a", "b", "level"]], table.drop(columns=["a", "b", "level"])
-    return pd.concat([keys, measured.assign(p=found.p), tallies], axis=1)
+    table = pd.DataFrame({name: 100 * value for name, value in numbers.items()})
+    tallies = pd.DataFrame([_tally(one, measure) for one in paired])
+    more = {"n_scenes": seen.sum(axis=0), "n_clusters": sizes}
+    return pd.concat([table.assign(p=found.p), tallies], axis=1).assign(**more)
 
 
-def _counts(both: pd.DataFrame) -> Floats:
-    """Counts of shape (samples, 2, 3)."""
-    return np.asarray(both.to_numpy(np.float64).reshape(len(both), 2, 3))
+def _difference(values: Floats) -> Floats:
+    return np.asarray(values[..., 0] - values[..., 1])
 
 
-def _difference(sums: Floats) -> Floats:
-    f1 = f1_of(sums)
-    return np.asarray(f1[..., 0] - f1[..., 1])
-
-
-def _tally(values: Floats) -> dict[str, int]:
-    """On how many samples, shape (samples, 2, 3), the first side is better, worse, the same."""
+def _tally(one: _Paired | None, measure: Measure) -> dict[str, int]:
+    """On how many samples the first side is better, worse, the same, and how many there are."""
     # A plan without a step for a goal without a block would have no F1; there is none.
-    sign = np.sign(np.nan_to_num(_difference(values)))
-    return {
-        name: int((sign == wanted).sum())
-        for name, wanted in (("better", 1), ("worse", -1), ("same", 0))
-    }
+    sign = np.sign(np.nan_to_num(_difference(measure.each(one.counts)))) if one else np.zeros(0)
+    counts = {"better": int((sign == 1).sum()), "worse": int((sign == -1).sum())}
+    return {**counts, "same": int((sign == 0).sum()), "n_samples": len(sign)}
 
 
-def _flipped(a: str, b: str, both: pd.DataFrame) -> pd.DataFrame:
-    f1 = 100 * np.nan_to_num(f1_of(_counts(both)))
-    table = both.index.to_frame(index=False).assign(a=a, b=b, f1_a=f1[:, 0], f1_b=f1[:, 1])
-    right = table[["f1_a", "f1_b"]] == 100
-    table["right"] = np.where(right["f1_a"], a, b)
-    return table.loc[right["f1_a"] != right["f1_b"], _FLIPPED].sort_values(["right", "scene"])
+def _flipped(a: str, b: str, one: _Paired | None, measure: Measure) -> pd.DataFrame:
+    if one is None:
+        return pd.DataFrame(columns=_FLIPPED)
+    values = 100 * np.nan_to_num(measure.each(one.counts))
+    table = one.keys.assign(a=a, b=b, value_a=values[:, 0], value_b=values[:, 1])
+    right = values == 100
+    table["right"] = np.where(right[:, 0], a, b)
+    rows = table.loc[right[:, 0] != right[:, 1], _FLIPPED]
+    return rows.sort_values(["right", "scene", "item", "seed"])
 
 
 def _verdict(row: Mapping[Any, Any]) -> str:

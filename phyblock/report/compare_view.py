@@ -19,14 +19,14 @@ _LEAST_P = 0.001
 
 
 def compare_view(found: Comparison) -> TextTable:
-    """A row a pair and level; the level is left out where there is but one."""
+    """A row a pair and part; the part is left out where there is but one."""
     table = found.table
-    one_level = table["level"].nunique() == 1
+    one_part = table["part"].nunique() == 1
     columns = [
         Column("A", is_text=True),
         Column("B", is_text=True),
-        *([] if one_level else [Column("Level", is_text=True)]),
-        *(Column(name, "F1 (%)") for name in ("A", "B", "A - B", "SE", "95 % CI")),
+        *([] if one_part else [Column("Part", is_text=True)]),
+        *(Column(name, f"{found.name} (%)") for name in ("A", "B", "A - B", "SE", "95 % CI")),
         Column("p (Holm)"),
         Column("Verdict", is_text=True),
         *(Column(name, "Samples") for name in ("A better", "B better", "same")),
@@ -38,9 +38,9 @@ def compare_view(found: Comparison) -> TextTable:
         rows.append(
             (
                 *(pair if pair != previous else ("", "")),
-                *([] if one_level else [level_name(row["level"])]),
-                number(row["f1_a"]),
-                number(row["f1_b"]),
+                *([] if one_part else [_part_name(row["part"])]),
+                number(row["value_a"]),
+                number(row["value_b"]),
                 number(row["difference"], signed=True),
                 number(row["se"]),
                 between(row["lo"], row["hi"], signed=True),
@@ -55,10 +55,14 @@ def compare_view(found: Comparison) -> TextTable:
     )
 
 
+def _part_name(part: str) -> str:
+    return level_name(part.replace("_", " "))
+
+
 def _notes(found: Comparison) -> tuple[str, ...]:
     table = found.table
     most = table.loc[table["n_scenes"].idxmax()] if len(table) else None
-    notes = [f"{found.how}; micro averages over the samples that both have."]
+    notes = [found.how]
     if most is not None:
         notes.append(
             f"{most['n_samples']} samples of {most['n_scenes']} scenes from {most['n_clusters']} "
@@ -86,8 +90,8 @@ def flipped_lines(found: Comparison) -> tuple[str, ...]:
         for side, other in ((a, b), (b, a)):
             rows = flips[flips["right"] == side]
             names = [
-                f"{scene} (seed {seed})" if several else str(scene)
-                for scene, seed in zip(rows["scene"], rows["seed"], strict=True)
+                f"{item} (seed {seed})" if several else str(item)
+                for item, seed in zip(rows["item"], rows["seed"], strict=True)
             ]
             if names:
                 lines.append(

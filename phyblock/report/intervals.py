@@ -66,13 +66,6 @@ class CountCube:
         self.parents = [tuple(parents[scene]) or (scene,) for scene in self.scenes]
         self.clusters = Clusters.of(self.parents)
 
-    def clusters_of(self, present: np.ndarray) -> np.ndarray:
-        """How many base scenes are behind each column of `present` (scenes, columns)."""
-        seen = np.zeros((self.clusters.size + 1, present.shape[1]), dtype=bool)
-        for members in self.clusters.members.T:
-            np.logical_or.at(seen, members, present)
-        return np.asarray(seen[:-1].sum(axis=0))
-
 
 def resampler() -> np.random.Generator:
     """The generator that every resampling begins with."""
@@ -113,7 +106,7 @@ def _of_level(run: Run, level: str) -> pd.DataFrame:
     cube = count_cube(run, level, _CELL)
     if not cube.scenes:
         return pd.DataFrame()
-    n_clusters = cube.clusters_of(cube.present)
+    n_clusters = cube.clusters.behind(cube.present)
     columns: dict[str, np.ndarray] = {
         "n_scenes": cube.present.sum(axis=0),
         "n_clusters": n_clusters,

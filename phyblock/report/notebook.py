@@ -82,14 +82,16 @@ class LoadedRun(Run):
                 table[name] = rows[rows["source"] == "run"].set_index("model")[column]
         return table
 
-    def compare(self, other: Run | None = None, models: Sequence[str] = ()) -> Comparison:
+    def compare(
+        self, other: Run | None = None, models: Sequence[str] = (), track: str = ""
+    ) -> Comparison:
         """The models of this run with one another, or with those of `other`; see `Comparison`.
 
         Raises SpecError for names that are not there or runs that cannot be compared.
         """
         if other is None:
-            return compare_models(self, models)
-        return compare_runs(self, other, models)
+            return compare_models(self, models, track)
+        return compare_runs(self, other, models, track)
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the headline of every model."""

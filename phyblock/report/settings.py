@@ -36,7 +36,7 @@ def settings_frame(run: Run) -> pd.DataFrame:
         if not models:
             continue
         both = np.array([[kept[model, setting] for setting in "AB"] for model in models])
-        n_clusters = cube.clusters_of(cube.present[:, both[:, 0]])
+        n_clusters = cube.clusters.behind(cube.present[:, both[:, 0]])
         found = bootstrap(
             cube.counts[:, both],
             cube.clusters,

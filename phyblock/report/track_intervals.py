@@ -75,7 +75,7 @@ def _of_cells(by_subtask: np.ndarray) -> np.ndarray:
 def _clusters_behind(cube: CountCube, present: np.ndarray) -> np.ndarray:
     """Base scenes behind each of the columns of `present`, whose first axis are scenes."""
     flat = present.reshape(len(present), -1)
-    return cube.clusters_of(flat).reshape(present.shape[1:])
+    return cube.clusters.behind(flat).reshape(present.shape[1:])
 
 
 def _cells_of(sums: Floats) -> Floats:
@@ -111,7 +111,7 @@ def step_metric_intervals(run: Run) -> pd.DataFrame:
     if kept.empty:
         return pd.DataFrame(columns=list(_COLUMNS)).astype({"cell": "str"})
     cube = CountCube(kept, parents_of(run), ["model", "criterion"], ["tp", "fp", "fn"])
-    n_clusters = cube.clusters_of(cube.present)
+    n_clusters = cube.clusters.behind(cube.present)
     found = bootstrap(
         cube.counts,
         cube.clusters,

@@ -72,6 +72,13 @@ class Clusters:
             row[: len(unit)] = [numbers[name] for name in unit]
         return cls(members, len(numbers))
 
+    def behind(self, present: NDArray[np.bool_]) -> NDArray[np.intp]:
+        """How many base scenes are behind each column of `present` (units, columns)."""
+        seen = np.zeros((self.size + 1, present.shape[1]), dtype=bool)
+        for members in self.members.T:
+            np.logical_or.at(seen, members, present)
+        return np.asarray(seen[:-1].sum(axis=0))
+
 
 @dataclass(frozen=True, eq=False)
 class Estimate:

@@ -49,9 +49,9 @@ def test_only_samples_that_both_have_are_compared() -> None:
         *plans("beta", {"001": 4, "002": 0, "003": 4}),
         record("beta", "000", outcome="missing", scores=[score(0, 0, 4)]),
     )
-    row = compare_models(run).table.set_index("level").loc["overall"]
+    row = compare_models(run).table.set_index("part").loc["overall"]
     assert (row["n_samples"], row["n_scenes"], row["n_clusters"]) == (2, 2, 2)
-    assert (row["f1_a"], row["f1_b"], row["difference"]) == (25, 50, -25)
+    assert (row["value_a"], row["value_b"], row["difference"]) == (25, 50, -25)
     assert (row["better"], row["worse"], row["same"]) == (0, 1, 1)
 
 
@@ -63,7 +63,7 @@ def test_a_model_without_any_reply_is_not_compared_though_empty_plans_count() ->
     assert set(compare_models(run).table["verdict"]) == {"nothing to compare"}
     some = record("beta", "000", scores=[score(3, 1, 1)])
     run = one_seed(*plans("alpha", dict.fromkeys(LEVELS, 3)), some, *silent[1:], missing="count")
-    row = compare_models(run).table.set_index("level").loc["overall"]
+    row = compare_models(run).table.set_index("part").loc["overall"]
     assert (row["n_samples"], row["better"], row["same"]) == (5, 4, 1)
 
 
@@ -73,7 +73,9 @@ def test_flipped_samples_are_those_that_one_side_alone_got_right() -> None:
         *plans("beta", {"000": 4, "001": 4, "002": 3, "003": 0}),
     )
     found = compare_models(run)
-    flipped = found.flipped[["scene", "right", "f1_a", "f1_b"]].to_records(index=False).tolist()
+    flipped = (
+        found.flipped[["scene", "right", "value_a", "value_b"]].to_records(index=False).tolist()
+    )
     assert flipped == [("002", "alpha", 100, 75), ("001", "beta", 50, 100)]
     assert flipped_lines(found) == (
         "alpha is right where beta is not, 1: 002",
@@ -84,10 +86,10 @@ def test_flipped_samples_are_those_that_one_side_alone_got_right() -> None:
 def test_what_cannot_be_told_is_said() -> None:
     same = dict.fromkeys(LEVELS, 2)
     run = one_seed(*plans("alpha", same), *plans("beta", same))
-    verdicts = compare_models(run).table.set_index("level")["verdict"]
+    verdicts = compare_models(run).table.set_index("part")["verdict"]
     assert verdicts["overall"] == "cannot tell"
     lone = one_seed(*plans("alpha", {"000": 4}), *plans("beta", {"000": 0}))
-    verdicts = compare_models(lone).table.set_index("level")["verdict"]
+    verdicts = compare_models(lone).table.set_index("part")["verdict"]
     assert verdicts["overall"] == "cannot tell: a single base scene"
     assert verdicts["3"] == "nothing to compare"
 
@@ -115,10 +117,10 @@ def test_two_runs_are_compared_by_the_models_they_share_or_by_two_named() -> Non
         manifest(seeds=[0]),
     )
     second = Run(Path("other"), second.manifest, second.design, second.records, second.scores)
-    shared = compare_runs(first, second).table.set_index("level")
+    shared = compare_runs(first, second).table.set_index("part")
     assert shared.loc["overall", ["a", "b"]].tolist() == ["alpha (run)", "alpha (other)"]
     assert shared.loc["overall", "difference"] == 50
-    named = compare_runs(first, second, ["alpha", "beta"]).table.set_index("level")
+    named = compare_runs(first, second, ["alpha", "beta"]).table.set_index("part")
     assert named.loc["overall", "difference"] == -25
     with pytest.raises(SpecError, match="has no such model"):
         compare_runs(first, second, ["beta", "alpha"])
@@ -135,8 +137,10 @@ def test_runs_that_cannot_be_compared_are_refused() -> None:
         compare_runs(first, one_seed(models=["beta"]))
     facts = manifest(seeds=[0])
     facts["suite"]["tracks"] = ["vqa"]
-    with pytest.raises(SpecError, match="no track that is compared"):
-        compare_models(run_of([], facts))
+    with pytest.raises(SpecError, match="no such track to compare"):
+        compare_runs(first, run_of([], facts))
+    with pytest.raises(SpecError, match=r"found: vqa(?s:.*)allowed: full_planning"):
+        compare_models(run_of([], manifest()), track="vqa")
     with pytest.raises(SpecError, match="needs two models"):
         compare_models(first)
 
@@ -149,7 +153,7 @@ def test_level_1_is_compared_by_one_criterion_alone() -> None:
     with pytest.raises(SpecError, match="was not scored as run was, by selection"):
         compare_runs(first, other)
     second = one_seed(*plans("alpha", {"001": 4, "002": 4}), models=["alpha"], levels=[2, 3])
-    table = compare_runs(first, second).table.set_index("level")
+    table = compare_runs(first, second).table.set_index("part")
     assert table.index.tolist() == ["2", "3", "overall"]
     assert table.loc["overall", "difference"] == -25
 
@@ -162,17 +166,20 @@ def test_the_first_runs_policy_on_missing_replies_holds_for_both() -> None:
 
     for missing, samples in (("skip", 1), ("count", 3)):
         other = of("count" if missing == "skip" else "skip", "001")
-        row = compare_runs(of(missing, "000"), other).table.set_index("level").loc["overall"]
+        row = compare_runs(of(missing, "000"), other).table.set_index("part").loc["overall"]
         assert (row["n_samples"], row["difference"]) == (samples, 0)
 
 
 def test_levels_are_rows_of_one_pair_alone() -> None:
     run = one_seed(*plans("alpha", {"000": 4, "001": 1}), *plans("beta", {"000": 4, "001": 2}))
     sides = [Side(name, name, run) for name in ("alpha", "beta")]
-    one = compare_view(compare([(sides[0], sides[1])], ["2", "overall"]))
+    one = compare_view(compare([(sides[0], sides[1])], ["2", "overall"], "full_planning"))
     assert [row[:3] for row in one.rows] == [("alpha", "beta", "Level-2"), ("", "", "Overall")]
-    assert "Level" not in [
-        column.name for column in compare_view(compare([(sides[0], sides[1])], ["overall"])).columns
+    assert "Part" not in [
+        column.name
+        for column in compare_view(
+            compare([(sides[0], sides[1])], ["overall"], "full_planning")
+        ).columns
     ]
 
 
