@@ -16,7 +16,7 @@ from phyblock.cli.vqa_data import data_option, questions_option, read_question_s
 from phyblock.cli.vqa_subtasks import subtasks_option
 from phyblock.domain import Question, Subtask
 from phyblock.errors import DataError, Problem, SpecError, StoreError
-from phyblock.models import Gate, Model, ReplyCache, build_model
+from phyblock.models import Gate, Model, ModelConfig, ReplyCache, build_model
 from phyblock.resources import bundled, reply_cache_file
 from phyblock.run.models import to_config
 from phyblock.run.wordings import Paraphrase, stems_of, write_wordings
@@ -78,10 +78,7 @@ def command(
     was written goes to the file with the reason where it is not accepted; nothing is used before
     a person has read it.
     """
-    known = load_models(find_models_file(models_file, None))
-    if name not in known:
-        hint = did_you_mean(name, list(known)) or "list them: phyblock models"
-        raise SpecError(Problem("--model", "is not in the models file", "", name, hint=hint))
+    config = _config(name, models_file)
     if out.exists():
         raise StoreError(Problem(str(out), "is already there", hint="name another file"))
     make_folder(out.parent)
@@ -91,7 +88,6 @@ def command(
         message = "holds no question of these subtasks in a known wording"
         raise DataError(Problem(questions, message))
     prompt = TemplatePrompt(bundled("prompts", "vqa_write.j2"), "vqa_write")
-    config = to_config(name, known[name], SuiteSpec(name="write", models=(name,)))
     with ExitStack() as stack:
         cache = None if no_cache else stack.enter_context(ReplyCache(reply_cache_file()))
         model = build_model(config, cache=cache, overall=Gate(_AT_ONCE))
@@ -101,6 +97,14 @@ def command(
     accepted = sum(paraphrase.fault is None for paraphrase in found)
     told = f"{counted(len(found), 'paraphrase')}, {accepted} accepted, in {shown_path(out)}"
     make_console().print(f"{told}; read them before they are used", markup=False, soft_wrap=True)
+
+
+def _config(name: str, models_file: str | None) -> ModelConfig:
+    known = load_models(find_models_file(models_file, None))
+    if name not in known:
+        hint = did_you_mean(name, list(known)) or "list them: phyblock models"
+        raise SpecError(Problem("--model", "is not in the models file", "", name, hint=hint))
+    return to_config(name, known[name], SuiteSpec(name="write", models=(name,)))
 
 
 async def _write(

@@ -20,7 +20,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from phyblock.domain import LETTERS, Question, Subtask, is_picture_option
-from phyblock.errors import Problem, PromptError
 from phyblock.generate.questions.verify import problem_of
 from phyblock.generate.questions.wording import WORDINGS, wording_ids
 from phyblock.models import ChoiceSubject, Message, Model, Request
@@ -30,6 +29,7 @@ from phyblock.tasks import TemplatePrompt
 __all__ = ["Paraphrase", "fault_of_form", "stems_of", "write_wordings"]
 
 _LENGTHS = (15, 400)
+_SHOWN_CHARS = 200
 _LETTERS = "ABCDE"
 _ELSE = "something else is asked, or it cannot be told"
 _LIST = re.compile(r"\[.*\]", re.DOTALL)
@@ -101,20 +101,26 @@ async def write_wordings(
 ) -> list[Paraphrase]:
     """Ask for `count` paraphrases of a stem's wordings and check each with `checks` questions.
 
-    Raises what models raise, and PromptError when the reply is no list of texts.
+    A reply that is no list of texts is one paraphrase with that fault: the cache would give it
+    again, and what was written for other stems counts. Raises what models raise.
     """
     originals = [WORDINGS[name] for name in wording_ids(stem)]
     facts: dict[str, object] = {"originals": originals, "count": count}
     facts["slots"] = [f"{{{name}}}" for name in sorted(_slots(originals[0]))]
     text = await _ask(model, prompt, "user", facts, f"write-{stem}", seed, questions[0])
+    subtask = questions[0].subtask
+    texts = _texts(text)
+    if texts is None:
+        shown = " ".join(text.split())[:_SHOWN_CHARS]
+        return [Paraphrase(stem, subtask, shown, "the reply holds no JSON list of texts")]
     found: list[Paraphrase] = []
-    for template in _texts(text):
+    for template in texts:
         fault = fault_of_form(template, [*originals, *(one.template for one in found)])
         chosen = _chosen(questions, checks, seed)
         for question in chosen if fault is None else ():
             fault = fault or await _fault_of_meaning(model, prompt, template, question, seed)
         names = tuple(question.id for question in chosen)
-        found.append(Paraphrase(stem, questions[0].subtask, template, fault, names))
+        found.append(Paraphrase(stem, subtask, template, fault, names))
     return found
 
 
@@ -171,17 +177,15 @@ async def _ask(
     return "" if reply is None else reply.text
 
 
-def _texts(reply: str) -> list[str]:
-    """The texts of the JSON list in a reply."""
+def _texts(reply: str) -> list[str] | None:
+    """The texts of the JSON list in a reply; None where there is none."""
     found = _LIST.search(reply)
     try:
         texts = json.loads(found.group()) if found else None
     except json.JSONDecodeError:
         texts = None
     if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
-        shown = " ".join(reply.split())[:80]
-        message = "the model's reply holds no JSON list of texts"
-        raise PromptError(Problem("vqa write", message, "", repr(shown)))
+        return None
     return [" ".join(text.split()) for text in texts]
 
 
@@ -192,8 +196,17 @@ def _chosen(questions: Sequence[Question], checks: int, seed: int) -> list[Quest
 
 
 def _slots(template: str) -> Counter[str]:
-    """How often each slot stands in a template; ValueError for broken braces."""
-    return Counter(name for _, name, _, _ in string.Formatter().parse(template) if name is not None)
+    """How often each slot stands in a template; ValueError for broken braces.
+
+    With a conversion or a format, such as `block!r`, it is another slot.
+    """
+    found: Counter[str] = Counter()
+    for _, name, form, conversion in string.Formatter().parse(template):
+        if name is not None:
+            found[
+                f"{name}{'!' + conversion if conversion else ''}{':' + form if form else ''}"
+            ] += 1
+    return found
 
 
 def _stem_of(question: Question) -> str:

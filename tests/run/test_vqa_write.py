@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytest
@@ -66,9 +66,11 @@ def sees_negations(text: str, truth: str) -> str:
     return f"Answer: {letter[1]}"
 
 
-def write(workspace: Workspace, server: OpenAIChat, *args: str, **change: Any) -> Done:
+def write(
+    workspace: Workspace, server: OpenAIChat, *args: str, questions: Sequence[Raw] = (QUESTION,)
+) -> Done:
     workspace.write_scenes(SCENE)
-    write_questions(workspace.root / "questions", [{**QUESTION, **change}])
+    write_questions(workspace.root / "questions", questions)
     with Running(server) as running:
         workspace.write_models(running.url, "alpha", transport="direct")
         places = ("--questions", "./questions", "--data", "./data", "--out", "found.jsonl")
@@ -98,18 +100,37 @@ def test_only_what_is_intact_new_and_true_is_accepted(workspace: Workspace) -> N
 
 def test_an_answer_that_the_scene_denies_is_never_accepted(workspace: Workspace) -> None:
     server = Writer([GOOD], sees_negations)
-    write(workspace, server, answer="A")
+    write(workspace, server, questions=[QUESTION | {"answer": "A"}])
     (one,) = written(workspace)
     assert not one["accepted"]
     assert "the answer is B, not A" in one["fault"]
     assert server.requests == 1
 
 
-def test_a_reply_without_a_list_is_one_error(workspace: Workspace) -> None:
-    done = write(workspace, Writer("no list", sees_negations))
-    assert done.code == 2
-    assert "holds no JSON list" in done.errors[0]
-    assert not (workspace.root / "found.jsonl").exists()
+def test_a_reply_without_a_list_does_not_stop_the_others(workspace: Workspace) -> None:
+    class Wordy(Writer):
+        """Lists wordings of shapes, and talks where it is asked for those of colors."""
+
+        def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+            body = super().reply(seen, ending)
+            if "What is the color of" in str(seen.parts[-1]):
+                body["choices"][0]["message"]["content"] = "There are many ways to ask this."
+            return body
+
+    color = {
+        "id": "co-001",
+        "subtask": "CO",
+        "wording": "co-1",
+        "question": "What is the color of the topmost block?",
+        "options": ["red", "blue", "green", "yellow"],
+        "evidence": {"slots": {"block": "topmost block"}},
+    }
+    done = write(workspace, Wordy([GOOD], sees_negations), questions=[QUESTION, QUESTION | color])
+    assert (done.code, done.err) == (0, "")
+    talk, good = sorted(written(workspace), key=lambda one: one["subtask"])
+    assert talk["fault"] == "the reply holds no JSON list of texts"
+    assert talk["template"] == "There are many ways to ask this."
+    assert (good["template"], good["accepted"], talk["accepted"]) == (GOOD, True, False)
 
 
 def test_an_unknown_model_and_a_taken_file_are_refused(workspace: Workspace) -> None:
@@ -126,3 +147,10 @@ def test_an_unknown_model_and_a_taken_file_are_refused(workspace: Workspace) -> 
 )
 def test_a_wording_in_the_form_of_the_others_has_no_fault(template: str) -> None:
     assert fault_of_form(template, ["What is the shape of the {block}?"]) is None
+
+
+@pytest.mark.parametrize("slot", ["{block!r}", "{block:>40}", "{block.text}", "{}", "{other}"])
+def test_a_slot_that_is_not_filled_in_as_it_is_is_another_one(slot: str) -> None:
+    fault = fault_of_form(f"Which shape has the {slot}?", ["What is the shape of the {block}?"])
+    assert fault is not None
+    assert "slots" in fault
