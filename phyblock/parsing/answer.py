@@ -22,6 +22,7 @@ from phyblock.parsing.answer_patterns import (
     BRANDED,
     CHOSEN,
     CONCLUDED,
+    DANGLES,
     IS_REJECTED,
     IS_RIGHT,
     JSON,
@@ -76,6 +77,7 @@ class _Statement:
 
 
 _SENTENCE_CHARS = 240
+_CUT_OFF_CHARS = 12
 _WHOLE_CHARS = 300
 _LINE_CHARS = 240
 _REVISION_CHARS = 4000
@@ -161,15 +163,24 @@ def _concluded(text: str, reader: Reader) -> str | None:
 
 
 def _only_one_named(text: str, reader: Reader) -> str | None:
-    """The one option that is named by a marked letter anywhere, unless only to turn it down."""
+    """The one option that is named by a marked letter anywhere.
+
+    Unless that is to turn it down, or the reply was cut off before it came to the others.
+    """
     if UNSURE.search(text):
         return None
     found = [(match, match["a"] or match["b"] or match["c"]) for match in BRANDED.finditer(text)]
     named = {letter for _, letter in found} & set(reader.letters)
-    if len(named) != 1:
+    if len(named) != 1 or _is_cut_off(text, found[-1][0].end()):
         return None
     sentences = (_sentence_of(text, match) for match, letter in found if letter in named)
     return None if all(map(REJECTS.search, sentences)) else named.pop()
+
+
+def _is_cut_off(text: str, named_until: int) -> bool:
+    """Whether a reply ends in the middle of a sentence, well after what it named last."""
+    rest = text[named_until:].rstrip()
+    return len(rest) > _CUT_OFF_CHARS and (rest[-1].isalnum() or bool(DANGLES.search(rest)))
 
 
 def _sentence_of(text: str, match: re.Match[str]) -> str:
@@ -185,6 +196,8 @@ def _only_text(text: str, reader: Reader) -> str | None:
     if not isinstance(reader, ChoiceReader) or UNSURE.search(text):
         return None
     last = _last_line(text)
+    if DANGLES.search(last):
+        return None
     for piece in (last, text[:_LINE_CHARS]) if len(text) <= _LINE_CHARS else (last,):
         found = CONTRADICTION if reader.letter(piece) == CONTRADICTION else None
         found = reader.option_text(piece) if found is None else found

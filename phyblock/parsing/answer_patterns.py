@@ -9,6 +9,7 @@ __all__ = [
     "BRANDED",
     "CHOSEN",
     "CONCLUDED",
+    "DANGLES",
     "IS_REJECTED",
     "IS_RIGHT",
     "JSON",
@@ -115,3 +116,8 @@ REJECTS = re.compile(
     r"|unlike|exclud\w+|eliminat\w+|rul(?:e|es|ed|ing) out|mismatch\w*)\b|n['\u2019]t\b",
     re.IGNORECASE,
 )
+DANGLES = re.compile(
+    r"(?:[,;:\-]|\b(?:which|that|the|an?|and|or|is|are|of|to|with|because|so|but|in|on|as|has))\Z",
+    re.IGNORECASE,
+)
+"""What no sentence ends with: the reply was cut off."""
