@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from phyblock.report.load import Run, once_per_run
-from phyblock.run.reading import read_records
+from phyblock.run.reading import RecordLines
 from phyblock.scoring import ERROR_TYPES
 from phyblock.tasks import ENDINGS
 
@@ -49,7 +49,7 @@ def episodes_frame(run: Run) -> pd.DataFrame:
     a step: what became of it, and the blocks that were placed by then. Episodes that got no reply
     are left out where the suite says `missing: skip`.
     """
-    rows = list(_rows(run))
+    rows = _rows(run)
     return pd.DataFrame(
         {
             name: pd.Series([row[name] for row in rows], dtype=dtype)
@@ -58,22 +58,30 @@ def episodes_frame(run: Run) -> pd.DataFrame:
     )
 
 
-def _rows(run: Run) -> Iterator[dict[str, Any]]:
+def _rows(run: Run) -> list[dict[str, Any]]:
+    """What is kept of each episode's newest record; never all records at once."""
     order = {name: place for place, name in enumerate(run.design.model_names)}
-    records = [r for r in read_records(run.path).values() if r["track"] == TRACK]
-    records.sort(key=lambda r: (order.get(r["model"], len(order)), r["scene"], r["seed"]))
-    for record in records:
-        if record["outcome"] in run.design.outcomes_left_out:
-            continue
-        outcomes = record.get("outcomes", ())
-        yield {
-            **{name: record[name] for name in ("model", "scene", "seed", "n_blocks", "outcome")},
-            "ending": record.get("ending", "unanswered"),
-            "steps": len(outcomes),
-            "max_steps": record.get("max_steps", 0),
-            "progress": tuple(record.get("progress", ())),
-            "outcomes": tuple(outcomes),
-        }
+    rows = {
+        record["sample"]: _row(record)
+        for _, record in RecordLines(run.path)
+        if record["track"] == TRACK
+    }
+    kept = [row for row in rows.values() if row["outcome"] not in run.design.outcomes_left_out]
+    return sorted(
+        kept, key=lambda row: (order.get(row["model"], len(order)), row["scene"], row["seed"])
+    )
+
+
+def _row(record: Mapping[str, Any]) -> dict[str, Any]:
+    outcomes = tuple(record.get("outcomes", ()))
+    return {
+        **{name: record[name] for name in ("model", "scene", "seed", "n_blocks", "outcome")},
+        "ending": record.get("ending", "unanswered"),
+        "steps": len(outcomes),
+        "max_steps": record.get("max_steps", 0),
+        "progress": tuple(record.get("progress", ())),
+        "outcomes": outcomes,
+    }
 
 
 def endings_frame(run: Run) -> pd.DataFrame:

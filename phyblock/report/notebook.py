@@ -13,7 +13,8 @@ from phyblock.report.compare import Comparison, compare_models, compare_runs
 from phyblock.report.design import OVERALL
 from phyblock.report.load import Run
 from phyblock.report.load import load_run as load_frames
-from phyblock.report.text_table import NO_VALUE, TextTable, between, number
+from phyblock.report.text_table import TextTable, between, number
+from phyblock.report.track_intervals import step_intervals, vqa_intervals
 from phyblock.report.write import make_tables, table_names
 
 __all__ = ["LoadedRun", "Tables", "load_run"]
@@ -62,8 +63,9 @@ class LoadedRun(Run):
     def summary(self) -> pd.DataFrame:
         """One row a model: samples, answered, and the headline of each track with its interval [%].
 
-        `f1`, `f1_lo`, `f1_hi` are of full planning overall (headline setting and matcher),
-        `vqa` the macro accuracy, `steps_f1` that of step planning; only of tracks that were run.
+        `f1` is of full planning overall (headline setting and matcher), `vqa` the macro accuracy,
+        `steps_f1` that of step planning, over the blocks placed; each with `*_lo` and `*_hi`. Only
+        of tracks that were run.
         """
         counts = self.tables["coverage"].groupby("model", sort=False)
         table = counts[["expected", "ok"]].sum()
@@ -73,13 +75,17 @@ class LoadedRun(Run):
             overall = cells[cells["level"] == OVERALL].set_index("model")
             for name, column in {"f1": "f1", "f1_lo": "lo", "f1_hi": "hi"}.items():
                 table[name] = overall[column]
-        for track, name, source, column in (
-            ("vqa", "vqa", "table2", OVERALL),
-            ("step_planning", "steps_f1", "table3", "placed_f1"),
+        for track, name, source, column, made, cell in (
+            ("vqa", "vqa", "table2", OVERALL, vqa_intervals, OVERALL),
+            ("step_planning", "steps_f1", "table3", "placed_f1", step_intervals, "placed"),
         ):
             if track in self.design.suite.tracks:
                 rows = self.tables[source]
                 table[name] = rows[rows["source"] == "run"].set_index("model")[column]
+                ends = made(self)
+                ends = ends[ends["cell"] == cell].set_index("model")
+                for end in ("lo", "hi"):
+                    table[f"{name}_{end}"] = ends[end].astype("float64")
         return table
 
     def compare(
@@ -104,8 +110,8 @@ class LoadedRun(Run):
             for column in summary.columns:
                 if column in _HEADS:
                     text = f"{row[column]:,}" if column in _WHOLE else number(row[column])
-                    if column == "f1" and text != NO_VALUE:
-                        text += f" {between(row['f1_lo'], row['f1_hi'])}"
+                    if f"{column}_lo" in row and not pd.isna(row[f"{column}_lo"]):
+                        text += f" {between(row[f'{column}_lo'], row[f'{column}_hi'])}"
                     cells.append(f'<td style="text-align:right">{escape(text)}</td>')
             lines.append(
                 f'<tr><th style="text-align:left">{escape(str(model))}</th>{"".join(cells)}</tr>'
@@ -123,8 +129,8 @@ _HEADS = {
     "expected": "Samples",
     "ok": "Answered",
     "f1": "F1 (%), 95 % CI",
-    "vqa": "VQA (%)",
-    "steps_f1": "Step F1 (%)",
+    "vqa": "VQA (%), 95 % CI",
+    "steps_f1": "Step F1 (%), 95 % CI",
 }
 
 

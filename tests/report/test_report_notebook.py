@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 import phyblock
+from phyblock.domain import SUBTASKS
 from phyblock.errors import SpecError
 from phyblock.report import to_markdown
 from tests.report.factory import LEVELS, manifest, record, score, write_run
@@ -58,3 +59,27 @@ def test_a_notebook_shows_escaped_names_and_aligned_numbers(run: phyblock.Run) -
     assert "&lt;b&gt;gamma&lt;/b&gt;" in html
     assert "75.0 [" in html
     assert html.count("<tr>") == 4
+
+
+def test_the_summary_has_intervals_of_questions_and_episodes_too(tmp_path: Path) -> None:
+    records = []
+    for n, scene in enumerate(LEVELS):
+        for subtask in SUBTASKS:
+            name = f"{subtask}-{scene}"
+            question = {"id": name, "subtask": subtask, "rotation": 0}
+            answer = {"right": "A", "given": "AB"[n % 2], "correct": n % 2 == 0}
+            about = {"sample": f"vqa/alpha/{name}/s0", "track": "vqa"}
+            records.append(record(scene=scene) | about | {"question": question, "answer": answer})
+        scores = [score(n, 0, 4 - n, criterion=name) for name in ("placed", "attempted")]
+        about = {"sample": f"step_planning/alpha/{scene}/s0", "track": "step_planning"}
+        records.append(record(scene=scene, scores=scores) | about)
+    facts = manifest(models=["alpha", "beta"], seeds=[0], settings=["A"])
+    facts["suite"]["tracks"] = ["vqa", "step_planning"]
+    run = phyblock.load_run(write_run(tmp_path / "run", records, facts))
+    summary = run.summary()
+    alpha = summary.loc["alpha"]
+    assert alpha["vqa"] == pytest.approx(60)
+    assert alpha["vqa_lo"] < alpha["vqa"] < alpha["vqa_hi"]
+    assert alpha["steps_f1_lo"] < alpha["steps_f1"] < alpha["steps_f1_hi"]
+    assert summary.loc["beta"].drop(["expected", "ok"]).isna().all()
+    assert "60.0 [" in run._repr_html_()

@@ -178,3 +178,10 @@ def test_a_model_without_any_reply_has_no_metrics(tmp_path: Path) -> None:
     assert set(step_intervals(run)["model"]) == {"alpha"}
     counts = step_scores_frame(run).set_index(["model", "setting", "criterion"])
     assert counts.loc[("beta", "A", "placed"), ["n", "fn"]].tolist() == [2, 8]
+
+
+def test_the_newest_record_of_an_episode_counts(tmp_path: Path) -> None:
+    first = episode("alpha", "001", "", "unanswered", outcome="missing")
+    write(tmp_path, first, episode("alpha", "001", "pp", "done"), models=("alpha",))
+    (row,) = episodes_frame(load_run(tmp_path)).to_dict("records")
+    assert (row["ending"], row["steps"], row["progress"]) == ("done", 2, (1, 2))
