@@ -53,6 +53,12 @@ def beside(printed: pd.DataFrame, ours: pd.DataFrame, run: Run, keys: list[str])
     return table[["model", "published_name", *keys, "published", "ours", "difference"]]
 
 
+def paper_table1_frame(run: Run) -> pd.DataFrame:
+    """`published_frame`; no rows for a run without full planning."""
+    table = published_frame(run)
+    return table if run.design.tracks else table.iloc[:0]
+
+
 def paper_table5_frame(run: Run) -> pd.DataFrame:
     """Mean and sd of F1 over seeds by level beside the paper's Table 5."""
     table = table5_frame(run)
@@ -64,7 +70,8 @@ def paper_table5_frame(run: Run) -> pd.DataFrame:
         for kind in ("mean", "sd")
     ]
     ours = pd.DataFrame(rows, columns=["model", "level", "metric", "ours"])
-    return beside(published_table(5), ours.astype({"ours": "float64"}), run, ["level", "metric"])
+    printed = published_table(5) if run.design.tracks else published_table(5).iloc[:0]
+    return beside(printed, ours.astype({"ours": "float64"}), run, ["level", "metric"])
 
 
 def paper_table5_view(table: pd.DataFrame, run: Run) -> TextTable:
@@ -173,7 +180,7 @@ _NOTHING = pd.DataFrame(
 )
 
 PAPER_TABLES: dict[int, PaperTable] = {
-    1: PaperTable(published_frame, published_view),
+    1: PaperTable(paper_table1_frame, published_view),
     2: PaperTable(paper_table2_frame, paper_table2_view),
     3: PaperTable(paper_table3_frame, paper_table3_view),
     5: PaperTable(paper_table5_frame, paper_table5_view),

@@ -24,17 +24,18 @@ __all__ = ["intervals_table", "intervals_view", "table5_frame", "table5_view"]
 def table5_frame(run: Run) -> pd.DataFrame:
     """One row a model: `level1_mean`, `level1_sd`, ... `overall_sd` of F1 over seeds [%].
 
-    Headline matcher and setting; sd with ddof = 1. Empty for a run of one seed.
+    Headline matcher and setting; sd with ddof = 1. Empty for a run of one seed or
+    without full planning.
     """
     design = run.design
-    cells = headline_cells(assembly_frame(run), design).set_index(["model", "level"])
-    names = design.model_names if len(design.suite.seeds) > 1 else ()
+    cells = headline_cells(assembly_frame(run), design)
+    names = design.model_names if design.tracks and len(design.suite.seeds) > 1 else ()
     table = pd.DataFrame({"model": list(names)})
     for level in design.levels:
         name = level if level == OVERALL else f"level{level}"
+        of_level = cells[cells["level"] == level].set_index("model")
         for kind in ("mean", "sd"):
-            values = cells[f"f1_{kind}"].xs(level, level="level")
-            table[f"{name}_{kind}"] = 100 * table["model"].map(values)
+            table[f"{name}_{kind}"] = 100 * table["model"].map(of_level[f"f1_{kind}"])
     return table
 
 

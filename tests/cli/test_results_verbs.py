@@ -58,6 +58,17 @@ def test_tables_beside_the_paper(folder: Path) -> None:
     assert "beside the paper's Table 5" in output
 
 
+@pytest.mark.parametrize("seeds", [[0], [0, 1]])
+def test_a_run_without_full_planning_has_nothing_beside_tables_1_and_5(
+    tmp_path: Path, seeds: list[int]
+) -> None:
+    facts = manifest(models=[("alpha", "GPT-4.1")], seeds=seeds, items={"step_planning": 5})
+    facts["suite"]["tracks"] = ["step_planning"]
+    folder = write_run(tmp_path / "run", [], facts)
+    output = call("tables", folder, "--paper").output
+    assert output == "No model of the run has a row in the paper's tables.\n"
+
+
 def test_compare_says_the_verdict_and_what_flipped(folder: Path, tmp_path: Path) -> None:
     done = call("compare", folder, "--models", "alpha,beta", "--out", tmp_path / "out")
     # Five base scenes are too few for five comparisons.
