@@ -25,6 +25,8 @@ __all__ = ["command"]
 
 _TRACK = "step_planning"
 _SIZE_PX = 256
+_NAMED = 5
+"""Episodes that a message names when it is unclear which one is meant."""
 
 
 @click.command("episode")
@@ -70,12 +72,18 @@ def _find(run: Path, sample: str) -> dict[str, Any]:
     """The one episode that `sample` means; StoreError with the others when there is not one."""
     read_manifest(run)
     episodes = {k: r for k, r in read_records(run).items() if r["track"] == _TRACK}
+    if not episodes:
+        hint = "phyblock run steps makes runs with episodes"
+        message = "holds no episodes of step planning"
+        raise StoreError(Problem(str(run / RECORDS), message, hint=hint))
     found = [sample] if sample in episodes else [name for name in episodes if sample in name]
     if len(found) == 1:
         return episodes[found[0]]
     message = "holds no such episode" if not found else f"holds {len(found)} such episodes"
-    names = ", ".join((found or list(episodes))[:5])
-    problem = Problem(str(run / RECORDS), message, "sample", sample, names or "none at all")
+    offered = found or list(episodes)
+    more = [f"and {len(offered) - _NAMED} more"] if len(offered) > _NAMED else []
+    allowed = ", ".join([*offered[:_NAMED], *more])
+    problem = Problem(str(run / RECORDS), message, "sample", sample, allowed)
     raise StoreError(problem)
 
 

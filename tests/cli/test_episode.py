@@ -74,7 +74,17 @@ def test_which_episode_is_meant_must_be_clear(played: Workspace, sample: str, me
     done = played.phyblock("episode", "out", sample)
     assert (done.code, len(done.errors)) == (2, 1)
     assert message in done.errors[0]
-    assert "step_planning/" in done.errors[0].partition("allowed")[2]
+    allowed = done.errors[0].partition("allowed")[2]
+    assert "step_planning/" in allowed
+    assert f"and {11 if sample == 'no-such' else 3} more" in allowed
+
+
+def test_a_run_without_episodes_says_so(played: Workspace) -> None:
+    words = ("--set", "tracks=[full_planning]", "--models", "oracle", "--out", "plans")
+    assert played.phyblock("run", "suite.yaml", *words, "--no-report").code == 0
+    done = played.phyblock("episode", "plans", "oracle")
+    assert (done.code, len(done.errors)) == (2, 1)
+    assert "holds no episodes of step planning" in done.errors[0]
 
 
 def test_a_data_set_that_was_moved_can_be_named(played: Workspace) -> None:
