@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
-from phyblock.cli.console import plain_table
-from phyblock.report import NO_VALUE
+from phyblock.cli.console import print_view
+from phyblock.report import NO_VALUE, Column, TextTable
 from phyblock.run.estimate import Estimate
 from phyblock.run.plan import RunPlan
 
@@ -15,21 +15,20 @@ __all__ = ["show_estimate"]
 
 _HEADINGS = (
     *("model", "kind", "samples", "done", "cached", "calls"),
-    *("tokens in", "out", "cost", "at most"),
+    *("tokens in", "tokens out", "cost", "at most"),
 )
+_TEXTS = ("model", "kind")
 _ITEMS = {"full_planning": "scene", "step_planning": "episode", "vqa": "question"}
 
 
 def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> None:
     """Print what each model would take, and the sum."""
     items = [_counted(len(track.items), _ITEMS[track.name]) for track in plan.tracks]
-    console.print(
+    caption = (
         f"{plan.suite.name}: {', '.join(items)} of {plan.dataset.name}, "
-        f"{_counted(len(plan.suite.seeds), 'seed')}, {_counted(len(plan.models), 'model')}",
-        highlight=False,
-        soft_wrap=True,
+        f"{_counted(len(plan.suite.seeds), 'seed')}, {_counted(len(plan.models), 'model')}"
     )
-    cells = [
+    cells = tuple(
         (
             row.model,
             row.kind,
@@ -43,8 +42,9 @@ def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> 
             _dollars(row.most_usd) if row.calls else NO_VALUE,
         )
         for row in rows
-    ]
-    console.print(plain_table(_HEADINGS, cells, numbers=8))
+    )
+    columns = tuple(Column(name, is_text=name in _TEXTS) for name in _HEADINGS)
+    print_view(console, TextTable(caption, columns, cells))
     calls = sum(row.calls for row in rows)
     known = sum(row.cost_usd or 0.0 for row in rows)
     unknown = [row.model for row in rows if row.calls and row.cost_usd is None]

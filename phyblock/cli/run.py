@@ -68,7 +68,8 @@ def command(
     no_report: bool,
     yes: bool,
 ) -> int:
-    """Run SUITE: a YAML file, or a bundled suite (quick, full, paper-table1, paper-random).
+    """Run SUITE: a YAML file, or a bundled suite (quick, full, steps, vqa, paper-table1,
+    paper-random).
 
     Records are kept as they come; the same command again goes on where it stopped and asks
     nothing twice.

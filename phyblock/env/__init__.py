@@ -1,7 +1,4 @@
-"""PhyBlock as a Gymnasium environment: importing this package registers `PhyBlock-v0`.
-
-Needs the optional dependency: pip install 'phyblock[gym]'.
-"""
+"""PhyBlock as a Gymnasium environment: importing this package registers `PhyBlock-v0`."""
 
 from __future__ import annotations
 
