@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
 from phyblock.domain import SUBTASK_NAMES
 from phyblock.errors import Problem, StoreError
@@ -29,6 +30,8 @@ from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.sources import Sources, open_sources
 from phyblock.report.load import Run
 from phyblock.report.write import TablesWritten
+from phyblock.run.prompts import PROMPTS
+from phyblock.run.reading import MANIFEST, RECORDS
 from phyblock.tasks.question_pictures import Shown
 
 __all__ = ["REPORT_FILE", "write_report"]
@@ -36,6 +39,7 @@ __all__ = ["REPORT_FILE", "write_report"]
 REPORT_FILE = "report.html"
 _FOLDER = "report"
 _PICTURES = "pictures"
+_UNFINISHED = ".new"
 _FIGURES = {
     "f1-levels": "F1 by level",
     "f1-radar": "F1 by level, as in the paper",
@@ -66,16 +70,21 @@ def write_report(
     sources = open_sources(run.manifest, run.design, data)
     drawn = write_figures(run, figures)
     path = run.path / REPORT_FILE
-    build = uuid4().hex[:12]
     folder = run.path / _FOLDER
     with _as_store_error(path):
-        (folder / build).mkdir(parents=True)
+        build = _build(run, sources)
+        new = folder / f"{build}{_UNFINISHED}"
+        shutil.rmtree(new, ignore_errors=True)
+        new.mkdir(parents=True)
         try:
-            _write_data(run, sources, folder, build)
-            atomic_write(path, _page(written, drawn, build))
+            _write_data(run, sources, folder, new, build)
+            page = _page(written, drawn, build)
         except BaseException:
-            shutil.rmtree(folder / build, ignore_errors=True)
+            shutil.rmtree(new, ignore_errors=True)
             raise
+        shutil.rmtree(folder / build, ignore_errors=True)
+        new.rename(folder / build)
+        atomic_write(path, page)
         # A page of an earlier build that is still open says that it was written again.
         for old in folder.iterdir():
             if old.name not in (build, _PICTURES):
@@ -83,9 +92,18 @@ def write_report(
     return path
 
 
-def _write_data(run: Run, sources: Sources, folder: Path, build: str) -> None:
+def _build(run: Run, sources: Sources) -> str:
+    """A name for what the page shows: the same run, written again, has the same files."""
+    digest = hashlib.sha256(f"{version('phyblock')} {sources.lacking}".encode())
+    for name in (MANIFEST, RECORDS, PROMPTS):
+        file = run.path / name
+        digest.update(file.read_bytes() if file.exists() else b"")
+    return digest.hexdigest()[:12]
+
+
+def _write_data(run: Run, sources: Sources, folder: Path, new: Path, build: str) -> None:
     kinds = ("records", "scenes", "questions", "prompts")
-    packs = {kind: Pack(folder / build, kind, build) for kind in kinds}
+    packs = {kind: Pack(new, kind, build) for kind in kinds}
     places = read_places(run.path, run.design)
     asked = questions_asked(run.path, places, sources.questions)
     pictures = {}
@@ -110,7 +128,7 @@ def _write_data(run: Run, sources: Sources, folder: Path, build: str) -> None:
         "no_scenes": sources.lacking,
         "subtask_names": SUBTASK_NAMES,
     }
-    write_script(folder / build, "index", build, content)
+    write_script(new, "index", build, content)
 
 
 def _keep_pictures(
