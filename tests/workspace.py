@@ -180,8 +180,11 @@ class Workspace:
         )
 
     def records(self, folder: Path | None = None) -> list[Raw]:
-        """The lines of a run's records, as they stand."""
+        """The lines of a run's records, as they stand; the file is made with the first one."""
         path = (folder or self.out) / "records.jsonl"
+        if not path.exists():
+            assert (path.parent / "run.yaml").exists(), "nothing has run"
+            return []
         return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
     def tables(self, folder: Path | None = None) -> dict[str, bytes]:

@@ -45,7 +45,10 @@ class RunResult:
 
 
 class Executor:
-    """Asks every model about every sample that has no final record yet."""
+    """Asks every model about every sample that has no final record yet.
+
+    `settled` are the records of those that had one from the start, by sample.
+    """
 
     INTERRUPTED = "interrupted"
 
@@ -56,23 +59,25 @@ class Executor:
         models: Mapping[str, Model],
         watch: Watcher,
         halt: Halt,
+        earlier: Mapping[str, Mapping[str, Any]],
         *,
         retry_failed: bool = False,
     ) -> None:
-        """`halt` is the switch that `models` were built with; `retry_failed` asks again also where
-        a request was rejected for good.
+        """`halt` is the switch that `models` were built with; `earlier` are the records that are
+        there, by sample; `retry_failed` asks again also where a request was rejected for good.
         """
-        self.is_settled = is_answered if retry_failed else is_final
+        is_settled = is_answered if retry_failed else is_final
+        self.settled = {sample: record for sample, record in earlier.items() if is_settled(record)}
         self._plan = plan
         self._writer = RecordWriter(store.records)
         self._turns = RecordWriter(store.turns)
-        self._samples = SampleRunner(
-            self._turns, store.prompts, halt, read_turns(store.folder) if plan.has_episodes else {}
-        )
+        begun = read_turns(store.folder, self.settled) if plan.has_episodes else {}
+        self._samples = SampleRunner(self._turns, store.prompts, halt, begun)
         self._models = models
         self._watch = watch
         self._halt = halt
         self.result = RunResult(plan.samples_per_model * len(plan.models))
+        self.result.failed = sum(not is_answered(record) for record in self.settled.values())
         self._in_flight = 0
         self._failure: PhyblockError | None = None
 
@@ -88,8 +93,8 @@ class Executor:
             self._watch(Stopping(reason, self._in_flight - self._halt.waiting))
             self._halt.set()
 
-    async def run(self, earlier: Mapping[str, Mapping[str, Any]]) -> RunResult:
-        """Run what `earlier` records have not settled.
+    async def run(self) -> RunResult:
+        """Run what earlier records have not settled.
 
         Raises the first StoreError, DataError or PromptError that a sample met, once calls under
         way have ended.
@@ -99,7 +104,7 @@ class Executor:
             queue = deque(
                 sample
                 for sample in self._plan.samples(planned.name)
-                if not self._settled(earlier, sample)
+                if sample.id not in self.settled
             )
             self.result.settled += self._plan.samples_per_model - len(queue)
             count = min(planned.config.max_concurrency, len(queue))
@@ -115,13 +120,6 @@ class Executor:
         if self._failure is not None:
             raise self._failure
         return self.result
-
-    def _settled(self, earlier: Mapping[str, Mapping[str, Any]], sample: Sample) -> bool:
-        record = earlier.get(sample.id)
-        if record is None or not self.is_settled(record):
-            return False
-        self.result.failed += not is_answered(record)
-        return True
 
     async def _work(self, planned: PlannedModel, queue: deque[Sample]) -> None:
         while queue and self.result.reason is None and planned.name not in self.result.stopped:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import NoneType
@@ -162,13 +162,15 @@ def read_records(folder: Path) -> dict[str, dict[str, Any]]:
     return {record["sample"]: record for _, record in RecordLines(folder)}
 
 
-def read_turns(folder: Path) -> dict[str, list[dict[str, Any]]]:
+def read_turns(folder: Path, without: Container[str] = ()) -> dict[str, list[dict[str, Any]]]:
     """The replies of every episode that has begun, by sample id, in the order of its turns.
 
-    Raises StoreError where a turn is missing.
+    Samples `without` are left out. Raises StoreError where a turn is missing.
     """
     found: dict[str, dict[int, dict[str, Any]]] = {}
     for where, line in TurnLines(folder):
+        if line["sample"] in without:
+            continue
         turns = found.setdefault(line["sample"], {})
         if line["turn"] > len(turns):
             message = f"is turn {line['turn']} of a sample of which {len(turns)} turns are there"

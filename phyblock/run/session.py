@@ -72,7 +72,6 @@ class Session:
         self._cache: ReplyCache | None = None
         self._store: RunStore | None = None
         self._models: dict[str, Model] = {}
-        self._earlier: dict[str, dict[str, Any]] = {}
         self.executor: Executor
 
     async def __aenter__(self) -> Session:
@@ -82,7 +81,6 @@ class Session:
             if self._use_cache and any(m.config.kind == "litellm" for m in plan.models):
                 self._cache = ReplyCache(reply_cache_file())
             limits = plan.suite.limits
-            self._earlier = read_records(self._folder)
             overall = Gate(limits.max_concurrency)
             halt = Halt()
             budget = None
@@ -99,7 +97,13 @@ class Session:
                     halt=halt,
                 )
             self.executor = Executor(
-                plan, self._store, self._models, self._watch, halt, retry_failed=self._retry_failed
+                plan,
+                self._store,
+                self._models,
+                self._watch,
+                halt,
+                read_records(self._folder),
+                retry_failed=self._retry_failed,
             )
         except BaseException:
             await self._close()
@@ -119,21 +123,17 @@ class Session:
 
         Raises StoreError also where all is asked but the cache refused a reply.
         """
-        earlier = self._earlier
+        settled = self.executor.settled.values()
         self._watch(
             RunStarted(
                 {model.name: self._plan.samples_per_model for model in self._plan.models},
                 {
-                    model.name: tuple(
-                        record
-                        for record in earlier.values()
-                        if record["model"] == model.name and self.executor.is_settled(record)
-                    )
+                    model.name: tuple(r for r in settled if r["model"] == model.name)
                     for model in self._plan.models
                 },
             )
         )
-        result = await self.executor.run(earlier)
+        result = await self.executor.run()
         if self._cache is not None:
             self._cache.check()
         return result

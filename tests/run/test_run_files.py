@@ -62,6 +62,11 @@ def test_turns_are_read_in_their_order_and_a_later_line_counts(tmp_path: Path) -
     ]
 
 
+def test_turns_of_samples_that_are_done_are_left_on_disk(tmp_path: Path) -> None:
+    turn_lines(tmp_path, 0, 2)
+    assert read_turns(tmp_path, {"s"}) == {}
+
+
 def test_a_turn_that_is_missing_is_an_error_at_the_next(tmp_path: Path) -> None:
     turn_lines(tmp_path, 0, 2)
     with pytest.raises(StoreError, match="is turn 2 of a sample of which 1"):
