@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from phyblock.datasets.base import Dataset, QuestionSet, QuestionTask
 from phyblock.datasets.builtin import scene_lines
@@ -30,6 +30,10 @@ from phyblock.errors import DataError, Problem
 __all__ = ["QUESTIONS_FILE", "QuestionReader", "read_question_line", "read_questions"]
 
 QUESTIONS_FILE = "questions.jsonl"
+_FIELDS = (
+    *("id", "subtask", "category", "scene_id", "wording", "question", "options", "answer"),
+    *("colors", "pictures", "evidence"),
+)
 
 
 def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
@@ -62,6 +66,7 @@ def read_question_line(path: Path, number: int, line: str, scenes: Mapping[str, 
     """The question in one line; raises DataError with everything that is wrong with it."""
     reader = QuestionReader(f"{path}:{number}")
     raw = reader.mapping(parse_json(line, path, number))
+    reader.check_fields(raw)
     name = reader.name(reader.get(raw, "id"), "id")
     subtask = reader.choice(reader.get(raw, "subtask"), "subtask", SUBTASKS)
     scene = reader.scene(reader.get(raw, "scene_id"), scenes)
@@ -90,6 +95,12 @@ def read_question_line(path: Path, number: int, line: str, scenes: Mapping[str, 
 
 class QuestionReader(RecipeReader):
     """Reads the fields of a question, and collects what is wrong with them."""
+
+    def check_fields(self, raw: Any) -> None:
+        """Complain about fields that are not known: a misspelled `colors` would change pictures."""
+        for name in () if raw is MISSING else raw:
+            if name not in _FIELDS:
+                self.complain(name, "is not known", allowed=", ".join(_FIELDS))
 
     def scene(self, raw: object, scenes: Mapping[str, Scene]) -> Scene | None:
         """The scene that is named."""
@@ -141,13 +152,18 @@ class QuestionReader(RecipeReader):
     def check_pictures(
         self, options: tuple[str, ...], pictures: tuple[QuestionPicture, ...]
     ) -> None:
-        """Complain about option pictures that are missing, and about those nothing shows."""
+        """Complain about pictures or marks of options that are missing, and pictures of none."""
         labels = {picture.label for picture in pictures} & set(LETTERS)
         wanted = set(LETTERS) if any(map(is_picture_option, options)) else set()
         if options and labels != wanted:
             missing, spare = sorted(wanted - labels), sorted(labels - wanted)
             told = "is missing for options" if missing else "is there for no option"
             self.complain("pictures", f"a picture {told}", missing or spare)
+        if list(options) == [f"place {letter}" for letter in LETTERS]:
+            marked = {mark.letter for picture in pictures for mark in picture.marks}
+            if unmarked := sorted(set(LETTERS) - marked):
+                allowed = "marks A to D where the options are places"
+                self.complain("pictures", "no picture marks the places", unmarked, allowed)
 
 
 def _plain(option: str) -> str:

@@ -107,6 +107,12 @@ BROKEN = {
     "a blank text": ({"question": " "}, "question", '" "'),
     "a color of no block": ({"colors": {"7": "red"}}, "colors", '"7"'),
     "an unknown color": ({"colors": {"1": "pink"}}, "colors.1", '"pink"'),
+    "a misspelled field": ({"colours": {"1": "red"}}, "colours", ""),
+    "places that are not marked": (
+        {"options": [f"place {letter}" for letter in "ABCD"]},
+        "pictures",
+        '["A", "B", "C", "D"]',
+    ),
     "pictures that are missing": ({"options": PICTURE_OPTIONS}, "pictures", '["A", "B", "C", "D"]'),
 }
 BROKEN_PICTURES = {
