@@ -64,14 +64,13 @@ def f1_bars(run: Run) -> Figure | None:
         rows = cells.loc[[(model, level) for model in models]]
         color = INK if level == OVERALL else ACCENT
         ax.barh(places, rows["f1"].fillna(0), height=0.62, color=color, alpha=0.85, linewidth=0)
-        for place, (f1, lo, hi) in enumerate(rows[["f1", "lo", "hi"]].to_numpy(float)):
-            if np.isnan(f1):
-                continue
-            if not np.isnan(lo):
-                ax.hlines(place, lo, hi, color="white", linewidth=2.8)
-                ax.hlines(place, lo, hi, color=MUTED, linewidth=1.1)
-            end = f1 if np.isnan(hi) else max(f1, hi)
-            ax.text(end + 2, place, f"{f1:.1f}", va="center", fontsize=6.5, color=INK)
+        f1, lo, hi = rows[["f1", "lo", "hi"]].to_numpy(float).T
+        sure = ~np.isnan(f1) & ~np.isnan(lo)
+        for line, width in (("white", 2.8), (MUTED, 1.1)):
+            ax.hlines(places[sure], lo[sure], hi[sure], color=line, linewidth=width)
+        for place in np.flatnonzero(~np.isnan(f1)):
+            end = np.nanmax([f1[place], hi[place]]) + 2
+            ax.text(end, place, f"{f1[place]:.1f}", va="center", fontsize=6.5, color=INK)
         ax.set(title=level_name(level), xlim=(0, 118), xticks=[0, 50, 100], xlabel="F1 (%)")
     axes[0].set_yticks(places, models)
     axes[0].set_ylim(len(models) - 0.4, -0.6)
