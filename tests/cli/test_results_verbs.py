@@ -75,6 +75,9 @@ def test_compare_says_the_verdict_and_what_flipped(folder: Path, tmp_path: Path)
     assert "cannot tell" in done.output
     assert "alpha is right where beta is not, 10: 000 (seed 0)" in done.output
     assert (tmp_path / "out" / "comparison.tex").exists()
+    assert call("compare", folder, "--track", "full_planning").output.startswith("Models compared")
+    with pytest.raises(SpecError, match="no such track to compare"):
+        call("compare", folder, "--track", "vqa")
     with pytest.raises(SpecError, match="no such model"):
         call("compare", folder, "--models", "alpha,delta")
     with pytest.raises(SpecError, match="a model twice"):
