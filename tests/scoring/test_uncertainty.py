@@ -146,7 +146,9 @@ def test_macro_means_are_recomputed_in_every_resample() -> None:
     counts = np.zeros((40, 2, 2))
     counts[:30, 0] = [[n % 3 == 0, 1] for n in range(30)]
     counts[30:, 1] = [[1, 1]] * 10
-    found = bootstrap(counts, alone(40), lambda sums: ratio_of(sums).mean(axis=-1), rng(), resamples=10_000)
+    found = bootstrap(
+        counts, alone(40), lambda sums: ratio_of(sums).mean(axis=-1), rng(), resamples=10_000
+    )
     assert found.value == pytest.approx((1 / 3 + 1) / 2)
     assert found.se == pytest.approx(np.sqrt(1 / 3 * 2 / 3 / 30) / 2, rel=0.06)
 
@@ -184,8 +186,12 @@ def test_recorded_scenes_of_common_origin_double_the_naive_standard_error(
     counts, clusters, naive = official
     gpt_4o = counts["gpt-4o"]
     assert clusters.size == 150
-    assert 100 * bootstrap(gpt_4o, naive, f1_of, rng(), resamples=10_000).se == pytest.approx(1.3, abs=0.1)
-    assert 100 * bootstrap(gpt_4o, clusters, f1_of, rng(), resamples=10_000).se == pytest.approx(2.7, abs=0.1)
+    assert 100 * bootstrap(gpt_4o, naive, f1_of, rng(), resamples=10_000).se == pytest.approx(
+        1.3, abs=0.1
+    )
+    assert 100 * bootstrap(gpt_4o, clusters, f1_of, rng(), resamples=10_000).se == pytest.approx(
+        2.7, abs=0.1
+    )
 
 
 def test_recorded_models_are_compared_in_pairs(
@@ -193,7 +199,9 @@ def test_recorded_models_are_compared_in_pairs(
 ) -> None:
     counts, clusters, _ = official
     pair = np.stack([counts["gpt-4o"], counts["gemini-2.0-flash"]], axis=1)
-    found = bootstrap(pair, clusters, lambda s: f1_of(s)[..., 0] - f1_of(s)[..., 1], rng(), resamples=10_000)
+    found = bootstrap(
+        pair, clusters, lambda s: f1_of(s)[..., 0] - f1_of(s)[..., 1], rng(), resamples=10_000
+    )
     assert 100 * found.value == pytest.approx(-0.5, abs=0.1)
     assert 100 * found.se == pytest.approx(2.2, abs=0.1)
     assert found.p > 0.5
