@@ -65,6 +65,11 @@ _QUIET_S = 0.25
 _QUIET_M_S = 0.005
 _LONGEST_S = 5.0
 _POSITION_DIGITS = 4
+_PATIENCE = 4.0
+"""How much longer than without friction a push is kept up."""
+_DOWN_M = 0.008
+_SAME_M, _SAME_DEG = 0.015, 15.0
+_AS_FAR_M, _STRAIGHT_DEG = 0.005, 10.0
 _ANGLE_DIGITS = 2
 
 
@@ -88,8 +93,9 @@ DEFAULT_LIMITS = Limits()
 class Push:
     """A block pushed along the floor's plane: `direction` is a unit vector (x, y).
 
-    It is moved at `speed_m_s` [m/s] over `distance_m` [m], free to tip and to rise. The distance
-    is 6 mm off every multiple of 12.5 mm, the grid that edges of built structures lie on.
+    It is moved at `speed_m_s` [m/s] until it has gone `distance_m` [m] that way or has come down,
+    free to tip and to rise. The distance is 6 mm off every multiple of 12.5 mm, the grid that edges
+    of built structures lie on.
     """
 
     order: int
@@ -132,6 +138,8 @@ def after(
         if moved is None or moved != (moved if found is None else found):
             return _UNCLEAR
         found, first = moved, first or poses
+        if push is not None and not _went_alike(blocks, push, first, poses):
+            return _UNCLEAR
     still = set(first) - set(found or ())
     settled = [b if b.order in still else _at(b, first[b.order]) for b in blocks]
     return Outcome(found or (), tuple(settled), True)
@@ -249,9 +257,46 @@ def _holds(blocks: Sequence[Block], setting: Setting, limits: Limits) -> bool | 
 
 def _push(world: _LeaningWorld, push: Push) -> None:
     x, y = (part * push.speed_m_s for part in push.direction)
-    for _ in range(round(push.distance_m / push.speed_m_s / world.physics.time_step_s)):
+    start = world.pose(push.order)
+    # Friction takes some of the speed within each step, so time alone does not tell the distance.
+    longest_s = _PATIENCE * push.distance_m / push.speed_m_s
+    for _ in range(round(longest_s / world.physics.time_step_s)):
         world.drive(push.order, (x, y))
         world.step(world.physics.time_step_s)
+        now = world.pose(push.order)
+        if _gone_m(push, start, now) >= push.distance_m or _came_down(start, now):
+            return
+
+
+def _went_alike(
+    blocks: Sequence[Block], push: Push, first: dict[int, Pose], poses: dict[int, Pose]
+) -> bool:
+    """Whether a push ends alike in two settings, and as a person would tell it.
+
+    The same blocks came down; the pushed one, where it only slid, went as far as it was pushed and
+    turned little, and ends near the same place in both.
+    """
+    starts = {block.order: Pose.goal(block) for block in blocks}
+    if any(_came_down(s, first[o]) != _came_down(s, poses[o]) for o, s in starts.items()):
+        return False
+    start, one, other = starts[push.order], first[push.order], poses[push.order]
+    if one.distance_m(other) > _SAME_M or one.angle_deg(other) > _SAME_DEG:
+        return False
+    if _came_down(start, other):
+        return True
+    is_as_far = abs(_gone_m(push, start, other) - push.distance_m) <= _AS_FAR_M
+    return is_as_far and other.angle_deg(start) <= _STRAIGHT_DEG
+
+
+def _gone_m(push: Push, start: Pose, end: Pose) -> float:
+    """How far the pushed block went in the direction of the push [m]."""
+    x, y = push.direction
+    way = np.asarray(end.position_m) - np.asarray(start.position_m)
+    return float(way[0] * x + way[1] * y)
+
+
+def _came_down(start: Pose, end: Pose) -> bool:
+    return bool(start.position_m[2] - end.position_m[2] >= _DOWN_M)
 
 
 def _at(block: Block, pose: Pose) -> Block:

@@ -78,7 +78,24 @@ What was unfair became a rule for all:
 * "type" in type counting says what it means: shape and size, not color;
 * "layer" in layer counting says what it means: one more than the highest block below;
 * a block is not said to be turned when a quarter turn maps it to itself, turns are steps of 30
-  degrees, and a turned block rests on what it rested on.
+  degrees, and a turned block rests on what it rested on;
+* a layer is counted only where what rests on what can be told from heights: a block wedged
+  between two roofs looks as if it stood beside them;
+* outcomes are tried under four settings (time step, solver, friction, and a floor that leans by 2
+  degrees to three sides), because weight exactly over an edge falls in every simulation and stays
+  on many a table; all must name the same blocks, each either clearly moved or clearly still;
+* a pushed block goes as far as the text says, in every setting, and came down or did not in all;
+  one that only slid did not turn by more than 10 degrees;
+* blocks are shifted and pushed by lengths that are no multiple of the grid of the structures;
+* of next steps at most one obviously floats; the others are blocks of the goal at wrong places;
+* of the pictures of removals at least one wrong one lacks the right block, so that to look for
+  what is gone is not enough; the removed block shows 40% of itself, the others 12%;
+* other viewpoints to a side are asked for from straight in front alone: a slanted view has a
+  mirror image that could be one of the same side;
+* options of viewpoints are four versions of one block, and the true one is drawn evenly;
+* places for a block hold, or do not, also 7 mm off in four directions, and blocks without a clear
+  middle are not put down;
+* pictures that are options differ in 220 of 256 x 256 pixels at least, and cut nothing off.
 
 ## What is in it
 

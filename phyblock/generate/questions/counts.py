@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -20,13 +20,14 @@ from phyblock.generate.questions.seeing import (
 )
 from phyblock.generate.questions.static import StaticMaker, draft, index_of, shuffled, window
 from phyblock.generate.questions.wording import slots_of
-from phyblock.sim.support import GROUND, support_graph
+from phyblock.sim.support import GROUND, bounds_m, support_graph
 
 __all__ = ["CountMaker", "LayerMaker", "NumberMaker", "TypeMaker"]
 
 _PLURALS = {word: f"{word}es" if word == "arch" else f"{word}s" for word in SHAPE_WORDS}
 _TYPES_OF = {_PLURALS[word]: types for word, types in SHAPE_WORDS.items()}
 _TRIES = 4
+_WEDGED_M = 0.005
 
 
 def _orders(blocks: Sequence[Block]) -> list[int]:
@@ -159,11 +160,28 @@ def _types(blocks: Sequence[Block]) -> int:
 
 
 def _layers(blocks: Sequence[Block]) -> int:
-    """The longest chain of blocks that rest on one another, from contacts alone."""
+    """The longest chain of blocks that rest on one another, from contacts alone.
+
+    UnfairError where it is longer than what the picture tells: a block that is wedged between two
+    slopes rests on them, and yet it looks as if it were beside them.
+    """
     below = support_graph(blocks)
+    top = {block.order: bounds_m(block)[1, 2] for block in blocks} | {GROUND: 0.0}
+    bottom = {block.order: bounds_m(block)[0, 2] for block in blocks}
+    plain = {
+        order: {other for other in others if bottom[order] > top[other] - _WEDGED_M} or {GROUND}
+        for order, others in below.items()
+    }
+    counted = _longest(below)
+    if counted != _longest(plain):
+        raise UnfairError("some block rests on others and stands lower than they reach")
+    return counted
+
+
+def _longest(below: Mapping[int, Collection[int]]) -> int:
     layer = {GROUND: 0}
-    while len(layer) <= len(blocks):
-        ready = [o for o in below if o not in layer and below[o] and below[o] <= layer.keys()]
+    while len(layer) <= len(below):
+        ready = [o for o in below if o not in layer and below[o] and set(below[o]) <= layer.keys()]
         if not ready:
             raise UnfairError("some block rests on nothing, or on itself")
         layer.update({order: 1 + max(layer[other] for other in below[order]) for order in ready})

@@ -34,7 +34,7 @@ _APART = (
     "A structure is taken apart, block by block, and no block is ever put back. Put the four"
     " pictures in the order in which they were taken, earliest first.",
     "The four pictures show one structure while its blocks are removed one after another. In which"
-    " order were they taken, from the earliest to the latest?",
+    " order were the pictures taken, from the earliest to the latest?",
     "Sort the four pictures of one disassembly by time: the most complete stage first, the one"
     " with the fewest blocks last.",
 )

@@ -37,7 +37,7 @@ _FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
 _LEVEL_M, _DOWN_M = 0.004, 0.008
 _PUSH_ELEVATION_DEG = 26.0
 _DIRECTIONS = {"to the right": 1, "to the left": -1}
-_LEAST_SHOWN = 20
+_LEAST_SHOWN = 60
 
 
 def push_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
