@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from phyblock.domain import Block
-from phyblock.sim.outcomes import Push, after
+from phyblock.sim.outcomes import OUTCOME_SETTINGS, Push, after
 
 HALF_M = 0.025
 
@@ -27,15 +27,26 @@ def test_a_block_that_slides_goes_as_far_as_it_is_pushed(direction: tuple[float,
     assert gone_m == pytest.approx(push.distance_m, abs=0.005)
 
 
-def test_a_block_off_the_top_comes_down_where_all_settings_agree() -> None:
-    outcome = after([cube(1, 0.0), cube(2, 0.0, layer=2)], Push(2, (1.0, 0.0)))
-    if outcome.is_clear:
-        (top,) = (block for block in outcome.settled if block.order == 2)
-        assert top.position_m[2] < 2 * HALF_M + 0.02
+def test_a_block_takes_along_what_stands_on_it() -> None:
+    outcome = after([cube(1, 0.0), cube(2, 0.0, layer=2)], Push(1, (1.0, 0.0)))
+    assert outcome.is_clear
+    assert outcome.moved == (1, 2)
+
+
+def test_what_ends_otherwise_in_another_setting_is_not_told() -> None:
+    """A cube pushed off another falls in each setting, and lies turned otherwise in each."""
+    stack = [cube(1, 0.0), cube(2, 0.0, layer=2)]
+    push = Push(2, (1.0, 0.0))
+    alone = [after(stack, push, settings=[setting]) for setting in OUTCOME_SETTINGS]
+    assert all(outcome.is_clear and outcome.moved == (2,) for outcome in alone)
+    assert all(outcome.settled[1].position_m[2] < 2 * HALF_M for outcome in alone)
+    assert not after(stack, push).is_clear
 
 
 def test_a_block_that_is_held_back_is_not_told() -> None:
+    """A wall in the way lets it go only a part of the distance."""
     row = [cube(order, 2 * HALF_M * order) for order in range(1, 4)]
     wall = [cube(order, 2 * HALF_M * 4, layer=order - 3) for order in range(4, 12)]
-    outcome = after([*row, *wall], Push(1, (1.0, 0.0)))
-    assert not outcome.is_clear or len(outcome.moved) > 1
+    setting = OUTCOME_SETTINGS[3]
+    assert after([*row, *wall], settings=[setting]).moved == ()
+    assert not after([*row, *wall], Push(1, (1.0, 0.0)), settings=[setting]).is_clear
