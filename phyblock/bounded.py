@@ -1,0 +1,100 @@
+"""Read files and JSON within bounds, so that no input hangs, exhausts memory or ends the process.
+
+The limits are far above what any honest file needs. Whoever reads says what was wrong: OSError is
+the disk's word, ValueError a content that is refused, with a text that can be shown as it is.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import stat
+from pathlib import Path
+from typing import NoReturn
+
+__all__ = ["LARGEST_FILE_BYTES", "load_json", "read_bytes", "read_text"]
+
+LARGEST_FILE_BYTES = 64 * 1024 * 1024
+"""Default limit of a file that is read whole [bytes]."""
+
+_DEEPEST = 64
+_LONGEST_INTEGER = 300
+"""Digits of an integer; what is longer fits no float, and int() takes quadratic time on it."""
+
+
+def read_bytes(path: Path, most_bytes: int = LARGEST_FILE_BYTES) -> bytes:
+    """The content of a regular file.
+
+    Raises ValueError for what is no regular file (a pipe would block, a device has no end) or is
+    larger than `most_bytes`, OSError where the file cannot be opened or read.
+    """
+    # A pipe without a writer would block an ordinary open.
+    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(number, "rb") as file:
+        mode = os.fstat(file.fileno()).st_mode
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(21, "Is a directory", str(path))
+        if not stat.S_ISREG(mode):
+            raise ValueError("is not a regular file")
+        data = file.read(most_bytes + 1)
+    if len(data) > most_bytes:
+        raise ValueError(f"is larger than {most_bytes / 1024**2:g} MB")
+    return data
+
+
+def read_text(path: Path, most_bytes: int = LARGEST_FILE_BYTES) -> str:
+    """The content of a regular UTF-8 file, a byte order mark left out; see `read_bytes`."""
+    data = read_bytes(path, most_bytes)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"is not UTF-8: {error.reason} at byte {error.start}") from None
+
+
+def load_json(data: bytes | str, *, deepest: int = _DEEPEST) -> object:
+    """Decode JSON whose nesting, integers and floats are bounded.
+
+    Raises ValueError (a JSONDecodeError for broken syntax) for NaN, Infinity, a float outside the
+    range of doubles, an integer of more than 300 digits, or nesting below `deepest`.
+    """
+    try:
+        found = json.loads(
+            data, parse_int=_integer, parse_float=_float, parse_constant=_no_constant
+        )
+    except RecursionError:
+        raise ValueError(f"is nested more than {deepest} levels deep") from None
+    _check_depth(found, deepest)
+    return found
+
+
+def _check_depth(found: object, deepest: int) -> None:
+    level: list[object] = [found]
+    for _ in range(deepest + 1):
+        below: list[object] = []
+        for value in level:
+            if isinstance(value, dict):
+                below += value.values()
+            elif isinstance(value, list):
+                below += value
+        level = [value for value in below if isinstance(value, (dict, list))]
+        if not level:
+            return
+    raise ValueError(f"is nested more than {deepest} levels deep")
+
+
+def _integer(digits: str) -> int:
+    if len(digits) > _LONGEST_INTEGER:
+        raise ValueError(f"holds a number of {len(digits):,} digits")
+    return int(digits)
+
+
+def _float(digits: str) -> float:
+    value = float(digits)
+    if not math.isfinite(value):
+        raise ValueError(f"holds {digits[:20]}, which is outside the range of numbers")
+    return value
+
+
+def _no_constant(name: str) -> NoReturn:
+    raise ValueError(f"holds {name}, which is no JSON")
