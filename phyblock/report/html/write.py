@@ -13,6 +13,7 @@ from typing import Any
 from phyblock.domain import SUBTASK_NAMES
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
+from phyblock.records import MANIFEST, PROMPTS, RECORDS
 from phyblock.report.figures import FIGURES, write_figures
 from phyblock.report.html.drawable import kit, question_entry, scene_entry
 from phyblock.report.html.headline import assembly_headline
@@ -30,8 +31,6 @@ from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.sources import Sources, open_sources
 from phyblock.report.load import Run
 from phyblock.report.write import TablesWritten
-from phyblock.run.prompts import PROMPTS
-from phyblock.run.reading import MANIFEST, RECORDS
 from phyblock.tasks.question_pictures import Shown
 
 __all__ = ["REPORT_FILE", "write_report"]
