@@ -25,9 +25,8 @@ def _finite(value: Any) -> Any:
 class Line(BaseModel):
     """A JSON object that is written and read again, or a part of one."""
 
-    model_config = ConfigDict(
-        frozen=True, extra="allow", allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    # Building is deferred because most commands read one kind of line, if any.
+    model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False, defer_build=True)
     __pydantic_extra__: dict[str, Annotated[Any, AfterValidator(_finite)]] = Field(init=False)
 
     def as_given(self) -> dict[str, Any]:

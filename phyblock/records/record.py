@@ -20,9 +20,9 @@ __all__ = [
     "Record",
     "Recorded",
     "Score",
+    "SentImage",
+    "SentPrompt",
     "StoredError",
-    "StoredImage",
-    "StoredPrompt",
     "StoredReply",
     "StoredUsage",
 ]
@@ -115,7 +115,7 @@ class StoredError(Line):
     """As of a reply."""
 
 
-class StoredImage(Line):
+class SentImage(Line):
     """A picture that was sent."""
 
     label: str
@@ -128,7 +128,7 @@ class StoredImage(Line):
     """Height [pixels]."""
 
 
-class StoredPrompt(Line):
+class SentPrompt(Line):
     """What was sent."""
 
     template: str
@@ -137,7 +137,7 @@ class StoredPrompt(Line):
     """Digest of the template."""
     messages: str
     """Digest of the prompt as sent, which stands in `prompts.jsonl`."""
-    images: tuple[StoredImage, ...] = ()
+    images: tuple[SentImage, ...] = ()
     """The pictures in the order sent."""
 
 
@@ -191,7 +191,7 @@ class Record(Line):
     """The reply, null when there is none; of an episode, all its replies together."""
     error: StoredError | None
     """The error, null when there is none."""
-    prompt: StoredPrompt | None = None
+    prompt: SentPrompt | None = None
     """What was sent, null for recordings; of an episode, with the first turn."""
     parse: Any = None
     """What was read in the reply, as the track says; null: nothing was."""

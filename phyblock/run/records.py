@@ -12,9 +12,9 @@ from phyblock.models.stored import stored
 from phyblock.records import (
     Outcome,
     Record,
+    SentImage,
+    SentPrompt,
     StoredError,
-    StoredImage,
-    StoredPrompt,
     StoredReply,
 )
 from phyblock.tasks import Item
@@ -61,10 +61,10 @@ def judged(fields: Mapping[str, Any], is_read: bool, told: Mapping[str, Any]) ->
     return RECORD_ADAPTER.validate_python({**fields, "outcome": outcome, **told})
 
 
-def about_prompt(request: Request, template: str, digest: str) -> StoredPrompt:
+def about_prompt(request: Request, template: str, digest: str) -> SentPrompt:
     """What a record says of a prompt that stands in `prompts.jsonl` under `digest`."""
     images = tuple(_picture(part) for part in _pictures(request.messages))
-    return StoredPrompt(
+    return SentPrompt(
         template=template, version=request.prompt_version, messages=digest, images=images
     )
 
@@ -102,8 +102,8 @@ def _pictures(messages: Sequence[Message]) -> Iterator[Image]:
         yield from (part for part in message.parts if isinstance(part, Image))
 
 
-def _picture(picture: Image) -> StoredImage:
-    return StoredImage(
+def _picture(picture: Image) -> SentImage:
+    return SentImage(
         label=picture.label,
         sha256=picture.sha256,
         width_px=picture.width_px,

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
 from phyblock.models import Halt, Model, Reply, Request, Usage
 from phyblock.models.stored import reply_of, stored
-from phyblock.records import Record, StoredPrompt, StoredReply, Turn
+from phyblock.records import Record, SentPrompt, StoredReply, Turn
 from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, begun, judged
 from phyblock.run.writer import RecordWriter
@@ -133,7 +133,7 @@ class SampleRunner:
         with self._halt.giving_up():
             return await episode.request()
 
-    def _prompt(self, track: AnyTrack, request: Request) -> StoredPrompt | None:
+    def _prompt(self, track: AnyTrack, request: Request) -> SentPrompt | None:
         if not request.messages:
             return None
         return about_prompt(request, track.template, self._prompts.keep(request.messages))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from phyblock.records import Line, Record, StoredPrompt, StoredReply
+from phyblock.records import Line, Record, SentPrompt, StoredReply
 from phyblock.records.line import Whole
 from phyblock.tasks.plan_record import PlanParse
 from phyblock.tasks.step_prompt import StepOutcome
@@ -31,7 +31,7 @@ class EpisodeTurn(Line):
     """Its place in the episode, from 1."""
     reply: StoredReply
     """The reply."""
-    prompt: StoredPrompt | None = None
+    prompt: SentPrompt | None = None
     """What was sent."""
     key: str = ""
     """The scene, the step, and the vote where a step has several."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from phyblock.datasets import QuestionTask
-from phyblock.records import PromptLines, Record, StoredPrompt
+from phyblock.records import PromptLines, Record, SentPrompt
 from phyblock.report.html.index import Item, Place, SampleIndex
 from phyblock.report.html.pack import Pack
 from phyblock.run.reading import any_records
@@ -95,7 +95,7 @@ def _entry(
 
 
 def _prompt(
-    prompt: StoredPrompt | None, prompts: Mapping[str, int], pictures: Mapping[str, str]
+    prompt: SentPrompt | None, prompts: Mapping[str, int], pictures: Mapping[str, str]
 ) -> dict[str, Any] | None:
     if prompt is None:
         return None
