@@ -64,7 +64,7 @@ def put_between(document: str, text: str) -> str:
 
 
 def json_schema(title: str, adapter: TypeAdapter[Any], kinds: Sequence[type[Line]]) -> Any:
-    """The JSON Schema (draft 2020-12) of a line, with what `kinds` and their parts say of fields."""
+    """The JSON Schema (draft 2020-12) of a line, with what `kinds` say of their fields."""
     schema = adapter.json_schema()
     told = {kind.__name__: kind for kind in _with_parts(kinds)}
     definitions = schema.get("$defs", {})
