@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from phyblock.errors import InputError, Problem, StoreError
 from phyblock.records.belonging import Belonging
-from phyblock.records.decode import decode, is_json, problem_of
+from phyblock.records.decode import decode, is_cut, problem_of
 from phyblock.records.line import Line
 from phyblock.records.others import Prompt, Turn
 
@@ -56,7 +56,7 @@ class Lines(Generic[LineT]):
                 for number, data in enumerate(self._raw(file), 1):
                     where = f"{self.path}:{number}"
                     self.lacks_newline = not data.endswith(b"\n")
-                    if self.lacks_newline and not is_json(data):
+                    if self.lacks_newline and len(data) <= _LONGEST_LINE_BYTES and is_cut(data):
                         self.is_cut = True
                         return
                     line = self._read(where, data)
