@@ -51,7 +51,11 @@ class Lines(Generic[LineT]):
         self._belonging = belonging
 
     def __iter__(self) -> Iterator[tuple[str, LineT]]:
+        self.whole_bytes = 0
         try:
+            # A pipe without a writer would block.
+            if self.path.exists() and not self.path.is_file():
+                raise self.error(Problem(str(self.path), "is not a regular file"))
             with self.path.open("rb") as file:
                 for number, data in enumerate(self._raw(file), 1):
                     where = f"{self.path}:{number}"

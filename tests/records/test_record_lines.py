@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -103,6 +105,13 @@ def test_a_line_without_end_is_refused_and_not_taken_for_a_cut_one(
     with pytest.raises(StoreError, match=r"records\.jsonl:2: is not a record: longer than"):
         list(found)
     assert not found.is_cut
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir])
+def test_what_is_no_file_is_refused(tmp_path: Path, make: Callable[[Path], None]) -> None:
+    make(tmp_path / "records.jsonl")
+    with pytest.raises(StoreError, match="is not a regular file"):
+        list(any_records(tmp_path))
 
 
 def test_text_that_no_output_could_hold_is_read_without_it(tmp_path: Path) -> None:
