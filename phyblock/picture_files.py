@@ -89,8 +89,8 @@ def _opened(data: bytes, where: str) -> Image.Image:
     except Exception as error:
         raise DataError(_damaged(where, error)) from error
     width, height = picture.size
-    fits = _LEAST_SIDE_PX <= min(width, height) and max(width, height) <= _MOST_SIDE_PX
-    if not fits or width * height > _MOST_PIXELS:
+    small, large = min(width, height), max(width, height)
+    if small < _LEAST_SIDE_PX or large > _MOST_SIDE_PX or small * large > _MOST_PIXELS:
         picture.close()
         found = f"{width:,} x {height:,} pixels"
         message = "is a picture of a size that is not taken"

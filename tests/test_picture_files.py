@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import struct
@@ -111,10 +112,7 @@ def test_what_is_no_file_or_too_large(tmp_path: Path) -> None:
 
 @given(PICTURES)
 def test_any_bytes_are_a_picture_or_a_data_error(data: bytes) -> None:
-    try:
+    with contextlib.suppress(DataError):
         picture = decoded(data, "pic")
-    except DataError as error:
-        assert error.problems[0].where == "pic"
-    else:
         assert 8 <= min(picture.size) <= max(picture.size) <= 10_000
         assert picture_size(data, "pic") == picture.size

@@ -11,6 +11,7 @@ from phyblock.specs.yaml_source import FieldPath, YamlSource, dotted, parse_yaml
 
 __all__ = ["apply_overrides"]
 
+_MOST, _DEEPEST, _LONGEST_SHOWN = 200, 16, 200
 _FORM = "--set KEY=VALUE, for example --set levels=[1,2] or --set dataset.path=FOLDER"
 
 
@@ -21,7 +22,11 @@ def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> None:
     an override's own form is added to `source.problems`; whether key and value make sense is
     judged with the rest of the file, and reported against the --set text.
     """
-    for text in overrides:
+    texts = tuple(overrides)
+    if len(texts) > _MOST:
+        problem = Problem("--set", "is given too often", "", f"{len(texts):,}", f"{_MOST} at most")
+        raise SpecError(problem)
+    for text in texts:
         try:
             _apply(source, text)
         except SpecError as error:
@@ -29,10 +34,11 @@ def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> None:
 
 
 def _apply(source: YamlSource, text: str) -> None:
-    place = "--set ..." if looks_secret(text) else f"--set {text}"
+    shown = text if len(text) <= _LONGEST_SHOWN else text[:_LONGEST_SHOWN] + "..."
+    place = "--set ..." if looks_secret(text) else f"--set {shown}"
     key, equals, raw = text.partition("=")
     parts = tuple(part.strip() for part in key.split("."))
-    if not equals or not all(parts):
+    if not equals or not all(parts) or len(parts) > _DEEPEST:
         raise SpecError(Problem(place, "is not of the form key=value", hint=_FORM))
     value = parse_yaml(raw, place, place=place)
     source.problems.extend(value.problems)

@@ -14,11 +14,14 @@ from phyblock.errors import Problem
 from phyblock.specs.words import SECRET_KEYS, did_you_mean, looks_secret, show
 from phyblock.specs.yaml_source import FieldPath, YamlSource, dotted
 
-__all__ = ["check", "find_secrets", "merge_problems"]
+__all__ = ["MOST_HINTS", "check", "find_secrets", "merge_problems"]
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
 KEY_HINT = "name an environment variable with api_key_env, and keep the key in it"
+
+MOST_HINTS = 100
+"""Problems of a file for which similar words are searched, which takes time."""
 
 _WANTED = {
     "int_type": "a whole number",
@@ -63,19 +66,28 @@ class _Fault:
 
 
 def check(
-    model: type[ModelT], data: object, source: YamlSource, base: FieldPath = ()
+    model: type[ModelT],
+    data: object,
+    source: YamlSource,
+    base: FieldPath = (),
+    hints: int = MOST_HINTS,
 ) -> tuple[ModelT | None, list[Problem]]:
     """Validate `data`, which stands at `base` in the source.
 
-    Returns the instance, or None and all problems found. Errors that a model raised for rules
-    across its fields (context `rules`) are left to the caller, who can judge them one by one.
+    Returns the instance, or None and all problems found, of which the first `hints` are said in
+    full. Errors that a model raised for rules across its fields (context `rules`) are left to the
+    caller, who can judge them one by one.
     """
     try:
         return model.model_validate(data), []
     except ValidationError as error:
         details = error.errors(include_url=False)
     faults = [_locate(detail, data, model, base) for detail in details]
-    return None, [_word(fault, source) for fault in faults if not _is_echo(fault)]
+    told = [fault for fault in faults if not _is_echo(fault)]
+    return None, [
+        *(_word(fault, source) for fault in told[:hints]),
+        *(_word_briefly(fault, source) for fault in told[hints:]),
+    ]
 
 
 def find_secrets(data: object, source: YamlSource, base: FieldPath = ()) -> Iterator[Problem]:
@@ -147,6 +159,10 @@ def _word(fault: _Fault, source: YamlSource) -> Problem:
     message, allowed, hint = _explain(fault)
     where = source.where(fault.path, key=bool(fault.context.get("key")))
     return Problem(where, message, dotted(fault.path), show(fault.found), allowed, hint)
+
+
+def _word_briefly(fault: _Fault, source: YamlSource) -> Problem:
+    return Problem(source.where(fault.path), fault.detail["msg"].lower(), dotted(fault.path))
 
 
 def _explain(fault: _Fault) -> tuple[str, str, str]:
