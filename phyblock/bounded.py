@@ -28,6 +28,8 @@ LARGEST_FILE_BYTES = 64 * 1024 * 1024
 _DEEPEST = 64
 LONGEST_INTEGER = 300
 """Digits of an integer; what is longer fits no float, and int() takes quadratic time on it."""
+_LONGEST_SHOWN_INTEGER = 4300
+"""Digits that Python turns into an integer and back."""
 
 
 def read_bytes(path: Path, most_bytes: int = LARGEST_FILE_BYTES) -> bytes:
@@ -74,13 +76,13 @@ def load_json(
 
     Raises ValueError (a JSONDecodeError for broken syntax) for NaN, Infinity, a float outside the
     range of doubles, an integer of more than 300 digits, or nesting below `deepest`. With
-    `finite=False` floats of all kinds pass, for a reader that says which field they stand in; with
-    `unique` a field that stands twice in one object is a RepeatedFieldError.
+    `finite=False` numbers outside that range pass, up to 4,300 digits, for a reader that says which
+    field they stand in; with `unique` a field that stands twice in one object is a RepeatedFieldError.
     """
     try:
         found = json.loads(
             data,
-            parse_int=_integer,
+            parse_int=_integer if finite else _any_integer,
             parse_float=_float if finite else None,
             parse_constant=_no_constant if finite else None,
             object_pairs_hook=_unique if unique else None,
@@ -115,10 +117,14 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _integer(digits: str) -> int:
-    if len(digits) > LONGEST_INTEGER:
+def _integer(digits: str, longest: int = LONGEST_INTEGER) -> int:
+    if len(digits) > longest:
         raise ValueError(f"holds a number of {len(digits):,} digits")
     return int(digits)
+
+
+def _any_integer(digits: str) -> int:
+    return _integer(digits, _LONGEST_SHOWN_INTEGER)
 
 
 def _float(digits: str) -> float:

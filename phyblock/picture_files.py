@@ -70,7 +70,7 @@ def picture_size(data: bytes, where: str) -> tuple[int, int]:
     its header.
     """
     with _opened(data, where) as picture:
-        return picture.size
+        return picture.width, picture.height
 
 
 def _opened(data: bytes, where: str) -> Image.Image:

@@ -40,16 +40,17 @@ class CoreLoader(yaml.SafeLoader):
         self._nodes += 1
         self._depth += 1
         if self._depth > MAX_DEPTH:
-            mark = self.peek_event().start_mark
-            raise TooMuchError("is nested too deeply", f"{MAX_DEPTH} levels at most", mark)
+            raise TooMuchError("is nested too deeply", f"{MAX_DEPTH} levels at most", self._mark())
         # A mapping has a node for each key and each value.
         if self._nodes > 2 * MAX_VALUES:
-            raise TooMuchError(
-                f"holds more than {MAX_VALUES:,} values", "", self.peek_event().start_mark
-            )
+            raise TooMuchError(f"holds more than {MAX_VALUES:,} values", "", self._mark())
         node: yaml.Node | None = super().compose_node(parent, index)
         self._depth -= 1
         return node
+
+    def _mark(self) -> yaml.Mark:
+        mark: yaml.Mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+        return mark
 
 
 def compose(text: str) -> yaml.Node | None:
