@@ -77,7 +77,8 @@ def load_json(
     Raises ValueError (a JSONDecodeError for broken syntax) for NaN, Infinity, a float outside the
     range of doubles, an integer of more than 300 digits, or nesting below `deepest`. With
     `finite=False` numbers outside that range pass, up to 4,300 digits, for a reader that says which
-    field they stand in; with `unique` a field that stands twice in one object is a RepeatedFieldError.
+    field they stand in. With `unique` a field that stands twice in one object is refused too
+    (RepeatedFieldError).
     """
     try:
         found = json.loads(
