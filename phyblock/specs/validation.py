@@ -196,11 +196,11 @@ def _not_a_choice(fault: _Fault) -> tuple[str, str, str]:
     choices = re.findall(r"[^\s',]+", fault.context["expected"].replace(" or ", " "))
     allowed = ", ".join(choices)
     if fault.path == (*fault.base, "models"):
-        hint = did_you_mean(str(fault.found), choices) or f"write a list: [{fault.found}]"
+        hint = did_you_mean(str(fault.found), choices) or f"write a list: [{_brief(fault.found)}]"
         return "is one name where a list belongs", "a list of models, or the word recorded", hint
     hint = did_you_mean(str(fault.found), choices) if isinstance(fault.found, str) else ""
     if isinstance(fault.found, list) and len(fault.found) == 1:
-        hint = f"take the brackets off: {fault.found[0]}"
+        hint = f"take the brackets off: {_brief(fault.found[0])}"
     return "is not one of the choices", allowed, hint
 
 
@@ -209,10 +209,15 @@ def _type_hint(kind: str, fault: _Fault) -> str:
     if kind in ("int_type", "float_type") and isinstance(found, str):
         return "take the quotes off" if re.fullmatch(r"[-+\d.eE]+", found) else ""
     if kind == "tuple_type" and isinstance(found, str | int | float):
-        return f"write a list: [{found}]"
+        return f"write a list: [{_brief(found)}]"
     if kind == "string_type" and isinstance(found, str | int | float):
-        return f'put it in quotes: "{found}"'
+        return f'put it in quotes: "{_brief(found)}"'
     return ""
+
+
+def _brief(found: object) -> str:
+    text = str(found)
+    return text if len(text) <= 80 else text[:77] + "..."
 
 
 def _unknown_key(fault: _Fault, source: YamlSource) -> Problem:
