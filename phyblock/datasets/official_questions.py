@@ -41,6 +41,7 @@ from phyblock.errors import DataError, Problem
 
 __all__ = ["read_official_questions"]
 
+_MOST_QUESTIONS = 100_000
 _GOAL_VIEW = (45.0, 22.0)
 _SUFFIXES = (".json", ".jsonl")
 _PICTURES = (".png", ".jpg", ".jpeg")
@@ -100,6 +101,9 @@ def _entries(path: Path) -> Iterator[_Entry]:
     whole = parse_json(text, path)
     if not isinstance(whole, list):
         raise DataError(Problem(str(path), "is not an array", allowed="an array of questions"))
+    if len(whole) > _MOST_QUESTIONS:
+        allowed = f"{_MOST_QUESTIONS:,} questions at most"
+        raise DataError(Problem(str(path), "is too long an array", "", f"{len(whole):,}", allowed))
     starts = _starts(text)
     for number, raw in enumerate(whole, 1):
         yield _Entry(f"{path}:{next(starts)}", raw, number)

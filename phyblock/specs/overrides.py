@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from phyblock.errors import Problem, SpecError
+from phyblock.specs.paths import is_utf8
 from phyblock.specs.words import looks_secret, show
 from phyblock.specs.yaml_source import FieldPath, YamlSource, dotted, parse_yaml
 
@@ -36,6 +37,8 @@ def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> None:
 def _apply(source: YamlSource, text: str) -> None:
     shown = text if len(text) <= _LONGEST_SHOWN else text[:_LONGEST_SHOWN] + "..."
     place = "--set ..." if looks_secret(text) else f"--set {shown}"
+    if not is_utf8(text):
+        raise SpecError(Problem(place, "is not UTF-8"))
     key, equals, raw = text.partition("=")
     parts = tuple(part.strip() for part in key.split("."))
     if not equals or not all(parts) or len(parts) > _DEEPEST:

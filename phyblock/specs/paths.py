@@ -9,7 +9,7 @@ from pathlib import Path
 
 from phyblock.errors import Problem
 
-__all__ = ["check_path", "expand", "sort_problems"]
+__all__ = ["check_path", "expand", "is_utf8", "sort_problems"]
 
 _VARIABLE = re.compile(r"\$(?:(\w+)|\{(\w+)\})")
 _LONGEST_PATH, _LONGEST_NAME = 4095, 255
@@ -43,14 +43,18 @@ def expand(text: str, base: Path, environ: Mapping[str, str] | None = None) -> P
 
 def check_path(text: str) -> None:
     """Raise ValueError, with a message for the user, for what cannot be a path of UTF-8 names."""
-    try:
-        data = text.encode()
-    except UnicodeEncodeError:
-        raise ValueError("holds a name that is not UTF-8") from None
+    if not is_utf8(text):
+        raise ValueError("holds a name that is not UTF-8")
+    data = text.encode()
     if b"\0" in data:
         raise ValueError("holds a NUL character")
     if len(data) > _LONGEST_PATH or any(len(part) > _LONGEST_NAME for part in data.split(b"/")):
         raise ValueError("is longer than a path can be")
+
+
+def is_utf8(text: str) -> bool:
+    """Whether a text from the command line or a file name can be written down as UTF-8."""
+    return not any("\ud800" <= character <= "\udfff" for character in text)
 
 
 def sort_problems(problems: Iterable[Problem]) -> list[Problem]:
