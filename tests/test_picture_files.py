@@ -10,7 +10,7 @@ import zlib
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from PIL import Image, PngImagePlugin
 
 from phyblock.errors import DataError
@@ -110,6 +110,7 @@ def test_what_is_no_file_or_too_large(tmp_path: Path) -> None:
         read_picture(tmp_path / "big.png")
 
 
+@settings(deadline=None)
 @given(PICTURES)
 def test_any_bytes_are_a_picture_or_a_data_error(data: bytes) -> None:
     with contextlib.suppress(DataError):

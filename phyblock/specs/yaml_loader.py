@@ -35,6 +35,13 @@ class CoreLoader(yaml.SafeLoader):
         self._nodes = 0
         super().__init__(text)
 
+    def fetch_flow_collection_start(self, token_class: type[yaml.Token]) -> None:
+        """Scan a bracket or a brace, whose depth PyYAML goes through again at each token."""
+        if self.flow_level > MAX_DEPTH:
+            mark: yaml.Mark = self.get_mark()
+            raise TooMuchError("is nested too deeply", f"{MAX_DEPTH} levels at most", mark)
+        super().fetch_flow_collection_start(token_class)
+
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         """The next node with all below it, as PyYAML makes it."""
         self._nodes += 1

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 
 from phyblock.datasets import read_builtin, read_official, read_official_questions, read_questions
 from phyblock.datasets.official import read_candidates
@@ -186,6 +186,7 @@ def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
     assert problem.message == "is not a regular file"
 
 
+@settings(deadline=None)
 @given(SCENES)
 def test_any_scene_is_read_or_refused(
     tmp_path_factory: pytest.TempPathFactory, line: bytes
@@ -196,6 +197,7 @@ def test_any_scene_is_read_or_refused(
             assert max(map(abs, (x for b in task.scene.blocks for x in b.position_m))) <= 100
 
 
+@settings(deadline=None)
 @given(CANDIDATES)
 def test_any_candidate_set_is_read_or_refused(
     tmp_path_factory: pytest.TempPathFactory, data: bytes
@@ -205,6 +207,7 @@ def test_any_candidate_set_is_read_or_refused(
         assert 1 <= len(read_candidates(folder / "c.json")) <= MAX_CANDIDATES
 
 
+@settings(deadline=None)
 @given(QUESTIONS)
 def test_any_question_is_read_or_refused(
     tmp_path_factory: pytest.TempPathFactory, line: bytes

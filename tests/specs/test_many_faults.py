@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.errors import SpecError
@@ -152,6 +152,7 @@ def test_an_override_that_is_not_utf8(tmp_path: Path) -> None:
     assert "is not UTF-8" in told
 
 
+@settings(deadline=None)
 @given(data=SUITES, override=st.none() | OVERRIDE_TEXTS)
 def test_any_suite_is_read_or_refused(
     data: bytes, override: str | None, tmp_path_factory: pytest.TempPathFactory
@@ -165,6 +166,7 @@ def test_any_suite_is_read_or_refused(
         assert json.dumps(loaded.suite.identity(), allow_nan=False)
 
 
+@settings(deadline=None)
 @given(data=MODELS_FILES)
 def test_any_models_file_is_read_or_refused(
     data: bytes, tmp_path_factory: pytest.TempPathFactory

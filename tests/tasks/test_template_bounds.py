@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 
 from phyblock.errors import PromptError
 from phyblock.models.base import Message
@@ -185,6 +185,7 @@ def test_a_template_that_is_no_file(tmp_path: Path) -> None:
         TemplatePrompt(tmp_path / "pipe.j2", "mine")
 
 
+@settings(deadline=None)
 @given(TEMPLATES)
 def test_any_bytes_are_a_prompt_or_a_prompt_error(
     tmp_path_factory: pytest.TempPathFactory, data: bytes
