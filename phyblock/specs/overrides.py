@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 from phyblock.errors import Problem, SpecError
@@ -44,7 +45,8 @@ def _apply(source: YamlSource, text: str) -> None:
     if not equals or not all(parts) or len(parts) > _DEEPEST:
         raise SpecError(Problem(place, "is not of the form key=value", hint=_FORM))
     value = parse_yaml(raw, place, place=place)
-    source.problems.extend(value.problems)
+    if value.problems:
+        raise SpecError(_below(parts, problem) for problem in value.problems)
     section = _section(source, parts[:-1], place)
     section[parts[-1]] = value.data
     for table in (source.keys, source.values):
@@ -52,6 +54,13 @@ def _apply(source: YamlSource, text: str) -> None:
             del table[path]
     source.keys[parts] = source.values[parts] = place
     source.overridden.add(parts)
+
+
+def _below(parts: FieldPath, problem: Problem) -> Problem:
+    """A problem of an override's value, said of the field of the suite that it is in."""
+    inner = problem.field
+    joint = "." if inner and not inner.startswith("[") else ""
+    return replace(problem, field=f"{dotted(parts)}{joint}{inner}")
 
 
 def _section(source: YamlSource, parts: FieldPath, place: str) -> dict[Any, Any]:
