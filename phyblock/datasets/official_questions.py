@@ -223,8 +223,11 @@ class _Reader(QuestionReader):
         """The file that is named, or the one at its usual place."""
         if label in named:
             path = self._folder / str(named[label])
-            if not os.path.isfile(path):
-                self.complain(f"images.{label}", "no such file", str(named[label]), _ALLOWED)
+            inside = os.path.join(os.path.abspath(self._folder), "")
+            if not os.path.abspath(path).startswith(inside) or not os.path.isfile(path):
+                self.complain(
+                    f"images.{label}", "no such file in the folder", str(named[label]), _ALLOWED
+                )
                 return None
             return path
         found = (default.with_name(default.name + suffix) for suffix in _PICTURES)

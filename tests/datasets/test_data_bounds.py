@@ -166,18 +166,20 @@ def test_a_file_of_official_questions_takes_linear_time(tmp_path: Path) -> None:
     assert "too long an array" in problem.message
 
 
-def test_official_pictures_that_cannot_be_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize("named", ["x" * 5_000, "a\0b", "../own.png", "/etc/hostname"])
+def test_official_pictures_that_cannot_be_named(tmp_path: Path, named: str) -> None:
+    (tmp_path / "own.png").write_bytes(b"mine")
     scenes = read_builtin(write(tmp_path / "scenes", json.dumps(SCENE)))
     entry = {
         "scene_id": "t1",
         "question": "How many?",
         "options": ["1", "2", "3", "4"],
         "answer": "A",
-        "images": {"scene": "x" * 5_000},
+        "images": {"scene": named},
     }
     folder = write(tmp_path / "asked", json.dumps([entry]), "CO.json")
     (problem,) = problems_of(read_official_questions, folder, scenes)
-    assert problem.message == "no such file"
+    assert problem.message == "no such file in the folder"
 
 
 def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
