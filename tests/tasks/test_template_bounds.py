@@ -185,7 +185,7 @@ def test_a_template_that_is_no_file(tmp_path: Path) -> None:
         TemplatePrompt(tmp_path / "pipe.j2", "mine")
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=40)
 @given(TEMPLATES)
 def test_any_bytes_are_a_prompt_or_a_prompt_error(
     tmp_path_factory: pytest.TempPathFactory, data: bytes
