@@ -168,7 +168,7 @@ def holds(
 def moved_orders(
     blocks: Sequence[Block], poses: dict[int, Pose], limits: Limits = DEFAULT_LIMITS
 ) -> tuple[int, ...] | None:
-    """Orders of the blocks that are elsewhere in `poses`; None when that is not clear of one."""
+    """Orders of the blocks that `poses` has elsewhere; None where one lies between the limits."""
     moved = []
     for block in blocks:
         start, end = Pose.goal(block), poses[block.order]

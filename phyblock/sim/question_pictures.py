@@ -95,8 +95,8 @@ def question_key(picture_recipe: QuestionPicture, style: PictureStyle) -> str:
         "style": [style.size_px, style.background],
         "view": list(picture_recipe.view_deg),
         "alone": _is_alone(picture_recipe),
-        "blocks": _told(drawn_blocks(picture_recipe)),
-        "framed": _told(_drawn(picture_recipe.framed)),
+        "blocks": _field_values(drawn_blocks(picture_recipe)),
+        "framed": _field_values(_drawn(picture_recipe.framed)),
         "marks": [[mark.letter, *mark.position_m] for mark in picture_recipe.marks],
     }
     text = json.dumps(parts, sort_keys=True, allow_nan=False)
@@ -111,6 +111,6 @@ def _drawn(blocks: Sequence[Block]) -> list[DrawnBlock]:
     return [DrawnBlock(b.type, b.color, b.position_m, b.euler_deg) for b in blocks]
 
 
-def _told(blocks: Sequence[DrawnBlock]) -> list[list[object]]:
+def _field_values(blocks: Sequence[DrawnBlock]) -> list[list[object]]:
     """All fields of each block; `astuple` would copy what is in them as well."""
     return [[getattr(block, field.name) for field in fields(block)] for block in blocks]

@@ -44,7 +44,8 @@ class Light:
     """A light from far away: `direction` (3,) is the unit vector to it, in the world.
 
     A face with the outward unit normal n has its mesh's color times
-    ambient + diffuse * max(0, n . direction), whatever stands in the way of the light.
+    ambient + diffuse * max(0, n . direction), whatever stands in the way of the light. PyBullet's
+    EGL plugin alone is known to do otherwise: its faces differ less.
     """
 
     direction: NDArray[np.float64]
