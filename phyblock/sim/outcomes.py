@@ -18,7 +18,7 @@ import numpy as np
 from phyblock.domain.scene import Block
 from phyblock.sim.engine import GRAVITY_M_S2, Physics
 from phyblock.sim.pose import Pose
-from phyblock.sim.steps import groups
+from phyblock.sim.steps import groups, moments, wait
 from phyblock.sim.world import World
 
 __all__ = [
@@ -33,7 +33,6 @@ __all__ = [
     "holds",
     "moved_orders",
 ]
-
 
 LEAN_DEG = 2.0
 """How much the floor leans [degrees]; blocks begin to slide at 17."""
@@ -55,9 +54,6 @@ OUTCOME_SETTINGS: tuple[Physics, ...] = (
 )
 """What every outcome is tried under; the first gives the settled poses."""
 
-_EVERY_S = 0.05
-_QUIET_S = 0.25
-_QUIET_M_S = 0.005
 _LONGEST_S = 5.0
 _PATIENCE = 4.0
 """How much longer than without friction a push is kept up."""
@@ -186,26 +182,17 @@ def _settle(blocks: Sequence[Block], setting: Physics, push: Push | None) -> dic
         world.place_all(blocks)
         if push is not None:
             _push(world, push)
-        quiet_s = 0.0
-        for _ in range(round(_LONGEST_S / _EVERY_S)):
-            world.step(_EVERY_S)
-            quiet_s = quiet_s + _EVERY_S if world.fastest_m_s() < _QUIET_M_S else 0.0
-            if quiet_s >= _QUIET_S - _EVERY_S / 2:
-                return world.poses()
-    return None
+        return world.poses() if wait(world, _LONGEST_S) else None
 
 
 def _holds(blocks: Sequence[Block], setting: Physics, limits: Limits) -> bool | None:
     loose = Limits(limits.moved_m, limits.moved_deg, limits.moved_m, limits.moved_deg)
     with World(setting) as world:
         world.place_all(blocks)
-        quiet_s = 0.0
-        for _ in range(round(_LONGEST_S / _EVERY_S)):
-            world.step(_EVERY_S)
+        for is_at_rest in moments(world, _LONGEST_S):
             if moved_orders(blocks, world.poses(), loose):
                 return False
-            quiet_s = quiet_s + _EVERY_S if world.fastest_m_s() < _QUIET_M_S else 0.0
-            if quiet_s >= _QUIET_S - _EVERY_S / 2:
+            if is_at_rest:
                 return True if moved_orders(blocks, world.poses(), limits) == () else None
     return None
 

@@ -79,18 +79,6 @@ class World:
         linear, angular = simulation.velocity(order)
         simulation.set_velocity(order, Velocity((*velocity_m_s, linear[2]), angular))
 
-    def settle(self, limit_s: float = 5.0, speed_m_s: float = 1e-3) -> bool:
-        """Simulate until every block is slower than `speed_m_s` [m/s], or `limit_s` [s] is over.
-
-        Speeds are those of the fastest corner. Returns whether the world came to rest; it is
-        looked at every tenth of a second, and never called at rest in the first.
-        """
-        for _ in range(round(limit_s / 0.1)):
-            self.step(0.1)
-            if self.fastest_m_s() < speed_m_s:
-                return True
-        return False
-
     def fastest_m_s(self) -> float:
         """Speed of the fastest corner of any block [m/s]; 0 in an empty world."""
         simulation = self._simulation()
