@@ -62,11 +62,13 @@ def renderer() -> Renderer:
 def _make(variable: str, word: str, path: str, names: str) -> object:
     """What the factory at `module:factory` makes, once a process."""
     module, _, factory = path.partition(":")
-    if not module or not factory:
+    if not all(part.isidentifier() for part in (*module.split("."), factory)):
         allowed = f"{names}, or module:factory"
         raise InputError(Problem(variable, "is not known", found=word, allowed=allowed))
     try:
         make = getattr(importlib.import_module(module), factory)
     except (ImportError, AttributeError) as error:
         raise InputError(Problem(variable, f"cannot be imported: {error}", found=word)) from error
+    if not callable(make):
+        raise InputError(Problem(variable, "names nothing that can be called", found=word))
     return make()

@@ -206,7 +206,10 @@ def test_the_chosen_engine_decides_what_stands(monkeypatch: pytest.MonkeyPatch) 
     ("word", "message"),
     [
         ("bullet", "allowed: pybullet, or module:factory"),
+        ("", "is not known"),
+        (".engine:Engine", "is not known"),
         ("phyblock.nowhere:Engine", "cannot be imported"),
+        ("phyblock.sim.engine:FLOOR", "can be called"),
         ("phyblock.sim.engine:Engine", "cannot be imported"),
         ("phyblock.sim.bullet.renderer:tiny_renderer", "names no physics engine"),
     ],
