@@ -1,8 +1,8 @@
 """Geometry, contact, stability and pictures, on a physics engine and a renderer of one's choice.
 
-What is asked of the two is in `engine` and `renderer`, which there are in `registry`; PyBullet is
-one of each, in `bullet`. It is loaded when a world or a picture is made, never by importing this
-package.
+`engine` and `renderer` say what is asked of the two, and `registry` lists all that there are.
+PyBullet is one of each (`bullet`). It is loaded when a world or a picture is made, never by
+importing this package.
 """
 
 from phyblock.sim.pictures import (

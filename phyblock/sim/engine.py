@@ -73,7 +73,10 @@ class Contact(NamedTuple):
 
 
 class Simulation(Protocol):
-    """Rigid blocks on a floor. The same calls on one machine give the same bits."""
+    """Rigid blocks on a floor.
+
+    The same calls on the same machine give the same bits, whatever other simulations are open.
+    """
 
     def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
         """Put a block at a pose, at rest; its number is above 0 and not taken."""
@@ -91,16 +94,16 @@ class Simulation(Protocol):
         """How a block moves now."""
 
     def set_velocity(self, number: int, velocity: Velocity) -> None:
-        """Make a block move this way from now on, as far as contacts let it."""
+        """Set how a block moves from now on, as far as contacts and gravity let it."""
 
     def contacts(self) -> tuple[Contact, ...]:
-        """Where bodies touched in the last time step; nothing before the first."""
+        """List where bodies touched in the last time step; empty before the first step."""
 
     def save(self) -> object:
-        """All that decides what follows, for `restore`; it is of no use to anyone else."""
+        """Everything that decides what happens next, as a value to give to `restore`."""
 
     def restore(self, saved: object) -> None:
-        """Bring back what was saved, so that what follows is the same bit for bit.
+        """Bring back what was saved: what happens next is then the same bit for bit.
 
         Raises SimulationError when blocks were added or removed since.
         """
@@ -122,7 +125,7 @@ class PhysicsEngine(Protocol):
         """Name and version of each library that decides where blocks end up."""
 
     def open(self, physics: Physics) -> AbstractContextManager[Simulation]:
-        """An empty floor; what it takes is given back on leaving.
+        """Open a floor without blocks, as a context manager that closes it on leaving.
 
-        Raises SimulationError when there is none to be had.
+        Raises SimulationError when the engine can open no more.
         """

@@ -1,4 +1,4 @@
-"""Which physics engine simulates and which renderer draws: the names of all there are.
+"""The names of all physics engines and renderers, and which of them are used.
 
 `PHYBLOCK_PHYSICS` and `PHYBLOCK_RENDERER` choose by name; processes that are started inherit the
 choice. Either may also be `module:factory`, for an implementation that is not part of phyblock.
@@ -45,7 +45,7 @@ def physics_engine() -> PhysicsEngine:
 
 
 def renderer() -> Renderer:
-    """The renderer that `PHYBLOCK_RENDERER` names, or PyBullet's TinyRenderer; as above.
+    """The renderer that `PHYBLOCK_RENDERER` names, or PyBullet's TinyRenderer; one object too.
 
     Raises InputError for a name that is not known, SimulationError for one that does not work
     here.

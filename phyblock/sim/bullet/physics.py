@@ -45,7 +45,7 @@ class BulletEngine:
 
     @contextlib.contextmanager
     def open(self, physics: Physics) -> Iterator[BulletSimulation]:
-        """As `PhysicsEngine.open`; there is none to be had when too many are open."""
+        """Open a floor without blocks; SimulationError when too many are open."""
         with fresh_client() as (bullet, client):
             yield BulletSimulation(bullet, client, physics)
 
@@ -150,12 +150,12 @@ class BulletSimulation:
         return tuple(sorted(found))
 
     def save(self) -> object:
-        """What decides what follows; the client keeps it as long as it is open."""
+        """Everything that decides what happens next; the client keeps it while it is open."""
         bodies = tuple(body.id for body in self._bodies.values())
         return _Saved(self._bullet.saveState(physicsClientId=self._client), bodies)
 
     def restore(self, saved: object) -> None:
-        """Bring back what was saved; SimulationError for blocks that are other ones."""
+        """Bring back what was saved; SimulationError when other blocks are there now."""
         bodies = tuple(body.id for body in self._bodies.values())
         if not isinstance(saved, _Saved) or saved.bodies != bodies:
             raise SimulationError("what was saved is of other blocks than are there now")

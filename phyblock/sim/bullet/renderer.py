@@ -34,7 +34,7 @@ class BulletRenderer:
         return {"pybullet": version()}
 
     def draw(self, props: Sequence[Prop], camera: Camera, light: Light, size_px: int) -> Raster:
-        """As `Renderer.draw`."""
+        """Draw props with one light, `size_px` squared."""
         with stage(with_egl=self._with_egl).showing(props) as (bullet, client, bodies):
             width, height, rgba, _, seen = bullet.getCameraImage(
                 size_px,
