@@ -7,6 +7,7 @@ worth hiding, and no fault of one is ever described by showing it.
 from __future__ import annotations
 
 import ipaddress
+import re
 import urllib.parse
 from dataclasses import dataclass
 
@@ -29,21 +30,21 @@ class AddressFault:
 def address_fault(url: str) -> AddressFault | None:
     """Why this is no address that a model can be called at; None when it is one."""
     scheme, mark, rest = url.partition("://")
-    host = rest.partition("/")[0]
-    if "@" in url:
+    host = re.split(r"[/?#\\]", rest if mark else url, maxsplit=1)[0]
+    if "@" in host:
         return AddressFault("holds a user name or a password", _BY_VARIABLE, may_hold_secret=True)
     if "?" in url or "#" in url:
         message = "holds a query or a fragment, where keys are often written"
         return AddressFault(message, _BY_VARIABLE, may_hold_secret=True)
     if not mark or scheme.lower() not in ("http", "https"):
-        return AddressFault("is not the address of a server", _EXAMPLE, may_hold_secret=False)
-    if len(url) > _LONGEST or "\\" in url or any(c.isspace() or not c.isprintable() for c in url):
-        message = "is too long for an address, or holds spaces or control characters"
-        return AddressFault(message, _EXAMPLE, may_hold_secret=True)
-    if not _is_host(host):
+        message = "is not the address of a server"
+    elif len(url) > _LONGEST or "\\" in url or any(not "!" <= c <= "~" for c in rest[len(host) :]):
+        message = "is too long, or holds characters that must be escaped in an address"
+    elif not _is_host(host):
         message = "names no host, or one that cannot be read"
-        return AddressFault(message, _EXAMPLE, may_hold_secret=False)
-    return None
+    else:
+        return None
+    return AddressFault(message, _EXAMPLE, may_hold_secret="@" in url)
 
 
 def host_of(url: str) -> str:
@@ -61,6 +62,8 @@ def host_of(url: str) -> str:
 
 def _is_host(host: str) -> bool:
     """Whether `host` is a name or an IP address, with or without a port."""
+    if any(character.isspace() or not character.isprintable() for character in host):
+        return False
     try:
         parts = urllib.parse.urlsplit(f"//{host}")
         name = parts.hostname or ""

@@ -11,20 +11,33 @@ from phyblock.models.raw_replies import token_count
 
 __all__ = ["readable_body"]
 
-_USAGES = ("usage", "usageMetadata", "usage_metadata", "meta")
+_USAGE_BESIDE = {
+    "choices": ("usage", {}),
+    "content": ("usage", {"input_tokens": 0, "output_tokens": 0}),
+    "candidates": ("usageMetadata", {}),
+}
+"""Where a body with this field says what it took, and how it would say that it does not know."""
 
 
 def readable_body(answer: Answer, body: object) -> Answer:
     """The answer with 0, which is read as unknown, in the place of counts that cannot be one.
 
-    `body` is its decoded body. An answer without such counts is returned as it is, byte for byte.
+    `body` is its decoded body. An answer whose counts are all in order is returned as it is, byte
+    for byte.
     """
     if not isinstance(body, Mapping):
         return answer
-    counts = {name: _believable(body[name]) for name in _USAGES if name in body}
-    if all(body[name] == counts[name] for name in counts):
+    usages = [usage for field, usage in _USAGE_BESIDE.items() if field in body]
+    if not usages:
         return answer
-    return replace(answer, body=json.dumps({**body, **counts}).encode())
+    name, unknown = usages[0]
+    told = body.get(name)
+    counts = _believable(told) if isinstance(told, Mapping) else unknown
+    return answer if told == counts else _with(answer, {**body, name: counts})
+
+
+def _with(answer: Answer, body: Mapping[str, object]) -> Answer:
+    return replace(answer, body=json.dumps(body).encode())
 
 
 def _believable(value: object, name: str = "") -> object:

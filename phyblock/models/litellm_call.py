@@ -69,7 +69,8 @@ class LitellmTransport(GuardedTransport):
         finally:
             CURRENT.reset(token)
         latency_s = time.perf_counter() - started
-        return read_completion(_plain(response), latency_s)
+        status = 200 if exchange.answer is None else exchange.answer.status
+        return read_completion(_plain(response), latency_s, status)
 
     def _arguments(self, call: Call) -> dict[str, Any]:
         arguments = {
