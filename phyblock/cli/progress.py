@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from types import TracebackType
 
 from rich.console import Console, Group, RenderableType
@@ -13,11 +14,13 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from phyblock.cli.tally import Tally
+from phyblock.cli.remarks import Remarks
+from phyblock.cli.tally import Tally, failure_text
 from phyblock.run.events import (
     ModelNotice,
     ModelStopped,
     RunEvent,
+    RunNotice,
     RunStarted,
     SampleDone,
     Stopping,
@@ -39,6 +42,7 @@ class ProgressView:
         self._started = time.monotonic()
         self._last_line = self._started
         self._status = ""
+        self._remarked = Remarks(_LINE_EVERY_S)
         self._live = (
             Live(console=console, refresh_per_second=4, get_renderable=self._panel, transient=True)
             if console.is_terminal
@@ -70,9 +74,9 @@ class ProgressView:
                 for record in records:
                     self._tallies[name].add(record, fresh=False)
         elif isinstance(event, ModelNotice):
-            tally = self._tallies[event.model]
-            tally.retries += event.kind == "retry"
-            tally.notice = event.text
+            self._take_note(event)
+        elif isinstance(event, RunNotice):
+            self._say(event.text)
         elif isinstance(event, ModelStopped):
             self._tallies[event.model].notice = f"stopped: {event.reason}"
             self._console.print(f"{event.model} stopped:", style="red", end=" ")
@@ -81,6 +85,19 @@ class ProgressView:
             self._status = self._stopping_text(event)
             if self._live is None:
                 self._console.print(self._status, markup=False)
+
+    def _take_note(self, event: ModelNotice) -> None:
+        tally = self._tallies[event.model]
+        tally.retries += event.kind == "retry"
+        tally.notice = event.text
+        # Where it ends for a model, another event says so.
+        if self._live is None and event.kind != "unavailable":
+            for line in self._remarked.add(event, time.monotonic()):
+                self._say(line)
+            self._plain_line()
+
+    def _say(self, line: str) -> None:
+        self._console.print(Text(line), soft_wrap=True)
 
     @property
     def cost_text(self) -> str:
@@ -99,7 +116,16 @@ class ProgressView:
         now = time.monotonic()
         if self._live is None and now - self._last_line >= _LINE_EVERY_S:
             self._last_line = now
-            self._console.print(self._summary(), markup=False, highlight=False)
+            for line in self._remarked.due(now):
+                self._say(line)
+            self._say(f"{self._summary()}{self._failures()}")
+
+    def _failures(self) -> str:
+        """Failures of all models, for a line of the log."""
+        counts: Counter[str] = Counter()
+        for tally in self._tallies.values():
+            counts.update(tally.failures)
+        return f" · {failure_text(counts)}" if counts else ""
 
     def _summary(self) -> str:
         done = sum(tally.done for tally in self._tallies.values())
