@@ -155,13 +155,7 @@ class Breakers:
 
 
 def server_of(config: ModelConfig) -> str:
-    """Scheme, host and port of a model's address, without a user or a password in it; the
-    provider where no address is given.
-    """
+    """Scheme, host and port of a model's address; the provider where no address is given."""
     if config.api_base is None:
         return config.provider
-    scheme, separator, rest = config.api_base.partition("://")
-    if not separator:
-        scheme, rest = "http", config.api_base
-    host = re.split(r"[/?#]", rest, maxsplit=1)[0].rpartition("@")[2]
-    return f"{scheme}://{host}".lower()
+    return re.split(r"(?<=[^/:])[/?#]", config.api_base, maxsplit=1)[0].lower()

@@ -8,7 +8,13 @@ from collections.abc import Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, nullcontext
 from dataclasses import dataclass, replace
 
-from phyblock.errors import BudgetReachedError, ModelError, RetryableError, UnavailableError
+from phyblock.errors import (
+    BudgetReachedError,
+    ModelError,
+    RetryableError,
+    UnavailableError,
+    UnreachableError,
+)
 from phyblock.models.base import Reply, Request
 from phyblock.models.breaker import Breaker
 from phyblock.models.cache import reply_key
@@ -19,7 +25,7 @@ from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import hidden
 from phyblock.models.limits import ModelLimiter, Slot
 from phyblock.models.payload import wire_params
-from phyblock.models.retry import RetryPolicy, with_retries
+from phyblock.models.retry import RetryPolicy, is_success, with_retries
 from phyblock.models.shared_cache import SharedCache, Turn
 from phyblock.models.transport import Call, SeedRefusedError, Transport
 
@@ -197,8 +203,8 @@ class ChatModel:
     async def _send_paid(self, call: Call, question: _Question) -> Reply:
         """Send with the call's greatest cost reserved in the budget.
 
-        A failure without a status of the server's own may have been billed, and counts in full;
-        a model that is found unable before anything is sent costs nothing.
+        A failure that may have been billed counts in full; a model that is found unable before
+        anything is sent costs nothing.
         """
         budget, price = self._parts.budget, self._parts.price
         if budget is None or price is None:
@@ -217,7 +223,7 @@ class ChatModel:
             spent_usd = 0.0
             raise
         except ModelError as error:
-            spent_usd = None if error.status in (None, 200) else 0.0
+            spent_usd = None if _may_be_billed(error) else 0.0
             raise
         finally:
             counted_usd = budget.settle(held, spent_usd)
@@ -267,6 +273,12 @@ class ChatModel:
         status: int | None = None,
     ) -> None:
         self._parts.observer(ModelEvent(self.name, kind, message, wait_s, limit, status))
+
+
+def _may_be_billed(error: ModelError) -> bool:
+    """Whether the server may have made a reply: it promised one, or was lost on the way."""
+    was_lost = error.status is None and not isinstance(error, UnreachableError)
+    return was_lost or is_success(error.status)
 
 
 def _counted(reply: Reply, question: _Question) -> Reply:

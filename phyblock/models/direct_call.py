@@ -14,7 +14,7 @@ import urllib.request
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from phyblock.errors import ModelError, Problem, RetryableError, SpecError
+from phyblock.errors import ModelError, Problem, RetryableError, SpecError, UnreachableError
 from phyblock.models.base import Reply
 from phyblock.models.completions import read_completion
 from phyblock.models.config import ModelConfig
@@ -67,6 +67,9 @@ class DirectTransport:
             ) as response:
                 status, answered = response.status, response.headers
                 body = await response.read()
+        except aiohttp.ClientConnectorError as error:
+            text = f"{type(error).__name__}: {error}"
+            raise UnreachableError(hidden(text, self._secrets)) from None
         except (aiohttp.ClientError, asyncio.TimeoutError, OSError) as error:
             text = str(error) or "no answer in time"
             raise self._error(None, f"{type(error).__name__}: {text}") from None

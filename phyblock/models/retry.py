@@ -10,7 +10,7 @@ from typing import TypeVar
 from phyblock.errors import RetryableError
 from phyblock.models.limits import Clock
 
-__all__ = ["RetryPolicy", "backoff_s", "with_retries"]
+__all__ = ["RetryPolicy", "backoff_s", "is_success", "with_retries"]
 
 T = TypeVar("T")
 
@@ -21,7 +21,7 @@ class RetryPolicy:
 
     A request is given up when it has failed `attempts` times and `retry_for_s` have passed since
     it first failed, both: attempts that fail at once outlast an outage, attempts that each take
-    long are bounded by their number. HTTP 200 with an unreadable body is an answer that was paid
+    long are bounded by their number. HTTP 2xx with an unreadable body is an answer that was paid
     for: there the number alone decides.
 
     The wait before attempt n + 1 is uniform between 0 and min(`max_wait_s`, `base_s` * 2^(n-1)),
@@ -40,12 +40,17 @@ class RetryPolicy:
         """Whether a request that failed so often and so long is not sent again."""
         if failures < self.attempts:
             return False
-        return error.status == 200 or failing_for_s >= self.retry_for_s
+        return is_success(error.status) or failing_for_s >= self.retry_for_s
 
     def wait_s(self, error: RetryableError, failures: int) -> float:
         """The wait before the next attempt [s]."""
         asked_s = min(error.retry_after_s or 0.0, self.max_retry_after_s)
         return asked_s + random.uniform(0.0, backoff_s(self.base_s, self.max_wait_s, failures))
+
+
+def is_success(status: int | None) -> bool:
+    """Whether the server promised a reply, and bills it, though it could not be read."""
+    return status is not None and 200 <= status < 300
 
 
 def backoff_s(base_s: float, most_s: float, failures: int) -> float:

@@ -126,8 +126,11 @@ def test_an_outage_of_less_than_five_minutes_is_outlasted_with_the_defaults(
     assert script.run() == "answer"
 
 
-def test_answers_that_were_paid_for_and_cannot_be_read_are_bounded_by_number_alone() -> None:
-    script = Script(*(RetryableError("malformed", status=200) for _ in range(20)))
+@pytest.mark.parametrize("status", [200, 201, 204])
+def test_answers_that_were_paid_for_and_cannot_be_read_are_bounded_by_number_alone(
+    status: int,
+) -> None:
+    script = Script(*(RetryableError("malformed", status=status) for _ in range(20)))
     with pytest.raises(RetryableError, match="malformed"):
         script.run(attempts=3)
     assert script.calls == 3

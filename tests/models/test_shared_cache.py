@@ -1,4 +1,4 @@
-"""The cache under a run: locked, broken, shared by processes that ask the same; never in the way."""
+"""The cache under a run: locked, broken, shared by those who ask the same; never in the way."""
 
 from __future__ import annotations
 
