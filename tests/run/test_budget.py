@@ -15,6 +15,8 @@ PRICE = {"input": 10.0, "output": 100.0}
 CALL_USD = 1000 * PRICE["input"] / 1e6 + 40 * PRICE["output"] / 1e6
 """The server counts 1,000 tokens in and 40 out for every call."""
 MOST_USD = 0.5
+TWICE = {"max_attempts": 2, "retry_for_s": 0.0}
+"""Limits of a run that gives up soon, however little time it took."""
 
 
 class Silent(OpenAIChat):
@@ -93,7 +95,7 @@ def test_what_an_earlier_run_may_have_paid_counts_in_the_next(
     dearest_reply_usd = 1000 * PRICE["output"] / 1e6
     with Running(server) as running:
         workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=1000)
-        workspace.write_suite(models=["alpha"], seeds=list(range(4)), limits={"max_attempts": 2})
+        workspace.write_suite(models=["alpha"], seeds=list(range(4)), limits=TWICE)
         codes = [workspace.run("--set", "limits.max_cost_usd=1").code for _ in range(3)]
     assert codes == [1, 1, 1]
     assert 2 <= server.requests <= 1 / dearest_reply_usd
@@ -118,7 +120,9 @@ def test_an_attempt_that_was_billed_is_recorded_though_the_next_does_not_fit(
 def test_a_run_without_a_limit_counts_once_there_is_one(workspace: Workspace) -> None:
     with Running(OpenAIChat(Faults(server_error=0.5))) as running:
         workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
-        workspace.write_suite(models=["alpha"], seeds=[0, 1, 2, 3], limits={"max_attempts": 1})
+        workspace.write_suite(
+            models=["alpha"], seeds=[0, 1, 2, 3], limits={**TWICE, "max_attempts": 1}
+        )
         assert workspace.run().code == 1
         asked, answered = running.server.requests, running.server.ended["ok"]
         assert 0 < answered < asked == 20

@@ -34,6 +34,10 @@ def is_scored(record: Raw) -> bool:
     return found == {(setting, matcher) for setting in "AB" for matcher in ("optimal", "paper")}
 
 
+TWICE = {"max_attempts": 2, "retry_for_s": 0.0}
+"""Limits of a run that gives up soon, however little time it took."""
+
+
 def coverage(workspace: Workspace) -> dict[str, Raw]:
     text = workspace.tables()["coverage.csv"].decode()
     return {row["model"]: row for row in csv.DictReader(io.StringIO(text))}
@@ -117,7 +121,7 @@ def test_a_sample_whose_every_attempt_failed_is_asked_again_by_the_next_run(
 ) -> None:
     with Running(BySeed({1: "500"})) as running:
         workspace.write_models(running.url, "alpha")
-        workspace.write_suite(models=["alpha"], seeds=[0, 1], limits={"max_attempts": 2})
+        workspace.write_suite(models=["alpha"], seeds=[0, 1], limits=TWICE)
         done = workspace.run()
         assert (done.code, done.err) == (1, "")
         assert "5 of 10 samples are done" in done.out
