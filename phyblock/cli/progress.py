@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
+from collections.abc import Callable
 from types import TracebackType
 
 from rich.console import Console, Group, RenderableType
@@ -35,11 +37,14 @@ _REMARKS = 6
 class ProgressView:
     """Watches a run; use as a context manager and pass it as the run's watcher."""
 
-    def __init__(self, console: Console, title: str) -> None:
+    def __init__(
+        self, console: Console, title: str, now: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._now = now
         self._console = console
         self._title = title
         self._tallies: dict[str, Tally] = {}
-        self._started = time.monotonic()
+        self._started = now()
         self._last_line = self._started
         self._status = ""
         self._remarked = Remarks(_LINE_EVERY_S)
@@ -62,6 +67,8 @@ class ProgressView:
     ) -> None:
         if self._live is not None:
             self._live.stop()
+        for line in self._remarked.due(math.inf):
+            self._say(line)
 
     def __call__(self, event: RunEvent) -> None:
         """Take note of an event."""
@@ -92,7 +99,7 @@ class ProgressView:
         tally.notice = event.text
         # Where it ends for a model, another event says so.
         if self._live is None and event.kind != "unavailable":
-            for line in self._remarked.add(event, time.monotonic()):
+            for line in self._remarked.add(event, self._now()):
                 self._say(line)
             self._plain_line()
 
@@ -113,7 +120,7 @@ class ProgressView:
         return f"Stopping: {event.reason}; waiting for {calls} (Ctrl-C again to give them up)."
 
     def _plain_line(self) -> None:
-        now = time.monotonic()
+        now = self._now()
         if self._live is None and now - self._last_line >= _LINE_EVERY_S:
             self._last_line = now
             for line in self._remarked.due(now):
@@ -131,7 +138,7 @@ class ProgressView:
         done = sum(tally.done for tally in self._tallies.values())
         total = sum(tally.expected for tally in self._tallies.values())
         fresh = sum(tally.fresh for tally in self._tallies.values())
-        elapsed = time.monotonic() - self._started
+        elapsed = self._now() - self._started
         text = f"{done:,} of {total:,} samples"
         if fresh and elapsed > 0:
             rate = fresh / elapsed

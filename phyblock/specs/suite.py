@@ -183,8 +183,8 @@ class LimitsSpec(Section):
     )
     max_attempts: Count = Field(
         default=8,
-        description="Requests sent for one sample before it is given up; more as long as "
-        "retry_for_s is not over and the server cannot have answered.",
+        description="Requests that must have failed before a sample is given up. More are sent "
+        "until retry_for_s is over, but for answers that were paid for and cannot be read.",
     )
     retry_for_s: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = Field(
         default=300.0,
