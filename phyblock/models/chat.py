@@ -211,7 +211,9 @@ class ChatModel:
             question.sent += 1
             return _counted(await self._parts.transport.send(call), question)
         with self._parts.halt.giving_up():
-            held = await budget.reserve(budget.most_usd(self.name, price, question.expected))
+            held = await budget.reserve(
+                lambda: budget.most_usd(self.name, price, question.expected)
+            )
         spent_usd: float | None = None
         try:
             question.sent += 1

@@ -11,6 +11,7 @@ import functools
 import importlib.util
 import json
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -179,10 +180,8 @@ class Budget:
     """
 
     def __init__(self, max_cost_usd: float, spent_usd: float = 0.0) -> None:
-        if not (_is_amount(max_cost_usd) and _is_amount(spent_usd)):
-            raise ValueError(f"no amounts of money: {max_cost_usd}, {spent_usd}")
-        self._max_usd = max_cost_usd
-        self._spent_usd = spent_usd
+        self._max_usd = _amount(max_cost_usd)
+        self._spent_usd = _amount(spent_usd)
         self._held: dict[int, float] = {}
         self._next = 0
         self._changed = asyncio.Event()
@@ -202,13 +201,14 @@ class Budget:
         """The most that a call can cost, as far as the model is known by now."""
         return most_usd(price, expected, self._ratio.get(model, 1.0))
 
-    async def reserve(self, usd: float) -> int:
-        """Hold `usd`, waiting for calls under way to settle; returns the reservation's number.
+    async def reserve(self, most_usd: Callable[[], float]) -> int:
+        """Hold the most that a call can cost, waiting for calls under way to settle; returns the
+        reservation's number.
 
+        `most_usd` is asked anew whenever a call has settled, since more is known of the model then.
         Raises BudgetReachedError when it does not fit although nothing is under way.
         """
-        if not _is_amount(usd):
-            raise ValueError(f"no amount of money: {usd}")
+        usd = _amount(most_usd())
         while self._spent_usd + sum(self._held.values()) + usd > self._max_usd:
             if not self._held:
                 raise BudgetReachedError(
@@ -217,6 +217,7 @@ class Budget:
                 )
             self._changed.clear()
             await self._changed.wait()
+            usd = _amount(most_usd())
         self._next += 1
         self._held[self._next] = usd
         return self._next
@@ -239,6 +240,12 @@ class Budget:
         if counted is not None and expected.prompt_tokens > 0:
             ratio = min(counted / expected.prompt_tokens, _MOST_TIMES_EXPECTED)
             self._ratio[model] = max(self._ratio.get(model, 1.0), ratio)
+
+
+def _amount(usd: float) -> float:
+    if not _is_amount(usd):
+        raise ValueError(f"no amount of money: {usd}")
+    return usd
 
 
 def _is_amount(usd: float) -> bool:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from phyblock.errors import Problem, SpecError
+from phyblock.errors import Problem, SpecError, StoreError
 from phyblock.models import (
     Breakers,
     Budget,
@@ -168,8 +169,8 @@ def _spent_usd(folder: Path) -> float:
 
 def _record_usd(record: Mapping[str, Any]) -> float:
     reply = {} if "turns" in record else record["reply"] or {}
-    failed = (record["error"] or {}).get("billed_usd") or 0.0
-    return _billed_usd(reply) if reply else failed
+    failed = (record["error"] or {}).get("billed_usd")
+    return _billed_usd(reply) if reply else _amount(failed)
 
 
 def _billed_usd(reply: Mapping[str, Any]) -> float:
@@ -177,4 +178,14 @@ def _billed_usd(reply: Mapping[str, Any]) -> float:
     billed_usd: float | None = reply.get("billed_usd")
     if billed_usd is None and not reply.get("cached"):
         billed_usd = reply.get("cost_usd")
-    return billed_usd or 0.0
+    return _amount(billed_usd)
+
+
+def _amount(usd: float | None) -> float:
+    """The amount; StoreError for what is none, since a limit cannot be kept on top of it."""
+    amount = usd or 0.0
+    if not (math.isfinite(amount) and amount >= 0):
+        message = "hold a cost that is no amount, so that max_cost_usd cannot be kept"
+        hint = "remove the line that holds it: its sample is asked again"
+        raise StoreError(Problem("the run's records", message, "cost", str(usd), hint=hint))
+    return amount

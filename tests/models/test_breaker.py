@@ -17,6 +17,7 @@ from phyblock.models.transport import Call
 from tests.models.factory import make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.models.test_limits import FakeTime
+from tests.servers.chassis import Faults, start
 
 REFUSED = RetryableError("connection refused")
 
@@ -251,6 +252,33 @@ def test_models_of_one_server_share_its_breaker() -> None:
 )
 def test_a_server_is_named_by_scheme_host_and_port(api_base: str | None, server: str) -> None:
     assert server_of(ModelConfig("m", "litellm", "openai/m", api_base=api_base)) == server
+
+
+@pytest.mark.parametrize("route", ["direct", "openai"])
+def test_a_server_that_restarts_loses_nothing_over_a_real_wire(
+    monkeypatch: pytest.MonkeyPatch, route: str
+) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    server = ROUTES[route].server(Faults(latency_s=0.02))
+    policy = RetryPolicy(base_s=0.01, max_wait_s=0.05)
+
+    async def main() -> list[object]:
+        runner, port = await start(server, 0)
+        config = ROUTES[route].config(f"http://127.0.0.1:{port}", max_concurrency=8)
+        model = make_model(config, policy=policy)
+        asked = [asyncio.create_task(model.ask(make_request(f"{n:03}"))) for n in range(60)]
+        while server.ended["ok"] < 20:
+            await asyncio.sleep(0.005)
+        await runner.cleanup()
+        # Each sample would use up its eight attempts in this time.
+        await asyncio.sleep(0.5)
+        runner, _ = await start(server, port)
+        answers = await asyncio.gather(*asked, return_exceptions=True)
+        await model.aclose()
+        await runner.cleanup()
+        return list(answers)
+
+    assert [type(answer) for answer in run(main)] == [Reply] * 60
 
 
 @pytest.mark.parametrize("route", ["direct", "openai"])

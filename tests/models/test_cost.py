@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 from pathlib import Path
 from typing import Any
 
@@ -183,7 +184,7 @@ def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(
 
         async def call(most: float, share: float, steps: int) -> None:
             try:
-                held = await budget.reserve(most)
+                held = await budget.reserve(lambda: most)
             except BudgetReachedError:
                 refused.append(most)
                 assert budget.spent_usd + most > limit
@@ -202,10 +203,26 @@ def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(
 def test_a_reservation_without_a_known_cost_counts_in_full() -> None:
     async def main() -> None:
         budget = Budget(1.0, spent_usd=0.25)
-        budget.settle(await budget.reserve(0.5), None)
+        budget.settle(await budget.reserve(lambda: 0.5), None)
         assert budget.spent_usd == 0.75
         with pytest.raises(BudgetReachedError, match=r"0\.7500 spent"):
-            await budget.reserve(0.5)
+            await budget.reserve(lambda: 0.5)
+
+    run(main)
+
+
+def test_a_call_that_waits_reserves_what_was_learned_meanwhile() -> None:
+    budget, price = Budget(1.0), Price(100.0, 0.0)
+    expected = Estimate(4000, 100, 100)
+
+    async def main() -> None:
+        first = await budget.reserve(lambda: budget.most_usd("m", price, expected))
+        second = asyncio.create_task(budget.reserve(lambda: budget.most_usd("m", price, expected)))
+        await asyncio.sleep(0)
+        budget.learn("m", expected, Usage(8000, 1))
+        budget.settle(first, 0.8)
+        with pytest.raises(BudgetReachedError, match=r"can cost 1\.2"):
+            await second
 
     run(main)
 
@@ -261,7 +278,7 @@ def test_what_was_spent_never_becomes_less_and_an_unknown_cost_is_the_dearest(
         for most, cost in calls:
             before = budget.spent_usd
             try:
-                held = await budget.reserve(most)
+                held = await budget.reserve(functools.partial(float, most))
             except BudgetReachedError:
                 break
             counted = budget.settle(held, cost)
@@ -292,7 +309,7 @@ def test_no_budget_is_made_of_what_is_no_amount(usd: float) -> None:
     with pytest.raises(ValueError, match="no amount"):
         Budget(1.0, usd)
     with pytest.raises(ValueError, match="no amount"):
-        run(lambda: Budget(1.0).reserve(usd))
+        run(lambda: Budget(1.0).reserve(lambda: usd))
 
 
 class Counting(OpenAIChat):
