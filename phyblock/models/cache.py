@@ -38,6 +38,7 @@ _HINT = (
 )
 _WAIT = "wait until the process that holds it has ended, or name another cache folder"
 _ELSEWHERE = "free some space, or name another cache folder with PHYBLOCK_CACHE"
+_MOST_TOKENS = 10**9
 _CREATE = """
 CREATE TABLE IF NOT EXISTS replies (
     key TEXT PRIMARY KEY,
@@ -220,5 +221,13 @@ class ReplyCache:
 
 
 def _reply(stored: dict[str, Any]) -> Reply:
-    reply = Reply(**{**stored, "usage": Usage(**stored["usage"])})
+    usage = Usage(**{name: _count(number) for name, number in stored["usage"].items()})
+    reply = Reply(**{**stored, "usage": usage})
     return replace(reply, cached=True, attempts=0)
+
+
+def _count(number: object) -> int | None:
+    """A number of tokens; older files may hold what a server made up."""
+    if not isinstance(number, int) or isinstance(number, bool):
+        return None
+    return number if 0 <= number <= _MOST_TOKENS else None

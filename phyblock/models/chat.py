@@ -133,7 +133,13 @@ class ChatModel:
                     continue
                 if self._unavailable is not None:
                     raise UnavailableError(str(self._unavailable), status=self._unavailable.status)
-                reply = await self._send_watched(question, slot, is_probe=is_probe)
+                try:
+                    reply = await self._send_watched(question, slot, is_probe=is_probe)
+                except RetryableError:
+                    # It is the server that fails then, and not this request.
+                    if self._parts.breaker.is_open:
+                        continue
+                    raise
                 slot.succeeded(_total(reply))
                 if self._parts.cache is not None:
                     await self._parts.cache.keep(question.key, self._config.id, reply)
@@ -232,10 +238,8 @@ class ChatModel:
             question.billed_usd = (question.billed_usd or 0.0) + counted_usd
 
     async def _pause(self, wait_s: float) -> None:
-        """Wait before another attempt; while the breaker is open it is the breaker that waits."""
-        if not self._parts.breaker.is_open:
-            with self._parts.halt.giving_up():
-                await self._parts.policy.clock.sleep(wait_s)
+        with self._parts.halt.giving_up():
+            await self._parts.policy.clock.sleep(wait_s)
 
     def _found(self, kept: Reply, question: _Question) -> Reply:
         """A reply that another brought, with what attempts of our own had cost before."""

@@ -158,6 +158,14 @@ def test_a_reply_comes_back_whole_and_marked(tmp_path: Path) -> None:
         assert cache.get("k") == expected
 
 
+def test_counts_that_cannot_be_true_are_not_known(tmp_path: Path) -> None:
+    with ReplyCache(tmp_path / "c.sqlite") as cache:
+        cache.put("k", "openai/m", replace(REPLY, usage=Usage(-1, 10**30, 2)))
+        found = cache.get("k")
+    assert found is not None
+    assert found.usage == Usage(None, None, 2)
+
+
 @pytest.mark.parametrize(
     "reply",
     [
