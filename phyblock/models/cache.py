@@ -207,7 +207,7 @@ class ReplyCache:
             raise self._problem(f"cannot be used: {error}", hint=_ELSEWHERE) from error
         except sqlite3.Error as error:
             raise self._problem(f"cannot be used: {error}") from error
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             raise self._problem(f"holds a broken reply: {error}") from error
 
     def _problem(
@@ -223,6 +223,8 @@ class ReplyCache:
 def _reply(stored: dict[str, Any]) -> Reply:
     usage = Usage(**{name: _count(number) for name, number in stored["usage"].items()})
     reply = Reply(**{**stored, "usage": usage})
+    if not (isinstance(reply.text, str) and isinstance(reply.reasoning, str)):
+        raise TypeError("its text is no text")
     return replace(reply, cached=True, attempts=0)
 
 
