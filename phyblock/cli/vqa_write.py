@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import AsyncExitStack
 from pathlib import Path
 
 import click
@@ -16,7 +16,7 @@ from phyblock.cli.vqa_data import data_option, questions_option, read_question_s
 from phyblock.cli.vqa_subtasks import subtasks_option
 from phyblock.domain import Question, Subtask
 from phyblock.errors import DataError, Problem, SpecError, StoreError
-from phyblock.models import Gate, Model, ModelConfig, ReplyCache, build_model
+from phyblock.models import Breakers, Gate, ModelConfig, RetryPolicy, SharedCache, build_model
 from phyblock.resources import bundled, reply_cache_file
 from phyblock.run.models import to_config
 from phyblock.run.wordings import Paraphrase, stems_of, write_wordings
@@ -88,10 +88,8 @@ def command(
         message = "holds no question of these subtasks in a known wording"
         raise DataError(Problem(questions, message))
     prompt = TemplatePrompt(bundled("prompts", "vqa_write.j2"), "vqa_write")
-    with ExitStack() as stack:
-        cache = None if no_cache else stack.enter_context(ReplyCache(reply_cache_file()))
-        model = build_model(config, cache=cache, overall=Gate(_AT_ONCE))
-        found = asyncio.run(_write(model, prompt, stems, count, checks, seed))
+    asking = _ask(config, prompt, stems, count, checks, seed, use_cache=not no_cache)
+    found = asyncio.run(asking)
     lines = [paraphrase.line(name, number) for number, paraphrase in _numbered(found)]
     write_file(out, "".join(line + "\n" for line in lines))
     accepted = sum(paraphrase.fault is None for paraphrase in found)
@@ -107,23 +105,30 @@ def _config(name: str, models_file: str | None) -> ModelConfig:
     return to_config(name, known[name], SuiteSpec(name="write", models=(name,)))
 
 
-async def _write(
-    model: Model,
+async def _ask(
+    config: ModelConfig,
     prompt: TemplatePrompt,
     stems: Mapping[str, Sequence[Question]],
     count: int,
     checks: int,
     seed: int,
+    *,
+    use_cache: bool,
 ) -> list[Paraphrase]:
-    try:
+    tell = make_console(stderr=True).print
+    async with AsyncExitStack() as stack:
+        cache = None
+        if use_cache:
+            cache = await stack.enter_async_context(SharedCache(reply_cache_file(), tell))
+        breakers = Breakers(RetryPolicy(), tell)
+        model = build_model(config, cache=cache, overall=Gate(_AT_ONCE), breakers=breakers)
+        stack.push_async_callback(model.aclose)
         found = await asyncio.gather(
             *(
                 write_wordings(model, prompt, stem, questions, count, checks, seed)
                 for stem, questions in stems.items()
             )
         )
-    finally:
-        await model.aclose()
     return [paraphrase for part in found for paraphrase in part]
 
 

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from phyblock.errors import Problem, SpecError
+from phyblock.errors import Problem, SpecError, StoreError
 from phyblock.models import (
+    Breakers,
     Budget,
     Gate,
     Halt,
     Model,
     ModelEvent,
-    ReplyCache,
     RetryPolicy,
+    SharedCache,
     api_key_status,
     build_model,
 )
 from phyblock.resources import reply_cache_file
-from phyblock.run.events import ModelNotice, RunStarted, Watcher
+from phyblock.run.events import ModelNotice, RunNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.plan import RunPlan
 from phyblock.run.reading import RecordLines, TurnLines, read_records
@@ -71,7 +73,7 @@ class Session:
         self._folder = folder
         self._watch = watch
         self._use_cache = use_cache
-        self._cache: ReplyCache | None = None
+        self._cache: SharedCache | None = None
         self._store: RunStore | None = None
         self._models: dict[str, Model] = {}
         self.executor: Executor
@@ -81,13 +83,16 @@ class Session:
         try:
             self._store = RunStore(self._folder, plan.manifest)
             if self._use_cache and any(m.config.kind == "litellm" for m in plan.models):
-                self._cache = ReplyCache(reply_cache_file())
+                self._cache = SharedCache(reply_cache_file(), self._tell)
+                await self._cache.open()
             limits = plan.suite.limits
             overall = Gate(limits.max_concurrency)
             halt = Halt()
             budget = None
             if limits.max_cost_usd is not None:
                 budget = Budget(limits.max_cost_usd, _spent_usd(self._folder))
+            policy = RetryPolicy(limits.max_attempts, limits.retry_for_s)
+            breakers = Breakers(policy, self._tell)
             for model in plan.models:
                 self._models[model.name] = build_model(
                     model.config,
@@ -95,7 +100,8 @@ class Session:
                     overall=overall,
                     budget=budget,
                     observer=self._notice,
-                    policy=RetryPolicy(attempts=limits.max_attempts),
+                    policy=policy,
+                    breakers=breakers,
                     halt=halt,
                 )
             self.executor = Executor(
@@ -121,10 +127,7 @@ class Session:
         await self._close()
 
     async def run(self) -> RunResult:
-        """Ask what is left to ask; see `Executor.run`.
-
-        Raises StoreError also where all is asked but the cache refused a reply.
-        """
+        """Ask what is left to ask; see `Executor.run`."""
         settled = self.executor.settled.values()
         self._watch(
             RunStarted(
@@ -135,22 +138,26 @@ class Session:
                 },
             )
         )
-        result = await self.executor.run()
-        if self._cache is not None:
-            self._cache.check()
-        return result
+        return await self.executor.run()
 
     def _notice(self, event: ModelEvent) -> None:
-        self._watch(ModelNotice(event.model, event.kind, event.message))
+        notice = ModelNotice(
+            event.model, event.kind, event.message, event.wait_s, event.limit, event.status
+        )
+        self._watch(notice)
+
+    def _tell(self, text: str) -> None:
+        self._watch(RunNotice(text))
 
     async def _close(self) -> None:
         for model in self._models.values():
             await model.aclose()
         for track in self._plan.tracks:
             track.close()
-        for resource in (self._cache, self._store):
-            if resource is not None:
-                resource.close()
+        if self._cache is not None:
+            await self._cache.aclose()
+        if self._store is not None:
+            self._store.close()
 
 
 def _spent_usd(folder: Path) -> float:
@@ -164,8 +171,8 @@ def _spent_usd(folder: Path) -> float:
 
 def _record_usd(record: Mapping[str, Any]) -> float:
     reply = {} if "turns" in record else record["reply"] or {}
-    failed = (record["error"] or {}).get("billed_usd") or 0.0
-    return _billed_usd(reply) if reply else failed
+    failed = (record["error"] or {}).get("billed_usd")
+    return _billed_usd(reply) if reply else _amount(failed)
 
 
 def _billed_usd(reply: Mapping[str, Any]) -> float:
@@ -173,4 +180,14 @@ def _billed_usd(reply: Mapping[str, Any]) -> float:
     billed_usd: float | None = reply.get("billed_usd")
     if billed_usd is None and not reply.get("cached"):
         billed_usd = reply.get("cost_usd")
-    return billed_usd or 0.0
+    return _amount(billed_usd)
+
+
+def _amount(usd: float | None) -> float:
+    """The amount; StoreError for what is none, since a limit cannot be kept on top of it."""
+    amount = usd or 0.0
+    if not (math.isfinite(amount) and amount >= 0):
+        message = "hold a cost that is no amount, so that max_cost_usd cannot be kept"
+        hint = "remove the line that holds it: its sample is asked again"
+        raise StoreError(Problem("the run's records", message, "cost", str(usd), hint=hint))
+    return amount
