@@ -1,0 +1,32 @@
+"""Text that others wrote (names, replies, paths), made harmless where we show or store it."""
+
+from __future__ import annotations
+
+import re
+
+__all__ = ["csv_cell", "one_line"]
+
+_FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+
+def one_line(text: str) -> str:
+    """Text on one line: a space for each newline, control character and half of a character.
+
+    Marks that turn the direction of writing go, too: they would change what stands beside them.
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+def csv_cell(value: object) -> object:
+    """A value as a cell of a CSV file that a spreadsheet never takes for a formula.
+
+    Text that begins with `=`, `+`, `-`, `@`, a tab or a line break gets an apostrophe before it;
+    so does text that begins with apostrophes and then one of these, so that one apostrophe taken
+    away gives back what was there. Numbers, as numbers or as text, stay as they are.
+    """
+    if isinstance(value, str) and _FORMULA.match(value) and not _NUMBER.fullmatch(value):
+        return f"'{value}"
+    return value
