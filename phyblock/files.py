@@ -5,13 +5,13 @@ from __future__ import annotations
 import contextlib
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from uuid import uuid4
 
 from phyblock.errors import Problem, StoreError
 
-__all__ = ["atomic_write", "make_folder", "write_named", "writing"]
+__all__ = ["atomic_write", "check_free", "make_folder", "write_named", "writing"]
 
 
 @contextlib.contextmanager
@@ -26,6 +26,13 @@ def writing(path: Path, hint: str = "") -> Iterator[None]:
         # A name that the file system cannot spell is an encoding error, no OSError.
         said = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise StoreError(Problem(str(path), f"cannot be written: {said}", hint=hint)) from error
+
+
+def check_free(paths: Iterable[Path], hint: str) -> None:
+    """Raise StoreError naming all of `paths` where something is, a link that leads nowhere too."""
+    taken = [path for path in paths if os.path.lexists(path)]
+    if taken:
+        raise StoreError([Problem(str(path), "is already there", hint=hint) for path in taken])
 
 
 def make_folder(path: Path, hint: str = "") -> None:

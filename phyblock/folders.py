@@ -11,8 +11,10 @@ import contextlib
 import errno
 import fcntl
 import os
+import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
+from uuid import uuid4
 
 from phyblock.bounded import read_bytes
 from phyblock.errors import Problem, StoreError
@@ -24,12 +26,16 @@ LIST = ".generated"
 """The file that names what we wrote into a folder."""
 
 _HEAD = "# What phyblock wrote here and may write again; all else is never touched."
-_LINK = "is a link, and links are never followed or replaced"
+_LINK = "cannot be written: it is a link, and links are never followed or replaced"
 _HINT = "move it away, or choose another folder with --out"
+_CLOSED = "cannot be written in"
 
 
 class OutFolder:
-    """A folder and what in it is ours; names are relative, with slashes."""
+    """A folder and what in it is ours.
+
+    Names are of files, relative, with slashes; one that ends in a slash is of a folder.
+    """
 
     def __init__(self, path: Path, earlier: Callable[[], Iterable[str]] | None = None) -> None:
         """Take `path`, which need not exist.
@@ -52,10 +58,14 @@ class OutFolder:
         """
         names = list(names)
         # What is there is looked at first: another process lists a name before it writes the file.
-        there = [name for name in names if os.path.lexists(self.path / name)]
+        files = [name for name in names if not name.endswith("/")]
+        there = [name for name in files if os.path.lexists(self.path / name)]
         known = self._known()
         found: dict[Path, str] = {}
-        for folder in sorted({above for name in names for above in _above(name)}):
+        # Itself it may be a link: a person named it.
+        if self.path.is_dir() and not os.access(self.path, os.W_OK | os.X_OK):
+            found[self.path] = _CLOSED
+        for folder in _folders(names):
             if wrong := _wrong_folder(self.path / folder):
                 found[self.path / folder] = wrong
         for name in there:
@@ -74,7 +84,7 @@ class OutFolder:
         make_folder(self.path, _HINT)
         with writing(self.path / LIST):
             self._append(names)
-        for folder in sorted({above for name in names for above in _above(name)}):
+        for folder in _folders(names):
             make_folder(self.path / folder, _HINT)
 
     def write(self, files: Mapping[str, bytes | str]) -> tuple[Path, ...]:
@@ -86,6 +96,28 @@ class OutFolder:
             with writing(paths[-1]):
                 atomic_write(paths[-1], data)
         return tuple(paths)
+
+    @contextlib.contextmanager
+    def making(self, below: str = "") -> Iterator[Path]:
+        """A new folder to write any files into; at the end they are moved to `below` in this one.
+
+        `below` is empty or a folder's name with its slash. Where the work fails, nothing is left of
+        it. Raises as `write`.
+        """
+        self.claim([below] if below else [])
+        part = self.path / f".{uuid4().hex}.part"
+        with writing(self.path / below):
+            part.mkdir()
+        try:
+            yield part
+            files = sorted(path for path in part.rglob("*") if path.is_file())
+            names = [path.relative_to(part).as_posix() for path in files]
+            self.claim(below + name for name in names)
+            with writing(self.path / below):
+                for file, name in zip(files, names, strict=True):
+                    file.replace(self.path / below / name)
+        finally:
+            shutil.rmtree(part)
 
     @contextlib.contextmanager
     def alone(self) -> Iterator[None]:
@@ -108,7 +140,8 @@ class OutFolder:
         path = self.path / LIST
         listed = _read(path)
         known = self._known()
-        lines = [name for name in dict.fromkeys(names) if name not in known]
+        files = (name for name in dict.fromkeys(names) if not name.endswith("/"))
+        lines = [name for name in files if name not in known]
         if not listed:
             lines = [_HEAD, *sorted(known), *lines]
         if lines:
@@ -143,9 +176,13 @@ def _append(path: Path, data: bytes) -> None:
             raise
 
 
-def _above(name: str) -> list[str]:
-    """The folders between the out folder and a file, the outermost first."""
-    return [str(above) for above in reversed(PurePosixPath(name).parents) if str(above) != "."]
+def _folders(names: Iterable[str]) -> list[str]:
+    """The folders that are named or hold what is named, those above before those below."""
+    found: set[str] = set()
+    for name in names:
+        path = PurePosixPath(f"{name}_" if name.endswith("/") else name)
+        found |= {str(above) for above in path.parents}
+    return sorted(found - {"."})
 
 
 def _wrong_folder(path: Path) -> str:
@@ -153,9 +190,9 @@ def _wrong_folder(path: Path) -> str:
     if path.is_symlink():
         return _LINK
     if path.exists() and not path.is_dir():
-        return "is in the way of a folder"
+        return "cannot be written in: it is no folder"
     if path.exists() and not os.access(path, os.W_OK | os.X_OK):
-        return "is a folder that cannot be written in"
+        return _CLOSED
     return ""
 
 
@@ -163,5 +200,5 @@ def _wrong_file(path: Path, is_ours: bool) -> str:
     if path.is_symlink():
         return _LINK
     if not path.is_file():
-        return "is in the way of a file"
-    return "" if is_ours else "is in the way: phyblock did not write it"
+        return "cannot be written: it is no file"
+    return "" if is_ours else "cannot be written: phyblock did not make what is there"

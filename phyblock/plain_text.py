@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["csv_cell", "one_line"]
+__all__ = ["csv_cell", "one_line", "plain_lines"]
 
 _FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -18,6 +18,11 @@ def one_line(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else " " for c in text)
+
+
+def plain_lines(text: str) -> str:
+    """Text whose lines are each as `one_line` makes them."""
+    return "\n".join(map(one_line, text.split("\n")))
 
 
 def csv_cell(value: object) -> object:

@@ -66,7 +66,7 @@ def test_a_list_that_is_a_link_is_not_written_through(tmp_path: Path) -> None:
     theirs.write_text("theirs")
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / LIST).symlink_to(theirs)
-    with pytest.raises(StoreError, match="is a link"):
+    with pytest.raises(StoreError, match="it is a link"):
         OutFolder(tmp_path / "out").write({"a": "ours"})
     assert theirs.read_text() == "theirs"
 
@@ -78,8 +78,8 @@ def test_files_and_folders_in_the_way_are_named(tmp_path: Path) -> None:
         OutFolder(tmp_path).check(["tables/b.csv", "a.csv"])
     told = {problem.where: problem.message for problem in caught.value.problems}
     assert told == {
-        str(tmp_path / "tables"): "is in the way of a folder",
-        str(tmp_path / "a.csv"): "is in the way of a file",
+        str(tmp_path / "tables"): "cannot be written in: it is no folder",
+        str(tmp_path / "a.csv"): "cannot be written: it is no file",
     }
     assert not (tmp_path / LIST).exists()
 
@@ -89,7 +89,7 @@ def test_what_was_written_before_there_was_a_list_is_ours(tmp_path: Path) -> Non
     out = OutFolder(tmp_path, earlier=lambda: ["a.csv", "b.md"])
     out.write({"a.csv": "ours"})
     OutFolder(tmp_path, earlier=lambda: ["mine.md"]).write({"b.md": "ours"})
-    with pytest.raises(StoreError, match="phyblock did not write it"):
+    with pytest.raises(StoreError, match="phyblock did not make"):
         OutFolder(tmp_path, earlier=lambda: ["mine.md"]).write({"mine.md": "ours"})
     assert contents(tmp_path) == {"a.csv": "ours", "b.md": "ours", "mine.md": "theirs"}
 
@@ -103,3 +103,26 @@ def test_a_list_that_was_cut_short_is_no_failure(tmp_path: Path) -> None:
     OutFolder(tmp_path).write({"a.csv": "2", "c": "2"})
     OutFolder(tmp_path).write({"c": "3"})
     assert contents(tmp_path) == {"a.csv": "2", "b.md": "1", "c": "3"}
+
+
+def make(out: OutFolder, name: str, failure: Exception | None = None) -> None:
+    with out.making() as folder:
+        (folder / "b").write_text("ours")
+        (folder / name).write_text("ours")
+        if failure is not None:
+            raise failure
+
+
+def test_files_that_are_made_together_come_together_or_not_at_all(tmp_path: Path) -> None:
+    out = OutFolder(tmp_path / "out")
+    with out.making("deep/") as folder:
+        (folder / "x").mkdir()
+        (folder / "x" / "y").write_text("ours")
+    assert contents(out.path) == {"deep/x/y": "ours"}
+    put(out.path, {"mine"})
+    with pytest.raises(ValueError, match="stop"):
+        make(out, "a", ValueError("stop"))
+    with pytest.raises(StoreError, match="mine"):
+        make(out, "mine")
+    assert contents(out.path) == {"deep/x/y": "ours", "mine": "theirs"}
+    assert sorted(path.name for path in out.path.iterdir()) == [LIST, "deep", "mine"]

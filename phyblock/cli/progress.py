@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from phyblock.cli.tally import Tally
+from phyblock.plain_text import one_line
 from phyblock.run.events import (
     ModelNotice,
     ModelStopped,
@@ -34,7 +35,7 @@ class ProgressView:
 
     def __init__(self, console: Console, title: str) -> None:
         self._console = console
-        self._title = title
+        self._title = one_line(title)
         self._tallies: dict[str, Tally] = {}
         self._started = time.monotonic()
         self._last_line = self._started
@@ -75,7 +76,7 @@ class ProgressView:
             tally.notice = event.text
         elif isinstance(event, ModelStopped):
             self._tallies[event.model].notice = f"stopped: {event.reason}"
-            self._console.print(f"{event.model} stopped:", style="red", end=" ")
+            self._console.print(f"{one_line(event.model)} stopped:", style="red", end=" ")
             self._console.print(event.reason)
         elif isinstance(event, Stopping):
             self._status = self._stopping_text(event)
@@ -128,7 +129,7 @@ class ProgressView:
         parts += [self._table(), *self._remarks()]
         return Panel(
             Group(*parts),
-            title=self._title,
+            title=Text(self._title),
             title_align="left",
             border_style="dim",
             # The terminal writes ^C behind the last column and would wrap a full line.
@@ -142,7 +143,7 @@ class ProgressView:
             said = [tally.failure_text] if tally.failures else []
             said += [tally.notice] if tally.notice and tally.done < tally.expected else []
             if said:
-                text = f"{name}: {'; '.join(said)}"
+                text = one_line(f"{name}: {'; '.join(said)}")
                 lines.append(Text(text, style="yellow", no_wrap=True, overflow="ellipsis"))
         return lines[:_REMARKS]
 
@@ -153,7 +154,7 @@ class ProgressView:
             table.add_column(name, justify="right", no_wrap=True)
         for name, tally in self._tallies.items():
             table.add_row(
-                name,
+                one_line(name),
                 f"{tally.done:,}/{tally.expected:,}",
                 tally.f1_text,
                 f"{tally.tokens:,}",

@@ -19,8 +19,8 @@ from typing import TypeVar
 
 from PIL import Image as PillowImage
 
-from phyblock.errors import Problem, SimulationError, StoreError
-from phyblock.files import atomic_write
+from phyblock.errors import SimulationError
+from phyblock.files import atomic_write, writing
 from phyblock.models.base import Image
 
 __all__ = ["Drawing", "Studio", "to_image"]
@@ -110,12 +110,9 @@ class Studio:
         try:
             data = await self.work_out(drawing.make)
             self.rendered += 1
-            path.parent.mkdir(parents=True, exist_ok=True)
-            atomic_write(path, data)
-        except OSError as error:
-            hint = "name another cache folder with PHYBLOCK_CACHE"
-            problem = Problem(str(path), f"cannot be written: {error.strerror}", hint=hint)
-            raise StoreError(problem) from error
+            with writing(path, "name another cache folder with PHYBLOCK_CACHE"):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                atomic_write(path, data)
         finally:
             del self._making[drawing.key]
         return data
