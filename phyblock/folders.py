@@ -29,6 +29,7 @@ _HEAD = "# What phyblock wrote here and may write again; all else is never touch
 _LINK = "cannot be written: it is a link, and links are never followed or replaced"
 _HINT = "move it away, or choose another folder with --out"
 _CLOSED = "cannot be written in"
+_OUTSIDE = "cannot be written: its name leads out of the folder"
 
 
 class OutFolder:
@@ -61,7 +62,7 @@ class OutFolder:
         files = [name for name in names if not name.endswith("/")]
         there = [name for name in files if os.path.lexists(self.path / name)]
         known = self._known()
-        found: dict[Path, str] = {}
+        found = {self.path / name: _OUTSIDE for name in names if _is_outside(name)}
         # Itself it may be a link: a person named it.
         if self.path.is_dir() and not os.access(self.path, os.W_OK | os.X_OK):
             found[self.path] = _CLOSED
@@ -183,6 +184,10 @@ def _folders(names: Iterable[str]) -> list[str]:
         path = PurePosixPath(f"{name}_" if name.endswith("/") else name)
         found |= {str(above) for above in path.parents}
     return sorted(found - {"."})
+
+
+def _is_outside(name: str) -> bool:
+    return PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts
 
 
 def _wrong_folder(path: Path) -> str:

@@ -84,6 +84,13 @@ def test_files_and_folders_in_the_way_are_named(tmp_path: Path) -> None:
     assert not (tmp_path / LIST).exists()
 
 
+@pytest.mark.parametrize("name", ["../mine", "a/../../mine", "/mine"])
+def test_no_name_leads_out_of_the_folder(tmp_path: Path, name: str) -> None:
+    with pytest.raises(StoreError, match="leads out of the folder"):
+        OutFolder(tmp_path / "out").write({name: "ours"})
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_what_was_written_before_there_was_a_list_is_ours(tmp_path: Path) -> None:
     put(tmp_path, {"a.csv", "b.md", "mine.md"})
     out = OutFolder(tmp_path, earlier=lambda: ["a.csv", "b.md"])

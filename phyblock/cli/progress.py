@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from types import TracebackType
 
@@ -76,12 +77,11 @@ class ProgressView:
             tally.notice = event.text
         elif isinstance(event, ModelStopped):
             self._tallies[event.model].notice = f"stopped: {event.reason}"
-            self._console.print(f"{one_line(event.model)} stopped:", style="red", end=" ")
-            self._console.print(event.reason)
+            self._say(f"{one_line(event.model)} stopped: {event.reason}", style="red")
         elif isinstance(event, Stopping):
             self._status = self._stopping_text(event)
             if self._live is None:
-                self._console.print(self._status, markup=False)
+                self._say(self._status)
 
     @property
     def cost_text(self) -> str:
@@ -100,7 +100,12 @@ class ProgressView:
         now = time.monotonic()
         if self._live is None and now - self._last_line >= _LINE_EVERY_S:
             self._last_line = now
-            self._console.print(self._summary(), markup=False, highlight=False)
+            self._say(self._summary())
+
+    def _say(self, text: str, style: str = "") -> None:
+        """Print a line; one that nobody can read any more must not end calls that cost money."""
+        with contextlib.suppress(OSError):
+            self._console.print(text, style=style)
 
     def _summary(self) -> str:
         done = sum(tally.done for tally in self._tallies.values())

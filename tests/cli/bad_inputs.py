@@ -167,7 +167,7 @@ FOLDERS: tuple[Bad, ...] = (
     Bad("no-run", command("report", "data"), ("data: holds no run.yaml",)),
     Bad("nothing", command("report", "nowhere"), ("nowhere", "phyblock run")),
     Bad("score-file", command("score", "suite.yaml"), ("suite.yaml", "phyblock run")),
-    Bad("orphans", no_manifest, ("out: holds another run", "records, and no run.yaml")),
+    Bad("orphans", no_manifest, ("out: is not empty and holds no run", "no run.yaml", "--out")),
     Bad("changed-data", changed_data, ("data: sha256: is not the data set", "found", "allowed")),
     Bad("lost-data", lost_data, ("data: ", "is not there", "--data")),
     Bad("score-over-run", scores_over_run, ("precious: holds another run", "--out")),
