@@ -6,17 +6,20 @@ import re
 
 __all__ = ["csv_cell", "one_line", "plain_lines"]
 
+_HALF = re.compile("[\ud800-\udfff]")
 _FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def one_line(text: str) -> str:
-    """Text on one line: a space for each newline, control character and half of a character.
+    """Text on one line: a space for each newline and control character.
 
+    Half a character, as it stands for a byte of a file name that is not UTF-8, becomes U+FFFD.
     Marks that turn the direction of writing go, too: they would change what stands beside them.
     """
     if text.isprintable():
         return text
+    text = _HALF.sub("\ufffd", text)
     return "".join(c if c.isprintable() else " " for c in text)
 
 

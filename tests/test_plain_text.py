@@ -46,4 +46,4 @@ def test_one_line_is_one_line_that_can_be_written(text: str) -> None:
 
 def test_one_line_leaves_printable_text_alone() -> None:
     assert one_line("a ± b – 模型") == "a ± b – 模型"  # noqa: RUF001
-    assert one_line("a\nb\x1b[31m\u202ec\ud800") == "a b [31m c "
+    assert one_line("a\nb\x1b[31m\u202ec\ud800") == "a b [31m c\ufffd"

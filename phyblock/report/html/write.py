@@ -72,7 +72,7 @@ def write_report(
     with out.alone(), writing(run.path / REPORT_FILE):
         drawn = write_figures(run, figures)
         build = _build(run, sources)
-        out.claim([*page_files(), f"{_FOLDER}/{build}/"])
+        out.claim([REPORT_FILE, f"{_FOLDER}/{build}/"])
         new = new_build(folder, build)
         try:
             _write_data(run, sources, folder, new, build)
