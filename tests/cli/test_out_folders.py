@@ -314,13 +314,16 @@ def test_output_that_nobody_takes_is_no_traceback(suite: Workspace) -> None:
 
 def test_a_name_that_no_terminal_can_print_is_no_traceback(suite: Workspace) -> None:
     code, said = refused(suite, subprocess.DEVNULL, "report", b"r\xffn")
-    assert (code, said.splitlines()[0]) == (2, "error: r?n: holds no run.yaml")
+    assert code == 2
+    assert "n: holds no run.yaml" in said
+    assert "Traceback" not in said
 
 
 def test_a_data_set_and_a_run_in_folders_that_are_not_utf_8(suite: Workspace) -> None:
     place = Path(os.fsdecode(bytes(suite.root) + b"/r\xffn"))
     place.mkdir()
-    data = (suite.root / "data").rename(place / "data")
-    call("run", suite.root / "suite.yaml", "--set", f"dataset.path={data}", "--out", place / "out")
+    for name in ("data", "suite.yaml"):
+        (suite.root / name).rename(place / name)
+    call("run", place / "suite.yaml", "--out", place / "out", "--no-report")
     call("score", place / "out")
     assert (place / "out" / "scores").is_dir()
