@@ -191,9 +191,17 @@ def test_a_link_in_the_place_of_a_build_is_not_followed(finished: Path, tmp_path
     put(tmp_path / "theirs" / "index.js")
     (finished / "report").mkdir()
     (finished / "report" / "0123456789ab").symlink_to(tmp_path / "theirs")
-    write_report(write_tables(finished), figures=())
-    assert (tmp_path / "theirs" / "index.js").read_text() == "mine"
+    page = write_report(write_tables(finished), figures=())
     assert (finished / "report" / "0123456789ab").is_symlink()
+    (build,) = (path for path in (finished / "report").iterdir() if not path.is_symlink())
+    build.rename(tmp_path / "build")
+    for name in (build.name, f"{build.name}.new"):
+        (finished / "report" / name).symlink_to(tmp_path / "theirs")
+        with pytest.raises(StoreError, match="it is a link"):
+            write_report(write_tables(finished), figures=())
+        (finished / "report" / name).unlink()
+    assert files(tmp_path / "theirs") == {"index.js": b"mine"}
+    assert page.is_file()
 
 
 def test_reports_that_are_written_at_once_all_come_to_their_end(finished: Path) -> None:

@@ -9,25 +9,22 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-__all__ = ["new_build", "put_in_place", "remove_build", "remove_others"]
+__all__ = ["clear", "put_in_place", "remove_build", "remove_others"]
 
 _BUILD = re.compile(r"[0-9a-f]{12}(\.new)?")
 _SCRIPT = re.compile(r"(index|(records|scenes|questions|prompts)-\d+)\.js")
 
 
-def new_build(folder: Path, build: str) -> Path:
-    """An empty folder for a build that is being written; raises OSError where it cannot be."""
-    new = folder / f"{build}.new"
-    remove_build(new)
-    new.mkdir(exist_ok=True)
-    return new
+def clear(build: Path) -> None:
+    """Make an empty folder for a build, whatever one that was killed left there."""
+    remove_build(build)
+    build.mkdir(exist_ok=True)
 
 
 def put_in_place(new: Path) -> None:
-    """Put a build that is whole where the page looks for it."""
+    """Put a build that is whole where the page looks for it: NAME.new becomes NAME."""
     place = new.with_suffix("")
-    remove_build(place)
-    place.mkdir(exist_ok=True)
+    clear(place)
     for script in new.iterdir():
         script.replace(place / script.name)
     remove_build(new)

@@ -11,7 +11,7 @@ from typing import Any
 from phyblock.domain import SUBTASK_NAMES
 from phyblock.files import writing
 from phyblock.report.figures import FIGURES, write_figures
-from phyblock.report.html.builds import new_build, put_in_place, remove_build, remove_others
+from phyblock.report.html.builds import clear, put_in_place, remove_build, remove_others
 from phyblock.report.html.drawable import kit, question_entry, scene_entry
 from phyblock.report.html.headline import assembly_headline
 from phyblock.report.html.headline_tracks import steps_headline, vqa_headline
@@ -72,8 +72,9 @@ def write_report(
     with out.alone(), writing(run.path / REPORT_FILE):
         drawn = write_figures(run, figures)
         build = _build(run, sources)
-        out.claim([REPORT_FILE, f"{_FOLDER}/{build}/"])
-        new = new_build(folder, build)
+        new = folder / f"{build}.new"
+        out.claim([REPORT_FILE, f"{_FOLDER}/{build}/", f"{_FOLDER}/{new.name}/"])
+        clear(new)
         try:
             _write_data(run, sources, folder, new, build)
             page = _page(written, drawn, build)
