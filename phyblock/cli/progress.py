@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 from collections import Counter
@@ -18,6 +19,7 @@ from rich.text import Text
 
 from phyblock.cli.remarks import Remarks
 from phyblock.cli.tally import Tally, failure_text
+from phyblock.plain_text import one_line
 from phyblock.run.events import (
     ModelNotice,
     ModelStopped,
@@ -42,7 +44,7 @@ class ProgressView:
     ) -> None:
         self._now = now
         self._console = console
-        self._title = title
+        self._title = one_line(title)
         self._tallies: dict[str, Tally] = {}
         self._started = now()
         self._last_line = self._started
@@ -86,12 +88,11 @@ class ProgressView:
             self._say(event.text)
         elif isinstance(event, ModelStopped):
             self._tallies[event.model].notice = f"stopped: {event.reason}"
-            self._console.print(f"{event.model} stopped:", style="red", end=" ")
-            self._console.print(event.reason)
+            self._say(f"{one_line(event.model)} stopped: {event.reason}", style="red")
         elif isinstance(event, Stopping):
             self._status = self._stopping_text(event)
             if self._live is None:
-                self._console.print(self._status, markup=False)
+                self._say(self._status)
 
     def _take_note(self, event: ModelNotice) -> None:
         tally = self._tallies[event.model]
@@ -103,8 +104,10 @@ class ProgressView:
                 self._say(line)
             self._plain_line()
 
-    def _say(self, line: str) -> None:
-        self._console.print(Text(line), soft_wrap=True)
+    def _say(self, line: str, style: str = "") -> None:
+        """Print a line; one that nobody can read any more must not end calls that cost money."""
+        with contextlib.suppress(OSError):
+            self._console.print(Text(line, style=style), soft_wrap=True)
 
     @property
     def cost_text(self) -> str:
@@ -161,7 +164,7 @@ class ProgressView:
         parts += [self._table(), *self._remarks()]
         return Panel(
             Group(*parts),
-            title=self._title,
+            title=Text(self._title),
             title_align="left",
             border_style="dim",
             # The terminal writes ^C behind the last column and would wrap a full line.
@@ -175,7 +178,7 @@ class ProgressView:
             said = [tally.failure_text] if tally.failures else []
             said += [tally.notice] if tally.notice and tally.done < tally.expected else []
             if said:
-                text = f"{name}: {'; '.join(said)}"
+                text = one_line(f"{name}: {'; '.join(said)}")
                 lines.append(Text(text, style="yellow", no_wrap=True, overflow="ellipsis"))
         return lines[:_REMARKS]
 
@@ -186,7 +189,7 @@ class ProgressView:
             table.add_column(name, justify="right", no_wrap=True)
         for name, tally in self._tallies.items():
             table.add_row(
-                name,
+                one_line(name),
                 f"{tally.done:,}/{tally.expected:,}",
                 tally.f1_text,
                 f"{tally.tokens:,}",

@@ -11,11 +11,12 @@ import click
 
 from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.files import find_models_file
-from phyblock.cli.scenes_work import make_folder, write_file
+from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.cli.vqa_data import data_option, questions_option, read_question_set
 from phyblock.cli.vqa_subtasks import subtasks_option
 from phyblock.domain import Question, Subtask
-from phyblock.errors import DataError, Problem, SpecError, StoreError
+from phyblock.errors import DataError, Problem, SpecError
+from phyblock.files import check_free, make_folder, write_named
 from phyblock.models import Breakers, Gate, ModelConfig, RetryPolicy, SharedCache, build_model
 from phyblock.resources import bundled, reply_cache_file
 from phyblock.run.models import to_config
@@ -52,12 +53,17 @@ _AT_ONCE = 8
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S")
 @click.option(
     "--out",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=UserPath(dir_okay=False),
     required=True,
     metavar="FILE",
     help="JSON Lines for review.",
 )
-@click.option("--models-file", metavar="FILE", help="Models file instead of models.yaml.")
+@click.option(
+    "--models-file",
+    type=NAME_OR_PATH,
+    metavar="FILE",
+    help="Models file instead of models.yaml.",
+)
 @click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
 def command(
     name: str,
@@ -79,8 +85,7 @@ def command(
     a person has read it.
     """
     config = _config(name, models_file)
-    if out.exists():
-        raise StoreError(Problem(str(out), "is already there", hint="name another file"))
+    check_free([out], "name another file")
     make_folder(out.parent)
     asked = [task.question for task in read_question_set(questions, data).tasks]
     stems = stems_of([question for question in asked if question.subtask in subtasks])
@@ -91,7 +96,7 @@ def command(
     asking = _ask(config, prompt, stems, count, checks, seed, use_cache=not no_cache)
     found = asyncio.run(asking)
     lines = [paraphrase.line(name, number) for number, paraphrase in _numbered(found)]
-    write_file(out, "".join(line + "\n" for line in lines))
+    write_named(out, "".join(line + "\n" for line in lines))
     accepted = sum(paraphrase.fault is None for paraphrase in found)
     told = f"{counted(len(found), 'paraphrase')}, {accepted} accepted, in {shown_path(out)}"
     make_console().print(f"{told}; read them before they are used", markup=False, soft_wrap=True)

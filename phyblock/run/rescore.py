@@ -13,9 +13,10 @@ from pydantic import ValidationError
 
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import DataError, Problem, StoreError
-from phyblock.files import atomic_write
+from phyblock.files import atomic_write, writing
 from phyblock.parsing import PlanParser
 from phyblock.run.data import open_dataset
+from phyblock.run.folder import check_place, run_folder
 from phyblock.run.reading import MANIFEST, RECORDS, read_manifest, read_records
 from phyblock.run.records import judged
 from phyblock.run.select import select_tasks
@@ -44,6 +45,12 @@ def rescore(
     """
     manifest = read_manifest(folder)
     suite = _suite(folder, manifest, parser, matcher)
+    name = f"scores/{suite.parser}-{suite.scoring.matchers[0]}"
+    target = out or folder / name
+    identity = f"{manifest['identity']} scored by {suite.parser}, {suite.scoring.matchers[0]}"
+    if out is None:
+        run_folder(folder).check([f"{name}/"])
+    _check_target(target, identity)
     tasks = {task.scene.id: task for task in _tasks(folder, manifest, suite, data)}
     track = FullPlanning(planning_rules(suite))
     records = []
@@ -61,14 +68,17 @@ def rescore(
         text = None if record["reply"] is None else record["reply"]["text"]
         judgement = track.judge(task, text)
         records.append(judged(record, judgement.is_read, judgement.fields()))
-    target = out or folder / "scores" / f"{suite.parser}-{suite.scoring.matchers[0]}"
-    identity = f"{manifest['identity']} scored by {suite.parser}, {suite.scoring.matchers[0]}"
     scored = {**manifest, "identity": identity, "suite": suite.model_dump(mode="json")}
+    _write(target, scored, records)
+    return target
+
+
+def _check_target(target: Path, identity: str) -> None:
+    """Raise StoreError unless `target` is new, empty or holds these scores."""
+    check_place(target)
     if (target / MANIFEST).exists() and read_manifest(target)["identity"] != identity:
         hint = "choose another folder with --out: what a run stored is never changed"
         raise StoreError(Problem(str(target), "holds another run", hint=hint))
-    _write(target, scored, records)
-    return target
 
 
 def _suite(
@@ -123,10 +133,7 @@ def _write(folder: Path, manifest: Mapping[str, Any], records: list[dict[str, An
         MANIFEST: yaml.safe_dump(dict(manifest), sort_keys=False, allow_unicode=True, width=100),
         RECORDS: "".join(line + "\n" for line in lines),
     }
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    run_folder(folder).begin()
+    with writing(folder):
         for name, text in texts.items():
             atomic_write(folder / name, text)
-    except OSError as error:
-        problem = Problem(str(folder), f"cannot be written: {error.strerror}")
-        raise StoreError(problem) from error

@@ -16,14 +16,15 @@ from typing import IO, Any
 import yaml
 
 from phyblock.errors import Problem, StoreError
-from phyblock.files import atomic_write
+from phyblock.files import atomic_write, writing
 from phyblock.run.appending import AppendFile
+from phyblock.run.folder import LOCK, check_place, run_folder
 from phyblock.run.prompts import PromptFile, PromptLines
 from phyblock.run.reading import MANIFEST, Lines, RecordLines, TurnLines, read_manifest
 
 __all__ = ["RunStore", "holds_run"]
 
-_LOCK = ".lock"
+_HINT = "choose another folder with --out"
 _NOT_IDENTITY = (
     "suite.description",
     "suite.limits",
@@ -50,19 +51,16 @@ class RunStore:
         self._lock: IO[str] | None = None
         self._files: list[AppendFile] = []
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            self._lock = (folder / _LOCK).open("w")
-            self._acquire()
-            self._claim(manifest)
-            self.records = self._open(RecordLines(folder))
-            self.turns = self._open(TurnLines(folder))
-            known = PromptLines(folder)
-            self.prompts = PromptFile(self._open(known, sync=False), known.digests)
-        except OSError as error:
-            self.close()
-            hint = "choose another folder with --out"
-            problem = Problem(str(folder), f"cannot be written: {error.strerror}", hint=hint)
-            raise StoreError(problem) from error
+            with writing(folder, _HINT):
+                check_place(folder)
+                run_folder(folder).begin()
+                self._lock = (folder / LOCK).open("w")
+                self._acquire()
+                self._claim(manifest)
+                self.records = self._open(RecordLines(folder))
+                self.turns = self._open(TurnLines(folder))
+                known = PromptLines(folder)
+                self.prompts = PromptFile(self._open(known, sync=False), known.digests)
         except StoreError:
             self.close()
             raise
@@ -113,20 +111,21 @@ class RunStore:
 def holds_run(folder: Path, manifest: Mapping[str, Any]) -> bool:
     """Whether `folder` holds the run that `manifest` describes; reads alone.
 
-    Raises StoreError when it holds records of another run. A manifest without records is no run
-    yet: one that failed at once leaves it behind, and nothing would be lost with it.
+    Raises StoreError when it holds records of another run, or what is no run. A manifest without
+    records is no run yet: one that failed at once leaves it behind, and nothing would be lost
+    with it.
     """
-    found = read_manifest(folder) if (folder / MANIFEST).exists() else None
-    if found is not None and found["identity"] == manifest["identity"]:
+    check_place(folder)
+    if not (folder / MANIFEST).exists():
+        return False
+    found = read_manifest(folder)
+    if found["identity"] == manifest["identity"]:
         return True
     if next(iter(RecordLines(folder)), None) is None:
         return False
-    changed = f"records, and no {MANIFEST}"
-    if found is not None:
-        names = _changed(found, manifest)
-        changed = f"different: {', '.join(names) or 'how pictures are drawn'}"
-    hint = "choose another folder with --out"
-    raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=hint))
+    names = _changed(found, manifest)
+    changed = f"different: {', '.join(names) or 'how pictures are drawn'}"
+    raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=_HINT))
 
 
 def _changed(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
