@@ -10,8 +10,7 @@ from pathlib import Path
 from phyblock.errors import Problem, StoreError
 from phyblock.files import writing
 from phyblock.folders import LIST, OutFolder
-from phyblock.run.prompts import PROMPTS
-from phyblock.run.reading import MANIFEST, RECORDS, TURNS
+from phyblock.records import MANIFEST, PROMPTS, RECORDS, TURNS
 
 __all__ = ["LOCK", "check_place", "run_folder"]
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
-from phyblock.errors import Problem, SpecError, StoreError
+from phyblock.errors import Problem, SpecError
 from phyblock.models import (
     Breakers,
     Budget,
@@ -25,7 +22,6 @@ from phyblock.resources import reply_cache_file
 from phyblock.run.events import ModelNotice, RunNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.plan import RunPlan
-from phyblock.run.reading import RecordLines, TurnLines, read_records
 from phyblock.run.store import RunStore
 
 __all__ = ["SERVERS", "Session", "check_ready"]
@@ -81,7 +77,7 @@ class Session:
     async def __aenter__(self) -> Session:
         plan = self._plan
         try:
-            self._store = RunStore(self._folder, plan.manifest)
+            self._store = RunStore(self._folder, plan.manifest, plan.sample_ids())
             if self._use_cache and any(m.config.kind == "litellm" for m in plan.models):
                 self._cache = SharedCache(reply_cache_file(), self._tell)
                 await self._cache.open()
@@ -90,7 +86,7 @@ class Session:
             halt = Halt()
             budget = None
             if limits.max_cost_usd is not None:
-                budget = Budget(limits.max_cost_usd, _spent_usd(self._folder))
+                budget = Budget(limits.max_cost_usd, self._store.standing.limit_usd)
             policy = RetryPolicy(limits.max_attempts, limits.retry_for_s)
             breakers = Breakers(policy, self._tell)
             for model in plan.models:
@@ -110,7 +106,6 @@ class Session:
                 self._models,
                 self._watch,
                 halt,
-                read_records(self._folder),
                 retry_failed=self._retry_failed,
             )
         except BaseException:
@@ -133,7 +128,7 @@ class Session:
             RunStarted(
                 {model.name: self._plan.samples_per_model for model in self._plan.models},
                 {
-                    model.name: tuple(r for r in settled if r["model"] == model.name)
+                    model.name: tuple(s for s in settled if s.model == model.name)
                     for model in self._plan.models
                 },
             )
@@ -158,36 +153,3 @@ class Session:
             await self._cache.aclose()
         if self._store is not None:
             self._store.close()
-
-
-def _spent_usd(folder: Path) -> float:
-    """What the run cost so far: of every line, also of those that later ones replaced.
-
-    Replies of episodes are counted where each was written when it came, as turns.
-    """
-    turns = sum(_billed_usd(turn["reply"]) for _, turn in TurnLines(folder))
-    return turns + sum(_record_usd(record) for _, record in RecordLines(folder))
-
-
-def _record_usd(record: Mapping[str, Any]) -> float:
-    reply = {} if "turns" in record else record["reply"] or {}
-    failed = (record["error"] or {}).get("billed_usd")
-    return _billed_usd(reply) if reply else _amount(failed)
-
-
-def _billed_usd(reply: Mapping[str, Any]) -> float:
-    """What a limit counted for a reply, else its cost unless that was paid elsewhere."""
-    billed_usd: float | None = reply.get("billed_usd")
-    if billed_usd is None and not reply.get("cached"):
-        billed_usd = reply.get("cost_usd")
-    return _amount(billed_usd)
-
-
-def _amount(usd: float | None) -> float:
-    """The amount; StoreError for what is none, since a limit cannot be kept on top of it."""
-    amount = usd or 0.0
-    if not (math.isfinite(amount) and amount >= 0):
-        message = "hold a cost that is no amount, so that max_cost_usd cannot be kept"
-        hint = "remove the line that holds it: its sample is asked again"
-        raise StoreError(Problem("the run's records", message, "cost", str(usd), hint=hint))
-    return amount

@@ -10,6 +10,7 @@ from typing import Any
 
 from phyblock.domain import SUBTASK_NAMES
 from phyblock.files import writing
+from phyblock.records import MANIFEST, PROMPTS, RECORDS
 from phyblock.report.figures import FIGURES, write_figures
 from phyblock.report.html.builds import clear, put_in_place, remove_build, remove_others
 from phyblock.report.html.drawable import kit, question_entry, scene_entry
@@ -29,8 +30,6 @@ from phyblock.report.html.sources import Sources, open_sources
 from phyblock.report.load import Run
 from phyblock.report.write import TablesWritten
 from phyblock.run.folder import run_folder
-from phyblock.run.prompts import PROMPTS
-from phyblock.run.reading import MANIFEST, RECORDS
 from phyblock.tasks.question_pictures import Shown
 
 __all__ = ["REPORT_FILE", "page_files", "write_report"]
