@@ -90,7 +90,9 @@ def _row(name: str, config: ModelConfig) -> tuple[str, ...]:
     if config.kind != "litellm":
         return (name, config.kind, str(config.recording or "built in"), NO_VALUE, "0", "0")
     status = api_key_status(config)
-    if status.is_set:
+    if status.fault:
+        key = "cannot be sent"
+    elif status.is_set:
         key = "set"
     else:
         key = f"needs {status.variables[0]}" if status.is_needed else "not needed"
