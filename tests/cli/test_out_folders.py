@@ -279,12 +279,12 @@ def test_init_writes_through_no_link(tmp_path: Path) -> None:
     assert not (tmp_path / "elsewhere.yaml").exists()
 
 
-@pytest.mark.parametrize("words", [("scenes", "generate"), ("vqa", "generate")])
-def test_a_data_set_is_made_over_no_card_of_another(tmp_path: Path, words: tuple[str, ...]) -> None:
-    put(tmp_path / "CARD.md")
-    with pytest.raises(StoreError, match=r"CARD\.md: is already there"):
-        call(*words, "--jobs", "1", "--replace", "--out", tmp_path)
-    assert files(tmp_path) == {"CARD.md": b"mine"}
+@pytest.mark.parametrize("verb", ["scenes", "vqa"])
+def test_a_data_set_is_made_over_no_sums_of_another(tmp_path: Path, verb: str) -> None:
+    put(tmp_path / "SHA256SUMS")
+    with pytest.raises(StoreError, match="SHA256SUMS: is already there"):
+        call(verb, "generate", "--jobs", "1", "--replace", "--out", tmp_path)
+    assert files(tmp_path) == {"SHA256SUMS": b"mine"}
 
 
 def test_pictures_are_drawn_over_none_of_another(suite: Workspace) -> None:
