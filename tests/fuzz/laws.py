@@ -37,8 +37,10 @@ class Broken:
     kind: str
     detail: str
 
-    def __str__(self) -> str:
-        return f"law {self.law}, {self.kind}:\n{self.detail}"
+    @property
+    def name(self) -> str:
+        """Law and kind."""
+        return f"law {self.law}: {self.kind}"
 
 
 def take_tree(root: Path) -> dict[str, Fingerprint]:
@@ -81,7 +83,7 @@ def broken_laws(
             change = "changed" if path in after and path in before else "made"
             change = change if path in after else "deleted"
             found.append(Broken(2, f"a file was {change}", path))
-    places = [str(root / place) for place in may_write]
+    places = [os.path.realpath(root / place) for place in may_write]
     found += [broken for deed in ended.deeds for broken in _judge(deed, places)]
     return found
 
@@ -90,12 +92,15 @@ def _judge(deed: Deed, places: Sequence[str]) -> Iterator[Broken]:
     if deed.event == "socket.connect":
         if not any(name in deed.about for name in _LOCAL):
             yield Broken(2, "a connection", deed.about)
-    elif not _lies_in(deed.about, [*(os.path.realpath(place) for place in places), *_DEVICES]):
+    elif not _lies_in(deed.about, [*places, *_DEVICES]):
         yield Broken(2, f"{deed.event} elsewhere", deed.about)
 
 
 def _lies_in(path: str, places: Sequence[str]) -> bool:
-    return any(path == place or path.startswith(place.rstrip("/") + "/") for place in places)
+    return any(
+        place == "." or path == place or path.startswith(place.rstrip("/") + "/")
+        for place in places
+    )
 
 
 def _walk(folder: Path) -> Iterator[os.DirEntry[str]]:
@@ -113,4 +118,4 @@ def _look(entry: os.DirEntry[str]) -> Fingerprint:
     if not stat.S_ISREG(mode):
         return "folder" if stat.S_ISDIR(mode) else "other", ""
     with open(entry.path, "rb") as file:
-        return "file", hashlib.file_digest(file, "md5").hexdigest()
+        return "file", hashlib.md5(file.read()).hexdigest()
