@@ -43,6 +43,8 @@ def check_ready(plan: RunPlan) -> None:
                 Problem(f"model {model.name}", message, "api_base", model.config.id, hint=hint)
             )
         status = api_key_status(model.config)
+        if status.fault:
+            problems.append(Problem(f"model {model.name}", status.fault, "", model.config.id))
         if status.is_needed and not status.is_set:
             message = "needs an API key, and none is set"
             names = " or ".join(status.variables)
