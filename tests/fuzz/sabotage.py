@@ -5,9 +5,11 @@ Each is a function that changes the product inside a worker, and nowhere else.
 
 from __future__ import annotations
 
+import itertools
 import os
 import shutil
 import sys
+import time
 import urllib.request
 from collections.abc import Callable
 from pathlib import Path
@@ -45,6 +47,13 @@ def _dies() -> None:
     from phyblock.cli import run
 
     run.load_suite = lambda *_, **__: os.abort()  # type: ignore[assignment]
+
+
+def _hangs() -> None:
+    """Law 1: a command never ends."""
+    from phyblock.cli import run
+
+    run.load_suite = lambda *_, **__: time.sleep(3600)  # type: ignore[assignment]
 
 
 def _after_load(deed: Callable[[], object]) -> None:
@@ -91,8 +100,8 @@ def _calls_home() -> None:
     _after_load(call)
 
 
-def _drops_records() -> None:
-    """Law 3: opening a run forgets its first record."""
+def _drops_earlier_records() -> None:
+    """Law 3: a run that goes on forgets its first record."""
 
     def forget() -> None:
         path = Path("out/records.jsonl")
@@ -102,6 +111,42 @@ def _drops_records() -> None:
     _after_load(forget)
 
 
+def _keeps_nothing_of_some_replies() -> None:
+    """Law 3: of every three records one is not written."""
+    from phyblock.run.writer import RecordWriter
+
+    put = RecordWriter.put
+    counted = itertools.count()
+
+    async def puts_some(self: RecordWriter, record: Any) -> None:
+        if next(counted) % 3:
+            await put(self, record)
+
+    RecordWriter.put = puts_some  # type: ignore[method-assign]
+
+
+def _asks_what_is_answered() -> None:
+    """Law 3: no record counts as final, and no reply is found in the cache."""
+    from phyblock.models.cache import ReplyCache
+    from phyblock.run import execute
+
+    execute.is_final = lambda _: False  # type: ignore[assignment]
+    ReplyCache.get = lambda *_: None  # type: ignore[assignment, method-assign]
+
+
+def _sends_twice() -> None:
+    """Law 3: a transport sends each request a second time, and tells nobody."""
+    from phyblock.models.direct_call import DirectTransport
+
+    send = DirectTransport.send
+
+    async def sends_again(self: DirectTransport, call: Any) -> Any:
+        await send(self, call)
+        return await send(self, call)
+
+    DirectTransport.send = sends_again  # type: ignore[method-assign]
+
+
 SABOTAGES: dict[str, Callable[[], None]] = {
     function.__name__.strip("_").replace("_", "-"): function
     for function in (
@@ -109,10 +154,14 @@ SABOTAGES: dict[str, Callable[[], None]] = {
         _ends_with_a_code_of_its_own,
         _says_nothing,
         _dies,
+        _hangs,
         _writes_at_home,
         _writes_and_tidies_up,
         _deletes_what_is_not_its_own,
         _calls_home,
-        _drops_records,
+        _drops_earlier_records,
+        _keeps_nothing_of_some_replies,
+        _asks_what_is_answered,
+        _sends_twice,
     )
 }

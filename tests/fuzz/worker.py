@@ -32,6 +32,7 @@ LONGEST_S = 20.0
 """A command on small files that is not done by then hangs [s]."""
 
 _MOST_MEMORY_BYTES = 8 * 2**30
+_READY = b"ready\n"
 _ROOT = Path(__file__).parents[2]
 
 
@@ -53,7 +54,8 @@ class Ended:
 class Worker:
     """The client's side; a context manager. `sabotage` breaks phyblock on purpose (see there)."""
 
-    def __init__(self, scratch: Path, sabotage: str = "") -> None:
+    def __init__(self, scratch: Path, sabotage: str = "", longest_s: float = LONGEST_S) -> None:
+        self._longest_s = longest_s
         self._out, self._err = scratch / "stdout", scratch / "stderr"
         self._sabotage = sabotage
         self._process: subprocess.Popen[bytes] | None = None
@@ -73,35 +75,34 @@ class Worker:
         process.stdin.write(json.dumps(order).encode() + b"\n")
         process.stdin.flush()
         answer = self._answer(process)
-        code = None if answer is None else json.loads(answer)["code"] if answer else 0
-        deeds = tuple(Deed(*deed) for deed in json.loads(answer)["deeds"]) if answer else ()
-        if not answer:
+        code, deeds = None, []
+        if answer:
+            code, deeds = json.loads(answer)
+        else:
             code = None if answer is None else process.wait()
             self._end()
-        told = [path.read_text(encoding="utf-8", errors="replace") for path in self._files()]
-        return Ended(code, told[0], told[1], deeds)
-
-    def _files(self) -> tuple[Path, Path]:
-        for path in (self._out, self._err):
-            path.touch()
-        return self._out, self._err
+        out, err = (path.read_bytes().decode("utf-8", "replace") for path in (self._out, self._err))
+        return Ended(code, out, err, tuple(Deed(*deed) for deed in deeds))
 
     def _start(self) -> subprocess.Popen[bytes]:
-        return subprocess.Popen(
+        """A worker that has imported everything."""
+        process = subprocess.Popen(
             [sys.executable, "-m", "tests.fuzz.worker", self._sabotage],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             cwd=_ROOT,
             env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
         )
+        assert process.stdout is not None
+        assert process.stdout.readline() == _READY
+        return process
 
-    @staticmethod
-    def _answer(process: subprocess.Popen[bytes]) -> bytes | None:
+    def _answer(self, process: subprocess.Popen[bytes]) -> bytes | None:
         """The line that the worker answers; empty where it died, None where it hangs."""
         assert process.stdout is not None
         with selectors.DefaultSelector() as selector:
             selector.register(process.stdout, selectors.EVENT_READ)
-            return process.stdout.readline() if selector.select(LONGEST_S) else None
+            return process.stdout.readline() if selector.select(self._longest_s) else None
 
     def _end(self) -> None:
         if self._process is not None:
@@ -124,13 +125,14 @@ def serve(sabotage: str) -> None:
     orders = os.fdopen(os.dup(0), encoding="utf-8")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     deeds = watch_deeds()
+    print(_READY.decode(), end="", file=answers, flush=True)
     for line in orders:
         order = json.loads(line)
         with _taken_over(order):
             deeds.clear()
             code = _code_of(main)
             done = list(deeds)
-        print(json.dumps({"code": code, "deeds": done}), file=answers, flush=True)
+        print(json.dumps([code, done]), file=answers, flush=True)
 
 
 @contextlib.contextmanager
