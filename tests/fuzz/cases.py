@@ -223,7 +223,12 @@ KINDS: dict[str, Cases] = {
     "overrides": st.lists(OVERRIDES, min_size=1, max_size=3).map(_override_cases),
     "arguments": _ARGUMENTS.map(_argument_cases),
     "scenes": _file(
-        "data/scenes.jsonl", SCENES, ("validate", "data"), ("scenes", "audit", "data"), DRY, RUN
+        "data/scenes.jsonl",
+        SCENES,
+        ("validate", "data"),
+        ("scenes", "audit", "data", "--jobs", "1"),
+        DRY,
+        RUN,
     ),
     "questions": _file(
         "questions/questions.jsonl",
