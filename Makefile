@@ -12,12 +12,12 @@ $(RUNS): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; \
 	  sys.exit(0 if v in ((3, 10), (3, 11)) else "phyblock needs Python 3.10 or 3.11 (pybullet ships no wheels for others), found %d.%d: make PYTHON=python3.11" % v)'
 	$(PYTHON) -m venv $(VENV)
-	$(PIP) --requirement requirements.lock
+	$(PIP) --require-hashes --requirement requirements.lock
 	$(PIP) --no-deps --editable .
 	@touch $@
 
 $(TESTS): $(RUNS) requirements-dev.lock
-	$(PIP) --requirement requirements-dev.lock
+	$(PIP) --require-hashes --requirement requirements-dev.lock
 	@touch $@
 
 run: $(RUNS)
@@ -36,7 +36,7 @@ check: $(TESTS)
 	$(BIN)/lint-imports
 
 LOCK := $(BIN)/uv pip compile pyproject.toml --universal --python-version 3.10 \
-	  --no-emit-index-url --no-annotate --no-header --quiet
+	  --generate-hashes --no-emit-index-url --no-emit-find-links --no-annotate --no-header --quiet
 
 lock: $(TESTS)
 	$(PIP) uv
