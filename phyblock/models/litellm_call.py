@@ -55,12 +55,13 @@ class LitellmTransport(GuardedTransport):
         litellm = _litellm()
         from phyblock.models.litellm_wire import CURRENT, Exchange
 
+        arguments = self._arguments(call)
         exchange = Exchange(self._client)
         token = CURRENT.set(exchange)
         started = time.perf_counter()
         try:
             response = await asyncio.wait_for(
-                litellm.acompletion(**self._arguments(call)), self._config.timeout_s + _GRACE_S
+                litellm.acompletion(**arguments), self._config.timeout_s + _GRACE_S
             )
         except asyncio.TimeoutError:
             raise RetryableError("no answer in time") from None

@@ -34,15 +34,15 @@ class Exchange:
         self.answer: Answer | None = None
         self.failure: ModelError | None = None
         self._client = client
-        self._sent: set[tuple[str, str]] = set()
+        self._posted: set[str] = set()
 
     async def send(
         self, method: str, url: str, body: bytes, headers: Mapping[str, str], tls: Any
     ) -> Answer:
         """Send through our client; raises a ModelError for all that litellm shall not see."""
-        if (method, url) in self._sent:
+        if method == "POST" and url in self._posted:
             raise self.failure or RuntimeError("the library tried to send a request twice")
-        self._sent.add((method, url))
+        self._posted.add(url)
         self.answer = None
         try:
             self.answer = await self._client.send(url, body, headers, method=method, tls=tls)

@@ -56,7 +56,7 @@ def prepare(workspace: Workspace, url: str, track: str, transport: str, seeds: l
             **_TRACKS[track],
             "models": ["alpha"],
             "seeds": seeds,
-            "limits": {"max_concurrency": 24, "timeout_s": 3.0},
+            "limits": {"max_concurrency": 24, "timeout_s": 20.0},
         }
     )
 

@@ -31,7 +31,7 @@ __all__ = ["WIRE_FAULTS", "Ending", "Fault", "reset_connection"]
 Ending = Literal["reply", "retryable", "unavailable", "sample"]
 Behaviour = Callable[["LocalServer", "Seen", web.Request], Awaitable[web.StreamResponse]]
 
-_BOMB_BYTES = 64 * 2**20
+_BOMB_BYTES = 40 * 2**20
 _DRIP_S = 0.02
 
 
@@ -186,13 +186,22 @@ async def _reset_midway(
     return response
 
 
+async def _raw(_: LocalServer, __: Seen, request: web.Request, *, data: bytes) -> web.Response:
+    """Answer with bytes that are no HTTP, or more of it than anyone reads."""
+    assert request.transport is not None
+    request.transport.write(data)
+    request.transport.close()
+    return web.Response()
+
+
 @cache
 def _bomb(encoding: str) -> bytes:
-    """A JSON text of 64 MiB in a few dozen kilobytes; twice compressed where two are named."""
+    """A JSON text of 40 MiB in a few hundred kilobytes; twice compressed where two are named."""
     plain = b'{"choices": "' + b"0" * _BOMB_BYTES + b'"}'
     if encoding == "deflate":
-        return zlib.compress(plain)
-    return gzip.compress(gzip.compress(plain)) if "," in encoding else gzip.compress(plain)
+        return zlib.compress(plain, 1)
+    packed = gzip.compress(plain, 1)
+    return gzip.compress(packed) if "," in encoding else packed
 
 
 async def _explode(_: LocalServer, __: Seen, ___: web.Request, *, encoding: str) -> web.Response:
@@ -319,6 +328,15 @@ WIRE_FAULTS: Mapping[str, Fault] = {
     "echo-key-page": Fault(partial(_echo, status=200, shape="page"), "retryable"),
     "reset-midway": Fault(partial(_reset_midway, claimed=0, resets=True), "retryable"),
     "short-body": Fault(partial(_reset_midway, claimed=5_000, resets=False), "retryable"),
+    "no-http": Fault(partial(_raw, data=b"HELO mail.example\r\n\r\n"), "retryable"),
+    "no-head": Fault(partial(_raw, data=b""), "retryable"),
+    "huge-header": Fault(
+        partial(_raw, data=b"HTTP/1.1 200 OK\r\nX: " + b"x" * 200_000 + b"\r\n\r\n"), "retryable"
+    ),
+    "bad-chunk": Fault(
+        partial(_raw, data=b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\nxyz\r\n"),
+        "retryable",
+    ),
     "endless": Fault(
         partial(_stream, chunk=b" " * 65_536, pause_s=0), "retryable", is_endless=True
     ),
