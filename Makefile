@@ -6,7 +6,13 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 RUNS := $(VENV)/.runs
 TESTS := $(VENV)/.tests
 
-.PHONY: run test test-all check lock clean
+# What `make fuzz` tries; SEED=n tries the same again.
+SEED ?= $(shell date +%s)
+INPUTS ?= 2400
+FAULTS ?= 510
+KILLS ?= 36
+
+.PHONY: run test test-all fuzz check lock clean
 
 $(RUNS): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; \
@@ -28,6 +34,10 @@ test: $(TESTS)
 
 test-all: $(TESTS)
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m ''
+
+fuzz: $(TESTS)
+	PHYBLOCK_FUZZ_SEED=$(SEED) PHYBLOCK_FUZZ_INPUTS=$(INPUTS) PHYBLOCK_FUZZ_FAULTS=$(FAULTS) \
+	  PHYBLOCK_FUZZ_KILLS=$(KILLS) $(BIN)/python -m pytest -m fuzz tests/fuzz
 
 check: $(TESTS)
 	$(BIN)/ruff check .
