@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from phyblock.addresses import host_of
-from phyblock.errors import RetryableError
+from phyblock.errors import RetryableError, UnreachableError
 from phyblock.models.config import ModelConfig
 from phyblock.models.unpacking import ACCEPTED_ENCODINGS, BodyReader
 
@@ -62,7 +62,8 @@ class HttpClient:
     ) -> Answer:
         """Send once and read the answer.
 
-        Raises RetryableError when there is none: no connection, a lost one, or no end in time.
+        Raises UnreachableError where no connection could be made, and RetryableError where it was
+        lost or the answer did not end in time.
         """
         import aiohttp
 
@@ -71,8 +72,12 @@ class HttpClient:
             return await asyncio.wait_for(exchange, self._timeout_s)
         except asyncio.TimeoutError:
             raise RetryableError(f"no whole answer within {self._timeout_s:g} s") from None
+        except aiohttp.ClientConnectorError as error:
+            raise _unconnected(error, url) from None
         except (aiohttp.ClientError, OSError) as error:
-            raise RetryableError(_words(error, url)) from None
+            text = f"{type(error).__name__}: {error}".strip(": ")
+            lost = f"the connection to {host_of(url)} was lost ({text})"
+            raise RetryableError(lost) from None
 
     async def aclose(self) -> None:
         """Close all connections."""
@@ -154,19 +159,19 @@ def _redirect(url: str, location: str | None) -> str:
     return f"redirects to {host_of(target)}, and no redirect is followed"
 
 
-def _words(error: Exception, url: str) -> str:
-    """What became of a connection, in words that tell a wrong name from a lost connection."""
+def _unconnected(error: aiohttp.ClientConnectorError, url: str) -> UnreachableError:
+    """Why no connection could be made: a wrong name is told from a server that is not there."""
     import aiohttp
 
     host = host_of(url)
+    if isinstance(error, aiohttp.ClientConnectorCertificateError):
+        return UnreachableError(f"no trusted connection to {host}: {error.certificate_error}")
+    reason = error.os_error.strerror or error.os_error
     if isinstance(error, aiohttp.ClientConnectorDNSError):
-        return f"the name of {host} is not known (DNS): {error.os_error.strerror}"
+        return UnreachableError(f"the name of {host} is not known (DNS): {reason}")
     if isinstance(error, aiohttp.ClientProxyConnectionError):
-        return f"no connection to the proxy: {error.os_error.strerror}"
-    if isinstance(error, aiohttp.ClientConnectorError):
-        return f"no connection to {host}: {error.os_error.strerror or error.os_error}"
-    text = str(error) or "without a word"
-    return f"the connection to {host} was lost ({type(error).__name__}: {text})"
+        return UnreachableError(f"no connection to the proxy: {reason}")
+    return UnreachableError(f"no connection to {host}: {reason}")
 
 
 def _proxy_for(scheme: str, host: str) -> str | None:

@@ -16,6 +16,7 @@ from phyblock.errors import (
     RetryableError,
     SampleError,
     UnavailableError,
+    UnreachableError,
 )
 from phyblock.models.http_client import Answer
 
@@ -103,7 +104,7 @@ def refused_before_sending(status: int | None, words: str) -> ModelError:
         return UnavailableError(words, status=status)
     if status is not None and 400 <= status < 500 and status not in _RETRYABLE:
         return SampleError(words, status=status)
-    return RetryableError(words)
+    return UnreachableError(words)
 
 
 def unreadable(answer: Answer, why: str) -> RetryableError:

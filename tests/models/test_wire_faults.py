@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import ssl
 
+import aiohttp
 import pytest
 
-from phyblock.errors import ModelError, RetryableError, SampleError, UnavailableError
+from phyblock.errors import (
+    ModelError,
+    RetryableError,
+    SampleError,
+    UnavailableError,
+    UnreachableError,
+)
 from phyblock.models import Reply, RetryPolicy
+from phyblock.models.http_client import _unconnected
 from tests.models.factory import ask, make_model, make_request
 from tests.models.routes import KEY_VARIABLE, ROUTES, Route
 from tests.servers.chassis import Faults, LocalServer, Running
@@ -126,7 +135,7 @@ def test_a_redirect_takes_nothing_anywhere(name: str) -> None:
 def test_a_name_that_is_not_known_is_not_called_a_lost_connection(name: str) -> None:
     config = ROUTES[name].config("http://no-such-host.invalid", sends_seed="never")
     (answer,) = ask(make_model(config, policy=ONCE), make_request())
-    assert isinstance(answer, RetryableError), answer
+    assert isinstance(answer, UnreachableError), answer
     assert answer.status is None
     assert "DNS" in str(answer)
     assert "no-such-host.invalid" in str(answer)
@@ -139,8 +148,27 @@ def test_a_closed_port_is_named(name: str) -> None:
         port = taken.getsockname()[1]
         config = ROUTES[name].config(f"http://127.0.0.1:{port}", sends_seed="never")
         (answer,) = ask(make_model(config, policy=ONCE), make_request())
-    assert isinstance(answer, RetryableError), answer
+    assert isinstance(answer, UnreachableError), answer
     assert f"no connection to 127.0.0.1:{port}" in str(answer)
+
+
+@pytest.mark.parametrize("name", ["direct", "vllm"])
+def test_a_server_without_tls_is_no_lost_connection(name: str) -> None:
+    with Running(OpenAIChat()) as running:
+        url = running.url.replace("http://", "https://")
+        config = ROUTES[name].config(url, sends_seed="never")
+        (answer,) = ask(make_model(config, policy=ONCE), make_request())
+    assert isinstance(answer, UnreachableError), answer
+    assert f"no connection to 127.0.0.1:{running.port}" in str(answer)
+
+
+def test_a_certificate_that_is_not_trusted_is_said() -> None:
+    url = "https://host:8443/v1?key=h1dden"
+    key = aiohttp.client_reqrep.ConnectionKey("host", 8443, True, True, None, None, None)
+    error = aiohttp.ClientConnectorCertificateError(key, ssl.CertificateError("self-signed"))
+    said = str(_unconnected(error, url))
+    assert said.startswith("no trusted connection to host:8443: ")
+    assert "self-signed" in said
 
 
 def test_both_transports_say_the_same_of_what_a_server_said() -> None:
