@@ -9,9 +9,10 @@ from typing import Any
 
 import pytest
 
-from tests.fuzz.laws import CODES, Broken, take_tree
+from tests.fuzz.laws import Broken, broken_laws, take_tree
 from tests.fuzz.ledger import LedgerAgent, LedgerChat, asked_twice, kept_in, lost
 from tests.fuzz.sizes import FAULTS, SEED
+from tests.fuzz.worker import Ended, Worker
 from tests.servers.chassis import Faults, Running
 from tests.servers.faults import WIRE_FAULTS
 from tests.vqa_set import questions, vqa_suite, write_questions
@@ -20,6 +21,7 @@ from tests.workspace import SCENES, Done, Workspace
 pytestmark = pytest.mark.fuzz
 
 _SHARE = 0.35
+_LONGEST_S = 300.0
 _TRACKS: dict[str, dict[str, Any]] = {
     "full_planning": {},
     "vqa": vqa_suite(subtasks=["SH", "OR", "VP"]),
@@ -61,58 +63,78 @@ def prepare(workspace: Workspace, url: str, track: str, transport: str, seeds: l
     )
 
 
-def checked(workspace: Workspace, before: dict[str, tuple[str, str]], *args: str) -> Done:
-    """Run, and hold the first two laws."""
-    done = workspace.run(*args)
-    assert done.code in CODES, done.err
-    assert "Traceback" not in done.err, done.err
-    own = (str(workspace.out.relative_to(workspace.root)), "cache", "suite.yaml", "models.yaml")
-    after = take_tree(workspace.root)
-    strays = {p for p in before.keys() | after.keys() if before.get(p) != after.get(p)}
-    assert not [path for path in strays if not path.startswith(own)]
-    return done
+class Runner:
+    """Runs the suite of a workspace and holds the first two laws.
+
+    Commands whose transport is litellm, which keeps clients for the life of a process, are run in
+    a process each.
+    """
+
+    def __init__(self, workspace: Workspace, worker: Worker | None) -> None:
+        self.workspace = workspace
+        self._worker = worker
+        self._before = take_tree(workspace.root)
+
+    def run(self, *args: str) -> Done:
+        workspace = self.workspace
+        if self._worker is None:
+            done = workspace.run(*args)
+            ended = Ended(done.code, done.out, done.err)
+        else:
+            command = ["run", "suite.yaml", "--out", str(workspace.out), "--no-report", *args]
+            ended = self._worker.phyblock(command, workspace.root, workspace.env, _LONGEST_S)
+        after = take_tree(workspace.root)
+        pictures = str((workspace.cache / "pictures").resolve())
+        places = (workspace.out.name, "cache", pictures)
+        broken = broken_laws(ended, workspace.root, self._before, after, places, ())
+        assert not broken, told(broken)
+        self._before = after
+        return ended.done
 
 
 def told(broken: list[Broken]) -> str:
     return "\n".join(f"{one.name}: {one.detail}" for one in broken[:20])
 
 
-def one_round(workspace: Workspace, server: LedgerChat, url: str, *cell: Any) -> None:
+def one_round(runner: Runner, server: LedgerChat, track: str) -> None:
     """A run with faults to its end, the same again, what was refused again, and a second run."""
-    prepare(workspace, url, *cell)
+    workspace = runner.workspace
     ledger = server.ledger
     first = len(ledger.entries)
-    before = take_tree(workspace.root)
     for _ in range(10):
-        done = checked(workspace, before)
+        done = runner.run()
         if "To go on" not in done.out:
             break
     asked = len(ledger.entries)
-    assert checked(workspace, before).code == (1 if ledger.refused() else 0), done.out + done.err
+    assert runner.run().code == (1 if ledger.refused() else 0), done.out + done.err
     assert len(ledger.entries) == asked, "a run that was done asked again"
     broken = [*asked_twice(ledger.entries), *lost(ledger, kept_in(workspace.out))]
     assert not broken, told(broken)
 
     server.faults = Faults()
     refused = {entry.key for entry in ledger.entries[first:] if entry.comes_to == "sample"}
-    done = checked(workspace, before, "--retry-failed")
+    done = runner.run("--retry-failed")
     assert done.code == 0, done.out + done.err
     again = ledger.entries[asked:]
-    if cell[0] != "step_planning":  # where an episode goes on with turns that were never asked
+    if track != "step_planning":  # where an episode goes on with turns that were never asked
         assert Counter(entry.key for entry in again) == Counter(refused)
     broken = [*asked_twice(ledger.entries, retries_refused=True)]
     assert not broken, told(broken)
 
     asked = len(ledger.entries)
     workspace.out = workspace.out.with_name(f"{workspace.out.name}-again")
-    done = checked(workspace, before | take_tree(workspace.root))
+    done = runner.run()
     assert done.code == 0, done.out + done.err
     assert len(ledger.entries) == asked, "what stands in the cache was asked again"
 
 
 @pytest.mark.parametrize(("track", "transport"), _CELLS)
 def test_faults(
-    workspace: Workspace, tallies: dict[str, Counter[str]], track: str, transport: str
+    workspace: Workspace,
+    worker: Worker,
+    tallies: dict[str, Counter[str]],
+    track: str,
+    transport: str,
 ) -> None:
     seeds = math.ceil(_QUOTA * (1 - _SHARE) / _SHARE / _ASKED_PER_SEED[track]) + 1
     met: Counter[str] = Counter()
@@ -123,7 +145,9 @@ def test_faults(
         with Running(server) as running:
             workspace.out = workspace.root / f"out{n}"
             drawn = list(range(n * seeds, (n + 1) * seeds))
-            one_round(workspace, server, running.url, track, transport, drawn)
+            prepare(workspace, running.url, track, transport, drawn)
+            runner = Runner(workspace, worker if transport == "direct" else None)
+            one_round(runner, server, track)
         met += server.ledger.faults
         n += 1
     tallies.setdefault(f"faults met by {track}, {transport}", Counter()).update(met)
@@ -140,12 +164,12 @@ def test_faults_that_stop_a_model(
         assert isinstance(server, LedgerChat)
         prepare(workspace, running.url, "full_planning", transport, list(range(8)))
         workspace.write_models(running.url, "alpha", transport=transport, max_concurrency=2)
-        before = take_tree(workspace.root)
+        runner = Runner(workspace, None)
         for _ in range(12):
-            done = checked(workspace, before)
+            done = runner.run()
             assert done.code in (0, 1), done.out + done.err
         server.faults = Faults()
-        assert checked(workspace, before).code == 0
+        assert runner.run().code == 0
     broken = [*asked_twice(server.ledger.entries), *lost(server.ledger, kept_in(workspace.out))]
     assert not broken, told(broken)
     tallies.setdefault(f"faults that stop, {transport}", Counter()).update(server.ledger.faults)

@@ -66,15 +66,21 @@ class Worker:
     def __exit__(self, *_: object) -> None:
         self._end()
 
-    def phyblock(self, args: list[str], cwd: Path, env: Mapping[str, str]) -> Ended:
-        """Run the command to its end."""
+    def phyblock(
+        self,
+        args: list[str],
+        cwd: Path,
+        env: Mapping[str, str],
+        longest_s: float | None = None,
+    ) -> Ended:
+        """Run the command to its end, or for its longest time."""
         process = self._process = self._process or self._start()
         order = {"args": args, "cwd": str(cwd), "env": dict(env),
                  "out": str(self._out), "err": str(self._err)}  # fmt: skip
         assert process.stdin is not None
         process.stdin.write(json.dumps(order).encode() + b"\n")
         process.stdin.flush()
-        answer = self._answer(process)
+        answer = self._answer(process, longest_s or self._longest_s)
         code, deeds = None, []
         if answer:
             code, deeds = json.loads(answer)
@@ -97,12 +103,13 @@ class Worker:
         assert process.stdout.readline() == _READY
         return process
 
-    def _answer(self, process: subprocess.Popen[bytes]) -> bytes | None:
+    @staticmethod
+    def _answer(process: subprocess.Popen[bytes], longest_s: float) -> bytes | None:
         """The line that the worker answers; empty where it died, None where it hangs."""
         assert process.stdout is not None
         with selectors.DefaultSelector() as selector:
             selector.register(process.stdout, selectors.EVENT_READ)
-            return process.stdout.readline() if selector.select(self._longest_s) else None
+            return process.stdout.readline() if selector.select(longest_s) else None
 
     def _end(self) -> None:
         if self._process is not None:
