@@ -28,7 +28,7 @@ from tests.workspace import Done
 
 __all__ = ["LONGEST_S", "Ended", "Worker"]
 
-LONGEST_S = 60.0
+LONGEST_S = 30.0
 """A command on small files that is not done by then hangs [s]."""
 
 _MOST_MEMORY_BYTES = 8 * 2**30
