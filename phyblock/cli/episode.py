@@ -8,10 +8,11 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import make_console, print_view, shown_path
+from phyblock.cli.paths import UserPath
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block
 from phyblock.errors import DataError, Problem, StoreError
-from phyblock.files import atomic_write
+from phyblock.files import write_named
 from phyblock.records import MANIFEST, RECORDS, read_manifest
 from phyblock.report.table3 import ENDING_NAMES
 from phyblock.report.text_table import Column, TextTable
@@ -30,10 +31,10 @@ _NAMED = 5
 
 
 @click.command("episode")
-@click.argument("run", type=click.Path(path_type=Path))
+@click.argument("run", type=UserPath())
 @click.argument("sample")
-@click.option("--gif", type=click.Path(path_type=Path, dir_okay=False), help="Animated GIF.")
-@click.option("--sheet", type=click.Path(path_type=Path, dir_okay=False), help="PNG of all steps.")
+@click.option("--gif", type=UserPath(dir_okay=False), help="Animated GIF.")
+@click.option("--sheet", type=UserPath(dir_okay=False), help="PNG of all steps.")
 @click.option(
     "--size",
     type=click.IntRange(128, 1024),
@@ -43,7 +44,7 @@ _NAMED = 5
 )
 @click.option(
     "--data",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=UserPath(file_okay=False),
     help="Where the run's data set is now, if it was moved.",
 )
 def command(
@@ -64,7 +65,7 @@ def command(
     images = episode_images(task.scene, task.candidates, steps, PictureStyle(size))
     for path, make in ((gif, episode_gif), (sheet, episode_sheet)):
         if path is not None:
-            _write(path, make(images))
+            write_named(path, make(images))
             console.print(f"{len(images)} frames in {shown_path(path)}", markup=False)
 
 
@@ -154,11 +155,3 @@ def _film(record: EpisodeRecord, task: AssemblyTask) -> Iterator[FilmStep]:
 
 def _ending(record: EpisodeRecord) -> str:
     return ENDING_NAMES[record.ending]
-
-
-def _write(path: Path, data: bytes) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        atomic_write(path, data)
-    except OSError as error:
-        raise StoreError(Problem(str(path), f"cannot be written: {error.strerror}")) from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from phyblock.report import NO_VALUE
@@ -9,7 +10,7 @@ from phyblock.report.outcomes import FAILURES
 from phyblock.run.standing import Summary
 from phyblock.scoring import Counts
 
-__all__ = ["Tally"]
+__all__ = ["Tally", "failure_text"]
 
 
 @dataclass
@@ -59,5 +60,9 @@ class Tally:
     @property
     def failure_text(self) -> str:
         """Failures by outcome, or a dash."""
-        words = [f"{n} {name.replace('_', ' ')}" for name, n in sorted(self.failures.items())]
-        return ", ".join(words) or NO_VALUE
+        return failure_text(self.failures) or NO_VALUE
+
+
+def failure_text(counts: Mapping[str, int]) -> str:
+    """Failures by outcome in words: `2 api error, 1 truncated`."""
+    return ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in sorted(counts.items()))

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-__all__ = ["LARGEST_WHOLE", "Amount", "Line", "Whole", "encodable"]
+__all__ = ["LARGEST_WHOLE", "Amount", "Line", "Usd", "Whole", "encodable"]
 
 LARGEST_WHOLE = 2**53
 
@@ -43,6 +43,9 @@ Whole = Annotated[int, Field(ge=-LARGEST_WHOLE, le=LARGEST_WHOLE)]
 
 Amount = Annotated[float, Field(allow_inf_nan=False)]
 """A finite number."""
+
+Usd = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+"""An amount of money [US dollars], which a cost limit can be kept on top of."""
 
 
 def encodable(text: str) -> str:

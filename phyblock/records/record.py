@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar
 
 from typing_extensions import Self
 
-from phyblock.records.line import LARGEST_WHOLE, Amount, Line, Whole, encodable
+from phyblock.records.line import LARGEST_WHOLE, Amount, Line, Usd, Whole, encodable
 
 __all__ = [
     "ErrorKind",
@@ -61,9 +61,9 @@ class StoredReply(Line):
     """Why it ended: by itself, at the token limit, by a content filter, or not said."""
     usage: StoredUsage
     """Its tokens."""
-    cost_usd: Amount | None
+    cost_usd: Usd | None
     """Its price [US dollars]; null: not known."""
-    billed_usd: Amount | None = None
+    billed_usd: Usd | None = None
     """What `max_cost_usd` counted [US dollars], failed attempts included, a reply without token
     counts at its dearest; null: no limit was set."""
     latency_s: Amount = 0.0
@@ -111,7 +111,7 @@ class StoredError(Line):
     """HTTP status, where there was one."""
     message: str = ""
     """What was said."""
-    billed_usd: Amount | None = None
+    billed_usd: Usd | None = None
     """As of a reply."""
 
 

@@ -12,6 +12,7 @@ __all__ = [
     "ModelNotice",
     "ModelStopped",
     "RunEvent",
+    "RunNotice",
     "RunStarted",
     "SampleDone",
     "Stopping",
@@ -36,10 +37,22 @@ class SampleDone:
 
 @dataclass(frozen=True)
 class ModelNotice:
-    """A model's call is repeated or its concurrency changed; `text` says so in a few words."""
+    """A model's call is repeated after `wait_s`, or its concurrency was brought down to `limit`;
+    `text` says why in a few words, `status` is what the server answered, if it did.
+    """
 
     model: str
     kind: str
+    text: str
+    wait_s: float = 0.0
+    limit: int = 0
+    status: int | None = None
+
+
+@dataclass(frozen=True)
+class RunNotice:
+    """Something that concerns no single model: a server that is gone, a cache set aside."""
+
     text: str
 
 
@@ -59,5 +72,5 @@ class Stopping:
     in_flight: int
 
 
-RunEvent = RunStarted | SampleDone | ModelNotice | ModelStopped | Stopping
+RunEvent = RunStarted | SampleDone | ModelNotice | RunNotice | ModelStopped | Stopping
 Watcher = Callable[[RunEvent], None]

@@ -12,10 +12,11 @@ from pydantic import ValidationError
 
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import DataError, Problem, StoreError
-from phyblock.files import atomic_write
+from phyblock.files import atomic_write, writing
 from phyblock.parsing import PlanParser
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
 from phyblock.run.data import open_dataset
+from phyblock.run.folder import check_place, run_folder
 from phyblock.run.reading import read_records
 from phyblock.run.records import judged
 from phyblock.run.select import select_tasks
@@ -44,6 +45,12 @@ def rescore(
     """
     manifest = read_manifest(folder)
     suite = _suite(folder, manifest, parser, matcher)
+    name = f"scores/{suite.parser}-{suite.scoring.matchers[0]}"
+    target = out or folder / name
+    identity = f"{manifest.identity} scored by {suite.parser}, {suite.scoring.matchers[0]}"
+    if out is None:
+        run_folder(folder).check([f"{name}/"])
+    _check_target(target, identity)
     tasks = {task.scene.id: task for task in _tasks(folder, manifest, suite, data)}
     track = FullPlanning(planning_rules(suite))
     records: list[Record] = []
@@ -60,15 +67,17 @@ def rescore(
             )  # fmt: skip
         judgement = track.judge(task, None if record.reply is None else record.reply.text)
         records.append(judged(record.as_given(), judgement.is_read, judgement.fields()))
-    target = out or folder / "scores" / f"{suite.parser}-{suite.scoring.matchers[0]}"
-    identity = f"{manifest.identity} scored by {suite.parser}, {suite.scoring.matchers[0]}"
     told = {"identity": identity, "suite": suite.model_dump(mode="json")}
-    scored = manifest.model_copy(update=told)
+    _write(target, manifest.model_copy(update=told), records)
+    return target
+
+
+def _check_target(target: Path, identity: str) -> None:
+    """Raise StoreError unless `target` is new, empty or holds these scores."""
+    check_place(target)
     if (target / MANIFEST).exists() and read_manifest(target).identity != identity:
         hint = "choose another folder with --out: what a run stored is never changed"
         raise StoreError(Problem(str(target), "holds another run", hint=hint))
-    _write(target, scored, records)
-    return target
 
 
 def _suite(
@@ -121,10 +130,7 @@ def _write(folder: Path, manifest: Manifest, records: Sequence[Record]) -> None:
         MANIFEST: yaml.safe_dump(manifest.fields(), sort_keys=False, allow_unicode=True, width=100),
         RECORDS: "".join(line + "\n" for line in lines),
     }
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    run_folder(folder).begin()
+    with writing(folder):
         for name, text in texts.items():
             atomic_write(folder / name, text)
-    except OSError as error:
-        problem = Problem(str(folder), f"cannot be written: {error.strerror}")
-        raise StoreError(problem) from error

@@ -7,18 +7,19 @@ from types import TracebackType
 
 from phyblock.errors import Problem, SpecError
 from phyblock.models import (
+    Breakers,
     Budget,
     Gate,
     Halt,
     Model,
     ModelEvent,
-    ReplyCache,
     RetryPolicy,
+    SharedCache,
     api_key_status,
     build_model,
 )
 from phyblock.resources import reply_cache_file
-from phyblock.run.events import ModelNotice, RunStarted, Watcher
+from phyblock.run.events import ModelNotice, RunNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.plan import RunPlan
 from phyblock.run.store import RunStore
@@ -40,6 +41,8 @@ def check_ready(plan: RunPlan) -> None:
                 Problem(f"model {model.name}", message, "api_base", model.config.id, hint=hint)
             )
         status = api_key_status(model.config)
+        if status.fault:
+            problems.append(Problem(f"model {model.name}", status.fault, "", model.config.id))
         if status.is_needed and not status.is_set:
             message = "needs an API key, and none is set"
             names = " or ".join(status.variables)
@@ -66,7 +69,7 @@ class Session:
         self._folder = folder
         self._watch = watch
         self._use_cache = use_cache
-        self._cache: ReplyCache | None = None
+        self._cache: SharedCache | None = None
         self._store: RunStore | None = None
         self._models: dict[str, Model] = {}
         self.executor: Executor
@@ -76,13 +79,16 @@ class Session:
         try:
             self._store = RunStore(self._folder, plan.manifest, plan.sample_ids())
             if self._use_cache and any(m.config.kind == "litellm" for m in plan.models):
-                self._cache = ReplyCache(reply_cache_file())
+                self._cache = SharedCache(reply_cache_file(), self._tell)
+                await self._cache.open()
             limits = plan.suite.limits
             overall = Gate(limits.max_concurrency)
             halt = Halt()
             budget = None
             if limits.max_cost_usd is not None:
                 budget = Budget(limits.max_cost_usd, self._store.standing.limit_usd)
+            policy = RetryPolicy(limits.max_attempts, limits.retry_for_s)
+            breakers = Breakers(policy, self._tell)
             for model in plan.models:
                 self._models[model.name] = build_model(
                     model.config,
@@ -90,7 +96,8 @@ class Session:
                     overall=overall,
                     budget=budget,
                     observer=self._notice,
-                    policy=RetryPolicy(attempts=limits.max_attempts),
+                    policy=policy,
+                    breakers=breakers,
                     halt=halt,
                 )
             self.executor = Executor(
@@ -115,10 +122,7 @@ class Session:
         await self._close()
 
     async def run(self) -> RunResult:
-        """Ask what is left to ask; see `Executor.run`.
-
-        Raises StoreError also where all is asked but the cache refused a reply.
-        """
+        """Ask what is left to ask; see `Executor.run`."""
         settled = self.executor.settled.values()
         self._watch(
             RunStarted(
@@ -129,19 +133,23 @@ class Session:
                 },
             )
         )
-        result = await self.executor.run()
-        if self._cache is not None:
-            self._cache.check()
-        return result
+        return await self.executor.run()
 
     def _notice(self, event: ModelEvent) -> None:
-        self._watch(ModelNotice(event.model, event.kind, event.message))
+        notice = ModelNotice(
+            event.model, event.kind, event.message, event.wait_s, event.limit, event.status
+        )
+        self._watch(notice)
+
+    def _tell(self, text: str) -> None:
+        self._watch(RunNotice(text))
 
     async def _close(self) -> None:
         for model in self._models.values():
             await model.aclose()
         for track in self._plan.tracks:
             track.close()
-        for resource in (self._cache, self._store):
-            if resource is not None:
-                resource.close()
+        if self._cache is not None:
+            await self._cache.aclose()
+        if self._store is not None:
+            self._store.close()

@@ -16,7 +16,7 @@ from typing import IO, Any, TypeVar
 import yaml
 
 from phyblock.errors import Problem, StoreError
-from phyblock.files import atomic_write
+from phyblock.files import atomic_write, writing
 from phyblock.records import (
     MANIFEST,
     Belonging,
@@ -29,6 +29,7 @@ from phyblock.records import (
     read_manifest,
 )
 from phyblock.run.appending import AppendFile
+from phyblock.run.folder import LOCK, check_place, run_folder
 from phyblock.run.prompts import PromptFile
 from phyblock.run.reading import any_records, collect_turns, run_records
 from phyblock.run.standing import Standing
@@ -37,7 +38,7 @@ __all__ = ["RunStore", "holds_run"]
 
 LineT = TypeVar("LineT", bound=Line)
 
-_LOCK = ".lock"
+_HINT = "choose another folder with --out"
 _NOT_IDENTITY = (
     "suite.description",
     "suite.limits",
@@ -67,21 +68,18 @@ class RunStore:
         self._lock: IO[str] | None = None
         self._files: list[AppendFile] = []
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            self._lock = (folder / _LOCK).open("w")
-            self._acquire()
-            self._claim(manifest)
-            records = run_records(folder, manifest, samples)
-            self.records = self._open(records, self.standing.add)
-            turns = TurnLines(folder, self._belonging)
-            self.turns = self._open(turns, self.standing.add_turn)
-            known = PromptLines(folder)
-            self.prompts = PromptFile(self._open(known, sync=False), known.digests)
-        except OSError as error:
-            self.close()
-            hint = "choose another folder with --out"
-            problem = Problem(str(folder), f"cannot be written: {error.strerror}", hint=hint)
-            raise StoreError(problem) from error
+            with writing(folder, _HINT):
+                check_place(folder)
+                run_folder(folder).begin()
+                self._lock = (folder / LOCK).open("w")
+                self._acquire()
+                self._claim(manifest)
+                records = run_records(folder, manifest, samples)
+                self.records = self._open(records, self.standing.add)
+                turns = TurnLines(folder, self._belonging)
+                self.turns = self._open(turns, self.standing.add_turn)
+                known = PromptLines(folder)
+                self.prompts = PromptFile(self._open(known, sync=False), known.digests)
         except StoreError:
             self.close()
             raise
@@ -142,21 +140,22 @@ class RunStore:
 def holds_run(folder: Path, manifest: Manifest) -> bool:
     """Whether `folder` holds the run that `manifest` describes; reads alone.
 
-    Raises StoreError when it holds records or turns of another run. A manifest without any is no
-    run yet: one that failed at once leaves it behind, and nothing would be lost with it.
+    Raises StoreError when it holds records or turns of another run, or what is no run. A manifest
+    without any is no run yet: one that failed at once leaves it behind, and nothing would be lost
+    with it.
     """
-    found = read_manifest(folder) if (folder / MANIFEST).exists() else None
-    if found is not None and found.identity == manifest.identity:
+    check_place(folder)
+    if not (folder / MANIFEST).exists():
+        return False
+    found = read_manifest(folder)
+    if found.identity == manifest.identity:
         return True
     paid: tuple[Lines[Any], ...] = (any_records(folder), TurnLines(folder))
     if all(next(iter(lines), None) is None for lines in paid):
         return False
-    changed = f"records, and no {MANIFEST}"
-    if found is not None:
-        names = _changed(found, manifest)
-        changed = f"different: {', '.join(names) or 'how pictures are drawn'}"
-    hint = "choose another folder with --out"
-    raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=hint))
+    names = _changed(found, manifest)
+    changed = f"different: {', '.join(names) or 'how pictures are drawn'}"
+    raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=_HINT))
 
 
 def _changed(found: Manifest, wanted: Manifest) -> list[str]:
