@@ -31,12 +31,11 @@ Outcome = Literal["ok", "parse_failure", "refusal", "truncated", "api_error", "m
 Finish = Literal["stop", "length", "refusal", "unknown"]
 ErrorKind = Literal["retryable", "sample", "refused", "unavailable"]
 
-
 _NumberT = TypeVar("_NumberT", int, float)
 
 
-def _sane(number: _NumberT | None) -> _NumberT | None:
-    return number if number is not None and abs(number) <= LARGEST_WHOLE else None
+def _within(number: _NumberT | None, least: int) -> _NumberT | None:
+    return number if number is not None and least <= number <= LARGEST_WHOLE else None
 
 
 class StoredUsage(Line):
@@ -84,8 +83,9 @@ class StoredReply(Line):
         It is paid for: an absurd number in it is one that is not known.
         """
         texts = {name: encodable(text) for name, text in reply.items() if isinstance(text, str)}
-        counts = {name: _sane(count) for name, count in reply["usage"].items()}
-        money = {name: _sane(reply.get(name)) for name in ("cost_usd", "billed_usd")}
+        usage = reply["usage"].items()
+        counts = {name: _within(count, -LARGEST_WHOLE) for name, count in usage}
+        money = {name: _within(reply.get(name), 0) for name in ("cost_usd", "billed_usd")}
         return cls.model_validate({**reply, **texts, **money, "usage": counts})
 
     @property
