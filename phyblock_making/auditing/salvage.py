@@ -1,7 +1,7 @@
 """Reading what can be read of a broken data set, for an audit; runs never read this way.
 
 A scene whose blocks make sense is kept although its dependencies, layers or candidates do not;
-whatever keeps a scene or a part of it from being read comes back as a fault, named by scene.
+whatever keeps a scene or a part of it from being read comes back as a finding, named by scene.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from phyblock.datasets.checks import SceneReader
 from phyblock.datasets.official import candidates_file, goal_files, read_candidates, read_scene
 from phyblock.domain import Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
+from phyblock_making.checks.finding import Finding, unreadable
 
-__all__ = ["Fault", "Salvage", "SalvagedTask", "salvage"]
+__all__ = ["Salvage", "SalvagedTask", "salvage"]
 
 
 @dataclass(frozen=True)
@@ -28,20 +29,15 @@ class SalvagedTask:
 
 
 @dataclass(frozen=True)
-class Fault:
-    """What could not be read: the scene's id, or the file and line of a scene without one."""
-
-    scene: str
-    problem: Problem
-
-
-@dataclass(frozen=True)
 class Salvage:
-    """What could be read of a data set, in scene-id order, and what could not."""
+    """What could be read of a data set, in scene-id order, and what could not.
+
+    A finding names the scene by its id, or by its line in the file where it has none.
+    """
 
     root: Path
     tasks: tuple[SalvagedTask, ...]
-    faults: tuple[Fault, ...]
+    findings: tuple[Finding, ...]
 
 
 def salvage(root: Path) -> Salvage:
@@ -50,10 +46,10 @@ def salvage(root: Path) -> Salvage:
     Raises DataError when it is neither.
     """
     tasks: list[SalvagedTask] = []
-    faults: list[Fault] = []
+    findings: list[Finding] = []
     read = _builtin if (root / SCENES_FILE).is_file() else _official
-    read(root, tasks, faults)
-    return Salvage(root, tuple(sorted(tasks, key=lambda task: task.scene.id)), tuple(faults))
+    read(root, tasks, findings)
+    return Salvage(root, tuple(sorted(tasks, key=lambda task: task.scene.id)), tuple(findings))
 
 
 class _TolerantReader(SceneReader):
@@ -86,7 +82,7 @@ class _TolerantReader(SceneReader):
         return found or CandidateSet(())
 
 
-def _builtin(folder: Path, tasks: list[SalvagedTask], faults: list[Fault]) -> None:
+def _builtin(folder: Path, tasks: list[SalvagedTask], findings: list[Finding]) -> None:
     path = folder / SCENES_FILE
     first_line: dict[str, int] = {}
     for number, line in enumerate(scene_lines(path), 1):
@@ -94,31 +90,32 @@ def _builtin(folder: Path, tasks: list[SalvagedTask], faults: list[Fault]) -> No
         try:
             task = read_line(path, number, line, reader)
         except DataError as error:
-            faults += [Fault(f"line {number}", problem) for problem in error.problems]
+            findings += [unreadable(f"line {number}", problem) for problem in error.problems]
             continue
         name = task.scene.id
         first = first_line.setdefault(name, number)
         if first != number:
             message = f"is used by line {first} already"
-            faults.append(Fault(name, Problem(reader.where, message, "id", repr(name))))
+            problem = Problem(reader.where, message, "id", repr(name))
+            findings.append(unreadable(name, problem))
             continue
-        faults += [Fault(name, problem) for problem in reader.tolerated]
+        findings += [unreadable(name, problem) for problem in reader.tolerated]
         tasks.append(SalvagedTask(task.scene, task.candidates if len(task.candidates) else None))
 
 
-def _official(root: Path, tasks: list[SalvagedTask], faults: list[Fault]) -> None:
+def _official(root: Path, tasks: list[SalvagedTask], findings: list[Finding]) -> None:
     for path in goal_files(root):
         reader = _TolerantReader(str(path))
         try:
             scene = read_scene(path, reader)
         except DataError as error:
-            faults += [Fault(path.stem, problem) for problem in error.problems]
+            findings += [unreadable(path.stem, problem) for problem in error.problems]
             continue
-        faults += [Fault(path.stem, problem) for problem in reader.tolerated]
+        findings += [unreadable(path.stem, problem) for problem in reader.tolerated]
         try:
             candidates = read_candidates(candidates_file(root, path))
         except DataError as error:
-            faults += [Fault(path.stem, problem) for problem in error.problems]
+            findings += [unreadable(path.stem, problem) for problem in error.problems]
             tasks.append(SalvagedTask(scene, None))
         else:
             tasks.append(SalvagedTask(scene, candidates))

@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import chain
-
 from phyblock.domain.blocks import KIT_PALETTE
 from phyblock.domain.scene import Kind, Scene
 from phyblock.errors import DataError, Problem
-from phyblock.sim.steps import Rest
-from phyblock_making.checks.scene_checks import (
-    dependency_problems,
-    finished_problems,
-    gap_problems,
-    layer_problems,
-    order_problems,
-    overlap_problems,
-    palette_problems,
-    size_problems,
-    step_problems,
+from phyblock_making.checks.finding import CheckName
+from phyblock_making.checks.scene_checks import findings_of
+from phyblock_making.checks.scene_facts import SceneFacts
+from phyblock_making.checks.tolerances import OURS_IN_HASTE
+
+__all__ = ["accept", "form_problems", "is_acceptable", "physics_problems"]
+
+_FORM: tuple[CheckName, ...] = ("size", "palette", "layer", "order")
+# Cheap ones first.
+_PHYSICS: tuple[CheckName, ...] = (
+    "overlap",
+    "floating",
+    "undeclared dependency",
+    "dependency without contact",
+    "unstable step",
+    "unstable",
 )
-
-__all__ = ["FINISHED_REST", "accept", "form_problems", "is_sound", "physics_problems"]
-
-FINISHED_REST = Rest(quiet_s=0.5)
-"""When the generator takes a finished structure to be at rest."""
 
 
 def accept(scene: Scene, palette: tuple[Kind, ...] = KIT_PALETTE) -> None:
@@ -36,12 +33,7 @@ def accept(scene: Scene, palette: tuple[Kind, ...] = KIT_PALETTE) -> None:
 
 def form_problems(scene: Scene, palette: tuple[Kind, ...] = KIT_PALETTE) -> tuple[Problem, ...]:
     """What is wrong with the scene's size, palette, layers and order, without physics."""
-    return (
-        *size_problems(scene),
-        *palette_problems(scene, palette),
-        *layer_problems(scene),
-        *order_problems(scene),
-    )
+    return _problems(SceneFacts(scene, palette=palette), _FORM)
 
 
 def physics_problems(scene: Scene) -> tuple[Problem, ...]:
@@ -49,19 +41,17 @@ def physics_problems(scene: Scene) -> tuple[Problem, ...]:
 
     The finished structure is watched for the whole time of the default trial.
     """
-    return tuple(_physics_problems(scene, None))
+    return _problems(SceneFacts(scene), _PHYSICS)
 
 
-def is_sound(scene: Scene) -> bool:
-    """A quick `physics_problems`: ends at the first, and a trial ends once all is at rest.
+def is_acceptable(scene: Scene, palette: tuple[Kind, ...]) -> bool:
+    """Whether a scene could enter a data set: a quick `accept` that also looks at the picture.
 
-    At rest is the finished structure as in `FINISHED_REST`, at both time steps.
+    It ends at the first fault, and a trial ends once all is at rest, at both time steps.
     """
-    return next(_physics_problems(scene, FINISHED_REST), None) is None
+    facts = SceneFacts(scene, tolerances=OURS_IN_HASTE, palette=palette)
+    return next(findings_of(facts, (*_FORM, "hidden", *_PHYSICS)), None) is None
 
 
-def _physics_problems(scene: Scene, rest: Rest | None) -> Iterator[Problem]:
-    """Cheap checks first; each runs only when the ones before it are used up."""
-    checks = (overlap_problems, gap_problems, dependency_problems, step_problems)
-    yield from chain.from_iterable(find(scene) for find in checks)
-    yield from finished_problems(scene, rest=rest)
+def _problems(facts: SceneFacts, names: tuple[CheckName, ...]) -> tuple[Problem, ...]:
+    return tuple(finding.problem for finding in findings_of(facts, names))

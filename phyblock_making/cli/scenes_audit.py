@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from phyblock.cli.console import make_console, shown_path
+from phyblock.datasets import SCENES_FILE
 from phyblock.errors import Problem, StoreError
 from phyblock.sim import PictureStyle
 from phyblock.sim.marked import marked_png
-from phyblock_making.auditing.salvage import Fault, Salvage, salvage
-from phyblock_making.auditing.scene_audit import AuditSettings, Finding, SceneAudit
-from phyblock_making.auditing.set_audit import (
-    Audit,
-    audit_scenes,
-    find_duplicates,
-    findings_csv,
-    write_fixed,
-)
+from phyblock_making.auditing.corrected_copy import CHANGES_FILE, write_fixed
+from phyblock_making.auditing.salvage import Salvage, salvage
+from phyblock_making.auditing.scene_audit import SceneAudit
+from phyblock_making.auditing.set_audit import Audit, audit_scenes, findings_csv
+from phyblock_making.checks.set_checks import find_duplicates
+from phyblock_making.checks.tolerances import FOREIGN, Tolerances
 from phyblock_making.cli.scene_sets import find_data_set
 from phyblock_making.cli.scenes_audit_view import print_audit, print_changes, worst_scenes
 from phyblock_making.cli.working import jobs_option, make_folder, tracked, write_file
@@ -50,7 +49,7 @@ __all__ = ["command"]
 @click.option(
     "--tolerance",
     type=click.FloatRange(0.01, 10),
-    default=2.0,
+    default=1000 * FOREIGN.fit_m,
     show_default=True,
     help="Overlaps and gaps up to this pass [mm].",
 )
@@ -71,11 +70,10 @@ def command(
     """
     console = make_console()
     _check_places(table, fix, pictures)
-    found = salvage(find_data_set(data))
-    settings = AuditSettings(tolerance_m=tolerance / 1000)
-    audits = _run(found, settings, jobs)
-    others = [*map(_unreadable, found.faults), *find_duplicates(task.scene for task in found.tasks)]
-    audit = Audit(tuple(audits), tuple(others))
+    salvaged = salvage(find_data_set(data))
+    audits = _run(salvaged, replace(FOREIGN, fit_m=tolerance / 1000), jobs)
+    twins = find_duplicates(task.scene for task in salvaged.tasks)
+    audit = Audit(tuple(audits), (*salvaged.findings, *twins))
     print_audit(console, audit, worst)
     if table is not None:
         write_file(table, findings_csv(audit))
@@ -84,23 +82,14 @@ def command(
         count = _draw(pictures, worst_scenes(audit, worst))
         console.print(f"{count} pictures in {shown_path(pictures)}", markup=False)
     if fix is not None:
-        sets = {task.scene.id: task.candidates for task in found.tasks}
+        sets = {task.scene.id: task.candidates for task in salvaged.tasks}
         print_changes(console, write_fixed(fix, audits, sets), shown_path(fix))
 
 
-def _run(found: Salvage, settings: AuditSettings, jobs: int) -> list[SceneAudit]:
-    tasks = [(task.scene, task.candidates) for task in found.tasks]
-    audits = audit_scenes(tasks, settings, min(jobs, max(len(tasks), 1)))
+def _run(salvaged: Salvage, tolerances: Tolerances, jobs: int) -> list[SceneAudit]:
+    tasks = [(task.scene, task.candidates) for task in salvaged.tasks]
+    audits = audit_scenes(tasks, tolerances, min(jobs, max(len(tasks), 1)))
     return list(tracked(audits, len(tasks), "Auditing"))
-
-
-def _unreadable(fault: Fault) -> Finding:
-    problem = fault.problem
-    told = f"{problem.field} {problem.message}".strip()
-    details = (problem.found, problem.allowed)
-    return Finding(
-        fault.scene, "unreadable", f"{problem.where}: {told}", declared=details[0], found=details[1]
-    )
 
 
 def _check_places(table: Path | None, fix: Path | None, pictures: Path | None) -> None:
@@ -109,7 +98,7 @@ def _check_places(table: Path | None, fix: Path | None, pictures: Path | None) -
     if table is not None and table.is_dir():
         taken.append(table)
     if fix is not None:
-        taken += [fix / name for name in ("scenes.jsonl", "changes.csv") if (fix / name).exists()]
+        taken += [fix / name for name in (SCENES_FILE, CHANGES_FILE) if (fix / name).exists()]
     if taken:
         hint = "name another place"
         raise StoreError([Problem(str(path), "is already there", hint=hint) for path in taken])
@@ -120,7 +109,8 @@ def _check_places(table: Path | None, fix: Path | None, pictures: Path | None) -
 
 
 def _draw(folder: Path, audits: Sequence[SceneAudit]) -> int:
-    for one in audits:
-        guilty = {order for finding in one.findings for order in finding.blocks}
-        write_file(folder / f"{one.scene.id}.png", marked_png(one.scene, guilty, PictureStyle()))
+    for audit in audits:
+        guilty = {order for finding in audit.findings for order in finding.blocks}
+        picture = marked_png(audit.scene, guilty, PictureStyle())
+        write_file(folder / f"{audit.scene.id}.png", picture)
     return len(audits)

@@ -8,18 +8,23 @@ from collections.abc import Sequence
 from rich.console import Console
 
 from phyblock.cli.console import counted, plain_table
-from phyblock_making.auditing.scene_audit import CHECKS, Check, Finding, SceneAudit
-from phyblock_making.auditing.set_audit import Audit, Copied
+from phyblock.domain import Scene
+from phyblock_making.auditing.corrected_copy import Copied
+from phyblock_making.auditing.scene_audit import AUDITED, SceneAudit
+from phyblock_making.auditing.set_audit import Audit, shown_orders
+from phyblock_making.checks.finding import CheckName, Finding
 
 __all__ = ["print_audit", "print_changes", "worst_scenes"]
 
 _CHANGED_SHOWN = 12
-_MOVING: tuple[Check, ...] = ("unstable", "unstable step")
+_BLOCKS_SHOWN = 3
+_MOVING: tuple[CheckName, ...] = ("unstable", "unstable step")
+_DEPENDING: tuple[CheckName, ...] = ("undeclared dependency", "dependency without contact")
 
 
 def worst_scenes(audit: Audit, count: int) -> tuple[SceneAudit, ...]:
     """The scenes with most to say against them: what falls, then what floats or overlaps, by mm."""
-    guilty = [one for one in audit.scenes if one.findings]
+    guilty = [scene_audit for scene_audit in audit.scenes if scene_audit.findings]
     return tuple(sorted(guilty, key=_badness, reverse=True)[:count])
 
 
@@ -56,9 +61,11 @@ def print_changes(console: Console, copied: Copied, folder: str) -> None:
 
 
 def _print_unreadable(console: Console, audit: Audit) -> None:
-    found = audit.of("unreadable")
-    if found:
-        rows = [(one.scene, one.message, one.declared, one.found) for one in found]
+    rows = [
+        (finding.scene, finding.message, str(finding.declared), str(finding.derived))
+        for finding in audit.of("unreadable")
+    ]
+    if rows:
         console.print("What cannot be read")
         console.print(plain_table(("scene", "what", "found", "allowed"), rows, numbers=0))
 
@@ -66,17 +73,20 @@ def _print_unreadable(console: Console, audit: Audit) -> None:
 def _print_dependencies(console: Console, audit: Audit) -> None:
     """One line for each block whose declared and true supports differ."""
     blocks: dict[tuple[str, int], list[Finding]] = {}
-    for check in ("undeclared dependency", "dependency without contact"):
-        for one in audit.of(check):
-            blocks.setdefault((one.scene, one.blocks[0]), []).append(one)
+    for check in _DEPENDING:
+        for finding in audit.of(check):
+            blocks.setdefault((finding.scene, finding.blocks[0]), []).append(finding)
     if not blocks:
         return
+    scenes = {scene_audit.scene.id: scene_audit.scene for scene_audit in audit.scenes}
     rows = []
-    for (scene, order), found in sorted(blocks.items()):
-        told = "; ".join(one.message.split(") ", 1)[-1] for one in found)
-        rows.append((scene, str(order), found[0].declared, found[0].found or "nothing", told))
+    for (name, order), findings in sorted(blocks.items()):
+        declared, contacts = (shown_orders(findings[0].declared), shown_orders(findings[0].derived))
+        messages = "; ".join(finding.message for finding in findings)
+        block = _blocks(scenes[name], (order,))
+        rows.append((name, block, declared, contacts or "nothing", messages))
     console.print("Dependencies: declared against contact (0 is the ground)")
-    headings = ("scene", "block", "declared", "contact", "the block")
+    headings = ("scene", "block", "declared", "contact", "findings")
     console.print(plain_table(headings, rows, numbers=0))
 
 
@@ -85,37 +95,44 @@ def _print_worst(console: Console, audit: Audit, count: int) -> None:
     if not worst:
         return
     rows = []
-    for one in worst:
-        first, size = _first(one), str(len(one.findings))
-        rows.append((one.scene.id, str(one.scene.level), first.check, first.message, size))
+    for scene_audit in worst:
+        scene, first = scene_audit.scene, _first(scene_audit)
+        facts = (first.check, first.message, _blocks(scene, first.blocks))
+        rows.append((scene.id, str(scene.level), *facts, str(len(scene_audit.findings))))
     console.print(f"The worst {len(rows)} scenes")
-    headings = ("scene", "level", "check", "first finding", "findings")
+    headings = ("scene", "level", "check", "first finding", "blocks", "findings")
     console.print(plain_table(headings, rows, numbers=1))
+
+
+def _blocks(scene: Scene, orders: Sequence[int]) -> str:
+    """The first few of these blocks with what they are; the ground is none."""
+    named = [f"{b.order} {b.color} {b.type}" for b in scene.blocks if b.order in orders]
+    return ", ".join(named[:_BLOCKS_SHOWN]) + (", ..." if len(named) > _BLOCKS_SHOWN else "")
 
 
 def _print_totals(console: Console, audit: Audit) -> None:
     rows = []
-    for check in CHECKS:
-        found = audit.of(check)
-        scenes = sorted({one.scene for one in found})
-        rows.append((check, _some(scenes), str(len(scenes)), str(len(found))))
+    for check in AUDITED:
+        findings = audit.of(check)
+        scenes = sorted({finding.scene for finding in findings})
+        rows.append((check, _some(scenes), str(len(scenes)), str(len(findings))))
     console.print("Totals")
     console.print(plain_table(("check", "in", "scenes", "findings"), rows, numbers=2))
     count = len(audit.scenes)
     steps, exact = audit.without(*_MOVING), _exact(audit)
-    told = [
-        f"{count} scenes read; {audit.without(*CHECKS)} with no finding",
+    totals = [
+        f"{count} scenes read; {audit.without(*AUDITED)} with no finding",
         f"{audit.without('unstable')} stand when finished, {steps} at every step as well",
         f"{_share(audit.shared, audit.declared)} dependencies are contacts (precision)",
         f"{_share(audit.shared, audit.contacts)} contacts are declared (recall)",
         f"{exact} declare their contacts and nothing else",
     ]
-    for line in told:
+    for line in totals:
         console.print(line, markup=False, soft_wrap=True)
 
 
 def _exact(audit: Audit) -> int:
-    return audit.without("undeclared dependency", "dependency without contact")
+    return audit.without(*_DEPENDING)
 
 
 def _share(part: int, whole: int) -> str:
@@ -129,10 +146,10 @@ def _some(scenes: Sequence[str], count: int = 24) -> str:
 
 def _badness(audit: SceneAudit) -> tuple[float, float, int]:
     falls = 2.0 * audit.has("unstable") + 1.0 * audit.has("unstable step")
-    fit = [one.size or 0.0 for one in audit.findings if one.check in ("overlap", "floating")]
+    fit = [f.value or 0.0 for f in audit.findings if f.check in ("overlap", "floating")]
     return (falls, max(fit, default=0.0), len(audit.findings))
 
 
 def _first(audit: SceneAudit) -> Finding:
     """The cause before its effect: what overlaps or floats before what falls."""
-    return min(audit.findings, key=lambda one: CHECKS.index(one.check))
+    return min(audit.findings, key=lambda finding: AUDITED.index(finding.check))

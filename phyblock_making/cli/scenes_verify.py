@@ -11,13 +11,12 @@ from phyblock.cli.console import make_console, plain_table
 from phyblock.datasets import SCENES_FILE, AssemblyTask, read_builtin
 from phyblock.errors import DataError, Problem
 from phyblock_making.auditing.set_verification import (
-    SCENE_CHECKS,
-    check_duplicates,
+    LAWS,
     check_looks,
-    check_parents,
     check_sums,
     verify_scenes,
 )
+from phyblock_making.checks.set_checks import find_duplicates, find_orphans
 from phyblock_making.cli.scene_sets import find_data_set
 from phyblock_making.cli.working import jobs_option, ray_option, tracked
 from phyblock_making.workers import open_workers
@@ -68,29 +67,30 @@ def command(data: str, jobs: int, ray_address: str | None, limit: int | None) ->
 def _check_scenes(
     tasks: tuple[AssemblyTask, ...], jobs: int, ray_address: str | None
 ) -> tuple[list[_Row], list[Problem]]:
-    passed = dict.fromkeys(SCENE_CHECKS, 0)
+    passed = dict.fromkeys(LAWS, 0)
     problems: list[Problem] = []
     with open_workers(jobs, ray_address) as workers:
         verified = verify_scenes(((task.scene, task.candidates) for task in tasks), workers)
-        for found in tracked(verified, len(tasks), "Verifying"):
-            for name, wrong in found.items():
-                passed[name] += not wrong
-                problems += wrong
-    return [(name, good, len(tasks)) for name, good in passed.items()], problems
+        for broken in tracked(verified, len(tasks), "Verifying"):
+            for law, findings in broken.items():
+                passed[law] += not findings
+                problems += [finding.problem for finding in findings]
+    return [(law, good, len(tasks)) for law, good in passed.items()], problems
 
 
 def _check_set(where: Path, tasks: tuple[AssemblyTask, ...]) -> tuple[list[_Row], list[Problem]]:
     scenes = [task.scene for task in tasks]
-    alike, orphans = check_duplicates(scenes), check_parents(scenes)
+    twins, orphans = find_duplicates(scenes), tuple(find_orphans(scenes))
     looks, same = check_looks(task.candidates for task in tasks)
     files, changed = check_sums(where)
     rows = [
-        ("no duplicate", len(scenes) - len(alike), len(scenes)),
+        ("no duplicate", len(scenes) - len(twins), len(scenes)),
         ("parents are base scenes", len(scenes) - len(orphans), len(scenes)),
         ("looks that pictures tell apart", looks - len(_named(same)), looks),
         ("checksums", files - len(changed), files),
     ]
-    return rows, [*alike.values(), *orphans.values(), *same, *changed]
+    findings = [finding.problem for finding in (*twins, *orphans)]
+    return rows, [*findings, *same, *changed]
 
 
 def _named(problems: Iterable[Problem]) -> set[str]:

@@ -15,7 +15,7 @@ import numpy as np
 from phyblock.domain.aov import CycleError
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.scene import Block, Kind, Scene
-from phyblock_making.checks.scene_checks import LEVEL_LIMITS
+from phyblock_making.checks.tolerances import LEVEL_LIMITS
 from phyblock_making.scenes.buildings import BUILDINGS
 from phyblock_making.scenes.compositions import COMPOSITIONS, beside
 from phyblock_making.scenes.creatures import CREATURES

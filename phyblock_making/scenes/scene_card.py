@@ -6,8 +6,7 @@ from phyblock.sim.stability import DEFAULT_TRIAL
 from phyblock.sim.steps import DEFAULT_REST
 from phyblock.sim.support import FIT_TOLERANCE_M
 from phyblock.sim.visibility import LEAST_SHARE
-from phyblock_making.checks.acceptance import FINISHED_REST
-from phyblock_making.checks.scene_checks import LEVEL_LIMITS
+from phyblock_making.checks.tolerances import FINISHED_REST, LEVEL_LIMITS
 from phyblock_making.scenes.scene_files import QUANTITIES, LevelStatistics, SetWriter
 
 __all__ = ["card"]

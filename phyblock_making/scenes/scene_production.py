@@ -10,8 +10,7 @@ import numpy as np
 
 from phyblock.domain.scene import Scene
 from phyblock.errors import DataError, Problem
-from phyblock.sim.visibility import hidden_blocks
-from phyblock_making.checks.acceptance import form_problems, is_sound
+from phyblock_making.checks.acceptance import is_acceptable
 from phyblock_making.scenes.grammar import GROUP_LEVELS, Group, Request, draw
 from phyblock_making.scenes.scene_draft import PALETTES, Palette
 from phyblock_making.symmetry import fingerprint
@@ -192,9 +191,7 @@ def _drawn(request: Request) -> tuple[Scene, bytes] | None:
 
 def _is_sound(task: tuple[Scene, Palette]) -> bool:
     scene, palette = task
-    if form_problems(scene, PALETTES[palette]) or hidden_blocks(scene):
-        return False
-    return is_sound(scene)
+    return is_acceptable(scene, PALETTES[palette])
 
 
 def _no_more(group: str, message: str) -> Problem:

@@ -25,14 +25,14 @@ REFUSED = {
 @pytest.mark.parametrize("official", [False, True])
 @pytest.mark.parametrize("name", TOLERATED)
 def test_blocks_that_make_sense_are_kept(name: str, official: bool, tmp_path: Path) -> None:
-    field, value, told = TOLERATED[name]
+    field, value, said = TOLERATED[name]
     write = write_checkout if official else write_scenes
     write(tmp_path, with_value(sound_scene(), field, value))
-    found = salvage(tmp_path)
-    assert [len(task.scene) for task in found.tasks] == [2]
-    assert [told in fault.problem.message for fault in found.faults] == ([True] if told else [])
-    assert all(fault.scene == "s1" for fault in found.faults)
-    assert (found.tasks[0].candidates is None) == ("alike" in name)
+    salvaged = salvage(tmp_path)
+    assert [len(task.scene) for task in salvaged.tasks] == [2]
+    assert [said in finding.message for finding in salvaged.findings] == ([True] if said else [])
+    assert all(finding.scene == "s1" for finding in salvaged.findings)
+    assert (salvaged.tasks[0].candidates is None) == ("alike" in name)
 
 
 @pytest.mark.parametrize("official", [False, True])
@@ -41,32 +41,32 @@ def test_the_rest_is_told_and_left_out(name: str, official: bool, tmp_path: Path
     good = with_value(sound_scene(), "id", "s2")
     write = write_checkout if official else write_scenes
     write(tmp_path, with_value(sound_scene(), *REFUSED[name]), good)
-    found = salvage(tmp_path)
-    assert [task.scene.id for task in found.tasks] == ["s2"]
-    assert [fault.scene for fault in found.faults] == ["s1" if official else "line 1"]
+    salvaged = salvage(tmp_path)
+    assert [task.scene.id for task in salvaged.tasks] == ["s2"]
+    assert [finding.scene for finding in salvaged.findings] == ["s1" if official else "line 1"]
 
 
 def test_a_missing_candidate_file_leaves_the_scene(tmp_path: Path) -> None:
     write_checkout(tmp_path, sound_scene())
     next((tmp_path / "data" / "SCENEs_400_Cand_Jsons").iterdir()).unlink()
-    found = salvage(tmp_path)
-    assert [task.candidates for task in found.tasks] == [None]
-    assert "cannot be read" in found.faults[0].problem.message
+    salvaged = salvage(tmp_path)
+    assert [task.candidates for task in salvaged.tasks] == [None]
+    assert "cannot be read" in salvaged.findings[0].message
 
 
 def test_an_id_twice_is_kept_once(tmp_path: Path) -> None:
     write_scenes(tmp_path, sound_scene(), sound_scene())
-    found = salvage(tmp_path)
-    assert len(found.tasks) == 1
-    assert "line 1 already" in found.faults[0].problem.message
+    salvaged = salvage(tmp_path)
+    assert len(salvaged.tasks) == 1
+    assert "line 1 already" in salvaged.findings[0].message
 
 
 def test_a_sound_set_reads_as_ever(tmp_path: Path) -> None:
     write_scenes(tmp_path, sound_scene())
-    found = salvage(tmp_path)
-    assert found.faults == ()
+    salvaged = salvage(tmp_path)
+    assert salvaged.findings == ()
     (task,) = read_builtin(tmp_path).tasks
-    assert (found.tasks[0].scene, found.tasks[0].candidates) == (task.scene, task.candidates)
+    assert (salvaged.tasks[0].scene, salvaged.tasks[0].candidates) == (task.scene, task.candidates)
 
 
 def test_what_is_no_data_set_is_refused(tmp_path: Path) -> None:

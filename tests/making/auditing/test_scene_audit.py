@@ -13,24 +13,21 @@ from phyblock.datasets import read_builtin
 from phyblock.domain import CandidateSet, Scene
 from phyblock.errors import StoreError
 from phyblock.sim import Physics, Trial
+from phyblock_making.auditing.corrected_copy import write_fixed
 from phyblock_making.auditing.salvage import salvage
-from phyblock_making.auditing.scene_audit import CHECKS, AuditSettings, SceneAudit, audit_scene
-from phyblock_making.auditing.set_audit import (
-    Audit,
-    audit_scenes,
-    find_duplicates,
-    findings_csv,
-    write_fixed,
-)
+from phyblock_making.auditing.scene_audit import AUDITED, SceneAudit, audit_scene
+from phyblock_making.auditing.set_audit import Audit, audit_scenes, findings_csv
+from phyblock_making.checks.set_checks import find_duplicates
+from phyblock_making.checks.tolerances import FOREIGN
 from phyblock_making.scenes import make_candidates
 from tests.designs.scenes import designed_scenes
 from tests.sim.structures import counterweighted_beam, scene_of, tower
 from tests.sim.test_support import FLOATING, OVERLAPPING
 
 SHORT = Trial(duration_s=1.0, physics=(Physics(),))
-QUICK = AuditSettings(trial=SHORT, step_trial=SHORT)
-STILL = AuditSettings(
-    trial=replace(SHORT, duration_s=0.0), step_trial=replace(SHORT, duration_s=0.0)
+QUICK = replace(FOREIGN, trial=SHORT, step_trial=SHORT)
+STILL = replace(
+    FOREIGN, trial=replace(SHORT, duration_s=0.0), step_trial=replace(SHORT, duration_s=0.0)
 )
 SCENES = {scene.id: scene for scene in designed_scenes()}
 OFFICIAL_SAMPLE = ("000", "001", "040", "069", "187")
@@ -124,7 +121,7 @@ def test_duplicates_are_found_by_shape_and_not_by_name() -> None:
     )
     twin = replace(gate, id="twin", blocks=shifted)
     (duplicate,) = find_duplicates([gate, dog, twin])
-    assert (duplicate.scene, duplicate.found) == ("twin", "l1-gate")
+    assert (duplicate.scene, duplicate.derived) == ("twin", "l1-gate")
 
 
 def test_the_same_findings_with_two_processes() -> None:
@@ -177,9 +174,9 @@ def test_official_annotation_errors_are_reported(official_checkout: Path) -> Non
 @pytest.mark.slow
 def test_the_whole_official_data(official_checkout: Path) -> None:
     read = salvage(official_checkout)
-    assert read.faults == ()
+    assert read.findings == ()
     tasks = [(task.scene, task.candidates) for task in read.tasks]
-    audit = Audit(tuple(audit_scenes(tasks, AuditSettings(), 2)), ())
+    audit = Audit(tuple(audit_scenes(tasks, FOREIGN, 2)), ())
     assert {finding.scene for finding in audit.of("overlap")} == OVERLAPPING
     assert {finding.scene for finding in audit.of("floating")} == FLOATING
     assert {finding.scene for finding in audit.of("unstable")} == FLOATING
@@ -191,4 +188,4 @@ def test_the_whole_official_data(official_checkout: Path) -> None:
 
 
 def test_every_check_has_a_name_of_its_own() -> None:
-    assert len(set(CHECKS)) == len(CHECKS) == 11
+    assert len(set(AUDITED)) == len(AUDITED) == 11

@@ -10,13 +10,12 @@ import pytest
 from phyblock.datasets import read_builtin
 from phyblock.domain import CandidateSet, Scene
 from phyblock_making.auditing.set_verification import (
-    SCENE_CHECKS,
-    check_duplicates,
+    LAWS,
     check_looks,
-    check_parents,
     check_sums,
     verify_scenes,
 )
+from phyblock_making.checks.set_checks import find_duplicates, find_orphans
 from phyblock_making.scenes import make_candidates
 from phyblock_making.scenes.scene_files import SUMS_FILE, sums_text
 from phyblock_making.scenes.sketch import make_scene
@@ -34,9 +33,9 @@ def failed(scene: Scene, candidates: CandidateSet | None = None) -> dict[str, li
     """What each failing check says of a scene."""
     chosen = candidates or make_candidates(scene)
     with open_workers() as workers:
-        (found,) = verify_scenes([(scene, chosen)], workers)
-    assert set(found) == set(SCENE_CHECKS)
-    return {name: [str(problem) for problem in wrong] for name, wrong in found.items() if wrong}
+        (broken,) = verify_scenes([(scene, chosen)], workers)
+    assert tuple(broken) == LAWS
+    return {law: [str(one) for one in findings] for law, findings in broken.items() if findings}
 
 
 def with_block(index: int, **changes: object) -> Scene:
@@ -114,14 +113,14 @@ def test_candidates_that_lack_a_block_or_stray_too_far_are_named() -> None:
 def test_duplicates_are_found_turned_and_mirrored() -> None:
     image = transformed(GATE.blocks, Symmetry(1, mirrored=True))
     copy = replace(GATE, id="copy", blocks=image)
-    assert list(check_duplicates([GATE, copy])) == ["copy"]
-    assert check_duplicates(designed_scenes()) == {}
+    assert [finding.scene for finding in find_duplicates([GATE, copy])] == ["copy"]
+    assert find_duplicates(designed_scenes()) == ()
 
 
 def test_parents_must_be_base_scenes_of_the_set() -> None:
     orphan = replace(GATE, id="orphan", parents=("nowhere",))
     child = replace(GATE, id="child", parents=(GATE.id,))
-    assert list(check_parents([GATE, child, orphan])) == ["orphan"]
+    assert [finding.scene for finding in find_orphans([GATE, child, orphan])] == ["orphan"]
 
 
 def test_pictures_tell_apart_all_looks_in_use() -> None:
@@ -156,8 +155,8 @@ def test_the_built_in_set_holds_what_the_paper_holds() -> None:
     assert count == {1: 36, 2: 121, 3: 138, 4: 119}
     assert sum(scene.levels == (1, 2) for scene in scenes) == 14
     assert sum(scene.parents == (scene.id,) for scene in scenes) == 150
-    assert check_duplicates(scenes) == {}
-    assert check_parents(scenes) == {}
+    assert find_duplicates(scenes) == ()
+    assert list(find_orphans(scenes)) == []
     assert (BUILT_IN / SUMS_FILE).read_text() == sums_text(BUILT_IN)
 
 

@@ -87,7 +87,8 @@ def test_what_falls_midway_is_refused_though_it_stands_in_the_end() -> None:
     sketch.put("cuboid3", pose="flat-y")
     sketch.pair("cube", 2.8)
     problems = physics_problems(make_scene("beam", (1,), sketch.blocks))
-    assert [problem.message for problem in problems] == ["blocks 2, 3 fall at step 3"]
+    messages = [problem.message for problem in problems]
+    assert messages == ["blocks 2, 3 fall at step 3, once block 3 is placed"]
 
 
 def test_a_block_that_touches_nothing_is_refused_though_it_declares_nothing() -> None:

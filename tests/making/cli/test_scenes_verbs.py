@@ -48,7 +48,8 @@ def test_an_audit_tells_files_draws_and_mends(data: Path, tmp_path: Path) -> Non
     )
     assert "6 scenes read; 5 with no finding" in told
     assert "5 stand when finished, 5 at every step as well" in told
-    assert "block 3 (green cube) hangs 20.0 mm above what is below it" in told
+    assert "block 3 floats 20.00 mm above its support" in told
+    assert "3 green cube" in told
     rows = list(csv.DictReader(io.StringIO(table.read_text(encoding="utf-8"))))
     assert {row["check"] for row in rows if row["scene"] == "t6"} >= {"floating", "unstable"}
     assert [path.name for path in sorted(pictures.iterdir())] == ["t6.png"]
