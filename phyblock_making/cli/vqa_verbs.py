@@ -14,6 +14,7 @@ _VERBS = {
     "show": "Show a question, and draw its pictures to a file.",
     "audit": "Look for what could be answered without looking; write a sheet for a human check.",
     "write": "Ask a model for further wordings of the questions.",
+    "reword": "Ask questions in further wordings, as a set that a suite can name.",
 }
 
 

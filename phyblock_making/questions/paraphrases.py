@@ -24,7 +24,7 @@ from phyblock.models import ChoiceSubject, Message, Model, Request
 from phyblock.parsing import parse_answer
 from phyblock.tasks import TemplatePrompt
 from phyblock_making.questions.rederiving import problem_of
-from phyblock_making.questions.wording import WORDINGS, wording_ids
+from phyblock_making.questions.wording import WORDINGS, fill_template, stem_of, wording_ids
 
 __all__ = ["Paraphrase", "fault_of_form", "stems_of", "write_wordings"]
 
@@ -48,7 +48,7 @@ class Paraphrase:
 
     def line(self, model: str, number: int) -> str:
         """As one line of JSON, without its end."""
-        told = {
+        fields = {
             "wording": f"{self.stem}-m{number}",
             "subtask": self.subtask,
             "template": self.template,
@@ -57,7 +57,7 @@ class Paraphrase:
             "checked_with": list(self.checked_with),
             "model": model,
         }
-        return json.dumps(told, ensure_ascii=False)
+        return json.dumps(fields, ensure_ascii=False)
 
 
 def stems_of(questions: Sequence[Question]) -> dict[str, list[Question]]:
@@ -65,7 +65,7 @@ def stems_of(questions: Sequence[Question]) -> dict[str, list[Question]]:
     found: dict[str, list[Question]] = {}
     for question in questions:
         if question.wording in WORDINGS:
-            found.setdefault(question.wording.rsplit("-", 1)[0], []).append(question)
+            found.setdefault(stem_of(question.wording), []).append(question)
     return found
 
 
@@ -129,8 +129,8 @@ async def _fault_of_meaning(
 ) -> str | None:
     """Why a paraphrase means something else, by a question whose answer is known."""
     slots: Mapping[str, str] = question.evidence.get("slots", {})
-    text = template.format(**slots)
-    asked = replace(question, text=text[:1].upper() + text[1:], wording=_stem_of(question) + "-m0")
+    text = fill_template(template, slots)
+    asked = replace(question, text=text, wording=f"{stem_of(question.wording)}-m0")
     problem = problem_of(asked)
     if problem is not None:
         return f"filled as {question.id}: {problem}"
@@ -207,10 +207,6 @@ def _slots(template: str) -> Counter[str]:
                 f"{name}{'!' + conversion if conversion else ''}{':' + form if form else ''}"
             ] += 1
     return found
-
-
-def _stem_of(question: Question) -> str:
-    return question.wording.rsplit("-", 1)[0]
 
 
 def _plain(text: str) -> str:

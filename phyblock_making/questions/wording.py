@@ -9,7 +9,7 @@ from phyblock_making.questions.dynamic_templates import DYNAMIC_TEMPLATES
 from phyblock_making.questions.question_draft import UnfairError
 from phyblock_making.questions.static_templates import TEMPLATES
 
-__all__ = ["WORDINGS", "fill", "slots_of", "wording_ids"]
+__all__ = ["WORDINGS", "fill", "fill_template", "slots_of", "stem_of", "wording_ids"]
 
 WORDINGS: Mapping[str, str] = {**TEMPLATES, **DYNAMIC_TEMPLATES}
 """All templates by id."""
@@ -17,12 +17,22 @@ WORDINGS: Mapping[str, str] = {**TEMPLATES, **DYNAMIC_TEMPLATES}
 
 def wording_ids(stem: str) -> Sequence[str]:
     """The ids `stem-1`, `stem-2` and so on, in that order."""
-    return [name for name in WORDINGS if name.rsplit("-", 1)[0] == stem]
+    return [name for name in WORDINGS if stem_of(name) == stem]
+
+
+def stem_of(wording: str) -> str:
+    """What all wordings of one kind of question share: `rp-corner` of `rp-corner-2`."""
+    return wording.rsplit("-", 1)[0]
 
 
 def fill(wording: str, **slots: str) -> str:
-    """The template with its slots filled, first letter large."""
-    text = WORDINGS[wording].format(**slots)
+    """The template of a known wording with its slots filled, first letter large."""
+    return fill_template(WORDINGS[wording], slots)
+
+
+def fill_template(template: str, slots: Mapping[str, str]) -> str:
+    """A template with its slots filled, first letter large."""
+    text = template.format(**slots)
     return text[:1].upper() + text[1:]
 
 
