@@ -107,6 +107,8 @@ class Workspace:
             "HOME": str(root),
             "PHYBLOCK_CACHE": str(self.cache),
             "LITELLM_LOCAL_MODEL_COST_MAP": "True",
+            # This checkout, wherever the environment's own installation of it points to.
+            "PYTHONPATH": str(Path(__file__).parents[1]),
         }
 
     def write_scenes(self, *scenes: Raw) -> Path:
