@@ -60,8 +60,8 @@ def find_questions(name: str) -> Path:
         return path.parent
     if len(path.parts) == 1 and bundled("benchmarks", "data", name, QUESTIONS_FILE).is_file():
         return bundled("benchmarks", "data", name)
-    found = bundled("benchmarks", "data").glob(f"*/{QUESTIONS_FILE}")
-    names = ", ".join(sorted(one.parent.name for one in found))
+    bundled_sets = bundled("benchmarks", "data").glob(f"*/{QUESTIONS_FILE}")
+    names = ", ".join(sorted(path.parent.name for path in bundled_sets))
     allowed = f"a folder with {QUESTIONS_FILE}, or a bundled set: {names}"
     raise DataError(Problem(name, "there are no such questions", allowed=allowed))
 

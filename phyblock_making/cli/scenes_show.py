@@ -28,8 +28,8 @@ def command(data: str, scene: str) -> None:
     levels = " and ".join(map(str, task.scene.levels))
     parents = ", ".join(task.scene.parents)
     layers = max(task.scene.graph.layers)
-    told = f"scene {task.scene.id} · level {levels} · {len(task.scene)} blocks · {layers} layers"
-    console.print(f"{told} · made from {parents}", markup=False, soft_wrap=True)
+    heading = f"scene {task.scene.id} · level {levels} · {len(task.scene)} blocks · {layers} layers"
+    console.print(f"{heading} · made from {parents}", markup=False, soft_wrap=True)
     headings = ("block", "type", "color", "on", "position mm", "euler deg")
     numbers = ("layer", "pick", "seen")
     console.print(plain_table((*headings, *numbers), _blocks(task), numbers=3, tight=True))

@@ -62,8 +62,8 @@ def command(
     """
     check_place(out, replace)
     wanted = {subtask: per_subtask or PER_SUBTASK[subtask] for subtask in subtasks}
-    found = read_data_set(data)
-    scenes = [task.scene for task in found.tasks]
+    read = read_data_set(data)
+    scenes = [task.scene for task in read.tasks]
     console = make_console(stderr=True)
     with (
         open_workers(jobs, ray_address) as workers,
@@ -71,21 +71,21 @@ def command(
     ):
         bars: dict[Subtask, TaskID] = {}
 
-        def told(subtask: Subtask, total: int) -> None:
+        def report(subtask: Subtask, total: int) -> None:
             if subtask not in bars:
                 bars[subtask] = progress.add_task(f"drafting {subtask}", total=total)
             progress.advance(bars[subtask])
 
-        questions = list(make_questions(scenes, wanted, seed, workers, told))
+        questions = list(make_questions(scenes, wanted, seed, workers, report))
     made_by = f"phyblock vqa generate --data {data} --seed {seed} --out {out.name}"
     if len(subtasks) < len(SUBTASKS):
         made_by += f" --subtasks {','.join(subtasks)}"
     if per_subtask is not None:
         made_by += f" --per-subtask {per_subtask}"
     originals = {scene.id: scene for scene in scenes}
-    write_questions(out, questions, originals, found.name, made_by, _audits(questions))
-    told_of = f"{len(questions)} questions in {len(subtasks)} subtasks"
-    click.echo(f"{told_of}: {shown_path(out)}")
+    write_questions(out, questions, originals, read.name, made_by, _audits(questions))
+    outcome = f"{len(questions)} questions in {len(subtasks)} subtasks"
+    click.echo(f"{outcome}: {shown_path(out)}")
 
 
 def _audits(questions: Sequence[Question]) -> list[SubtaskAudit]:

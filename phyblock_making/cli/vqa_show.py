@@ -45,23 +45,23 @@ def command(
 
     With --out its pictures are drawn side by side, in the order of the recipe.
     """
-    found = _find(read_question_set(questions, data), question)
+    shown = _find(read_question_set(questions, data), question)
     console = make_console()
-    labels = ", ".join(picture.label for picture in found.pictures)
+    labels = ", ".join(picture.label for picture in shown.pictures)
     lines = [
-        f"{found.id} · {SUBTASK_NAMES[found.subtask]} · scene {found.scene.id}",
+        f"{shown.id} · {SUBTASK_NAMES[shown.subtask]} · scene {shown.scene.id}",
         f"pictures: {labels}",
         "",
-        found.text,
-        *(f"  {letter}. {text}" for letter, text in zip(LETTERS, found.options, strict=True)),
+        shown.text,
+        *(f"  {letter}. {text}" for letter, text in zip(LETTERS, shown.options, strict=True)),
     ]
     if not blind:
-        lines += ["", f"answer: {found.answer_letters}"]
-        lines.append(f"evidence: {json.dumps(found.evidence)}")
+        lines += ["", f"answer: {shown.answer_letters}"]
+        lines.append(f"evidence: {json.dumps(shown.evidence)}")
     for line in lines:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     if out is not None:
-        write_file(out, _side_by_side(found, PictureStyle(size)))
+        write_file(out, _side_by_side(shown, PictureStyle(size)))
         console.print(f"pictures: {shown_path(out)}", markup=False, soft_wrap=True)
 
 

@@ -28,8 +28,8 @@ def command(questions: str, data: str, jobs: int, ray_address: str | None) -> No
     PATH is a folder with questions.jsonl or a bundled set, by default the built-in phyblock-vqa.
     Exit code 1 when an answer differs, or a question is not fair.
     """
-    found = read_question_set(questions, data)
-    asked = [task.question for task in found.tasks]
+    read = read_question_set(questions, data)
+    asked = [task.question for task in read.tasks]
     good: Counter[str] = Counter()
     failures: list[str] = []
     with open_workers(jobs, ray_address) as workers:
@@ -38,7 +38,7 @@ def command(questions: str, data: str, jobs: int, ray_address: str | None) -> No
             good[question.subtask] += problem is None
             if problem is not None:
                 failures.append(f"{question.id}: {problem}")
-    files, changed = check_sums(found.root)
+    files, changed = check_sums(read.root)
     failures += map(str, changed)
     rows: list[tuple[str, ...]] = [
         (s, SUBTASK_NAMES[s], str(good[s]), str(sum(q.subtask == s for q in asked)))
@@ -51,7 +51,7 @@ def command(questions: str, data: str, jobs: int, ray_address: str | None) -> No
     for failure in sorted(failures):
         click.echo(f"failed: {failure}", err=True)
     verdict = f"{len(failures)} failures" if failures else "all answers derived again"
-    told = f"{questions}: {sum(good.values())} of {len(asked)} questions, {verdict}"
-    console.print(told, markup=False, soft_wrap=True)
+    summary = f"{questions}: {sum(good.values())} of {len(asked)} questions, {verdict}"
+    console.print(summary, markup=False, soft_wrap=True)
     if failures:
         raise click.exceptions.Exit(1)

@@ -91,12 +91,14 @@ def command(
     with ExitStack() as stack:
         cache = None if no_cache else stack.enter_context(ReplyCache(reply_cache_file()))
         model = build_model(config, cache=cache, overall=Gate(_AT_ONCE))
-        found = asyncio.run(_write(model, prompt, stems, count, checks, seed))
-    lines = [paraphrase.line(name, number) for number, paraphrase in _numbered(found)]
+        paraphrases = asyncio.run(_write(model, prompt, stems, count, checks, seed))
+    lines = [paraphrase.line(name, number) for number, paraphrase in _numbered(paraphrases)]
     write_file(out, "".join(line + "\n" for line in lines))
-    accepted = sum(paraphrase.fault is None for paraphrase in found)
-    told = f"{counted(len(found), 'paraphrase')}, {accepted} accepted, in {shown_path(out)}"
-    make_console().print(f"{told}; read them before they are used", markup=False, soft_wrap=True)
+    accepted = sum(paraphrase.fault is None for paraphrase in paraphrases)
+    summary = (
+        f"{counted(len(paraphrases), 'paraphrase')}, {accepted} accepted, in {shown_path(out)}"
+    )
+    make_console().print(f"{summary}; read them before they are used", markup=False, soft_wrap=True)
 
 
 def _config(name: str, models_file: str | None) -> ModelConfig:
@@ -116,7 +118,7 @@ async def _write(
     seed: int,
 ) -> list[Paraphrase]:
     try:
-        found = await asyncio.gather(
+        by_stem = await asyncio.gather(
             *(
                 write_wordings(model, prompt, stem, questions, count, checks, seed)
                 for stem, questions in stems.items()
@@ -124,14 +126,14 @@ async def _write(
         )
     finally:
         await model.aclose()
-    return [paraphrase for part in found for paraphrase in part]
+    return [paraphrase for of_stem in by_stem for paraphrase in of_stem]
 
 
-def _numbered(found: Sequence[Paraphrase]) -> list[tuple[int, Paraphrase]]:
+def _numbered(paraphrases: Sequence[Paraphrase]) -> list[tuple[int, Paraphrase]]:
     """Each with its number inside its stem, from 1."""
     counts: dict[str, int] = {}
     numbered = []
-    for paraphrase in found:
+    for paraphrase in paraphrases:
         counts[paraphrase.stem] = counts.get(paraphrase.stem, 0) + 1
         numbered.append((counts[paraphrase.stem], paraphrase))
     return numbered

@@ -23,13 +23,12 @@ from phyblock.sim.question_pictures import BLOCK_LABEL
 from phyblock.sim.seeing import Top, is_apart, is_inside, seen, seen_order, visible_tops
 from phyblock.sim.support import bounds_m, drop_height_m
 from phyblock_making.poses import POSES
+from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.goal_view import GOAL_VIEW
 from phyblock_making.questions.pictured_drafts import (
     draft,
     only_index,
-    pick,
     picture_of,
-    shuffled,
     state,
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError

@@ -16,6 +16,7 @@ from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, S
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.outcomes import OUTCOME_SETTINGS, Outcome, Push, after, after_removal
 from phyblock.sim.seeing import block_mark, is_apart, seen, seen_order
+from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.goal_view import COUNTED, GOAL_VIEW, NAMED, are_seen, require_seen
 from phyblock_making.questions.pictured_drafts import (
     are_told_apart,
@@ -24,9 +25,7 @@ from phyblock_making.questions.pictured_drafts import (
     of_kind,
     only_index,
     option_pictures,
-    pick,
     picture_of,
-    shuffled,
     state,
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError

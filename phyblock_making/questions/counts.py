@@ -10,6 +10,7 @@ from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import Question, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.support import GROUND, bounds_m, support_graph
+from phyblock_making.questions.choices import shuffled
 from phyblock_making.questions.goal_view import (
     COUNTED,
     are_seen,
@@ -19,7 +20,7 @@ from phyblock_making.questions.goal_view import (
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import SHAPE_WORDS
-from phyblock_making.questions.static_drafts import StaticMaker, draft, index_of, shuffled, window
+from phyblock_making.questions.static_drafts import StaticMaker, draft, index_of, window
 from phyblock_making.questions.wording import slots_of
 
 __all__ = ["CountMaker", "LayerMaker", "NumberMaker", "TypeMaker"]
@@ -49,13 +50,13 @@ class NumberMaker(StaticMaker):
         kinds += [(f"{color} {word}", "both") for color in colors for word in _TYPES_OF]
         if not _shapes_are_seen(scene.blocks):
             kinds = [(what, kind) for what, kind in kinds if kind == "color"]
-        for what, kind in shuffled(kinds, rng):
+        for what, kind in shuffled(rng, kinds):
             counted = _fitting(what, scene.blocks)
-            values = window(range(1, 8), len(counted), rng)
+            values = window(rng, range(1, 8), len(counted))
             if values is not None:
                 options = [str(value) for value in values]
                 evidence = {"counted": _orders(counted)}
-                yield draft(scene, "nu", rng, {"what": what}, options, options[0], kind, **evidence)
+                yield draft(scene, rng, "nu", {"what": what}, options, options[0], kind, **evidence)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Counts the blocks that fit the words."""
@@ -89,10 +90,10 @@ class _WholeMaker(StaticMaker):
         except UnfairError:
             return
         for _ in range(_TRIES):
-            values = window(self._values, right, rng)
+            values = window(rng, self._values, right)
             if values is not None:
                 options = [str(value) for value in values]
-                yield draft(scene, self.subtask.lower(), rng, {}, options, options[0], count=right)
+                yield draft(scene, rng, self.subtask.lower(), {}, options, options[0], count=right)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Counts anew."""

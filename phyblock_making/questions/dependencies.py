@@ -9,11 +9,12 @@ import numpy as np
 from phyblock.domain.question import Question, Subtask
 from phyblock.domain.scene import Scene
 from phyblock.sim.support import GROUND, support_graph
+from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import recolored
 from phyblock_making.questions.goal_view import NAMED, require_seen, shown_blocks
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import Feature, names, resolve_one
-from phyblock_making.questions.static_drafts import StaticMaker, draft, pick, seen_blocks, shuffled
+from phyblock_making.questions.static_drafts import StaticMaker, draft, seen_blocks
 from phyblock_making.questions.wording import slots_of
 
 __all__ = ["DependencyMaker"]
@@ -65,7 +66,7 @@ class DependencyMaker(StaticMaker):
                 if (found := names(block, shown.blocks, _PLAIN))
             }
             if len(named) >= 5:
-                yield from _one(shown, named, below, rng)
+                yield from _about_one(shown, named, below, rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """From the contacts of the blocks that the text and the options name."""
@@ -83,22 +84,22 @@ class DependencyMaker(StaticMaker):
         return (right[0],)
 
 
-def _one(
+def _about_one(
     scene: Scene, named: Mapping[int, str], below: Below, rng: np.random.Generator
 ) -> Iterator[Draft]:
     types = {block.order: block.type for block in scene.blocks}
-    anchor = pick(list(named), rng)
-    for rule in shuffled(list(_RULES), rng)[:2]:
+    anchor = pick(rng, list(named))
+    for rule in shuffled(rng, list(_RULES))[:2]:
         rest = [order for order in named if order != anchor]
         right = [order for order in rest if _RULES[rule](order, anchor, below)]
-        wrong = shuffled([order for order in rest if order not in right], rng)[:3]
+        wrong = shuffled(rng, [order for order in rest if order not in right])[:3]
         if right and len(wrong) == 3:
-            chosen = [pick(right, rng), *wrong]
+            chosen = [pick(rng, right), *wrong]
             options = [f"the {named[order]}" for order in chosen]
             slots = {"block": named[anchor]}
             contacts = {str(o): sorted(below[o]) for o in (anchor, *chosen)}
             value = types[chosen[0]]
-            yield draft(scene, f"rd-{rule}", rng, slots, options, value, rule, rests_on=contacts)
+            yield draft(scene, rng, f"rd-{rule}", slots, options, value, rule, rests_on=contacts)
 
 
 def _all_below(order: int, below: Below) -> set[int]:

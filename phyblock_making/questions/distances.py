@@ -11,6 +11,7 @@ from phyblock.domain.question import Question, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.support import bounds_m
 from phyblock_making.questions.block_measures import top_m
+from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import recolored
 from phyblock_making.questions.goal_view import NAMED, center_m, require_seen, shown_blocks
 from phyblock_making.questions.question_draft import Draft, UnfairError
@@ -19,9 +20,7 @@ from phyblock_making.questions.static_drafts import (
     StaticMaker,
     draft,
     index_of,
-    pick,
     seen_blocks,
-    shuffled,
 )
 from phyblock_making.questions.wording import slots_of
 
@@ -96,7 +95,7 @@ class DistanceMaker(StaticMaker):
             }
             blocks = [block for block in seen if block.order in named]
             if scales:
-                scale = _SCALES[pick(scales, rng)]
+                scale = _SCALES[pick(rng, scales)]
                 yield from _of_blocks(shown, blocks, named, scale, rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
@@ -127,9 +126,9 @@ def _of_blocks(
     scale: str,
     rng: np.random.Generator,
 ) -> Iterator[Draft]:
-    pairs = shuffled(list(itertools.permutations(blocks, 2)), rng)[:6]
+    pairs = shuffled(rng, list(itertools.permutations(blocks, 2)))[:6]
     for one, other in pairs:
-        for rule in shuffled(list(_RULES), rng)[:2]:
+        for rule in shuffled(rng, list(_RULES))[:2]:
             slots = {"block": named[one.order], "scale": scale}
             if rule in ("apart", "rise"):
                 slots["other"] = named[other.order]
@@ -141,11 +140,11 @@ def _of_blocks(
                 continue
             ladders = [ladder for ladder in _LADDERS if right in ladder]
             if ladders:
-                ladder = pick(ladders, rng)
+                ladder = pick(rng, ladders)
                 values = [right, *(value for value in ladder if value != right)]
                 options = [_shown(value) for value in values]
                 yield draft(
-                    scene, f"ap-{rule}", rng, slots, options, options[0], rule, length_cm=right
+                    scene, rng, f"ap-{rule}", slots, options, options[0], rule, length_cm=right
                 )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.outcomes import OUTCOME_SETTINGS, after
+from phyblock_making.questions.choices import pick
 from phyblock_making.questions.goal_view import GOAL_VIEW
 from phyblock_making.questions.pictured_drafts import (
     are_alike,
@@ -17,7 +18,6 @@ from phyblock_making.questions.pictured_drafts import (
     draft,
     of_kind,
     option_pictures,
-    pick,
     state,
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.sim.outcomes import DEFAULT_LIMITS, Limits
 from phyblock.sim.seeing import is_inside, least_difference, seen
 from phyblock.sim.world import Pose
+from phyblock_making.questions.choices import pick
 from phyblock_making.questions.question_draft import Draft, Option, UnfairError
 from phyblock_making.questions.wording import fill, wording_ids
 
@@ -25,18 +25,15 @@ __all__ = [
     "of_kind",
     "only_index",
     "option_pictures",
-    "pick",
     "picture_of",
     "relabeled",
     "same_blocks",
-    "shuffled",
     "state",
 ]
 
 LEAST_PIXELS = 220
 """In so many pixels of 256 by 256 any two pictures that are compared differ, at the least."""
 _SAME = Limits(still_m=0.002, still_deg=2.0, moved_m=0.002, moved_deg=2.0)
-T = TypeVar("T")
 
 
 def state(
@@ -149,16 +146,6 @@ def only_index(right: Sequence[bool]) -> tuple[int]:
     if len(found) != 1:
         raise UnfairError(f"{len(found)} of {len(right)} options are right")
     return (found[0],)
-
-
-def pick(rng: np.random.Generator, options: Sequence[T]) -> T:
-    """One of the options, all alike."""
-    return options[int(rng.integers(len(options)))]
-
-
-def shuffled(rng: np.random.Generator, options: Sequence[T]) -> list[T]:
-    """The options in an order drawn with `rng`."""
-    return [options[int(i)] for i in rng.permutation(len(options))]
 
 
 def relabeled(picture: QuestionPicture, label: str) -> QuestionPicture:

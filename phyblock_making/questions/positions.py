@@ -11,6 +11,7 @@ from phyblock.domain.question import Question, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.support import bounds_m
 from phyblock_making.questions.block_measures import offset_m, top_m
+from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import recolored
 from phyblock_making.questions.goal_view import (
     NAMED,
@@ -25,9 +26,7 @@ from phyblock_making.questions.static_drafts import (
     StaticMaker,
     draft,
     index_of,
-    pick,
     seen_blocks,
-    shuffled,
 )
 from phyblock_making.questions.wording import slots_of
 
@@ -95,7 +94,7 @@ class PositionMaker(StaticMaker):
 def _of_pairs(
     scene: Scene, blocks: Sequence[Block], named: dict[int, str], rng: np.random.Generator
 ) -> Iterator[Draft]:
-    pairs = shuffled(list(itertools.permutations(blocks, 2)), rng)[:4]
+    pairs = shuffled(rng, list(itertools.permutations(blocks, 2)))[:4]
     for one, other in pairs:
         slots = {"block": named[one.order], "other": named[other.order]}
         for stem, words, rule in (
@@ -108,17 +107,17 @@ def _of_pairs(
                 continue
             options = [right, *(word for word in words if word != right)]
             offset = [round(float(x), 6) for x in offset_m(one, other)]
-            yield draft(scene, f"rp-{stem}", rng, slots, options, right, stem, offset_m=offset)
+            yield draft(scene, rng, f"rp-{stem}", slots, options, right, stem, offset_m=offset)
 
 
 def _of_four(
     scene: Scene, blocks: Sequence[Block], named: dict[int, str], rng: np.random.Generator
 ) -> Iterator[Draft]:
-    chosen = shuffled(blocks, rng)[:5]
+    chosen = shuffled(rng, blocks)[:5]
     if len(chosen) < 5:
         return
     anchor, four = chosen[0], chosen[1:]
-    kind = pick((*_EXTREMES, "nearest"), rng)
+    kind = pick(rng, (*_EXTREMES, "nearest"))
     try:
         is_near = kind == "nearest"
         right = _nearest(anchor, four) if is_near else _extreme(kind, four, scene.blocks)
@@ -129,7 +128,7 @@ def _of_four(
     slots = {"other": named[anchor.order]} if kind == "nearest" else {"extreme": kind}
     stem = "nearest" if kind == "nearest" else "extreme"
     orders = {"ranked": [block.order for block in ranked]}
-    yield draft(scene, f"rp-{stem}", rng, slots, options, right.type, kind, **orders)
+    yield draft(scene, rng, f"rp-{stem}", slots, options, right.type, kind, **orders)
 
 
 def _corner(one: Block, other: Block) -> str:

@@ -19,6 +19,7 @@ from phyblock.sim.outcomes import (
 )
 from phyblock.sim.seeing import seen, shown_pixels
 from phyblock.sim.support import bounds_m, drop_height_m
+from phyblock_making.questions.choices import shuffled
 from phyblock_making.questions.counterfactual import TAKEN, marked_order
 from phyblock_making.questions.goal_view import GOAL_VIEW
 from phyblock_making.questions.pictured_drafts import (
@@ -30,10 +31,9 @@ from phyblock_making.questions.pictured_drafts import (
     option_pictures,
     picture_of,
     same_blocks,
-    shuffled,
     state,
 )
-from phyblock_making.questions.pushes import meant_push, push_drafts, told
+from phyblock_making.questions.pushes import meant_push, push_drafts, what_happened
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.wording import slots_of
 
@@ -78,8 +78,8 @@ class PredictiveMaker:
         if not outcome.is_clear:
             raise UnfairError("the settings disagree on what follows the push")
         settled = state(question.scene, outcome.settled, shown.view_deg)
-        expected = told(question.scene, settled, push)
-        return only_index([told(question.scene, one, push) == expected for one in options])
+        expected = what_happened(question.scene, settled, push)
+        return only_index([what_happened(question.scene, one, push) == expected for one in options])
 
 
 def _next(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:

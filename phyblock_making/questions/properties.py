@@ -10,6 +10,7 @@ from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import Question, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock_making.questions.block_measures import height_m
+from phyblock_making.questions.choices import shuffled
 from phyblock_making.questions.coloring import recolored
 from phyblock_making.questions.goal_view import NAMED, STUDIED, require_seen, shown_blocks
 from phyblock_making.questions.question_draft import Draft, UnfairError
@@ -17,11 +18,10 @@ from phyblock_making.questions.referring import SHAPE_WORDS, Feature, resolve_on
 from phyblock_making.questions.static_drafts import (
     StaticMaker,
     draft,
+    drawn_name,
     index_of,
-    name_one,
-    others,
     seen_blocks,
-    shuffled,
+    wrong_options,
 )
 from phyblock_making.questions.wording import slots_of
 
@@ -40,16 +40,16 @@ class ShapeMaker(StaticMaker):
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """One a block that shows enough of itself."""
-        for block in shuffled(seen_blocks(scene, STUDIED), rng):
+        for block in shuffled(rng, seen_blocks(scene, STUDIED)):
             if _hides_its_shape(block, scene.blocks):
                 continue
             shown = recolored(scene, rng)
             again = next(b for b in shown.blocks if b.order == block.order)
-            name = name_one(again, shown, _BY_LOOKS, rng)
+            name = drawn_name(rng, again, shown, _BY_LOOKS)
             if name is not None:
                 right = shape_word(block.type)
-                options = [right, *others(list(SHAPE_WORDS), right, rng)]
-                yield draft(shown, "sh", rng, {"block": name}, options, right, block=block.order)
+                options = [right, *wrong_options(rng, list(SHAPE_WORDS), right)]
+                yield draft(shown, rng, "sh", {"block": name}, options, right, block=block.order)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """The word for the type of the block that the text names."""
@@ -68,14 +68,14 @@ class ColorMaker(StaticMaker):
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """One a block that can be named."""
-        for block in shuffled(seen_blocks(scene, NAMED), rng):
+        for block in shuffled(rng, seen_blocks(scene, NAMED)):
             shown = recolored(scene, rng)
             again = next(b for b in shown.blocks if b.order == block.order)
-            name = name_one(again, shown, _BY_SHAPE, rng)
+            name = drawn_name(rng, again, shown, _BY_SHAPE)
             if name is not None:
-                options = [again.color, *others(COLORS, again.color, rng)]
+                options = [again.color, *wrong_options(rng, COLORS, again.color)]
                 yield draft(
-                    shown, "co", rng, {"block": name}, options, again.color, block=block.order
+                    shown, rng, "co", {"block": name}, options, again.color, block=block.order
                 )
 
     def rederive(self, question: Question) -> tuple[int, ...]:

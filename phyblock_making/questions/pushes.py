@@ -19,18 +19,17 @@ from phyblock.sim.outcomes import (
     after_removal,
 )
 from phyblock.sim.seeing import block_mark, seen, shown_pixels
+from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.counterfactual import TAKEN
 from phyblock_making.questions.pictured_drafts import (
     are_told_apart,
     draft,
     moved_between,
-    pick,
-    shuffled,
     state,
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError
 
-__all__ = ["meant_push", "push_drafts", "told"]
+__all__ = ["meant_push", "push_drafts", "what_happened"]
 
 _PUSHES_TRIED = 4
 _FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
@@ -137,7 +136,7 @@ def _distinct(
     for blocks in states:
         picture = state(scene, blocks, plain.view_deg)
         try:
-            story = told(scene, picture, push)
+            story = what_happened(scene, picture, push)
         except UnfairError:
             story = None
         is_new = story is not None and story not in stories
@@ -149,7 +148,7 @@ def _distinct(
     return chosen
 
 
-def told(
+def what_happened(
     scene: Scene, picture: QuestionPicture, push: Push
 ) -> tuple[tuple[int, ...], tuple[int, ...], bool, frozenset[int]]:
     """What a picture says happened, in words that two settled scenes can be compared by.

@@ -37,12 +37,12 @@ def make_questions(
     wanted: Mapping[Subtask, int],
     seed: int,
     workers: Workers,
-    told: Callable[[Subtask, int], None] = lambda _, __: None,
+    report: Callable[[Subtask, int], None] = lambda _, __: None,
 ) -> Iterator[Question]:
     """The questions, subtask by subtask; the same for the same arguments, whatever the workers.
 
     Drafts of a scene depend on seed, subtask and scene alone; what is taken of them, and which
-    letter is right, on seed and subtask. `told` hears of every scene that was asked, and of
+    letter is right, on seed and subtask. `report` hears of every scene that was asked, and of
     how many there are to ask. Raises DataError when the scenes give too few.
     """
     for subtask, count in wanted.items():
@@ -50,7 +50,7 @@ def make_questions(
         tasks = [(subtask, seed, scene) for scene in _tried(subtask, scenes, seed)]
         for drafts in workers.map(_drafts, tasks):
             pool += [Pooled(draft, _texts(draft.options)) for draft in drafts]
-            told(subtask, len(tasks))
+            report(subtask, len(tasks))
         rng = _rng(seed, subtask, "choice")
         taken = select(pool, count, rng)
         if len(taken) < count:
@@ -82,7 +82,7 @@ def _tried(subtask: Subtask, scenes: Sequence[Scene], seed: int) -> list[Scene]:
     for scene in drawn:
         by_level.setdefault(scene.level, []).append(scene)
     ranked = sorted(
-        ((i, level, scene) for level, found in by_level.items() for i, scene in enumerate(found)),
+        ((i, level, scene) for level, group in by_level.items() for i, scene in enumerate(group)),
         key=lambda entry: entry[:2],
     )
     return [scene for _, _, scene in ranked[: MAKERS[subtask].scenes_tried]]
@@ -91,8 +91,8 @@ def _tried(subtask: Subtask, scenes: Sequence[Scene], seed: int) -> list[Scene]:
 def _drafts(task: tuple[Subtask, int, Scene]) -> list[Draft]:
     subtask, seed, scene = task
     maker = MAKERS[subtask]
-    found = maker.drafts(scene, _rng(seed, subtask, scene.id))
-    return list(islice(found, maker.drafts_a_scene))
+    drafts = maker.drafts(scene, _rng(seed, subtask, scene.id))
+    return list(islice(drafts, maker.drafts_a_scene))
 
 
 def _texts(options: Sequence[Option]) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from phyblock.sim.support import (
     support_graph,
 )
 from phyblock_making.questions.block_measures import turned_about_vertical, vertical_turns_deg
+from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import with_own_colors
 from phyblock_making.questions.goal_view import (
     GOAL_VIEW,
@@ -33,9 +34,7 @@ from phyblock_making.questions.static_drafts import (
     StaticMaker,
     draft,
     index_of,
-    pick,
     seen_blocks,
-    shuffled,
 )
 from phyblock_making.questions.wording import slots_of
 
@@ -47,7 +46,7 @@ class _Rule:
     """How turns about the vertical are told of a sort of block, and what can be told apart."""
 
     kind: str
-    told: Callable[[int], str]
+    phrase_of: Callable[[int], str]
     options: tuple[str, ...]
 
 
@@ -89,7 +88,7 @@ class RotationMaker(StaticMaker):
             and _rule(one)
             and vertical_turns_deg(one, other)
         ]
-        for one, other in shuffled(pairs, rng)[:_PAIRS]:
+        for one, other in shuffled(rng, pairs)[:_PAIRS]:
             rule = _rule(one)
             made = _turned(scene, one, other, rule, rng) if rule else None
             if made is not None:
@@ -101,10 +100,10 @@ class RotationMaker(StaticMaker):
         one, other = (resolve_one(slots[name], blocks) for name in ("block", "other"))
         require_seen(blocks, [one.order, other.order], STUDIED)
         rule = _rule(one)
-        turns = [rule.told(turn) for turn in vertical_turns_deg(one, other)] if rule else []
+        turns = [rule.phrase_of(turn) for turn in vertical_turns_deg(one, other)] if rule else []
         if not turns or not rule:
             raise UnfairError("are not of one type, or not turned about the vertical alone")
-        also_true = {told for told in turns if told != turns[0]} & set(question.options)
+        also_true = {phrase for phrase in turns if phrase != turns[0]} & set(question.options)
         if question.wording and not question.wording.startswith(f"rr-{rule.kind}-"):
             raise UnfairError("asks for a direction that is not there, or not for one that is")
         if also_true:
@@ -116,15 +115,15 @@ def _turned(
     scene: Scene, one: Block, other: Block, rule: _Rule, rng: np.random.Generator
 ) -> Draft | None:
     """A draft in which `one` stands at an angle drawn to `other`; None when it does not fit."""
-    told = pick(rule.options, rng)
+    phrase = pick(rng, rule.options)
     colored = with_own_colors(scene, [one.order, other.order], rng)
     mine, its = (next(b for b in colored.blocks if b.order == x.order) for x in (one, other))
-    for turn in shuffled(range(0, 360, 15), rng):
+    for turn in shuffled(rng, range(0, 360, 15)):
         moved = turned_about_vertical(mine, turn) if turn else mine
-        if told in [rule.told(t) for t in vertical_turns_deg(moved, its)[:1]]:
+        if phrase in [rule.phrase_of(t) for t in vertical_turns_deg(moved, its)[:1]]:
             blocks = tuple(moved if b.order == one.order else b for b in colored.blocks)
             if _is_sound(blocks, moved, mine, its):
-                return _draft(colored, blocks, (mine, its), rule, told, rng)
+                return _draft(colored, blocks, (mine, its), rule, phrase, rng)
     return None
 
 
@@ -133,13 +132,13 @@ def _draft(
     blocks: tuple[Block, ...],
     pair: tuple[Block, Block],
     rule: _Rule,
-    told: str,
+    phrase: str,
     rng: np.random.Generator,
 ) -> Draft:
-    options = [told, *(option for option in rule.options if option != told)]
+    options = [phrase, *(option for option in rule.options if option != phrase)]
     noun = shape_word(pair[0].type)
     slots = {"block": f"{pair[0].color} {noun}", "other": f"{pair[1].color} {noun}"}
-    made = draft(scene, f"rr-{rule.kind}", rng, slots, options, told, rule.kind, turned=told)
+    made = draft(scene, rng, f"rr-{rule.kind}", slots, options, phrase, rule.kind, turned=phrase)
     return replace(made, pictures=(QuestionPicture("scene", blocks, GOAL_VIEW, (), scene.blocks),))
 
 

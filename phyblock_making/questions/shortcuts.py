@@ -79,19 +79,19 @@ def audit_questions(
     questions: Sequence[Question],
     *,
     with_text_probe: bool = True,
-    told: Callable[[Subtask], None] = lambda _: None,
+    report: Callable[[Subtask], None] = lambda _: None,
 ) -> Iterator[SubtaskAudit]:
     """An audit of each subtask that has questions, in the paper's order.
 
-    `told` hears of each question whose picture was looked at. Raises SpecError where the text-only
-    probe is wanted and scikit-learn is not installed.
+    `report` hears of each question whose picture was looked at. Raises SpecError where the
+    text-only probe is wanted and scikit-learn is not installed.
     """
     guesses = Guesses(questions)
     repeated = duplicates_of(questions)
     for subtask in SUBTASKS:
         mine = [question for question in questions if question.subtask == subtask]
         if mine:
-            yield _audit(subtask, mine, guesses, repeated, with_text_probe, told)
+            yield _audit(subtask, mine, guesses, repeated, with_text_probe, report)
 
 
 def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
@@ -127,12 +127,12 @@ def _audit(
     guesses: Guesses,
     repeated: dict[str, str],
     with_text_probe: bool,
-    told: Callable[[Subtask], None],
+    report: Callable[[Subtask], None],
 ) -> SubtaskAudit:
     seen: list[tuple[float, str]] = []
     for question in questions:
         seen += [(share, question.id) for share in referents(question).values()]
-        told(subtask)
+        report(subtask)
     scenes = Counter(question.scene.id for question in questions)
     chances = [1 / math.factorial(4) if subtask == "OR" else 1 / len(q.options) for q in questions]
     return SubtaskAudit(

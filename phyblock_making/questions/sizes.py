@@ -10,6 +10,7 @@ import numpy as np
 from phyblock.domain.question import Question, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock_making.questions.block_measures import height_m, length_m, volume_m3
+from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import with_own_colors
 from phyblock_making.questions.goal_view import STUDIED, require_seen, shown_blocks
 from phyblock_making.questions.question_draft import Draft, UnfairError
@@ -18,9 +19,7 @@ from phyblock_making.questions.static_drafts import (
     StaticMaker,
     draft,
     index_of,
-    pick,
     seen_blocks,
-    shuffled,
 )
 from phyblock_making.questions.wording import slots_of
 
@@ -63,9 +62,9 @@ class SizeMaker(StaticMaker):
         seen = seen_blocks(scene, STUDIED)
         for _ in range(_TRIES):
             if len(seen) >= 4:
-                yield from _which_of_four(scene, shuffled(seen, rng)[:4], rng)
+                yield from _which_of_four(scene, shuffled(rng, seen)[:4], rng)
             if len(seen) >= 2:
-                yield from _how_many_times(scene, shuffled(seen, rng)[:2], rng)
+                yield from _how_many_times(scene, shuffled(rng, seen)[:2], rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """From the measures of the blocks that the text or the options name."""
@@ -83,7 +82,7 @@ class SizeMaker(StaticMaker):
 def _which_of_four(
     scene: Scene, chosen: Sequence[Block], rng: np.random.Generator
 ) -> Iterator[Draft]:
-    comparison = pick(list(_WHICH), rng)
+    comparison = pick(rng, list(_WHICH))
     try:
         right = _extreme(chosen, comparison)
     except UnfairError:
@@ -95,8 +94,8 @@ def _which_of_four(
     measure = _WHICH[comparison].measure
     yield draft(
         shown,
-        f"si-{_stem(comparison)}",
         rng,
+        f"si-{_stem(comparison)}",
         {"comparison": comparison},
         options,
         colors[right.order],
@@ -114,13 +113,13 @@ def _how_many_times(
     except UnfairError:
         return
     words = [word for _, word in _TIMES]
-    start = pick([i for i in (0, 1) if right in words[i : i + 4]], rng)
+    start = pick(rng, [i for i in (0, 1) if right in words[i : i + 4]])
     wrong = [word for word in words[start : start + 4] if word != right]
     shown = with_own_colors(scene, [one.order, other.order], rng)
     colors = {block.order: block.color for block in shown.blocks}
     slots = {"block": f"{colors[one.order]} block", "other": f"{colors[other.order]} block"}
     heights = {str(block.order): round(height_m(block), 6) for block in chosen}
-    yield draft(shown, "si-times", rng, slots, [right, *wrong], right, "times", measures=heights)
+    yield draft(shown, rng, "si-times", slots, [right, *wrong], right, "times", measures=heights)
 
 
 def _stem(comparison: str) -> str:

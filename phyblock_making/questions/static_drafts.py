@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from phyblock.domain.question import Question
 from phyblock.domain.scene import Block, Scene
+from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.goal_view import goal_picture, shares
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import Feature, names
@@ -17,16 +18,13 @@ from phyblock_making.questions.wording import fill, wording_ids
 __all__ = [
     "StaticMaker",
     "draft",
+    "drawn_name",
     "index_of",
-    "name_one",
-    "others",
-    "pick",
     "seen_blocks",
-    "shuffled",
     "window",
+    "wrong_options",
 ]
 
-T = TypeVar("T")
 _NAMES_DRAWN_FROM = 3
 
 
@@ -39,8 +37,8 @@ class StaticMaker:
 
 def draft(
     scene: Scene,
-    stem: str,
     rng: np.random.Generator,
+    stem: str,
     slots: Mapping[str, str],
     options: Sequence[str],
     value: str,
@@ -48,7 +46,7 @@ def draft(
     **evidence: Any,
 ) -> Draft:
     """A draft about the goal view, in a wording drawn from those of a stem; right option first."""
-    wording = pick(wording_ids(stem), rng)
+    wording = pick(rng, wording_ids(stem))
     return Draft(
         scene=scene,
         text=fill(wording, **slots),
@@ -61,21 +59,11 @@ def draft(
     )
 
 
-def pick(options: Sequence[T], rng: np.random.Generator) -> T:
-    """One of the options, all alike."""
-    return options[int(rng.integers(len(options)))]
-
-
-def shuffled(items: Sequence[T], rng: np.random.Generator) -> list[T]:
-    """The items in an order drawn with `rng`."""
-    return [items[int(i)] for i in rng.permutation(len(items))]
-
-
-def others(
-    allowed: Sequence[str], right: str, rng: np.random.Generator, count: int = 3
+def wrong_options(
+    rng: np.random.Generator, allowed: Sequence[str], right: str, count: int = 3
 ) -> list[str]:
     """`count` of the allowed that are not the right one."""
-    return shuffled([option for option in allowed if option != right], rng)[:count]
+    return shuffled(rng, [option for option in allowed if option != right])[:count]
 
 
 def seen_blocks(scene: Scene, least: float) -> list[Block]:
@@ -84,15 +72,15 @@ def seen_blocks(scene: Scene, least: float) -> list[Block]:
     return [block for block in scene.blocks if seen[block.order] >= least]
 
 
-def name_one(
-    block: Block, scene: Scene, features: Sequence[Feature], rng: np.random.Generator
+def drawn_name(
+    rng: np.random.Generator, block: Block, scene: Scene, features: Sequence[Feature]
 ) -> str | None:
     """One of the shortest expressions that fit a block alone, or None when nothing does."""
     found = names(block, scene.blocks, features)
-    return pick(found[:_NAMES_DRAWN_FROM], rng) if found else None
+    return pick(rng, found[:_NAMES_DRAWN_FROM]) if found else None
 
 
-def window(values: Sequence[int], right: int, rng: np.random.Generator) -> tuple[int, ...] | None:
+def window(rng: np.random.Generator, values: Sequence[int], right: int) -> tuple[int, ...] | None:
     """Four neighbors among the allowed values that hold the right one, in a place drawn evenly.
 
     The right one stands first. None where it is not allowed, or the place drawn does not exist.

@@ -18,6 +18,7 @@ from phyblock.sim.outcomes import OUTCOME_SETTINGS, holds
 from phyblock.sim.seeing import seen, shown_pixels
 from phyblock.sim.support import bounds_m, drop_height_m, find_overlaps
 from phyblock_making.poses import POSES
+from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.goal_view import GOAL_VIEW
 from phyblock_making.questions.pictured_drafts import (
     are_told_apart,
@@ -25,10 +26,8 @@ from phyblock_making.questions.pictured_drafts import (
     of_kind,
     only_index,
     option_pictures,
-    pick,
     picture_of,
     same_blocks,
-    shuffled,
     state,
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError

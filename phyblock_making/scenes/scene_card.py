@@ -24,11 +24,11 @@ _TEXT = """# {name}
 
 makes these files anew, byte for byte, with any number of processes.
 
-**Base scenes** come from a grammar of motifs (`phyblock/generate/`): columns, piers, decks, crowns
-and flanks make towers, gates, houses, bridges, arcades, walls, pyramids, stairs, courts, animals,
-figures, cars, ships, rockets, furniture; parts side by side make streets and trains. A seeded
-choice picks the rules, and most structures are mirror-symmetric. Blocks are let down one after
-another onto a grid of 2.5 cm; a block's height follows from what it lands on.
+**Base scenes** come from a grammar of motifs (`phyblock_making/scenes/`): columns, piers, decks,
+crowns and flanks make towers, gates, houses, bridges, arcades, walls, pyramids, stairs, courts,
+animals, figures, cars, ships, rockets, furniture; parts side by side make streets and trains. A
+seeded choice picks the rules, and most structures are mirror-symmetric. Blocks are let down one
+after another onto a grid of 2.5 cm; a block's height follows from what it lands on.
 
 **Variations** are base scenes in other colors, and two base scenes side by side; each is turned
 by quarter turns and mirrored at random. `parents` names the base scenes that a scene was made from
