@@ -76,10 +76,10 @@ class _TolerantReader(SceneReader):
 
     def _tolerate(self, read: Callable[[], CandidateSet | None]) -> CandidateSet:
         before = len(self.problems)
-        found = read()
+        candidates = read()
         self.tolerated += self.problems[before:]
         del self.problems[before:]
-        return found or CandidateSet(())
+        return candidates or CandidateSet(())
 
 
 def _builtin(folder: Path, tasks: list[SalvagedTask], findings: list[Finding]) -> None:

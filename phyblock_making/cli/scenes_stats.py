@@ -49,8 +49,8 @@ def _bases(read: Dataset) -> int:
 def _by_level(read: Dataset) -> list[tuple[str, list[AssemblyTask]]]:
     """Tasks of every level, a scene of two levels in both, and of all together."""
     levels = sorted({level for task in read.tasks for level in task.scene.levels})
-    found = [(str(n), [task for task in read.tasks if n in task.scene.levels]) for n in levels]
-    return [*found, ("all", list(read.tasks))]
+    by_level = [(str(n), [task for task in read.tasks if n in task.scene.levels]) for n in levels]
+    return [*by_level, ("all", list(read.tasks))]
 
 
 def _sizes(level: str, tasks: Sequence[AssemblyTask]) -> tuple[str, ...]:

@@ -55,15 +55,15 @@ def _balanced() -> list[tuple[BlockType, Euler]]:
 
     Of others, such as a wedge, nobody could say what "its middle" is.
     """
-    found = []
+    poses = []
     for block_type in BLOCK_TYPES:
         for euler in POSES[block_type].values():
             block = Block(1, block_type, "red", (0.0, 0.0, 0.0), euler, (), 1)
             rotation = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(euler))
             center = rotation @ np.array(SHAPES[block_type].center_of_mass_m)
             if np.abs(center - bounds_m(block).mean(axis=0))[:2].max() < _OFF_CENTER_M:
-                found.append((block_type, euler))
-    return found
+                poses.append((block_type, euler))
+    return poses
 
 
 _BALANCED = _balanced()
@@ -143,19 +143,19 @@ def _first_sure(
     plain: QuestionPicture,
 ) -> list[Mark]:
     """The first place where it surely stays, or as many where it surely does not as are wanted."""
-    found: list[Mark] = []
+    marks: list[Mark] = []
     wanted = 1 if stays else len(LETTERS) - 1
     for top in tops:
         mark = Mark("A", top.position_m)
         is_fit = (
-            len(found) < wanted
-            and is_apart(plain, mark, [*others, *found], _APART_PX)
+            len(marks) < wanted
+            and is_apart(plain, mark, [*others, *marks], _APART_PX)
             and is_inside(replace(plain, marks=(mark,)))
             and _is_met(scene, block, top)
         )
         if is_fit and _is_sure(scene, block, top.position_m, stays):
-            found.append(mark)
-    return found
+            marks.append(mark)
+    return marks
 
 
 def _is_sure(scene: Scene, block: Block, place_m: tuple[float, float, float], stays: bool) -> bool:

@@ -74,12 +74,12 @@ def _turns_deg(block_type: BlockType, euler_deg: Euler, other_deg: Euler) -> tup
     wanted = np.array(orientation_class(block_type, euler_deg))
     roll, pitch, yaw = other_deg
     turns = sorted(range(-180 + _STEP_DEG, 181, _STEP_DEG), key=lambda turn: (abs(turn), -turn))
-    found = []
+    distinct = []
     for turn in turns:
         turned = orientation_class(block_type, (roll, pitch, _yaw_deg(yaw, turn)))
         if np.abs(wanted - np.array(turned)).max() < _SAME:
-            found.append(turn)
-    return tuple(found)
+            distinct.append(turn)
+    return tuple(distinct)
 
 
 def turned_about_vertical(block: Block, angle_deg: float) -> Block:

@@ -86,8 +86,8 @@ class CounterfactualMaker:
             marked = [marked_order(shown, letter) for letter in LETTERS]
             return only_index([one in outcome.moved for one in marked])
         expected = ((order,), outcome.moved)
-        found = [moved_between(scene, option) for option in option_pictures(question)]
-        return only_index([one == expected for one in found])
+        movements = [moved_between(scene, option) for option in option_pictures(question)]
+        return only_index([one == expected for one in movements])
 
 
 def marked_order(picture: QuestionPicture, letter: str) -> int:
@@ -149,8 +149,8 @@ def _pictured(
 ) -> Iterator[Draft]:
     """The settled scene among others of which some also lack the block."""
     block = next(b for b in scene.blocks if b.order == order)
-    found = names(block, scene.blocks, ("color", "type", "layer", "side"))
-    if not found:
+    expressions = names(block, scene.blocks, ("color", "type", "layer", "side"))
+    if not expressions:
         return
     plain = state(scene, scene.blocks, GOAL_VIEW)
     right = state(scene, outcome.settled, GOAL_VIEW)
@@ -163,7 +163,7 @@ def _pictured(
             if not any(_lacks_only(scene, one, order) for one in chosen[1:]):
                 return
             facts = {"removed": order, "moved": list(outcome.moved)}
-            slots = {"block": pick(rng, found[:2])}
+            slots = {"block": pick(rng, expressions[:2])}
             value = "falls" if outcome.moved else "stays"
             yield draft(scene, rng, "cf-picture", chosen, [plain], value, slots, facts)
             return
@@ -172,10 +172,10 @@ def _pictured(
 def _are_clear(scene: Scene, pictures: Sequence[QuestionPicture]) -> bool:
     """Whether each picture tells which blocks are gone or moved, no two of them the same."""
     try:
-        found = [moved_between(scene, picture) for picture in pictures]
+        movements = [moved_between(scene, picture) for picture in pictures]
     except UnfairError:
         return False
-    return len(set(found)) == len(found)
+    return len(set(movements)) == len(movements)
 
 
 def _lacks_only(scene: Scene, picture: QuestionPicture, order: int) -> bool:

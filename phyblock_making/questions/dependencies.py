@@ -61,9 +61,9 @@ class DependencyMaker(StaticMaker):
         for _ in range(_TRIES):
             shown = recolored(scene, rng)
             named = {
-                block.order: found[0]
+                block.order: expressions[0]
                 for block in seen_blocks(shown, NAMED)
-                if (found := names(block, shown.blocks, _PLAIN))
+                if (expressions := names(block, shown.blocks, _PLAIN))
             }
             if len(named) >= 5:
                 yield from _about_one(shown, named, below, rng)
@@ -103,10 +103,10 @@ def _about_one(
 
 
 def _all_below(order: int, below: Below) -> set[int]:
-    found: set[int] = set()
+    below_it: set[int] = set()
     waiting = [order]
     while waiting:
-        for other in below[waiting.pop()] - {GROUND} - found:
-            found.add(other)
+        for other in below[waiting.pop()] - {GROUND} - below_it:
+            below_it.add(other)
             waiting.append(other)
-    return found
+    return below_it

@@ -89,9 +89,9 @@ class DistanceMaker(StaticMaker):
             seen = seen_blocks(shown, NAMED)
             scales = [kind for kind in _SCALES if any(block.type == kind for block in seen)]
             named = {
-                block.order: found[0]
+                block.order: expressions[0]
                 for block in seen
-                if (found := names(block, shown.blocks, _PLAIN))
+                if (expressions := names(block, shown.blocks, _PLAIN))
             }
             blocks = [block for block in seen if block.order in named]
             if scales:

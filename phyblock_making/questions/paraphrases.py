@@ -62,11 +62,11 @@ class Paraphrase:
 
 def stems_of(questions: Sequence[Question]) -> dict[str, list[Question]]:
     """Questions by the stem of their wording (`rp-corner` of `rp-corner-2`), known ones alone."""
-    found: dict[str, list[Question]] = {}
+    by_stem: dict[str, list[Question]] = {}
     for question in questions:
         if question.wording in WORDINGS:
-            found.setdefault(stem_of(question.wording), []).append(question)
-    return found
+            by_stem.setdefault(stem_of(question.wording), []).append(question)
+    return by_stem
 
 
 def fault_of_form(template: str, originals: Sequence[str]) -> str | None:
@@ -77,8 +77,8 @@ def fault_of_form(template: str, originals: Sequence[str]) -> str | None:
         return f"its braces are broken: {error}"
     wanted = _slots(originals[0])
     if slots != wanted:
-        found = ", ".join(sorted(slots.elements())) or "none"
-        return f"its slots are {found}, not {', '.join(sorted(wanted.elements())) or 'none'}"
+        held = ", ".join(sorted(slots.elements())) or "none"
+        return f"its slots are {held}, not {', '.join(sorted(wanted.elements())) or 'none'}"
     if not _LENGTHS[0] <= len(template) <= _LENGTHS[1] or "\n" in template:
         return "it is no single sentence or two"
     if not template.rstrip().endswith(("?", ".")):
@@ -113,15 +113,15 @@ async def write_wordings(
     if texts is None:
         shown = " ".join(text.split())[:_SHOWN_CHARS]
         return [Paraphrase(stem, subtask, shown, "the reply holds no JSON list of texts")]
-    found: list[Paraphrase] = []
+    paraphrases: list[Paraphrase] = []
     for template in texts:
-        fault = fault_of_form(template, [*originals, *(one.template for one in found)])
+        fault = fault_of_form(template, [*originals, *(one.template for one in paraphrases)])
         chosen = _chosen(questions, checks, seed)
         for question in chosen if fault is None else ():
             fault = fault or await _fault_of_meaning(model, prompt, template, question, seed)
         names = tuple(question.id for question in chosen)
-        found.append(Paraphrase(stem, subtask, template, fault, names))
-    return found
+        paraphrases.append(Paraphrase(stem, subtask, template, fault, names))
+    return paraphrases
 
 
 async def _fault_of_meaning(
@@ -179,9 +179,9 @@ async def _ask(
 
 def _texts(reply: str) -> list[str] | None:
     """The texts of the JSON list in a reply; None where there is none."""
-    found = _LIST.search(reply)
+    listed = _LIST.search(reply)
     try:
-        texts = json.loads(found.group()) if found else None
+        texts = json.loads(listed.group()) if listed else None
     except json.JSONDecodeError:
         texts = None
     if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
@@ -200,13 +200,13 @@ def _slots(template: str) -> Counter[str]:
 
     With a conversion or a format, such as `block!r`, it is another slot.
     """
-    found: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     for _, name, form, conversion in string.Formatter().parse(template):
         if name is not None:
-            found[
+            counts[
                 f"{name}{'!' + conversion if conversion else ''}{':' + form if form else ''}"
             ] += 1
-    return found
+    return counts
 
 
 def _plain(text: str) -> str:

@@ -65,9 +65,9 @@ class PositionMaker(StaticMaker):
         for _ in range(_TRIES):
             shown = recolored(scene, rng)
             named = {
-                block.order: found[0]
+                block.order: expressions[0]
                 for block in seen_blocks(shown, NAMED)
-                if (found := names(block, shown.blocks, _PLAIN))
+                if (expressions := names(block, shown.blocks, _PLAIN))
             }
             blocks = [block for block in shown.blocks if block.order in named]
             yield from _of_pairs(shown, blocks, named, rng)

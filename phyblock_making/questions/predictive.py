@@ -106,7 +106,7 @@ def _misplaced(
     base: Sequence[Block], blocks: Sequence[Block], rng: np.random.Generator
 ) -> list[Block]:
     """Blocks let down onto the stage where they lean or overhang: shifted, or come too early."""
-    found = []
+    misplaced = []
     for block in blocks:
         for dx, dy in shuffled(rng, _SHIFTS_M)[:_SHIFTS_TRIED]:
             x, y, z = block.position_m
@@ -114,8 +114,8 @@ def _misplaced(
             fall = drop_height_m(lifted, base)
             lowered = (*lifted.position_m[:2], round(z + _LIFT_M - fall, 4))
             if bounds_m(replace(block, position_m=lowered))[0, 2] > _LEAST_HEIGHT_M:
-                found.append(replace(block, position_m=lowered))
-    return found
+                misplaced.append(replace(block, position_m=lowered))
+    return misplaced
 
 
 def _stage(scene: Scene, rng: np.random.Generator) -> tuple[set[int], list[Block], list[Block]]:

@@ -121,10 +121,10 @@ def _slid(scene: Scene, push: Push, orders: set[int]) -> tuple[Block, ...]:
 
 def _above(scene: Scene, order: int) -> set[int]:
     """A block and all that rests on it, directly or not."""
-    found = {order}
+    standing_on = {order}
     for _ in scene.blocks:
-        found |= {b.order for b in scene.blocks if found & set(b.depend)}
-    return found
+        standing_on |= {b.order for b in scene.blocks if standing_on & set(b.depend)}
+    return standing_on
 
 
 def _distinct(

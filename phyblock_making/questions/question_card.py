@@ -144,14 +144,14 @@ def question_card(
         scenes_name=scenes_name,
         count=len(questions),
         scenes=len({question.scene.id for question in questions}),
-        subtasks=sum(bool(found) for found in by_subtask.values()),
+        subtasks=sum(bool(asked) for asked in by_subtask.values()),
         made_by=made_by,
         named=NAMED,
         studied=STUDIED,
         counted=COUNTED,
         shaped=SHAPED,
         area=SHAPED_AREA,
-        rows="\n".join(_row(found) for found in by_subtask.values() if found),
+        rows="\n".join(_row(asked) for asked in by_subtask.values() if asked),
         audit=_audit_text(audits) if audits else "",
     )
 

@@ -88,10 +88,10 @@ def resolve(text: str, blocks: Sequence[Block], loosely: bool = False) -> tuple[
     short rectangular prisms, half cylinders for cylinders, and the other way round. Raises
     UnfairError for words that are no expression.
     """
-    found = _PATTERN.fullmatch(text.removeprefix("the "))
-    if found is None:
+    match = _PATTERN.fullmatch(text.removeprefix("the "))
+    if match is None:
         raise UnfairError(f"{text!r} names no block")
-    words = found.groupdict()
+    words = match.groupdict()
     fitting = [block for block in blocks if _fits(block, words, loosely)]
     if words["layer"] is not None:
         layers = [block.layer for block in fitting]
@@ -118,13 +118,13 @@ def resolve_one(text: str, blocks: Sequence[Block]) -> Block:
 
 def names(block: Block, blocks: Sequence[Block], features: Sequence[Feature]) -> tuple[str, ...]:
     """Expressions that fit this block alone and speak of these features only, shortest first."""
-    found: list[_Expression] = []
+    shortest: list[_Expression] = []
     for expression in _expressions(block, blocks, features):
-        is_longer = any(_is_part(shorter, expression) for shorter in found)
+        is_longer = any(_is_part(shorter, expression) for shorter in shortest)
         readings = (resolve(expression.text, blocks, loosely) for loosely in (False, True))
         if not is_longer and all(reading == (block.order,) for reading in readings):
-            found.append(expression)
-    return tuple(expression.text for expression in found)
+            shortest.append(expression)
+    return tuple(expression.text for expression in shortest)
 
 
 def _expressions(

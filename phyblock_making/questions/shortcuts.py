@@ -97,12 +97,12 @@ def audit_questions(
 def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
     """Questions that ask what an earlier one asks, in any order of options, with that one's id."""
     first: dict[str, str] = {}
-    found = {}
+    repeats = {}
     for question in questions:
         earlier = first.setdefault(_content(question), question.id)
         if earlier != question.id:
-            found[question.id] = earlier
-    return found
+            repeats[question.id] = earlier
+    return repeats
 
 
 def referents(question: Question) -> dict[int, float]:
@@ -165,10 +165,10 @@ def _accuracy(probe: str, questions: Sequence[Question], guesses: Guesses) -> fl
 def _named(text: str, blocks: Sequence[Block]) -> tuple[int, ...]:
     """The block that a text names; none where it is no expression, or fits several."""
     try:
-        found = resolve(text.lower(), blocks)
+        orders = resolve(text.lower(), blocks)
     except UnfairError:
         return ()
-    return found if len(found) == 1 else ()
+    return orders if len(orders) == 1 else ()
 
 
 def _reads_alike(question: Question) -> bool:

@@ -76,8 +76,8 @@ def drawn_name(
     rng: np.random.Generator, block: Block, scene: Scene, features: Sequence[Feature]
 ) -> str | None:
     """One of the shortest expressions that fit a block alone, or None when nothing does."""
-    found = names(block, scene.blocks, features)
-    return pick(rng, found[:_NAMES_DRAWN_FROM]) if found else None
+    expressions = names(block, scene.blocks, features)
+    return pick(rng, expressions[:_NAMES_DRAWN_FROM]) if expressions else None
 
 
 def window(rng: np.random.Generator, values: Sequence[int], right: int) -> tuple[int, ...] | None:

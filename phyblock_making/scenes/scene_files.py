@@ -45,7 +45,7 @@ class LevelStatistics:
 
     def add(self, scene: Scene) -> None:
         """Count a scene."""
-        found = {
+        counts = {
             "blocks": len(scene),
             "types": len({block.type for block in scene.blocks}),
             "colors": len({block.color for block in scene.blocks}),
@@ -53,7 +53,7 @@ class LevelStatistics:
         }
         self.scenes += 1
         self.base += scene.parents == (scene.id,)
-        for name, number in found.items():
+        for name, number in counts.items():
             self.total[name] += number
             self.most[name] = max(self.most[name], number)
 

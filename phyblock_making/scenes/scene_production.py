@@ -107,14 +107,14 @@ class _Maker:
         def request(number: int) -> Request:
             return Request(self._order.seed, self._order.palette, group, number)
 
-        found = 0
+        taken = 0
         for made, scene in self._accepted(wanted, request, self._next[group]):
-            found, self._next[group] = found + 1, made.number + 1
+            taken, self._next[group] = taken + 1, made.number + 1
             name = self._name(scene)
             self._bases[group].append((name, made))
             yield replace(scene, id=name, parents=(name,))
-        if found < wanted:
-            raise DataError(_no_more(group, f"gave no more than {found} new scenes of {wanted}"))
+        if taken < wanted:
+            raise DataError(_no_more(group, f"gave no more than {taken} new scenes of {wanted}"))
 
     def variations(self, group: Group, wanted: int) -> Iterator[Scene]:
         """Variations, and base scenes for what is missing where there are too few to vary."""
@@ -126,13 +126,13 @@ class _Maker:
             made = Request(self._order.seed, self._order.palette, group, number)
             return replace(made, parents=tuple(parent for _, parent in chosen))
 
-        found = 0
+        taken = 0
         if self._sources(group):
             for made, scene in self._accepted(wanted, request, 0):
-                found += 1
+                taken += 1
                 names = tuple(dict.fromkeys(parents[made.number]))
                 yield replace(scene, id=self._name(scene), parents=names)
-        yield from self.bases(group, wanted - found)
+        yield from self.bases(group, wanted - taken)
 
     def _parents(self, group: Group, number: int) -> list[tuple[str, Request]]:
         text = f"{self._order.seed}/{group}/parents/{number}".encode()
@@ -143,11 +143,11 @@ class _Maker:
 
     def _sources(self, group: Group) -> list[tuple[int, list[tuple[str, Request]]]]:
         """How many parents out of which base scenes, in the ways that there are enough for."""
-        found = [
+        sources = [
             (count, [base for name in groups for base in self._bases[name]])
             for count, groups in _SOURCES[group]
         ]
-        return [(count, bases) for count, bases in found if len(bases) >= count]
+        return [(count, bases) for count, bases in sources if len(bases) >= count]
 
     def _accepted(
         self, wanted: int, request: Callable[[int], Request], first: int
@@ -156,15 +156,15 @@ class _Maker:
 
         Fewer when candidate after candidate brings nothing new.
         """
-        number, found, last = first, 0, first
-        while found < wanted and number - last <= _PATIENCE:
-            size = min(_LARGEST_ROUND, max(8, math.ceil((wanted - found) * 1.3)))
+        number, taken, last = first, 0, first
+        while taken < wanted and number - last <= _PATIENCE:
+            size = min(_LARGEST_ROUND, max(8, math.ceil((wanted - taken) * 1.3)))
             requests = [request(number + i) for i in range(size)]
             number += size
             for made, scene in self._sound(requests):
-                found, last = found + 1, made.number
+                taken, last = taken + 1, made.number
                 yield made, scene
-                if found == wanted:
+                if taken == wanted:
                     return
 
     def _sound(self, requests: list[Request]) -> Iterator[tuple[Request, Scene]]:
