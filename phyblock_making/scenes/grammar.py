@@ -15,6 +15,7 @@ import numpy as np
 from phyblock.domain.aov import CycleError
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.scene import Block, Kind, Scene
+from phyblock.sim.support import find_gaps
 from phyblock_making.checks.tolerances import LEVEL_LIMITS
 from phyblock_making.scenes.buildings import BUILDINGS
 from phyblock_making.scenes.compositions import COMPOSITIONS, beside
@@ -85,7 +86,8 @@ def draw(request: Request) -> Scene | None:
         _ALL[name](draft)
         scene = _fitting(name, request.group, draft.blocks)
         if scene is not None:
-            return scene
+            # A block let down along the face of another may catch on its edge and hang there.
+            return None if find_gaps(scene.blocks) else scene
     return None
 
 

@@ -6,7 +6,7 @@ from itertools import islice
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain import KIT_PALETTE, Scene
@@ -34,6 +34,7 @@ def some(group: str, count: int, palette: str = "kit") -> tuple[Request, ...]:
 
 
 @given(requests)
+@example(Request(13, "full", "3", 15))
 @settings(deadline=None, max_examples=40)
 def test_what_the_grammar_draws_keeps_its_limits(request_: Request) -> None:
     scene = draw(request_)
