@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 import click
 
 from phyblock.cli.verbs import Verbs
-from phyblock.errors import InputError, PhyblockError
+from phyblock.errors import InputError, PhyblockError, Problem, said
 
 __all__ = ["main"]
 
@@ -68,6 +69,14 @@ def main() -> None:
     except PhyblockError as error:
         click.echo(f"error: {error}", err=True)
         sys.exit(1)
+    except OSError as error:
+        # A file that the user named: too long a name, a folder that may not be looked into.
+        if error.filename is None:
+            raise
+        _complain(
+            InputError(Problem(os.fsdecode(error.filename), f"cannot be used: {said(error)}"))
+        )
+        sys.exit(2)
     sys.exit(code if isinstance(code, int) else 0)
 
 

@@ -6,7 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from phyblock.errors import DataError, Problem, RefusedError, SampleError
+from phyblock.bounded import load_json, read_text
+from phyblock.errors import DataError, Problem, RefusedError, SampleError, said
 from phyblock.models.base import Reply, Request, Usage
 from phyblock.models.config import ModelConfig
 from phyblock.models.raw_replies import RawReply, read_raw_reply
@@ -116,9 +117,9 @@ def _replayed(raw: RawReply) -> Reply:
 
 def _read_json(path: Path) -> object:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return load_json(read_text(path), finite=False)
     except OSError as error:
-        raise DataError(Problem(str(path), f"cannot be read: {error.strerror}")) from error
+        raise DataError(Problem(str(path), f"cannot be read: {said(error)}")) from error
     except ValueError as error:
         where = f"{path}:{getattr(error, 'lineno', 1)}:{getattr(error, 'colno', 1)}"
         raise DataError(Problem(where, f"is not JSON: {error}")) from error

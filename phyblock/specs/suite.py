@@ -15,6 +15,7 @@ from phyblock.specs.fields import (
     ModelName,
     Section,
     Temperature,
+    TimeoutS,
     TopP,
     Unique,
     UniqueSome,
@@ -182,9 +183,7 @@ class LimitsSpec(Section):
         default=64, description="Calls under way at once, over all models."
     )
     max_attempts: Count = Field(default=8, description="Requests sent for one sample at most.")
-    timeout_s: Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] = Field(
-        default=300.0, description="Longest wait for one reply [s]."
-    )
+    timeout_s: TimeoutS = Field(default=300.0, description="Longest wait for one reply [s].")
     max_cost_usd: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] | None = Field(
         default=None,
         description="The run stops before it costs more than this [USD]; null: no bound.",

@@ -19,6 +19,8 @@ from phyblock_making.checks.finding import Finding, unreadable
 
 __all__ = ["Salvage", "SalvagedTask", "salvage"]
 
+_MOST_FINDINGS = 10_000
+
 
 @dataclass(frozen=True)
 class SalvagedTask:
@@ -82,10 +84,17 @@ class _TolerantReader(SceneReader):
         return candidates or CandidateSet(())
 
 
+def _check_number(findings: list[Finding], root: Path) -> None:
+    if len(findings) > _MOST_FINDINGS:
+        message = f"has more than {_MOST_FINDINGS:,} faults: is this a data set?"
+        raise DataError(Problem(str(root), message))
+
+
 def _builtin(folder: Path, tasks: list[SalvagedTask], findings: list[Finding]) -> None:
     path = folder / SCENES_FILE
     first_line: dict[str, int] = {}
     for number, line in enumerate(scene_lines(path), 1):
+        _check_number(findings, folder)
         reader = _TolerantReader(f"{path}:{number}")
         try:
             task = read_line(path, number, line, reader)
@@ -105,6 +114,7 @@ def _builtin(folder: Path, tasks: list[SalvagedTask], findings: list[Finding]) -
 
 def _official(root: Path, tasks: list[SalvagedTask], findings: list[Finding]) -> None:
     for path in goal_files(root):
+        _check_number(findings, root)
         reader = _TolerantReader(str(path))
         try:
             scene = read_scene(path, reader)

@@ -18,7 +18,8 @@ from phyblock.domain.blocks import (
 )
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.sim.outcomes import OUTCOME_SETTINGS, Setting, holds
+from phyblock.sim.engine import Physics
+from phyblock.sim.outcomes import OUTCOME_SETTINGS, holds
 from phyblock.sim.question_pictures import BLOCK_LABEL
 from phyblock.sim.seeing import Top, is_apart, is_inside, seen, seen_order, visible_tops
 from phyblock.sim.support import bounds_m, drop_height_m
@@ -169,7 +170,7 @@ def _is_sure(scene: Scene, block: Block, place_m: tuple[float, float, float], st
 
 
 def _verdict(
-    scene: Scene, block: Block, place_m: tuple[float, float, float], settings: Sequence[Setting]
+    scene: Scene, block: Block, place_m: tuple[float, float, float], settings: Sequence[Physics]
 ) -> bool | None:
     return holds((*scene.blocks, _put(scene, block, place_m)), block.order, settings)
 

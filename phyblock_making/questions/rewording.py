@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from phyblock.bounded import read_text
+from phyblock.datasets.builtin import scene_lines
 from phyblock.datasets.raw import MISSING, RawReader, parse_json
 from phyblock.domain import Question
 from phyblock.errors import DataError, Problem
@@ -23,6 +23,8 @@ from phyblock_making.questions.paraphrases import fault_of_form
 from phyblock_making.questions.wording import WORDINGS, fill_template, stem_of, wording_ids
 
 __all__ = ["Wording", "read_wordings", "reword"]
+
+_ALLOWED = "a file that phyblock vqa write wrote"
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ def read_wordings(path: Path) -> tuple[Wording, ...]:
     """The accepted wordings of a file; raises DataError with everything that is wrong in it."""
     wordings: list[Wording] = []
     problems: list[Problem] = []
-    for number, line in enumerate(_lines(path), 1):
+    for number, line in enumerate(scene_lines(path, _ALLOWED), 1):
         reader = RawReader(f"{path}:{number}")
         try:
             wording = _read_line(reader, parse_json(line, path, number), wordings)
@@ -62,8 +64,7 @@ def read_wordings(path: Path) -> tuple[Wording, ...]:
     if problems:
         raise DataError(problems)
     if not wordings:
-        hint = "phyblock vqa write makes such files"
-        raise DataError(Problem(str(path), "holds no accepted wording", hint=hint))
+        raise DataError(Problem(str(path), "holds no accepted wording", allowed=_ALLOWED))
     return tuple(wordings)
 
 
@@ -82,17 +83,6 @@ def reword(
             rng = np.random.default_rng([seed, *question.id.encode()])
             reworded[question.id] = pick(rng, fitting).asks(question)
     return reworded
-
-
-def _lines(path: Path) -> list[str]:
-    try:
-        text = read_text(path)
-    except OSError as error:
-        raise DataError(Problem(str(path), f"cannot be read: {error.strerror}")) from error
-    except ValueError as error:
-        raise DataError(Problem(str(path), str(error))) from error
-    # Not splitlines(): a JSON string may hold U+2028 and other line ends of Unicode.
-    return text.removesuffix("\n").split("\n") if text else []
 
 
 def _read_line(reader: RawReader, content: object, earlier: Sequence[Wording]) -> Wording | None:

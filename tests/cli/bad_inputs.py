@@ -21,8 +21,10 @@ from tests.cli.breakage import (
     many_files,
     models_text,
     no_manifest,
+    noise,
     options,
     pictures_taken,
+    pipe,
     png,
     recording,
     scenes_text,
@@ -34,7 +36,11 @@ from tests.cli.breakage import (
     user_block,
     without_field,
 )
+from tests.fuzz.strategies import png_header
 from tests.workspace import tower
+
+EPS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 90 90\nshowpage\n"
+LONG = "x" * 5_000
 
 
 @dataclass(frozen=True)
@@ -92,12 +98,35 @@ OPTIONS: tuple[Bad, ...] = (
     Bad("check", command("models", "check", "alpah"), ("alpah", "did you mean alpha?")),
     Bad("parser", command("score", "out", "--parser", "mine"), ("--parser", "steps", "official")),
     Bad("validate", many_files, (), messages=3),
+    Bad("validate-pipe", pipe("p.yaml", "validate", "p.yaml"), ("p.yaml: is not a regular file",)),
+    Bad("validate-device", command("validate", "/dev/zero"), ("/dev/zero: is not a regular",)),
+    # A file that is there and cannot be read, for root too.
+    Bad("validate-locked", command("validate", "/proc/self/mem"), ("mem: cannot be read: ",)),
+    Bad("validate-noise", noise("n.yaml", "validate", "n.yaml"), ("n.yaml: is larger than",)),
+    Bad(
+        "validate-data",
+        pipe("data/scenes.jsonl", "validate", "data"),
+        ("scenes.jsonl: is not a regular file",),
+    ),
+    Bad("validate-lines", noise("data/scenes.jsonl", "validate", "data"), ("is not UTF-8 text",)),
+    Bad("validate-long", command("validate", LONG), (LONG[:80], "there is no such suite")),
+    Bad("run-long", command("run", "suite.yaml", "--models-file", LONG), ("no such models file",)),
+    Bad("report-long", command("report", LONG), (LONG[:80],)),
+    Bad("show-long", command("scenes", "show", LONG, "t1"), (LONG[:80],)),
+    Bad(
+        "set-long",
+        options("--set", "seeds=[0x" + "f" * 90_000 + "]"),
+        ("seeds[0]: is too long a number",),
+    ),
+    Bad("set-deep", options("--set", "a." * 9_000 + "a=1"), ("key=value",)),
     Bad("init", command("init", "."), ("models.yaml", "is already there")),
 )
 DATA: tuple[Bad, ...] = (
     Bad("cycle", second_scene("blocks.0.depend", [2]), ("scenes.jsonl:2: ", "cycle", "1 -> 2")),
     Bad("dangling", second_scene("blocks.1.depend", [7]), ("scenes.jsonl:2: ", "found: 7")),
     Bad("nan-m", second_scene("blocks.1.position", [0, 0, float("nan")]), ("jsonl:2:", "position")),
+    Bad("far", second_scene("blocks.1.position", [0, 0, -1e308]),
+        ("jsonl:2: blocks[1].position", "is out of range", "-100 to 100 m")),
     Bad("kind", second_scene("blocks.0.type", "cub"), ("jsonl:2: blocks[0].type", "cube, cuboid1")),
     Bad("layer", second_scene("blocks.1.layer", 1), ("jsonl:2: blocks[1].layer", "found: 1")),
     Bad("lost", second_scene("candidates", [tower("t", [1], ("red",))["candidates"][0]]),
@@ -107,6 +136,9 @@ DATA: tuple[Bad, ...] = (
     Bad("none", scenes_text(lambda _: []), ("scenes.jsonl", "holds no scenes")),
     Bad("no-png", checkout(None), ("official", "images.source", "found: 000", "render")),
     Bad("bad-png", checkout(b"no picture"), ("000.png", "is no picture")),
+    Bad("eps", checkout(EPS), ("000.png", "is no picture", "PNG, JPEG, GIF or WebP")),
+    Bad("dot-png", checkout(png((1, 1))), ("000.png", "found: 1 x 1 pixels", "10,000 pixels")),
+    Bad("huge-png", checkout(png_header(30_000, 30_000)), ("000.png", "900,000,000 pixels")),
     Bad("cut-png", checkout(png()[:-40]), ("000.png", "is not a readable picture")),
 )  # fmt: skip
 MODELS: tuple[Bad, ...] = (
@@ -119,6 +151,13 @@ MODELS: tuple[Bad, ...] = (
         ("mine.j2:2: ", "loader"), writes=("fresh",)),
     Bad("jinja-sandbox", template(user_block("{{ pictures.__class__.__mro__ }}")),
         ("mine.j2:2: ", "unsafe"), writes=("fresh",)),
+    Bad("jinja-bomb", template(user_block("{{ 'x' * 10**9 }}")),
+        ("mine.j2:2: ", "more than 500,000 steps"), writes=("fresh",)),
+    Bad("jinja-lipsum", template(user_block("{{ lipsum(9) }}")),
+        ("mine.j2:2: ", "'lipsum' is undefined"), writes=("fresh",)),
+    Bad("jinja-pipe", pipe("mine.j2", *FRESH, "--set", "prompt=mine.j2"), ("no such file",)),
+    Bad("hex", models_text("a:\n  id: openai/x\n  extra_body: {k: 0x" + "f" * 90_000 + "}\n"),
+        ("models.yaml:3:19: a.extra_body.k: is too long a number", "90,002 digits")),
     Bad("no-user", template("Build it."), ("mine.j2", "has no user block")),
     Bad("no-template", template(None), ("suite.yaml", "prompt", "no such file")),
     Bad("secret", models_text(f"mine:\n  id: openai/x\n  api_key: {FAKE_KEY}\n"),

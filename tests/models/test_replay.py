@@ -54,6 +54,8 @@ def test_a_file_may_say_more_after_the_key(tmp_path: Path) -> None:
     [
         (b'{"predict": "a"', r"007\.json:1:\d+: is not JSON"),
         (b"\xff\xfe\x00", r"007\.json:1:1: is not JSON"),
+        (b"[" * 100_000, r"007\.json:1:1: is not JSON: is nested more than 64 levels"),
+        (b'{"text": ' + b"9" * 100_000 + b"}", "holds a number of 100,000 digits"),
         (b'{"error": "overloaded"}', "no recorded reply of a known shape"),
     ],
 )

@@ -1,0 +1,263 @@
+"""Bad and nearly sound inputs of every kind a user gives, drawn for hypothesis.
+
+Each strategy gives the bytes of one file: `SUITES`, `MODELS_FILES`, `SCENES`, `QUESTIONS`,
+`CANDIDATES`, `TEMPLATES`, `PICTURES`; `OVERRIDES` gives texts for `--set`. Most begin with
+something sound and break it in one or two places, as people and disks do; some are plain noise.
+A law about them holds for whatever they give: exit code 0 or 2, and never a traceback.
+"""
+
+from __future__ import annotations
+
+import copy
+import io
+import json
+import struct
+import zlib
+from collections.abc import Iterator
+from typing import Any
+
+from hypothesis import strategies as st
+from PIL import Image
+
+from tests.specs.strategies import SUITES as SOUND_SUITES
+from tests.workspace import tower
+
+__all__ = [
+    "CANDIDATES",
+    "MODELS_FILES",
+    "NASTY_TOKENS",
+    "OVERRIDES",
+    "PICTURES",
+    "QUESTIONS",
+    "SCENES",
+    "SUITES",
+    "TEMPLATES",
+    "broken",
+    "png_header",
+    "sound_question",
+]
+
+JSON_TOKENS = (
+    *("null", "true", "-1", "0", "1e308", "-1e308", "1e999", "NaN", "-Infinity", "-0.0", "5e-324"),
+    *("9" * 25, "9" * 400, "9" * 6000, "-" + "9" * 6000, "0." + "3" * 5000),
+    *('""', '"a"', '"\\u0000"', '"\\ud800"', '"\\u202e\\u001b[31m"', '"' + "x" * 5000 + '"'),
+    *('"../../etc/passwd"', '"/dev/stdin"', '"' + "d/" * 3000 + '"', '"=1+1"', '"<img1>"'),
+    *("[]", "{}", "[[[]]]", "[" * 80 + "]" * 80, "[" * 9000 + "]" * 9000, '{"a": 1, "a": 2}'),
+    *("[" + "0, " * 3000 + "0]", "{" + ", ".join(f'"k{i}": 0' for i in range(3000)) + "}"),
+    *("", "[", '"', "}", "\\", "\x00", "'x'", "1 2", "// no"),
+)
+"""Texts that stand in JSON where a value belongs; not all of them are JSON."""
+
+YAML_TOKENS = (
+    *("0x" + "f" * 6000, "0o" + "7" * 6000, "1:30:30", "190:20:30.15", ".nan", "-.inf", "~", "<<"),
+    *("*none", "&a [*a]", "!!python/object:os.system x", "!mine x", "!!binary eA==", "!!set {a}"),
+    *("[&a 1, *a, *a]", "{<<: 5}", "{? [a]: 1}", "|\n  x", ">-\n x", "%x", "@x", "`", "\t- 1"),
+    *("$HOME", "~nobody/x", "$NOWHERE", "'" + "x" * 3000 + "'", "'\x85'", "---\na: 1", "...\n"),
+)
+NASTY_TOKENS = (*JSON_TOKENS, *YAML_TOKENS)
+"""Texts that stand in YAML where a value belongs; not all of them are YAML."""
+
+_MARK = "@@here@@"
+
+
+def _places(value: object, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+    yield path
+    entries: Any = ()
+    if isinstance(value, dict):
+        entries = value.items()
+    elif isinstance(value, list):
+        entries = enumerate(value)
+    for key, inner in entries:
+        yield from _places(inner, (*path, key))
+
+
+def _with(document: Any, path: tuple[str | int, ...], value: object) -> Any:
+    if not path:
+        return value
+    changed = copy.deepcopy(document)
+    here = changed
+    for key in path[:-1]:
+        here = here[key]
+    here[path[-1]] = value
+    return changed
+
+
+def _without(document: Any, path: tuple[str | int, ...]) -> Any:
+    changed = copy.deepcopy(document)
+    here = changed
+    for key in path[:-1]:
+        here = here[key]
+    del here[path[-1]]
+    return changed
+
+
+@st.composite
+def broken(draw: st.DrawFn, documents: st.SearchStrategy[Any], tokens: tuple[str, ...]) -> bytes:
+    """A document as JSON text with one value replaced by a token, left out, renamed or cut."""
+    document = draw(documents)
+    paths = list(_places(document))
+    path = draw(st.sampled_from(paths))
+    how = draw(st.sampled_from(["token", "token", "token", "gone", "key", "cut", "bytes", "sound"]))
+    if how == "gone" and path:
+        document = _without(document, path)
+    elif how == "key":
+        inside = [p for p in paths if isinstance(_at(document, p), dict)]
+        if inside:
+            name = draw(st.sampled_from(["no", "id ", "é", "a.b", "\x1b[1m", "<<", "x" * 2000]))
+            document = _with(document, (*draw(st.sampled_from(inside)), name), 1)
+    elif how == "token":
+        document = _with(document, path, _MARK)
+    text = json.dumps(document)
+    if how == "token":
+        text = text.replace(f'"{_MARK}"', draw(st.sampled_from(tokens)))
+    data = text.encode("utf-8", "surrogatepass")
+    if how == "cut":
+        data = data[: draw(st.integers(0, len(data)))]
+    elif how == "bytes":
+        at = draw(st.integers(0, len(data)))
+        data = data[:at] + draw(st.binary(min_size=1, max_size=4)) + data[at:]
+    return data
+
+
+def _at(document: Any, path: tuple[str | int, ...]) -> Any:
+    for key in path:
+        document = document[key]
+    return document
+
+
+NOISE = st.binary(max_size=200) | st.text(max_size=200).map(
+    lambda text: text.encode("utf-8", "surrogatepass")
+)
+
+SUITES = broken(SOUND_SUITES, NASTY_TOKENS) | NOISE
+"""Suite files."""
+
+_SOUND_MODELS: dict[str, Any] = {
+    "plain": "openai/gpt-4o-2024-08-06",
+    "local": {
+        "id": "hosted_vllm/qwen",
+        "api_base": "http://localhost:8000/v1",
+        "max_tokens": 512,
+        "extra_body": {"top_k": 1, "deep": {"er": [1, 2.5, "x"]}},
+        "price": {"input": 1.0, "output": 2.0},
+        "timeout_s": 30,
+    },
+    "old": {"replay": "replies", "size_b": 7},
+}
+MODELS_FILES = broken(st.just(_SOUND_MODELS), NASTY_TOKENS) | NOISE
+"""Models files."""
+
+_SOUND_SCENE = tower("t1", [1, 2], ("red", "blue"))
+SCENES = broken(st.just(_SOUND_SCENE), JSON_TOKENS) | NOISE
+"""One line of `scenes.jsonl` (noise may hold more lines)."""
+
+CANDIDATES = (
+    broken(
+        st.just(
+            [
+                {**candidate, "position": number}
+                for number, candidate in enumerate(_SOUND_SCENE["candidates"], 1)
+            ]
+        ),
+        JSON_TOKENS,
+    )
+    | NOISE
+)
+"""A candidate file of the official layout."""
+
+
+def sound_question(scene_id: str = "t1") -> dict[str, Any]:
+    """A question about a scene of two blocks, every field of a recipe in it."""
+    return {
+        "id": "q1",
+        "subtask": "CO",
+        "scene_id": scene_id,
+        "wording": "plain",
+        "question": "How many blocks are red?",
+        "options": ["1", "2", "3", "4"],
+        "answer": "A",
+        "colors": {"1": "green"},
+        "pictures": [
+            {
+                "label": "scene",
+                "view": [45.0, 22.0],
+                "without": [2],
+                "poses": {"1": {"position": [0, 0, 0.02], "euler": [0, 0, 0]}},
+                "swap": {"1": {"type": "cube", "color": "blue"}},
+                "marks": [{"letter": "A", "position": [0, 0, 0.1]}],
+                "framed": True,
+            }
+        ],
+        "evidence": {"count": 1, "orders": [1]},
+    }
+
+
+QUESTIONS = broken(st.just(sound_question()), JSON_TOKENS) | NOISE
+"""One line of `questions.jsonl`."""
+
+_PIECES = (
+    *("{{", "}}", "{%", "%}", "{#", "#}", "\n", " ", "x", "1", "'a'", "|", ".", "(", ")", "[", "]"),
+    *("{% for i in range(99999) %}", "{% endfor %}", "{% if n %}", "{% endif %}", "{{ i }}"),
+    *(
+        "{% macro m(n) %}",
+        "{{ m(n) }}",
+        "{% endmacro %}",
+        "{% set x = x ~ x %}",
+        "{{ x * 999999 }}",
+    ),
+    *("{{ lipsum() }}", "{{ 'x'|center(10**9) }}", "{{ '%1000000000d' % 1 }}", "{{ 9 ** 9 ** 9 }}"),
+    *("{{ '{:>1000000000}'.format(1) }}", "{{ n_candidates }}", "{{ pictures | join(', ') }}"),
+    *("{{ self.user() }}", "{% set x = [x, x] %}", "{{ x }}", "{% raw %}", "{% include 'x' %}"),
+    *("{% set x = 'xxxxxxxxxx' %}", "{{ ''.join(x) }}", "{{ x.__class__ }}", "{{ 1 // 0 }}"),
+)
+TEMPLATES = (
+    st.lists(st.sampled_from(_PIECES), max_size=12).map(
+        lambda pieces: f"{{% block user %}}{''.join(pieces)}{{% endblock %}}".encode()
+    )
+    | NOISE
+)
+"""Prompt templates."""
+
+
+def png_header(width: int, height: int) -> bytes:
+    """A PNG that claims a size and holds next to nothing."""
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(b"\0" * 8)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+        for name, body in chunks
+    )
+
+
+def _encoded(format_name: str) -> bytes:
+    buffer = io.BytesIO()
+    Image.linear_gradient("L").resize((64, 32)).convert("RGB").save(buffer, format_name)
+    return buffer.getvalue()
+
+
+@st.composite
+def _damaged(draw: st.DrawFn) -> bytes:
+    data = bytearray(_encoded(draw(st.sampled_from(["PNG", "JPEG", "GIF", "WEBP", "BMP", "TIFF"]))))
+    for _ in range(draw(st.integers(0, 3))):
+        data[draw(st.integers(0, len(data) - 1))] = draw(st.integers(0, 255))
+    return bytes(data[: draw(st.integers(1, len(data)))] if draw(st.booleans()) else data)
+
+
+PICTURES = (
+    _damaged()
+    | st.builds(png_header, st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))
+    | st.sampled_from(
+        [b"", b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n", b"<svg/>", b"GIF89a", b"RIFF"]
+    )
+    | NOISE
+)
+"""Picture files."""
+
+_KEYS = ("seeds", "images.size_px", "name", "limits.a.b", "", ".", "a" * 500, "x." * 200 + "x")
+OVERRIDES = st.builds(
+    lambda key, equals, value: f"{key}{equals}{value}".replace("\0", ""),
+    st.sampled_from(_KEYS),
+    st.sampled_from(["=", "=", "=", "", ":"]),
+    st.sampled_from(NASTY_TOKENS) | st.text(st.characters(exclude_categories=["Cs"]), max_size=20),
+)
+"""Texts for `--set`."""
