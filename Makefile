@@ -6,18 +6,24 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 RUNS := $(VENV)/.runs
 TESTS := $(VENV)/.tests
 
-.PHONY: run test test-all check lock clean
+# What `make fuzz` tries; SEED=n tries the same again.
+SEED ?= $(shell date +%s)
+INPUTS ?= 2400
+FAULTS ?= 510
+KILLS ?= 36
+
+.PHONY: run test test-all fuzz check lock clean
 
 $(RUNS): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; \
 	  sys.exit(0 if v in ((3, 10), (3, 11)) else "phyblock needs Python 3.10 or 3.11 (pybullet ships no wheels for others), found %d.%d: make PYTHON=python3.11" % v)'
 	$(PYTHON) -m venv $(VENV)
-	$(PIP) --requirement requirements.lock
+	$(PIP) --require-hashes --requirement requirements.lock
 	$(PIP) --no-deps --editable .
 	@touch $@
 
 $(TESTS): $(RUNS) requirements-dev.lock
-	$(PIP) --requirement requirements-dev.lock
+	$(PIP) --require-hashes --requirement requirements-dev.lock
 	@touch $@
 
 run: $(RUNS)
@@ -29,6 +35,10 @@ test: $(TESTS)
 test-all: $(TESTS)
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m ''
 
+fuzz: $(TESTS)
+	PHYBLOCK_FUZZ_SEED=$(SEED) PHYBLOCK_FUZZ_INPUTS=$(INPUTS) PHYBLOCK_FUZZ_FAULTS=$(FAULTS) \
+	  PHYBLOCK_FUZZ_KILLS=$(KILLS) $(BIN)/python -m pytest -m fuzz tests/fuzz
+
 check: $(TESTS)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -36,7 +46,7 @@ check: $(TESTS)
 	$(BIN)/lint-imports
 
 LOCK := $(BIN)/uv pip compile pyproject.toml --universal --python-version 3.10 \
-	  --no-emit-index-url --no-annotate --no-header --quiet
+	  --generate-hashes --no-emit-index-url --no-emit-find-links --no-annotate --no-header --quiet
 
 lock: $(TESTS)
 	$(PIP) uv

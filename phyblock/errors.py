@@ -8,6 +8,7 @@ PhyblockError
 │   └── StoreError          a run folder, a record, the reply cache, a disk that refuses
 ├── ModelError              a call to a model failed
 │   ├── RetryableError      429, 5xx, connection, timeout, malformed body: ask again
+│   │   └── UnreachableError    no connection could be made, so that nothing was sent
 │   ├── SampleError         this request will never succeed (400): go on with the next
 │   │   └── RefusedError    the provider's content policy refused it
 │   └── UnavailableError    this model will never answer (401, 403, unknown): stop the model
@@ -36,6 +37,7 @@ __all__ = [
     "SpecError",
     "StoreError",
     "UnavailableError",
+    "UnreachableError",
     "said",
 ]
 
@@ -140,6 +142,10 @@ class RetryableError(ModelError):
     ) -> None:
         self.retry_after_s = retry_after_s
         super().__init__(message, status=status)
+
+
+class UnreachableError(RetryableError):
+    """No connection to the server could be made: nothing was sent, and nothing can be billed."""
 
 
 class SampleError(ModelError):

@@ -11,6 +11,7 @@ import click
 from phyblock.bounded import read_bytes
 from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.files import find_models_file, find_suite
+from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
 from phyblock.resources import bundled
@@ -24,11 +25,16 @@ _SUITE_KEY = re.compile(rf"^(?:{'|'.join(SuiteSpec.model_fields)})[ \t]*:", re.M
 
 
 @click.command("validate")
-@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("files", nargs=-1, required=True, type=UserPath())
 @click.option(
     "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Override a value of the suites."
 )
-@click.option("--models-file", metavar="FILE", help="Models file that suites are checked against.")
+@click.option(
+    "--models-file",
+    type=NAME_OR_PATH,
+    metavar="FILE",
+    help="Models file that suites are checked against.",
+)
 def command(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | None) -> None:
     """Check FILES: suites (or names of bundled ones) and models files, data set folders, official
     checkouts.

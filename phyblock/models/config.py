@@ -8,7 +8,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-__all__ = ["DIRECT_PROVIDERS", "Kind", "ModelConfig", "Price", "SeedMode", "Transport"]
+from phyblock.addresses import address_fault
+from phyblock.errors import Problem, SpecError
+
+__all__ = [
+    "DIRECT_PROVIDERS",
+    "LARGEST_REPLY_BYTES",
+    "Kind",
+    "ModelConfig",
+    "Price",
+    "SeedMode",
+    "Transport",
+]
 
 Kind = Literal["litellm", "replay", "baseline"]
 Transport = Literal["auto", "litellm", "direct"]
@@ -16,6 +27,9 @@ SeedMode = Literal["auto", "always", "never"]
 
 DIRECT_PROVIDERS = ("openai", "hosted_vllm", "lm_studio")
 """Provider prefixes that mean the plain OpenAI protocol: litellm has nothing to translate."""
+
+LARGEST_REPLY_BYTES = 32 * 1024 * 1024
+"""Default limit of a reply's body [bytes]: a hundred times what the longest thoughts take."""
 
 _RENAMES_PARAMETERS = re.compile(r"o\d|gpt-5")
 
@@ -38,7 +52,10 @@ class ModelConfig:
     their OpenAI names; they win over a request's, and None there means "do not send". `rpm` and
     `tpm` are limits a minute, None for none. `price` None means litellm's price map is asked.
     `sends_seed`: `auto` sends seeds until the provider refuses, `always` takes a refusal as an
-    error, `never` sends none.
+    error, `never` sends none. `timeout_s` bounds a request from its first byte to the last of its
+    answer, `most_body_bytes` that answer's body, packed and unpacked.
+
+    Raises SpecError for an `api_base` that is no address, or that holds a key or a password.
     """
 
     name: str
@@ -55,6 +72,13 @@ class ModelConfig:
     recording: Path | None = None
     sends_seed: SeedMode = "auto"
     timeout_s: float = 600.0
+    most_body_bytes: int = LARGEST_REPLY_BYTES
+
+    def __post_init__(self) -> None:
+        fault = address_fault(self.api_base) if self.api_base is not None else None
+        if fault is not None:
+            where = f"model {self.name}"
+            raise SpecError(Problem(where, fault.message, "api_base", hint=fault.hint))
 
     @property
     def provider(self) -> str:

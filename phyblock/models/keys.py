@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from phyblock.errors import UnavailableError
+from phyblock.addresses import address_fault
+from phyblock.errors import Problem, SpecError, UnavailableError
 from phyblock.models.config import ModelConfig
+from phyblock.models.masks import hidden
 
 __all__ = ["KeyStatus", "api_key", "api_key_status", "hidden", "secrets_of", "server_address"]
 
@@ -65,10 +66,9 @@ _ADDRESS_VARIABLES: Mapping[str, tuple[str, ...]] = {
 """Where litellm looks for a server's address when it is given none, in its order."""
 
 _PLACEHOLDER = "no-key"
-_SHORTEST_SECRET = 8
-_LOOKS_SECRET = re.compile(
-    r"(?:\bsk-[\w-]{6,}|\bAIza[\w-]{10,}|(?<=Bearer )[\w.~+/-]{6,}|(?<=[?&]key=)[^&\s'\"]+)"
-)
+_SHORTEST_SECRET = 4
+_PLACEHOLDERS = (_PLACEHOLDER, "empty", "none", "null", "dummy", "test")
+"""What people write where a server needs no key, in lower case: no secrets."""
 
 
 @dataclass(frozen=True)
@@ -76,12 +76,14 @@ class KeyStatus:
     """Whether a model can be called as far as keys go.
 
     `variables` are the environment variables looked at, in order; `is_set` whether one holds a
-    key; `is_needed` whether calls fail without.
+    key; `is_needed` whether calls fail without; `fault` what keeps the key that is set from being
+    sent, or "".
     """
 
     variables: tuple[str, ...]
     is_set: bool
     is_needed: bool
+    fault: str = ""
 
 
 def api_key_status(config: ModelConfig) -> KeyStatus:
@@ -92,19 +94,22 @@ def api_key_status(config: ModelConfig) -> KeyStatus:
     is_needed = config.api_key_env is not None or not (
         config.api_base or config.provider in _KEYLESS + _OWN_CREDENTIALS
     )
-    return KeyStatus(variables, any(os.environ.get(name) for name in variables), is_needed)
+    found = _found(variables)
+    fault = _fault(*found) if found is not None else ""
+    return KeyStatus(variables, found is not None, is_needed, fault)
 
 
 def api_key(config: ModelConfig) -> str | None:
     """The key to send; None leaves it to litellm (providers with credentials of their own).
 
     A server named by `api_base` gets a placeholder when no key is set, as clients insist on one.
-    Raises UnavailableError when a key is needed and not set.
+    Raises UnavailableError when a key is needed and not set, or when no header can carry it.
     """
-    for name in _variables(config):
-        if value := os.environ.get(name):
-            return value
     status = api_key_status(config)
+    if status.fault:
+        raise UnavailableError(f"the API key of {config.name} cannot be sent: {status.fault}")
+    if (found := _found(status.variables)) is not None:
+        return found[1]
     if status.is_needed:
         names = " or ".join(status.variables)
         raise UnavailableError(f"no API key for {config.name}: set {names} in the environment")
@@ -115,22 +120,32 @@ def server_address(model_id: str) -> str | None:
     """Address of the model's server that the environment names, or None.
 
     litellm would find it too, but unseen: replies of two servers must not pass for one another's.
+    Raises SpecError for what is no address, or may hold a key or a password: it is kept and shown.
     """
-    names = _ADDRESS_VARIABLES.get(model_id.partition("/")[0], ())
-    return next((value for name in names if (value := os.environ.get(name))), None)
+    for name in _ADDRESS_VARIABLES.get(model_id.partition("/")[0], ()):
+        if value := os.environ.get(name):
+            if (fault := address_fault(value)) is not None:
+                raise SpecError(
+                    Problem(f"environment variable {name}", fault.message, hint=fault.hint)
+                )
+            return value
+    return None
 
 
 def secrets_of(config: ModelConfig) -> tuple[str, ...]:
-    """Values that no stored text may hold: the keys that calls to this model could carry."""
-    values = {os.environ.get(name, "") for name in _variables(config)}
-    return tuple(sorted(value for value in values if len(value) >= _SHORTEST_SECRET))
+    """Values that no stored text may hold: the keys that calls to this model could carry.
 
-
-def hidden(text: str, secrets: Iterable[str], *, guess: bool = True) -> str:
-    """`text` with every secret replaced; with `guess`, also what looks like a key."""
-    for secret in secrets:
-        text = text.replace(secret, "[key]")
-    return _LOOKS_SECRET.sub("[key]", text) if guess else text
+    A value of fewer than 4 characters, or a usual word for "no key", is none: to take it out of all
+    text would ruin the text and hide nothing.
+    """
+    values = {os.environ.get(name, "").strip() for name in _variables(config)}
+    return tuple(
+        sorted(
+            value
+            for value in values
+            if len(value) >= _SHORTEST_SECRET and value.lower() not in _PLACEHOLDERS
+        )
+    )
 
 
 def _variables(config: ModelConfig) -> tuple[str, ...]:
@@ -138,3 +153,16 @@ def _variables(config: ModelConfig) -> tuple[str, ...]:
         return (config.api_key_env,)
     usual = f"{config.provider.upper().replace('-', '_')}_API_KEY"
     return _KEY_VARIABLES.get(config.provider, (usual,))
+
+
+def _found(variables: tuple[str, ...]) -> tuple[str, str] | None:
+    """The first variable that holds a key, and that key without white space around it."""
+    values = ((name, os.environ.get(name, "").strip()) for name in variables)
+    return next((found for found in values if found[1]), None)
+
+
+def _fault(variable: str, value: str) -> str:
+    """What keeps a key from standing in an HTTP header, without the key."""
+    if all(" " <= character <= "~" for character in value):
+        return ""
+    return f"{variable} holds a line break or another character that no HTTP header can carry"

@@ -9,27 +9,28 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-import re
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from phyblock.errors import ModelError, RefusedError, UnavailableError
+from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models.base import Reply
 from phyblock.models.completions import read_completion
-from phyblock.models.config import ModelConfig
-from phyblock.models.keys import api_key, hidden
+from phyblock.models.keys import api_key
 from phyblock.models.payload import wire_messages
-from phyblock.models.transport import (
-    Call,
-    SeedRefusedError,
-    classify,
+from phyblock.models.refusals import (
+    refusal,
+    refused_before_sending,
+    refused_for_policy,
     refuses_seed,
-    retry_after_s,
+    unreadable,
 )
+from phyblock.models.transport import Call, GuardedTransport, SeedRefusedError
 
 if TYPE_CHECKING:
     import types
+
+    from phyblock.models.litellm_wire import Exchange
 
 __all__ = ["LitellmTransport"]
 
@@ -38,43 +39,39 @@ _DEFAULTS = {
     "MAX_BASE64_LENGTH_FOR_LOGGING": "0",  # else a regex goes over every picture for its log
     "LITELLM_MODE": "PRODUCTION",  # else the import reads keys from any .env file above
 }
-_MALFORMED = re.compile("Unable to get json response|Error converting to valid response")
-_open: set[LitellmTransport] = set()
+_OWN_CLIENTS = ("aiohttp_openai",)
+"""Providers whose code in litellm opens connections of its own, past our client."""
+
+_GRACE_S = 10.0
+"""What litellm's own work may take beyond the time for the exchange, which ours keeps."""
 
 
-class LitellmTransport:
-    """`litellm.acompletion`, for every provider it knows."""
+class LitellmTransport(GuardedTransport):
+    """`litellm.acompletion`, for every provider it knows, over our HTTP client."""
 
-    def __init__(self, config: ModelConfig, secrets: Sequence[str]) -> None:
-        self._config = config
-        self._secrets = secrets
-
-    async def send(self, call: Call) -> Reply:
-        """Send once; see Transport."""
+    async def _ask(self, call: Call) -> Reply:
+        if self._config.provider in _OWN_CLIENTS:
+            raise UnavailableError(f"{self._config.provider} is not supported: use openai/...")
         litellm = _litellm()
-        _open.add(self)
+        from phyblock.models.litellm_wire import CURRENT, Exchange
+
         arguments = self._arguments(call)
+        exchange = Exchange(self._client)
+        token = CURRENT.set(exchange)
         started = time.perf_counter()
         try:
             response = await asyncio.wait_for(
-                litellm.acompletion(**arguments), self._config.timeout_s
+                litellm.acompletion(**arguments), self._config.timeout_s + _GRACE_S
             )
         except asyncio.TimeoutError:
-            raise classify(None, "no answer in time") from None
-        except litellm.UnsupportedParamsError as error:
-            raise self._unsupported(call, str(error)) from None
+            raise RetryableError("no answer in time") from None
         except Exception as error:
-            # litellm gives whatever went wrong a class of its own; all of them mean that the call
-            # failed, and the status says how.
-            raise self._failure(call, error) from None
-        return read_completion(_plain(response), time.perf_counter() - started)
-
-    async def aclose(self) -> None:
-        """Close litellm's clients, which all models share, with the last model that used them."""
-        if self in _open:
-            _open.discard(self)
-            if not _open:
-                await _litellm().close_litellm_async_clients()
+            raise self._failure(call, error, exchange) from None
+        finally:
+            CURRENT.reset(token)
+        latency_s = time.perf_counter() - started
+        status = 200 if exchange.answer is None else exchange.answer.status
+        return read_completion(_plain(response), latency_s, status)
 
     def _arguments(self, call: Call) -> dict[str, Any]:
         arguments = {
@@ -90,41 +87,37 @@ class LitellmTransport:
         optional = {"api_key": key, "api_base": self._config.api_base, "seed": call.seed}
         return arguments | {name: value for name, value in optional.items() if value is not None}
 
-    def _unsupported(self, call: Call, message: str) -> ModelError | SeedRefusedError:
-        """litellm knows that the provider lacks a parameter; nothing was sent."""
-        if call.seed is not None and refuses_seed(400, message):
-            return SeedRefusedError(sent=False)
-        return UnavailableError(hidden(message, self._secrets))
+    def _failure(
+        self, call: Call, error: Exception, exchange: Exchange
+    ) -> ModelError | SeedRefusedError:
+        """The error of a call that litellm gave up, by what was on the wire.
 
-    def _failure(self, call: Call, error: Exception) -> ModelError | SeedRefusedError:
-        status, message = _status(error), _message(error)
-        if call.seed is not None and refuses_seed(status, message):
+        litellm gives whatever went wrong a class of its own, which says less; but it knows more of
+        the words by which providers refuse for their policy.
+        """
+        litellm, answer = _litellm(), exchange.answer
+        if exchange.failure is not None:
+            return exchange.failure
+        if answer is None:
+            if isinstance(error, litellm.UnsupportedParamsError):
+                if call.seed is not None and refuses_seed(400, str(error)):
+                    return SeedRefusedError(sent=False)
+                return UnavailableError(str(error))
+            return refused_before_sending(getattr(error, "status_code", None), _message(error))
+        if answer.is_success:
+            return unreadable(answer, _message(error))
+        if isinstance(error, litellm.ContentPolicyViolationError):
+            return refused_for_policy(answer)
+        refused = refusal(answer)
+        if call.seed is not None and refuses_seed(answer.status, str(refused)):
             return SeedRefusedError(sent=True)
-        text = hidden(message, self._secrets)
-        if isinstance(error, _litellm().ContentPolicyViolationError):
-            return RefusedError(text, status=status)
-        headers = getattr(error, "litellm_response_headers", None)
-        return classify(status, text, retry_after_s=retry_after_s(headers))
-
-
-def _status(error: Exception) -> int | None:
-    """The server's status; None where litellm made one up for a connection that failed.
-
-    A body that litellm could not read comes with whatever status; the server had said 200.
-    """
-    if _MALFORMED.search(str(error)):
-        return 200
-    status: int | None = getattr(error, "status_code", None)
-    heard = getattr(error, "litellm_response_headers", None) is not None
-    return status if heard or (status is not None and status != 408 and status < 500) else None
+        return refused
 
 
 def _message(error: Exception) -> str:
-    """What went wrong, with the code of the error body, and without litellm's own traceback."""
-    body = getattr(error, "body", None)
-    code = body.get("code") if isinstance(body, dict) else None
+    """What litellm says, without the traceback that it puts into some messages."""
     text = str(error).partition("Traceback (most recent call last)")[0]
-    return f"{text} {code}" if code else text
+    return f"{type(error).__name__}: {text}"
 
 
 def _litellm() -> types.ModuleType:
@@ -139,24 +132,11 @@ def _litellm() -> types.ModuleType:
         litellm.drop_params = False
         for name in ("LiteLLM", "LiteLLM Router", "LiteLLM Proxy"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
-        _send_once()
+        from phyblock.models.litellm_wire import install
+
+        install()
     module: types.ModuleType = litellm
     return module
-
-
-def _send_once() -> None:
-    """Take from litellm's HTTP client its habit of sending again what died with its connection.
-
-    It has no setting for it (BerriAI/litellm pull request 34830 removes it), and a request that
-    the server may have answered and billed would be sent twice unseen.
-    """
-    import httpx
-    from litellm.llms.custom_httpx.http_handler import AsyncHTTPHandler
-
-    async def refuse(_: object, url: str, **__: object) -> None:
-        raise httpx.ReadError("the connection was lost", request=httpx.Request("POST", url))
-
-    AsyncHTTPHandler.single_connection_post_request = refuse
 
 
 def _plain(response: Any) -> Mapping[str, object]:

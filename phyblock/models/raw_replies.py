@@ -6,6 +6,7 @@ six shapes of the official outputs and their near relatives.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,7 +14,18 @@ from typing import Any
 from phyblock.errors import DataError, Problem
 from phyblock.models.base import Finish, Usage
 
-__all__ = ["RawReply", "finish_of", "read_chat_completion", "read_raw_reply"]
+__all__ = [
+    "RawReply",
+    "finish_of",
+    "read_chat_completion",
+    "read_raw_reply",
+    "token_count",
+    "well_formed",
+]
+
+_LONE_SURROGATE = re.compile("[\ud800-\udfff]")
+_MOST_TOKENS = 10**9
+"""Counts above this are believed by nobody: a hundred times the longest context that there is."""
 
 _FINISH: Mapping[str, Finish] = {
     "stop": "stop",
@@ -39,7 +51,10 @@ _FINISH: Mapping[str, Finish] = {
 
 @dataclass(frozen=True)
 class RawReply:
-    """What a raw reply says; `shape` names the form in which it was found."""
+    """What a raw reply says; `shape` names the form in which it was found.
+
+    Characters of its texts that no file can hold (lone surrogates) are replaced.
+    """
 
     shape: str
     text: str
@@ -47,6 +62,15 @@ class RawReply:
     finish: Finish = "unknown"
     usage: Usage = field(default_factory=Usage)
     model: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("text", "reasoning", "model"):
+            object.__setattr__(self, name, well_formed(getattr(self, name)))
+
+
+def well_formed(text: str) -> str:
+    """The text with U+FFFD in the place of lone surrogates, which cannot be written as UTF-8."""
+    return _LONE_SURROGATE.sub("\ufffd", text)
 
 
 def finish_of(word: object) -> Finish:
@@ -133,9 +157,9 @@ def _gemini(raw: object) -> RawReply | None:
     text, thoughts = _parts(parts if isinstance(parts, list) else [])
     finish = finish_of(_get(candidate, "finishReason", "finish_reason"))
     usage = Usage(
-        _count(_get(counts, "promptTokenCount", "prompt_token_count")),
-        _count(_get(counts, "candidatesTokenCount", "candidates_token_count")),
-        _count(_get(counts, "thoughtsTokenCount", "thoughts_token_count")),
+        token_count(_get(counts, "promptTokenCount", "prompt_token_count")),
+        token_count(_get(counts, "candidatesTokenCount", "candidates_token_count")),
+        token_count(_get(counts, "thoughtsTokenCount", "thoughts_token_count")),
     )
     model = _text(_get(raw, "modelVersion", "model_version"))
     return RawReply("Gemini", text, thoughts, "refusal" if blocked else finish, usage, model)
@@ -210,14 +234,17 @@ def _joined(texts: list[str]) -> str:
 def _usage(counts: object, prompt: str, completion: str) -> Usage:
     details = _get(counts, "completion_tokens_details", "output_tokens_details")
     return Usage(
-        _count(_get(counts, prompt)),
-        _count(_get(counts, completion)),
-        _count(_get(details, "reasoning_tokens")),
+        token_count(_get(counts, prompt)),
+        token_count(_get(counts, completion)),
+        token_count(_get(details, "reasoning_tokens")),
     )
 
 
-def _count(value: object) -> int | None:
-    return value if isinstance(value, int) and not isinstance(value, bool) else None
+def token_count(value: object) -> int | None:
+    """A number of tokens as a server wrote it; None, not known, for what cannot be one."""
+    if not isinstance(value, int) or isinstance(value, bool):
+        return None
+    return value if 0 <= value <= _MOST_TOKENS else None
 
 
 def _get(raw: object, *names: str) -> Any:

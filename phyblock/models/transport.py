@@ -1,37 +1,21 @@
-"""What sends a request once: the contract of the two transports, and how errors are classed."""
+"""What sends a request once: the contract of the transports, and the guard around every call."""
 
 from __future__ import annotations
 
-import email.utils
-import re
-from collections.abc import Mapping
-from dataclasses import dataclass
-from datetime import datetime, timezone
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-from phyblock.errors import (
-    ModelError,
-    RefusedError,
-    RetryableError,
-    SampleError,
-    UnavailableError,
-)
+from phyblock.errors import ModelError, PhyblockError, RetryableError
 from phyblock.models.base import Message, Reply
+from phyblock.models.config import ModelConfig
+from phyblock.models.http_client import HttpClient
+from phyblock.models.keys import hidden
+from phyblock.models.raw_replies import well_formed
 
-__all__ = ["Call", "SeedRefusedError", "Transport", "classify", "refuses_seed", "retry_after_s"]
+__all__ = ["Call", "GuardedTransport", "SeedRefusedError", "Transport"]
 
-_RETRYABLE = (408, 409, 425, 429)
-_UNAVAILABLE = (401, 402, 403, 404)
-_POLICY = re.compile(
-    r"content_policy_violation|ResponsibleAIPolicyViolation|content management policy"
-    r"|data_?inspection_?failed|\bcontent_filter\b|requires moderation",
-    re.IGNORECASE,
-)
-_NEVER = re.compile(
-    r"insufficient_quota|billing_hard_limit_reached|model_not_found|invalid_api_key"
-    r"|credit balance is too low|API_KEY_INVALID|API key not valid|LLM Provider NOT provided",
-    re.IGNORECASE,
-)
 _LONGEST_MESSAGE = 500
 
 
@@ -58,50 +42,59 @@ class Transport(Protocol):
     async def send(self, call: Call) -> Reply:
         """The validated reply, its cost not yet known.
 
-        Raises a ModelError by class, with no key in its message, or SeedRefusedError.
+        Raises a ModelError by class, or SeedRefusedError. Neither reply nor error holds a key.
         """
 
     async def aclose(self) -> None:
         """Release connections."""
 
 
-def classify(status: int | None, message: str, *, retry_after_s: float | None = None) -> ModelError:
-    """The error of an answer that is not a reply.
+class GuardedTransport(ABC):
+    """A transport from which nothing comes but replies and errors of ours, with no key in them.
 
-    None as status is a connection that failed, 200 a body that could not be read.
+    Whatever the libraries below raise, or our own reading of what a server sent, is a failed call
+    and no end of the run. What stops the process passes: cancellation, Ctrl-C.
     """
-    text = " ".join(message.split())[:_LONGEST_MESSAGE]
-    text = text if status is None else f"HTTP {status}: {text}"
-    if status is None or status == 200 or status >= 500:
-        return RetryableError(text, status=status, retry_after_s=retry_after_s)
-    if _POLICY.search(message):
-        return RefusedError(text, status=status)
-    if status in _UNAVAILABLE or _NEVER.search(message):
-        return UnavailableError(text, status=status)
-    if status in _RETRYABLE:
-        return RetryableError(text, status=status, retry_after_s=retry_after_s)
-    if 300 <= status < 400:
-        return UnavailableError(f"{text} (is api_base the address of the API?)", status=status)
-    return SampleError(text, status=status)
 
+    def __init__(self, config: ModelConfig, secrets: Sequence[str]) -> None:
+        self._config = config
+        self._secrets = tuple(secrets)
+        self._client = HttpClient(config)
 
-def refuses_seed(status: int | None, message: str) -> bool:
-    """Whether an error says that the provider does not take the `seed` parameter."""
-    return status in (400, 422) and re.search(r"\bseed\b", message) is not None
+    async def send(self, call: Call) -> Reply:
+        """Send once; see Transport."""
+        try:
+            return self._clean(await self._ask(call))
+        except ModelError as error:
+            error.args = (self._shown(str(error)),)
+            raise
+        except (PhyblockError, SeedRefusedError):
+            raise
+        except Exception as error:
+            said = f"the call failed: {type(error).__name__}: {error}"
+            raise RetryableError(self._shown(said)) from None
 
+    async def aclose(self) -> None:
+        """Close all connections."""
+        await self._client.aclose()
 
-def retry_after_s(headers: Mapping[str, str] | None) -> float | None:
-    """Seconds that a `Retry-After` header asks for, given as seconds or as an HTTP date."""
-    value = next((v for k, v in (headers or {}).items() if k.lower() == "retry-after"), None)
-    if value is None:
-        return None
-    try:
-        return max(0.0, float(value))
-    except ValueError:
-        pass
-    try:
-        then = email.utils.parsedate_to_datetime(value)
-    except ValueError:
-        return None
-    then = then if then.tzinfo else then.replace(tzinfo=timezone.utc)
-    return max(0.0, (then - datetime.now(timezone.utc)).total_seconds())
+    @abstractmethod
+    async def _ask(self, call: Call) -> Reply:
+        """Send once; may raise anything."""
+
+    def _clean(self, reply: Reply) -> Reply:
+        """The reply without keys, and without characters that no file can hold."""
+
+        def clean(text: str) -> str:
+            return hidden(well_formed(text), self._secrets, guess=False)
+
+        return replace(
+            reply,
+            text=clean(reply.text),
+            reasoning=clean(reply.reasoning),
+            provider_model=clean(reply.provider_model),
+        )
+
+    def _shown(self, text: str) -> str:
+        """A text for messages and records: keys are taken out before it is cut."""
+        return " ".join(hidden(text, self._secrets).split())[:_LONGEST_MESSAGE]

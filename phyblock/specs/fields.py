@@ -34,8 +34,8 @@ class Section(BaseModel):
 def refuse(message: str, **context: Any) -> PydanticCustomError:
     """A validation error in plain words.
 
-    `context` may hold `allowed`, `hint` and `words` (close ones are proposed), and `at`, the
-    path below the validated value where the fault stands.
+    `context` may hold `allowed`, `hint` and `words` (close ones are proposed), `at`, the path below
+    the validated value where the fault stands, and `hides`: that the value must not be shown.
     """
     return PydanticCustomError("refused", "{message}", {"message": message, **context})
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, JsonValue, model_validator
 
+from phyblock.addresses import address_fault
 from phyblock.specs.fields import Count, MaxTokens, Section, Temperature, TimeoutS, TopP, refuse
 from phyblock.specs.suite import SamplingSpec
 
@@ -18,6 +19,7 @@ UsdPerMillion = Annotated[float, Field(strict=True, ge=0, le=1e9, allow_inf_nan=
 _ID_PATTERN = r"^[A-Za-z0-9_.-]+/\S+$"
 _OWNERS = (("gpt", "openai"), ("o1", "openai"), ("o3", "openai"), ("claude", "anthropic"),
            ("gemini", "gemini"), ("qwen-vl", "dashscope"))  # fmt: skip
+_LARGEST_INTEGER = 2**64 - 1
 _WITH_REPLAY = {"replay", "published", "size_b"}
 
 
@@ -31,12 +33,14 @@ def _check_id(model_id: str) -> str:
 
 
 def _check_api_base(url: str) -> str:
-    if url.startswith(("http://", "https://")):
+    fault = address_fault(url)
+    if fault is None:
         return url
     raise refuse(
-        "is not the address of a server",
-        allowed="http://... or https://...",
-        hint="for example http://localhost:8000/v1",
+        fault.message,
+        allowed="http://... or https://..., without user, password, query and fragment",
+        hint=fault.hint,
+        hides=fault.may_hold_secret,
     )
 
 
@@ -46,6 +50,9 @@ def _check_finite(body: dict[str, JsonValue]) -> dict[str, JsonValue]:
         path, value = stack.pop()
         if isinstance(value, float) and not math.isfinite(value):
             raise refuse("is not a number that JSON can carry", at=path)
+        if isinstance(value, int) and abs(value) > _LARGEST_INTEGER:
+            allowed = "whole numbers of 64 bits"
+            raise refuse("is larger than servers can read", at=path, allowed=allowed, hides=True)
         if isinstance(value, dict):
             stack.extend(((*path, key), item) for key, item in value.items())
         elif isinstance(value, list):

@@ -158,7 +158,8 @@ def _word(fault: _Fault, source: YamlSource) -> Problem:
         return Problem(where, "is missing", dotted(fault.path), hint=f"add {fault.key}: ...")
     message, allowed, hint = _explain(fault)
     where = source.where(fault.path, key=bool(fault.context.get("key")))
-    return Problem(where, message, dotted(fault.path), show(fault.found), allowed, hint)
+    found = "" if fault.context.get("hides") else show(fault.found)
+    return Problem(where, message, dotted(fault.path), found, allowed, hint)
 
 
 def _word_briefly(fault: _Fault, source: YamlSource) -> Problem:

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from phyblock.bounded import read_bytes
-from phyblock.errors import DataError, Problem, SimulationError, StoreError
-from phyblock.files import atomic_write
+from phyblock.errors import DataError, SimulationError
+from phyblock.files import atomic_write, writing
 from phyblock.models.base import Image
 from phyblock.picture_files import LARGEST_PICTURE_BYTES, picture_size
 
@@ -113,12 +113,9 @@ class Studio:
         try:
             data = await self.work_out(drawing.make)
             self.rendered += 1
-            path.parent.mkdir(parents=True, exist_ok=True)
-            atomic_write(path, data)
-        except OSError as error:
-            hint = "name another cache folder with PHYBLOCK_CACHE"
-            problem = Problem(str(path), f"cannot be written: {error.strerror}", hint=hint)
-            raise StoreError(problem) from error
+            with writing(path, "name another cache folder with PHYBLOCK_CACHE"):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                atomic_write(path, data)
         finally:
             del self._making[drawing.key]
         return data

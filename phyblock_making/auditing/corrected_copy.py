@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from phyblock.domain.candidates import CandidateSet
-from phyblock.errors import Problem, StoreError
+from phyblock.files import atomic_write, check_free, writing
 from phyblock_making.auditing.scene_audit import SceneAudit
 from phyblock_making.auditing.set_audit import csv_text, shown_orders
 from phyblock_making.checks.scene_facts import declared_orders
@@ -97,14 +97,8 @@ def _why_not(audit: SceneAudit, candidates: CandidateSet | None) -> str:
 
 
 def _write_new(folder: Path, texts: Mapping[str, str]) -> None:
-    taken = [folder / name for name in texts if (folder / name).exists()]
-    if taken:
-        hint = "choose another folder"
-        raise StoreError([Problem(str(path), "is already there", hint=hint) for path in taken])
-    try:
+    check_free([folder / name for name in texts], "choose another folder")
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():
-            with (folder / name).open("w", encoding="utf-8", newline="\n") as file:
-                file.write(text)
-    except OSError as error:
-        raise StoreError(Problem(str(folder), f"cannot be written: {error.strerror}")) from error
+            atomic_write(folder / name, text)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
+from phyblock.plain_text import csv_cell
 from phyblock_making.auditing.scene_audit import SceneAudit, audit_scene
 from phyblock_making.checks.finding import CheckName, Declared, Finding
 from phyblock_making.checks.tolerances import FOREIGN, Tolerances
@@ -97,7 +98,7 @@ def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows(rows)
+    writer.writerows(map(csv_cell, row) for row in rows)
     return text.getvalue()
 
 

@@ -9,8 +9,10 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import make_console, shown_path
+from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.datasets import SCENES_FILE
-from phyblock.errors import Problem, StoreError
+from phyblock.files import check_free, make_folder, write_named
+from phyblock.folders import OutFolder
 from phyblock.sim import PictureStyle
 from phyblock.sim.marked import marked_png
 from phyblock_making.auditing.corrected_copy import CHANGES_FILE, write_fixed
@@ -21,22 +23,16 @@ from phyblock_making.checks.set_checks import find_duplicates
 from phyblock_making.checks.tolerances import FOREIGN, Tolerances
 from phyblock_making.cli.scene_sets import find_data_set
 from phyblock_making.cli.scenes_audit_view import print_audit, print_changes, worst_scenes
-from phyblock_making.cli.working import jobs_option, make_folder, tracked, write_file
+from phyblock_making.cli.working import jobs_option, tracked
 
 __all__ = ["command"]
 
 
 @click.command("audit")
-@click.argument("data", metavar="PATH")
-@click.option(
-    "--csv", "table", type=click.Path(path_type=Path), metavar="FILE", help="All findings as CSV."
-)
-@click.option(
-    "--fix", type=click.Path(path_type=Path), metavar="OUT", help="Write a corrected copy here."
-)
-@click.option(
-    "--pictures", type=click.Path(path_type=Path), metavar="DIR", help="Draw the worst scenes here."
-)
+@click.argument("data", metavar="PATH", type=NAME_OR_PATH)
+@click.option("--csv", "table", type=UserPath(), metavar="FILE", help="All findings as CSV.")
+@click.option("--fix", type=UserPath(), metavar="OUT", help="Write a corrected copy here.")
+@click.option("--pictures", type=UserPath(), metavar="DIR", help="Draw the worst scenes here.")
 @click.option(
     "--worst",
     type=click.IntRange(0),
@@ -76,7 +72,7 @@ def command(
     audit = Audit(tuple(audits), (*salvaged.findings, *twins))
     print_audit(console, audit, worst)
     if table is not None:
-        write_file(table, findings_csv(audit))
+        write_named(table, findings_csv(audit))
         console.print(f"{len(audit.findings)} findings in {shown_path(table)}", markup=False)
     if pictures is not None:
         count = _draw(pictures, worst_scenes(audit, worst))
@@ -98,10 +94,8 @@ def _check_places(table: Path | None, fix: Path | None, pictures: Path | None) -
     if table is not None and table.is_dir():
         taken.append(table)
     if fix is not None:
-        taken += [fix / name for name in (SCENES_FILE, CHANGES_FILE) if (fix / name).exists()]
-    if taken:
-        hint = "name another place"
-        raise StoreError([Problem(str(path), "is already there", hint=hint) for path in taken])
+        taken += [fix / name for name in (SCENES_FILE, CHANGES_FILE)]
+    check_free(taken, "name another place")
     folders = (None if table is None else table.parent, fix, pictures)
     for folder in folders:
         if folder is not None:
@@ -109,8 +103,10 @@ def _check_places(table: Path | None, fix: Path | None, pictures: Path | None) -
 
 
 def _draw(folder: Path, audits: Sequence[SceneAudit]) -> int:
+    out = OutFolder(folder)
+    out.check(f"{audit.scene.id}.png" for audit in audits)
     for audit in audits:
         guilty = {order for finding in audit.findings for order in finding.blocks}
         picture = marked_png(audit.scene, guilty, PictureStyle())
-        write_file(folder / f"{audit.scene.id}.png", picture)
+        out.write({f"{audit.scene.id}.png": picture})
     return len(audits)

@@ -10,7 +10,9 @@ import click
 from rich.console import Console
 
 from phyblock.cli.console import counted, make_console, plain_table, shown_path
+from phyblock.cli.paths import UserPath
 from phyblock.domain import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
+from phyblock.files import make_folder, write_named
 from phyblock.run.vqa import select_questions
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
@@ -20,7 +22,7 @@ from phyblock_making.cli.question_sets import (
     read_question_set,
     size_option,
 )
-from phyblock_making.cli.working import make_folder, tracked, write_file
+from phyblock_making.cli.working import tracked
 from phyblock_making.questions.sheet import sheet_html
 from phyblock_making.questions.shortcuts import (
     BALANCE,
@@ -40,7 +42,7 @@ _PER_SUBTASK = 5
 @data_option
 @click.option(
     "--sheet",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=UserPath(dir_okay=False),
     metavar="FILE",
     help="Write an HTML page for a human check: pictures, questions, answers behind a fold.",
 )
@@ -93,7 +95,7 @@ def command(
         chosen = [task.question for task in some]
         draw = partial(question_png, style=PictureStyle(size))
         pieces = sheet_html(f"Questions of {questions}", chosen, draw)
-        write_file(sheet, "".join(pieces))
+        write_named(sheet, "".join(pieces))
         console.print(f"{counted(len(chosen), 'question')} in {shown_path(sheet)}", markup=False)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import counted, make_console, shown_path
+from phyblock.cli.paths import UserPath
 from phyblock.datasets import read_questions
 from phyblock.domain import Question
 from phyblock.errors import DataError, Problem
@@ -23,7 +24,7 @@ __all__ = ["command"]
 
 
 @click.command("reword")
-@click.argument("wordings", type=click.Path(path_type=Path), metavar="FILE")
+@click.argument("wordings", type=UserPath(), metavar="FILE")
 @questions_option
 @data_option
 @click.option("--add", is_flag=True, help="Keep the questions of the set beside the new ones.")
@@ -36,9 +37,7 @@ __all__ = ["command"]
     help="Another seed draws other wordings.",
 )
 @jobs_option
-@click.option(
-    "--out", type=click.Path(path_type=Path), required=True, metavar="DIR", help="Folder to write."
-)
+@click.option("--out", type=UserPath(), required=True, metavar="DIR", help="Folder to write.")
 @click.option("--replace", is_flag=True, help="Replace questions that are in the folder.")
 def command(
     wordings: Path,

@@ -11,9 +11,11 @@ import click
 from PIL import Image
 
 from phyblock.cli.console import make_console, shown_path
+from phyblock.cli.paths import UserPath
 from phyblock.datasets import QuestionSet
 from phyblock.domain import LETTERS, SUBTASK_NAMES, Question
 from phyblock.errors import DataError, Problem
+from phyblock.files import write_named
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from phyblock_making.cli.question_sets import (
@@ -22,7 +24,6 @@ from phyblock_making.cli.question_sets import (
     read_question_set,
     size_option,
 )
-from phyblock_making.cli.working import write_file
 
 __all__ = ["command"]
 
@@ -33,9 +34,7 @@ _GAP_PX = 8
 @click.argument("question")
 @questions_option
 @data_option
-@click.option(
-    "--out", type=click.Path(path_type=Path), metavar="FILE", help="Draw the pictures to this PNG."
-)
+@click.option("--out", type=UserPath(), metavar="FILE", help="Draw the pictures to this PNG.")
 @size_option
 @click.option("--blind", is_flag=True, help="Keep answer and evidence to yourself.")
 def command(
@@ -61,7 +60,7 @@ def command(
     for line in lines:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     if out is not None:
-        write_file(out, _side_by_side(shown, PictureStyle(size)))
+        write_named(out, _side_by_side(shown, PictureStyle(size)))
         console.print(f"pictures: {shown_path(out)}", markup=False, soft_wrap=True)
 
 

@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import base64
+import html
+import json
+import urllib.parse
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from phyblock.errors import UnavailableError
 from phyblock.models import KeyStatus, ModelConfig, api_key_status
@@ -70,7 +77,78 @@ def test_keys_are_hidden_wherever_they_stand(monkeypatch: pytest.MonkeyPatch) ->
     assert hidden("Bearer abcdefgh1234", secrets, guess=False) == "Bearer abcdefgh1234"
 
 
-@pytest.mark.parametrize("value", ["", "EMPTY", "no-key"])
+@pytest.mark.parametrize("value", ["", " ", "abc", "EMPTY", "no-key"])
 def test_a_placeholder_is_no_secret(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", value)
     assert secrets_of(config("openai/o1")) == ()
+
+
+PRINTABLE = st.characters(min_codepoint=33, max_codepoint=126)
+KEYS = st.text(PRINTABLE, min_size=8, max_size=60)
+
+
+@given(KEYS, st.text(max_size=8), st.text(max_size=8))
+def test_a_key_is_hidden_in_every_form(key: str, before: str, after: str) -> None:
+    forms = [
+        key,
+        json.dumps(key)[1:-1],
+        json.dumps(key)[1:-1].replace("/", "\\/"),
+        repr(key)[1:-1],
+        html.escape(key),
+        urllib.parse.quote(key),
+        urllib.parse.quote(key, safe=""),
+        urllib.parse.quote_plus(key),
+        urllib.parse.quote(key, safe="").lower() if key == key.lower() else key,
+    ]
+    for form in forms:
+        for guess in (True, False):
+            text = hidden(f"{before} {form} {after}", (key,), guess=guess)
+            assert form not in text or form in f"{before} [key] {after}"
+
+
+@given(KEYS, st.text(PRINTABLE.filter(lambda c: c != ":"), max_size=9))
+def test_a_key_is_hidden_in_basic_credentials(key: str, user: str) -> None:
+    credentials = base64.b64encode(f"{user}:{key}".encode()).decode()
+    left = hidden(f"got {credentials}", (key,), guess=False).partition("[key]")
+    assert left[1]
+    assert len(left[2]) <= 4
+    try:
+        shown = base64.b64decode(left[0].removeprefix("got ") + "===", validate=False)
+    except ValueError:
+        return
+    assert key[:2].encode() not in shown.removeprefix(f"{user}:".encode())
+
+
+@given(KEYS, st.integers(min_value=4))
+def test_a_key_that_is_cut_at_the_end_is_hidden(key: str, length: int) -> None:
+    part = key[: min(length, len(key) - 1)]
+    assert not hidden(f"bad key {part}", (key,)).endswith(part)
+
+
+def test_a_short_key_is_hidden_as_a_word_and_not_inside_of_others() -> None:
+    assert hidden("key s3cr! of s3cr, not xs3cr or s3crets", ("s3cr",)) == (
+        "key [key]! of [key], not xs3cr or s3crets"
+    )
+
+
+def test_the_longer_of_two_keys_goes_whole() -> None:
+    assert hidden("a-long-key-and-more", ("a-long-key", "a-long-key-and-more")) == "[key]"
+
+
+def test_white_space_around_a_key_is_no_part_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "  a-key-of-mine\r\n")
+    assert api_key(config("openai/o1")) == "a-key-of-mine"
+    assert secrets_of(config("openai/o1")) == ("a-key-of-mine",)
+    monkeypatch.setenv("OPENAI_API_KEY", " \n")
+    assert not api_key_status(config("openai/o1")).is_set
+
+
+@pytest.mark.parametrize("bad", ["a-key\nof-mine", "a-key\x7fof-mine", "a-k\u00e9y-of-mine"])
+def test_a_key_that_cannot_be_sent_is_named_by_its_variable(
+    monkeypatch: pytest.MonkeyPatch, bad: str
+) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", bad)
+    with pytest.raises(UnavailableError, match="OPENAI_API_KEY holds") as refused:
+        api_key(config("openai/o1"))
+    assert "of-mine" not in str(refused.value)
+    assert api_key_status(config("openai/o1")).fault

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from phyblock.errors import DataError
 from phyblock.models import RawReply, Usage, read_raw_reply
+from phyblock.models.raw_replies import token_count, well_formed
 
 STEPS = "Step1: Move block with index 3"
 
@@ -215,3 +216,22 @@ def test_the_official_recordings_are_all_read(
     assert {reply.shape for reply in read} == {shape}
     assert all(reply.text for reply in read)
     assert all(bool(reply.reasoning) == ("thinking" in shape) for reply in read)
+
+
+@given(st.one_of(st.integers(), st.floats(), st.booleans(), st.text(max_size=3), st.none()))
+def test_a_number_of_tokens_is_one_or_not_known(value: object) -> None:
+    count = token_count(value)
+    if count is not None:
+        assert type(count) is int
+        assert 0 <= count <= 10**9
+        assert count == value
+    else:
+        assert type(value) is not int or not 0 <= value <= 10**9
+
+
+@given(st.text(st.characters()))
+def test_every_text_of_a_reply_can_be_written(text: str) -> None:
+    raw = RawReply("x", f"{text}\ud800", f"\udfff{text}", model=f"{text}\udc00\ud800")
+    for kept in (raw.text, raw.reasoning, raw.model):
+        kept.encode()
+        assert kept.replace("\ufffd", "") == well_formed(text).replace("\ufffd", "")

@@ -15,7 +15,8 @@ KEYS = {
     "OPENAI_API_KEY": "sk-proj-5ecret0123456789abcdefghij",
     "ANTHROPIC_API_KEY": "sk-ant-5ecret0123456789abcdefghij",
     "GEMINI_API_KEY": "AIza5ecret0123456789abcdefghij",
-    "MY_SERVER_KEY": "a plain word with 5ecret in it",
+    "MY_SERVER_KEY": 'a "plain" w\\ord/with 5ecret in it & <more>',
+    "MY_SHORT_KEY": "5ecret!",
 }
 PNG_HEAD = base64.b64encode(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")[:20]
 
@@ -25,6 +26,7 @@ class Parrot(OpenAIChat):
 
     def reply(self, seen: Seen, ending: str) -> dict[str, object]:
         body = super().reply(seen, ending)
+        body["model"] = f"a model for {seen.key}"
         for choice in body["choices"]:
             choice["message"]["content"] += f"\nYour key is {seen.key}."
             choice["message"]["reasoning_content"] = f"The key is {seen.key}."
@@ -42,7 +44,8 @@ def everything(workspace: Workspace) -> dict[str, bytes]:
 
 @pytest.mark.parametrize("transport", ["direct", pytest.param("litellm", marks=pytest.mark.slow)])
 def test_keys_and_pictures_stay_off_the_disk(workspace: Workspace, transport: str) -> None:
-    faults = Faults(rate_limited=0.1, server_error=0.1, malformed=0.1, retry_after="0")
+    others = tuple((f"echo-key-{kind}", 0.04) for kind in ("in-reply", "json", "cut", "page"))
+    faults = Faults(0.1, 0.1, malformed=0.1, retry_after="0", others=others)
     kinds = {"talks": faults, "locked": Faults(mode="echo-key"), "refuses": Faults(mode="400")}
     servers = {name: Parrot(each) for name, each in kinds.items()}
     with (
@@ -57,6 +60,7 @@ def test_keys_and_pictures_stay_off_the_disk(workspace: Workspace, transport: st
             for name, url in urls.items()
         }
         entries["named"] = {**entries["talks"], "api_key_env": "MY_SERVER_KEY"}
+        entries["short"] = {**entries["talks"], "api_key_env": "MY_SHORT_KEY"}
         entries["openai"] = {**entries["talks"], "id": "openai/some-model"}
         workspace.write_yaml("models.yaml", entries)
         workspace.write_suite(models=list(entries), seeds=[0, 1])
@@ -64,7 +68,8 @@ def test_keys_and_pictures_stay_off_the_disk(workspace: Workspace, transport: st
         told.append(workspace.phyblock("models", env=KEYS))
         told += [workspace.phyblock("models", "check", n, env=KEYS) for n in ("talks", "locked")]
     used = {seen.key for server in servers.values() for seen in server.seen}
-    assert used == {KEYS[n] for n in ("HOSTED_VLLM_API_KEY", "MY_SERVER_KEY", "OPENAI_API_KEY")}
+    names = ("HOSTED_VLLM_API_KEY", "MY_SERVER_KEY", "MY_SHORT_KEY", "OPENAI_API_KEY")
+    assert used == {KEYS[name] for name in names}
     assert {r["outcome"] for r in workspace.records()} >= {"ok", "api_error"}
 
     found = everything(workspace)

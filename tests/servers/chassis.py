@@ -11,17 +11,19 @@ import argparse
 import asyncio
 import hashlib
 import json
-import socket
-import struct
 import threading
 from abc import ABC, abstractmethod
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
 from aiohttp import web
 
+from tests.servers.faults import WIRE_FAULTS, reset_connection
+
 FAULTS = ("429", "500", "reset", "cut", "html", "empty")
+ELSEWHERE = "http://localhost:9"
 
 
 @dataclass(frozen=True)
@@ -29,9 +31,10 @@ class Faults:
     """Shares of requests that fail in each way, and how an answer comes otherwise.
 
     `malformed` is spread over cut JSON, an HTML page with status 200, and a reply without choices.
-    `mode` makes every request end in one way: a name of FAULTS, or "401", "403", "404", "quota",
-    "400", "policy", "seed" (400 for a request with a seed), "echo-key", "length", "filtered",
-    "blank", "slow" (never answers).
+    `others` are further names with their shares; another `seed` draws other requests for each.
+    `mode` makes every request end in one way: a name of FAULTS or WIRE_FAULTS, or "401", "403",
+    "404", "quota", "400", "policy", "seed" (400 for a request with a seed), "echo-key", "length",
+    "filtered", "blank", "slow" (never answers).
     """
 
     rate_limited: float = 0.0
@@ -41,18 +44,28 @@ class Faults:
     latency_s: float = 0.0
     retry_after: str = "1"
     mode: str = "ok"
+    others: tuple[tuple[str, float], ...] = ()
+    seed: int = 0
+
+    @classmethod
+    def spread(cls, names: Iterable[str], share: float, *, seed: int, **fields: Any) -> Faults:
+        """Faults of which each of the names takes the same part of `share`."""
+        chosen = tuple(names)
+        return cls(others=tuple((n, share / len(chosen)) for n in chosen), seed=seed, **fields)
 
     def draw(self, sample: str, nth: int) -> str:
         """The way in which the nth request of a sample ends."""
         if self.mode != "ok":
             return self.mode
-        number = int(hashlib.sha256(f"{sample}|{nth}".encode()).hexdigest(), 16)
+        drawn = f"{sample}|{nth}|{self.seed}" if self.seed else f"{sample}|{nth}"
+        number = int(hashlib.sha256(drawn.encode()).hexdigest(), 16)
         share, kind = (number % 10**6) / 10**6, (number >> 64) % 3
         for name, size in (
             ("429", self.rate_limited),
             ("500", self.server_error),
             ("reset", self.reset),
             (("cut", "html", "empty")[kind], self.malformed),
+            *self.others,
         ):
             if share < size:
                 return name
@@ -91,11 +104,17 @@ class Seen:
 
 
 class LocalServer(ABC):
-    """One provider's protocol; `ended` counts requests by how they ended."""
+    """One provider's protocol; `ended` counts requests by how they ended.
 
-    def __init__(self, faults: Faults | None = None, *, keep: bool = True) -> None:
+    `elsewhere` is where redirects to another host lead.
+    """
+
+    def __init__(
+        self, faults: Faults | None = None, *, keep: bool = True, elsewhere: str = ELSEWHERE
+    ) -> None:
         self.faults = faults or Faults()
         self.keep = keep
+        self.elsewhere = elsewhere
         self.seen: list[Seen] = []
         self.ended: Counter[str] = Counter()
         self.by_sample: Counter[str] = Counter()
@@ -157,15 +176,17 @@ class LocalServer(ABC):
             if self.faults.latency_s:
                 await asyncio.sleep(self.faults.latency_s)
             response = await self._end(seen, ending, request)
-            if ending == "ok":
+            if ending == "ok" or (ending in WIRE_FAULTS and WIRE_FAULTS[ending].ending == "reply"):
                 self.answered_by_sample[sample] += 1
             return response
         finally:
             self.at_once -= 1
 
     async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
+        if ending in WIRE_FAULTS:
+            return await WIRE_FAULTS[ending].behave(self, seen, request)
         if ending == "reset":
-            return _reset(request)
+            return reset_connection(request)
         if ending == "slow":
             await asyncio.sleep(3600)
         if ending == "html":
@@ -196,16 +217,6 @@ class LocalServer(ABC):
         return web.json_response(
             self.error(status, ending, message), status=status, headers=headers
         )
-
-
-def _reset(request: web.Request) -> web.Response:
-    """Send a TCP reset in the place of an answer."""
-    transport = request.transport
-    assert transport is not None
-    lingering = struct.pack("ii", 1, 0)
-    transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, lingering)
-    transport.abort()
-    return web.Response()
 
 
 class Running:
@@ -264,19 +275,27 @@ def main(kind: type[LocalServer]) -> None:
     parser.add_argument("--malformed", type=float, default=0.0, metavar="SHARE")
     parser.add_argument("--retry-after", default="1")
     parser.add_argument("--mode", default="ok")
+    parser.add_argument("--others", default="", metavar="NAME[,NAME...]", help="names of faults")
+    parser.add_argument("--others-share", type=float, default=0.0, metavar="SHARE")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--elsewhere", default=ELSEWHERE, help="where redirects lead")
     given = parser.parse_args()
-    faults = Faults(
-        given.rate_limited,
-        given.server_error,
-        given.reset,
-        given.malformed,
-        given.latency,
-        given.retry_after,
-        given.mode,
+    others = [name for name in given.others.split(",") if name]
+    faults = Faults.spread(
+        others,
+        given.others_share,
+        seed=given.seed,
+        rate_limited=given.rate_limited,
+        server_error=given.server_error,
+        reset=given.reset,
+        malformed=given.malformed,
+        latency_s=given.latency,
+        retry_after=given.retry_after,
+        mode=given.mode,
     )
 
     async def serve() -> None:
-        _, port = await start(kind(faults, keep=False), given.port)
+        _, port = await start(kind(faults, keep=False, elsewhere=given.elsewhere), given.port)
         print(port, flush=True)
         await asyncio.Event().wait()
 

@@ -106,6 +106,7 @@ BAD = [
     ("m: {id: a/b, price: {input: 1, output: -1}}\n", "1:40", "m.price.output", "range", "0", ""),
     ("m: {id: a/b, input: 1}\n", "1:14", "m.input", "known key", "", "belongs at price.input"),
     ("m: {id: a/b, extra_body: {x: [1, .nan]}}\n", "1:34", "m.extra_body.x[1]", "JSON", "", ""),
+    ("m: {id: a/b, extra_body: {x: 0x1ffffffffffffffff}}\n", "1:30", "m.extra_body.x", "", "", ""),
     ("m: {id: a/b, replay: x}\n", "1:5", "m.id", "no meaning for a replay", "published", "either"),
     ("m: {replay: x, rpm: 5}\n", "1:16", "m.rpm", "no meaning for a replay", "", ""),
     ("m: {replay: $PHYBLOCK_UNSET/x}\n", "1:13", "m.replay", "PHYBLOCK_UNSET is not set", "", ""),

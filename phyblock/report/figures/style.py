@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
+
+from phyblock.resources import cache_dir
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,7 +80,11 @@ _RC: dict[str, Any] = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Within it, figures are made and saved in the project's style, whatever the user's is."""
+    """Within it, figures are made and saved in the project's style, whatever the user's is.
+
+    The list of fonts that matplotlib keeps goes into our cache folder, not into the home folder.
+    """
+    os.environ.setdefault("MPLCONFIGDIR", str(cache_dir() / "matplotlib"))
     import matplotlib as mpl
 
     with mpl.rc_context():

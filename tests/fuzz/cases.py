@@ -1,0 +1,310 @@
+"""Cases drawn for hypothesis: each puts a bad file, argument or folder before a command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import yaml
+from hypothesis import strategies as st
+
+from tests.datasets.broken import sound_scene
+from tests.fuzz.bench import Case, Fifo, Link
+from tests.fuzz.strategies import (
+    CANDIDATES,
+    JSON_TOKENS,
+    MODELS_FILES,
+    NASTY_TOKENS,
+    NOISE,
+    OVERRIDES,
+    PICTURES,
+    QUESTIONS,
+    SCENES,
+    SUITES,
+    TEMPLATES,
+    broken,
+)
+
+__all__ = ["KINDS", "Cases", "run_cases"]
+
+Cases = st.SearchStrategy[Case]
+
+RUN = ("run", "suite.yaml", "--out", "fresh", "--no-report")
+DRY = ("run", "suite.yaml", "--dry-run")
+LASTING = ("thesis/ch1.tex", "suite.yaml", "models.yaml", "data/scenes.jsonl")
+
+_TEXTS = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=12)
+_NO_FILES = st.sampled_from(
+    [
+        Fifo(),
+        *map(Link, ("/dev/zero", "/dev/stdin", "/proc/self/environ", ".", "gone", "/etc/hosts")),
+        b"",
+        b"\xff\xfe\x00",
+        b"a: &a [x,x,x,x,x,x,x,x,x]\nb: &b [*a,*a,*a,*a,*a,*a,*a]\nc: [*b,*b,*b,*b,*b,*b,*b]\n",
+        b"[" * 100_000,
+        b"a: " * 50_000,
+        b"- " * 200_000,
+        b"x" * 3_000_000,
+        b'"' + b"x" * 2_000_000 + b'"',
+        b"name: 0x" + b"f" * 100_000,
+        b"seeds: [" + b"1, " * 200_000 + b"1]",
+    ]
+)
+"""What may stand where a file is expected."""
+
+
+def _mostly(contents: st.SearchStrategy[bytes]) -> st.SearchStrategy[Any]:
+    """These contents, and once in ten something that is no such file at all."""
+    return st.integers(0, 9).flatmap(lambda n: contents if n else _NO_FILES)
+
+
+def _file(name: str, contents: Any, *commands: tuple[str, ...]) -> Cases:
+    """A command, and a file of this name that is drawn."""
+    return st.builds(
+        lambda content, args: Case(args, {name: content}, ("fresh",)),
+        _mostly(contents),
+        st.sampled_from(commands),
+    )
+
+
+def _override_cases(texts: list[str]) -> Case:
+    args = [arg for text in texts for arg in ("--set", text)]
+    return Case((*DRY, *args))
+
+
+def _argument_cases(args: list[str]) -> Case:
+    return Case(tuple(args), may_write=("fresh",))
+
+
+def _place_case(place: str, is_there: bool, content: bytes) -> Case:
+    """A run that is told to go somewhere, where something of the user's may be already."""
+    name = place.strip("/") or "nowhere"
+    inside = f"{name}/report/ch1/thesis.tex"
+    can_be_there = is_there and ".." not in place and "~" not in place and len(place) < 80
+    files = {inside: content} if can_be_there else {}
+    return Case(
+        ("run", "suite.yaml", "--out", place, "--no-report", "--models", "oracle"),
+        files,
+        (".",) if name == "." else (name.split("/")[0],),
+        (*LASTING, *files),
+    )
+
+
+_PLACES = st.sampled_from(
+    [
+        ".",
+        "thesis",
+        "fresh",
+        "a/b/c",
+        "~/x",
+        "$HOME/x",
+        "-x",
+        "=1+1",
+        ":b:",
+        "a\nb",
+        "[red]x",
+        "x" * 300,
+        "d/" * 3000,
+        "\udcff",
+        "data",
+        "suite.yaml",
+        "suite.yaml/x",
+        "/proc/x",
+        "/dev/null",
+        "cache",
+        "..x",
+        "a b",
+        "\u202e",
+        "%s",
+        "{x}",
+    ]
+)
+_VERBS = (
+    *("run", "score", "report", "tables", "figures", "compare", "export", "episode", "export-data"),
+    *("models", "validate", "scenes", "vqa", "cache", "init", "--help", "-V", "nope", ""),
+)
+_WORDS = (
+    *("suite.yaml", "data", "questions", "thesis", "gone", "stats", "audit", "show", "verify"),
+    *("--dry-run", "--set", "--limit", "--models", "--models-file", "--only", "--format", "--to"),
+    *("-1", "0", "9" * 400, "x=1", "seeds=[0]", "random", "t1", "csv", "html", "\udcff", "a\nb"),
+    *("/dev/null", "/dev/stdin", "--yes", "--", "x" * 5000, "../..", "http://[::1/v1", "%s", "{}"),
+    *("fresh", "check", "list", "--json", "--jobs", "--help"),
+)
+_ARGUMENTS = st.builds(
+    lambda verb, words: [verb, *words],
+    st.sampled_from(_VERBS),
+    st.lists(st.sampled_from(_WORDS) | _TEXTS, max_size=4),
+).filter(lambda args: not _makes_much(args))
+
+
+def _makes_much(args: list[str]) -> bool:
+    """Commands whose honest work takes long: generating data sets, drawing all scenes."""
+    return args[0] == "init" or {"generate", "render"} & set(args) != set()
+
+
+def _replies(texts: list[bytes]) -> Case:
+    """Recorded replies of any content, read, parsed and scored."""
+    files = {f"replies/t{n}.json": text for n, text in enumerate(texts, 1)}
+    return Case((*RUN, "--models", "old"), dict(files), ("fresh",))
+
+
+_SOUND_REPLY = {
+    "id": "x",
+    "model": "m",
+    "choices": [{"finish_reason": "stop", "message": {"role": "assistant", "content": "1, 2"}}],
+    "usage": {"prompt_tokens": 10, "completion_tokens": 3, "total_tokens": 13},
+}  # fmt: skip
+_STEPS = st.sampled_from(
+    [
+        "Step1: Move block with index 1",
+        "Step 2:",
+        "Move(3)",
+        "index",
+        "1",
+        "-1",
+        "9" * 400,
+        "\n",
+        "Answer: A",
+        "=1+1",
+        "<script>",
+        "\ud800",
+        "\u202e",
+        "```json",
+        "[1, 2]",
+        "{",
+        "<think>",
+        "\0",
+        "٣",
+        "①",
+        "Step" * 2000,
+        "1, " * 3000,
+        "Next plan: Done",
+        ":b:",
+        "[red]",
+        "\x1b[31m",
+    ]
+)
+
+
+def _reply_with(pieces: list[str]) -> bytes:
+    message = {"role": "assistant", "content": " ".join(pieces)}
+    body = {**_SOUND_REPLY, "choices": [{"finish_reason": "stop", "message": message}]}
+    return json.dumps(body).encode()
+
+
+_REPLY_FILES = broken(st.just(_SOUND_REPLY), JSON_TOKENS) | st.builds(
+    _reply_with, st.lists(_STEPS | _TEXTS, max_size=8)
+)
+
+
+def _official(picture: bytes, candidates: bytes | None) -> Case:
+    """A checkout in the official layout with one picture and maybe broken candidates."""
+    scene = {**sound_scene(), "id": "000"}
+    goal = {"level": 2, "blocks": scene["blocks"]}
+    numbered = [{**entry, "position": n} for n, entry in enumerate(scene["candidates"], 1)]
+    folder = "official/data/SCENEs_400_"
+    files = {
+        f"{folder}Goal_Jsons/000.json": json.dumps(goal).encode(),
+        f"{folder}Cand_Jsons/000_16_cand_blocks.json": candidates or json.dumps(numbered).encode(),
+        f"{folder}Goal_and_Cand_Imgs_resized/000.png": picture,
+    }
+    sets = ("dataset.format=official", "dataset.path=official", "images.source=dataset")
+    args = [arg for text in sets for arg in ("--set", text)]
+    return Case((*RUN, *args), files, ("fresh",))
+
+
+_SOUND_PROMPT = b"{% block user %}Build it.{% endblock %}"
+_PROMPTED = ("--set", "prompt=mine.j2")
+
+KINDS: dict[str, Cases] = {
+    "suites": _file("bad.yaml", SUITES, ("validate", "bad.yaml"), ("run", "bad.yaml", "--dry-run")),
+    "models": _file("models.yaml", MODELS_FILES, ("validate", "models.yaml"), ("models",), DRY),
+    "overrides": st.lists(OVERRIDES, min_size=1, max_size=3).map(_override_cases),
+    "arguments": _ARGUMENTS.map(_argument_cases),
+    "scenes": _file(
+        "data/scenes.jsonl",
+        SCENES,
+        ("validate", "data"),
+        ("scenes", "audit", "data", "--jobs", "1"),
+        DRY,
+        RUN,
+    ),
+    "questions": _file(
+        "questions/questions.jsonl",
+        QUESTIONS,
+        ("validate", "questions"),
+        ("run", "questions.yaml", "--dry-run"),
+    ),
+    "prompts": _file("mine.j2", TEMPLATES, (*RUN, *_PROMPTED), (*DRY, *_PROMPTED)),
+    "pictures": st.builds(_official, PICTURES, st.none() | CANDIDATES),
+    "replies": st.lists(_REPLY_FILES, min_size=2, max_size=2).map(_replies),
+    "places": st.builds(_place_case, _PLACES | _TEXTS, st.booleans(), NOISE),
+}
+"""Cases beside a sound suite, by what is bad about them."""
+
+_OF_RUN = {
+    "out": (
+        ("tables", "out"),
+        ("score", "out", "--out", "fresh"),
+        ("export", "out", "--to", "csv", "--out", "fresh"),
+        ("compare", "out"),
+        ("report", "out"),
+        ("run", "suite.yaml", "--out", "out", "--no-report", "--models", "random,oracle"),
+    ),
+    "steps": (
+        ("tables", "steps"),
+        ("episode", "steps", "step_planning/oracle/t1/s0"),
+        ("run", "suite.yaml", "--out", "steps", "--no-report", "--models", "oracle",
+         "--set", "tracks=[step_planning]", "--set", "steps.physics=off"),
+    ),
+    "asked": (
+        ("tables", "asked"),
+        ("score", "asked", "--out", "fresh"),
+        ("run", "questions.yaml", "--out", "asked", "--no-report"),
+    ),
+}  # fmt: skip
+_GROWING = ("records.jsonl", "turns.jsonl", "prompts.jsonl")
+_IN_OUT = ("report/ch1/thesis.tex", "figures/mine.svg", "tables/mine.csv", "notes.md")
+
+
+def run_cases(root: Path) -> Cases:
+    """Cases about the finished runs in `root`: a line of a file that grows, or the manifest."""
+    found: list[Cases] = []
+    for run, commands in _OF_RUN.items():
+        own = tuple(f"{run}/{name}" for name in _IN_OUT) if run == "out" else ()
+        for name in (*_GROWING, "run.yaml"):
+            path = root / run / name
+            if not path.exists():
+                continue
+            contents = _manifests(path) if name == "run.yaml" else _with_bad_line(path)
+            found.append(
+                st.builds(
+                    lambda content, args, at, run, own: Case(
+                        args, {at: content}, (run, "fresh"), (*LASTING, *own)
+                    ),
+                    _mostly(contents),
+                    st.sampled_from(commands),
+                    st.just(f"{run}/{name}"),
+                    st.just(run),
+                    st.just(own),
+                )
+            )
+    return st.one_of(found)
+
+
+def _manifests(path: Path) -> st.SearchStrategy[bytes]:
+    manifest = yaml.safe_load(path.read_text(encoding="utf-8"))
+    return broken(st.just(manifest), NASTY_TOKENS)
+
+
+def _with_bad_line(path: Path) -> st.SearchStrategy[bytes]:
+    lines = path.read_bytes().splitlines(keepends=True)
+    documents = [json.loads(line) for line in lines]
+
+    def joined(place: int, bad: bytes, ending: bytes) -> bytes:
+        return b"".join([*lines[:place], bad + ending, *lines[place + 1 :]])
+
+    bad = broken(st.sampled_from(documents), JSON_TOKENS) | NOISE
+    endings = st.sampled_from([b"\n", b"\n", b"\n", b"", b"\r\n", b"\n\n"])
+    return st.builds(joined, st.integers(0, len(lines) - 1), bad, endings)

@@ -1,0 +1,358 @@
+"""Faults by name: what a server can do to whoever asks it, one behaviour each.
+
+`WIRE_FAULTS` holds them all; each is a mode of `Faults`, beside those that the chassis knows. A
+behaviour gets the server, the request as it was read, and the request itself, and ends it. None
+draws a random number: which fault meets which request is decided by `Faults.draw`.
+
+`Ending` says what has to come of a fault, if nothing else happens, whatever the protocol.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import copy
+import gzip
+import json
+import socket
+import struct
+import zlib
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any, Literal
+
+from aiohttp import web
+
+if TYPE_CHECKING:
+    from tests.servers.chassis import LocalServer, Seen
+
+__all__ = ["WIRE_FAULTS", "Ending", "Fault", "reset_connection"]
+
+Ending = Literal["reply", "retryable", "unavailable", "sample"]
+Behaviour = Callable[["LocalServer", "Seen", web.Request], Awaitable[web.StreamResponse]]
+
+_BOMB_BYTES = 40 * 2**20
+_DRIP_S = 0.02
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A behaviour; what must come of it; whether the answer would go on for ever."""
+
+    behave: Behaviour
+    ending: Ending
+    is_endless: bool = False
+
+
+def reset_connection(request: web.Request) -> web.Response:
+    """Send a TCP reset in the place of (the rest of) an answer."""
+    transport = request.transport
+    if transport is not None:
+        lingering = struct.pack("ii", 1, 0)
+        raw = transport.get_extra_info("socket")
+        raw.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, lingering)
+        transport.abort()
+    return web.Response()
+
+
+async def _redirect(
+    server: LocalServer, _: Seen, request: web.Request, *, status: int, away: bool
+) -> web.Response:
+    there = server.elsewhere if away else f"{request.scheme}://{request.host}"
+    location = f"{there}{request.path}?session=h1dden#h1dden"
+    return web.Response(status=status, headers={"Location": location})
+
+
+async def _sends(
+    _: LocalServer,
+    __: Seen,
+    ___: web.Request,
+    *,
+    status: int,
+    body: Any = None,
+    headers: Mapping[str, str] | None = None,
+) -> web.Response:
+    """Answer with this status and body: bytes as they are, anything else as JSON."""
+    if body is None:
+        return web.Response(status=status, headers=headers)
+    data = body if isinstance(body, bytes) else json.dumps(body).encode()
+    content_type = "application/json"
+    return web.Response(body=data, status=status, headers=headers, content_type=content_type)
+
+
+async def _changed(
+    server: LocalServer,
+    seen: Seen,
+    _: web.Request,
+    *,
+    change: Callable[[dict[str, Any], Seen], Any],
+) -> web.Response:
+    """Answer with a good reply that was changed."""
+    body = copy.deepcopy(server.reply(seen, "ok"))
+    data = json.dumps(change(body, seen)).encode()
+    return web.Response(body=data, content_type="application/json")
+
+
+def _usage(value: Any) -> Callable[[dict[str, Any], Seen], Any]:
+    """Each count of a reply's usage becomes `value`; "missing" takes the whole away."""
+
+    def change(body: dict[str, Any], _: Seen) -> dict[str, Any]:
+        name = "usageMetadata" if "usageMetadata" in body else "usage"
+        counts = body.pop(name)
+        if value != "missing":
+            body[name] = dict.fromkeys(counts, value)
+        return body
+
+    return change
+
+
+def _texts(value: Any, text: str) -> Any:
+    """A copy in which each text of a reply, wherever its protocol puts it, is `text`."""
+    if isinstance(value, dict):
+        return {
+            key: text
+            if key in ("text", "content") and isinstance(item, str)
+            else _texts(item, text)
+            for key, item in value.items()
+        }
+    return [_texts(item, text) for item in value] if isinstance(value, list) else value
+
+
+def _emptied(value: Any) -> Callable[[dict[str, Any], Seen], Any]:
+    """The list that holds the answers becomes `value`."""
+
+    def change(body: dict[str, Any], _: Seen) -> dict[str, Any]:
+        name = next(name for name in ("choices", "candidates", "content") if name in body)
+        return {**body, name: value}
+
+    return change
+
+
+def _with_key(body: dict[str, Any], seen: Seen) -> dict[str, Any]:
+    """The key stands in every text and in the model's name."""
+    for name in ("model", "modelVersion"):
+        if name in body:
+            body[name] = f"{body[name]}-{seen.key}"
+    told: dict[str, Any] = _texts(body, f"{seen.reply_text}\nYour key is {seen.key}.")
+    return told
+
+
+async def _echo(
+    _: LocalServer, seen: Seen, __: web.Request, *, status: int, shape: str
+) -> web.Response:
+    """Say the key in an error: quoted as JSON, in a text cut short, or in a page."""
+    if shape == "page":
+        page = f"<html>{'x' * 60} {seen.key}</html>"
+        return web.Response(text=page, status=status, content_type="text/html")
+    said = f"bad key {seen.key}" if shape == "json" else f"{'x' * 485} {seen.key}"
+    return web.json_response({"error": {"message": said, "code": None}}, status=status)
+
+
+async def _stream(
+    _: LocalServer,
+    __: Seen,
+    request: web.Request,
+    *,
+    chunk: bytes,
+    pause_s: float,
+    encoding: str = "",
+) -> web.StreamResponse:
+    """Answer with a body that never ends."""
+    response = web.StreamResponse(headers={"Content-Type": "application/json"})
+    if encoding:
+        response.headers["Content-Encoding"] = encoding
+    await response.prepare(request)
+    try:
+        while True:
+            await response.write(chunk)
+            await asyncio.sleep(pause_s)
+    except ConnectionError:
+        return response
+
+
+async def _reset_midway(
+    server: LocalServer, seen: Seen, request: web.Request, *, claimed: int, resets: bool
+) -> web.StreamResponse:
+    """Send half of a good reply, then lose the connection or end it."""
+    whole = json.dumps(server.reply(seen, "ok")).encode()
+    response = web.StreamResponse(headers={"Content-Type": "application/json"})
+    response.content_length = len(whole) + claimed
+    await response.prepare(request)
+    await response.write(whole[: len(whole) // 2])
+    if resets:
+        reset_connection(request)
+    elif request.transport is not None:
+        request.transport.close()
+    return response
+
+
+async def _raw(_: LocalServer, __: Seen, request: web.Request, *, data: bytes) -> web.Response:
+    """Answer with bytes that are no HTTP, or more of it than anyone reads."""
+    assert request.transport is not None
+    request.transport.write(data)
+    request.transport.close()
+    return web.Response()
+
+
+@cache
+def _bomb(encoding: str) -> bytes:
+    """A JSON text of 40 MiB in a few hundred kilobytes; twice compressed where two are named."""
+    plain = b'{"choices": "' + b"0" * _BOMB_BYTES + b'"}'
+    if encoding == "deflate":
+        return zlib.compress(plain, 1)
+    packed = gzip.compress(plain, 1)
+    return gzip.compress(packed) if "," in encoding else packed
+
+
+async def _explode(_: LocalServer, __: Seen, ___: web.Request, *, encoding: str) -> web.Response:
+    headers = {"Content-Encoding": encoding}
+    return web.Response(body=_bomb(encoding), headers=headers, content_type="application/json")
+
+
+async def _packed(
+    server: LocalServer, seen: Seen, _: web.Request, *, encoding: str, share: float = 1.0
+) -> web.Response:
+    """A good reply, compressed, of which only a share arrives (at 0: not compressed at all)."""
+    plain = json.dumps(server.reply(seen, "ok")).encode()
+    packed = zlib.compress(plain) if encoding == "deflate" else gzip.compress(plain)
+    body = packed[: int(len(packed) * share)] if share else plain
+    headers = {"Content-Encoding": encoding}
+    return web.Response(body=body, headers=headers, content_type="application/json")
+
+
+def _nested(body: dict[str, Any], _: Seen) -> dict[str, Any]:
+    deep: list[Any] = []
+    for _level in range(400):
+        deep = [deep]
+    return {**body, "extra": deep}
+
+
+def _error(message: Any, code: Any) -> dict[str, Any]:
+    return {"error": {"message": message, "type": "api_error", "param": None, "code": code}}
+
+
+def _redirects() -> dict[str, Fault]:
+    return {
+        f"redirect-{status}-{'away' if away else 'here'}": Fault(
+            partial(_redirect, status=status, away=away), "unavailable"
+        )
+        for status in (301, 302, 303, 307, 308)
+        for away in (False, True)
+    }
+
+
+_DEEP = b'{"choices": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"
+_QUOTA = "You exceeded your current quota"
+
+_ERRORS_IN_200: Mapping[str, tuple[Any, Ending]] = {
+    "200-quota": (_error(_QUOTA, "insufficient_quota"), "unavailable"),
+    "200-code-401": (_error("No auth credentials found", "401"), "unavailable"),
+    "200-code-401-number": (_error("No auth credentials found", 401), "unavailable"),
+    "200-code-500": (_error("Upstream is down", 500), "retryable"),
+    "200-code-object": (_error("Upstream is down", {"status": 401}), "retryable"),
+    "200-code-huge": (_error("Upstream is down", 10**30), "retryable"),
+    "200-message-object": (_error({"text": "Upstream is down"}, None), "retryable"),
+    "200-error-string": ({"error": "Upstream is down"}, "retryable"),
+    "200-error-list": ({"error": ["Upstream is down"]}, "retryable"),
+    "200-error-empty": ({"error": {}}, "retryable"),
+    "200-error-and-null-choices": (
+        {**_error("Upstream is down", 502), "choices": None},
+        "retryable",
+    ),
+    "200-string": ("Upstream is down", "retryable"),
+    "200-null": (b"null", "retryable"),
+    "200-number": (b"7", "retryable"),
+    "200-list": ([], "retryable"),
+    "200-empty-object": ({}, "retryable"),
+    "200-empty": (b"", "retryable"),
+    "200-no-utf-8": (b'{"choices": "\xff\xfe"}', "retryable"),
+    "200-nan": (b'{"choices": NaN}', "retryable"),
+    "200-deep": (_DEEP, "retryable"),
+    "200-huge-number": (b'{"choices": ' + b"9" * 100_000 + b"}", "retryable"),
+}
+"""Bodies that come with status 200 and are no reply."""
+
+_STATUSES: Mapping[str, tuple[int, Any, Mapping[str, str], Ending]] = {
+    "201-empty": (201, b"", {}, "retryable"),
+    "202-accepted": (202, {"status": "queued"}, {}, "retryable"),
+    "204": (204, None, {}, "retryable"),
+    "400-string": (400, {"error": "Invalid value for messages"}, {}, "sample"),
+    "401-string": (401, {"error": "Unauthorized"}, {}, "unavailable"),
+    "402": (402, _error("Insufficient credits", 402), {}, "unavailable"),
+    "408": (408, b"", {}, "retryable"),
+    "429-bare": (429, {"error": "Too many requests"}, {}, "retryable"),
+    "429-soon": (429, {"error": "Too many requests"}, {"Retry-After": "0"}, "retryable"),
+    "429-broken-wish": (429, {"error": "Too many"}, {"Retry-After": "soon"}, "retryable"),
+    "429-endless-wish": (429, {"error": "Too many"}, {"Retry-After": "1e400"}, "retryable"),
+    "429-no-wish": (429, {"error": "Too many"}, {"Retry-After": "nan"}, "retryable"),
+    "500-string": (500, {"error": "Internal error"}, {}, "retryable"),
+    "500-deep": (500, _DEEP, {}, "retryable"),
+    "502-page": (502, b"<html>Bad gateway</html>", {}, "retryable"),
+    "503": (503, _error("Overloaded", None), {}, "retryable"),
+    "529": (529, _error("Overloaded", None), {}, "retryable"),
+}
+"""Answers by their status alone."""
+
+WIRE_FAULTS: Mapping[str, Fault] = {
+    **_redirects(),
+    "redirect-nowhere": Fault(partial(_sends, status=302), "unavailable"),
+    "redirect-garbled": Fault(
+        partial(_sends, status=302, headers={"Location": "http://[::1/v1"}), "unavailable"
+    ),
+    **{
+        name: Fault(partial(_sends, status=200, body=body), ending)
+        for name, (body, ending) in _ERRORS_IN_200.items()
+    },
+    **{
+        name: Fault(partial(_sends, status=status, body=body, headers=headers), ending)
+        for name, (status, body, headers, ending) in _STATUSES.items()
+    },
+    "null-choices": Fault(partial(_changed, change=_emptied(None)), "retryable"),
+    "choices-of-strings": Fault(partial(_changed, change=_emptied(["a", "b"])), "retryable"),
+    "choices-object": Fault(partial(_changed, change=_emptied({"0": {}})), "retryable"),
+    "deep-beside-choices": Fault(partial(_changed, change=_nested), "retryable"),
+    "surrogate": Fault(
+        partial(_changed, change=lambda body, _: _texts(body, "Step1: \ud800 index 1")), "reply"
+    ),
+    "echo-key-in-reply": Fault(partial(_changed, change=_with_key), "reply"),
+    "usage-missing": Fault(partial(_changed, change=_usage("missing")), "reply"),
+    "usage-null": Fault(partial(_changed, change=_usage(None)), "reply"),
+    "usage-zero": Fault(partial(_changed, change=_usage(0)), "reply"),
+    "usage-negative": Fault(partial(_changed, change=_usage(-1_000_000)), "reply"),
+    "usage-huge": Fault(partial(_changed, change=_usage(10**30)), "reply"),
+    "usage-true": Fault(partial(_changed, change=_usage(True)), "reply"),
+    "usage-fraction": Fault(partial(_changed, change=_usage(12.5)), "reply"),
+    "usage-text": Fault(partial(_changed, change=_usage("many")), "reply"),
+    "echo-key-json": Fault(partial(_echo, status=400, shape="json"), "sample"),
+    "echo-key-cut": Fault(partial(_echo, status=400, shape="cut"), "sample"),
+    "echo-key-page": Fault(partial(_echo, status=200, shape="page"), "retryable"),
+    "reset-midway": Fault(partial(_reset_midway, claimed=0, resets=True), "retryable"),
+    "short-body": Fault(partial(_reset_midway, claimed=5_000, resets=False), "retryable"),
+    "no-http": Fault(partial(_raw, data=b"HELO mail.example\r\n\r\n"), "retryable"),
+    "no-head": Fault(partial(_raw, data=b""), "retryable"),
+    "huge-header": Fault(
+        partial(_raw, data=b"HTTP/1.1 200 OK\r\nX: " + b"x" * 200_000 + b"\r\n\r\n"), "retryable"
+    ),
+    "bad-chunk": Fault(
+        partial(_raw, data=b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\nxyz\r\n"),
+        "retryable",
+    ),
+    "endless": Fault(
+        partial(_stream, chunk=b" " * 65_536, pause_s=0), "retryable", is_endless=True
+    ),
+    "endless-gzip": Fault(
+        partial(_stream, chunk=gzip.compress(b" " * 2**20), pause_s=0, encoding="gzip"),
+        "retryable",
+        is_endless=True,
+    ),
+    "drip": Fault(partial(_stream, chunk=b" ", pause_s=_DRIP_S), "retryable", is_endless=True),
+    "gzip": Fault(partial(_packed, encoding="gzip"), "reply"),
+    "deflate": Fault(partial(_packed, encoding="deflate"), "reply"),
+    "gzip-cut": Fault(partial(_packed, encoding="gzip", share=0.5), "retryable"),
+    "gzip-that-is-none": Fault(partial(_packed, encoding="gzip", share=0.0), "retryable"),
+    "brotli-that-is-none": Fault(partial(_packed, encoding="br"), "retryable"),
+    "gzip-bomb": Fault(partial(_explode, encoding="gzip"), "retryable"),
+    "deflate-bomb": Fault(partial(_explode, encoding="deflate"), "retryable"),
+    "gzip-twice-bomb": Fault(partial(_explode, encoding="gzip, gzip"), "retryable"),
+}
+"""Every fault by its name."""

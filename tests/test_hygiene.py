@@ -1,0 +1,83 @@
+"""What the project depends on is declared, pinned with hashes, and licensed."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("phyblock", "phyblock_making")
+LOCKS = ("requirements.lock", "requirements-dev.lock")
+MODULES = {
+    "PIL": "pillow",
+    "inspect_ai": "inspect-ai",
+    "pydantic_core": "pydantic-core",
+    "sklearn": "scikit-learn",
+    "yaml": "pyyaml",
+}
+"""Import names that differ from the package's."""
+
+
+def blocks(lock: str) -> list[str]:
+    """One requirement each, with its hashes."""
+    text = (ROOT / lock).read_text(encoding="utf-8").replace("\\\n", " ")
+    return [line for line in text.splitlines() if line.strip()]
+
+
+def declared() -> dict[str, str]:
+    """Every requirement in pyproject.toml by the name of its package."""
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    found = re.findall(r'"([A-Za-z][A-Za-z0-9_.-]*)((?:\[[a-z,]+\])?[<>=!][^"]*)"', text)
+    return {name.lower(): bounds for name, bounds in found}
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_every_requirement_is_pinned_with_hashes_and_names_no_host(lock: str) -> None:
+    wrong = [
+        block[:60]
+        for block in blocks(lock)
+        if not re.match(r"[a-z0-9._-]+(\[[a-z0-9,-]+\])?==\S+ ", block)
+        or not re.search(r" --hash=sha256:[0-9a-f]{64}( |$)", block)
+    ]
+    assert not wrong
+    assert "://" not in (ROOT / lock).read_text(encoding="utf-8")
+
+
+def test_what_runs_need_is_pinned_alike_for_tests() -> None:
+    runs, tests = ({block.split(" --hash")[0].strip() for block in blocks(lock)} for lock in LOCKS)
+    assert runs <= tests
+
+
+def test_both_lock_files_are_installed_with_their_hashes() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for lock in LOCKS:
+        assert f"$(PIP) --require-hashes --requirement {lock}" in makefile
+
+
+def test_litellm_ends_below_its_next_major_version() -> None:
+    assert declared()["litellm"] == ">=1.83.10,!=1.82.7,!=1.82.8,<2"
+
+
+def test_every_package_that_is_imported_is_declared() -> None:
+    imported: set[str] = set()
+    for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                imported |= {name.name.partition(".")[0] for name in node.names}
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                imported.add(str(node.module).partition(".")[0])
+    outside = imported - sys.stdlib_module_names - set(PACKAGES)
+    missing = {name for name in outside if MODULES.get(name, name).lower() not in declared()}
+    assert not missing
+
+
+def test_every_data_set_names_its_licence() -> None:
+    folders = [path for path in (ROOT / "benchmarks" / "data").iterdir() if path.is_dir()]
+    assert folders
+    terms = (ROOT / "LICENSE").read_text(encoding="utf-8")
+    for folder in folders:
+        assert terms in (folder / "LICENSE").read_text(encoding="utf-8")
