@@ -246,7 +246,6 @@ def test_models_of_one_server_share_its_breaker() -> None:
         ("https://Host:8000/v1", "https://host:8000"),
         ("http://[::1]:8000/v1/", "http://[::1]:8000"),
         ("http://host", "http://host"),
-        ("host:80/v1", "host:80"),
         (None, "openai"),
     ],
 )
