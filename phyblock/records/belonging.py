@@ -74,8 +74,12 @@ class Belonging:
             ("seed", record.seed, self.seeds),
         ):
             yield name, value, _listed(known), not known or value in known
-        named = f"{record.track}/{record.model}/{record.item}/s{record.seed}"
-        yield "sample", record.sample, named, record.sample == named
+        begin, end = f"{record.track}/{record.model}/", f"/s{record.seed}"
+        named = f"{begin}{record.item}{end}"
+        # An older record without a key may name a question, which only its id tells.
+        is_alike = record.sample.startswith(begin) and record.sample.endswith(end)
+        is_named = is_alike if not record.key else record.sample == named
+        yield "sample", record.sample, named, is_named
         yield self._sample(record.sample)
         if record.prompt is not None:
             wanted = self.prompts.get(record.track)

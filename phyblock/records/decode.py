@@ -12,7 +12,7 @@ from phyblock.bounded import load_json
 from phyblock.errors import Problem
 from phyblock.records.line import encodable
 
-__all__ = ["decode", "is_json", "problem_of"]
+__all__ = ["decode", "is_cut", "problem_of"]
 
 _LONGEST_SHOWN = 60
 _MISSING = "missing"
@@ -32,13 +32,15 @@ def decode(adapter: TypeAdapter[Any], line: bytes) -> Any:
     return adapter.validate_json(json.dumps(_clean(found)), strict=True)
 
 
-def is_json(line: bytes) -> bool:
-    """Whether a line is JSON of any kind, within bounds or not."""
+def is_cut(line: bytes) -> bool:
+    """Whether a line is no JSON, as one that a kill cut short; one out of bounds is whole."""
     try:
         json.loads(line)
+    except (json.JSONDecodeError, UnicodeDecodeError):
+        return True
     except (ValueError, RecursionError):
         return False
-    return True
+    return False
 
 
 def problem_of(error: Any, where: str, is_not: str, hint: str) -> Problem:

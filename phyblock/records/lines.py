@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from phyblock.errors import InputError, Problem, StoreError
 from phyblock.records.belonging import Belonging
-from phyblock.records.decode import decode, is_json, problem_of
+from phyblock.records.decode import decode, is_cut, problem_of
 from phyblock.records.line import Line
 from phyblock.records.others import Prompt, Turn
 
@@ -51,12 +51,16 @@ class Lines(Generic[LineT]):
         self._belonging = belonging
 
     def __iter__(self) -> Iterator[tuple[str, LineT]]:
+        self.whole_bytes = 0
         try:
+            # A pipe without a writer would block.
+            if self.path.exists() and not self.path.is_file():
+                raise self.error(Problem(str(self.path), "is not a regular file"))
             with self.path.open("rb") as file:
                 for number, data in enumerate(self._raw(file), 1):
                     where = f"{self.path}:{number}"
                     self.lacks_newline = not data.endswith(b"\n")
-                    if self.lacks_newline and not is_json(data):
+                    if self.lacks_newline and len(data) <= _LONGEST_LINE_BYTES and is_cut(data):
                         self.is_cut = True
                         return
                     line = self._read(where, data)

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from phyblock.report.design import OVERALL
-from phyblock.report.load import Run, once_per_run
+from phyblock.report.load import Run, kept_per_run
 from phyblock.report.outcomes import WITHOUT_REPLY
 
 __all__ = ["METRICS", "cell_scores", "measured", "micro_averages", "with_levels"]
 
 METRICS = ("precision", "recall", "f1")
+_COLUMNS = (
+    *("track", "model", "scene", "seed", "outcome", "criterion", "matcher", "setting"),
+    *("tp", "fp", "fn"),
+)
+"""Those of scores that cells need."""
 
 
 def with_levels(frame: pd.DataFrame, run: Run) -> pd.DataFrame:
@@ -21,24 +27,56 @@ def with_levels(frame: pd.DataFrame, run: Run) -> pd.DataFrame:
 
     Adds the column `level`; levels that the suite does not run are left out.
     """
-    levels = run.records[["sample", "levels"]].explode("levels", ignore_index=True)
-    levels["level"] = levels.pop("levels").map(str)
-    levels = levels[levels["level"].isin(run.design.levels)]
-    return pd.concat(
-        [frame.merge(levels, on="sample"), frame.assign(level=OVERALL)], ignore_index=True
+    rows, levels = _rows_by_level(frame["sample"], run)
+    columns = {str(name): _taken(frame[name], rows) for name in frame}
+    return pd.DataFrame({**columns, "level": levels}, copy=False)
+
+
+def _rows_by_level(
+    samples: pd.Series[str], run: Run
+) -> tuple[np.ndarray[Any, np.dtype[np.intp]], pd.Series[str]]:
+    """Numbers of rows of these samples as `with_levels` repeats them, and the level of each."""
+    kinds: dict[tuple[int, ...], int] = {}
+    codes = np.array([kinds.setdefault(held, len(kinds)) for held in run.records["levels"]], int)
+    wanted = run.design.levels
+    named = [[str(level) for level in held if str(level) in wanted] for held in kinds]
+    n_named = np.array([len(levels) for levels in named], dtype=np.intp)
+    kind = (
+        codes[pd.Index(run.records["sample"]).get_indexer(samples)] if len(samples) else codes[:0]
     )
+    kind = kind.astype(np.intp)
+    lengths = n_named[kind]
+    first = (np.cumsum(n_named) - n_named)[kind] - (np.cumsum(lengths) - lengths)
+    labels = np.array([level for levels in named for level in levels], dtype=object)
+    everything = np.arange(len(samples))
+    repeated = labels[np.repeat(first, lengths) + np.arange(lengths.sum())]
+    levels = np.concatenate([repeated, np.full(len(samples), OVERALL, dtype=object)])
+    rows = np.concatenate([np.repeat(everything, lengths), everything])
+    return rows, pd.Series(levels, dtype="object", copy=False)
 
 
-@once_per_run
+def _taken(column: pd.Series[Any], rows: np.ndarray[Any, np.dtype[np.intp]]) -> pd.Series[Any]:
+    """Rows of a column, in a frame's order, of the same type."""
+    return pd.Series(column.array.take(rows), dtype=column.dtype, copy=False)
+
+
+@kept_per_run
 def cell_scores(run: Run) -> pd.DataFrame:
     """Scores by level, each level under its criterion alone, without those the run leaves out.
 
-    What is left out are missing replies and API errors where the suite says `missing: skip`.
+    What is left out are missing replies and API errors where the suite says `missing: skip`. The
+    frame is shared: do not change it.
     """
-    scores = run.scores[~run.scores["outcome"].isin(run.design.outcomes_left_out)]
-    scores = with_levels(scores, run)
+    scores = run.scores
+    rows, levels = _rows_by_level(scores["sample"], run)
     criteria = {level: run.design.criterion(level) for level in run.design.levels}
-    return scores[scores["criterion"] == scores["level"].map(criteria)]
+    left_out = scores["outcome"].isin(run.design.outcomes_left_out).to_numpy()
+    is_counted = scores["criterion"].to_numpy()[rows] == levels.map(criteria).to_numpy()
+    is_counted &= ~left_out[rows]
+    rows = rows[is_counted]
+    columns = {name: _taken(scores[name], rows) for name in _COLUMNS}
+    named = pd.Series(levels.to_numpy()[is_counted], dtype="object", copy=False)
+    return pd.DataFrame({**columns, "level": named}, copy=False)
 
 
 def measured(scores: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
@@ -46,8 +84,9 @@ def measured(scores: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
 
     Where empty plans count, such a group has counts, but nothing was measured.
     """
-    replied = scores.assign(replied=~scores["outcome"].isin(WITHOUT_REPLY))
-    return scores[replied.groupby(list(keys))["replied"].transform("any").astype(bool)]
+    replied = scores[list(keys)].assign(replied=~scores["outcome"].isin(WITHOUT_REPLY))
+    kept = replied.groupby(list(keys))["replied"].transform("any").astype(bool)
+    return scores if kept.all() else scores[kept]
 
 
 def micro_averages(scores: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:

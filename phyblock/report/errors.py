@@ -24,7 +24,7 @@ def errors_frame(run: Run) -> pd.DataFrame:
         & (run.scores["setting"] == design.setting)
         & (run.scores["matcher"] == design.matcher)
         & ~run.scores["outcome"].isin(design.outcomes_left_out)
-    ]
+    ][["sample", "model", *ERROR_TYPES]]
     groups = with_levels(scores, run).groupby(["model", "level"])
     counts = groups[list(ERROR_TYPES)].sum()
     counts.insert(0, "n", groups.size())

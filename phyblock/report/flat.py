@@ -116,17 +116,15 @@ class Flattened:
         """One row a sample, and one a score, by track, `place` of the model, scene and seed.
 
         Columns and types do not depend on the records. Columns of text stay Python objects, so
-        that long replies are never copied.
+        that long replies are never copied. What was read is used up: call it once.
         """
         order = self._order(place)
-        columns = {name: _objects(column) for name, column in self._records.items()}
-        records = pd.DataFrame(
-            {
-                name: pd.Series(columns[name][order].tolist(), dtype=kind)
-                for name, kind in _RECORD_TYPES.items()
-            }
-        )
-        return records, self._scores(columns, order)
+        columns = {}
+        for name, kind in _RECORD_TYPES.items():
+            column = self._records.pop(name)
+            columns[name] = pd.Series(_objects(column)[order], dtype=kind, copy=False)
+        records = pd.DataFrame(columns, copy=False)
+        return records, self._scores(records, order)
 
     def _order(self, place: Callable[[str], int]) -> np.ndarray[Any, np.dtype[np.intp]]:
         names = ("track", "model", "scene", "seed", "sample")
@@ -138,22 +136,23 @@ class Flattened:
         return np.array(rows, dtype=np.intp)
 
     def _scores(
-        self,
-        columns: dict[str, np.ndarray[Any, Any]],
-        order: np.ndarray[Any, np.dtype[np.intp]],
+        self, records: pd.DataFrame, order: np.ndarray[Any, np.dtype[np.intp]]
     ) -> pd.DataFrame:
         lengths = np.array(self._n_scores, dtype=np.intp)[order]
         ends = np.cumsum(lengths)
         shifts = np.array(self._first, dtype=np.intp)[order] - (ends - lengths)
         kept = np.repeat(shifts, lengths) + np.arange(lengths.sum())
-        owners = np.repeat(order, lengths)
-        made = {name: columns[name][owners] for name in _OF_SAMPLE}
-        made |= {name: _objects(column)[kept] for name, column in self._labels.items()}
-        numbers = {name: np.array(column, dtype=np.int64) for name, column in self._counts.items()}
-        made |= {name: column[kept] for name, column in numbers.items()}
-        return pd.DataFrame(
-            {name: _series(made[name], kind) for name, kind in _SCORE_TYPES.items()}
-        )
+        owners = np.repeat(np.arange(len(order)), lengths)
+        columns = {}
+        for name, kind in _SCORE_TYPES.items():
+            if name in _OF_SAMPLE:
+                values = records[name].to_numpy()[owners]
+            elif name in _LABELS:
+                values = _objects(self._labels.pop(name))[kept]
+            else:
+                values = _counts(self._counts.pop(name), kept, kind)
+            columns[name] = pd.Series(values, dtype=kind, copy=False)
+        return pd.DataFrame(columns, copy=False)
 
     def _add_score(self, score: Score) -> None:
         for name, label in zip(
@@ -231,7 +230,6 @@ def _objects(values: Iterable[Any]) -> np.ndarray[Any, Any]:
     return made
 
 
-def _series(values: np.ndarray[Any, Any], kind: str) -> pd.Series[Any]:
-    if kind != "Int64":
-        return pd.Series(values, dtype=kind)
-    return pd.Series(pd.array(values, dtype="Int64")).mask(values == _UNKNOWN)
+def _counts(column: array[int], rows: np.ndarray[Any, np.dtype[np.intp]], kind: str) -> Any:
+    values = np.frombuffer(column, dtype=np.int64)[rows] if column else np.zeros(0, np.int64)
+    return pd.arrays.IntegerArray(values, values == _UNKNOWN) if kind == "Int64" else values

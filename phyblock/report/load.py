@@ -15,7 +15,7 @@ from phyblock.report.design import Design, read_design
 from phyblock.report.flat import Flattened
 from phyblock.run.reading import run_records
 
-__all__ = ["Frames", "Run", "frames_of", "load_run", "once_per_run"]
+__all__ = ["Frames", "Run", "frames_of", "kept_per_run", "load_run", "once_per_run"]
 
 
 class Frames(NamedTuple):
@@ -45,15 +45,26 @@ class Run:
     _made: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False, init=False)
 
 
-def once_per_run(make: Callable[[Run], pd.DataFrame]) -> Callable[[Run], pd.DataFrame]:
-    """A function of a run that works once and returns copies of its frame after that."""
+def kept_per_run(make: Callable[[Run], pd.DataFrame]) -> Callable[[Run], pd.DataFrame]:
+    """A function of a run that works once; all its callers share the frame."""
 
     @functools.wraps(make)
     def made(run: Run) -> pd.DataFrame:
         name = f"{make.__module__}.{make.__qualname__}"
         if name not in run._made:
             run._made[name] = make(run)
-        return run._made[name].copy()
+        return run._made[name]
+
+    return made
+
+
+def once_per_run(make: Callable[[Run], pd.DataFrame]) -> Callable[[Run], pd.DataFrame]:
+    """A function of a run that works once and returns copies of its frame."""
+    kept = kept_per_run(make)
+
+    @functools.wraps(make)
+    def made(run: Run) -> pd.DataFrame:
+        return kept(run).copy()
 
     return made
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -14,7 +16,7 @@ from hypothesis import strategies as st
 from phyblock.errors import StoreError
 from phyblock.models import Reply, Usage
 from phyblock.models.stored import reply_of, stored
-from phyblock.records import StoredReply
+from phyblock.records import StoredReply, lines
 from phyblock.report import load_run
 from phyblock.run.reading import any_records, newest_starts
 from phyblock.tasks.record_types import RECORD_ADAPTER
@@ -25,11 +27,11 @@ numbers = st.none() | st.integers(-(10**40), 10**40)
 amounts = st.none() | st.floats()
 
 
-def folder_with(path: Path, *lines: bytes) -> Path:
+def folder_with(path: Path, *held: bytes) -> Path:
     """A run folder with these lines, of a run that they belong to."""
     suite = manifest(models=["random"], seeds=[0])
     (path / "run.yaml").write_text(yaml.safe_dump(suite), encoding="utf-8")
-    (path / "records.jsonl").write_bytes(b"".join(line + b"\n" for line in lines))
+    (path / "records.jsonl").write_bytes(b"".join(line + b"\n" for line in held))
     return path
 
 
@@ -85,6 +87,33 @@ def test_any_bytes_are_read_or_refused(
     json.dumps([record.fields() for record in found], ensure_ascii=False).encode()
 
 
+@pytest.mark.parametrize("name", ["deep", "many-digits", "word", "nan"])
+def test_only_what_a_kill_cut_short_is_passed_over(tmp_path: Path, name: str) -> None:
+    folder = folder_with(tmp_path, lines_before()[0])
+    with (folder / "records.jsonl").open("ab") as file:
+        file.write(DAMAGED[name][0])
+    with pytest.raises(StoreError, match=r"records\.jsonl:2"):
+        list(any_records(folder))
+
+
+def test_a_line_without_end_is_refused_and_not_taken_for_a_cut_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lines, "_LONGEST_LINE_BYTES", 3000)
+    folder = folder_with(tmp_path, lines_before()[0], b'"' + b"x" * 5000, lines_before()[0])
+    found = any_records(folder)
+    with pytest.raises(StoreError, match=r"records\.jsonl:2: is not a record: longer than"):
+        list(found)
+    assert not found.is_cut
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir])
+def test_what_is_no_file_is_refused(tmp_path: Path, make: Callable[[Path], None]) -> None:
+    make(tmp_path / "records.jsonl")
+    with pytest.raises(StoreError, match="is not a regular file"):
+        list(any_records(tmp_path))
+
+
 def test_text_that_no_output_could_hold_is_read_without_it(tmp_path: Path) -> None:
     line = with_value("reply.text", "half \ud83d of one")
     run = load_run(folder_with(tmp_path, line))
@@ -98,10 +127,12 @@ def test_lines_that_end_as_on_other_systems_are_read(tmp_path: Path) -> None:
 
 def test_a_sample_is_taken_from_its_last_line(tmp_path: Path) -> None:
     first, last = lines_before()[0], with_value("reply.text", "later")
-    lines = any_records(folder_with(tmp_path, first, last))
-    starts = newest_starts(lines)
+    records = any_records(folder_with(tmp_path, first, last))
+    starts = newest_starts(records)
     assert list(starts.values()) == [len(first) + 1]
-    assert [record.reply.text for record in lines.at(starts.values()) if record.reply] == ["later"]
+    assert [record.reply.text for record in records.at(starts.values()) if record.reply] == [
+        "later"
+    ]
 
 
 @given(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
@@ -37,6 +38,7 @@ __all__ = ["REPORT_FILE", "page_files", "write_report"]
 REPORT_FILE = "report.html"
 _FOLDER = "report"
 _PICTURES = "pictures"
+_CHUNK_BYTES = 2**20
 _FIGURES = {
     "f1-levels": "F1 by level",
     "f1-radar": "F1 by level, as in the paper",
@@ -95,8 +97,9 @@ def _build(run: Run, sources: Sources) -> str:
     """A name for what the page shows: the same run, written again, has the same files."""
     digest = hashlib.sha256(f"{version('phyblock')} {sources.lacking}".encode())
     for name in (MANIFEST, RECORDS, PROMPTS):
-        file = run.path / name
-        digest.update(file.read_bytes() if file.exists() else b"")
+        with contextlib.suppress(FileNotFoundError), (run.path / name).open("rb") as file:
+            while chunk := file.read(_CHUNK_BYTES):
+                digest.update(chunk)
     return digest.hexdigest()[:12]
 
 
