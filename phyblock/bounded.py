@@ -11,16 +11,25 @@ import math
 import os
 import stat
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
-__all__ = ["LARGEST_FILE_BYTES", "load_json", "read_bytes", "read_text"]
+__all__ = [
+    "LARGEST_FILE_BYTES",
+    "LONGEST_INTEGER",
+    "RepeatedFieldError",
+    "load_json",
+    "read_bytes",
+    "read_text",
+]
 
 LARGEST_FILE_BYTES = 64 * 1024 * 1024
 """Default limit of a file that is read whole [bytes]."""
 
 _DEEPEST = 64
-_LONGEST_INTEGER = 300
+LONGEST_INTEGER = 300
 """Digits of an integer; what is longer fits no float, and int() takes quadratic time on it."""
+_LONGEST_SHOWN_INTEGER = 4300
+"""Digits that Python turns into an integer and back."""
 
 
 def read_bytes(path: Path, most_bytes: int = LARGEST_FILE_BYTES) -> bytes:
@@ -52,15 +61,32 @@ def read_text(path: Path, most_bytes: int = LARGEST_FILE_BYTES) -> str:
         raise ValueError(f"is not UTF-8: {error.reason} at byte {error.start}") from None
 
 
-def load_json(data: bytes | str, *, deepest: int = _DEEPEST) -> object:
+class RepeatedFieldError(ValueError):
+    """A JSON object holds a field twice; `field` names it."""
+
+    def __init__(self, field: str) -> None:
+        self.field = field
+        super().__init__(f"holds the field {field[:80]!r} twice in one object")
+
+
+def load_json(
+    data: bytes | str, *, deepest: int = _DEEPEST, finite: bool = True, unique: bool = False
+) -> Any:
     """Decode JSON whose nesting, integers and floats are bounded.
 
     Raises ValueError (a JSONDecodeError for broken syntax) for NaN, Infinity, a float outside the
-    range of doubles, an integer of more than 300 digits, or nesting below `deepest`.
+    range of doubles, an integer of more than 300 digits, or nesting below `deepest`. With
+    `finite=False` numbers outside that range pass, up to 4,300 digits, for a reader that says which
+    field they stand in. With `unique` a field that stands twice in one object is refused too
+    (RepeatedFieldError).
     """
     try:
         found = json.loads(
-            data, parse_int=_integer, parse_float=_float, parse_constant=_no_constant
+            data,
+            parse_int=_integer if finite else _any_integer,
+            parse_float=_float if finite else None,
+            parse_constant=_no_constant if finite else None,
+            object_pairs_hook=_unique if unique else None,
         )
     except RecursionError:
         raise ValueError(f"is nested more than {deepest} levels deep") from None
@@ -83,10 +109,23 @@ def _check_depth(found: object, deepest: int) -> None:
     raise ValueError(f"is nested more than {deepest} levels deep")
 
 
-def _integer(digits: str) -> int:
-    if len(digits) > _LONGEST_INTEGER:
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for field, value in pairs:
+        if field in found:
+            raise RepeatedFieldError(field)
+        found[field] = value
+    return found
+
+
+def _integer(digits: str, longest: int = LONGEST_INTEGER) -> int:
+    if len(digits) > longest:
         raise ValueError(f"holds a number of {len(digits):,} digits")
     return int(digits)
+
+
+def _any_integer(digits: str) -> int:
+    return _integer(digits, _LONGEST_SHOWN_INTEGER)
 
 
 def _float(digits: str) -> float:

@@ -18,6 +18,7 @@ PhyblockError
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -37,7 +38,11 @@ __all__ = [
     "StoreError",
     "UnavailableError",
     "UnreachableError",
+    "said",
 ]
+
+_LONGEST_PART = 2000
+"""Characters of a problem's part that are shown; what is longer holds garbage."""
 
 
 @dataclass(frozen=True)
@@ -56,13 +61,35 @@ class Problem:
     hint: str = ""
 
     def __str__(self) -> str:
-        head = f"{self.where}: {self.field}: " if self.field else f"{self.where}: "
-        lines = [head + self.message]
-        lines += [f"    {name}: {text}" for name, text in self._details() if text]
+        where, field = _plain(self.where), _plain(self.field)
+        head = f"{where}: {field}: " if field else f"{where}: "
+        lines = [head + _plain(self.message)]
+        lines += [f"    {name}: {_plain(text)}" for name, text in self._details() if text]
         return "\n".join(lines)
 
     def _details(self) -> tuple[tuple[str, str], ...]:
         return (("found", self.found), ("allowed", self.allowed), ("hint", self.hint))
+
+
+def said(error: BaseException) -> str:
+    """What an exception says, or its class in plain words where it says nothing."""
+    text = (error.strerror if isinstance(error, OSError) else None) or str(error).strip()
+    if isinstance(error, RecursionError):
+        return "nested too deeply"
+    if isinstance(error, MemoryError):
+        return "out of memory"
+    return text or re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(error).__name__).lower()
+
+
+def _plain(text: str) -> str:
+    """A text for a terminal: no escape codes, no halves of characters, no end of garbage."""
+    if len(text) > _LONGEST_PART:
+        text = f"{text[:_LONGEST_PART]}... ({len(text):,} characters)"
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
+    )
 
 
 class PhyblockError(Exception):

@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.files import atomic_write
+from phyblock.errors import StoreError
+from phyblock.files import atomic_write, write_named, writing
 
 
 @given(st.binary() | st.text())
@@ -61,3 +62,34 @@ def test_a_full_disk_leaves_the_file_of_before(tmp_path: Path) -> None:
     assert done.returncode == 7
     assert path.read_text() == "before"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_the_disk_refuses_is_one_of_our_errors(tmp_path: Path) -> None:
+    long = tmp_path / ("x" * 300)
+    for path, said in ((long, "File name too long"), (tmp_path / "\ud800", "surrogates")):
+        with pytest.raises(StoreError, match=f"cannot be written: .*{said}"), writing(path):
+            path.write_text("text")
+    with pytest.raises(StoreError, match="no words"), writing(tmp_path):
+        raise OSError("no words")
+
+
+def test_halves_of_characters_are_no_failure(tmp_path: Path) -> None:
+    atomic_write(tmp_path / "file", "a\ud83db")
+    assert (tmp_path / "file").read_text() == "a?b"
+
+
+def test_a_named_file_is_written_through_the_link_that_a_person_made(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(tmp_path / "target")
+    write_named(tmp_path / "link", "text")
+    write_named(tmp_path / "deep" / "file", "text")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "target").read_text() == (tmp_path / "deep" / "file").read_text() == "text"
+
+
+def test_a_device_is_never_replaced(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for path, said in ((tmp_path / "pipe", "no regular file"), (tmp_path, "a folder")):
+        with pytest.raises(StoreError, match=said):
+            write_named(path, "text")
+    assert list(tmp_path.iterdir()) == [tmp_path / "pipe"]
+    assert (tmp_path / "pipe").is_fifo()

@@ -8,6 +8,7 @@ import click
 
 from phyblock.cli.console import make_console, print_view, shown_path
 from phyblock.cli.names import split_names
+from phyblock.cli.paths import UserPath
 from phyblock.report.compare import compare_models, compare_runs
 from phyblock.report.compare_view import compare_view, flipped_lines, write_comparison
 from phyblock.report.load import load_run
@@ -17,11 +18,11 @@ __all__ = ["command"]
 
 
 @click.command("compare")
-@click.argument("run", type=click.Path(path_type=Path))
-@click.argument("other", type=click.Path(path_type=Path), required=False)
+@click.argument("run", type=UserPath())
+@click.argument("other", type=UserPath(), required=False)
 @click.option("--models", metavar="A,B", help="Only these models; of two runs, A of the first.")
 @click.option("--track", type=click.Choice(list(MEASURES)), help="[default: the first they have]")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for CSV, Markdown and LaTeX.")
+@click.option("--out", type=UserPath(), help="Folder for CSV, Markdown and LaTeX.")
 def command(
     run: Path, other: Path | None, models: str | None, track: str | None, out: Path | None
 ) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich import box
 from rich.console import Console
@@ -12,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from phyblock.cli.layout import lay_out
+from phyblock.plain_text import one_line, plain_lines
 from phyblock.report import TextTable
 
 __all__ = ["counted", "make_console", "plain_table", "print_view", "shown_path"]
@@ -19,10 +21,18 @@ __all__ = ["counted", "make_console", "plain_table", "print_view", "shown_path"]
 _PLAIN_WIDTH = 160
 
 
+class _PlainConsole(Console):
+    """Shows strings as they are: no markup, no emoji codes, nothing that steers a terminal."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """The text, its control characters as spaces."""
+        return super().render_str(plain_lines(text), **options)
+
+
 def make_console(*, stderr: bool = False) -> Console:
     """The console; wide enough for whole tables when the output is no terminal."""
-    # Without markup: paths, names and what servers say may hold brackets.
-    console = Console(stderr=stderr, highlight=False, markup=False)
+    # Paths, names and what servers say may hold brackets and colons.
+    console = _PlainConsole(stderr=stderr, highlight=False, markup=False, emoji=False)
     if not console.is_terminal and "COLUMNS" not in os.environ:
         console.width = _PLAIN_WIDTH
     return console
@@ -49,6 +59,7 @@ def plain_table(
 
     With `tight` one space stands between columns, not three, and words are never broken.
     """
+    rows = [[one_line(cell) for cell in row] for row in rows]
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=0 if tight else (0, 1))
     for position, heading in enumerate(headings):
         right = position >= len(headings) - numbers
@@ -63,7 +74,7 @@ def plain_table(
             overflow="fold",
         )
     for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
+        table.add_row(*map(Text, row))
     return table
 
 
@@ -73,8 +84,8 @@ def counted(number: int, noun: str) -> str:
 
 
 def shown_path(path: Path) -> str:
-    """A path as a person would type it from here."""
+    """A path as a person would type it from here, on one line."""
     try:
-        return str(path.resolve().relative_to(Path.cwd()))
-    except ValueError:
-        return str(path)
+        return one_line(str(path.resolve().relative_to(Path.cwd())))
+    except (ValueError, OSError):
+        return one_line(str(path))

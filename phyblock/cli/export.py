@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import make_console, shown_path
+from phyblock.cli.paths import UserPath
 from phyblock.report.export.write import FORMATS, export_run
 from phyblock.report.load import load_run
 
@@ -14,9 +15,9 @@ __all__ = ["command"]
 
 
 @click.command("export")
-@click.argument("run", type=click.Path(path_type=Path))
+@click.argument("run", type=UserPath())
 @click.option("--to", "form", required=True, type=click.Choice(FORMATS), help="The format.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder. [default: RUN/export/FORMAT]")
+@click.option("--out", type=UserPath(), help="Folder. [default: RUN/export/FORMAT]")
 def command(run: Path, form: str, out: Path | None) -> None:
     """Write the records of the folder RUN for another tool.
 

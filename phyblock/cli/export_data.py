@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import make_console, shown_path
+from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.datasets import SCENES_FILE
 from phyblock.domain import SUBTASKS
 from phyblock.report.export.questions import QUESTION_FORMATS, export_questions
@@ -26,12 +27,20 @@ _LEVELS = (1, 2, 3, 4)
 @click.option(
     "--to", "form", required=True, type=click.Choice(list(QUESTION_FORMATS)), help="The format."
 )
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
+@click.option("--out", required=True, type=UserPath(), help="Folder to write.")
 @click.option(
-    "--questions", default="phyblock-vqa", show_default=True, help="A set of questions, or folder."
+    "--questions",
+    type=NAME_OR_PATH,
+    default="phyblock-vqa",
+    show_default=True,
+    help="A set of questions, or folder.",
 )
 @click.option(
-    "--data", default="phyblock-400", show_default=True, help="Scenes they are about, or folder."
+    "--data",
+    type=NAME_OR_PATH,
+    default="phyblock-400",
+    show_default=True,
+    help="Scenes they are about, or folder.",
 )
 @click.option("--limit", type=click.IntRange(min=1), help="N questions, spread over subtasks.")
 @click.option(

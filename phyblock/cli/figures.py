@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import make_console, shown_path
+from phyblock.cli.paths import UserPath
 from phyblock.report.figures import FIGURES, write_figures
 from phyblock.report.load import load_run
 
@@ -14,7 +15,7 @@ __all__ = ["command"]
 
 
 @click.command("figures")
-@click.argument("run", type=click.Path(path_type=Path))
+@click.argument("run", type=UserPath())
 @click.option(
     "--only", "names", multiple=True, type=click.Choice(FIGURES), help="Only this figure; repeat."
 )

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from phyblock.errors import Problem, SpecError
 from phyblock.resources import bundled
 from phyblock.specs import did_you_mean
 
-__all__ = ["find_models_file", "find_suite"]
+__all__ = ["find_models_file", "find_suite", "what_it_is"]
 
 
 def find_suite(name: str) -> Path:
@@ -17,17 +18,24 @@ def find_suite(name: str) -> Path:
     Raises SpecError that lists the bundled suites when there is no such file.
     """
     path = Path(name)
-    if path.is_file():
+    if os.path.isfile(path):
         return path
     if path.suffix in ("", ".yaml") and path.parent == Path():
         inside = bundled("benchmarks", f"{path.stem}.yaml")
-        if inside.is_file():
+        if os.path.isfile(inside):
             return inside
     names = sorted(p.stem for p in bundled("benchmarks").glob("*.yaml"))
     hint = did_you_mean(path.stem, names)
     allowed = "a suite file, or a bundled suite: " + ", ".join(names)
-    message = "is a folder" if path.is_dir() else "there is no such suite"
+    message = what_it_is(path) or "there is no such suite"
     raise SpecError(Problem(name, message, allowed=allowed, hint=hint))
+
+
+def what_it_is(path: Path) -> str:
+    """Why something that is no file cannot be read; "" where there is nothing at all."""
+    if os.path.isdir(path):
+        return "is a folder"
+    return "is not a regular file" if os.path.exists(path) else ""
 
 
 def find_models_file(named: str | None, suite: Path | None) -> Path:
@@ -36,11 +44,12 @@ def find_models_file(named: str | None, suite: Path | None) -> Path:
     Raises SpecError when the one named is not there.
     """
     if named is not None:
-        if Path(named).is_file():
+        if os.path.isfile(named):
             return Path(named)
-        raise SpecError(Problem(named, "there is no such models file"))
+        message = what_it_is(Path(named)) or "there is no such models file"
+        raise SpecError(Problem(named, message))
     near = [] if suite is None else [suite.parent, suite.parent.parent]
     for folder in (Path(), *near):
-        if (folder / "models.yaml").is_file():
+        if os.path.isfile(folder / "models.yaml"):
             return folder / "models.yaml"
     return bundled("models.yaml")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import shlex
-import shutil
 from pathlib import Path
 
 import click
 
 from phyblock.cli.console import make_console, shown_path
-from phyblock.errors import Problem, StoreError
+from phyblock.cli.paths import UserPath
+from phyblock.files import check_free, writing
 from phyblock.resources import bundled
 
 __all__ = ["command"]
@@ -26,29 +26,22 @@ _FILES = (
 
 
 @click.command("init")
-@click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("folder", type=UserPath())
 def command(folder: Path) -> None:
     """Lay out FOLDER with a suite, a models file and a prompt to change.
 
     Files that are already there are never written over.
     """
-    taken = [folder.joinpath(*parts) for parts in _FILES if folder.joinpath(*parts).exists()]
-    if taken:
-        hint = "choose another folder"
-        raise StoreError([Problem(str(path), "is already there", hint=hint) for path in taken])
+    files = [folder.joinpath(*parts) for parts in _FILES]
+    check_free(files, "choose another folder")
     console = make_console()
-    try:
-        for parts in _FILES:
-            target = folder.joinpath(*parts)
+    with writing(folder):
+        for target, parts in zip(files, _FILES, strict=True):
             target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(bundled(*parts), target)
-            if target.name == _SUITE:
-                with target.open("a", encoding="utf-8") as suite:
-                    suite.write(_OWN_PROMPT)
+            more = _OWN_PROMPT if target.name == _SUITE else ""
+            with target.open("xb") as file:
+                file.write(bundled(*parts).read_bytes() + more.encode())
             console.print(f"  {shown_path(target)}")
-    except OSError as error:
-        problem = Problem(str(folder), f"cannot be written: {error.strerror}")
-        raise StoreError(problem) from error
     console.print(
         f"\nNext: cd {shlex.quote(shown_path(folder))} && phyblock run benchmarks/quick.yaml\n"
         "Add a model with one line in models.yaml, then name it under models in the suite.",

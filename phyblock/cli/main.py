@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 import click
 
 from phyblock.cli.verbs import Verbs
-from phyblock.errors import InputError, PhyblockError
+from phyblock.errors import InputError, PhyblockError, Problem, StoreError, said
+from phyblock.plain_text import plain_lines
 
 __all__ = ["main"]
 
@@ -49,6 +51,7 @@ def main() -> None:
         stream.reconfigure(errors="replace")  # type: ignore[union-attr]
     try:
         code = phyblock.main(prog_name="phyblock", standalone_mode=False)
+        sys.stdout.flush()
     except click.ClickException as error:
         error.show()
         sys.exit(2)
@@ -58,15 +61,33 @@ def main() -> None:
         _complain(error)
         sys.exit(2)
     except PhyblockError as error:
-        click.echo(f"error: {error}", err=True)
+        click.echo(plain_lines(f"error: {error}"), err=True)
         sys.exit(1)
+    except BrokenPipeError:
+        # Who read the output has seen enough: `| head`.
+        _drop_output()
+        sys.exit(1)
+    except OSError as error:
+        _drop_output()
+        where = "output" if error.filename is None else os.fsdecode(error.filename)
+        _complain(StoreError(Problem(where, f"cannot be used: {said(error)}")))
+        sys.exit(2)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _drop_output() -> None:
+    """Give up what standard output refuses to take, or the interpreter would try again."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
 
 
 def _complain(error: InputError) -> None:
     shown = error.problems[:_SHOWN]
     for problem in shown:
-        click.echo(click.style("error: ", fg="red", bold=True) + str(problem), err=True)
+        click.echo(
+            click.style("error: ", fg="red", bold=True) + plain_lines(str(problem)), err=True
+        )
     if len(error.problems) > len(shown):
         click.echo(f"... and {len(error.problems) - len(shown)} more problems", err=True)
 

@@ -8,6 +8,7 @@ import click
 
 from phyblock.cli.console import counted, make_console, plain_table, shown_path
 from phyblock.cli.files import find_models_file
+from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.errors import ModelError, Problem, SpecError
 from phyblock.models import ModelConfig, api_key_status, price_of
 from phyblock.report import NO_VALUE
@@ -22,7 +23,12 @@ _WIDE = 130
 
 
 @click.group("models", invoke_without_command=True)
-@click.option("--models-file", metavar="FILE", help="Models file instead of models.yaml.")
+@click.option(
+    "--models-file",
+    type=NAME_OR_PATH,
+    metavar="FILE",
+    help="Models file instead of models.yaml.",
+)
 @click.pass_context
 def command(ctx: click.Context, models_file: str | None) -> None:
     """List the models that suites may name; `check NAME` makes one tiny call."""
@@ -84,7 +90,9 @@ def _row(name: str, config: ModelConfig) -> tuple[str, ...]:
     if config.kind != "litellm":
         return (name, config.kind, str(config.recording or "built in"), NO_VALUE, "0", "0")
     status = api_key_status(config)
-    if status.is_set:
+    if status.fault:
+        key = "cannot be sent"
+    elif status.is_set:
         key = "set"
     else:
         key = f"needs {status.variables[0]}" if status.is_needed else "not needed"

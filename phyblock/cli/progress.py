@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 import time
+from collections import Counter
+from collections.abc import Callable
 from types import TracebackType
 
 from rich.console import Console, Group, RenderableType
@@ -13,15 +17,19 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from phyblock.cli.tally import Tally
+from phyblock.cli.remarks import Remarks
+from phyblock.cli.tally import Tally, failure_text
+from phyblock.plain_text import one_line
 from phyblock.run.events import (
     ModelNotice,
     ModelStopped,
     RunEvent,
+    RunNotice,
     RunStarted,
     SampleDone,
     Stopping,
 )
+from phyblock.run.standing import Summary
 
 __all__ = ["ProgressView"]
 
@@ -32,13 +40,17 @@ _REMARKS = 6
 class ProgressView:
     """Watches a run; use as a context manager and pass it as the run's watcher."""
 
-    def __init__(self, console: Console, title: str) -> None:
+    def __init__(
+        self, console: Console, title: str, now: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._now = now
         self._console = console
-        self._title = title
+        self._title = one_line(title)
         self._tallies: dict[str, Tally] = {}
-        self._started = time.monotonic()
+        self._started = now()
         self._last_line = self._started
         self._status = ""
+        self._remarked = Remarks(_LINE_EVERY_S)
         self._live = (
             Live(console=console, refresh_per_second=4, get_renderable=self._panel, transient=True)
             if console.is_terminal
@@ -58,29 +70,45 @@ class ProgressView:
     ) -> None:
         if self._live is not None:
             self._live.stop()
+        for line in self._remarked.due(math.inf):
+            self._say(line)
 
     def __call__(self, event: RunEvent) -> None:
         """Take note of an event."""
         if isinstance(event, SampleDone):
-            self._tallies[event.record["model"]].add(event.record, fresh=True)
+            self._tallies[event.record.model].add(Summary.of(event.record), fresh=True)
             self._plain_line()
         elif isinstance(event, RunStarted):
             self._tallies = {name: Tally(n) for name, n in event.expected.items()}
-            for name, records in event.earlier.items():
-                for record in records:
-                    self._tallies[name].add(record, fresh=False)
+            for name, samples in event.earlier.items():
+                for sample in samples:
+                    self._tallies[name].add(sample, fresh=False)
         elif isinstance(event, ModelNotice):
-            tally = self._tallies[event.model]
-            tally.retries += event.kind == "retry"
-            tally.notice = event.text
+            self._take_note(event)
+        elif isinstance(event, RunNotice):
+            self._say(event.text)
         elif isinstance(event, ModelStopped):
             self._tallies[event.model].notice = f"stopped: {event.reason}"
-            self._console.print(f"{event.model} stopped:", style="red", end=" ")
-            self._console.print(event.reason)
+            self._say(f"{one_line(event.model)} stopped: {event.reason}", style="red")
         elif isinstance(event, Stopping):
             self._status = self._stopping_text(event)
             if self._live is None:
-                self._console.print(self._status, markup=False)
+                self._say(self._status)
+
+    def _take_note(self, event: ModelNotice) -> None:
+        tally = self._tallies[event.model]
+        tally.retries += event.kind == "retry"
+        tally.notice = event.text
+        # Where it ends for a model, another event says so.
+        if self._live is None and event.kind != "unavailable":
+            for line in self._remarked.add(event, self._now()):
+                self._say(line)
+            self._plain_line()
+
+    def _say(self, line: str, style: str = "") -> None:
+        """Print a line; one that nobody can read any more must not end calls that cost money."""
+        with contextlib.suppress(OSError):
+            self._console.print(Text(line, style=style), soft_wrap=True)
 
     @property
     def cost_text(self) -> str:
@@ -96,16 +124,25 @@ class ProgressView:
         return f"Stopping: {event.reason}; waiting for {calls} (Ctrl-C again to give them up)."
 
     def _plain_line(self) -> None:
-        now = time.monotonic()
+        now = self._now()
         if self._live is None and now - self._last_line >= _LINE_EVERY_S:
             self._last_line = now
-            self._console.print(self._summary(), markup=False, highlight=False)
+            for line in self._remarked.due(now):
+                self._say(line)
+            self._say(f"{self._summary()}{self._failures()}")
+
+    def _failures(self) -> str:
+        """Failures of all models, for a line of the log."""
+        counts: Counter[str] = Counter()
+        for tally in self._tallies.values():
+            counts.update(tally.failures)
+        return f" · {failure_text(counts)}" if counts else ""
 
     def _summary(self) -> str:
         done = sum(tally.done for tally in self._tallies.values())
         total = sum(tally.expected for tally in self._tallies.values())
         fresh = sum(tally.fresh for tally in self._tallies.values())
-        elapsed = time.monotonic() - self._started
+        elapsed = self._now() - self._started
         text = f"{done:,} of {total:,} samples"
         if fresh and elapsed > 0:
             rate = fresh / elapsed
@@ -128,7 +165,7 @@ class ProgressView:
         parts += [self._table(), *self._remarks()]
         return Panel(
             Group(*parts),
-            title=self._title,
+            title=Text(self._title),
             title_align="left",
             border_style="dim",
             # The terminal writes ^C behind the last column and would wrap a full line.
@@ -142,7 +179,7 @@ class ProgressView:
             said = [tally.failure_text] if tally.failures else []
             said += [tally.notice] if tally.notice and tally.done < tally.expected else []
             if said:
-                text = f"{name}: {'; '.join(said)}"
+                text = one_line(f"{name}: {'; '.join(said)}")
                 lines.append(Text(text, style="yellow", no_wrap=True, overflow="ellipsis"))
         return lines[:_REMARKS]
 
@@ -153,7 +190,7 @@ class ProgressView:
             table.add_column(name, justify="right", no_wrap=True)
         for name, tally in self._tallies.items():
             table.add_row(
-                name,
+                one_line(name),
                 f"{tally.done:,}/{tally.expected:,}",
                 tally.f1_text,
                 f"{tally.tokens:,}",

@@ -9,14 +9,15 @@ from rich.console import Console
 
 from phyblock import report
 from phyblock.cli.console import make_console, shown_path
+from phyblock.cli.paths import UserPath
 from phyblock.cli.summary import print_summary
 
 __all__ = ["command", "show_page", "show_tables"]
 
 
 @click.command("report")
-@click.argument("run", type=click.Path(path_type=Path))
-@click.option("--data", type=click.Path(path_type=Path), help="The data set, where it has moved.")
+@click.argument("run", type=UserPath())
+@click.option("--data", type=UserPath(), help="The data set, where it has moved.")
 def command(run: Path, data: Path | None) -> None:
     """Write tables and report.html of the folder RUN again, and print the tables.
 

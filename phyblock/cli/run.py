@@ -16,14 +16,18 @@ from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.estimate_view import show_estimate
 from phyblock.cli.files import find_models_file, find_suite
 from phyblock.cli.names import split_names
+from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.cli.progress import ProgressView
 from phyblock.cli.report import show_page
 from phyblock.cli.summary import print_summary
+from phyblock.plain_text import one_line
 from phyblock.resources import bundled
 from phyblock.run.estimate import Estimate, estimate
 from phyblock.run.execute import Executor, RunResult
+from phyblock.run.folder import run_folder
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.session import Session, check_ready
+from phyblock.run.store import holds_run
 from phyblock.specs import load_models, load_suite
 
 __all__ = ["command"]
@@ -32,7 +36,7 @@ _INTERRUPTED = 130
 
 
 @click.command("run")
-@click.argument("suite")
+@click.argument("suite", type=NAME_OR_PATH)
 @click.option(
     "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Override a value of the suite."
 )
@@ -46,10 +50,15 @@ _INTERRUPTED = 130
 )
 @click.option(
     "--out",
-    type=click.Path(path_type=Path),
+    type=UserPath(),
     help="Folder of the run. [default: results/SUITE-DIGEST]",
 )
-@click.option("--models-file", metavar="FILE", help="Models file instead of models.yaml.")
+@click.option(
+    "--models-file",
+    type=NAME_OR_PATH,
+    metavar="FILE",
+    help="Models file instead of models.yaml.",
+)
 @click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
 @click.option("--dry-run", is_flag=True, help="Print calls, tokens and dollars; call nothing.")
 @click.option("--retry-failed", is_flag=True, help="Ask again where a request was rejected.")
@@ -80,6 +89,8 @@ def command(
     known = load_models(find_models_file(models_file, path))
     plan = make_plan(loaded, known, only=split_names(models), limit=limit)
     folder = out or Path("results") / plan.folder_name
+    if holds_run(folder, plan.manifest):
+        run_folder(folder).check(() if dry_run else report.files_of(page=not no_report))
     if dry_run:
         show_estimate(console, plan, estimate(plan, folder, use_cache=not no_cache))
         return 0
@@ -136,7 +147,7 @@ def _may_cost(row: Estimate) -> bool:
 def _conclude(console: Console, folder: Path, result: RunResult, cost: str) -> int:
     where = shown_path(folder)
     for name, reason in result.stopped.items():
-        console.print(f"{name} was stopped:", style="red", end=" ")
+        console.print(f"{one_line(name)} was stopped:", style="red", end=" ")
         console.print(reason, soft_wrap=True)
     done = (
         f"All {result.samples:,}"

@@ -9,10 +9,12 @@ import click
 
 from phyblock.cli.audit_view import print_audit, print_changes, worst_scenes
 from phyblock.cli.console import make_console, shown_path
+from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.cli.scenes_data import find_data_set
-from phyblock.cli.scenes_work import jobs_option, make_folder, tracked, write_file
+from phyblock.cli.scenes_work import jobs_option, tracked
 from phyblock.datasets import Fault, Salvage, salvage
-from phyblock.errors import Problem, StoreError
+from phyblock.files import check_free, make_folder, write_named
+from phyblock.folders import OutFolder
 from phyblock.generate.audit import AuditSettings, Finding, SceneAudit
 from phyblock.generate.audit_set import (
     Audit,
@@ -28,16 +30,10 @@ __all__ = ["command"]
 
 
 @click.command("audit")
-@click.argument("data", metavar="PATH")
-@click.option(
-    "--csv", "table", type=click.Path(path_type=Path), metavar="FILE", help="All findings as CSV."
-)
-@click.option(
-    "--fix", type=click.Path(path_type=Path), metavar="OUT", help="Write a corrected copy here."
-)
-@click.option(
-    "--pictures", type=click.Path(path_type=Path), metavar="DIR", help="Draw the worst scenes here."
-)
+@click.argument("data", metavar="PATH", type=NAME_OR_PATH)
+@click.option("--csv", "table", type=UserPath(), metavar="FILE", help="All findings as CSV.")
+@click.option("--fix", type=UserPath(), metavar="OUT", help="Write a corrected copy here.")
+@click.option("--pictures", type=UserPath(), metavar="DIR", help="Draw the worst scenes here.")
 @click.option(
     "--worst",
     type=click.IntRange(0),
@@ -78,7 +74,7 @@ def command(
     audit = Audit(tuple(audits), tuple(others))
     print_audit(console, audit, worst)
     if table is not None:
-        write_file(table, findings_csv(audit))
+        write_named(table, findings_csv(audit))
         console.print(f"{len(audit.findings)} findings in {shown_path(table)}", markup=False)
     if pictures is not None:
         count = _draw(pictures, worst_scenes(audit, worst))
@@ -109,10 +105,8 @@ def _check_places(table: Path | None, fix: Path | None, pictures: Path | None) -
     if table is not None and table.is_dir():
         taken.append(table)
     if fix is not None:
-        taken += [fix / name for name in ("scenes.jsonl", "changes.csv") if (fix / name).exists()]
-    if taken:
-        hint = "name another place"
-        raise StoreError([Problem(str(path), "is already there", hint=hint) for path in taken])
+        taken += [fix / name for name in ("scenes.jsonl", "changes.csv")]
+    check_free(taken, "name another place")
     folders = (None if table is None else table.parent, fix, pictures)
     for folder in folders:
         if folder is not None:
@@ -120,7 +114,9 @@ def _check_places(table: Path | None, fix: Path | None, pictures: Path | None) -
 
 
 def _draw(folder: Path, audits: Sequence[SceneAudit]) -> int:
+    out = OutFolder(folder)
+    out.check(f"{one.scene.id}.png" for one in audits)
     for one in audits:
         guilty = {order for finding in one.findings for order in finding.blocks}
-        write_file(folder / f"{one.scene.id}.png", marked_png(one.scene, guilty, PictureStyle()))
+        out.write({f"{one.scene.id}.png": marked_png(one.scene, guilty, PictureStyle())})
     return len(audits)

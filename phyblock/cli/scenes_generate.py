@@ -8,6 +8,7 @@ from typing import cast
 import click
 
 from phyblock.cli.console import shown_path
+from phyblock.cli.paths import UserPath
 from phyblock.cli.scenes_work import jobs_option, ray_option, tracked
 from phyblock.generate.card import card
 from phyblock.generate.draft import Palette
@@ -66,7 +67,7 @@ def _levels(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int
 @ray_option
 @click.option(
     *("--out", "-o"),
-    type=click.Path(path_type=Path),
+    type=UserPath(),
     required=True,
     metavar="DIR",
     help="Folder to write.",

@@ -9,9 +9,10 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import counted, make_console, shown_path
+from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.cli.scenes_data import find_scenes, read_data_set
-from phyblock.cli.scenes_work import write_file
 from phyblock.datasets import AssemblyTask
+from phyblock.folders import OutFolder
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
 from phyblock.sim.assembly import animation, filmstrip_png
 from phyblock.sim.camera import VIEWS
@@ -31,11 +32,11 @@ def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> 
 
 
 @click.command("render")
-@click.argument("data", metavar="PATH")
+@click.argument("data", metavar="PATH", type=NAME_OR_PATH)
 @click.argument("scenes", metavar="[SCENE]...", nargs=-1)
 @click.option(
     *("--out", "-o"),
-    type=click.Path(path_type=Path, file_okay=False),
+    type=UserPath(file_okay=False),
     required=True,
     metavar="DIR",
     help="Folder for the pictures.",
@@ -93,19 +94,23 @@ def command(
 ) -> None:
     """Draw the scenes SCENE... of the data set PATH, or all of them.
 
-    Files are named SCENE-VIEW-BACKGROUND-WHAT; those that are there are written over.
+    Files are named SCENE-VIEW-BACKGROUND-WHAT; those that this command wrote are written over.
     """
     read = read_data_set(data)
     tasks = find_scenes(read, scenes) if scenes else read.tasks
     styles = _styles(view, azimuth, elevation, background, size)
     wanted = [name for name, is_wanted in extras.items() if is_wanted]
-    count = 0
-    for task in tasks:
-        for name, style in styles.items():
-            for what, make in _drawings(task, style, wanted):
-                write_file(out / f"{task.scene.id}-{name}{what}", make())
-                count += 1
-    make_console().print(f"{counted(count, 'file')} in {shown_path(out)}", markup=False)
+    drawings = {
+        f"{task.scene.id}-{name}{what}": make
+        for task in tasks
+        for name, style in styles.items()
+        for what, make in _drawings(task, style, wanted)
+    }
+    folder = OutFolder(out)
+    folder.check(drawings)
+    for name, make in drawings.items():
+        folder.write({name: make()})
+    make_console().print(f"{counted(len(drawings), 'file')} in {shown_path(out)}")
 
 
 def _styles(

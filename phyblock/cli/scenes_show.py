@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from phyblock.cli.console import make_console, plain_table
+from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.cli.scenes_data import find_scenes, read_data_set
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block
@@ -15,7 +16,7 @@ __all__ = ["command"]
 
 
 @click.command("show")
-@click.argument("data", metavar="PATH")
+@click.argument("data", metavar="PATH", type=NAME_OR_PATH)
 @click.argument("scene")
 def command(data: str, scene: str) -> None:
     """Show the facts of SCENE in the data set PATH: blocks, layers, dependencies, candidates.

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import click
 
 from phyblock.cli.console import make_console, plain_table
+from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.cli.scenes_data import read_data_set
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.domain import BLOCK_TYPES, COLORS, Scene
@@ -16,7 +17,7 @@ __all__ = ["command"]
 
 
 @click.command("stats")
-@click.argument("data", metavar="PATH")
+@click.argument("data", metavar="PATH", type=NAME_OR_PATH)
 def command(data: str) -> None:
     """Statistics of the data set PATH, by level.
 

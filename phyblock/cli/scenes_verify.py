@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import make_console, plain_table
+from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.cli.scenes_data import find_data_set
 from phyblock.cli.scenes_work import jobs_option, ray_option, tracked
 from phyblock.datasets import SCENES_FILE, AssemblyTask, read_builtin
@@ -28,7 +29,7 @@ _Row = tuple[str, int, int]
 
 
 @click.command("verify")
-@click.argument("data", metavar="[PATH]", default="phyblock-400")
+@click.argument("data", metavar="[PATH]", default="phyblock-400", type=NAME_OR_PATH)
 @jobs_option
 @ray_option
 @click.option(

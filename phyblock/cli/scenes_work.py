@@ -1,19 +1,17 @@
-"""What the verbs that work through many scenes share: processes, progress, writing files."""
+"""What the verbs that work through many scenes share: processes, progress."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import TypeVar
 
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from phyblock.cli.console import make_console
-from phyblock.errors import Problem, StoreError
 
-__all__ = ["jobs_option", "make_folder", "ray_option", "tracked", "write_file"]
+__all__ = ["jobs_option", "ray_option", "tracked"]
 
 T = TypeVar("T")
 _LINE_EVERY = 25
@@ -45,20 +43,3 @@ def tracked(items: Iterable[T], total: int, doing: str, noun: str = "scenes") ->
             if hidden and count % _LINE_EVERY == 0:
                 console.print(f"{count} of {total} {noun}")
             yield item
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder and those above it; StoreError where the disk refuses."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(Problem(str(folder), f"cannot be made: {error.strerror}")) from error
-
-
-def write_file(path: Path, content: str | bytes) -> None:
-    """Write a file and the folders above it; StoreError where the disk refuses."""
-    make_folder(path.parent)
-    try:
-        path.write_bytes(content.encode() if isinstance(content, str) else content)
-    except OSError as error:
-        raise StoreError(Problem(str(path), f"cannot be written: {error.strerror}")) from error

@@ -7,6 +7,7 @@ from typing import cast
 
 import click
 
+from phyblock.cli.paths import UserPath
 from phyblock.cli.report import show_tables
 from phyblock.parsing import PLAN_PARSERS, PlanParser
 from phyblock.run.rescore import rescore
@@ -16,11 +17,11 @@ __all__ = ["command"]
 
 
 @click.command("score")
-@click.argument("run", type=click.Path(path_type=Path))
+@click.argument("run", type=UserPath())
 @click.option("--parser", type=click.Choice(PLAN_PARSERS), help="Parser to read replies with.")
 @click.option("--matcher", type=click.Choice(MATCHERS), help="Matcher of the headline numbers.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for the new scores.")
-@click.option("--data", type=click.Path(path_type=Path), help="The data set, where it has moved.")
+@click.option("--out", type=UserPath(), help="Folder for the new scores.")
+@click.option("--data", type=UserPath(), help="The data set, where it has moved.")
 def command(
     run: Path, parser: str | None, matcher: str | None, out: Path | None, data: Path | None
 ) -> None:

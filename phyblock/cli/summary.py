@@ -12,6 +12,7 @@ from rich.console import Console
 from phyblock import report
 from phyblock.cli.console import print_view, shown_path
 from phyblock.cli.layout import width_of
+from phyblock.plain_text import one_line
 from phyblock.report.outcomes import HEADINGS
 from phyblock.report.text_table import NO_VALUE, number
 
@@ -95,7 +96,8 @@ def _print_failures(console: Console, written: TablesWritten) -> None:
         return
     console.print("Failed calls", style="bold")
     for (model, message), times in said.most_common(_FAILURES_SHOWN):
-        console.print(f"{times:>6,} x {model}: {message}", markup=False, soft_wrap=True)
+        told = one_line(f"{model}: {message}")
+        console.print(f"{times:>6,} x {told}", soft_wrap=True)
     if len(said) > _FAILURES_SHOWN:
         console.print(f"       and {len(said) - _FAILURES_SHOWN} other messages", markup=False)
     console.print()
@@ -111,7 +113,7 @@ def _print_comparison(console: Console, written: TablesWritten) -> None:
         # Where nothing was compared, there is no difference to judge.
         mark = ("as published" if points <= _MET else "differs") if cells[name] else "not compared"
         console.print(
-            f"{name:<{width}}  {number(points, 3):>7}  {cells[name]} cells, {mark}", markup=False
+            f"{one_line(str(name)):<{width}}  {number(points, 3):>7}  {cells[name]} cells, {mark}"
         )
     for note in report.comparison_notes(frame, written.run.design):
         console.print(note, markup=False, soft_wrap=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import make_console, print_view
+from phyblock.cli.paths import UserPath
 from phyblock.errors import Problem, SpecError
 from phyblock.report import TextTable, to_latex, to_markdown
 from phyblock.report.load import load_run
@@ -17,7 +18,7 @@ __all__ = ["command"]
 
 
 @click.command("tables")
-@click.argument("run", type=click.Path(path_type=Path))
+@click.argument("run", type=UserPath())
 @click.option("--paper", is_flag=True, help="Published, ours and difference: Tables 1, 2, 3, 5.")
 @click.option("--only", "names", multiple=True, metavar="NAME", help="Only this table; repeat.")
 @click.option(

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
 import click
 
+from phyblock.bounded import read_bytes
 from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.files import find_models_file, find_suite
+from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
 from phyblock.resources import bundled
@@ -22,11 +25,16 @@ _SUITE_KEY = re.compile(rf"^(?:{'|'.join(SuiteSpec.model_fields)})[ \t]*:", re.M
 
 
 @click.command("validate")
-@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("files", nargs=-1, required=True, type=UserPath())
 @click.option(
     "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Override a value of the suites."
 )
-@click.option("--models-file", metavar="FILE", help="Models file that suites are checked against.")
+@click.option(
+    "--models-file",
+    type=NAME_OR_PATH,
+    metavar="FILE",
+    help="Models file that suites are checked against.",
+)
 def command(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | None) -> None:
     """Check FILES: suites (or names of bundled ones) and models files, data set folders, official
     checkouts.
@@ -47,14 +55,14 @@ def command(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | N
 
 
 def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> str:
-    if path.is_dir():
-        is_builtin = (path / SCENES_FILE).exists()
+    if os.path.isdir(path):
+        is_builtin = os.path.lexists(path / SCENES_FILE)
         return _about(read_builtin(path) if is_builtin else read_official(path))
     if path.name == SCENES_FILE:
         return _about(read_builtin(path.parent))
-    if not path.exists():
+    if not os.path.isfile(path):
         path = find_suite(str(path))
-    if not _SUITE_KEY.search(path.read_text(encoding="utf-8", errors="replace")):
+    if not _is_suite(path):
         known = load_models(path)
         if not known:
             allowed = "a suite, or a models file with name: provider/model lines"
@@ -65,6 +73,14 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> str:
     calls = plan.samples_per_model
     models = counted(len(plan.models), "model")
     return f"suite {plan.suite.name}, {models}, {counted(calls, 'sample')} a model"
+
+
+def _is_suite(path: Path) -> bool:
+    """Whether a file has a key of suites; False for what cannot be read, whose reader says why."""
+    try:
+        return bool(_SUITE_KEY.search(read_bytes(path).decode(errors="replace")))
+    except (OSError, ValueError):
+        return False
 
 
 def _about(dataset: Dataset) -> str:

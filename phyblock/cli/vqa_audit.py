@@ -10,9 +10,11 @@ import click
 from rich.console import Console
 
 from phyblock.cli.console import counted, make_console, plain_table, shown_path
-from phyblock.cli.scenes_work import make_folder, tracked, write_file
+from phyblock.cli.paths import UserPath
+from phyblock.cli.scenes_work import tracked
 from phyblock.cli.vqa_data import data_option, questions_argument, read_question_set, size_option
 from phyblock.domain import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
+from phyblock.files import make_folder, write_named
 from phyblock.generate.questions.audit import (
     BALANCE,
     GUESSABLE,
@@ -35,7 +37,7 @@ _PER_SUBTASK = 5
 @data_option
 @click.option(
     "--sheet",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=UserPath(dir_okay=False),
     metavar="FILE",
     help="Write an HTML page for a human check: pictures, questions, answers behind a fold.",
 )
@@ -88,7 +90,7 @@ def command(
         chosen = [task.question for task in some]
         draw = partial(question_png, style=PictureStyle(size))
         pieces = sheet_html(f"Questions of {questions}", chosen, draw)
-        write_file(sheet, "".join(pieces))
+        write_named(sheet, "".join(pieces))
         console.print(f"{counted(len(chosen), 'question')} in {shown_path(sheet)}", markup=False)
 
 

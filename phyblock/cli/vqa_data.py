@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.cli.scenes_data import read_data_set
 from phyblock.datasets import QUESTIONS_FILE, QuestionSet, read_questions
 from phyblock.errors import DataError, Problem
@@ -23,10 +24,13 @@ __all__ = [
 _QUESTIONS = "phyblock-vqa"
 _SCENES = "phyblock-400"
 
-questions_argument = click.argument("questions", metavar="[PATH]", default=_QUESTIONS)
+questions_argument = click.argument(
+    "questions", metavar="[PATH]", default=_QUESTIONS, type=NAME_OR_PATH
+)
 questions_option = click.option(
     "--questions",
     default=_QUESTIONS,
+    type=NAME_OR_PATH,
     show_default=True,
     metavar="PATH",
     help="A folder with questions, or a bundled set.",
@@ -34,6 +38,7 @@ questions_option = click.option(
 data_option = click.option(
     "--data",
     default=_SCENES,
+    type=NAME_OR_PATH,
     show_default=True,
     metavar="PATH",
     help="The scenes that the questions are about: a folder or a bundled set.",

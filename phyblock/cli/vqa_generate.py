@@ -9,6 +9,7 @@ import click
 from rich.progress import Progress, TaskID
 
 from phyblock.cli.console import make_console, shown_path
+from phyblock.cli.paths import UserPath
 from phyblock.cli.scenes_data import read_data_set
 from phyblock.cli.scenes_work import jobs_option, ray_option
 from phyblock.cli.vqa_data import data_option
@@ -42,9 +43,7 @@ __all__ = ["command"]
 )
 @jobs_option
 @ray_option
-@click.option(
-    "--out", type=click.Path(path_type=Path), required=True, metavar="DIR", help="Folder to write."
-)
+@click.option("--out", type=UserPath(), required=True, metavar="DIR", help="Folder to write.")
 @click.option("--replace", is_flag=True, help="Replace questions that are in the folder.")
 def command(
     data: str,

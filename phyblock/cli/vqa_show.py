@@ -11,11 +11,12 @@ import click
 from PIL import Image
 
 from phyblock.cli.console import make_console, shown_path
-from phyblock.cli.scenes_work import write_file
+from phyblock.cli.paths import UserPath
 from phyblock.cli.vqa_data import data_option, questions_option, read_question_set, size_option
 from phyblock.datasets import QuestionSet
 from phyblock.domain import LETTERS, SUBTASK_NAMES, Question
 from phyblock.errors import DataError, Problem
+from phyblock.files import write_named
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
 
@@ -28,9 +29,7 @@ _GAP_PX = 8
 @click.argument("question")
 @questions_option
 @data_option
-@click.option(
-    "--out", type=click.Path(path_type=Path), metavar="FILE", help="Draw the pictures to this PNG."
-)
+@click.option("--out", type=UserPath(), metavar="FILE", help="Draw the pictures to this PNG.")
 @size_option
 @click.option("--blind", is_flag=True, help="Keep answer and evidence to yourself.")
 def command(
@@ -56,7 +55,7 @@ def command(
     for line in lines:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     if out is not None:
-        write_file(out, _side_by_side(found, PictureStyle(size)))
+        write_named(out, _side_by_side(found, PictureStyle(size)))
         console.print(f"pictures: {shown_path(out)}", markup=False, soft_wrap=True)
 
 

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import AsyncExitStack
 from pathlib import Path
 
 import click
 
 from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.files import find_models_file
-from phyblock.cli.scenes_work import make_folder, write_file
+from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.cli.vqa_data import data_option, questions_option, read_question_set
 from phyblock.cli.vqa_subtasks import subtasks_option
 from phyblock.domain import Question, Subtask
-from phyblock.errors import DataError, Problem, SpecError, StoreError
-from phyblock.models import Gate, Model, ModelConfig, ReplyCache, build_model
+from phyblock.errors import DataError, Problem, SpecError
+from phyblock.files import check_free, make_folder, write_named
+from phyblock.models import Breakers, Gate, ModelConfig, RetryPolicy, SharedCache, build_model
 from phyblock.resources import bundled, reply_cache_file
 from phyblock.run.models import to_config
 from phyblock.run.wordings import Paraphrase, stems_of, write_wordings
@@ -52,12 +53,17 @@ _AT_ONCE = 8
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S")
 @click.option(
     "--out",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=UserPath(dir_okay=False),
     required=True,
     metavar="FILE",
     help="JSON Lines for review.",
 )
-@click.option("--models-file", metavar="FILE", help="Models file instead of models.yaml.")
+@click.option(
+    "--models-file",
+    type=NAME_OR_PATH,
+    metavar="FILE",
+    help="Models file instead of models.yaml.",
+)
 @click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
 def command(
     name: str,
@@ -79,8 +85,7 @@ def command(
     a person has read it.
     """
     config = _config(name, models_file)
-    if out.exists():
-        raise StoreError(Problem(str(out), "is already there", hint="name another file"))
+    check_free([out], "name another file")
     make_folder(out.parent)
     asked = [task.question for task in read_question_set(questions, data).tasks]
     stems = stems_of([question for question in asked if question.subtask in subtasks])
@@ -88,12 +93,10 @@ def command(
         message = "holds no question of these subtasks in a known wording"
         raise DataError(Problem(questions, message))
     prompt = TemplatePrompt(bundled("prompts", "vqa_write.j2"), "vqa_write")
-    with ExitStack() as stack:
-        cache = None if no_cache else stack.enter_context(ReplyCache(reply_cache_file()))
-        model = build_model(config, cache=cache, overall=Gate(_AT_ONCE))
-        found = asyncio.run(_write(model, prompt, stems, count, checks, seed))
+    asking = _ask(config, prompt, stems, count, checks, seed, use_cache=not no_cache)
+    found = asyncio.run(asking)
     lines = [paraphrase.line(name, number) for number, paraphrase in _numbered(found)]
-    write_file(out, "".join(line + "\n" for line in lines))
+    write_named(out, "".join(line + "\n" for line in lines))
     accepted = sum(paraphrase.fault is None for paraphrase in found)
     told = f"{counted(len(found), 'paraphrase')}, {accepted} accepted, in {shown_path(out)}"
     make_console().print(f"{told}; read them before they are used", markup=False, soft_wrap=True)
@@ -107,23 +110,30 @@ def _config(name: str, models_file: str | None) -> ModelConfig:
     return to_config(name, known[name], SuiteSpec(name="write", models=(name,)))
 
 
-async def _write(
-    model: Model,
+async def _ask(
+    config: ModelConfig,
     prompt: TemplatePrompt,
     stems: Mapping[str, Sequence[Question]],
     count: int,
     checks: int,
     seed: int,
+    *,
+    use_cache: bool,
 ) -> list[Paraphrase]:
-    try:
+    tell = make_console(stderr=True).print
+    async with AsyncExitStack() as stack:
+        cache = None
+        if use_cache:
+            cache = await stack.enter_async_context(SharedCache(reply_cache_file(), tell))
+        breakers = Breakers(RetryPolicy(), tell)
+        model = build_model(config, cache=cache, overall=Gate(_AT_ONCE), breakers=breakers)
+        stack.push_async_callback(model.aclose)
         found = await asyncio.gather(
             *(
                 write_wordings(model, prompt, stem, questions, count, checks, seed)
                 for stem, questions in stems.items()
             )
         )
-    finally:
-        await model.aclose()
     return [paraphrase for part in found for paraphrase in part]
 
 

@@ -10,7 +10,10 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from phyblock.bounded import read_bytes
 from phyblock.domain import CandidateSet, Question, Scene
+from phyblock.errors import DataError, Problem, said
+from phyblock.picture_files import LARGEST_PICTURE_BYTES
 
 __all__ = ["AssemblyTask", "Dataset", "QuestionSet", "QuestionTask"]
 
@@ -79,9 +82,16 @@ class QuestionSet:
 
 def _digests(files: Mapping[str, Path]) -> dict[str, str]:
     return {
-        label: hashlib.sha256(path.read_bytes()).hexdigest()
+        label: hashlib.sha256(_picture_bytes(path)).hexdigest()
         for label, path in sorted(files.items())
     }
+
+
+def _picture_bytes(path: Path) -> bytes:
+    try:
+        return read_bytes(path, LARGEST_PICTURE_BYTES)
+    except (OSError, ValueError) as error:
+        raise DataError(Problem(str(path), f"cannot be read: {said(error)}")) from error
 
 
 def _digest(content: object) -> str:

@@ -11,13 +11,14 @@ from pathlib import Path
 
 from phyblock.datasets.base import AssemblyTask, Dataset
 from phyblock.datasets.checks import SceneReader
-from phyblock.datasets.raw import parse_json, read_text
+from phyblock.datasets.raw import gather, parse_json, read_text
 from phyblock.domain import Scene
 from phyblock.errors import DataError, Problem
 
 __all__ = ["SCENES_FILE", "read_builtin", "read_line", "scene_lines"]
 
 SCENES_FILE = "scenes.jsonl"
+_MOST_PARENTS = 100
 _LEVELS = ("[1]", "[2]", "[3]", "[4]", "[1, 2]")
 
 
@@ -32,12 +33,13 @@ def read_builtin(folder: Path) -> Dataset:
         try:
             task = read_line(path, number, line)
         except DataError as error:
-            problems += error.problems
+            gather(problems, error.problems, path)
             continue
         first = first_line.setdefault(task.scene.id, number)
         if first != number:
             message = f"is used by line {first} already"
-            problems.append(Problem(f"{path}:{number}", message, "id", repr(task.scene.id)))
+            twice = Problem(f"{path}:{number}", message, "id", repr(task.scene.id))
+            gather(problems, [twice], path)
         tasks.append(task)
     if not lines:
         problems.append(Problem(str(path), "holds no scenes", allowed="one scene a line"))
@@ -61,10 +63,10 @@ def read_line(
     reader = reader or SceneReader(f"{path}:{number}")
     raw = reader.mapping(parse_json(line, path, number))
     name = reader.name(reader.get(raw, "id"), "id")
-    levels = reader.items(reader.get(raw, "levels"), "levels")
+    levels = reader.items(reader.get(raw, "levels"), "levels", 2)
     if levels and str(levels) not in _LEVELS:
         reader.complain("levels", "are not allowed", levels, "one level 1 to 4, or [1, 2]")
-    parents = reader.items(reader.get(raw, "parents"), "parents")
+    parents = reader.items(reader.get(raw, "parents"), "parents", _MOST_PARENTS)
     for i, parent in enumerate(parents):
         reader.name(parent, f"parents[{i}]")
     blocks = reader.blocks(reader.get(raw, "blocks"), strict_layers=True)

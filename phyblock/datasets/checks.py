@@ -31,9 +31,7 @@ class SceneReader(RawReader):
     def blocks(self, raw: object, *, strict_layers: bool) -> tuple[Block, ...]:
         """The blocks of a scene, with a graph that is known to be sound; () after a complaint."""
         before = len(self.problems)
-        entries = self.items(raw, "blocks")
-        if len(entries) > MAX_BLOCKS:
-            self.complain("blocks", "are too many", len(entries), f"at most {MAX_BLOCKS}")
+        entries = self.items(raw, "blocks", MAX_BLOCKS)
         found = [self.block(entry, f"blocks[{i}]") for i, entry in enumerate(entries)]
         if len(self.problems) == before:
             whole = tuple(cast(Block, block) for block in found)
@@ -49,7 +47,7 @@ class SceneReader(RawReader):
         order = self.integer(self.get(raw, "order", f"{at}."), f"{at}.order", 1)
         kind, color = self._kind(raw, at)
         layer = self.integer(self.get(raw, "layer", f"{at}."), f"{at}.layer", 1)
-        position = self.vector(self.get(raw, "position", f"{at}."), f"{at}.position")
+        position = self.position(self.get(raw, "position", f"{at}."), f"{at}.position")
         euler = self._euler(raw, at)
         depend = self._depend(self.get(raw, "depend", f"{at}."), f"{at}.depend")
         if order is None or kind is None or color is None or layer is None:
@@ -61,9 +59,7 @@ class SceneReader(RawReader):
     def candidates(self, raw: object) -> CandidateSet:
         """A candidate set: at most 16, no two alike; empty after a complaint."""
         before = len(self.problems)
-        entries = self.items(raw, "candidates")
-        if len(entries) > MAX_CANDIDATES:
-            self.complain("candidates", "are too many", len(entries), f"at most {MAX_CANDIDATES}")
+        entries = self.items(raw, "candidates", MAX_CANDIDATES)
         found = [self._candidate(entry, f"candidates[{i}]") for i, entry in enumerate(entries)]
         first: dict[object, int] = {}
         for i, candidate in enumerate(found):
@@ -109,10 +105,10 @@ class SceneReader(RawReader):
         # The paper's text calls the field `orientation`, the released files `euler`.
         named = isinstance(raw, dict) and "orientation" in raw and "euler" not in raw
         field = "orientation" if named else "euler"
-        return self.vector(self.get(raw, field, f"{at}."), f"{at}.{field}")
+        return self.angles(self.get(raw, field, f"{at}."), f"{at}.{field}")
 
     def _depend(self, raw: object, field: str) -> tuple[int, ...] | None:
-        entries = enumerate(self.items(raw, field))
+        entries = enumerate(self.items(raw, field, MAX_BLOCKS))
         orders = [self.integer(entry, f"{field}[{i}]", 0) for i, entry in entries]
         if not orders or None in orders:
             return None

@@ -18,7 +18,7 @@ from typing import TypeVar, cast
 
 from phyblock.datasets.base import AssemblyTask, Dataset
 from phyblock.datasets.checks import SceneReader
-from phyblock.datasets.raw import read_json
+from phyblock.datasets.raw import gather, is_name, read_json
 from phyblock.domain import CandidateSet, Scene
 from phyblock.errors import DataError, Problem
 
@@ -49,7 +49,7 @@ def read_official(root: Path) -> Dataset:
         try:
             tasks.append(_read_task(root, path))
         except DataError as error:
-            problems += error.problems
+            gather(problems, error.problems, root)
     if problems:
         raise DataError(problems)
     return Dataset("official", root, tuple(tasks))
@@ -135,11 +135,11 @@ def read_scene(path: Path, reader: SceneReader | None = None) -> Scene:
     blocks = reader.blocks(reader.get(raw, "blocks"), strict_layers=False)
     optional = raw if isinstance(raw, dict) else {}
     look_at = optional.get("lookat_pos")
-    look_at_m = None if look_at is None else reader.vector(look_at, "lookat_pos")
-    parents = [path.stem]
+    look_at_m = None if look_at is None else reader.position(look_at, "lookat_pos")
+    parents = [reader.name(path.stem, "the file's name")]
     if (combined := optional.get("combined")) is not None:
         parents = combined.split("_") if isinstance(combined, str) else []
-        if not parents or not all(parents):
+        if not parents or not all(map(is_name, parents)):
             reader.complain("combined", "is not allowed", combined, "base scenes joined by '_'")
     reader.raise_if_broken()
     levels = (1, 2) if level == 2 else (cast(int, level),)

@@ -17,6 +17,7 @@ where neither tells, they are refused.
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -25,7 +26,7 @@ from typing import Any, NamedTuple, cast
 from phyblock.datasets.base import Dataset, QuestionSet, QuestionTask
 from phyblock.datasets.builtin import scene_lines
 from phyblock.datasets.questions import QuestionReader
-from phyblock.datasets.raw import MISSING, parse_json, read_text
+from phyblock.datasets.raw import MISSING, gather, parse_json, read_text
 from phyblock.domain import (
     LETTERS,
     SUBTASK_NAMES,
@@ -40,6 +41,7 @@ from phyblock.errors import DataError, Problem
 
 __all__ = ["read_official_questions"]
 
+_MOST_QUESTIONS = 100_000
 _GOAL_VIEW = (45.0, 22.0)
 _SUFFIXES = (".json", ".jsonl")
 _PICTURES = (".png", ".jpg", ".jpeg")
@@ -71,18 +73,18 @@ def read_official_questions(folder: Path, scenes: Dataset) -> QuestionSet:
         try:
             entries = list(_entries(path))
         except DataError as error:
-            problems += error.problems
+            gather(problems, error.problems, folder)
             continue
         base = _index_base([entry.raw for entry in entries])
         for entry in entries:
             try:
                 task = _Reader(entry.where, folder, base).task(entry, path.stem, known)
             except DataError as error:
-                problems += error.problems
+                gather(problems, error.problems, folder)
                 continue
             if first.setdefault(task.key, entry.where) != entry.where:
                 message = f"is used at {first[task.key]} already"
-                problems.append(Problem(entry.where, message, "id", repr(task.key)))
+                gather(problems, [Problem(entry.where, message, "id", repr(task.key))], folder)
             tasks.append(task)
     if problems:
         raise DataError(problems)
@@ -99,6 +101,9 @@ def _entries(path: Path) -> Iterator[_Entry]:
     whole = parse_json(text, path)
     if not isinstance(whole, list):
         raise DataError(Problem(str(path), "is not an array", allowed="an array of questions"))
+    if len(whole) > _MOST_QUESTIONS:
+        allowed = f"{_MOST_QUESTIONS:,} questions at most"
+        raise DataError(Problem(str(path), "is too long an array", "", f"{len(whole):,}", allowed))
     starts = _starts(text)
     for number, raw in enumerate(whole, 1):
         yield _Entry(f"{path}:{next(starts)}", raw, number)
@@ -107,10 +112,13 @@ def _entries(path: Path) -> Iterator[_Entry]:
 def _starts(text: str) -> Iterator[int]:
     """The line on which each entry of the array that `text` holds begins."""
     decoder, at = json.JSONDecoder(), text.index("[") + 1
+    line, counted = 1, 0
     while True:
         found = re.compile(r"[\s,]*").match(text, at)
         at = found.end() if found else at
-        yield text.count("\n", 0, at) + 1
+        line += text.count("\n", counted, at)
+        counted = at
+        yield line
         _, at = decoder.raw_decode(text, at)
 
 
@@ -215,12 +223,15 @@ class _Reader(QuestionReader):
         """The file that is named, or the one at its usual place."""
         if label in named:
             path = self._folder / str(named[label])
-            if not path.is_file():
-                self.complain(f"images.{label}", "no such file", str(named[label]), _ALLOWED)
+            inside = os.path.join(os.path.abspath(self._folder), "")
+            if not os.path.abspath(path).startswith(inside) or not os.path.isfile(path):
+                self.complain(
+                    f"images.{label}", "no such file in the folder", str(named[label]), _ALLOWED
+                )
                 return None
             return path
         found = (default.with_name(default.name + suffix) for suffix in _PICTURES)
-        return next((path for path in found if path.is_file()), None)
+        return next((path for path in found if os.path.isfile(path)), None)
 
 
 _ALLOWED = "a PNG or JPEG file inside the folder"

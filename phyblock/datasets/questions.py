@@ -13,8 +13,8 @@ from typing import Any, cast
 
 from phyblock.datasets.base import Dataset, QuestionSet, QuestionTask
 from phyblock.datasets.builtin import scene_lines
-from phyblock.datasets.raw import MISSING, parse_json
-from phyblock.datasets.recipes import RecipeReader
+from phyblock.datasets.raw import MISSING, gather, parse_json
+from phyblock.datasets.recipes import LABELS, RecipeReader
 from phyblock.domain import (
     LETTERS,
     SUBTASKS,
@@ -30,6 +30,7 @@ from phyblock.errors import DataError, Problem
 __all__ = ["QUESTIONS_FILE", "QuestionReader", "read_question_line", "read_questions"]
 
 QUESTIONS_FILE = "questions.jsonl"
+_MOST_OPTIONS = 26
 _FIELDS = (
     *("id", "subtask", "category", "scene_id", "wording", "question", "options", "answer"),
     *("colors", "pictures", "evidence"),
@@ -48,12 +49,13 @@ def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
         try:
             question = read_question_line(path, number, line, known)
         except DataError as error:
-            problems += error.problems
+            gather(problems, error.problems, path)
             continue
         first = first_line.setdefault(question.id, number)
         if first != number:
             message = f"is used by line {first} already"
-            problems.append(Problem(f"{path}:{number}", message, "id", repr(question.id)))
+            twice = Problem(f"{path}:{number}", message, "id", repr(question.id))
+            gather(problems, [twice], path)
         tasks.append(QuestionTask(question))
     if not lines:
         problems.append(Problem(str(path), "holds no questions", allowed="one question a line"))
@@ -73,7 +75,7 @@ def read_question_line(path: Path, number: int, line: str, scenes: Mapping[str, 
     text = reader.text(reader.get(raw, "question"), "question")
     options = reader.options(reader.get(raw, "options"))
     answer = reader.answer(reader.get(raw, "answer"), subtask == "OR")
-    entries = reader.items(reader.get(raw, "pictures"), "pictures")
+    entries = reader.items(reader.get(raw, "pictures"), "pictures", len(LABELS))
     pictures: tuple[QuestionPicture, ...] = ()
     if scene is not None:
         scene = reader.recolored(raw.get("colors", {}), scene, "colors")
@@ -123,9 +125,10 @@ class QuestionReader(RecipeReader):
     def options(self, raw: object) -> tuple[str, ...]:
         """Four different texts, or the four pictures in order."""
         entries = self.items(raw, "options")
-        found = [self.text(entry, f"options[{i}]") for i, entry in enumerate(entries)]
+        few = entries[:_MOST_OPTIONS]
+        found = [self.text(entry, f"options[{i}]") for i, entry in enumerate(few)]
         if entries and len(found) != len(LETTERS):
-            self.complain("options", "are not four", len(found), "four options")
+            self.complain("options", "are not four", len(entries), "four options")
         for i, option in enumerate(found):
             first = [_plain(other) for other in found].index(_plain(option))
             if option and first != i:

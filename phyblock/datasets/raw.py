@@ -5,13 +5,24 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
-from phyblock.errors import DataError, Problem
+from phyblock.bounded import RepeatedFieldError, load_json, read_bytes
+from phyblock.errors import DataError, Problem, said
 
-__all__ = ["MISSING", "RawReader", "parse_json", "read_json", "read_text"]
+__all__ = ["MISSING", "RawReader", "gather", "is_name", "parse_json", "read_json", "read_text"]
+
+_LARGEST_BYTES = 1024**3
+_LONGEST_LINE = 2**20
+_MOST_OF_ALL, _MOST_OF_ONE = 1000, 100
+"""Faults of a data set, and of one scene or question, that are told."""
+_MOST_NUMBER = 9999
+"""Of a block or a layer: far above any use."""
+_MOST_POSITION_M = 100.0
+_MOST_ANGLE_DEG = 36_000.0
+_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
 MISSING: Any = object()
 """Stands for a value that was complained about already; every check lets it pass in silence."""
@@ -33,9 +44,11 @@ class RawReader:
     def complain(
         self, field: str, message: str, found: object = MISSING, allowed: str = ""
     ) -> None:
-        """Note one problem."""
+        """Note one problem; raises DataError when there are too many to go on."""
         shown = "" if found is MISSING else _show(found)
         self.problems.append(Problem(self.where, message, field, shown, allowed))
+        if len(self.problems) >= _MOST_OF_ONE:
+            raise DataError(self.problems)
 
     def raise_if_broken(self) -> None:
         """Raise DataError with everything that was noted, if anything was."""
@@ -58,11 +71,14 @@ class RawReader:
         return raw.get(field, MISSING)
 
     def integer(self, value: object, field: str, low: int, high: int | None = None) -> int | None:
-        """An integer in low..high."""
-        fits = isinstance(value, int) and not isinstance(value, bool) and value >= low
-        if fits and (high is None or cast(int, value) <= high):
+        """An integer in low..high; without `high` one that is exact in every arithmetic."""
+        most = _MOST_NUMBER if high is None else high
+        is_whole = isinstance(value, int) and not isinstance(value, bool)
+        if is_whole and low <= cast(int, value) <= most:
             return cast(int, value)
-        allowed = f"an integer of at least {low}" if high is None else f"an integer {low} to {high}"
+        is_large = is_whole and cast(int, value) > most
+        bounded = is_large or high is not None
+        allowed = f"an integer {low} to {most}" if bounded else f"an integer of at least {low}"
         self._complain_unless_missing(field, "is not an allowed number", value, allowed)
         return None
 
@@ -75,23 +91,40 @@ class RawReader:
 
     def name(self, value: object, field: str) -> str:
         """A name that is safe in file names and tables; "" after a complaint."""
-        if isinstance(value, str) and _NAME.fullmatch(value):
+        if isinstance(value, str) and is_name(value):
             return value
         allowed = "up to 100 letters, digits, '.', '_' or '-', a letter or digit first"
         self._complain_unless_missing(field, "is not a name", value, allowed)
         return ""
 
-    def vector(self, value: object, field: str) -> tuple[float, float, float] | None:
-        """Three finite numbers."""
-        if isinstance(value, list) and len(value) == 3:
-            x, y, z = map(_finite, value)
-            if x is not None and y is not None and z is not None:
-                return (x, y, z)
-        self._complain_unless_missing(field, "is not a vector", value, "three finite numbers")
-        return None
+    def position(self, value: object, field: str) -> tuple[float, float, float] | None:
+        """Three numbers of meters, near enough to the origin for geometry to be exact."""
+        allowed = f"three numbers of -{_MOST_POSITION_M:g} to {_MOST_POSITION_M:g} m"
+        return self._vector(value, field, _MOST_POSITION_M, allowed)
 
-    def items(self, value: object, field: str) -> list[Any]:
-        """A non-empty list."""
+    def angles(self, value: object, field: str) -> tuple[float, float, float] | None:
+        """Three numbers of degrees, a hundred turns at most."""
+        allowed = f"three numbers of -{_MOST_ANGLE_DEG:g} to {_MOST_ANGLE_DEG:g} degrees"
+        return self._vector(value, field, _MOST_ANGLE_DEG, allowed)
+
+    def _vector(
+        self, value: object, field: str, most: float, allowed: str
+    ) -> tuple[float, float, float] | None:
+        numbers = map(_finite, value) if isinstance(value, list) and len(value) == 3 else ()
+        found = tuple(number for number in numbers if number is not None)
+        if len(found) != 3:
+            self._complain_unless_missing(field, "is not a vector", value, "three finite numbers")
+            return None
+        if max(map(abs, found)) > most:
+            self.complain(field, "is out of range", value, allowed)
+            return None
+        return found
+
+    def items(self, value: object, field: str, most: int | None = None) -> list[Any]:
+        """A non-empty list of `most` entries at most; [] after a complaint."""
+        if isinstance(value, list) and most is not None and len(value) > most:
+            self.complain(field, "are too many", len(value), f"at most {most}")
+            return []
         if isinstance(value, list) and value:
             return value
         allowed = "a list with at least one entry"
@@ -105,15 +138,22 @@ class RawReader:
             self.complain(field, message, found, allowed)
 
 
+def is_name(text: str) -> bool:
+    """Whether a text is safe in file names and tables."""
+    return _NAME.fullmatch(text) is not None
+
+
 def read_text(path: Path, allowed: str = "") -> str:
-    """The text of `path`; DataError when it cannot be read or is not UTF-8."""
+    """The text of `path`; DataError when it cannot be read, is too large or is not UTF-8."""
     try:
-        return path.read_bytes().decode("utf-8")
+        return read_bytes(path, _LARGEST_BYTES).decode("utf-8")
     except OSError as error:
-        problem = Problem(str(path), f"cannot be read: {error.strerror}", allowed=allowed)
+        problem = Problem(str(path), f"cannot be read: {said(error)}", allowed=allowed)
         raise DataError(problem) from error
     except UnicodeDecodeError as error:
         raise DataError(Problem(str(path), f"is not UTF-8 text: {error.reason}")) from error
+    except ValueError as error:
+        raise DataError(Problem(str(path), str(error), allowed=allowed)) from error
 
 
 def read_json(path: Path) -> Any:
@@ -124,36 +164,38 @@ def read_json(path: Path) -> Any:
 def parse_json(text: str, path: Path, line: int | None = None) -> Any:
     """The JSON value in `text`: all of `path`, or its line number `line`.
 
-    Raises DataError for bad syntax, an object that holds a field twice, a number of thousands of
-    digits, or nesting that is too deep.
+    Raises DataError for bad syntax, an object that holds a field twice, a number of hundreds of
+    digits, nesting that is too deep, half of a character, or a line of more than a million
+    characters. Numbers that are not finite pass: the field they stand in is checked.
     """
     where = str(path) if line is None else f"{path}:{line}"
+    if line is not None and len(text) > _LONGEST_LINE:
+        found = f"{len(text):,} characters"
+        problem = Problem(where, "is too long a line", "", found, f"{_LONGEST_LINE:,} at most")
+        raise DataError(problem)
     try:
-        return json.loads(text, object_pairs_hook=_unique)
+        value = load_json(text, finite=False, unique=True)
+        if _SURROGATE.search(text):
+            json.dumps(value, ensure_ascii=False).encode()
     except json.JSONDecodeError as error:
         where += f":{error.colno}" if line is not None else f":{error.lineno}:{error.colno}"
         raise DataError(Problem(where, f"is not valid JSON: {error.msg}")) from error
-    except _RepeatedFieldError as error:
+    except RepeatedFieldError as error:
         raise DataError(Problem(where, "stands twice in one object", error.field)) from error
+    except UnicodeEncodeError as error:
+        message = "holds half of a character (a lone surrogate)"
+        raise DataError(Problem(where, message)) from error
     except ValueError as error:
-        raise DataError(Problem(where, "holds a number of too many digits")) from error
-    except RecursionError as error:
-        raise DataError(Problem(where, "is nested too deeply")) from error
+        raise DataError(Problem(where, str(error))) from error
+    return value
 
 
-class _RepeatedFieldError(ValueError):
-    def __init__(self, field: str) -> None:
-        self.field = field
-        super().__init__(field)
-
-
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    raw: dict[str, Any] = {}
-    for field, value in pairs:
-        if field in raw:
-            raise _RepeatedFieldError(field)
-        raw[field] = value
-    return raw
+def gather(problems: list[Problem], more: Iterable[Problem], where: object) -> None:
+    """Add problems to those of a whole data set; DataError when they become too many to go on."""
+    problems += more
+    if len(problems) > _MOST_OF_ALL:
+        note = f"has more than {_MOST_OF_ALL:,} faults; only the first were looked for"
+        raise DataError([Problem(str(where), note), *problems])
 
 
 def _finite(value: object) -> float | None:
@@ -168,5 +210,9 @@ def _finite(value: object) -> float | None:
 
 
 def _show(value: object) -> str:
-    text = json.dumps(value, default=str)
-    return text if len(text) <= _SHOWN else text[: _SHOWN - 1] + "…"
+    text = ""
+    for piece in json.JSONEncoder(default=str).iterencode(value):
+        text += piece
+        if len(text) > _SHOWN:
+            return text[: _SHOWN - 1] + "…"
+    return text

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, cast
 
-from phyblock.datasets.checks import SceneReader
+from phyblock.datasets.checks import MAX_BLOCKS, SceneReader
 from phyblock.datasets.raw import MISSING
 from phyblock.domain import (
     BLOCK_TYPES,
@@ -104,8 +104,8 @@ class RecipeReader(SceneReader):
             return block
         at = f"{at}.{block.order}"
         raw = self.mapping(raw, at)
-        position = self.vector(self.get(raw, "position", f"{at}."), f"{at}.position")
-        euler = self.vector(self.get(raw, "euler", f"{at}."), f"{at}.euler")
+        position = self.position(self.get(raw, "position", f"{at}."), f"{at}.position")
+        euler = self.angles(self.get(raw, "euler", f"{at}."), f"{at}.euler")
         if position is None or euler is None:
             return block
         return replace(block, position_m=position, euler_deg=euler)
@@ -113,7 +113,8 @@ class RecipeReader(SceneReader):
     def _added(self, raw: Any, at: str) -> tuple[Block, ...]:
         if raw is None:
             return ()
-        found = [self.block(entry, f"{at}[{i}]") for i, entry in enumerate(self.items(raw, at))]
+        entries = self.items(raw, at, MAX_BLOCKS)
+        found = [self.block(entry, f"{at}[{i}]") for i, entry in enumerate(entries)]
         return tuple(block for block in found if block is not None)
 
     def _framed(self, raw: Any, scene: Scene, at: str) -> tuple[Block, ...]:
@@ -122,17 +123,17 @@ class RecipeReader(SceneReader):
 
     def _optional(self, raw: Any, name: str, at: str) -> list[Any]:
         """The entries of a list that may be left out."""
-        return self.items(raw[name], f"{at}.{name}") if name in raw else []
+        return self.items(raw[name], f"{at}.{name}", MAX_BLOCKS) if name in raw else []
 
     def _mark(self, entry: Any, at: str) -> Mark:
         raw = self.mapping(entry, at)
         letter = self.choice(self.get(raw, "letter", f"{at}."), f"{at}.letter", MARK_LETTERS)
-        place = self.vector(self.get(raw, "position", f"{at}."), f"{at}.position")
+        place = self.position(self.get(raw, "position", f"{at}."), f"{at}.position")
         return Mark(letter or "", place or (0.0, 0.0, 0.0))
 
     def _view(self, raw: Any, at: str) -> tuple[float, float]:
         is_pair = isinstance(raw, list) and len(raw) == 2
-        whole = self.vector([*raw, 0.0], at) if is_pair else None
+        whole = self.angles([*raw, 0.0], at) if is_pair else None
         if not is_pair and raw is not MISSING:
             self.complain(at, "is no view", raw, "azimuth and elevation [degrees]")
         if whole is None:

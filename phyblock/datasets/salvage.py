@@ -16,6 +16,8 @@ from phyblock.datasets.official import candidates_file, goal_files, read_candida
 from phyblock.domain import Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
 
+_MOST_FAULTS = 10_000
+
 __all__ = ["Fault", "Salvage", "SalvagedTask", "salvage"]
 
 
@@ -86,10 +88,17 @@ class _TolerantReader(SceneReader):
         return found or CandidateSet(())
 
 
+def _check_number(faults: list[Fault], root: Path) -> None:
+    if len(faults) > _MOST_FAULTS:
+        message = f"has more than {_MOST_FAULTS:,} faults: is this a data set?"
+        raise DataError(Problem(str(root), message))
+
+
 def _builtin(folder: Path, tasks: list[SalvagedTask], faults: list[Fault]) -> None:
     path = folder / SCENES_FILE
     first_line: dict[str, int] = {}
     for number, line in enumerate(scene_lines(path), 1):
+        _check_number(faults, folder)
         reader = _TolerantReader(f"{path}:{number}")
         try:
             task = read_line(path, number, line, reader)
@@ -108,6 +117,7 @@ def _builtin(folder: Path, tasks: list[SalvagedTask], faults: list[Fault]) -> No
 
 def _official(root: Path, tasks: list[SalvagedTask], faults: list[Fault]) -> None:
     for path in goal_files(root):
+        _check_number(faults, root)
         reader = _TolerantReader(str(path))
         try:
             scene = read_scene(path, reader)

@@ -11,11 +11,12 @@ from pathlib import Path
 
 from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
-from phyblock.errors import Problem, StoreError
+from phyblock.files import atomic_write, check_free, writing
 from phyblock.generate.audit import AuditSettings, Check, Finding, SceneAudit, audit_scene
 from phyblock.generate.symmetry import find_twins
 from phyblock.generate.workers import open_workers
 from phyblock.generate.writing import SCENES_FILE, scene_line
+from phyblock.plain_text import csv_cell
 
 __all__ = [
     "Audit",
@@ -189,24 +190,18 @@ def _why_not(audit: SceneAudit, candidates: CandidateSet | None) -> str:
 
 
 def _write_new(folder: Path, texts: Mapping[str, str]) -> None:
-    taken = [folder / name for name in texts if (folder / name).exists()]
-    if taken:
-        hint = "choose another folder"
-        raise StoreError([Problem(str(path), "is already there", hint=hint) for path in taken])
-    try:
+    check_free([folder / name for name in texts], "choose another folder")
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():
-            with (folder / name).open("w", encoding="utf-8", newline="\n") as file:
-                file.write(text)
-    except OSError as error:
-        raise StoreError(Problem(str(folder), f"cannot be written: {error.strerror}")) from error
+            atomic_write(folder / name, text)
 
 
 def _csv(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows(rows)
+    writer.writerows(map(csv_cell, row) for row in rows)
     return text.getvalue()
 
 

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from phyblock.bounded import read_text
 from phyblock.domain.candidates import MAX_CANDIDATES, Candidate, CandidateSet
 from phyblock.domain.scene import Block, Scene
-from phyblock.errors import Problem
+from phyblock.errors import Problem, said
 from phyblock.generate.checks import (
     dependency_problems,
     finished_problems,
@@ -142,7 +143,10 @@ def check_sums(folder: Path) -> tuple[int, tuple[Problem, ...]]:
     path = folder / SUMS_FILE
     if not path.is_file():
         return 1, (Problem(str(path), "is missing"),)
-    lines = path.read_text(encoding="utf-8").splitlines()
+    try:
+        lines = read_text(path).splitlines()
+    except (OSError, ValueError) as error:
+        return 1, (Problem(str(path), f"cannot be read: {said(error)}"),)
     wrong = []
     for line in lines:
         digest, _, name = line.partition("  ")

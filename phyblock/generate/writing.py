@@ -14,6 +14,7 @@ from pathlib import Path
 from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
+from phyblock.files import atomic_write, check_free, writing
 from phyblock.generate.candidates import make_candidates
 from phyblock.generate.draft import PALETTES, Palette
 
@@ -87,10 +88,8 @@ class SetWriter:
                 with part.open("rb") as file:
                     shutil.copyfileobj(file, out)
         whole.replace(self._folder / SCENES_FILE)
-        with (self._folder / CARD_FILE).open("w", encoding="utf-8", newline="\n") as out_text:
-            out_text.write(card)
-        with (self._folder / SUMS_FILE).open("w", encoding="utf-8", newline="\n") as out_text:
-            out_text.write(sums_text(self._folder))
+        atomic_write(self._folder / CARD_FILE, card)
+        atomic_write(self._folder / SUMS_FILE, sums_text(self._folder))
 
 
 @contextlib.contextmanager
@@ -102,12 +101,13 @@ def open_writer(folder: Path, palette: Palette, replace: bool = False) -> Iterat
     if (folder / SCENES_FILE).exists() and not replace:
         hint = "give another --out, or --replace"
         raise StoreError(Problem(str(folder), "holds a data set already", hint=hint))
-    try:
+    if not (folder / SCENES_FILE).exists():
+        others = [folder / name for name in (SCENES_FILE, CARD_FILE, SUMS_FILE)]
+        check_free(others, "give another --out")
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".making-", dir=folder) as parts:
             yield SetWriter(folder, Path(parts), palette)
-    except OSError as error:
-        raise StoreError(Problem(str(folder), f"cannot be written: {error.strerror}")) from error
 
 
 def scene_line(scene: Scene, candidates: CandidateSet) -> str:

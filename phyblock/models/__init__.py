@@ -17,6 +17,7 @@ from phyblock.models.base import (
     Usage,
 )
 from phyblock.models.baselines import BASELINES
+from phyblock.models.breaker import Breakers
 from phyblock.models.build import build_model
 from phyblock.models.cache import CacheStats, ReplyCache, reply_key
 from phyblock.models.config import Kind, ModelConfig, Price
@@ -28,15 +29,17 @@ from phyblock.models.cost import (
     most_usd,
     price_of,
 )
-from phyblock.models.events import ModelEvent, Observer
+from phyblock.models.events import ModelEvent, Observer, Tell
 from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import KeyStatus, api_key_status, server_address
 from phyblock.models.limits import Gate
 from phyblock.models.raw_replies import RawReply, read_raw_reply
 from phyblock.models.retry import RetryPolicy
+from phyblock.models.shared_cache import SharedCache
 
 __all__ = [
     "BASELINES",
+    "Breakers",
     "Budget",
     "CacheStats",
     "ChoiceSubject",
@@ -60,8 +63,10 @@ __all__ = [
     "ReplyCache",
     "Request",
     "RetryPolicy",
+    "SharedCache",
     "StepSubject",
     "Subject",
+    "Tell",
     "Usage",
     "api_key_status",
     "build_model",

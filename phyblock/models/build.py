@@ -5,7 +5,7 @@ from __future__ import annotations
 from phyblock.errors import Problem, SpecError
 from phyblock.models.base import Model
 from phyblock.models.baselines import BaselineModel
-from phyblock.models.cache import ReplyCache
+from phyblock.models.breaker import Breakers
 from phyblock.models.chat import ChatModel, ChatParts
 from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, price_of, require_price
@@ -17,6 +17,7 @@ from phyblock.models.limits import Gate, ModelLimiter
 from phyblock.models.litellm_call import LitellmTransport
 from phyblock.models.replay import open_replay
 from phyblock.models.retry import RetryPolicy
+from phyblock.models.shared_cache import SharedCache
 from phyblock.models.transport import Transport
 
 __all__ = ["build_model"]
@@ -25,18 +26,19 @@ __all__ = ["build_model"]
 def build_model(
     config: ModelConfig,
     *,
-    cache: ReplyCache | None,
+    cache: SharedCache | None,
     overall: Gate,
     budget: Budget | None = None,
     observer: Observer = ignore_event,
     policy: RetryPolicy | None = None,
+    breakers: Breakers | None = None,
     halt: Halt | None = None,
 ) -> Model:
     """The model that a configuration describes; nothing is imported or sent before it is asked.
 
-    `overall` bounds what all models of a run have under way together, `halt` ends their waits.
-    Raises SpecError for an
-    unknown baseline or a model without a price under a budget, DataError for missing recordings.
+    `overall` bounds what all models of a run have under way together, `breakers` are those of their
+    servers, `halt` ends their waits. Raises SpecError for an unknown baseline or a model without a
+    price under a budget, DataError for missing recordings.
     """
     if config.kind == "baseline":
         return BaselineModel(config)
@@ -44,16 +46,18 @@ def build_model(
         return open_replay(config)
     _check(config)
     secrets = secrets_of(config)
+    policy = policy or RetryPolicy()
     transport: Transport = (
         DirectTransport(config, secrets) if config.is_direct else LitellmTransport(config, secrets)
     )
     parts = ChatParts(
         transport=transport,
         limiter=ModelLimiter(config.max_concurrency, overall, config.rpm, config.tpm),
+        breaker=(breakers or Breakers(policy)).of(config),
         cache=cache,
         budget=budget,
         price=price_of(config) if budget is None else require_price(config),
-        policy=policy or RetryPolicy(),
+        policy=policy,
         secrets=secrets,
         observer=observer,
         halt=halt or Halt(),

@@ -10,8 +10,10 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import re
 import sqlite3
 import time
+import uuid
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -20,19 +22,23 @@ from typing import Any
 from phyblock.errors import Problem, StoreError
 from phyblock.models.base import Image, Message, Reply, Request, Usage
 from phyblock.models.config import ModelConfig
+from phyblock.models.leases import Leases
 from phyblock.models.payload import wire_params
 
-__all__ = ["CacheStats", "ReplyCache", "reply_key"]
+__all__ = ["CacheBusyError", "CacheStats", "ReplyCache", "reply_key"]
 
 SCHEMA = 1
 """Version of the file's layout and of what enters a key."""
 
-_BUSY_TIMEOUT_S = 30.0
+_BUSY_TIMEOUT_S = 5.0
+_BUSY = re.compile(r"\b(locked|busy)\b")
 _FOREIGN = "belongs to another version of phyblock, or is no reply cache"
 _HINT = (
     "delete the file, or name another cache folder; answered samples of a run stay in its records"
 )
+_WAIT = "wait until the process that holds it has ended, or name another cache folder"
 _ELSEWHERE = "free some space, or name another cache folder with PHYBLOCK_CACHE"
+_MOST_TOKENS = 10**9
 _CREATE = """
 CREATE TABLE IF NOT EXISTS replies (
     key TEXT PRIMARY KEY,
@@ -41,6 +47,10 @@ CREATE TABLE IF NOT EXISTS replies (
     reply TEXT NOT NULL
 ) WITHOUT ROWID
 """
+
+
+class CacheBusyError(StoreError):
+    """Another process holds the file: it may be free in a moment."""
 
 
 @dataclass(frozen=True)
@@ -74,20 +84,21 @@ def _message(message: Message) -> list[object]:
 
 
 class ReplyCache:
-    """Replies by key.
+    """Replies by key, and the questions that are being asked.
 
-    Every method but `keep` raises StoreError when the file is broken or cannot be used.
+    Every method raises StoreError when the file is broken or cannot be used, CacheBusyError when
+    another process held it for `busy_timeout_s`. To be used in the thread that made it.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, busy_timeout_s: float = _BUSY_TIMEOUT_S) -> None:
         self.path = path
-        self._failure: StoreError | None = None
+        self._leases: Leases | None = None
         with self._explained():
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
             except OSError as error:
                 raise self._problem(f"cannot be made: {error.strerror}", hint=_ELSEWHERE) from error
-            self._db = sqlite3.connect(path, timeout=_BUSY_TIMEOUT_S, isolation_level=None)
+            self._db = sqlite3.connect(path, timeout=busy_timeout_s, isolation_level=None)
             try:
                 self._prepare()
             except BaseException:
@@ -125,17 +136,13 @@ class ReplyCache:
             )
         return True
 
-    def keep(self, key: str, model_id: str, reply: Reply) -> None:
-        """`put` a reply that was paid for and must not be lost: `check` raises what went wrong."""
-        try:
-            self.put(key, model_id, reply)
-        except StoreError as error:
-            self._failure = error
-
-    def check(self) -> None:
-        """Raise the StoreError that `keep` met last, if any."""
-        if self._failure is not None:
-            raise self._failure
+    @contextlib.contextmanager
+    def leases(self) -> Iterator[Leases]:
+        """What is being asked now, by all who share the file."""
+        with self._explained():
+            if self._leases is None:
+                self._leases = Leases(self._db, uuid.uuid4().hex)
+            yield self._leases
 
     def stats(self) -> CacheStats:
         """What the cache holds."""
@@ -194,20 +201,35 @@ class ReplyCache:
         try:
             yield
         except sqlite3.OperationalError as error:
+            if _BUSY.search(str(error)):
+                raise CacheBusyError(self._said(f"cannot be used: {error}", hint=_WAIT)) from error
             # The disk or the place, not the content: to delete paid replies would be no help.
             raise self._problem(f"cannot be used: {error}", hint=_ELSEWHERE) from error
         except sqlite3.Error as error:
             raise self._problem(f"cannot be used: {error}") from error
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             raise self._problem(f"holds a broken reply: {error}") from error
 
     def _problem(
         self, message: str, found: str = "", allowed: str = "", hint: str = _HINT
     ) -> StoreError:
+        return StoreError(self._said(message, found, allowed, hint))
+
+    def _said(self, message: str, found: str = "", allowed: str = "", hint: str = _HINT) -> Problem:
         where = f"reply cache {self.path}"
-        return StoreError(Problem(where, message, found=found, allowed=allowed, hint=hint))
+        return Problem(where, message, found=found, allowed=allowed, hint=hint)
 
 
 def _reply(stored: dict[str, Any]) -> Reply:
-    reply = Reply(**{**stored, "usage": Usage(**stored["usage"])})
+    usage = Usage(**{name: _count(number) for name, number in stored["usage"].items()})
+    reply = Reply(**{**stored, "usage": usage})
+    if not (isinstance(reply.text, str) and isinstance(reply.reasoning, str)):
+        raise TypeError("its text is no text")
     return replace(reply, cached=True, attempts=0)
+
+
+def _count(number: object) -> int | None:
+    """A number of tokens; older files may hold what a server made up."""
+    if not isinstance(number, int) or isinstance(number, bool):
+        return None
+    return number if 0 <= number <= _MOST_TOKENS else None

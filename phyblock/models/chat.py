@@ -1,28 +1,32 @@
-"""A model behind a network: cache, then retries, and for each attempt limits, budget, transport."""
+"""A model behind a network: the cache, then retries; for each attempt those who ask the same,
+the breaker, limits, budget, transport.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import AsyncExitStack
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, nullcontext
 from dataclasses import dataclass, replace
 
 from phyblock.errors import (
     BudgetReachedError,
     ModelError,
     RetryableError,
-    StoreError,
     UnavailableError,
+    UnreachableError,
 )
 from phyblock.models.base import Reply, Request
-from phyblock.models.cache import ReplyCache, reply_key
+from phyblock.models.breaker import Breaker
+from phyblock.models.cache import reply_key
 from phyblock.models.config import ModelConfig, Price
-from phyblock.models.cost import Budget, Estimate, cost_usd, estimate
+from phyblock.models.cost import Budget, Estimate, cost_usd, estimate, plausible
 from phyblock.models.events import EventKind, ModelEvent, Observer
 from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import hidden
-from phyblock.models.limits import ModelLimiter
+from phyblock.models.limits import ModelLimiter, Slot
 from phyblock.models.payload import wire_params
-from phyblock.models.retry import RetryPolicy, with_retries
+from phyblock.models.retry import RetryPolicy, is_success, with_retries
+from phyblock.models.shared_cache import SharedCache, Turn
 from phyblock.models.transport import Call, SeedRefusedError, Transport
 
 __all__ = ["ChatModel", "ChatParts"]
@@ -34,7 +38,8 @@ class ChatParts:
 
     transport: Transport
     limiter: ModelLimiter
-    cache: ReplyCache | None
+    breaker: Breaker
+    cache: SharedCache | None
     budget: Budget | None
     price: Price | None
     policy: RetryPolicy
@@ -45,13 +50,17 @@ class ChatParts:
 
 @dataclass
 class _Question:
-    """A request with its expected size, how often it was sent, what that cost, its last failure."""
+    """A request with its key in the cache and its expected size, how often it was sent, what that
+    cost, its last failure. `by_force`: another asks the same and takes too long.
+    """
 
     request: Request
+    key: str
     expected: Estimate
     sent: int = 0
     billed_usd: float | None = None
     failure: RetryableError | None = None
+    by_force: bool = False
 
 
 class ChatModel:
@@ -71,17 +80,17 @@ class ChatModel:
 
         `cost_usd` of a cached reply is what it cost when it was new. Raises what the model seam
         says, BudgetReachedError when the call does not fit, HaltedError when the run ends before it
-        is sent, StoreError for a broken cache. A new reply that the cache refuses is returned all
-        the same; the StoreError is raised in the place of the next request.
+        is sent.
         """
-        cache, price = self._parts.cache, self._parts.price
-        key = reply_key(self._config, request) if cache is not None else ""
-        if cache is not None and (kept := cache.get(key)) is not None:
-            return replace(kept, cost_usd=cost_usd(price, kept.usage))
-        reply = await self._ask_new(_Question(request, estimate(self._config, request)))
+        cache = self._parts.cache
+        key = ""
         if cache is not None:
-            cache.keep(key, self._config.id, reply)
-        return reply
+            key = reply_key(self._config, request)
+            with self._parts.halt.giving_up():
+                kept = await cache.find(key)
+            if kept is not None:
+                return replace(kept, cost_usd=cost_usd(self._parts.price, kept.usage))
+        return await self._ask_new(_Question(request, key, estimate(self._config, request)))
 
     async def aclose(self) -> None:
         """Release connections."""
@@ -89,13 +98,13 @@ class ChatModel:
 
     async def _ask_new(self, question: _Question) -> Reply:
         """Send until answered; whatever ends it, what was billed is told."""
+        policy = self._parts.policy
+        clock = replace(policy.clock, sleep=self._pause)
         try:
-            reply = await with_retries(
-                lambda: self._attempt(question),
-                replace(self._parts.policy, sleep=self._sleep),
-                self._on_retry,
+            return await with_retries(
+                lambda: self._attempt(question), replace(policy, clock=clock), self._on_retry
             )
-        except (UnavailableError, BudgetReachedError, HaltedError, StoreError):
+        except (UnavailableError, BudgetReachedError, HaltedError):
             if not question.billed_usd:
                 raise
             # These leave no record. The attempt that was billed needs one, and the next request
@@ -106,31 +115,73 @@ class ChatModel:
         except ModelError as error:
             error.billed_usd = question.billed_usd
             raise
-        return self._finished(reply, question)
 
     async def _attempt(self, question: _Question) -> Reply:
+        """Send once, when it is this question's turn, or find the reply to it meanwhile."""
+        while True:
+            kept = await self._from_others(question)
+            if kept is not None:
+                return self._found(kept, question)
+            async with AsyncExitStack() as stack:
+                with self._parts.halt.giving_up():
+                    is_probe = await stack.enter_async_context(self._parts.breaker.passing())
+                    slot = await stack.enter_async_context(self._slot(question))
+                    turn = await stack.enter_async_context(self._asking(question))
+                if turn.reply is not None:
+                    return self._found(turn.reply, question)
+                if not turn.is_ours or (self._parts.breaker.is_open and not is_probe):
+                    continue
+                if self._unavailable is not None:
+                    raise UnavailableError(str(self._unavailable), status=self._unavailable.status)
+                try:
+                    reply = await self._send_watched(question, slot, is_probe=is_probe)
+                except RetryableError:
+                    # It is the server that fails then, and not this request.
+                    if self._parts.breaker.is_open:
+                        continue
+                    raise
+                slot.succeeded(_total(reply))
+                if self._parts.cache is not None:
+                    await self._parts.cache.keep(question.key, self._config.id, reply)
+                return reply
+
+    async def _from_others(self, question: _Question) -> Reply | None:
+        """Wait for others that ask the same, no longer than a request of our own would take."""
+        cache = self._parts.cache
+        if cache is None or question.by_force:
+            return None
+        with self._parts.halt.giving_up():
+            kept, question.by_force = await cache.await_others(question.key, self._config.timeout_s)
+        return kept
+
+    def _slot(self, question: _Question) -> AbstractAsyncContextManager[Slot]:
         expected = question.expected
-        limiter = self._parts.limiter
-        async with AsyncExitStack() as stack:
-            with self._parts.halt.giving_up():
-                tokens = expected.prompt_tokens + expected.completion_tokens
-                slot = await stack.enter_async_context(limiter.slot(tokens))
-            if self._parts.cache is not None:
-                self._parts.cache.check()
-            if self._unavailable is not None:
-                raise UnavailableError(str(self._unavailable), status=self._unavailable.status)
-            try:
-                reply = await self._send_seeded(question)
-            except RetryableError as error:
+        return self._parts.limiter.slot(expected.prompt_tokens + expected.completion_tokens)
+
+    def _asking(self, question: _Question) -> AbstractAsyncContextManager[Turn]:
+        cache = self._parts.cache
+        if cache is None:
+            return nullcontext(Turn(is_ours=True))
+        return cache.asking(question.key, by_force=question.by_force)
+
+    async def _send_watched(self, question: _Question, slot: Slot, *, is_probe: bool) -> Reply:
+        """Send, and tell the limits and the breaker what came of it."""
+        breaker = self._parts.breaker
+        try:
+            reply = await self._send_seeded(question)
+        except ModelError as error:
+            sender = (self.name, question.request.key, question.request.seed)
+            breaker.failed(error, sender, is_probe=is_probe)
+            if isinstance(error, UnavailableError):
+                self._stop(error)
+            elif isinstance(error, RetryableError):
                 question.failure = error
                 if error.status == 429 and slot.rate_limited():
-                    self._tell("slow_down", str(error), limit=limiter.width)
-                raise
-            except UnavailableError as error:
-                self._stop(error)
-                raise
-            slot.succeeded(_total(reply))
-            return reply
+                    self._tell("slow_down", str(error), limit=self._parts.limiter.width, status=429)
+                breaker.raise_if_ended()
+            raise
+        breaker.heard()
+        return self._finished(reply, question)
 
     async def _send_seeded(self, question: _Question) -> Reply:
         """Send with the seed, or without where the provider is known or found to take none.
@@ -158,19 +209,21 @@ class ChatModel:
     async def _send_paid(self, call: Call, question: _Question) -> Reply:
         """Send with the call's greatest cost reserved in the budget.
 
-        A failure without a status of the server's own may have been billed, and counts in full;
-        a model that is found unable before anything is sent costs nothing.
+        A failure that may have been billed counts in full; a model that is found unable before
+        anything is sent costs nothing.
         """
         budget, price = self._parts.budget, self._parts.price
         if budget is None or price is None:
             question.sent += 1
-            return await self._parts.transport.send(call)
+            return _counted(await self._parts.transport.send(call), question)
         with self._parts.halt.giving_up():
-            held = await budget.reserve(budget.most_usd(self.name, price, question.expected))
+            held = await budget.reserve(
+                lambda: budget.most_usd(self.name, price, question.expected)
+            )
         spent_usd: float | None = None
         try:
             question.sent += 1
-            reply = await self._parts.transport.send(call)
+            reply = _counted(await self._parts.transport.send(call), question)
             spent_usd = cost_usd(price, reply.usage)
             budget.learn(self.name, question.expected, reply.usage)
             return reply
@@ -178,15 +231,24 @@ class ChatModel:
             spent_usd = 0.0
             raise
         except ModelError as error:
-            spent_usd = None if error.status in (None, 200) else 0.0
+            spent_usd = None if _may_be_billed(error) else 0.0
             raise
         finally:
             counted_usd = budget.settle(held, spent_usd)
             question.billed_usd = (question.billed_usd or 0.0) + counted_usd
 
-    async def _sleep(self, wait_s: float) -> None:
+    async def _pause(self, wait_s: float) -> None:
         with self._parts.halt.giving_up():
-            await self._parts.policy.sleep(wait_s)
+            await self._parts.policy.clock.sleep(wait_s)
+
+    def _found(self, kept: Reply, question: _Question) -> Reply:
+        """A reply that another brought, with what attempts of our own had cost before."""
+        return replace(
+            kept,
+            cost_usd=cost_usd(self._parts.price, kept.usage),
+            billed_usd=question.billed_usd,
+            attempts=question.sent,
+        )
 
     def _finished(self, reply: Reply, question: _Question) -> Reply:
         secrets = self._parts.secrets
@@ -200,15 +262,36 @@ class ChatModel:
         )
 
     def _on_retry(self, error: RetryableError, wait_s: float) -> None:
-        self._tell("retry", str(error), wait_s=wait_s)
+        self._tell("retry", str(error), wait_s=wait_s, status=error.status)
 
     def _stop(self, error: UnavailableError) -> None:
         if self._unavailable is None:
             self._unavailable = error
             self._tell("unavailable", str(error))
 
-    def _tell(self, kind: EventKind, message: str, *, wait_s: float = 0.0, limit: int = 0) -> None:
-        self._parts.observer(ModelEvent(self.name, kind, message, wait_s, limit))
+    def _tell(
+        self,
+        kind: EventKind,
+        message: str,
+        *,
+        wait_s: float = 0.0,
+        limit: int = 0,
+        status: int | None = None,
+    ) -> None:
+        self._parts.observer(ModelEvent(self.name, kind, message, wait_s, limit, status))
+
+
+def _may_be_billed(error: ModelError) -> bool:
+    """Whether the server may have made a reply: it promised one, or was lost on the way."""
+    was_lost = error.status is None and not isinstance(error, UnreachableError)
+    return was_lost or is_success(error.status)
+
+
+def _counted(reply: Reply, question: _Question) -> Reply:
+    """The reply with the counts alone that can be true."""
+    said_something = bool(reply.text or reply.reasoning)
+    usage = plausible(reply.usage, question.expected, said_something=said_something)
+    return replace(reply, usage=usage)
 
 
 def _total(reply: Reply) -> int | None:

@@ -11,6 +11,7 @@ import functools
 import importlib.util
 import json
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ __all__ = [
     "cost_usd",
     "estimate",
     "most_usd",
+    "plausible",
     "price_of",
     "require_price",
 ]
@@ -39,6 +41,8 @@ _ROOM_TO_THINK_TOKENS = 8_192
 _LONGEST_REPLY_TOKENS = 32_768
 _PROMPT_MARGIN = 1.5
 _PER_MILLION = 1_000_000
+_MOST_TIMES_EXPECTED = 100
+_LEAST_EXPECTED_TOKENS = 1_000
 
 
 @dataclass(frozen=True)
@@ -124,6 +128,27 @@ def estimate(config: ModelConfig, request: Request) -> Estimate:
     return Estimate(prompt, min(usual, most), most)
 
 
+def plausible(usage: Usage, expected: Estimate, *, said_something: bool) -> Usage:
+    """The counts that can be true; the others are not known.
+
+    Every request has a prompt and every reply that says something took tokens, whatever a server
+    or a library puts in the place of a count that it does not have; and no call takes a hundred
+    times what was expected of it.
+    """
+    prompt = _plausible(usage.prompt_tokens, 1, expected.prompt_tokens)
+    completion = _plausible(
+        usage.completion_tokens, int(said_something), expected.most_completion_tokens
+    )
+    reasoning = _plausible(usage.reasoning_tokens, 0, expected.most_completion_tokens)
+    return Usage(prompt, completion, reasoning)
+
+
+def _plausible(count: int | None, least: int, expected: int) -> int | None:
+    most = _MOST_TIMES_EXPECTED * max(expected, _LEAST_EXPECTED_TOKENS)
+    is_count = isinstance(count, int) and not isinstance(count, bool)
+    return count if is_count and least <= (count or 0) <= most else None
+
+
 @functools.cache
 def _price_map() -> dict[str, dict[str, Any]]:
     spec = importlib.util.find_spec("litellm")
@@ -149,13 +174,14 @@ def _map_entry(config: ModelConfig) -> dict[str, Any]:
 class Budget:
     """A cost limit for a whole run: room is reserved before a call and settled after it.
 
-    Of each model the largest ratio of real to estimated prompt tokens is remembered, so that
-    pictures which a provider counts higher than the estimate soon are reserved for.
+    What was spent never becomes less, and a cost that is not known counts as the most that was
+    reserved. Of each model the largest ratio of real to estimated prompt tokens is remembered, so
+    that pictures which a provider counts higher than the estimate soon are reserved for.
     """
 
     def __init__(self, max_cost_usd: float, spent_usd: float = 0.0) -> None:
-        self._max_usd = max_cost_usd
-        self._spent_usd = spent_usd
+        self._max_usd = _amount(max_cost_usd)
+        self._spent_usd = _amount(spent_usd)
         self._held: dict[int, float] = {}
         self._next = 0
         self._changed = asyncio.Event()
@@ -175,11 +201,14 @@ class Budget:
         """The most that a call can cost, as far as the model is known by now."""
         return most_usd(price, expected, self._ratio.get(model, 1.0))
 
-    async def reserve(self, usd: float) -> int:
-        """Hold `usd`, waiting for calls under way to settle; returns the reservation's number.
+    async def reserve(self, most_usd: Callable[[], float]) -> int:
+        """Hold the most that a call can cost, waiting for calls under way to settle; returns the
+        reservation's number.
 
+        `most_usd` is asked anew whenever a call has settled, since more is known of the model then.
         Raises BudgetReachedError when it does not fit although nothing is under way.
         """
+        usd = _amount(most_usd())
         while self._spent_usd + sum(self._held.values()) + usd > self._max_usd:
             if not self._held:
                 raise BudgetReachedError(
@@ -188,23 +217,36 @@ class Budget:
                 )
             self._changed.clear()
             await self._changed.wait()
+            usd = _amount(most_usd())
         self._next += 1
         self._held[self._next] = usd
         return self._next
 
     def settle(self, reservation: int, usd: float | None) -> float:
-        """Put the real cost in the place of a reservation; None counts all that was held.
+        """Put the real cost in the place of a reservation; what is no amount counts all that was
+        held, as None does.
 
         Returns what was counted [US dollars].
         """
         held = self._held.pop(reservation)
-        counted = held if usd is None else usd
+        counted = usd if usd is not None and _is_amount(usd) else held
         self._spent_usd += counted
         self._changed.set()
         return counted
 
     def learn(self, model: str, expected: Estimate, usage: Usage) -> None:
-        """Compare an estimate with what the provider counted."""
-        if usage.prompt_tokens and expected.prompt_tokens:
-            ratio = usage.prompt_tokens / expected.prompt_tokens
+        """Compare an estimate with what the provider counted, where that can be true."""
+        counted = plausible(usage, expected, said_something=False).prompt_tokens
+        if counted is not None and expected.prompt_tokens > 0:
+            ratio = min(counted / expected.prompt_tokens, _MOST_TIMES_EXPECTED)
             self._ratio[model] = max(self._ratio.get(model, 1.0), ratio)
+
+
+def _amount(usd: float) -> float:
+    if not _is_amount(usd):
+        raise ValueError(f"no amount of money: {usd}")
+    return usd
+
+
+def _is_amount(usd: float) -> bool:
+    return math.isfinite(usd) and usd >= 0

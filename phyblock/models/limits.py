@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 
-__all__ = ["Clock", "Gate", "MinuteWindow", "ModelLimiter", "Start"]
+__all__ = ["Clock", "Gate", "MinuteWindow", "ModelLimiter", "Slot", "Start"]
 
 WINDOW_S = 60.0
 _RECOVERY_ROUNDS = 8

@@ -39,7 +39,8 @@ _POLICY = re.compile(
 )
 _NEVER = re.compile(
     r"insufficient_quota|billing_hard_limit_reached|model_not_found|invalid_api_key"
-    r"|credit balance is too low|API_KEY_INVALID|API key not valid|LLM Provider NOT provided",
+    r"|authentication_error|credit balance is too low|API_KEY_INVALID|API key not valid"
+    r"|LLM Provider NOT provided",
     re.IGNORECASE,
 )
 _LONGEST_WORDS = 20_000

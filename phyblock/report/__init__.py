@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from phyblock.report.coverage import coverage_frame
     from phyblock.report.design import Design, read_design
     from phyblock.report.errors import errors_frame
+    from phyblock.report.files import files_of
     from phyblock.report.html import write_report
     from phyblock.report.latex import to_latex
     from phyblock.report.load import Run, load_run
@@ -39,6 +40,7 @@ __all__ = [
     "comparison_notes",
     "coverage_frame",
     "errors_frame",
+    "files_of",
     "largest_differences",
     "load_run",
     "published_frame",
@@ -63,6 +65,7 @@ _HOMES = {
     "Design": "design",
     "read_design": "design",
     "errors_frame": "errors",
+    "files_of": "files",
     "to_latex": "latex",
     "Run": "load",
     "load_run": "load",

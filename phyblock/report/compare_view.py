@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from phyblock.errors import Problem, StoreError
-from phyblock.files import atomic_write
+from phyblock.folders import OutFolder
 from phyblock.report.compare import COMPARE_RESAMPLES, Comparison
+from phyblock.report.csv_text import to_csv
 from phyblock.report.latex import to_latex
 from phyblock.report.markdown import to_markdown
 from phyblock.report.text_table import NO_VALUE, Column, TextTable, between, level_name, number
@@ -103,16 +103,10 @@ def flipped_lines(found: Comparison) -> tuple[str, ...]:
 def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:
     """Write comparison.csv, .md, .tex and flipped.csv into `folder`; StoreError if it cannot be."""
     view = compare_view(found)
-    texts = {
-        "comparison.csv": found.table.to_csv(index=False, float_format="%.6f", lineterminator="\n"),
+    texts: dict[str, bytes | str] = {
+        "comparison.csv": to_csv(found.table, "%.6f"),
         "comparison.md": to_markdown(view),
         "comparison.tex": to_latex(view, "phyblock-comparison"),
-        "flipped.csv": found.flipped.to_csv(index=False, float_format="%.2f", lineterminator="\n"),
+        "flipped.csv": to_csv(found.flipped, "%.2f"),
     }
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in texts.items():
-            atomic_write(folder / name, text)
-    except OSError as error:
-        raise StoreError(Problem(str(folder), f"cannot be written: {error.strerror}")) from error
-    return tuple(folder / name for name in texts)
+    return OutFolder(folder).write(texts)

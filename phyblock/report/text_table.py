@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from phyblock.plain_text import one_line
+
 __all__ = [
     "NO_VALUE",
     "SPREAD",
@@ -33,12 +35,26 @@ class Column:
 
 @dataclass(frozen=True)
 class TextTable:
-    """Cells as they are shown, row by row, with a caption and notes."""
+    """Cells as they are shown, row by row, with a caption and notes, each on one line.
+
+    Names that models and people gave stand in them: newlines and control characters become spaces.
+    """
 
     caption: str
     columns: tuple[Column, ...]
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        columns = (Column(one_line(c.name), one_line(c.group), c.is_text) for c in self.columns)
+        plain = {
+            "caption": one_line(self.caption),
+            "columns": tuple(columns),
+            "rows": tuple(tuple(map(one_line, row)) for row in self.rows),
+            "notes": tuple(map(one_line, self.notes)),
+        }
+        for name, value in plain.items():
+            object.__setattr__(self, name, value)
 
 
 def number(value: float, digits: int = 1, *, signed: bool = False) -> str:

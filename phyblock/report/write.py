@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
-from phyblock.errors import Problem, StoreError
-from phyblock.files import atomic_write
 from phyblock.report.assembly import assembly_frame, table1_frame
 from phyblock.report.comparison import published_frame
 from phyblock.report.cost import cost_frame, cost_view
 from phyblock.report.coverage import coverage_frame
+from phyblock.report.csv_text import to_csv
 from phyblock.report.episodes import endings_frame, moves_frame, progress_frame
 from phyblock.report.errors import errors_frame
 from phyblock.report.latex import to_latex
@@ -39,8 +37,12 @@ from phyblock.report.track_intervals import (
 )
 from phyblock.report.views import coverage_view, errors_view, published_view, table1_view
 from phyblock.report.vqa import letters_view, table2_frame, table2_view
+from phyblock.run.folder import run_folder
 
-__all__ = ["TablesWritten", "make_tables", "table_names", "write_tables"]
+__all__ = ["TablesWritten", "make_tables", "table_files", "table_names", "write_tables"]
+
+_FOLDER = "tables"
+_FORMS = ("csv", "md", "tex")
 
 _View = Callable[[pd.DataFrame, Run], TextTable]
 
@@ -65,19 +67,27 @@ def write_tables(path: str | Path, tables: Sequence[str] | None = None) -> Table
     """Rebuild `tables/` of a run folder from its records; each file appears whole or not at all.
 
     `tables` names those to write; None is what the suite in `run.yaml` asks for. Raises StoreError
-    for a broken run (see `load_run`) or a folder that cannot be written.
+    for a broken run (see `load_run`) or a folder that cannot be written,
+    and, before anything is, naming every file in the way that we never wrote.
     """
     run = load_run(path, texts=False)
     frames, views = make_tables(run, run.design.suite.tables if tables is None else tables)
-    texts = {f"{name}.csv": _csv(frame, name) for name, frame in frames.items()}
-    texts |= {f"{name}.md": to_markdown(view) for name, view in views.items()}
-    texts |= {f"{name}.tex": to_latex(view, f"phyblock-{name}") for name, view in views.items()}
-    folder = run.path / "tables"
-    with _as_store_error(folder):
-        folder.mkdir(exist_ok=True)
-        for name, text in texts.items():
-            atomic_write(folder / name, text)
-    return TablesWritten(folder, tuple(folder / name for name in texts), frames, views, run)
+    texts = {name: {"csv": _csv(frame, name)} for name, frame in frames.items()}
+    for name, view in views.items():
+        texts[name] |= {"md": to_markdown(view), "tex": to_latex(view, f"phyblock-{name}")}
+    files: dict[str, str | bytes] = {
+        f"{_FOLDER}/{name}.{form}": text[form]
+        for form in _FORMS
+        for name, text in texts.items()
+        if form in text
+    }
+    written = run_folder(run.path).write(files)
+    return TablesWritten(run.path / _FOLDER, written, frames, views, run)
+
+
+def table_files() -> tuple[str, ...]:
+    """Every file of tables that a run folder may hold, by its name in it."""
+    return tuple(f"{_FOLDER}/{name}.{form}" for form in _FORMS for name in _MAKERS)
 
 
 @dataclass(frozen=True)
@@ -145,12 +155,4 @@ def make_tables(
 
 def _csv(frame: pd.DataFrame, name: str) -> str:
     decimals = "%.1f" if name in ("table1", "table2", "table3") else "%.6f"
-    return frame.to_csv(index=False, float_format=decimals, lineterminator="\n")
-
-
-@contextlib.contextmanager
-def _as_store_error(folder: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise StoreError(Problem(str(folder), f"cannot be written: {error.strerror}")) from error
+    return to_csv(frame, decimals)

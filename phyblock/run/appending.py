@@ -11,9 +11,11 @@ from io import FileIO
 from pathlib import Path
 from typing import Any
 
-from phyblock.errors import Problem, StoreError
+from phyblock.files import writing
 
 __all__ = ["AppendFile"]
+
+_HINT = "free some space and give the same command again: it goes on from here"
 
 
 class AppendFile:
@@ -51,25 +53,25 @@ class AppendFile:
                 self._file = None
 
     def _append(self, data: bytes) -> None:
-        size = 0
-        try:
-            if self._file is None:
-                # Unbuffered: a write that failed must not be tried again behind our back.
-                self._file = FileIO(self._path, "a")
-            size = self._file.seek(0, os.SEEK_END)
-            written = 0
-            while written < len(data):
-                written += self._file.write(data[written:])
-            if self._sync:
-                os.fsync(self._file.fileno())
-        except OSError as error:
-            # Where even this fails, what is left is an unfinished line: the next start drops it.
-            if self._file is not None:
-                with contextlib.suppress(OSError):
-                    self._file.truncate(size)
-            hint = "free some space and give the same command again: it goes on from here"
-            problem = Problem(str(self._path), f"cannot be written: {error.strerror}", hint=hint)
-            raise StoreError(problem) from error
+        with writing(self._path, _HINT):
+            size = 0
+            try:
+                if self._file is None:
+                    # Unbuffered: a write that failed must not be tried again behind our back.
+                    self._file = FileIO(self._path, "a")
+                size = self._file.seek(0, os.SEEK_END)
+                written = 0
+                while written < len(data):
+                    written += self._file.write(data[written:])
+                if self._sync:
+                    os.fsync(self._file.fileno())
+            except OSError:
+                # Where even this fails, what is left is an unfinished line: the next start drops
+                # it.
+                if self._file is not None:
+                    with contextlib.suppress(OSError):
+                        self._file.truncate(size)
+                raise
 
 
 def _line(line: Mapping[str, Any]) -> bytes:

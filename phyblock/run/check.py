@@ -41,7 +41,7 @@ async def check_model(config: ModelConfig) -> Reply:
         replace(config, sends_seed="never"),
         cache=None,
         overall=Gate(1),
-        policy=RetryPolicy(attempts=1),
+        policy=RetryPolicy(attempts=1, retry_for_s=0.0),
     )
     try:
         reply = await model.ask(request)

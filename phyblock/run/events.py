@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+
+from phyblock.records import Record
+from phyblock.run.standing import Summary
 
 __all__ = [
     "ModelNotice",
     "ModelStopped",
     "RunEvent",
+    "RunNotice",
     "RunStarted",
     "SampleDone",
     "Stopping",
@@ -19,25 +22,37 @@ __all__ = [
 
 @dataclass(frozen=True)
 class RunStarted:
-    """Samples in all, and the final records already on disk, by model."""
+    """Samples in all, and the final records already on disk summed up, by model."""
 
     expected: Mapping[str, int]
-    earlier: Mapping[str, tuple[Mapping[str, Any], ...]]
+    earlier: Mapping[str, tuple[Summary, ...]]
 
 
 @dataclass(frozen=True)
 class SampleDone:
     """A record was written."""
 
-    record: Mapping[str, Any]
+    record: Record
 
 
 @dataclass(frozen=True)
 class ModelNotice:
-    """A model's call is repeated or its concurrency changed; `text` says so in a few words."""
+    """A model's call is repeated after `wait_s`, or its concurrency was brought down to `limit`;
+    `text` says why in a few words, `status` is what the server answered, if it did.
+    """
 
     model: str
     kind: str
+    text: str
+    wait_s: float = 0.0
+    limit: int = 0
+    status: int | None = None
+
+
+@dataclass(frozen=True)
+class RunNotice:
+    """Something that concerns no single model: a server that is gone, a cache set aside."""
+
     text: str
 
 
@@ -57,5 +72,5 @@ class Stopping:
     in_flight: int
 
 
-RunEvent = RunStarted | SampleDone | ModelNotice | ModelStopped | Stopping
+RunEvent = RunStarted | SampleDone | ModelNotice | RunNotice | ModelStopped | Stopping
 Watcher = Callable[[RunEvent], None]

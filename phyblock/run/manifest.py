@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from phyblock.datasets import Dataset
+from phyblock.records import FORMAT, Manifest
 from phyblock.run.models import PlannedModel
 from phyblock.specs import SuiteSpec
 from phyblock.tasks import AnyTrack
 
 __all__ = ["make_manifest"]
 
-_FORMAT = 1
 _LIBRARIES = ("phyblock", "litellm", "pybullet", "numpy", "pillow", "jinja2")
 
 
@@ -29,14 +29,14 @@ def make_manifest(
     tracks: Sequence[AnyTrack],
     limit: int | None,
     questions: Path | None = None,
-) -> dict[str, Any]:
+) -> Manifest:
     """The manifest; `identity` digests what decides the results, so that only the same run goes
     on in a folder. Limits, prices, tables and paths are no part of it.
 
     `questions` is where those of the vqa track are.
     """
     inputs: dict[str, Any] = {
-        "format": _FORMAT,
+        "format": FORMAT,
         "suite": suite.identity(),
         "models": [
             {"name": m.name, "published": m.published, "size_b": m.size_b, **_identity(m)}
@@ -48,7 +48,7 @@ def make_manifest(
     }
     canonical = json.dumps(inputs, sort_keys=True, separators=(",", ":"))
     scenes = [task.scene for task in dataset.tasks]
-    return {
+    fields = {
         "identity": hashlib.sha256(canonical.encode()).hexdigest(),
         "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         **inputs,
@@ -62,6 +62,7 @@ def make_manifest(
         },
         "versions": {"python": platform.python_version(), **{n: version(n) for n in _LIBRARIES}},
     }
+    return Manifest.model_validate(fields)
 
 
 def _identity(model: PlannedModel) -> dict[str, object]:

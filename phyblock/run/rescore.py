@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import yaml
 from pydantic import ValidationError
 
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import DataError, Problem, StoreError
-from phyblock.files import atomic_write
+from phyblock.files import atomic_write, writing
 from phyblock.parsing import PlanParser
+from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
 from phyblock.run.data import open_dataset
-from phyblock.run.reading import MANIFEST, RECORDS, read_manifest, read_records
+from phyblock.run.folder import check_place, run_folder
+from phyblock.run.reading import read_records
 from phyblock.run.records import judged
 from phyblock.run.select import select_tasks
 from phyblock.run.tracks import planning_rules
@@ -44,42 +45,50 @@ def rescore(
     """
     manifest = read_manifest(folder)
     suite = _suite(folder, manifest, parser, matcher)
+    name = f"scores/{suite.parser}-{suite.scoring.matchers[0]}"
+    target = out or folder / name
+    identity = f"{manifest.identity} scored by {suite.parser}, {suite.scoring.matchers[0]}"
+    if out is None:
+        run_folder(folder).check([f"{name}/"])
+    _check_target(target, identity)
     tasks = {task.scene.id: task for task in _tasks(folder, manifest, suite, data)}
     track = FullPlanning(planning_rules(suite))
-    records = []
-    for record in read_records(folder).values():
-        if record["track"] != track.name:
+    records: list[Record] = []
+    for record in read_records(folder, manifest):
+        if record.track != track.name:
             records.append(record)
             continue
-        task = tasks.get(record["scene"])
+        task = tasks.get(record.scene)
         if task is None:
             where, hint = str(folder / RECORDS), "the file was changed: restore it from a copy"
             raise StoreError(
-                Problem(where, "names a scene that the run has not", "scene", record["scene"],
+                Problem(where, "names a scene that the run has not", "scene", record.scene,
                         hint=hint)
             )  # fmt: skip
-        text = None if record["reply"] is None else record["reply"]["text"]
-        judgement = track.judge(task, text)
-        records.append(judged(record, judgement.is_read, judgement.fields()))
-    target = out or folder / "scores" / f"{suite.parser}-{suite.scoring.matchers[0]}"
-    identity = f"{manifest['identity']} scored by {suite.parser}, {suite.scoring.matchers[0]}"
-    scored = {**manifest, "identity": identity, "suite": suite.model_dump(mode="json")}
-    if (target / MANIFEST).exists() and read_manifest(target)["identity"] != identity:
+        judgement = track.judge(task, None if record.reply is None else record.reply.text)
+        records.append(judged(record.as_given(), judgement.is_read, judgement.fields()))
+    told = {"identity": identity, "suite": suite.model_dump(mode="json")}
+    _write(target, manifest.model_copy(update=told), records)
+    return target
+
+
+def _check_target(target: Path, identity: str) -> None:
+    """Raise StoreError unless `target` is new, empty or holds these scores."""
+    check_place(target)
+    if (target / MANIFEST).exists() and read_manifest(target).identity != identity:
         hint = "choose another folder with --out: what a run stored is never changed"
         raise StoreError(Problem(str(target), "holds another run", hint=hint))
-    _write(target, scored, records)
-    return target
 
 
 def _suite(
     folder: Path,
-    manifest: Mapping[str, Any],
+    manifest: Manifest,
     parser: PlanParser | None,
     matcher: Matcher | None,
 ) -> SuiteSpec:
     """The run's suite with parser and headline matcher replaced."""
     try:
-        suite = SuiteSpec.model_validate(manifest.get("suite"))
+        suite = SuiteSpec.model_validate(manifest.suite)
         matchers = suite.scoring.matchers
         if matcher is not None:
             matchers = (matcher, *(name for name in matchers if name != matcher))
@@ -90,24 +99,22 @@ def _suite(
 
 
 def _tasks(
-    folder: Path, manifest: Mapping[str, Any], suite: SuiteSpec, data: Path | None
+    folder: Path, manifest: Manifest, suite: SuiteSpec, data: Path | None
 ) -> tuple[AssemblyTask, ...]:
     """The tasks of the run, known to be those that it was made on."""
-    recorded = manifest.get("dataset")
-    if not isinstance(recorded, dict) or not {"root", "sha256"} <= recorded.keys():
+    recorded = manifest.dataset
+    if recorded is None:
         raise _broken(folder, "dataset")
     hint = "name the folder where it is now with --data"
-    root = data or Path(recorded["root"])
+    root = data or Path(recorded.root)
     if not root.is_dir():
         raise DataError(Problem(str(root), "the data set of the run is not there", hint=hint))
     dataset = open_dataset(suite.dataset.format, root)
-    dataset = replace(
-        dataset, tasks=select_tasks(dataset.tasks, suite.levels, manifest.get("limit"))
-    )
-    if dataset.sha256 != recorded["sha256"]:
+    dataset = replace(dataset, tasks=select_tasks(dataset.tasks, suite.levels, manifest.limit))
+    if dataset.sha256 != recorded.sha256:
         message = "is not the data set that the run was made on, or it was changed since"
         raise DataError(
-            Problem(str(root), message, "sha256", dataset.sha256, recorded["sha256"], hint)
+            Problem(str(root), message, "sha256", dataset.sha256, recorded.sha256, hint)
         )
     return dataset.tasks
 
@@ -117,16 +124,13 @@ def _broken(folder: Path, field: str) -> StoreError:
     return StoreError(Problem(str(folder / MANIFEST), "is missing or wrong", field, hint=hint))
 
 
-def _write(folder: Path, manifest: Mapping[str, Any], records: list[dict[str, Any]]) -> None:
-    lines = (json.dumps(r, ensure_ascii=False, separators=(",", ":")) for r in records)
+def _write(folder: Path, manifest: Manifest, records: Sequence[Record]) -> None:
+    lines = (json.dumps(r.fields(), ensure_ascii=False, separators=(",", ":")) for r in records)
     texts = {
-        MANIFEST: yaml.safe_dump(dict(manifest), sort_keys=False, allow_unicode=True, width=100),
+        MANIFEST: yaml.safe_dump(manifest.fields(), sort_keys=False, allow_unicode=True, width=100),
         RECORDS: "".join(line + "\n" for line in lines),
     }
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    run_folder(folder).begin()
+    with writing(folder):
         for name, text in texts.items():
             atomic_write(folder / name, text)
-    except OSError as error:
-        problem = Problem(str(folder), f"cannot be written: {error.strerror}")
-        raise StoreError(problem) from error

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 from phyblock.errors import Problem, SpecError
 from phyblock.models import (
+    Breakers,
     Budget,
     Gate,
     Halt,
     Model,
     ModelEvent,
-    ReplyCache,
     RetryPolicy,
+    SharedCache,
     api_key_status,
     build_model,
 )
 from phyblock.resources import reply_cache_file
-from phyblock.run.events import ModelNotice, RunStarted, Watcher
+from phyblock.run.events import ModelNotice, RunNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.plan import RunPlan
-from phyblock.run.reading import RecordLines, TurnLines, read_records
 from phyblock.run.store import RunStore
 
 __all__ = ["SERVERS", "Session", "check_ready"]
@@ -71,7 +69,7 @@ class Session:
         self._folder = folder
         self._watch = watch
         self._use_cache = use_cache
-        self._cache: ReplyCache | None = None
+        self._cache: SharedCache | None = None
         self._store: RunStore | None = None
         self._models: dict[str, Model] = {}
         self.executor: Executor
@@ -79,15 +77,18 @@ class Session:
     async def __aenter__(self) -> Session:
         plan = self._plan
         try:
-            self._store = RunStore(self._folder, plan.manifest)
+            self._store = RunStore(self._folder, plan.manifest, plan.sample_ids())
             if self._use_cache and any(m.config.kind == "litellm" for m in plan.models):
-                self._cache = ReplyCache(reply_cache_file())
+                self._cache = SharedCache(reply_cache_file(), self._tell)
+                await self._cache.open()
             limits = plan.suite.limits
             overall = Gate(limits.max_concurrency)
             halt = Halt()
             budget = None
             if limits.max_cost_usd is not None:
-                budget = Budget(limits.max_cost_usd, _spent_usd(self._folder))
+                budget = Budget(limits.max_cost_usd, self._store.standing.limit_usd)
+            policy = RetryPolicy(limits.max_attempts, limits.retry_for_s)
+            breakers = Breakers(policy, self._tell)
             for model in plan.models:
                 self._models[model.name] = build_model(
                     model.config,
@@ -95,7 +96,8 @@ class Session:
                     overall=overall,
                     budget=budget,
                     observer=self._notice,
-                    policy=RetryPolicy(attempts=limits.max_attempts),
+                    policy=policy,
+                    breakers=breakers,
                     halt=halt,
                 )
             self.executor = Executor(
@@ -104,7 +106,6 @@ class Session:
                 self._models,
                 self._watch,
                 halt,
-                read_records(self._folder),
                 retry_failed=self._retry_failed,
             )
         except BaseException:
@@ -121,56 +122,34 @@ class Session:
         await self._close()
 
     async def run(self) -> RunResult:
-        """Ask what is left to ask; see `Executor.run`.
-
-        Raises StoreError also where all is asked but the cache refused a reply.
-        """
+        """Ask what is left to ask; see `Executor.run`."""
         settled = self.executor.settled.values()
         self._watch(
             RunStarted(
                 {model.name: self._plan.samples_per_model for model in self._plan.models},
                 {
-                    model.name: tuple(r for r in settled if r["model"] == model.name)
+                    model.name: tuple(s for s in settled if s.model == model.name)
                     for model in self._plan.models
                 },
             )
         )
-        result = await self.executor.run()
-        if self._cache is not None:
-            self._cache.check()
-        return result
+        return await self.executor.run()
 
     def _notice(self, event: ModelEvent) -> None:
-        self._watch(ModelNotice(event.model, event.kind, event.message))
+        notice = ModelNotice(
+            event.model, event.kind, event.message, event.wait_s, event.limit, event.status
+        )
+        self._watch(notice)
+
+    def _tell(self, text: str) -> None:
+        self._watch(RunNotice(text))
 
     async def _close(self) -> None:
         for model in self._models.values():
             await model.aclose()
         for track in self._plan.tracks:
             track.close()
-        for resource in (self._cache, self._store):
-            if resource is not None:
-                resource.close()
-
-
-def _spent_usd(folder: Path) -> float:
-    """What the run cost so far: of every line, also of those that later ones replaced.
-
-    Replies of episodes are counted where each was written when it came, as turns.
-    """
-    turns = sum(_billed_usd(turn["reply"]) for _, turn in TurnLines(folder))
-    return turns + sum(_record_usd(record) for _, record in RecordLines(folder))
-
-
-def _record_usd(record: Mapping[str, Any]) -> float:
-    reply = {} if "turns" in record else record["reply"] or {}
-    failed = (record["error"] or {}).get("billed_usd") or 0.0
-    return _billed_usd(reply) if reply else failed
-
-
-def _billed_usd(reply: Mapping[str, Any]) -> float:
-    """What a limit counted for a reply, else its cost unless that was paid elsewhere."""
-    billed_usd: float | None = reply.get("billed_usd")
-    if billed_usd is None and not reply.get("cached"):
-        billed_usd = reply.get("cost_usd")
-    return billed_usd or 0.0
+        if self._cache is not None:
+            await self._cache.aclose()
+        if self._store is not None:
+            self._store.close()

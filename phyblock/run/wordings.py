@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from phyblock.bounded import load_json
 from phyblock.domain import LETTERS, Question, Subtask, is_picture_option
 from phyblock.generate.questions.verify import problem_of
 from phyblock.generate.questions.wording import WORDINGS, wording_ids
@@ -26,13 +27,12 @@ from phyblock.models import ChoiceSubject, Message, Model, Request
 from phyblock.parsing import parse_answer
 from phyblock.tasks import TemplatePrompt
 
-__all__ = ["Paraphrase", "fault_of_form", "stems_of", "write_wordings"]
+__all__ = ["Paraphrase", "fault_of_form", "stems_of", "texts_in", "write_wordings"]
 
 _LENGTHS = (15, 400)
 _SHOWN_CHARS = 200
 _LETTERS = "ABCDE"
 _ELSE = "something else is asked, or it cannot be told"
-_LIST = re.compile(r"\[.*\]", re.DOTALL)
 _LETTER = re.compile(r"\boptions?\b|\b[A-D]\)|\([A-D]\)|answer:", re.IGNORECASE)
 
 
@@ -109,7 +109,7 @@ async def write_wordings(
     facts["slots"] = [f"{{{name}}}" for name in sorted(_slots(originals[0]))]
     text = await _ask(model, prompt, "user", facts, f"write-{stem}", seed, questions[0])
     subtask = questions[0].subtask
-    texts = _texts(text)
+    texts = texts_in(text)
     if texts is None:
         shown = " ".join(text.split())[:_SHOWN_CHARS]
         return [Paraphrase(stem, subtask, shown, "the reply holds no JSON list of texts")]
@@ -177,12 +177,12 @@ async def _ask(
     return "" if reply is None else reply.text
 
 
-def _texts(reply: str) -> list[str] | None:
+def texts_in(reply: str) -> list[str] | None:
     """The texts of the JSON list in a reply; None where there is none."""
-    found = _LIST.search(reply)
+    start, end = reply.find("["), reply.rfind("]")
     try:
-        texts = json.loads(found.group()) if found else None
-    except json.JSONDecodeError:
+        texts = load_json(reply[start : end + 1]) if 0 <= start < end else None
+    except ValueError:
         texts = None
     if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
         return None

@@ -1,6 +1,8 @@
-"""The physics seam: geometry, contact, stability and pictures; the only layer with PyBullet.
+"""Geometry, contact, stability and pictures, on a physics engine and a renderer of one's choice.
 
-PyBullet itself is loaded when a world or a picture is made, never by importing this package.
+`engine` and `renderer` say what is asked of the two, and `registry` lists all that there are.
+PyBullet is one of each (`bullet`). It is loaded when a world or a picture is made, never by
+importing this package.
 """
 
 from phyblock.sim.pictures import (

@@ -53,19 +53,26 @@ FULL_WINDOW = Window(-1.0, 1.0, -1.0, 1.0)
 class Camera:
     """A perspective camera: `eye_m` shape (3,) [m]; `axes` rows right, up, forward (world).
 
-    `near_m` and `far_m` bound the depths that are drawn [m].
+    `near_m` and `far_m` bound the depths that are drawn [m]; the field of view is that from the
+    upper to the lower edge and from the left to the right one, since pictures are square.
     """
 
     eye_m: NDArray[np.float64]
     axes: NDArray[np.float64]
     near_m: float
     far_m: float
+    field_of_view_deg: float = FIELD_OF_VIEW_DEG
+
+    @property
+    def half_tangent(self) -> float:
+        """Half the width of what is seen at a depth, as a share of that depth."""
+        return math.tan(math.radians(self.field_of_view_deg / 2))
 
     def project(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """Normalized picture coordinates of world points (n, 3), shape (n, 2)."""
         right, up, depth = self.axes @ (points_m - self.eye_m).T
         seen: NDArray[np.float64] = np.stack([right, up], axis=1) / depth[:, None]
-        seen /= _HALF_TANGENT
+        seen /= self.half_tangent
         return seen
 
     def to_pixels(self, points_m: NDArray[np.float64], size_px: int) -> NDArray[np.float64]:
@@ -78,7 +85,7 @@ class Camera:
         Shape (size, size); the three components are not of unit length, but of unit depth. They
         are given one by one because a picture's worth of all three takes much memory.
         """
-        steps = ((np.arange(size_px) + 0.5) / size_px * 2 - 1) * _HALF_TANGENT
+        steps = ((np.arange(size_px) + 0.5) / size_px * 2 - 1) * self.half_tangent
         right, up, forward = self.axes[:, axis]
         across, down = steps * right + forward, steps * up
         component: NDArray[np.float32] = np.subtract.outer(-down, -across).astype(np.float32)
@@ -86,24 +93,7 @@ class Camera:
 
     def width_m(self, depth_m: float) -> float:
         """Width of what the picture shows at a depth [m]."""
-        return 2 * depth_m * _HALF_TANGENT
-
-    def view_matrix(self) -> list[float]:
-        """OpenGL view matrix, column-major, 16 numbers."""
-        matrix = np.eye(4)
-        matrix[:3, :3] = self.axes * [[1.0], [1.0], [-1.0]]
-        matrix[:3, 3] = -matrix[:3, :3] @ self.eye_m
-        return [float(entry) for entry in matrix.T.ravel()]
-
-    def projection_matrix(self) -> list[float]:
-        """OpenGL projection matrix, column-major, 16 numbers."""
-        near, far = self.near_m, self.far_m
-        matrix = np.zeros((4, 4))
-        matrix[0, 0] = matrix[1, 1] = 1 / _HALF_TANGENT
-        matrix[2, 2] = (far + near) / (near - far)
-        matrix[2, 3] = 2 * far * near / (near - far)
-        matrix[3, 2] = -1.0
-        return [float(entry) for entry in matrix.T.ravel()]
+        return 2 * depth_m * self.half_tangent
 
 
 def view_axes(azimuth_deg: float, elevation_deg: float) -> NDArray[np.float64]:

@@ -1,64 +1,131 @@
-"""The door to PyBullet: loaded late, quietly, one in-process client for each user."""
+"""What `sim` asks of a physics engine: two protocols, in terms of blocks on a floor.
+
+A `PhysicsEngine` opens simulations; a `Simulation` holds blocks and moves them. The floor is the
+plane z = 0. Blocks are named by number, and `FLOOR` (0) stands for the floor; the caller names
+only blocks that are there. Poses are those of body frames (`phyblock.domain.blocks`). What a
+block is made of, an engine finds in `SHAPES` (mass, center of mass) and in
+`phyblock.sim.geometry` (`collision_pieces`, `solid_mesh` with its inertia).
+
+To add an engine: write a module with a class that follows `PhysicsEngine`, name it in
+`phyblock.sim.registry`, and let `tests/sim/test_engine_laws.py` tell what it lacks.
+"""
 
 from __future__ import annotations
 
-import contextlib
-import functools
-import importlib
-import importlib.metadata
-import os
-from collections.abc import Iterator
-from types import ModuleType
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol, runtime_checkable
 
-from phyblock.errors import SimulationError
+from phyblock.domain.blocks import FRICTION, BlockType
+from phyblock.sim.pose import Pose
 
-__all__ = ["client", "connect", "load", "version"]
+__all__ = [
+    "FLOOR",
+    "GRAVITY_M_S2",
+    "Contact",
+    "Physics",
+    "PhysicsEngine",
+    "Simulation",
+    "Vector",
+    "Velocity",
+]
+
+Vector = tuple[float, float, float]
+"""x, y and z in the world."""
+FLOOR = 0
+"""The floor's number among the blocks."""
+GRAVITY_M_S2 = 9.81
 
 
-@functools.cache
-def version() -> str:
-    """Version of the installed PyBullet, without importing it."""
-    return importlib.metadata.version("pybullet")
+@dataclass(frozen=True)
+class Physics:
+    """Settings of a simulation.
 
-
-@functools.cache
-def load() -> ModuleType:
-    """The `pybullet` module; its C code's build banner is kept off standard error."""
-    with _quiet_stderr():
-        return importlib.import_module("pybullet")
-
-
-def connect() -> tuple[ModuleType, int]:
-    """The module and the id of a fresh DIRECT client, which the caller closes.
-
-    Raises SimulationError when PyBullet has no client left to give.
+    Time step [s], iterations of the contact solver in each step, friction coefficient of any two
+    bodies that touch, and gravity [m/s2], which is not straight down where the floor is to lean.
     """
-    bullet = load()
-    number = bullet.connect(bullet.DIRECT)
-    if number < 0:
-        raise SimulationError("PyBullet gave no client: too many are open in this process")
-    return bullet, number
+
+    time_step_s: float = 1 / 240
+    iterations: int = 50
+    friction: float = FRICTION
+    gravity_m_s2: Vector = (0.0, 0.0, -GRAVITY_M_S2)
 
 
-@contextlib.contextmanager
-def client() -> Iterator[tuple[ModuleType, int]]:
-    """The module and the id of a fresh DIRECT client, closed on leaving; raises as `connect`."""
-    bullet, number = connect()
-    try:
-        yield bullet, number
-    finally:
-        bullet.disconnect(number)
+class Velocity(NamedTuple):
+    """How a block moves: velocity of its center of mass [m/s], and its spin [rad/s]."""
+
+    linear_m_s: Vector
+    angular_rad_s: Vector
 
 
-@contextlib.contextmanager
-def _quiet_stderr() -> Iterator[None]:
-    """Send what C code writes to file descriptor 2 to the null device."""
-    kept = os.dup(2)
-    null = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(null, 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(null)
+class Contact(NamedTuple):
+    """A point where two bodies touch: their numbers, `first` below `second`.
+
+    `normal` is a unit vector from the first to the second; `distance_m` is how far apart they are
+    there [m], negative where they overlap.
+    """
+
+    first: int
+    second: int
+    normal: Vector
+    distance_m: float
+
+
+class Simulation(Protocol):
+    """Rigid blocks on a floor.
+
+    The same calls on the same machine give the same bits, whatever other simulations are open.
+    """
+
+    def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
+        """Put a block at a pose, at rest; its number is above 0 and not taken."""
+
+    def remove(self, number: int) -> None:
+        """Take a block out."""
+
+    def step(self, n: int) -> None:
+        """Simulate `n` time steps."""
+
+    def pose(self, number: int) -> Pose:
+        """Where a block is now."""
+
+    def velocity(self, number: int) -> Velocity:
+        """How a block moves now."""
+
+    def set_velocity(self, number: int, velocity: Velocity) -> None:
+        """Set how a block moves from now on, as far as contacts and gravity let it."""
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """List where bodies touched in the last time step; empty before the first step."""
+
+    def save(self) -> object:
+        """Everything that decides what happens next, as a value to give to `restore`."""
+
+    def restore(self, saved: object) -> None:
+        """Bring back what was saved: what happens next is then the same bit for bit.
+
+        Raises SimulationError when blocks were added or removed since.
+        """
+
+
+@runtime_checkable
+class PhysicsEngine(Protocol):
+    """A way to simulate; any number of its simulations may be open at once."""
+
+    def __hash__(self) -> int:
+        """Results are kept by engine."""
+
+    @property
+    def name(self) -> str:
+        """What it is called in `PHYBLOCK_PHYSICS` and in what is written about a run."""
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """Name and version of each library that decides where blocks end up."""
+
+    def open(self, physics: Physics) -> AbstractContextManager[Simulation]:
+        """Open a floor without blocks, as a context manager that closes it on leaving.
+
+        Raises SimulationError when the engine can open no more.
+        """

@@ -90,7 +90,7 @@ def collision_pieces(block_type: BlockType, inset_m: float = 0.0) -> tuple[Conve
     """Convex pieces that fill the block, every plane moved inward by `inset_m` [m].
 
     One piece, but for the arch: ten (each leg with its first arc segment, and eight slices).
-    PyBullet adds an outer margin of 1 mm to mesh hulls; `inset_m=0.001` takes it back.
+    The inset takes back the margin that a simulator adds around hulls.
     """
     prism = _prism(block_type)
     return tuple(_convex_prism(prism, _shrink(part, inset_m), inset_m) for part in prism.parts)

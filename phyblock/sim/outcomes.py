@@ -14,12 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from phyblock.domain.blocks import Euler, quat_xyzw_to_matrix
 from phyblock.domain.scene import Block
-from phyblock.sim.steps import groups
-from phyblock.sim.world import Physics, Pose, World
+from phyblock.sim.engine import GRAVITY_M_S2, Physics
+from phyblock.sim.pose import Pose
+from phyblock.sim.steps import groups, moments, wait
+from phyblock.sim.world import World
 
 __all__ = [
     "DEFAULT_LIMITS",
@@ -28,49 +28,38 @@ __all__ = [
     "Limits",
     "Outcome",
     "Push",
-    "Setting",
     "after",
     "after_removal",
     "holds",
     "moved_orders",
-    "quat_xyzw_to_euler_deg",
 ]
-
-
-@dataclass(frozen=True)
-class Setting:
-    """One way of trying an outcome: a simulation, and where the floor leans to, if anywhere.
-
-    `lean` is a unit vector (x, y), downhill, of a slope of `LEAN_DEG`.
-    """
-
-    physics: Physics
-    lean: tuple[float, float] | None = None
-
 
 LEAN_DEG = 2.0
 """How much the floor leans [degrees]; blocks begin to slide at 17."""
+
+
+def _leaning(physics: Physics, downhill: tuple[float, float]) -> Physics:
+    """The same settings on a floor that leans by `LEAN_DEG` to a side, a unit vector (x, y)."""
+    slope = math.radians(LEAN_DEG)
+    x, y = (part * math.sin(slope) * GRAVITY_M_S2 for part in downhill)
+    return replace(physics, gravity_m_s2=(x, y, -math.cos(slope) * GRAVITY_M_S2))
+
+
 _ACROSS = math.sqrt(0.75)
-OUTCOME_SETTINGS: tuple[Setting, ...] = (
-    Setting(Physics(1 / 240, 50, 0.35)),
-    Setting(Physics(1 / 200, 50, 0.40), (0.0, 1.0)),
-    Setting(Physics(1 / 300, 80, 0.30), (_ACROSS, -0.5)),
-    Setting(Physics(1 / 480, 100, 0.35), (-_ACROSS, -0.5)),
+OUTCOME_SETTINGS: tuple[Physics, ...] = (
+    Physics(1 / 240, 50, 0.35),
+    _leaning(Physics(1 / 200, 50, 0.40), (0.0, 1.0)),
+    _leaning(Physics(1 / 300, 80, 0.30), (_ACROSS, -0.5)),
+    _leaning(Physics(1 / 480, 100, 0.35), (-_ACROSS, -0.5)),
 )
 """What every outcome is tried under; the first gives the settled poses."""
 
-_GRAVITY_M_S2 = 9.81
-_EVERY_S = 0.05
-_QUIET_S = 0.25
-_QUIET_M_S = 0.005
 _LONGEST_S = 5.0
-_POSITION_DIGITS = 4
 _PATIENCE = 4.0
 """How much longer than without friction a push is kept up."""
 _DOWN_M = 0.008
 _SAME_M, _SAME_DEG = 0.015, 15.0
 _AS_FAR_M, _STRAIGHT_DEG = 0.005, 10.0
-_ANGLE_DIGITS = 2
 
 
 @dataclass(frozen=True)
@@ -124,7 +113,7 @@ _UNCLEAR = Outcome((), (), False)
 def after(
     blocks: Sequence[Block],
     push: Push | None = None,
-    settings: Sequence[Setting] = OUTCOME_SETTINGS,
+    settings: Sequence[Physics] = OUTCOME_SETTINGS,
     limits: Limits = DEFAULT_LIMITS,
 ) -> Outcome:
     """Let blocks go where they are, or push one of them, and see what follows."""
@@ -141,12 +130,12 @@ def after(
         if push is not None and not _went_alike(blocks, push, first, poses):
             return _UNCLEAR
     still = set(first) - set(found or ())
-    settled = [b if b.order in still else _at(b, first[b.order]) for b in blocks]
+    settled = [b if b.order in still else first[b.order].put(b) for b in blocks]
     return Outcome(found or (), tuple(settled), True)
 
 
 def after_removal(
-    blocks: Sequence[Block], order: int, settings: Sequence[Setting] = OUTCOME_SETTINGS
+    blocks: Sequence[Block], order: int, settings: Sequence[Physics] = OUTCOME_SETTINGS
 ) -> Outcome:
     """What follows when the block with this order is taken away at once."""
     return after([block for block in blocks if block.order != order], settings=settings)
@@ -155,13 +144,13 @@ def after_removal(
 def holds(
     blocks: Sequence[Block],
     about: int,
-    settings: Sequence[Setting] = OUTCOME_SETTINGS,
+    settings: Sequence[Physics] = OUTCOME_SETTINGS,
     limits: Limits = DEFAULT_LIMITS,
 ) -> bool | None:
     """Whether all blocks stay where they are; None where the settings, or the limits, differ.
 
-    As `after`, but it ends as soon as a block has clearly left its place, and only the blocks that
-    are in reach of the one with the order `about` are tried: the others are to stand anyway.
+    Quicker than `after`: a trial ends as soon as a block has clearly left its place, and only the
+    blocks in reach of the one with the order `about` are tried, for the others stand anyway.
     """
     near = next(group for group in groups(blocks) if any(b.order == about for b in group))
     verdicts = set()
@@ -175,7 +164,7 @@ def holds(
 def moved_orders(
     blocks: Sequence[Block], poses: dict[int, Pose], limits: Limits = DEFAULT_LIMITS
 ) -> tuple[int, ...] | None:
-    """Orders of the blocks that are elsewhere in `poses`; None when that is not clear of one."""
+    """Orders of the blocks that `poses` has elsewhere; None where one lies between the limits."""
     moved = []
     for block in blocks:
         start, end = Pose.goal(block), poses[block.order]
@@ -187,75 +176,28 @@ def moved_orders(
     return tuple(moved)
 
 
-def quat_xyzw_to_euler_deg(quat_xyzw: NDArray[np.float64]) -> Euler:
-    """Extrinsic x-y-z angles [degrees] of a unit quaternion (x, y, z, w)."""
-    rotation = quat_xyzw_to_matrix(quat_xyzw)
-    pitch = np.arcsin(np.clip(-rotation[2, 0], -1.0, 1.0))
-    if abs(rotation[2, 0]) > 1 - 1e-9:
-        roll, yaw = 0.0, np.arctan2(-rotation[0, 1], rotation[1, 1])
-    else:
-        roll = np.arctan2(rotation[2, 1], rotation[2, 2])
-        yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
-    x, y, z = (float(np.degrees(angle)) for angle in (roll, pitch, yaw))
-    return (x, y, z)
-
-
-class _LeaningWorld(World):
-    """A world whose floor may lean, and in which a block's velocity across it can be set."""
-
-    def __init__(self, setting: Setting) -> None:
-        super().__init__(setting.physics)
-        self._lean = setting.lean
-
-    def __enter__(self) -> _LeaningWorld:
-        super().__enter__()
-        if self._lean is not None:
-            bullet, client = self._open()
-            slope = math.radians(LEAN_DEG)
-            x, y = (part * math.sin(slope) * _GRAVITY_M_S2 for part in self._lean)
-            bullet.setGravity(x, y, -math.cos(slope) * _GRAVITY_M_S2, physicsClientId=client)
-        return self
-
-    def drive(self, order: int, velocity_m_s: tuple[float, float]) -> None:
-        """Give a block this velocity in x and y; how it rises and turns is left as it is."""
-        bullet, client = self._open()
-        body = self._body(order)
-        linear, _ = bullet.getBaseVelocity(body, physicsClientId=client)
-        velocity = (*velocity_m_s, linear[2])
-        bullet.resetBaseVelocity(body, linearVelocity=velocity, physicsClientId=client)
-
-
-def _settle(blocks: Sequence[Block], setting: Setting, push: Push | None) -> dict[int, Pose] | None:
+def _settle(blocks: Sequence[Block], setting: Physics, push: Push | None) -> dict[int, Pose] | None:
     """Poses once all is at rest; None when that takes too long."""
-    with _LeaningWorld(setting) as world:
+    with World(setting) as world:
         world.place_all(blocks)
         if push is not None:
             _push(world, push)
-        quiet_s = 0.0
-        for _ in range(round(_LONGEST_S / _EVERY_S)):
-            world.step(_EVERY_S)
-            quiet_s = quiet_s + _EVERY_S if world.fastest_m_s() < _QUIET_M_S else 0.0
-            if quiet_s >= _QUIET_S - _EVERY_S / 2:
-                return world.poses()
-    return None
+        return world.poses() if wait(world, _LONGEST_S) else None
 
 
-def _holds(blocks: Sequence[Block], setting: Setting, limits: Limits) -> bool | None:
+def _holds(blocks: Sequence[Block], setting: Physics, limits: Limits) -> bool | None:
     loose = Limits(limits.moved_m, limits.moved_deg, limits.moved_m, limits.moved_deg)
-    with _LeaningWorld(setting) as world:
+    with World(setting) as world:
         world.place_all(blocks)
-        quiet_s = 0.0
-        for _ in range(round(_LONGEST_S / _EVERY_S)):
-            world.step(_EVERY_S)
+        for is_at_rest in moments(world, _LONGEST_S):
             if moved_orders(blocks, world.poses(), loose):
                 return False
-            quiet_s = quiet_s + _EVERY_S if world.fastest_m_s() < _QUIET_M_S else 0.0
-            if quiet_s >= _QUIET_S - _EVERY_S / 2:
+            if is_at_rest:
                 return True if moved_orders(blocks, world.poses(), limits) == () else None
     return None
 
 
-def _push(world: _LeaningWorld, push: Push) -> None:
+def _push(world: World, push: Push) -> None:
     x, y = (part * push.speed_m_s for part in push.direction)
     start = world.pose(push.order)
     # Friction takes some of the speed within each step, so time alone does not tell the distance.
@@ -297,11 +239,3 @@ def _gone_m(push: Push, start: Pose, end: Pose) -> float:
 
 def _came_down(start: Pose, end: Pose) -> bool:
     return bool(start.position_m[2] - end.position_m[2] >= _DOWN_M)
-
-
-def _at(block: Block, pose: Pose) -> Block:
-    """The block at a pose, with angles and places as they are written."""
-    x, y, z = (round(float(place), _POSITION_DIGITS) + 0.0 for place in pose.position_m)
-    euler = quat_xyzw_to_euler_deg(pose.quat_xyzw)
-    a, b, c = (round(angle, _ANGLE_DIGITS) + 0.0 for angle in euler)
-    return replace(block, position_m=(x, y, z), euler_deg=(a, b, c))

@@ -22,11 +22,11 @@ from phyblock.domain.blocks import SHAPES, BlockType, Color, Euler
 from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
 from phyblock.errors import DataError, Problem
-from phyblock.sim import engine
 from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
 from phyblock.sim.compose import GRID_COLUMNS, LABEL_STRIP, numbered_grid, side_by_side, to_png
+from phyblock.sim.registry import renderer
 from phyblock.sim.render import DrawnBlock, picture
-from phyblock.sim.renderer import renderer
+from phyblock.sim.renderer import Renderer
 from phyblock.sim.textures import BACKGROUNDS, Background
 
 __all__ = [
@@ -42,6 +42,7 @@ __all__ = [
     "goal_key",
     "goal_png",
     "on_the_floor",
+    "pixel_versions",
 ]
 
 RENDER_VERSION = 1
@@ -99,7 +100,7 @@ def candidates_png(candidates: CandidateSet, style: PictureStyle) -> bytes:
     """PNG of the numbered candidates, square, 4 by 4 cells, seen from where the goal is seen."""
     cell_px = math.ceil(style.size_px / GRID_COLUMNS)
     cells = [
-        _thumbnail(candidate.type, candidate.color, candidate.euler_deg, style, cell_px)
+        _thumbnail(candidate.type, candidate.color, candidate.euler_deg, style, cell_px, renderer())
         for candidate in candidates.candidates
     ]
     empty = _empty_cell(style, cell_px)
@@ -158,10 +159,16 @@ def on_the_floor(block_type: BlockType, color: Color, euler_deg: Euler) -> Drawn
 
 @functools.lru_cache(maxsize=512)
 def _thumbnail(
-    block_type: BlockType, color: Color, euler_deg: Euler, style: PictureStyle, cell_px: int
+    block_type: BlockType,
+    color: Color,
+    euler_deg: Euler,
+    style: PictureStyle,
+    cell_px: int,
+    drawn_by: Renderer,
 ) -> Image.Image:
     block = on_the_floor(block_type, color, euler_deg)
-    return picture([block], candidate_camera(block, style), style.background, cell_px)
+    camera = candidate_camera(block, style)
+    return picture([block], camera, style.background, cell_px, drawn_by=drawn_by)
 
 
 def _empty_cell(style: PictureStyle, cell_px: int) -> Image.Image:
@@ -174,13 +181,17 @@ def drawn(scene: Scene) -> list[DrawnBlock]:
     return [DrawnBlock(b.type, b.color, b.position_m, b.euler_deg) for b in scene.blocks]
 
 
+def pixel_versions() -> dict[str, str]:
+    """The chosen renderer, and the version of each library that decides a picture's bytes."""
+    drawn_by = renderer()
+    return {"renderer": drawn_by.name, **drawn_by.versions, "pillow": PIL.__version__}
+
+
 def _key(kind: str, style: PictureStyle, content: Iterable[object]) -> str:
     parts = {
         "kind": kind,
         "render_version": RENDER_VERSION,
-        "renderer": renderer(),
-        "pybullet": engine.version(),
-        "pillow": PIL.__version__,
+        **pixel_versions(),
         "style": [style.size_px, style.background, style.azimuth_deg, style.elevation_deg],
         "content": list(content),
     }

@@ -12,18 +12,20 @@ import math
 from collections.abc import Sequence
 from dataclasses import fields, replace
 
-import PIL
-
 from phyblock.domain.blocks import SHAPES
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block
-from phyblock.sim import engine
 from phyblock.sim.camera import Camera, Window, frame, view_axes
 from phyblock.sim.compose import to_png
 from phyblock.sim.marks import draw_marks
-from phyblock.sim.pictures import RENDER_VERSION, PictureStyle, camera_for, on_the_floor
+from phyblock.sim.pictures import (
+    RENDER_VERSION,
+    PictureStyle,
+    camera_for,
+    on_the_floor,
+    pixel_versions,
+)
 from phyblock.sim.render import DrawnBlock, picture
-from phyblock.sim.renderer import renderer
 
 __all__ = [
     "BLOCK_LABEL",
@@ -89,14 +91,12 @@ def question_key(picture_recipe: QuestionPicture, style: PictureStyle) -> str:
     parts = {
         "kind": "question",
         "render_version": [RENDER_VERSION, QUESTION_RENDER_VERSION],
-        "renderer": renderer(),
-        "pybullet": engine.version(),
-        "pillow": PIL.__version__,
+        **pixel_versions(),
         "style": [style.size_px, style.background],
         "view": list(picture_recipe.view_deg),
         "alone": _is_alone(picture_recipe),
-        "blocks": _told(drawn_blocks(picture_recipe)),
-        "framed": _told(_drawn(picture_recipe.framed)),
+        "blocks": _field_values(drawn_blocks(picture_recipe)),
+        "framed": _field_values(_drawn(picture_recipe.framed)),
         "marks": [[mark.letter, *mark.position_m] for mark in picture_recipe.marks],
     }
     text = json.dumps(parts, sort_keys=True, allow_nan=False)
@@ -111,6 +111,6 @@ def _drawn(blocks: Sequence[Block]) -> list[DrawnBlock]:
     return [DrawnBlock(b.type, b.color, b.position_m, b.euler_deg) for b in blocks]
 
 
-def _told(blocks: Sequence[DrawnBlock]) -> list[list[object]]:
+def _field_values(blocks: Sequence[DrawnBlock]) -> list[list[object]]:
     """All fields of each block; `astuple` would copy what is in them as well."""
     return [[getattr(block, field.name) for field in fields(block)] for block in blocks]

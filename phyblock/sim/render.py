@@ -1,8 +1,8 @@
-"""Blocks to pixels with PyBullet: by its software renderer (TinyRenderer), or by EGL if asked for.
+"""Blocks to pixels, by whichever renderer is chosen.
 
-TinyRenderer has no anti-aliasing, so pictures are made at twice the size and scaled down. A block
-is drawn as its solid and as black bars along its true edges; outlines found afterwards in depth
-or segmentation would draw false diagonals. A block is no more than a color and two meshes here:
+Renderers need no anti-aliasing: pictures are made at twice the size and scaled down. A block is
+drawn as its solid and as black bars along its true edges; outlines found afterwards in depth or
+segmentation would draw false diagonals. A block is no more than a color and two meshes here:
 physics lives in `phyblock.sim.world`.
 """
 
@@ -19,15 +19,16 @@ from PIL import Image
 from phyblock.domain.blocks import BlockType, Color, Euler, euler_deg_to_quat_xyzw
 from phyblock.sim.camera import Camera
 from phyblock.sim.geometry import corners_m, edge_bars, solid_mesh
-from phyblock.sim.renderer import renderer
-from phyblock.sim.stage import Prop, stage
+from phyblock.sim.pose import Pose
+from phyblock.sim.registry import renderer
+from phyblock.sim.renderer import Light, Prop, Renderer, Rgb
 from phyblock.sim.textures import Background, floor, shadow
 
 __all__ = ["COLOR_RGB", "SUPERSAMPLE", "DrawnBlock", "Shot", "empty_ground", "picture", "shoot"]
 
 SUPERSAMPLE = 2
 
-COLOR_RGB: dict[Color, tuple[int, int, int]] = {
+COLOR_RGB: dict[Color, Rgb] = {
     "red": (244, 54, 54),
     "yellow": (250, 218, 50),
     "blue": (56, 88, 246),
@@ -40,7 +41,7 @@ _EDGE_HALF_WIDTH_M = 0.0004
 _EDGE_HALF_WIDTH_PX = 0.45
 _EDGE_STEP_M = 0.0001
 
-_BODIES_PER_BLOCK = 2
+_PROPS_PER_BLOCK = 2
 """Its solid and its edges."""
 
 _AMBIENT = 0.55
@@ -72,7 +73,7 @@ class DrawnBlock:
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """The renderer's raw answer.
+    """Blocks as the renderer gives them, before floor and smoothing.
 
     `rgb` shape (size, size, 3), 0..255; `block` shape (size, size), the 0-based number of the
     block seen in each pixel, -1 where there is none.
@@ -82,35 +83,26 @@ class Shot:
     block: NDArray[np.int64]
 
 
-def shoot(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> Shot:
-    """Draw blocks (one at least) alone, with no floor, at exactly `size_px` and unsmoothed."""
+def shoot(
+    blocks: Sequence[DrawnBlock],
+    camera: Camera,
+    size_px: int,
+    drawn_by: Renderer | None = None,
+) -> Shot:
+    """Draw blocks (one at least) alone, with no floor, at exactly `size_px` and unsmoothed.
+
+    The chosen renderer draws unless another is given.
+    """
     half_width_m = _edge_half_width_m(blocks, camera, size_px)
     props: list[Prop] = []
     for block in blocks:
-        where = (block.position_m, euler_deg_to_quat_xyzw(block.euler_deg))
-        props.append((solid_mesh(block.type), COLOR_RGB[block.color], *where))
-        props.append((edge_bars(block.type, half_width_m), _EDGE_RGB, *where))
-    with stage().showing(props) as (bullet, client, numbers):
-        width, height, rgba, _, seen = bullet.getCameraImage(
-            size_px,
-            size_px,
-            camera.view_matrix(),
-            camera.projection_matrix(),
-            lightDirection=light_direction(camera).tolist(),
-            lightAmbientCoeff=_AMBIENT,
-            lightDiffuseCoeff=_DIFFUSE,
-            lightSpecularCoeff=0.0,
-            shadow=0,
-            renderer=(
-                bullet.ER_BULLET_HARDWARE_OPENGL if renderer() == "egl" else bullet.ER_TINY_RENDERER
-            ),
-            physicsClientId=client,
-        )
-    colors = np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[..., :3]
-    owner = np.full(max(numbers) + 2, -1)
-    owner[list(numbers)] = np.arange(len(numbers)) // _BODIES_PER_BLOCK
-    bodies = np.asarray(seen, dtype=np.int64).reshape(height, width)
-    return Shot(colors.copy(), owner[bodies])
+        pose = Pose(np.array(block.position_m), euler_deg_to_quat_xyzw(block.euler_deg))
+        props.append(Prop(solid_mesh(block.type), COLOR_RGB[block.color], pose))
+        props.append(Prop(edge_bars(block.type, half_width_m), _EDGE_RGB, pose))
+    light = Light(light_direction(camera), _AMBIENT, _DIFFUSE)
+    raster = (drawn_by or renderer()).draw(props, camera, light, size_px)
+    # Floor division takes -1, for no prop, to -1.
+    return Shot(raster.rgb, raster.prop // _PROPS_PER_BLOCK)
 
 
 def picture(
@@ -119,15 +111,17 @@ def picture(
     background: Background,
     size_px: int,
     ground: NDArray[np.float32] | None = None,
+    drawn_by: Renderer | None = None,
 ) -> Image.Image:
     """Blocks on their floor, anti-aliased, an RGB image of `size_px` squared.
 
-    `ground` is the floor as `empty_ground` gives it, for those who draw it often.
+    `ground` is the floor as `empty_ground` gives it, for those who draw it often. The chosen
+    renderer draws unless another is given.
     """
     large_px = size_px * SUPERSAMPLE
     image = floor(background, camera, large_px) if ground is None else ground.copy()
     if blocks:
-        shot = shoot(blocks, camera, large_px)
+        shot = shoot(blocks, camera, large_px, drawn_by)
         triangles = [block.triangles_m for block in blocks]
         image *= shadow(background, camera, large_px, triangles, light_direction(camera))
         np.copyto(image, shot.rgb, where=shot.block[..., None] >= 0)

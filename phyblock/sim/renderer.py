@@ -1,104 +1,84 @@
-"""Which renderer draws: TinyRenderer unless asked otherwise, EGL where a probe says it works.
+"""What `sim` asks of a renderer: colored meshes and a camera in, pixels out.
 
-`PHYBLOCK_RENDERER` is `tinyrenderer` (the default: the same pictures on every machine), `egl`
-(an error where it does not work) or `auto`. The EGL plugin of PyBullet draws on a graphics card
-or a software OpenGL. A plugin that fails to load ends its process, so a child process tries it.
+A renderer draws meshes alone, with no floor, shadow or smoothing: those are made in
+`phyblock.sim.render`, in the same way for every renderer.
+
+To add a renderer: write a module with a class that follows `Renderer`, name it in
+`phyblock.sim.registry`, and let `tests/sim/test_renderer_laws.py` tell what it lacks.
 """
 
 from __future__ import annotations
 
-import functools
-import importlib.util
-import os
-import tempfile
-from collections.abc import Callable
-from multiprocessing import get_context
-from pathlib import Path
-from types import ModuleType
-from typing import Literal, get_args
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
-from phyblock.errors import InputError, Problem, SimulationError
-from phyblock.sim import engine
+import numpy as np
+from numpy.typing import NDArray
 
-__all__ = ["Renderer", "draw_with_egl", "load_egl", "renderer", "succeeds_in_child"]
+from phyblock.sim.camera import Camera
+from phyblock.sim.mesh import Mesh
+from phyblock.sim.pose import Pose
 
-Renderer = Literal["tinyrenderer", "egl"]
-_VARIABLE = "PHYBLOCK_RENDERER"
-_WORDS = (*get_args(Renderer), "auto")
-_PATIENCE_S = 60.0
-_PROBE_PX = 32
-_TRIANGLE = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n"
+__all__ = ["Light", "Prop", "Raster", "Renderer", "Rgb"]
+
+Rgb = tuple[int, int, int]
+"""Red, green and blue, 0..255."""
 
 
-def renderer() -> Renderer:
-    """The renderer of this process's pictures, by `PHYBLOCK_RENDERER`.
+@dataclass(frozen=True, eq=False)
+class Prop:
+    """A mesh in one color at a pose.
 
-    Raises InputError for an unknown word, SimulationError when EGL is asked for and does not work.
+    The same mesh is the same object in every picture, so that a renderer may keep what it makes
+    of one.
     """
-    return _choose(os.environ.get(_VARIABLE, "tinyrenderer"))
+
+    mesh: Mesh
+    rgb: Rgb
+    pose: Pose
 
 
-def load_egl(bullet: ModuleType, client: int) -> None:
-    """Load the plugin into a client; SimulationError when there is none. May end the process."""
-    found = importlib.util.find_spec("eglRenderer")
-    if found is None or found.origin is None:
-        raise SimulationError("PyBullet came without its EGL plugin")
-    if bullet.loadPlugin(found.origin, "_eglRendererPlugin", physicsClientId=client) < 0:
-        raise SimulationError("PyBullet could not load its EGL plugin")
+@dataclass(frozen=True, eq=False)
+class Light:
+    """A light from far away: `direction` (3,) is the unit vector to it, in the world.
+
+    A face with the outward unit normal n has its mesh's color times
+    ambient + diffuse * max(0, n . direction), whatever stands in the way of the light. PyBullet's
+    EGL plugin alone is known to do otherwise: its faces differ less.
+    """
+
+    direction: NDArray[np.float64]
+    ambient: float
+    diffuse: float
 
 
-def succeeds_in_child(probe: Callable[[], object], patience_s: float = _PATIENCE_S) -> bool:
-    """Whether `probe` returns in a process of its own: no exception, crash or hang."""
-    child = get_context("spawn").Process(target=_quietly, args=(probe,), daemon=False)
-    child.start()
-    child.join(patience_s)
-    if child.is_alive():
-        child.kill()
-        child.join()
-    worked = child.exitcode == 0
-    child.close()
-    return worked
+@dataclass(frozen=True, eq=False)
+class Raster:
+    """What a renderer gives: `rgb` shape (size, size, 3), 0..255, row 0 on top.
+
+    `prop` shape (size, size) is the place in the list of the prop that each pixel shows, -1 where
+    it shows none; what color such a pixel has does not matter.
+    """
+
+    rgb: NDArray[np.uint8]
+    prop: NDArray[np.int64]
 
 
-@functools.cache
-def _choose(wanted: str) -> Renderer:
-    if wanted not in _WORDS:
-        raise InputError(Problem(_VARIABLE, "is not known", "", wanted, ", ".join(_WORDS)))
-    if wanted == "tinyrenderer":
-        return "tinyrenderer"
-    if succeeds_in_child(draw_with_egl):
-        return "egl"
-    if wanted == "egl":
-        raise SimulationError(f"{_VARIABLE} asks for egl, but a trial in a child process failed")
-    return "tinyrenderer"
+@runtime_checkable
+class Renderer(Protocol):
+    """A way to draw. Threads may use it at the same time; the same call gives the same pixels."""
 
+    def __hash__(self) -> int:
+        """Pictures are kept by renderer."""
 
-def draw_with_egl() -> None:
-    """Draw a red triangle; SimulationError when it does not come out."""
-    with engine.client() as (bullet, client), tempfile.TemporaryDirectory() as folder:
-        load_egl(bullet, client)
-        path = Path(folder, "triangle.obj")
-        path.write_text(_TRIANGLE, encoding="ascii")
-        shape = bullet.createVisualShape(
-            bullet.GEOM_MESH, fileName=str(path), rgbaColor=[1, 0, 0, 1], physicsClientId=client
-        )
-        body = bullet.createMultiBody(baseVisualShapeIndex=shape, physicsClientId=client)
-        _, _, _, _, seen = bullet.getCameraImage(
-            _PROBE_PX,
-            _PROBE_PX,
-            bullet.computeViewMatrix([0, 0, 2], [0, 0, 0], [0, 1, 0]),
-            bullet.computeProjectionMatrixFOV(60, 1, 0.1, 5),
-            renderer=bullet.ER_BULLET_HARDWARE_OPENGL,
-            physicsClientId=client,
-        )
-        middle = _PROBE_PX // 2
-        if int(seen.reshape(_PROBE_PX, _PROBE_PX)[middle, middle]) != body:
-            raise SimulationError("the EGL plugin draws nothing")
+    @property
+    def name(self) -> str:
+        """What it is called in the keys of pictures."""
 
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """Name and version of each library that decides pixels, for the keys of pictures."""
 
-def _quietly(probe: Callable[[], object]) -> None:
-    """Run a probe with everything that it or a driver prints thrown away."""
-    null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, 1)
-    os.dup2(null, 2)
-    probe()
+    def draw(self, props: Sequence[Prop], camera: Camera, light: Light, size_px: int) -> Raster:
+        """Draw what lies between the camera's near and far plane, `size_px` squared."""

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.question import Mark, QuestionPicture
-from phyblock.sim.camera import FIELD_OF_VIEW_DEG, Camera
+from phyblock.sim.camera import Camera
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import drawn_blocks, question_camera
+from phyblock.sim.registry import renderer
 from phyblock.sim.render import DrawnBlock, Shot, shoot
+from phyblock.sim.renderer import Renderer
 
 __all__ = [
     "MARKS_APART_PX",
@@ -55,10 +57,14 @@ class Top(NamedTuple):
     off_center_m: float
 
 
-@functools.lru_cache(maxsize=48)
 def seen(recipe: QuestionPicture) -> Shot:
     """The blocks of a picture by its camera, `SEEN_PX` squared, with no floor and no marks."""
-    return shoot(drawn_blocks(recipe), question_camera(recipe, _STYLE), SEEN_PX)
+    return _seen(recipe, renderer())
+
+
+@functools.lru_cache(maxsize=48)
+def _seen(recipe: QuestionPicture, drawn_by: Renderer) -> Shot:
+    return shoot(drawn_blocks(recipe), question_camera(recipe, _STYLE), SEEN_PX, drawn_by)
 
 
 def differing_pixels(one: Shot, other: Shot) -> int:
@@ -170,7 +176,7 @@ def _deepest(mask: NDArray[np.bool_]) -> tuple[tuple[int, int], int]:
 
 def _hit(block: DrawnBlock, camera: Camera, pixel: tuple[int, int]) -> Top | None:
     """Where the ray through a pixel meets the block first (Moeller-Trumbore); None if it misses."""
-    half = np.tan(np.radians(FIELD_OF_VIEW_DEG / 2))
+    half = camera.half_tangent
     across = ((pixel[1] + 0.5) / SEEN_PX * 2 - 1) * half
     up = (1 - (pixel[0] + 0.5) / SEEN_PX * 2) * half
     ray = camera.axes[0] * across + camera.axes[1] * up + camera.axes[2]

@@ -9,10 +9,9 @@ is met again: a verdict depends on nothing that was tried before.
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import functools
 import threading
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 
@@ -20,13 +19,14 @@ from PIL import Image
 
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block, Scene
-from phyblock.sim.outcomes import quat_xyzw_to_euler_deg
+from phyblock.sim.engine import PhysicsEngine
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_camera
+from phyblock.sim.registry import physics_engine
 from phyblock.sim.render import DrawnBlock, empty_ground, picture
 from phyblock.sim.stability import DEFAULT_TRIAL, Trial, movement
 from phyblock.sim.steps import groups, wait
-from phyblock.sim.world import Physics, Pose, World
+from phyblock.sim.world import Physics, World
 
 __all__ = ["ONE_SETTING", "Lookout", "Settled", "Site", "settle", "state_picture"]
 
@@ -36,8 +36,6 @@ ONE_SETTING = Trial(physics=DEFAULT_TRIAL.physics[:1])
 _KEPT = 65_536
 """Arrangements and states that are remembered, about 1 kB each."""
 _PLACE_DIGITS = 6
-_POSITION_DIGITS = 4
-_ANGLE_DIGITS = 2
 _ONE_AT_A_TIME = threading.Lock()
 _COLLAPSE_S = 3.0
 """How long fallen blocks are given to come to rest [s]."""
@@ -62,10 +60,14 @@ class Settled:
 
 
 class Site:
-    """Worlds kept open to try one state after another, each once; a context manager."""
+    """Worlds kept open to try one state after another, each once; a context manager.
 
-    def __init__(self, trial: Trial = DEFAULT_TRIAL) -> None:
+    The chosen physics engine tries them unless another is given.
+    """
+
+    def __init__(self, trial: Trial = DEFAULT_TRIAL, tried_by: PhysicsEngine | None = None) -> None:
         self.trial = trial
+        self._engine = tried_by or physics_engine()
         self._stack = contextlib.ExitStack()
         self._worlds: dict[Physics, World] = {}
         self._known = functools.lru_cache(_KEPT)(self._settle)
@@ -116,7 +118,7 @@ class Site:
     ) -> tuple[tuple[int, ...], tuple[Block, ...]]:
         """The orders that fell under one setting, and if any did, the blocks as they lie then."""
         # A fresh world: how blocks tumble could depend on what was in a used one before.
-        with World(physics) as world:
+        with World(physics, self._engine) as world:
             world.place_all(blocks)
             wait(world, self.trial.duration_s)
             fallen = movement(blocks, world.poses(), self.trial).fallen
@@ -125,13 +127,16 @@ class Site:
             wait(world, _COLLAPSE_S)
             poses = world.poses()
             fallen = (*fallen, *movement(blocks, poses, self.trial).fallen)
-            return fallen, tuple(_lying(block, poses[block.order], fallen) for block in blocks)
+            return fallen, tuple(
+                poses[block.order].put(block) if block.order in fallen else block
+                for block in blocks
+            )
 
     @contextlib.contextmanager
     def _placed(self, blocks: Sequence[Block], physics: Physics) -> Iterator[World]:
         """A world with these blocks in it for a while."""
         if physics not in self._worlds:
-            self._worlds[physics] = self._stack.enter_context(World(physics))
+            self._worlds[physics] = self._stack.enter_context(World(physics, self._engine))
         world = self._worlds[physics]
         world.place_all(blocks)
         try:
@@ -142,14 +147,14 @@ class Site:
 
 
 @functools.cache
-def _shared_site(trial: Trial) -> Site:
-    return Site(trial)
+def _shared_site(trial: Trial, tried_by: PhysicsEngine) -> Site:
+    return Site(trial, tried_by)
 
 
 def settle(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Settled:
     """As `Site.settle`, at a site that lasts as long as the process; for any thread."""
     with _ONE_AT_A_TIME:
-        return _shared_site(trial).settle(blocks)
+        return _shared_site(trial, physics_engine()).settle(blocks)
 
 
 def state_picture(
@@ -179,16 +184,6 @@ def _arrangement(group: Sequence[Block]) -> tuple[Block, ...]:
         )
         for number, block in enumerate(group, 1)
     )
-
-
-def _lying(block: Block, pose: Pose, fallen: Collection[int]) -> Block:
-    """A fallen block at a pose, rounded to 0.1 mm and 0.01 degrees; any other as it is."""
-    if block.order not in fallen:
-        return block
-    x, y, z = (round(float(place), _POSITION_DIGITS) + 0.0 for place in pose.position_m)
-    euler = quat_xyzw_to_euler_deg(pose.quat_xyzw)
-    a, b, c = (round(angle, _ANGLE_DIGITS) + 0.0 for angle in euler)
-    return dataclasses.replace(block, position_m=(x, y, z), euler_deg=(a, b, c))
 
 
 class Lookout:

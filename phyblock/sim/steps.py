@@ -7,7 +7,7 @@ been quiet for a while is at rest, for an unsupported load of 0.2 % of a block's
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from phyblock.domain.scene import Block
@@ -22,12 +22,12 @@ from phyblock.sim.stability import (
 from phyblock.sim.support import bounds_m, boxes_near
 from phyblock.sim.world import World
 
-__all__ = ["DEFAULT_REST", "Rest", "check_at_rest", "check_steps", "groups", "wait"]
+__all__ = ["DEFAULT_REST", "Rest", "check_at_rest", "check_steps", "groups", "moments", "wait"]
 
 
 @dataclass(frozen=True)
 class Rest:
-    """When a trial may end early: no corner was faster than `speed_m_s` [m/s] for `quiet_s` [s].
+    """When blocks are at rest: no corner was faster than `speed_m_s` [m/s] for `quiet_s` [s].
 
     Speeds are read every `every_s` [s]. 5 mm/s lies above the jitter of resting contacts (up to
     4 mm/s) and far below what a block reaches that has begun to tip.
@@ -111,12 +111,16 @@ def _try(world: World, group: Sequence[Block], trial: Trial, rest: Rest | None) 
     return found
 
 
-def wait(world: World, limit_s: float, rest: Rest = DEFAULT_REST) -> None:
-    """Simulate until all has been quiet for a while, but no longer than `limit_s` [s]."""
+def wait(world: World, limit_s: float, rest: Rest = DEFAULT_REST) -> bool:
+    """Simulate until all has been quiet for a while; whether that was within `limit_s` [s]."""
+    return any(moments(world, limit_s, rest))
+
+
+def moments(world: World, limit_s: float, rest: Rest = DEFAULT_REST) -> Iterator[bool]:
+    """Simulate moment by moment up to `limit_s` [s]; yields whether all is at rest by then."""
     every_s = max(rest.every_s, world.physics.time_step_s)
     quiet_s = 0.0
     for _ in range(round(limit_s / every_s)):
         world.step(every_s)
         quiet_s = quiet_s + every_s if world.fastest_m_s() < rest.speed_m_s else 0.0
-        if quiet_s >= rest.quiet_s - every_s / 2:
-            return
+        yield quiet_s >= rest.quiet_s - every_s / 2

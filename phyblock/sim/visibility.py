@@ -1,4 +1,4 @@
-"""How much of each block a picture shows, counted in the renderer's segmentation."""
+"""How much of each block a picture shows, counted in the renderer's map of what shows where."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ __all__ = [
     "ModelName",
     "Section",
     "Temperature",
+    "TimeoutS",
     "TopP",
     "Unique",
     "UniqueSome",
@@ -61,10 +62,11 @@ UniqueSome = Annotated[
 ]
 """A list with at least one item, whose items all differ."""
 
-Count = Annotated[int, Field(strict=True, ge=1)]
+Count = Annotated[int, Field(strict=True, ge=1, le=10**9)]
 Temperature = Annotated[float, Field(strict=True, ge=0, le=2, allow_inf_nan=False)]
 TopP = Annotated[float, Field(strict=True, gt=0, le=1, allow_inf_nan=False)]
 MaxTokens = Count
+TimeoutS = Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)]
 
 ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._:+-]{0,79}$")]
 """Names of models become names of folders and rows of tables, hence the narrow alphabet."""

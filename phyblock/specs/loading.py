@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,7 +23,7 @@ from phyblock.specs.suite import (
     RECORDED,
     SuiteSpec,
 )
-from phyblock.specs.validation import check, find_secrets, merge_problems
+from phyblock.specs.validation import MOST_HINTS, check, find_secrets, merge_problems
 from phyblock.specs.words import did_you_mean, show
 from phyblock.specs.yaml_source import FieldPath, YamlSource, dotted, read_yaml
 
@@ -84,6 +85,7 @@ def resolve_models(
     if names == RECORDED:
         raise ValueError("the models of a suite of recorded replies are listed by its data set")
     allowed = [*BASELINES, *known]
+    unknown = [(index, name) for index, name in enumerate(names) if name not in allowed]
     problems = [
         Problem(
             loaded.where("models", index),
@@ -91,10 +93,10 @@ def resolve_models(
             f"models[{index}]",
             show(name),
             ", ".join(allowed) if len(allowed) <= 12 else "",
-            did_you_mean(name, allowed) or "list them: phyblock models",
+            (did_you_mean(name, allowed) if number < MOST_HINTS else "")
+            or "list them: phyblock models",
         )
-        for index, name in enumerate(names)
-        if name not in allowed
+        for number, (index, name) in enumerate(unknown)
     ]
     if problems:
         raise SpecError(problems)
@@ -178,21 +180,21 @@ class _Finder:
         """The folder of data: a bundled set by its name, or a path."""
         if may_be_bundled and _BARE_NAME.match(text):
             folder = self._data_dir.absolute() / text
-            if not folder.is_dir():
+            if not os.path.isdir(folder):
                 names = sorted(p.name for p in self._data_dir.glob("*/"))
                 allowed = f"a bundled data set ({', '.join(names)}), or the path of a folder"
                 hint = did_you_mean(text, names) or f"for a folder beside the suite write ./{text}"
                 self._complain(at, "is not a bundled data set", show(text), allowed, hint)
             return folder
         found = self._expand(text, at)
-        if found is not None and not found.is_dir():
+        if found is not None and not os.path.isdir(found):
             self._complain(at, "no such folder", str(found))
         return found
 
     def file(self, text: str, at: FieldPath) -> Path | None:
         """A file that must be there."""
         found = self._expand(text, at)
-        if found is not None and not found.is_file():
+        if found is not None and not os.path.isfile(found):
             self._complain(at, "no such file", str(found))
         return found
 

@@ -8,13 +8,13 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, JsonValue, model_validator
 
 from phyblock.addresses import address_fault
-from phyblock.specs.fields import Count, MaxTokens, Section, Temperature, TopP, refuse
+from phyblock.specs.fields import Count, MaxTokens, Section, Temperature, TimeoutS, TopP, refuse
 from phyblock.specs.suite import SamplingSpec
 
 __all__ = ["ModelSpec", "PriceSpec"]
 
 Effort = Literal["none", "minimal", "low", "medium", "high", "xhigh", "max"]
-UsdPerMillion = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
+UsdPerMillion = Annotated[float, Field(strict=True, ge=0, le=1e9, allow_inf_nan=False)]
 
 _ID_PATTERN = r"^[A-Za-z0-9_.-]+/\S+$"
 _OWNERS = (("gpt", "openai"), ("o1", "openai"), ("o3", "openai"), ("claude", "anthropic"),
@@ -129,13 +129,13 @@ class ModelSpec(Section):
         description="auto: seeds are sent until the provider refuses one, then repeats are "
         "independent. always: a refused seed is an error. never: none is sent.",
     )
-    timeout_s: Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] | None = Field(
+    timeout_s: TimeoutS | None = Field(
         default=None, description="Longest wait for one reply [s]; null: the suite's."
     )
     published: Annotated[str, Field(min_length=1)] | None = Field(
         default=None, description="Name of its row in the paper's tables."
     )
-    size_b: Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] | None = Field(
+    size_b: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] | None = Field(
         default=None, description="Parameters [billions], where known."
     )
     replay: Annotated[str, Field(min_length=1)] | None = Field(

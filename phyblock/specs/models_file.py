@@ -12,7 +12,7 @@ from phyblock.specs.fields import ModelName
 from phyblock.specs.model import ModelSpec
 from phyblock.specs.paths import expand, sort_problems
 from phyblock.specs.suite import BASELINES, RECORDED
-from phyblock.specs.validation import check, find_secrets, merge_problems
+from phyblock.specs.validation import MOST_HINTS, check, find_secrets, merge_problems
 from phyblock.specs.words import show
 from phyblock.specs.yaml_source import YamlSource, read_yaml
 
@@ -35,7 +35,8 @@ def load_models(path: Path) -> dict[str, ModelSpec]:
     models: dict[str, ModelSpec] = {}
     problems: list[Problem] = []
     for name, entry in data.items():
-        spec, found = _read_entry(name, entry, source)
+        hints = max(0, MOST_HINTS - len(problems))
+        spec, found = _read_entry(name, entry, source, hints)
         problems += found
         if spec is not None:
             models[name] = spec
@@ -47,7 +48,7 @@ def load_models(path: Path) -> dict[str, ModelSpec]:
 
 
 def _read_entry(
-    name: str, entry: Any, source: YamlSource
+    name: str, entry: Any, source: YamlSource, hints: int
 ) -> tuple[ModelSpec | None, list[Problem]]:
     problems = _check_name(name, source)
     if not isinstance(entry, str | dict):
@@ -55,7 +56,7 @@ def _read_entry(
                         "a litellm id (provider/model), or a mapping")  # fmt: skip
         return None, [*problems, wrong]
     spec, found = check(ModelSpec, {"id": entry} if isinstance(entry, str) else entry, source,
-                        (name,))  # fmt: skip
+                        (name,), hints)  # fmt: skip
     problems += found
     if spec is not None and spec.replay is not None:
         try:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 from phyblock.errors import Problem, SpecError
+from phyblock.specs.paths import is_utf8
 from phyblock.specs.words import looks_secret, show
 from phyblock.specs.yaml_source import FieldPath, YamlSource, dotted, parse_yaml
 
 __all__ = ["apply_overrides"]
 
+_MOST, _DEEPEST, _LONGEST_SHOWN = 200, 16, 200
 _FORM = "--set KEY=VALUE, for example --set levels=[1,2] or --set dataset.path=FOLDER"
 
 
@@ -21,7 +24,11 @@ def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> None:
     an override's own form is added to `source.problems`; whether key and value make sense is
     judged with the rest of the file, and reported against the --set text.
     """
-    for text in overrides:
+    texts = tuple(overrides)
+    if len(texts) > _MOST:
+        problem = Problem("--set", "is given too often", "", f"{len(texts):,}", f"{_MOST} at most")
+        raise SpecError(problem)
+    for text in texts:
         try:
             _apply(source, text)
         except SpecError as error:
@@ -29,13 +36,17 @@ def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> None:
 
 
 def _apply(source: YamlSource, text: str) -> None:
-    place = "--set ..." if looks_secret(text) else f"--set {text}"
+    shown = text if len(text) <= _LONGEST_SHOWN else text[:_LONGEST_SHOWN] + "..."
+    place = "--set ..." if looks_secret(text) else f"--set {shown}"
+    if not is_utf8(text):
+        raise SpecError(Problem(place, "is not UTF-8"))
     key, equals, raw = text.partition("=")
     parts = tuple(part.strip() for part in key.split("."))
-    if not equals or not all(parts):
+    if not equals or not all(parts) or len(parts) > _DEEPEST:
         raise SpecError(Problem(place, "is not of the form key=value", hint=_FORM))
     value = parse_yaml(raw, place, place=place)
-    source.problems.extend(value.problems)
+    if value.problems:
+        raise SpecError(_below(parts, problem) for problem in value.problems)
     section = _section(source, parts[:-1], place)
     section[parts[-1]] = value.data
     for table in (source.keys, source.values):
@@ -43,6 +54,13 @@ def _apply(source: YamlSource, text: str) -> None:
             del table[path]
     source.keys[parts] = source.values[parts] = place
     source.overridden.add(parts)
+
+
+def _below(parts: FieldPath, problem: Problem) -> Problem:
+    """A problem of an override's value, said of the field of the suite that it is in."""
+    inner = problem.field
+    joint = "." if inner and not inner.startswith("[") else ""
+    return replace(problem, field=f"{dotted(parts)}{joint}{inner}")
 
 
 def _section(source: YamlSource, parts: FieldPath, place: str) -> dict[Any, Any]:

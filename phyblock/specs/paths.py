@@ -9,17 +9,20 @@ from pathlib import Path
 
 from phyblock.errors import Problem
 
-__all__ = ["expand", "sort_problems"]
+__all__ = ["check_path", "expand", "is_utf8", "sort_problems"]
 
 _VARIABLE = re.compile(r"\$(?:(\w+)|\{(\w+)\})")
+_LONGEST_PATH, _LONGEST_NAME = 4095, 255
+"""Limits of Linux [bytes]."""
+
 _PLACE = re.compile(r":(\d+):(\d+)$")
 
 
 def expand(text: str, base: Path, environ: Mapping[str, str] | None = None) -> Path:
     """The absolute path that `text` means, seen from the folder `base`.
 
-    Raises ValueError, with a message for the user, for a variable that is not set or a home
-    folder that is not known.
+    Raises ValueError, with a message for the user, for a variable that is not set, a home
+    folder that is not known, or what cannot be the name of a file or be written down in a run.
     """
     values = os.environ if environ is None else environ
 
@@ -33,7 +36,25 @@ def expand(text: str, base: Path, environ: Mapping[str, str] | None = None) -> P
         path = Path(_VARIABLE.sub(value_of, text)).expanduser()
     except RuntimeError as error:
         raise ValueError("the home folder that ~ stands for is not known") from error
-    return Path(os.path.normpath(base.absolute() / path))
+    whole = os.path.normpath(base.absolute() / path)
+    check_path(whole)
+    return Path(whole)
+
+
+def check_path(text: str) -> None:
+    """Raise ValueError, with a message for the user, for what cannot be a path of UTF-8 names."""
+    if not is_utf8(text):
+        raise ValueError("holds a name that is not UTF-8")
+    data = text.encode()
+    if b"\0" in data:
+        raise ValueError("holds a NUL character")
+    if len(data) > _LONGEST_PATH or any(len(part) > _LONGEST_NAME for part in data.split(b"/")):
+        raise ValueError("is longer than a path can be")
+
+
+def is_utf8(text: str) -> bool:
+    """Whether a text from the command line or a file name can be written down as UTF-8."""
+    return not any("\ud800" <= character <= "\udfff" for character in text)
 
 
 def sort_problems(problems: Iterable[Problem]) -> list[Problem]:

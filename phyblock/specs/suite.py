@@ -15,6 +15,7 @@ from phyblock.specs.fields import (
     ModelName,
     Section,
     Temperature,
+    TimeoutS,
     TopP,
     Unique,
     UniqueSome,
@@ -181,10 +182,17 @@ class LimitsSpec(Section):
     max_concurrency: Count = Field(
         default=64, description="Calls under way at once, over all models."
     )
-    max_attempts: Count = Field(default=8, description="Requests sent for one sample at most.")
-    timeout_s: Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] = Field(
-        default=300.0, description="Longest wait for one reply [s]."
+    max_attempts: Count = Field(
+        default=8,
+        description="Requests that must have failed before a sample is given up. More are sent "
+        "until retry_for_s is over, but for answers that were paid for and cannot be read.",
     )
+    retry_for_s: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = Field(
+        default=300.0,
+        description="Outage that is outlasted [s]: a sample is not given up sooner after its first "
+        "failure, and a model whose server cannot be reached for longer is stopped.",
+    )
+    timeout_s: TimeoutS = Field(default=300.0, description="Longest wait for one reply [s].")
     max_cost_usd: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] | None = Field(
         default=None,
         description="The run stops before it costs more than this [USD]; null: no bound.",

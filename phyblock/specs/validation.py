@@ -14,11 +14,14 @@ from phyblock.errors import Problem
 from phyblock.specs.words import SECRET_KEYS, did_you_mean, looks_secret, show
 from phyblock.specs.yaml_source import FieldPath, YamlSource, dotted
 
-__all__ = ["check", "find_secrets", "merge_problems"]
+__all__ = ["MOST_HINTS", "check", "find_secrets", "merge_problems"]
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
 KEY_HINT = "name an environment variable with api_key_env, and keep the key in it"
+
+MOST_HINTS = 100
+"""Problems of a file for which similar words are searched, which takes time."""
 
 _WANTED = {
     "int_type": "a whole number",
@@ -63,19 +66,28 @@ class _Fault:
 
 
 def check(
-    model: type[ModelT], data: object, source: YamlSource, base: FieldPath = ()
+    model: type[ModelT],
+    data: object,
+    source: YamlSource,
+    base: FieldPath = (),
+    hints: int = MOST_HINTS,
 ) -> tuple[ModelT | None, list[Problem]]:
     """Validate `data`, which stands at `base` in the source.
 
-    Returns the instance, or None and all problems found. Errors that a model raised for rules
-    across its fields (context `rules`) are left to the caller, who can judge them one by one.
+    Returns the instance, or None and all problems found, of which the first `hints` are said in
+    full. Errors that a model raised for rules across its fields (context `rules`) are left to the
+    caller, who can judge them one by one.
     """
     try:
         return model.model_validate(data), []
     except ValidationError as error:
         details = error.errors(include_url=False)
     faults = [_locate(detail, data, model, base) for detail in details]
-    return None, [_word(fault, source) for fault in faults if not _is_echo(fault)]
+    told = [fault for fault in faults if not _is_echo(fault)]
+    return None, [
+        *(_word(fault, source) for fault in told[:hints]),
+        *(_word_briefly(fault, source) for fault in told[hints:]),
+    ]
 
 
 def find_secrets(data: object, source: YamlSource, base: FieldPath = ()) -> Iterator[Problem]:
@@ -150,6 +162,10 @@ def _word(fault: _Fault, source: YamlSource) -> Problem:
     return Problem(where, message, dotted(fault.path), found, allowed, hint)
 
 
+def _word_briefly(fault: _Fault, source: YamlSource) -> Problem:
+    return Problem(source.where(fault.path), fault.detail["msg"].lower(), dotted(fault.path))
+
+
 def _explain(fault: _Fault) -> tuple[str, str, str]:
     """Message, what is allowed, and a hint."""
     kind, context = fault.detail["type"], fault.context
@@ -181,11 +197,11 @@ def _not_a_choice(fault: _Fault) -> tuple[str, str, str]:
     choices = re.findall(r"[^\s',]+", fault.context["expected"].replace(" or ", " "))
     allowed = ", ".join(choices)
     if fault.path == (*fault.base, "models"):
-        hint = did_you_mean(str(fault.found), choices) or f"write a list: [{fault.found}]"
+        hint = did_you_mean(str(fault.found), choices) or f"write a list: [{_brief(fault.found)}]"
         return "is one name where a list belongs", "a list of models, or the word recorded", hint
     hint = did_you_mean(str(fault.found), choices) if isinstance(fault.found, str) else ""
     if isinstance(fault.found, list) and len(fault.found) == 1:
-        hint = f"take the brackets off: {fault.found[0]}"
+        hint = f"take the brackets off: {_brief(fault.found[0])}"
     return "is not one of the choices", allowed, hint
 
 
@@ -194,10 +210,15 @@ def _type_hint(kind: str, fault: _Fault) -> str:
     if kind in ("int_type", "float_type") and isinstance(found, str):
         return "take the quotes off" if re.fullmatch(r"[-+\d.eE]+", found) else ""
     if kind == "tuple_type" and isinstance(found, str | int | float):
-        return f"write a list: [{found}]"
+        return f"write a list: [{_brief(found)}]"
     if kind == "string_type" and isinstance(found, str | int | float):
-        return f'put it in quotes: "{found}"'
+        return f'put it in quotes: "{_brief(found)}"'
     return ""
+
+
+def _brief(found: object) -> str:
+    text = str(found)
+    return text if len(text) <= 80 else text[:77] + "..."
 
 
 def _unknown_key(fault: _Fault, source: YamlSource) -> Problem:

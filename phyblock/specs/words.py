@@ -6,10 +6,12 @@ import difflib
 import json
 import re
 from collections.abc import Iterable, Mapping
+from itertools import islice
 
 __all__ = ["SECRET_KEYS", "close_match", "did_you_mean", "looks_secret", "show"]
 
 _LONGEST = 80
+"""Characters of a value that are shown, and so the most of its items that can matter."""
 
 _SECRET = re.compile(
     r"""(?<![A-Za-z0-9])(?:
@@ -17,12 +19,12 @@ _SECRET = re.compile(
       | (?:AIza|ya29\.)[A-Za-z0-9_-]{16,}  # Google
       | (?:hf|gsk|pplx|xai|nvapi|r8|ghp|fw)[_-][A-Za-z0-9_-]{16,}
       | AKIA[A-Z0-9]{12,}               # AWS
-      | eyJ[A-Za-z0-9_-]{10,}\.[A-Za-z0-9_-]{10,}
+      | eyJ[A-Za-z0-9_-]{10,300}\.[A-Za-z0-9_-]{10,}
       | [Bb]earer\s+[A-Za-z0-9._-]{8,}
     )""",
     re.VERBOSE,
 )
-_CREDENTIALS_IN_URL = re.compile(r"^[a-z][a-z0-9+.-]*://[^/@\s]*:[^/@\s]*@", re.IGNORECASE)
+_CREDENTIALS_IN_URL = re.compile(r"^[a-z][a-z0-9+.-]*://[^/@\s:]*:[^/@\s]*@", re.IGNORECASE)
 
 SECRET_KEYS = frozenset(
     {"api_key", "apikey", "api-key", "token", "secret", "password", "authorization",
@@ -39,10 +41,10 @@ def looks_secret(text: str) -> bool:
 def show(value: object) -> str:
     """A value as it would be written in YAML, on one short line; secrets are not repeated."""
     if isinstance(value, Mapping):
-        keys = ", ".join(str(key) for key in value)
+        keys = ", ".join(str(key) for key in islice(value, _LONGEST))
         text = f"a mapping with {keys}" if value else "an empty mapping"
     elif isinstance(value, list | tuple):
-        text = "[" + ", ".join(show(item) for item in value) + "]"
+        text = "[" + ", ".join(show(item) for item in islice(value, _LONGEST)) + "]"
     elif isinstance(value, str):
         text = "a text that looks like a key" if looks_secret(value) else _quote(value)
     elif isinstance(value, float):

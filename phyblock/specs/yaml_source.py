@@ -15,43 +15,29 @@ from typing import Any
 
 import yaml
 
-from phyblock.errors import Problem, SpecError
+from phyblock.bounded import LONGEST_INTEGER, read_bytes
+from phyblock.errors import Problem, SpecError, said
+from phyblock.specs.yaml_loader import MAX_VALUES, TAG, CoreLoader, TooMuchError, compose
 
 __all__ = ["CoreLoader", "FieldPath", "YamlSource", "dotted", "parse_yaml", "read_yaml"]
 
 FieldPath = tuple[str | int, ...]
 
-MAX_VALUES = 100_000
-"""Bound on the values of a file, anchors expanded: far above any use, far below a memory bomb."""
+LARGEST_YAML_BYTES = 256 * 1024
+"""Limit of a file: some fifty times what the largest honest ones hold."""
 
-_TAG = "tag:yaml.org,2002:"
-
-
-class CoreLoader(yaml.SafeLoader):
-    """SafeLoader with the scalars of YAML 1.2's core schema."""
-
-
-CoreLoader.yaml_implicit_resolvers = {}
-
-for _kind, _pattern, _first in (
-    ("null", r"^(?:~|null|Null|NULL|)$", ["~", "n", "N", ""]),
-    ("bool", r"^(?:true|True|TRUE|false|False|FALSE)$", list("tTfF")),
-    ("int", r"^(?:[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+)$", list("-+0123456789")),
-    (
-        "float",
-        r"^(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
-        r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$",
-        list("-+.0123456789"),
-    ),
-    ("merge", r"^<<$", ["<"]),
-):
-    CoreLoader.add_implicit_resolver(_TAG + _kind, re.compile(_pattern), _first)
+_LONGEST_KEY = 100
+_ALLOWED = f"{LARGEST_YAML_BYTES // 1024} kB at most"
 
 
 def dotted(path: FieldPath) -> str:
     """A path as people write it: `images.order[1]`."""
-    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{_cut(part)}" for part in path)
     return text.removeprefix(".")
+
+
+def _cut(key: str) -> str:
+    return key if len(key) <= _LONGEST_KEY else key[:_LONGEST_KEY] + "..."
 
 
 @dataclass
@@ -86,10 +72,11 @@ class YamlSource:
 def read_yaml(path: Path) -> YamlSource:
     """Read a file; SpecError where it cannot be read or is not YAML."""
     try:
-        raw = path.read_bytes()
+        raw = read_bytes(path, LARGEST_YAML_BYTES)
     except OSError as error:
-        reason = error.strerror or type(error).__name__
-        raise SpecError(Problem(str(path), f"cannot be read: {reason}")) from error
+        raise SpecError(Problem(str(path), f"cannot be read: {said(error)}")) from error
+    except ValueError as error:
+        raise SpecError(Problem(str(path), str(error), allowed=_ALLOWED)) from error
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -105,12 +92,15 @@ def parse_yaml(text: str, label: str, *, place: str | None = None) -> YamlSource
     """Read a text.
 
     Every place is `place` where that is given, else `label:line:col`. Raises SpecError where the
-    text is not YAML.
+    text is not YAML, or larger, deeper or longer than any honest file.
     """
     source = YamlSource(label)
     reader = _Reader(source, place)
+    if len(text) > LARGEST_YAML_BYTES:
+        problem = Problem(place or label, "is too long", "", f"{len(text):,} characters", _ALLOWED)
+        raise SpecError(problem)
     try:
-        node = _compose(text)
+        node = compose(text)
         if node is not None:
             source.data = reader.build(node, (), ())
     except yaml.MarkedYAMLError as error:
@@ -121,18 +111,10 @@ def parse_yaml(text: str, label: str, *, place: str | None = None) -> YamlSource
         raise SpecError(Problem(where, "holds a character YAML does not allow", "", found)) from (
             error
         )
-    except RecursionError as error:
-        raise SpecError(Problem(place or label, "is nested too deeply")) from error
+    except TooMuchError as error:
+        where = place or f"{label}:{error.mark.line + 1}:{error.mark.column + 1}"
+        raise SpecError(Problem(where, error.message, allowed=error.allowed)) from error
     return source
-
-
-def _compose(text: str) -> yaml.Node | None:
-    loader = CoreLoader(text)
-    try:
-        node: yaml.Node | None = loader.get_single_node()
-        return node
-    finally:
-        loader.dispose()
 
 
 class _Reader:
@@ -145,13 +127,14 @@ class _Reader:
 
     def build(self, node: yaml.Node, path: FieldPath, above: tuple[yaml.Node, ...]) -> Any:
         if any(node is other for other in above):
-            self._stop(node, "an anchor holds itself")
+            raise TooMuchError("an anchor holds itself", "", node.start_mark)
         self._count += 1
         if self._count > MAX_VALUES:
-            self._stop(node, f"the file holds more than {MAX_VALUES} values")
+            message = f"holds more than {MAX_VALUES:,} values"
+            raise TooMuchError(message, "", node.start_mark)
         self._source.values.setdefault(path, self._where(node))
         above = (*above, node)
-        kind = node.tag.removeprefix(_TAG)
+        kind = node.tag.removeprefix(TAG)
         if isinstance(node, yaml.MappingNode) and kind == "map":
             return self._mapping(node, path, above)
         if isinstance(node, yaml.SequenceNode) and kind == "seq":
@@ -164,10 +147,10 @@ class _Reader:
     def _mapping(
         self, node: yaml.MappingNode, path: FieldPath, above: tuple[yaml.Node, ...]
     ) -> dict[str, Any]:
-        merged = [value for key, value in node.value if key.tag == _TAG + "merge"]
+        merged = [value for key, value in node.value if key.tag == TAG + "merge"]
         own: dict[str, Any] = {}
         for key_node, value_node in node.value:
-            if key_node.tag == _TAG + "merge":
+            if key_node.tag == TAG + "merge":
                 continue
             if not isinstance(key_node, yaml.ScalarNode):
                 self._note(key_node, path, "has a key that is not plain text")
@@ -180,9 +163,11 @@ class _Reader:
                 continue
             self._source.keys.setdefault(here, self._where(key_node))
             own[key] = self.build(value_node, here, above)
+        below: dict[str, Any] = {}
         for base in self._merged(merged, path, above):
-            own = {**base, **own}
-        return own
+            for key, value in base.items():
+                below.setdefault(key, value)
+        return {**below, **own}
 
     def _merged(
         self, nodes: list[yaml.Node], path: FieldPath, above: tuple[yaml.Node, ...]
@@ -200,11 +185,11 @@ class _Reader:
             if kind == "int":
                 digits = text.lower()
                 base = 8 if digits.startswith("0o") else 16 if digits.startswith("0x") else 10
-                return int(digits, base)
+                return self._integer(node, path, digits, base)
             if kind == "float":
                 return float(re.sub(r"\.(?=inf|nan)", "", text.lower()))
         except ValueError:
-            self._note(node, path, f"is not a number ({kind})", text)
+            self._note(node, path, f"is not a number ({kind})", _cut(text))
             return None
         if kind == "bool":
             return text.lower() == "true"
@@ -212,6 +197,18 @@ class _Reader:
             return None if kind == "null" else text
         self._note(node, path, "has a tag that is not allowed", node.tag)
         return None
+
+    def _integer(self, node: yaml.Node, path: FieldPath, digits: str, base: int) -> int | None:
+        most = f"numbers of {LONGEST_INTEGER} digits at most"
+        if len(digits) > LONGEST_INTEGER:
+            self._note(node, path, "is too long a number", f"{len(digits):,} digits", allowed=most)
+            return None
+        # Digits of other bases stand for more than one of ten.
+        value = int(digits, base)
+        if abs(value) >= 10**LONGEST_INTEGER:
+            self._note(node, path, "is too large a number", _cut(digits), allowed=most)
+            return None
+        return value
 
     def _text(self, node: yaml.ScalarNode, path: FieldPath) -> str:
         """The node's text with surrogate pairs (JSON's escapes) joined, which PyYAML leaves."""
@@ -244,13 +241,16 @@ class _Reader:
         return self._place or f"{self._source.label}:{mark.line + 1}:{mark.column + 1}"
 
     def _note(
-        self, node: yaml.Node, path: FieldPath, message: str, found: str = "", hint: str = ""
+        self,
+        node: yaml.Node,
+        path: FieldPath,
+        message: str,
+        found: str = "",
+        hint: str = "",
+        allowed: str = "",
     ) -> None:
-        problem = Problem(self._where(node), message, dotted(path), found, hint=hint)
+        problem = Problem(self._where(node), message, dotted(path), found, allowed, hint)
         self._source.problems.append(problem)
-
-    def _stop(self, node: yaml.Node, message: str) -> None:
-        raise SpecError(Problem(self._where(node), message))
 
 
 def _line_col(before: str) -> str:

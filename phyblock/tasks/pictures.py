@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-import io
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Literal
 
-from PIL import Image as PillowImage
-from PIL import UnidentifiedImageError
-
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import DataError, Problem
 from phyblock.models.base import Image
+from phyblock.picture_files import decoded, read_picture
 from phyblock.sim import (
     PictureStyle,
     candidates_key,
@@ -24,9 +21,10 @@ from phyblock.sim import (
     goal_key,
     goal_png,
 )
+from phyblock.sim.compose import to_png
 from phyblock.tasks.studio import Drawing, Studio, to_image
 
-__all__ = ["PicturePolicy", "Pictures", "read_picture"]
+__all__ = ["PicturePolicy", "Pictures"]
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,7 @@ class Pictures(Studio):
         data = read_picture(task.composite)
         if self.policy.layout == "composite":
             return (to_image(data, "composite"),)
-        halves = dict(zip(("goal", "candidates"), _halves(data), strict=True))
+        halves = dict(zip(("goal", "candidates"), _halves(data, task.composite), strict=True))
         return tuple(to_image(halves[label], label) for label in self.policy.order)
 
 
@@ -111,30 +109,13 @@ def _composite(make_goal: Callable[[], bytes], make_grid: Callable[[], bytes]) -
     return composite_png(make_goal(), make_grid())
 
 
-def read_picture(path: Path) -> bytes:
-    """The bytes of a PNG or JPEG file; DataError when it is missing or no picture."""
-    try:
-        data = path.read_bytes()
-        with PillowImage.open(io.BytesIO(data)) as picture:
-            picture.verify()
-    except UnidentifiedImageError as error:
-        raise DataError(Problem(str(path), "is no picture", allowed="PNG or JPEG")) from error
-    except (OSError, SyntaxError) as error:
-        problem = Problem(str(path), f"is not a readable picture: {error}", allowed="PNG or JPEG")
-        raise DataError(problem) from error
-    return data
-
-
-def _halves(composite: bytes) -> tuple[bytes, bytes]:
+def _halves(composite: bytes, path: Path) -> tuple[bytes, bytes]:
     """Goal and candidates cut out of a 2:1 composite: two squares but for the gap between."""
-    with PillowImage.open(io.BytesIO(composite)) as picture:
+    with decoded(composite, str(path)) as picture:
+        # PNG knows no CMYK, in which JPEG files may come.
+        picture = picture.convert("RGB") if picture.mode == "CMYK" else picture
         width, height = picture.size
         side = width // 2 - width // 256
-        boxes = ((0, 0, side, height), (width - side, 0, width, height))
-        return (_encode(picture.crop(boxes[0])), _encode(picture.crop(boxes[1])))
-
-
-def _encode(picture: PillowImage.Image) -> bytes:
-    buffer = io.BytesIO()
-    picture.save(buffer, "PNG")
-    return buffer.getvalue()
+        left = picture.crop((0, 0, side, height))
+        right = picture.crop((width - side, 0, width, height))
+        return to_png(left), to_png(right)

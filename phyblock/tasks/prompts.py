@@ -10,14 +10,16 @@ from pathlib import Path
 from typing import Protocol
 
 import jinja2
-from jinja2.sandbox import SandboxedEnvironment
 
-from phyblock.errors import Problem, PromptError
+from phyblock.bounded import read_text
+from phyblock.errors import Problem, PromptError, said
 from phyblock.models.base import Image, Message
+from phyblock.tasks.template_bounds import BoundedEnvironment, render_block
 
 __all__ = ["OfficialPrompt", "Prompt", "TemplatePrompt"]
 
 _BLOCKS = ("system", "user")
+_LARGEST_BYTES = 256 * 1024
 
 
 class Prompt(Protocol):
@@ -71,19 +73,20 @@ class TemplatePrompt:
         self.name = name
         self._path = path
         try:
-            source = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else error.reason
-            raise PromptError(Problem(str(path), f"cannot be read: {reason}")) from error
+            source = read_text(path, _LARGEST_BYTES)
+        except OSError as error:
+            raise PromptError(Problem(str(path), f"cannot be read: {said(error)}")) from error
+        except ValueError as error:
+            raise PromptError(Problem(str(path), f"cannot be read: it {error}")) from error
         self.version = _digest(source)
-        environment = SandboxedEnvironment(
-            undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-        )
         try:
-            self._template = environment.from_string(source)
+            self._template = BoundedEnvironment().bounded_template(source)
         except jinja2.TemplateSyntaxError as error:
             where = f"{path}:{error.lineno}"
             raise PromptError(Problem(where, f"is not valid Jinja: {error.message}")) from error
+        except Exception as error:
+            # Python compiles what Jinja makes of it, and has bounds of its own.
+            raise PromptError(Problem(str(path), f"is not valid Jinja: {said(error)}")) from error
         self.require("user", "and, if wanted, a block system")
 
     def require(self, block: str, more: str) -> None:
@@ -115,13 +118,12 @@ class TemplatePrompt:
         """What a block of the template says, "" for one that it lacks; raises PromptError."""
         if block not in self._template.blocks:
             return ""
-        context = self._template.new_context(dict(facts))
         try:
-            return "".join(self._template.blocks[block](context)).strip()
+            return render_block(self._template, block, dict(facts)).strip()
         except Exception as error:
             # A template is a program: what it computes can fail in any way.
             known = "names that are there: " + ", ".join(sorted(facts))
-            message = f"cannot be rendered: {error or type(error).__name__}"
+            message = f"cannot be rendered: {said(error)}"
             where = f"{self._path}:{self._line_of(error)}"
             raise PromptError(Problem(where, message, f"block {block}", "", known)) from error
 

@@ -12,10 +12,10 @@ from typing import Literal
 from phyblock.domain import LETTERS, Question, QuestionPicture
 from phyblock.errors import DataError, Problem
 from phyblock.models.base import Image
+from phyblock.picture_files import read_picture
 from phyblock.sim import PictureStyle
 from phyblock.sim.lettered import LETTERED_VERSION, lettered_sheet_png, sheet_size_px
 from phyblock.sim.question_pictures import question_key, question_png
-from phyblock.tasks.pictures import read_picture
 from phyblock.tasks.studio import Drawing, Studio, to_image
 
 __all__ = ["OptionsAs", "QuestionPictures", "Shown"]

@@ -20,6 +20,7 @@ from phyblock.domain import Block
 from phyblock.models.base import Image, Message, Request, StepSubject
 from phyblock.scoring import Assembly
 from phyblock.sim.question_pictures import question_key, question_png
+from phyblock.sim.registry import DEFAULT_ENGINE, physics_engine
 from phyblock.sim.site import ONE_SETTING, Settled, settle, state_picture
 from phyblock.sim.stability import DEFAULT_TRIAL
 from phyblock.tasks.pictures import Pictures
@@ -68,14 +69,18 @@ class StepPlanning:
         return {"max_steps": self.rules.limits.max_steps(len(item.scene))}
 
     def identity(self) -> dict[str, Any]:
-        """Name and version of the prompt, and a digest of all that decides the pictures."""
+        """Name and version of the prompt, a digest of all that decides the pictures, and the
+        physics engine where blocks are let go in another one than PyBullet.
+        """
+        engine = self._other_engine()
         if self._sight is None:
-            return {"prompt": None, "pictures": None}
+            return {"prompt": None, "pictures": None, **engine}
         template = self._sight.prompt.template
         keys = [self._sight.pictures.keys(task) for task in self.items]
         return {
             "prompt": {"name": template.name, "version": template.version},
             "pictures": hashlib.sha256(json.dumps(keys).encode()).hexdigest(),
+            **engine,
         }
 
     def start(
@@ -122,6 +127,13 @@ class StepPlanning:
         version = self._sight.prompt.template.version
         request = replace(request, messages=messages, prompt_version=version)
         return request, is_real and is_fixed_real and is_current_real
+
+    def _other_engine(self) -> dict[str, Any]:
+        # Runs made before there was a choice name none, and are to go on with PyBullet.
+        engine = None if self.rules.physics == "off" else physics_engine()
+        if engine is None or engine.name == DEFAULT_ENGINE:
+            return {}
+        return {"physics": {"engine": engine.name, **engine.versions}}
 
     async def _write(
         self,

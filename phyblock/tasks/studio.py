@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import io
 import os
 import signal
 import threading
@@ -17,11 +16,11 @@ from multiprocessing import get_context, parent_process
 from pathlib import Path
 from typing import TypeVar
 
-from PIL import Image as PillowImage
-
-from phyblock.errors import Problem, SimulationError, StoreError
-from phyblock.files import atomic_write
+from phyblock.bounded import read_bytes
+from phyblock.errors import DataError, SimulationError
+from phyblock.files import atomic_write, writing
 from phyblock.models.base import Image
+from phyblock.picture_files import LARGEST_PICTURE_BYTES, picture_size
 
 __all__ = ["Drawing", "Studio", "to_image"]
 
@@ -87,9 +86,13 @@ class Studio:
         return tuple(Image(b"", drawing.label, *size_px) for drawing in drawings), False
 
     def kept(self, drawing: Drawing) -> Image | None:
-        """A picture from the cache, or None where it is not there."""
+        """A picture from the cache, or None where it is not there, not whole, or no picture."""
         data = _whole_png(self._path(drawing.key))
-        return None if data is None else to_image(data, drawing.label)
+        try:
+            return None if data is None else to_image(data, drawing.label)
+        except DataError:
+            # It is drawn anew.
+            return None
 
     async def image(self, drawing: Drawing) -> Image:
         """A picture from the cache, or made now.
@@ -110,12 +113,9 @@ class Studio:
         try:
             data = await self.work_out(drawing.make)
             self.rendered += 1
-            path.parent.mkdir(parents=True, exist_ok=True)
-            atomic_write(path, data)
-        except OSError as error:
-            hint = "name another cache folder with PHYBLOCK_CACHE"
-            problem = Problem(str(path), f"cannot be written: {error.strerror}", hint=hint)
-            raise StoreError(problem) from error
+            with writing(path, "name another cache folder with PHYBLOCK_CACHE"):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                atomic_write(path, data)
         finally:
             del self._making[drawing.key]
         return data
@@ -160,14 +160,16 @@ def _take_note(drawn: asyncio.Task[bytes]) -> None:
 
 
 def to_image(data: bytes, label: str) -> Image:
-    """An encoded picture as it is sent."""
-    with PillowImage.open(io.BytesIO(data)) as picture:
-        return Image(data, label, *picture.size)
+    """An encoded picture as it is sent; DataError for what is none."""
+    return Image(data, label, *picture_size(data, f"picture {label}"))
 
 
 def _whole_png(path: Path) -> bytes | None:
     """The bytes of a picture in the cache; None when it is not there, or not whole."""
-    data = path.read_bytes() if path.is_file() else b""
+    try:
+        data = read_bytes(path, LARGEST_PICTURE_BYTES)
+    except (OSError, ValueError):
+        return None
     is_whole = data.startswith(b"\x89PNG\r\n\x1a\n") and data.endswith(b"IEND\xaeB`\x82")
     return data if is_whole else None
 

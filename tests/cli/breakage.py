@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import shutil
 import sqlite3
 from collections.abc import Callable
@@ -92,11 +93,32 @@ def models_text(text: str) -> Prepare:
     return prepare
 
 
-def png() -> bytes:
+def png(size: tuple[int, int] = (64, 32)) -> bytes:
     """A small picture."""
     buffer = io.BytesIO()
-    PillowImage.effect_noise((64, 32), 50).save(buffer, "PNG")
+    PillowImage.effect_noise(size, 50).save(buffer, "PNG")
     return buffer.getvalue()
+
+
+def pipe(name: str, *args: str) -> Prepare:
+    """A pipe without a writer stands where a file belongs."""
+
+    def prepare(workspace: Workspace) -> list[str]:
+        (workspace.root / name).unlink(missing_ok=True)
+        os.mkfifo(workspace.root / name)
+        return list(args)
+
+    return prepare
+
+
+def noise(name: str, *args: str) -> Prepare:
+    """Ten megabytes that are no text stand in a file."""
+
+    def prepare(workspace: Workspace) -> list[str]:
+        (workspace.root / name).write_bytes(bytes(range(256)) * 40_000)
+        return list(args)
+
+    return prepare
 
 
 def checkout(picture: bytes | None) -> Prepare:

@@ -109,7 +109,8 @@ def test_a_person_is_asked_before_money_is_spent(
 def test_samples_that_are_asked_again_are_counted_once(suite: Workspace) -> None:
     with Running(OpenAIChat(Faults(mode="500"))) as running:
         suite.write_models(running.url, "alpha", price={"input": 0.0, "output": 0.0})
-        limits = ["--set", "limits.max_attempts=1", "--models", "alpha,oracle"]
+        once = ["--set", "limits.max_attempts=1", "--set", "limits.retry_for_s=0"]
+        limits = [*once, "--models", "alpha,oracle"]
         assert suite.run(*limits).code == 1
         running.server.faults = Faults(latency_s=0.5)
         code, screen = in_terminal(suite, "", *limits)

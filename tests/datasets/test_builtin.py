@@ -196,8 +196,8 @@ BROKEN_TEXTS: dict[str, tuple[bytes, str, str]] = {
     "not UTF-8": (b'{"id": "\xff"}', "", "not UTF-8"),
     "UTF-16": ("{}".encode("utf-16"), "", "not UTF-8"),
     "a field twice": (b'{"id": "s1", "id": "s2"}', ":1", "twice"),
-    "too many digits": (b'{"id": ' + b"1" * 5000 + b"}", ":1", "too many digits"),
-    "nested without end": (b"[" * 200_000, ":1", "nested too deeply"),
+    "too many digits": (b'{"id": ' + b"1" * 5000 + b"}", ":1", "of 5,000 digits"),
+    "nested without end": (b"[" * 200_000, ":1", "nested more than 64 levels"),
 }
 
 

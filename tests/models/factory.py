@@ -9,8 +9,10 @@ from typing import Any, TypeVar
 from phyblock.domain import Block, Candidate, CandidateSet, Scene
 from phyblock.errors import ModelError
 from phyblock.models import (
+    Breakers,
     Budget,
     Gate,
+    Halt,
     Image,
     Message,
     Model,
@@ -21,6 +23,7 @@ from phyblock.models import (
     ReplyCache,
     Request,
     RetryPolicy,
+    SharedCache,
     build_model,
 )
 
@@ -28,8 +31,8 @@ T = TypeVar("T")
 
 PNG = b"\x89PNG\r\n\x1a\n"
 JPEG = b"\xff\xd8\xff\xe0"
-QUICK = RetryPolicy(base_s=0.001, max_wait_s=0.002, max_retry_after_s=0.002)
-"""The default number of attempts with next to no wait between them."""
+QUICK = RetryPolicy(retry_for_s=0.0, base_s=0.001, max_wait_s=0.002, max_retry_after_s=0.002)
+"""The default number of attempts with next to no wait between them, however little time it took."""
 
 BLOCKS = (
     Block(1, "cube", "red", (0.0, 0.0, 0.025), (0.0, 0.0, 0.0), (), 1),
@@ -74,13 +77,17 @@ def make_request(
 def make_model(
     config: ModelConfig,
     *,
-    cache: ReplyCache | None = None,
+    cache: ReplyCache | SharedCache | None = None,
     overall: Gate | None = None,
     budget: Budget | None = None,
     events: list[ModelEvent] | None = None,
     policy: RetryPolicy = QUICK,
+    breakers: Breakers | None = None,
+    halt: Halt | None = None,
 ) -> Model:
     """A model with quick retries; its events go into the list."""
+    if isinstance(cache, ReplyCache):
+        cache = SharedCache(cache.path)
     return build_model(
         config,
         cache=cache,
@@ -88,6 +95,8 @@ def make_model(
         budget=budget,
         observer=(events if events is not None else []).append,
         policy=policy,
+        breakers=breakers,
+        halt=halt,
     )
 
 

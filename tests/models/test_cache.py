@@ -158,6 +158,14 @@ def test_a_reply_comes_back_whole_and_marked(tmp_path: Path) -> None:
         assert cache.get("k") == expected
 
 
+def test_counts_that_cannot_be_true_are_not_known(tmp_path: Path) -> None:
+    with ReplyCache(tmp_path / "c.sqlite") as cache:
+        cache.put("k", "openai/m", replace(REPLY, usage=Usage(-1, 10**30, 2)))
+        found = cache.get("k")
+    assert found is not None
+    assert found.usage == Usage(None, None, 2)
+
+
 @pytest.mark.parametrize(
     "reply",
     [
@@ -236,13 +244,25 @@ def test_a_page_overwritten_in_the_middle_is_an_error_not_a_reply(tmp_path: Path
         cache.get(f"{7:064}")
 
 
-def test_a_row_that_is_no_reply_is_an_error(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "content",
+    [
+        '{"text": 1',
+        "[]",
+        "{}",
+        '{"text": "a", "usage": 5}',
+        '{"text": 5, "usage": {}}',
+        '{"usage": {"x": 1}}',
+        "[" * 10**5,
+    ],
+)
+def test_a_row_that_is_no_reply_is_an_error(tmp_path: Path, content: str) -> None:
     path = tmp_path / "c.sqlite"
     with ReplyCache(path) as cache:
         cache.put("k", "openai/m", REPLY)
     db = sqlite3.connect(path)
     with db:
-        db.execute("UPDATE replies SET reply = '{\"text\": 1'")
+        db.execute("UPDATE replies SET reply = ?", (content,))
     db.close()
     with ReplyCache(path) as cache, pytest.raises(StoreError, match="broken reply"):
         cache.get("k")

@@ -10,8 +10,16 @@ from pathlib import Path
 import pytest
 from aiohttp import web
 
-from phyblock.errors import RetryableError, SpecError, StoreError, UnavailableError
-from phyblock.models import Gate, ModelConfig, ModelEvent, Reply, ReplyCache, RetryPolicy
+from phyblock.errors import RetryableError, SpecError, UnavailableError
+from phyblock.models import (
+    Gate,
+    ModelConfig,
+    ModelEvent,
+    Reply,
+    ReplyCache,
+    RetryPolicy,
+    SharedCache,
+)
 from tests.models.factory import QUICK, ask, make_model, make_request, reply_of, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Faults, Running
@@ -76,29 +84,21 @@ def refuse_after(path: Path, replies: int) -> None:
     db.close()
 
 
-@pytest.mark.parametrize("at_once", [1, 4])
-def test_a_reply_that_the_cache_refuses_is_not_lost_and_nothing_more_is_sent(
-    tmp_path: Path, at_once: int
-) -> None:
+def test_a_cache_that_takes_no_more_is_said_once_and_every_reply_comes(tmp_path: Path) -> None:
     refuse_after(tmp_path / "c.sqlite", 3)
+    said: list[str] = []
     server = ROUTES["direct"].server(Faults(latency_s=0.01))
-    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
-        model = make_model(
-            ROUTES["direct"].config(running.url, max_concurrency=at_once), cache=cache
-        )
-
-        async def main() -> list[object]:
-            asked = (model.ask(make_request(f"{n:03}")) for n in range(20))
-            answers = await asyncio.gather(*asked, return_exceptions=True)
-            await model.aclose()
-            return list(answers)
-
-        answers = run(main)
-        with pytest.raises(StoreError, match="the disk is full"):
-            cache.check()
-    assert {type(answer) for answer in answers} == {Reply, StoreError}
-    assert 4 <= sum(isinstance(answer, Reply) for answer in answers) < 4 + at_once
-    assert server.ended == {"ok": sum(isinstance(answer, Reply) for answer in answers)}
+    requests = [make_request(f"{n:03}") for n in range(20)]
+    with Running(server) as running:
+        config = ROUTES["direct"].config(running.url, max_concurrency=4)
+        cache = SharedCache(tmp_path / "c.sqlite", said.append)
+        answers = ask(make_model(config, cache=cache), *requests)
+        run(cache.aclose)
+    assert {type(answer) for answer in answers} == {Reply}
+    assert server.ended == {"ok": 20}
+    (text,) = said
+    assert "the disk is full" in text
+    assert str(tmp_path / "c.sqlite") in text
 
 
 def test_a_dead_model_still_gives_what_is_cached(tmp_path: Path) -> None:
@@ -151,7 +151,7 @@ def test_a_429_slows_the_model_down_and_is_told() -> None:
     events: list[ModelEvent] = []
     with Running(server) as running:
         config = ROUTES["direct"].config(running.url, max_concurrency=8)
-        policy = RetryPolicy(attempts=30, base_s=0.001, max_wait_s=0.001, max_retry_after_s=0.0)
+        policy = RetryPolicy(30, 0.0, base_s=0.001, max_wait_s=0.001, max_retry_after_s=0.0)
         answers = ask(
             make_model(config, events=events, policy=policy),
             *(make_request(f"{n:03}") for n in range(40)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.errors import BudgetReachedError, RetryableError, SpecError, UnavailableError
+from phyblock.errors import (
+    BudgetReachedError,
+    RetryableError,
+    SpecError,
+    UnavailableError,
+    UnreachableError,
+)
 from phyblock.models import (
     Budget,
     Estimate,
@@ -30,9 +37,11 @@ from phyblock.models import (
     most_usd,
     price_of,
 )
+from phyblock.models.cost import plausible
 from tests.models.factory import CANDIDATES, SCENE, ask, make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
-from tests.servers.chassis import Faults, Running
+from tests.servers.chassis import Faults, Running, Seen
+from tests.servers.openai_chat import OpenAIChat
 
 
 def config(model_id: str, **fields: object) -> ModelConfig:
@@ -175,7 +184,7 @@ def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(
 
         async def call(most: float, share: float, steps: int) -> None:
             try:
-                held = await budget.reserve(most)
+                held = await budget.reserve(lambda: most)
             except BudgetReachedError:
                 refused.append(most)
                 assert budget.spent_usd + most > limit
@@ -194,10 +203,26 @@ def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(
 def test_a_reservation_without_a_known_cost_counts_in_full() -> None:
     async def main() -> None:
         budget = Budget(1.0, spent_usd=0.25)
-        budget.settle(await budget.reserve(0.5), None)
+        budget.settle(await budget.reserve(lambda: 0.5), None)
         assert budget.spent_usd == 0.75
         with pytest.raises(BudgetReachedError, match=r"0\.7500 spent"):
-            await budget.reserve(0.5)
+            await budget.reserve(lambda: 0.5)
+
+    run(main)
+
+
+def test_a_call_that_waits_reserves_what_was_learned_meanwhile() -> None:
+    budget, price = Budget(1.0), Price(100.0, 0.0)
+    expected = Estimate(4000, 100, 100)
+
+    async def main() -> None:
+        first = await budget.reserve(lambda: budget.most_usd("m", price, expected))
+        second = asyncio.create_task(budget.reserve(lambda: budget.most_usd("m", price, expected)))
+        await asyncio.sleep(0)
+        budget.learn("m", expected, Usage(8000, 1))
+        budget.settle(first, 0.8)
+        with pytest.raises(BudgetReachedError, match=r"can cost 1\.2"):
+            await second
 
     run(main)
 
@@ -209,6 +234,132 @@ def test_a_provider_that_counts_pictures_higher_is_reserved_for() -> None:
     budget.learn("m", expected, Usage(20_000, 10))
     assert budget.most_usd("m", price, expected) > 10 * before
     assert budget.most_usd("n", price, expected) == before
+
+
+strange = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-(10**40), 10**40),
+    st.integers(-10, 200_000),
+    st.floats(),
+    st.text(max_size=3),
+)
+
+
+@given(strange, strange, strange, st.integers(1, 10**5), st.integers(1, 10**5), st.booleans())
+def test_only_counts_that_can_be_true_are_known(
+    prompt: Any, completion: Any, reasoning: Any, asked: int, most: int, said: bool
+) -> None:
+    given_usage = Usage(prompt, completion, reasoning)
+    usage = plausible(given_usage, Estimate(asked, 1, most), said_something=said)
+    for was, now in zip(
+        (prompt, completion, reasoning),
+        (usage.prompt_tokens, usage.completion_tokens, usage.reasoning_tokens),
+        strict=True,
+    ):
+        assert now is None or (now is was and type(now) is int and 0 <= now <= 10**7)
+    assert usage.prompt_tokens != 0
+    assert not said or usage.completion_tokens != 0
+    if type(prompt) is int and 0 < prompt <= 10 * asked:
+        assert usage.prompt_tokens == prompt
+    if type(completion) is int and said <= completion <= most:
+        assert usage.completion_tokens == completion
+
+
+amounts = st.one_of(st.none(), st.floats(), st.floats(0, 2))
+
+
+@given(st.lists(st.tuples(st.floats(0.01, 2), amounts), max_size=30))
+def test_what_was_spent_never_becomes_less_and_an_unknown_cost_is_the_dearest(
+    calls: list[tuple[float, float | None]],
+) -> None:
+    async def main() -> None:
+        budget = Budget(1000.0)
+        for most, cost in calls:
+            before = budget.spent_usd
+            try:
+                held = await budget.reserve(functools.partial(float, most))
+            except BudgetReachedError:
+                break
+            counted = budget.settle(held, cost)
+            is_known = cost is not None and 0 <= cost < float("inf")
+            assert counted == (cost if is_known else most)
+            assert budget.spent_usd == before + counted >= before
+
+    run(main)
+
+
+@given(st.lists(st.tuples(st.integers(0, 5000), strange), max_size=20))
+def test_what_is_learned_stays_within_bounds(counts: list[tuple[int, Any]]) -> None:
+    budget, price = Budget(1.0), Price(1.0, 1.0)
+    expected = Estimate(1000, 100, 100)
+    plain = budget.most_usd("m", price, expected)
+    last = plain
+    for asked, told in counts:
+        budget.learn("m", Estimate(asked, 1, 1), Usage(told, 1))
+        most = budget.most_usd("m", price, expected)
+        assert last <= most <= 100 * plain
+        last = most
+
+
+@pytest.mark.parametrize("usd", [-1.0, float("nan"), float("inf")])
+def test_no_budget_is_made_of_what_is_no_amount(usd: float) -> None:
+    with pytest.raises(ValueError, match="no amount"):
+        Budget(usd)
+    with pytest.raises(ValueError, match="no amount"):
+        Budget(1.0, usd)
+    with pytest.raises(ValueError, match="no amount"):
+        run(lambda: Budget(1.0).reserve(lambda: usd))
+
+
+class Counting(OpenAIChat):
+    """Says what it is told to say of tokens."""
+
+    def __init__(self, usage: object) -> None:
+        super().__init__()
+        self.usage = usage
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        return {**super().reply(seen, ending), "usage": self.usage}
+
+
+@pytest.mark.parametrize("route", ["direct", "openai"])
+@pytest.mark.parametrize(
+    "usage",
+    [
+        None,
+        {"prompt_tokens": 0, "completion_tokens": 0, "total_tokens": 0},
+        {"prompt_tokens": -(10**6), "completion_tokens": -5, "total_tokens": -5},
+        {"prompt_tokens": 10**30, "completion_tokens": 10**30, "total_tokens": 10**30},
+    ],
+    ids=["none", "zero", "negative", "absurd"],
+)
+def test_a_server_that_does_not_count_stops_within_the_limit(
+    monkeypatch: pytest.MonkeyPatch, route: str, usage: object
+) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    server = Counting(usage)
+    budget = Budget(0.1)
+    with Running(server) as running:
+        config = ROUTES[route].config(running.url, price=Price(10.0, 100.0), max_concurrency=4)
+        dearest = most_usd(Price(10.0, 100.0), estimate(config, make_request()))
+
+        async def main() -> list[Reply | BaseException | None]:
+            model = make_model(config, budget=budget)
+            asked = (model.ask(make_request(f"{n:03}")) for n in range(40))
+            answers = await asyncio.gather(*asked, return_exceptions=True)
+            await model.aclose()
+            return list(answers)
+
+        answers = run(main)
+    replies = [answer for answer in answers if isinstance(answer, Reply)]
+    assert {type(answer) for answer in answers} == {Reply, BudgetReachedError}
+    assert 0 < len(replies) == server.requests <= 0.1 / dearest
+    assert budget.spent_usd <= 0.1
+    for reply in replies:
+        assert reply.cost_usd is None
+        assert reply.billed_usd == pytest.approx(dearest)
+        assert reply.usage == Usage()
 
 
 def test_a_run_stops_before_its_limit_and_answers_say_what_they_cost(
@@ -280,6 +431,17 @@ def test_a_reply_says_what_the_limit_counts_for_all_its_attempts(
     assert sum(usd or 0.0 for usd in billed) == pytest.approx(budget.spent_usd)
     assert max(usd or 0.0 for usd in billed) > min(usd or 0.0 for usd in billed) > 0
     assert {reply.billed_usd for reply in [*again, *free]} == {None}  # type: ignore[union-attr]
+
+
+def test_a_server_to_which_nothing_could_be_sent_costs_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    budget = Budget(100.0)
+    config = ROUTES["direct"].config("http://127.0.0.1:9", price=Price(10.0, 100.0))
+    (answer,) = ask(make_model(config, budget=budget), make_request())
+    assert isinstance(answer, UnreachableError)
+    assert budget.spent_usd == 0
 
 
 def test_a_model_without_its_key_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,16 +15,18 @@ ROOT = Path(__file__).parents[2]
 CACHED = """
 import asyncio, sys
 from pathlib import Path
-from phyblock.models import Gate, ModelConfig, Reply, ReplyCache, build_model, reply_key
+from phyblock.models import Gate, ModelConfig, Reply, ReplyCache, SharedCache
+from phyblock.models import build_model, reply_key
 from tests.models.factory import make_request
 config = ModelConfig("m", "litellm", "anthropic/claude")
 with ReplyCache(Path(sys.argv[1])) as cache:
     cache.put(reply_key(config, make_request()), config.id, Reply("kept"))
-    model = build_model(config, cache=cache, overall=Gate(1))
-    async def main():
+async def main():
+    async with SharedCache(Path(sys.argv[1])) as cache:
+        model = build_model(config, cache=cache, overall=Gate(1))
         assert (await model.ask(make_request())).text == "kept"
         await model.aclose()
-    asyncio.run(main())
+asyncio.run(main())
 """
 IMPORTED = "\nprint([name for name in ('litellm', 'aiohttp', 'httpx') if name in sys.modules])"
 
@@ -35,7 +37,7 @@ from tests.models.factory import make_request
 os.chdir(sys.argv[1])
 model = build_model(
     ModelConfig("m", "litellm", "anthropic/claude", api_base="http://127.0.0.1:9", timeout_s=5),
-    cache=None, overall=Gate(1), policy=RetryPolicy(attempts=1),
+    cache=None, overall=Gate(1), policy=RetryPolicy(attempts=1, retry_for_s=0.0),
 )
 async def main():
     try:

@@ -54,6 +54,8 @@ def test_a_file_may_say_more_after_the_key(tmp_path: Path) -> None:
     [
         (b'{"predict": "a"', r"007\.json:1:\d+: is not JSON"),
         (b"\xff\xfe\x00", r"007\.json:1:1: is not JSON"),
+        (b"[" * 100_000, r"007\.json:1:1: is not JSON: is nested more than 64 levels"),
+        (b'{"text": ' + b"9" * 100_000 + b"}", "holds a number of 100,000 digits"),
         (b'{"error": "overloaded"}', "no recorded reply of a known shape"),
     ],
 )
@@ -122,7 +124,7 @@ def test_the_only_model_of_a_run_needs_no_name_and_others_do(tmp_path: Path) -> 
 @pytest.mark.parametrize("line", ["{", "[]", '{"model": "m"}', "7"])
 def test_a_broken_record_is_an_error_at_its_line(tmp_path: Path, line: str) -> None:
     (tmp_path / "records.jsonl").write_text(record("m", "007", 1) + line + "\n")
-    with pytest.raises(DataError, match=r"records\.jsonl:2: is not a record"):
+    with pytest.raises(DataError, match=r"records\.jsonl:2(:\d+)?: (\w+: )?is not a record"):
         replay(tmp_path)
 
 

@@ -1,4 +1,4 @@
-"""The one retry layer: what is repeated, how often, after which waits."""
+"""The one retry layer: what is repeated, how often, how long, after which waits."""
 
 from __future__ import annotations
 
@@ -16,29 +16,37 @@ from phyblock.errors import (
     StoreError,
     UnavailableError,
 )
+from phyblock.models.limits import Clock
 from phyblock.models.retry import RetryPolicy, with_retries
 
 
 class Script:
-    """Raises the given errors one by one, then answers."""
+    """Raises the given errors one by one, each after `takes_s`, then answers; sleeps are jumps."""
 
-    def __init__(self, *errors: Exception) -> None:
+    def __init__(self, *errors: Exception, takes_s: float = 0.0) -> None:
         self.errors = list(errors)
+        self.takes_s = takes_s
+        self.now_s = 0.0
+        self.failed_at: list[float] = []
         self.calls = 0
         self.waits: list[float] = []
         self.told: list[float] = []
 
     async def send(self) -> str:
         self.calls += 1
+        self.now_s += self.takes_s
         if self.errors:
+            self.failed_at.append(self.now_s)
             raise self.errors.pop(0)
         return "answer"
 
     async def sleep(self, seconds: float) -> None:
         self.waits.append(seconds)
+        self.now_s += seconds
 
     def run(self, **policy: float) -> str:
-        rules = RetryPolicy(sleep=self.sleep, **policy)  # type: ignore[arg-type]
+        clock = Clock(lambda: self.now_s, self.sleep)
+        rules = RetryPolicy(clock=clock, **policy)  # type: ignore[arg-type]
 
         async def main() -> str:
             return await with_retries(self.send, rules, lambda _, wait_s: self.told.append(wait_s))
@@ -77,9 +85,56 @@ def test_after_the_last_attempt_its_error_comes_out() -> None:
     errors = [RetryableError(str(n)) for n in range(20)]
     script = Script(*errors)
     with pytest.raises(RetryableError, match=r"^7$"):
-        script.run()
+        script.run(retry_for_s=0.0)
     assert script.calls == 8
     assert len(script.waits) == 7
+
+
+statuses = st.sampled_from([None, 408, 429, 500, 502, 503])
+
+
+@given(
+    st.lists(statuses, min_size=1, max_size=8),
+    st.integers(1, 12),
+    st.floats(0, 600, allow_nan=False),
+    st.floats(0, 400, allow_nan=False),
+)
+def test_a_request_is_given_up_when_both_number_and_time_are_over(
+    found: list[int | None], attempts: int, retry_for_s: float, takes_s: float
+) -> None:
+    errors = (RetryableError("x", status=status) for status in found * 400)
+    script = Script(*errors, takes_s=takes_s)
+    with pytest.raises(RetryableError):
+        script.run(attempts=attempts, retry_for_s=retry_for_s, base_s=2.0)
+    lasted = [now_s - script.failed_at[0] for now_s in script.failed_at]
+    is_over = [n >= attempts and s >= retry_for_s for n, s in enumerate(lasted, 1)]
+    assert is_over[-1]
+    assert not any(is_over[:-1])
+
+
+@given(st.floats(0, 300, exclude_max=True, allow_nan=False))
+def test_an_outage_of_less_than_five_minutes_is_outlasted_with_the_defaults(
+    outage_s: float,
+) -> None:
+    script = Script()
+
+    async def send() -> str:
+        if script.now_s < outage_s:
+            raise RetryableError("connection refused")
+        return "answer"
+
+    script.send = send  # type: ignore[method-assign]
+    assert script.run() == "answer"
+
+
+@pytest.mark.parametrize("status", [200, 201, 204])
+def test_answers_that_were_paid_for_and_cannot_be_read_are_bounded_by_number_alone(
+    status: int,
+) -> None:
+    script = Script(*(RetryableError("malformed", status=status) for _ in range(20)))
+    with pytest.raises(RetryableError, match="malformed"):
+        script.run(attempts=3)
+    assert script.calls == 3
 
 
 def test_a_fifth_of_faults_leaves_a_thousand_samples_unharmed() -> None:

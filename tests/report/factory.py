@@ -15,6 +15,7 @@ from phyblock.report import Run, read_design
 from phyblock.report.load import Frames, frames_of
 from phyblock.report.outcomes import OUTCOMES
 from phyblock.scoring import ERROR_TYPES
+from phyblock.tasks.record_types import RECORD_ADAPTER
 
 laws = settings(max_examples=12, deadline=None)
 """Tables take some 50 ms each, so that few examples must do."""
@@ -119,8 +120,8 @@ def record(
 
 
 def frames_from(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Frames:
-    numbered = ((f"record {number}", one) for number, one in enumerate(records, 1))
-    return frames_of(numbered, read_design(facts))
+    read = (RECORD_ADAPTER.validate_python(one) for one in records)
+    return frames_of(read, read_design(facts))
 
 
 def run_of(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Run:

@@ -318,7 +318,8 @@ def test_a_hostile_reply_does_nothing(visit: Visit) -> None:
     visit.show(HOSTILE_SAMPLE)
     page = visit.page
     reply = page.locator("pre.reply").inner_text()
-    assert reply == HOSTILE
+    # Half a pair of surrogates, which no output could hold, is read as "?".
+    assert reply == HOSTILE.encode("utf-8", "replace").decode()
     assert page.locator("#detail script, #detail img").count() == 0
     assert page.evaluate("window.hacked") is None
 

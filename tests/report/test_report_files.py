@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import StoreError
+from phyblock.folders import LIST
 from phyblock.report import Column, TextTable, load_run, to_latex, to_markdown, write_tables
 from phyblock.report.compare import compare_models
 from phyblock.report.compare_view import write_comparison
@@ -202,7 +203,9 @@ def test_writing_again_changes_nothing(
     folder = write_run(tmp_path_factory.mktemp("runs") / "run", records, manifest())
     first = {file: file.read_bytes() for file in write_tables(folder).files}
     assert {file: file.read_bytes() for file in write_tables(folder).files} == first
-    assert {file.name for file in folder.iterdir()} == {"run.yaml", "records.jsonl", "tables"}
+    assert {file.name for file in folder.iterdir()} == {
+        *("run.yaml", "records.jsonl", "tables", LIST),
+    }
 
 
 def test_a_folder_that_cannot_be_written_is_said_so(tmp_path: Path) -> None:

@@ -14,7 +14,10 @@ from tests.workspace import Workspace
 PRICE = {"input": 10.0, "output": 100.0}
 CALL_USD = 1000 * PRICE["input"] / 1e6 + 40 * PRICE["output"] / 1e6
 """The server counts 1,000 tokens in and 40 out for every call."""
-MOST_USD = 0.5
+MOST_USD = 0.505
+"""Room for 35 calls, and for no 36th, be it as estimated at first or as the run learns to."""
+TWICE = {"max_attempts": 2, "retry_for_s": 0.0}
+"""Limits of a run that gives up soon, however little time it took."""
 
 
 class Silent(OpenAIChat):
@@ -93,7 +96,7 @@ def test_what_an_earlier_run_may_have_paid_counts_in_the_next(
     dearest_reply_usd = 1000 * PRICE["output"] / 1e6
     with Running(server) as running:
         workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=1000)
-        workspace.write_suite(models=["alpha"], seeds=list(range(4)), limits={"max_attempts": 2})
+        workspace.write_suite(models=["alpha"], seeds=list(range(4)), limits=TWICE)
         codes = [workspace.run("--set", "limits.max_cost_usd=1").code for _ in range(3)]
     assert codes == [1, 1, 1]
     assert 2 <= server.requests <= 1 / dearest_reply_usd
@@ -118,10 +121,26 @@ def test_an_attempt_that_was_billed_is_recorded_though_the_next_does_not_fit(
 def test_a_run_without_a_limit_counts_once_there_is_one(workspace: Workspace) -> None:
     with Running(OpenAIChat(Faults(server_error=0.5))) as running:
         workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
-        workspace.write_suite(models=["alpha"], seeds=[0, 1, 2, 3], limits={"max_attempts": 1})
+        workspace.write_suite(
+            models=["alpha"], seeds=[0, 1, 2, 3], limits={**TWICE, "max_attempts": 1}
+        )
         assert workspace.run().code == 1
         asked, answered = running.server.requests, running.server.ended["ok"]
         assert 0 < answered < asked == 20
         same = workspace.run("--set", f"limits.max_cost_usd={answered * CALL_USD}")
         assert same.code == 1
         assert running.server.requests == asked
+
+
+def test_a_stored_cost_that_is_none_is_named_before_anything_is_sent(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
+        workspace.write_suite(models=["alpha"])
+        assert workspace.run("--set", f"limits.max_cost_usd={2.5 * CALL_USD}").code == 1
+        path = workspace.out / "records.jsonl"
+        stored = path.read_text(encoding="utf-8")
+        path.write_text(re.sub(r'"billed_usd":[\d.]+', '"billed_usd":-5', stored), encoding="utf-8")
+        asked = running.server.requests
+        done = workspace.run("--set", "limits.max_cost_usd=5")
+        assert (done.code, running.server.requests) == (2, asked)
+        assert len(done.errors) == 1

@@ -34,6 +34,10 @@ def is_scored(record: Raw) -> bool:
     return found == {(setting, matcher) for setting in "AB" for matcher in ("optimal", "paper")}
 
 
+TWICE = {"max_attempts": 2, "retry_for_s": 0.0}
+"""Limits of a run that gives up soon, however little time it took."""
+
+
 def coverage(workspace: Workspace) -> dict[str, Raw]:
     text = workspace.tables()["coverage.csv"].decode()
     return {row["model"]: row for row in csv.DictReader(io.StringIO(text))}
@@ -90,6 +94,21 @@ def test_a_model_that_cannot_answer_is_stopped_alone(workspace: Workspace) -> No
     assert [server.ended["ok"] for server in servers] == [100, 100, 100]
 
 
+def test_a_server_that_is_gone_stops_its_model_and_leaves_the_samples(
+    workspace: Workspace,
+) -> None:
+    workspace.write_models("http://127.0.0.1:9", "alpha")
+    workspace.write_suite(models=["alpha", "random"], seeds=list(range(20)), limits=TWICE)
+    done = workspace.run()
+    assert (done.code, done.err) == (1, "")
+    assert done.out.count("http://127.0.0.1:9 cannot be reached, trying now and then") == 1
+    assert "alpha was stopped: http://127.0.0.1:9 could not be reached" in done.out
+    assert "100 of 200 samples are done" in done.out
+    assert "give the same command again" in done.out
+    assert {record["model"] for record in workspace.records()} == {"random"}
+    assert coverage(workspace)["alpha"]["api_error"] == "0"
+
+
 def test_each_way_to_fail_is_an_outcome_of_its_own(workspace: Workspace) -> None:
     endings = {1: "400", 2: "policy", 3: "length", 4: "filtered", 5: "blank"}
     outcomes = ("ok", "api_error", "refusal", "truncated", "refusal", "parse_failure")
@@ -117,7 +136,7 @@ def test_a_sample_whose_every_attempt_failed_is_asked_again_by_the_next_run(
 ) -> None:
     with Running(BySeed({1: "500"})) as running:
         workspace.write_models(running.url, "alpha")
-        workspace.write_suite(models=["alpha"], seeds=[0, 1], limits={"max_attempts": 2})
+        workspace.write_suite(models=["alpha"], seeds=[0, 1], limits=TWICE)
         done = workspace.run()
         assert (done.code, done.err) == (1, "")
         assert "5 of 10 samples are done" in done.out

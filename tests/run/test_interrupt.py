@@ -96,6 +96,19 @@ def test_a_wait_before_another_attempt_is_given_up(workspace: Workspace) -> None
     assert server.requests == AT_ONCE
 
 
+def test_a_wait_for_a_server_that_cannot_be_reached_is_given_up(workspace: Workspace) -> None:
+    prepare(workspace, "http://127.0.0.1:9", "alpha")
+    process = workspace.start()
+    assert process.stdout is not None
+    while "http://127.0.0.1:9 cannot be reached" not in process.stdout.readline():
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    code, out, err = ended(process)
+    assert (code, err) == (130, "")
+    assert f"0 of {SAMPLES} samples are done (interrupted)" in out
+    assert not workspace.records()
+
+
 def test_a_second_interrupt_ends_at_once(workspace: Workspace) -> None:
     with Running(OpenAIChat(Faults(mode="slow"))) as running:
         prepare(workspace, running.url, "alpha")

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from phyblock.run.wordings import fault_of_form
+from phyblock.run.wordings import fault_of_form, texts_in
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.vqa_set import write_questions
@@ -154,3 +154,19 @@ def test_a_slot_that_is_not_filled_in_as_it_is_is_another_one(slot: str) -> None
     fault = fault_of_form(f"Which shape has the {slot}?", ["What is the shape of the {block}?"])
     assert fault is not None
     assert "slots" in fault
+
+
+@pytest.mark.parametrize(
+    ("reply", "texts"),
+    [
+        ('Here: ["a  b", "c"].', ["a b", "c"]),
+        ("[" * 200_000, None),
+        ("[" * 100_000 + "]" * 100_000, None),
+        ("[" + "9" * 100_000 + "]", None),
+        ('["a", 1]', None),
+        ("] [", None),
+        ("none", None),
+    ],
+)
+def test_any_reply_is_a_list_of_texts_or_none(reply: str, texts: list[str] | None) -> None:
+    assert texts_in(reply) == texts

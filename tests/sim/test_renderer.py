@@ -12,7 +12,8 @@ from PIL import Image
 
 from phyblock.errors import InputError
 from phyblock.sim import PictureStyle, goal_key, goal_png
-from phyblock.sim.renderer import draw_with_egl, renderer, succeeds_in_child
+from phyblock.sim.bullet.egl import draw_with_egl, succeeds_in_child
+from phyblock.sim.registry import renderer
 from tests.designs.scenes import designed_scenes
 
 SCENE = designed_scenes()[0]
@@ -22,11 +23,11 @@ import sys
 from pathlib import Path
 from tests.designs.scenes import designed_scenes
 from phyblock.sim import PictureStyle, goal_key, goal_png
-from phyblock.sim.renderer import renderer
+from phyblock.sim.registry import renderer
 if __name__ == "__main__":
     scene, style = designed_scenes()[0], PictureStyle(size_px=128)
     Path(sys.argv[1]).write_bytes(goal_png(scene, style))
-    print(f"\\nANSWER {renderer()} {goal_key(scene, style)}", flush=True)
+    print(f"\\nANSWER {renderer().name} {goal_key(scene, style)}", flush=True)
 """
 
 
@@ -58,7 +59,7 @@ def test_a_probe_that_hangs_is_given_up() -> None:
 
 def test_tinyrenderer_is_the_default_and_words_are_checked(monkeypatch) -> None:
     monkeypatch.delenv("PHYBLOCK_RENDERER", raising=False)
-    assert renderer() == "tinyrenderer"
+    assert renderer().name == "tinyrenderer"
     monkeypatch.setenv("PHYBLOCK_RENDERER", "vulkan")
     with pytest.raises(InputError, match="tinyrenderer, egl, auto"):
         renderer()

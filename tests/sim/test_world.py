@@ -12,6 +12,7 @@ from phyblock.domain import BLOCK_TYPES, SHAPES, BlockType
 from phyblock.errors import SimulationError
 from phyblock.generate.poses import POSES
 from phyblock.sim import Physics, Pose, World
+from phyblock.sim.steps import wait
 from phyblock.sim.support import drop_height_m
 from tests.sim.structures import block, counterweighted_beam, tower
 
@@ -54,14 +55,14 @@ def test_a_block_stays_where_it_is_laid_down(block_type: BlockType, pose: str) -
 def test_a_dropped_cube_settles_on_the_ground() -> None:
     with World() as world:
         world.place(block(1, "cube", (0.0, 0.0, 0.1)))
-        assert world.settle()
+        assert wait(world, 5.0)
         assert world.pose(1).position_m[2] == pytest.approx(0.025, abs=0.001)
 
 
 def test_settling_gives_up_on_what_still_falls() -> None:
     with World() as world:
         world.place(block(1, "cube", (0.0, 0.0, 50.0)))
-        assert not world.settle(limit_s=0.3)
+        assert not wait(world, 0.3)
 
 
 def test_free_fall_follows_gravity() -> None:
@@ -90,7 +91,7 @@ def test_removing_a_block_lets_the_one_above_fall() -> None:
         world.place_all(tower(2))
         world.remove(1)
         assert world.orders == (2,)
-        world.settle()
+        wait(world, 5.0)
         assert world.pose(2).position_m[2] == pytest.approx(0.025, abs=0.001)
 
 

@@ -41,6 +41,7 @@ SECTIONS: dict[str, dict[str, st.SearchStrategy[Any]]] = {
     "limits": {
         "max_concurrency": st.integers(1, 1000),
         "max_attempts": st.integers(1, 100),
+        "retry_for_s": _numbers(0, 1e9),
         "timeout_s": _numbers(1e-3, 1e9),
         "max_cost_usd": st.none() | _numbers(0, 1e9),
     },

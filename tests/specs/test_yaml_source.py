@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from pathlib import Path
 
 import pytest
@@ -149,13 +150,63 @@ def test_what_is_not_plain_data_is_a_problem(text: str, where: str) -> None:
 def test_a_bomb_of_anchors_is_refused() -> None:
     lines = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 9)]
-    with pytest.raises(SpecError, match="more than 100000 values"):
+    with pytest.raises(SpecError, match="more than 20,000 values"):
         parse_yaml("\n".join(lines), "f")
 
 
 def test_deep_nesting_is_refused() -> None:
     with pytest.raises(SpecError, match="nested too deeply"):
         parse_yaml("[" * 5000, "f")
+
+
+TOO_MUCH = {
+    "hex": ("a: 0x" + "f" * 100_000, "f:1:4", "too long a number"),
+    "octal": ("a: 0o" + "7" * 100_000, "f:1:4", "too long a number"),
+    "digits": ("a: [1, -" + "9" * 6_000 + "]", "f:1:8", "too long a number"),
+    "hex above doubles": ("a: 0x" + "f" * 290, "f:1:4", "too large a number"),
+    "brackets": ("a: " + "[" * 100_000, None, "nested too deeply"),
+    "dashes": ("- " * 100_000, "f:1:129", "nested too deeply"),
+    "mappings": ("{a: " * 50_000, None, "nested too deeply"),
+    "list": ("a: [" + "1, " * 50_000 + "]", None, "more than 20,000 values"),
+    "keys": ("".join(f"k{i}: \n" for i in range(25_000)), None, "more than 20,000 values"),
+    "aliases": ("a: &a 1\nb: [" + "*a, " * 50_000 + "]", None, "more than 20,000 values"),
+    "merges": ("a: &a {x: 1}\nb: {<<: [" + "*a, " * 50_000 + "]}", None, "than 20,000 values"),
+    "size": ("#" * 10_000_000, "f", "too long"),
+    "documents": ("---\n" * 50_000, "f:2:1", "another document"),
+    "cycle": ("a: &a {b: [*a]}", "f:1:4", "an anchor holds itself"),
+}
+
+
+@pytest.mark.parametrize(("text", "where", "said"), TOO_MUCH.values(), ids=TOO_MUCH)
+def test_what_passes_a_bound_is_refused_at_its_place(
+    text: str, where: str | None, said: str
+) -> None:
+    try:
+        problems = parse_yaml(text, "f").problems
+    except SpecError as error:
+        problems = list(error.problems)
+    (problem,) = problems
+    assert problem.where == where or where is None
+    assert said in problem.message
+    assert len(str(problem)) < 500
+
+
+def test_a_key_without_end_is_shown_in_part() -> None:
+    (problem,) = parse_yaml("? " + "k" * 50_000 + "\n: !mine x", "f").problems
+    assert len(str(problem)) < 500
+
+
+def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(SpecError, match="is not a regular file"):
+        read_yaml(tmp_path / "pipe")
+    with pytest.raises(SpecError, match="is not a regular file"):
+        read_yaml(Path("/dev/zero"))
+    (tmp_path / "big").write_bytes(b"a: 1\n" * 200_000)
+    with pytest.raises(SpecError, match=r"is larger than 0\.25 MB"):
+        read_yaml(tmp_path / "big")
+    with pytest.raises(SpecError, match="File name too long"):
+        read_yaml(tmp_path / ("x" * 5_000))
 
 
 @given(st.text())

@@ -16,6 +16,7 @@ from phyblock.models.base import Image
 from phyblock.sim import PictureStyle
 from phyblock.tasks import PicturePolicy, Pictures
 from tests.datasets.broken import write_scenes
+from tests.fuzz.strategies import png_header
 from tests.workspace import SCENES
 
 STYLE = PictureStyle(size_px=128)
@@ -163,6 +164,18 @@ def test_a_data_set_without_the_picture_is_refused(
     policy = PicturePolicy("dataset", "composite", COMPOSITE.order, STYLE)
     with pytest.raises(DataError, match="has no picture of it"):
         draw(tmp_path, policy, tasks)
+
+
+@pytest.mark.parametrize("size", [(30_000, 30_000), (1, 1), (0, 9)])
+def test_what_is_no_picture_in_the_cache_is_drawn_anew(
+    tasks: tuple[AssemblyTask, ...], tmp_path: Path, size: tuple[int, int]
+) -> None:
+    pictures = Pictures(tmp_path, COMPOSITE, workers=1)
+    (key,) = pictures.keys(tasks[0])
+    (tmp_path / key[:2]).mkdir()
+    (tmp_path / key[:2] / f"{key}.png").write_bytes(png_header(*size))
+    (outline,), are_real = pictures.outline(tasks[0])
+    assert (outline.data, are_real) == (b"", False)
 
 
 def test_a_cache_that_cannot_be_written_is_said_so(

@@ -30,7 +30,8 @@ from phyblock.generate.questions.pictured import (
 )
 from phyblock.generate.questions.seeing import GOAL_VIEW
 from phyblock.generate.questions.wording import slots_of
-from phyblock.sim.outcomes import OUTCOME_SETTINGS, Setting, holds
+from phyblock.sim.engine import Physics
+from phyblock.sim.outcomes import OUTCOME_SETTINGS, holds
 from phyblock.sim.question_pictures import BLOCK_LABEL
 from phyblock.sim.seeing import Top, is_apart, is_inside, seen, seen_order, visible_tops
 from phyblock.sim.support import bounds_m, drop_height_m
@@ -170,7 +171,7 @@ def _is_sure(scene: Scene, block: Block, place_m: tuple[float, float, float], st
 
 
 def _verdict(
-    scene: Scene, block: Block, place_m: tuple[float, float, float], settings: Sequence[Setting]
+    scene: Scene, block: Block, place_m: tuple[float, float, float], settings: Sequence[Physics]
 ) -> bool | None:
     return holds((*scene.blocks, _put(scene, block, place_m)), block.order, settings)
 

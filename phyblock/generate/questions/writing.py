@@ -9,6 +9,7 @@ from pathlib import Path
 from phyblock.domain.question import Question
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
+from phyblock.files import atomic_write, check_free, writing
 from phyblock.generate.questions.audit import SubtaskAudit
 from phyblock.generate.questions.card import question_card
 from phyblock.generate.questions.records import question_line
@@ -21,10 +22,15 @@ _SUMS_FILE = "SHA256SUMS"
 
 
 def check_place(folder: Path, replace: bool) -> None:
-    """Raise StoreError when the folder holds questions already and is not to be replaced."""
+    """Raise StoreError when the folder holds questions already and is not to be replaced, or files
+    of others by the names that will be written.
+    """
     if (folder / QUESTIONS_FILE).exists() and not replace:
         hint = "give another --out, or --replace"
         raise StoreError(Problem(str(folder), "holds questions already", hint=hint))
+    if not (folder / QUESTIONS_FILE).exists():
+        others = [folder / name for name in (QUESTIONS_FILE, _CARD_FILE, _SUMS_FILE)]
+        check_free(others, "give another --out")
 
 
 def write_questions(
@@ -46,9 +52,7 @@ def write_questions(
         QUESTIONS_FILE: lines.encode(),
     }
     sums = "".join(f"{hashlib.sha256(d).hexdigest()}  {name}\n" for name, d in files.items())
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for name, data in {**files, _SUMS_FILE: sums.encode()}.items():
-            (folder / name).write_bytes(data)
-    except OSError as error:
-        raise StoreError(Problem(str(folder), f"cannot be written: {error.strerror}")) from error
+            atomic_write(folder / name, data)

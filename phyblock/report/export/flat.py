@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from phyblock.files import atomic_write
+from phyblock.report.csv_text import to_csv as csv_text
 from phyblock.report.export.rows import as_json, export_rows, needs
 from phyblock.report.load import Run
 
@@ -48,7 +48,7 @@ def to_csv(run: Run, folder: Path) -> tuple[Path, ...]:
         if name in frame:
             frame[name] = frame[name].map(as_json)
     path = folder / "records.csv"
-    atomic_write(path, frame.to_csv(index=False, lineterminator="\n"))
+    path.write_bytes(csv_text(frame).encode("utf-8", "replace"))
     return (path,)
 
 

@@ -13,8 +13,8 @@ from typing import Any
 
 from phyblock.datasets import QuestionTask
 from phyblock.domain import LETTERS, is_picture_option
-from phyblock.errors import Problem, StoreError
-from phyblock.files import atomic_write
+from phyblock.files import writing
+from phyblock.folders import OutFolder
 from phyblock.models.base import Image
 from phyblock.report.export.rows import needs
 from phyblock.tasks import QuestionPictures
@@ -24,6 +24,11 @@ __all__ = ["QUESTION_FORMATS", "export_questions"]
 
 MCQ_FILE, ORDERING_FILE = "PhyBlock_MCQ.tsv", "PhyBlock_Ordering.tsv"
 _TSV = ("index", "question", *LETTERS, "answer", "category", "l2-category", "scene")
+_FILES = {
+    "vlmevalkit": (MCQ_FILE, ORDERING_FILE),
+    "hf": ("questions.parquet", "README.md", "dataset/"),
+}
+"""What each format writes, as far as it is known before it is made."""
 _AT_ONCE = 4
 
 _Drawn = tuple[QuestionTask, tuple[Image, ...]]
@@ -34,14 +39,15 @@ def export_questions(
 ) -> tuple[Path, ...]:
     """Write questions and their pictures into `folder`; what was written.
 
-    Raises StoreError where the folder cannot be written, SpecError where a package is missing,
+    Raises StoreError where the folder cannot be written or a file is in the way that we never
+    wrote, SpecError where a package is missing,
     DataError for a picture that cannot be had.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        return QUESTION_FORMATS[form](tasks, pictures, folder)
-    except OSError as error:
-        raise StoreError(Problem(str(folder), f"cannot be written: {error.strerror}")) from error
+    out = OutFolder(folder)
+    out.check(_FILES[form])
+    with writing(folder), out.making() as made:
+        files = QUESTION_FORMATS[form](tasks, pictures, made)
+    return tuple(folder / file.relative_to(made) for file in files)
 
 
 def _vlmevalkit(
@@ -59,10 +65,9 @@ async def _write_tsv(
     tasks: Sequence[QuestionTask], pictures: QuestionPictures, folder: Path
 ) -> tuple[Path, ...]:
     paths = (folder / MCQ_FILE, folder / ORDERING_FILE)
-    partial = [path.with_suffix(".part") for path in paths]
     with contextlib.ExitStack() as stack:
         files = [
-            stack.enter_context(path.open("w", newline="", encoding="utf-8")) for path in partial
+            stack.enter_context(path.open("w", newline="", encoding="utf-8")) for path in paths
         ]
         writers = [csv.writer(file, delimiter="\t", lineterminator="\n") for file in files]
         for writer in writers:
@@ -70,8 +75,6 @@ async def _write_tsv(
         async for task, drawn in _drawn(tasks, pictures):
             is_ordering = len(task.question.answer) > 1
             writers[is_ordering].writerow(_tsv_row(task, drawn))
-    for path, whole in zip(paths, partial, strict=True):
-        whole.replace(path)
     return paths
 
 
@@ -126,7 +129,7 @@ def _hugging_face(
     dataset.save_to_disk(folder / "dataset")
     path = folder / "questions.parquet"
     dataset.to_parquet(path)
-    atomic_write(folder / "README.md", _CARD)
+    (folder / "README.md").write_text(_CARD, encoding="utf-8")
     return folder / "dataset", path
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from phyblock.errors import Problem, StoreError
+from phyblock.files import writing
+from phyblock.folders import OutFolder
 from phyblock.report.export.flat import EXPORTS
 from phyblock.report.export.inspect_log import to_inspect
 from phyblock.report.load import Run
+from phyblock.run.folder import run_folder
 
 __all__ = ["FORMATS", "export_run"]
 
@@ -20,11 +22,12 @@ FORMATS = tuple(_ALL)
 def export_run(run: Run, form: str, folder: Path | None = None) -> tuple[Path, ...]:
     """Write a run in another format into `folder` (export/FORMAT in the run's); what was written.
 
-    Raises StoreError where the folder cannot be written, SpecError where a package is missing.
+    Raises StoreError where the folder cannot be written or a file is in the way that we never
+    wrote, SpecError where a package is missing.
     """
-    target = folder or run.path / "export" / form
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-        return _ALL[form](run, target)
-    except OSError as error:
-        raise StoreError(Problem(str(target), f"cannot be written: {error.strerror}")) from error
+    out = OutFolder(folder) if folder else run_folder(run.path)
+    below = "" if folder else f"export/{form}/"
+    target = out.path / below
+    with writing(target), out.making(below) as made:
+        files = _ALL[form](run, made)
+    return tuple(target / file.relative_to(made) for file in files)

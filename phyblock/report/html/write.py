@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from phyblock.domain import SUBTASK_NAMES
-from phyblock.errors import Problem, StoreError
-from phyblock.files import atomic_write
+from phyblock.files import writing
+from phyblock.records import MANIFEST, PROMPTS, RECORDS
 from phyblock.report.figures import FIGURES, write_figures
+from phyblock.report.html.builds import clear, put_in_place, remove_build, remove_others
 from phyblock.report.html.drawable import kit, question_entry, scene_entry
 from phyblock.report.html.headline import assembly_headline
 from phyblock.report.html.headline_tracks import steps_headline, vqa_headline
@@ -30,16 +29,14 @@ from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.sources import Sources, open_sources
 from phyblock.report.load import Run
 from phyblock.report.write import TablesWritten
-from phyblock.run.prompts import PROMPTS
-from phyblock.run.reading import MANIFEST, RECORDS
+from phyblock.run.folder import run_folder
 from phyblock.tasks.question_pictures import Shown
 
-__all__ = ["REPORT_FILE", "write_report"]
+__all__ = ["REPORT_FILE", "page_files", "write_report"]
 
 REPORT_FILE = "report.html"
 _FOLDER = "report"
 _PICTURES = "pictures"
-_UNFINISHED = ".new"
 _FIGURES = {
     "f1-levels": "F1 by level",
     "f1-radar": "F1 by level, as in the paper",
@@ -64,32 +61,34 @@ def write_report(
     data set is now, if it has moved; where it cannot be read, the page says so and shows the rest.
     Pictures that were sent lie beside the page as far as the picture cache has them. `figures`
     names those to draw. Raises DataError for a `data` that is not what the run was made on,
-    StoreError where the folder cannot be written.
+    StoreError where the folder cannot be written or something is in the way that we never wrote.
     """
     run = written.run
     sources = open_sources(run.manifest, run.design, data)
-    drawn = write_figures(run, figures)
-    path = run.path / REPORT_FILE
+    out = run_folder(run.path)
+    out.check(page_files())
     folder = run.path / _FOLDER
-    with _as_store_error(path):
+    with out.alone(), writing(run.path / REPORT_FILE):
+        drawn = write_figures(run, figures)
         build = _build(run, sources)
-        new = folder / f"{build}{_UNFINISHED}"
-        shutil.rmtree(new, ignore_errors=True)
-        new.mkdir(parents=True)
+        new = folder / f"{build}.new"
+        out.claim([REPORT_FILE, f"{_FOLDER}/{build}/", f"{_FOLDER}/{new.name}/"])
+        clear(new)
         try:
             _write_data(run, sources, folder, new, build)
             page = _page(written, drawn, build)
+            put_in_place(new)
         except BaseException:
-            shutil.rmtree(new, ignore_errors=True)
+            remove_build(new)
             raise
-        shutil.rmtree(folder / build, ignore_errors=True)
-        new.rename(folder / build)
-        atomic_write(path, page)
-        # A page of an earlier build that is still open says that it was written again.
-        for old in folder.iterdir():
-            if old.name not in (build, _PICTURES):
-                shutil.rmtree(old)
+        (path,) = out.write({REPORT_FILE: page})
+        remove_others(folder, build)
     return path
+
+
+def page_files() -> tuple[str, ...]:
+    """The page and the folders beside it, by their names in a run folder."""
+    return (REPORT_FILE, f"{_FOLDER}/", f"{_FOLDER}/{_PICTURES}/")
 
 
 def _build(run: Run, sources: Sources) -> str:
@@ -188,11 +187,3 @@ def _figures(files: Sequence[Path]) -> list[Figure]:
         for path in files
         if path.suffix == ".svg"
     ]
-
-
-@contextlib.contextmanager
-def _as_store_error(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise StoreError(Problem(str(path), f"cannot be written: {error.strerror}")) from error

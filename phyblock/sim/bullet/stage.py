@@ -17,29 +17,25 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
-from phyblock.sim import engine
+from phyblock.sim.bullet.client import connect
+from phyblock.sim.bullet.egl import load_egl
 from phyblock.sim.mesh import Mesh
-from phyblock.sim.renderer import Renderer, load_egl, renderer
+from phyblock.sim.renderer import Prop, Rgb
 
-__all__ = ["Prop", "Stage", "stage"]
-
-Prop = tuple[Mesh, tuple[int, int, int], tuple[float, float, float], NDArray[np.float64]]
-"""Mesh, color 0..255, position of its frame [m], orientation (x, y, z, w)."""
+__all__ = ["Stage", "stage"]
 
 
 class Stage:
     """A client with the visual shapes made so far; use it through `stage`."""
 
-    def __init__(self, bullet: ModuleType, client: int, drawn_by: Renderer) -> None:
-        self._bullet = bullet
-        self._client = client
+    def __init__(self, *, with_egl: bool) -> None:
+        self._bullet, self._client = connect()
         self._make_shape = self._shape_in_memory
-        if drawn_by == "egl":
-            load_egl(bullet, client)
+        if with_egl:
+            load_egl(self._bullet, self._client)
             self._make_shape = self._shape_from_file
-        self._shapes: dict[tuple[int, tuple[int, int, int]], tuple[int, Mesh]] = {}
+        self._shapes: dict[tuple[int, Rgb], tuple[int, Mesh]] = {}
         self._lock = threading.Lock()
 
     @contextlib.contextmanager
@@ -59,24 +55,23 @@ class Stage:
                     self._bullet.removeBody(body, physicsClientId=self._client)
 
     def _put_up(self, prop: Prop) -> int:
-        mesh, rgb, position_m, quat_xyzw = prop
         return int(
             self._bullet.createMultiBody(
-                baseVisualShapeIndex=self._shape(mesh, rgb),
-                basePosition=position_m,
-                baseOrientation=quat_xyzw.tolist(),
+                baseVisualShapeIndex=self._shape(prop.mesh, prop.rgb),
+                basePosition=prop.pose.position_m.tolist(),
+                baseOrientation=prop.pose.quat_xyzw.tolist(),
                 physicsClientId=self._client,
             )
         )
 
-    def _shape(self, mesh: Mesh, rgb: tuple[int, int, int]) -> int:
+    def _shape(self, mesh: Mesh, rgb: Rgb) -> int:
         """The kept shape; the mesh is kept with it, so that its identity stays taken."""
         key = (id(mesh), rgb)
         if key not in self._shapes:
             self._shapes[key] = (self._make_shape(mesh, rgb), mesh)
         return self._shapes[key][0]
 
-    def _shape_in_memory(self, mesh: Mesh, rgb: tuple[int, int, int]) -> int:
+    def _shape_in_memory(self, mesh: Mesh, rgb: Rgb) -> int:
         """Every triangle with corners of its own, which keeps the shading of faces flat."""
         corners = mesh.corners_m.reshape(-1, 3)
         return int(
@@ -91,7 +86,7 @@ class Stage:
             )
         )
 
-    def _shape_from_file(self, mesh: Mesh, rgb: tuple[int, int, int]) -> int:
+    def _shape_from_file(self, mesh: Mesh, rgb: Rgb) -> int:
         """The same shape for EGL, which crashes on meshes that come from memory."""
         corners, normals = mesh.corners_m.reshape(-1, 3), np.repeat(mesh.normals, 3, axis=0)
         lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in corners.tolist()]
@@ -114,12 +109,12 @@ class Stage:
 _opening = threading.Lock()
 
 
-def stage() -> Stage:
+def stage(*, with_egl: bool) -> Stage:
     """This process's stage; its client stays open until the process ends."""
     with _opening:
-        return _only_stage()
+        return _only_stage(with_egl)
 
 
 @functools.cache
-def _only_stage() -> Stage:
-    return Stage(*engine.connect(), renderer())
+def _only_stage(with_egl: bool) -> Stage:
+    return Stage(with_egl=with_egl)

@@ -1,0 +1,240 @@
+"""The reply cache as a run uses it: off the event loop, shared with other processes, never waited
+for long.
+
+It is a cache: replies stand in the records of the run as well. A file that is locked or fails while
+a run goes on is set aside, said once, and tried again later.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import random
+import time
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from phyblock.errors import StoreError
+from phyblock.models.base import Reply
+from phyblock.models.cache import CacheBusyError, ReplyCache
+from phyblock.models.events import Tell, ignore_text
+from phyblock.models.leases import LEASE_S
+from phyblock.models.limits import Clock
+from phyblock.models.worker import Worker
+
+__all__ = ["SharedCache", "Turn"]
+
+T = TypeVar("T")
+
+_BUSY_TIMEOUT_S = 0.5
+_PATIENCE_S = 5.0
+_TRY_AGAIN_AFTER_S = 60.0
+_FIRST_LOOK_S = 0.05
+_LONGEST_LOOK_S = 1.0
+_NOTHING: tuple[Reply | None, bool] = (None, False)
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Whether it is ours to ask; if not, another asks, or has been answered meanwhile."""
+
+    is_ours: bool
+    reply: Reply | None = None
+
+
+class SharedCache:
+    """Replies by key, and who asks what; an async context manager.
+
+    Nothing but `open` raises an error of the file: what fails is told to `tell`, and the cache is
+    as good as empty until it works again.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        tell: Tell = ignore_text,
+        *,
+        patience_s: float = _PATIENCE_S,
+        try_again_after_s: float = _TRY_AGAIN_AFTER_S,
+        clock: Clock | None = None,
+    ) -> None:
+        """`patience_s` is how long a locked file is waited for before it is set aside."""
+        self.path = path
+        self._tell = tell
+        self._patience_s = patience_s
+        self._try_again_after_s = try_again_after_s
+        self._clock = clock or Clock()
+        self._worker = Worker("reply cache")
+        self._file: ReplyCache | None = None
+        self._aside_until_s: float | None = None
+        self._is_told = False
+        self._is_closing = False
+
+    async def __aenter__(self) -> SharedCache:
+        await self.open()
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.aclose()
+
+    async def open(self) -> None:
+        """Open the file; StoreError when it is foreign or broken. A locked one is set aside."""
+        try:
+            await self._worker.run(lambda: self._try(lambda _: None))
+        except CacheBusyError as error:
+            self._set_aside(error)
+
+    async def find(self, key: str) -> Reply | None:
+        """The reply kept under `key`."""
+        return await self._do(lambda file: file.get(key), None)
+
+    async def await_others(self, key: str, most_s: float) -> tuple[Reply | None, bool]:
+        """Wait while another asks the same, `most_s` at most.
+
+        The reply if there is one then, and whether the other is still asking.
+        """
+        began_s, pause_s = self._clock.now(), _FIRST_LOOK_S
+        while True:
+            reply, is_asked = await self._do(lambda file: _look(file, key), _NOTHING)
+            waited_s = self._clock.now() - began_s
+            if reply is not None or not is_asked or waited_s >= most_s:
+                return reply, is_asked
+            await self._clock.sleep(pause_s * random.uniform(0.5, 1.0))
+            pause_s = min(_LONGEST_LOOK_S, 1.5 * pause_s)
+
+    @contextlib.asynccontextmanager
+    async def asking(self, key: str, *, by_force: bool = False) -> AsyncIterator[Turn]:
+        """Keep others from asking the same meanwhile, if it is our turn to ask."""
+        turn = await self._do(lambda file: _take(file, key, by_force=by_force), Turn(True))
+        renewing = asyncio.create_task(self._renew(key)) if turn.is_ours else None
+        try:
+            yield turn
+        finally:
+            if renewing is not None:
+                renewing.cancel()
+                await self._do(lambda file: _give_back(file, key), None)
+
+    async def keep(self, key: str, model_id: str, reply: Reply) -> None:
+        """Keep a reply, if it is whole and the file takes it."""
+        is_kept = await self._do(lambda file: file.put(key, model_id, reply), False)
+        # Not before it was written to: a full disk can be read all the same.
+        if is_kept and self._is_told:
+            self._is_told = False
+            self._tell(f"reply cache {self.path}: is in use again")
+
+    async def aclose(self) -> None:
+        """Give back what is held and close the file."""
+        self._is_closing = True
+        # What cannot be given back runs out by itself.
+        with contextlib.suppress(StoreError, asyncio.TimeoutError):
+            await asyncio.wait_for(self._worker.run(self._close_file), 2 * _BUSY_TIMEOUT_S)
+        self._worker.stop()
+
+    async def _renew(self, key: str) -> None:
+        while True:
+            await asyncio.sleep(LEASE_S / 3)
+            await self._do(lambda file: _renew(file, key), None)
+
+    async def _do(self, operation: Callable[[ReplyCache], T], otherwise: T) -> T:
+        """What the operation returns; `otherwise` while the cache is set aside."""
+        if self._is_aside:
+            return otherwise
+        try:
+            # The file may hang in a way that SQLite knows nothing of, as on a lost network disk.
+            limit_s = self._patience_s + 2 * _BUSY_TIMEOUT_S
+            job = self._worker.run(lambda: self._try(operation))
+            return await asyncio.wait_for(job, limit_s)
+        except _AsideError:
+            return otherwise
+        except (StoreError, asyncio.TimeoutError) as error:
+            self._set_aside(error)
+            return otherwise
+
+    @property
+    def _is_aside(self) -> bool:
+        until_s = self._aside_until_s
+        return until_s is not None and self._clock.now() < until_s
+
+    def _set_aside(self, error: Exception) -> None:
+        self._aside_until_s = self._clock.now() + self._try_again_after_s
+        if not self._is_told and not self._is_closing:
+            self._is_told = True
+            said = str(error).partition("\n")[0] or f"reply cache {self.path}: does not answer"
+            self._tell(f"{said}; going on without it, and trying again later")
+
+    def _try(self, operation: Callable[[ReplyCache], T]) -> T:
+        """In the worker: operate on the file, waiting for others to let go of it."""
+        if self._is_aside:
+            raise _AsideError(())
+        was_aside = self._aside_until_s is not None
+        until_s = time.monotonic() + (0.0 if was_aside else self._patience_s)
+        try:
+            result = self._wait_and_try(operation, until_s)
+        except StoreError as error:
+            # Here and not on the loop: the jobs that wait already must not try in their turn.
+            self._aside_until_s = self._clock.now() + self._try_again_after_s
+            if not isinstance(error, CacheBusyError):
+                self._drop_file()
+            raise
+        self._aside_until_s = None
+        return result
+
+    def _wait_and_try(self, operation: Callable[[ReplyCache], T], until_s: float) -> T:
+        while True:
+            try:
+                if self._file is None:
+                    self._file = ReplyCache(self.path, min(_BUSY_TIMEOUT_S, self._patience_s))
+                return operation(self._file)
+            except CacheBusyError:
+                if self._is_closing or time.monotonic() >= until_s:
+                    raise
+
+    def _close_file(self) -> None:
+        if self._file is not None:
+            try:
+                with self._file.leases() as leases:
+                    leases.give_all_back()
+            finally:
+                self._drop_file()
+
+    def _drop_file(self) -> None:
+        """Forget a file that failed; it may be another one when it is opened again."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+
+class _AsideError(StoreError):
+    """The cache was set aside while this operation waited for its turn."""
+
+
+def _look(file: ReplyCache, key: str) -> tuple[Reply | None, bool]:
+    """The reply, or whether the question is being asked. In this order: a reply is kept before
+    its lease is given back.
+    """
+    with file.leases() as leases:
+        is_asked = leases.is_taken(key)
+    return file.get(key), is_asked
+
+
+def _take(file: ReplyCache, key: str, *, by_force: bool) -> Turn:
+    """Look for the reply once more with the lease in hand: then nobody can bring it meanwhile."""
+    with file.leases() as leases:
+        if not leases.take(key, by_force=by_force):
+            return Turn(False)
+        reply = file.get(key)
+        if reply is not None:
+            leases.give_back(key)
+    return Turn(reply is None, reply)
+
+
+def _renew(file: ReplyCache, key: str) -> None:
+    with file.leases() as leases:
+        leases.renew(key)
+
+
+def _give_back(file: ReplyCache, key: str) -> None:
+    with file.leases() as leases:
+        leases.give_back(key)

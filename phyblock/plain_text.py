@@ -1,0 +1,40 @@
+"""Text that others wrote (names, replies, paths), made harmless where we show or store it."""
+
+from __future__ import annotations
+
+import re
+
+__all__ = ["csv_cell", "one_line", "plain_lines"]
+
+_HALF = re.compile("[\ud800-\udfff]")
+_FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+
+def one_line(text: str) -> str:
+    """Text on one line: a space for each newline and control character.
+
+    Half a character, as it stands for a byte of a file name that is not UTF-8, becomes U+FFFD.
+    Marks that turn the direction of writing go, too: they would change what stands beside them.
+    """
+    if text.isprintable():
+        return text
+    text = _HALF.sub("\ufffd", text)
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+def plain_lines(text: str) -> str:
+    """Text whose lines are each as `one_line` makes them."""
+    return "\n".join(map(one_line, text.split("\n")))
+
+
+def csv_cell(value: object) -> object:
+    """A value as a cell of a CSV file that a spreadsheet never takes for a formula.
+
+    Text that begins with `=`, `+`, `-`, `@`, a tab or a line break gets an apostrophe before it;
+    so does text that begins with apostrophes and then one of these, so that one apostrophe taken
+    away gives back what was there. Numbers, as numbers or as text, stay as they are.
+    """
+    if isinstance(value, str) and _FORMULA.match(value) and not _NUMBER.fullmatch(value):
+        return f"'{value}"
+    return value

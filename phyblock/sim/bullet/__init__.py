@@ -1,0 +1,1 @@
+"""PyBullet behind the two protocols: the only package that imports it, and then late."""

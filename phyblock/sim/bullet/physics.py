@@ -1,0 +1,225 @@
+"""PyBullet as a physics engine.
+
+The measured conditions for wooden-block structures to stand as they do on a table: collision
+hulls moved inward by the 1 mm margin that Bullet adds to meshes, the cylinder as the 18-gon it
+is, the arch as ten convex pieces, the center of mass and the inertia of the true solid, and the
+square root of the pair's friction on each body, because Bullet multiplies them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import tempfile
+from collections.abc import Iterator, Mapping
+from itertools import product
+from pathlib import Path
+from types import ModuleType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.domain.blocks import SHAPES, BlockType, quat_xyzw_to_matrix
+from phyblock.errors import SimulationError
+from phyblock.sim.bullet.client import client as fresh_client
+from phyblock.sim.bullet.client import version
+from phyblock.sim.engine import FLOOR, Contact, Physics, Velocity
+from phyblock.sim.geometry import collision_pieces, solid_mesh
+from phyblock.sim.pose import Pose
+
+__all__ = ["BulletEngine", "BulletSimulation"]
+
+_MESH_MARGIN_M = 0.001
+
+
+class BulletEngine:
+    """Opens simulations, each in a PyBullet client of its own."""
+
+    name = "pybullet"
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """PyBullet's."""
+        return {"pybullet": version()}
+
+    @contextlib.contextmanager
+    def open(self, physics: Physics) -> Iterator[BulletSimulation]:
+        """Open a floor without blocks; SimulationError when too many are open."""
+        with fresh_client() as (bullet, client):
+            yield BulletSimulation(bullet, client, physics)
+
+
+class _Body(NamedTuple):
+    """A block in the client: its number there, and its center of mass in its own frame [m]."""
+
+    id: int
+    center_m: NDArray[np.float64]
+
+
+class _Saved(NamedTuple):
+    """A state that the client keeps, and the bodies that it is of."""
+
+    id: int
+    bodies: tuple[int, ...]
+
+
+class BulletSimulation:
+    """Blocks on a plane, as `Simulation`; Bullet itself knows centers of mass only."""
+
+    def __init__(self, bullet: ModuleType, client: int, physics: Physics) -> None:
+        self._bullet = bullet
+        self._client = client
+        self._friction = math.sqrt(physics.friction)
+        self._shapes: dict[BlockType, int] = {}
+        self._bodies: dict[int, _Body] = {}
+        bullet.setGravity(*physics.gravity_m_s2, physicsClientId=client)
+        bullet.setPhysicsEngineParameter(
+            fixedTimeStep=physics.time_step_s,
+            numSolverIterations=physics.iterations,
+            deterministicOverlappingPairs=1,
+            physicsClientId=client,
+        )
+        plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
+        self._floor = int(bullet.createMultiBody(0, plane, physicsClientId=client))
+        self._set_friction(self._floor)
+
+    def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
+        """Put a block at a pose, at rest."""
+        shape = SHAPES[block_type]
+        body = self._bullet.createMultiBody(
+            baseMass=shape.mass_kg,
+            baseCollisionShapeIndex=self._shape(block_type),
+            physicsClientId=self._client,
+        )
+        inertia = np.diag(solid_mesh(block_type).inertia_m2) * shape.mass_kg
+        self._bullet.changeDynamics(
+            body, -1, localInertiaDiagonal=inertia.tolist(), physicsClientId=self._client
+        )
+        self._set_friction(body)
+        offset_m = np.array(shape.center_of_mass_m)
+        center_m = pose.position_m + quat_xyzw_to_matrix(pose.quat_xyzw) @ offset_m
+        self._bullet.resetBasePositionAndOrientation(
+            body, center_m.tolist(), pose.quat_xyzw.tolist(), physicsClientId=self._client
+        )
+        self._bodies[number] = _Body(int(body), offset_m)
+
+    def remove(self, number: int) -> None:
+        """Take a block out."""
+        self._bullet.removeBody(self._bodies.pop(number).id, physicsClientId=self._client)
+
+    def step(self, n: int) -> None:
+        """Simulate `n` time steps."""
+        for _ in range(n):
+            self._bullet.stepSimulation(physicsClientId=self._client)
+
+    def pose(self, number: int) -> Pose:
+        """Where a block is now."""
+        body = self._bodies[number]
+        center_m, quat = self._bullet.getBasePositionAndOrientation(
+            body.id, physicsClientId=self._client
+        )
+        quat_xyzw = np.array(quat)
+        return Pose(np.array(center_m) - quat_xyzw_to_matrix(quat_xyzw) @ body.center_m, quat_xyzw)
+
+    def velocity(self, number: int) -> Velocity:
+        """How a block moves now."""
+        body = self._bodies[number].id
+        return Velocity(*self._bullet.getBaseVelocity(body, physicsClientId=self._client))
+
+    def set_velocity(self, number: int, velocity: Velocity) -> None:
+        """Make a block move this way from now on."""
+        self._bullet.resetBaseVelocity(
+            self._bodies[number].id,
+            velocity.linear_m_s,
+            velocity.angular_rad_s,
+            physicsClientId=self._client,
+        )
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """Where bodies touched in the last time step."""
+        numbers = {body.id: number for number, body in self._bodies.items()}
+        numbers[self._floor] = FLOOR
+        found = []
+        for point in self._bullet.getContactPoints(physicsClientId=self._client):
+            # Bullet's normal points from its second body to its first one.
+            second, first, (x, y, z) = numbers[point[1]], numbers[point[2]], point[7]
+            if second < first:
+                first, second, x, y, z = second, first, -x, -y, -z
+            found.append(Contact(first, second, (x, y, z), point[8]))
+        return tuple(sorted(found))
+
+    def save(self) -> object:
+        """Everything that decides what happens next; the client keeps it while it is open."""
+        bodies = tuple(body.id for body in self._bodies.values())
+        return _Saved(self._bullet.saveState(physicsClientId=self._client), bodies)
+
+    def restore(self, saved: object) -> None:
+        """Bring back what was saved; SimulationError when other blocks are there now."""
+        bodies = tuple(body.id for body in self._bodies.values())
+        if not isinstance(saved, _Saved) or saved.bodies != bodies:
+            raise SimulationError("what was saved is of other blocks than are there now")
+        self._bullet.restoreState(stateId=saved.id, physicsClientId=self._client)
+
+    def _set_friction(self, body: int) -> None:
+        self._bullet.changeDynamics(
+            body,
+            -1,
+            lateralFriction=self._friction,
+            rollingFriction=0.0,
+            spinningFriction=0.0,
+            restitution=0.0,
+            physicsClientId=self._client,
+        )
+
+    def _shape(self, block_type: BlockType) -> int:
+        """Collision shape of a type about its center of mass, made once a simulation."""
+        if block_type not in self._shapes:
+            self._shapes[block_type] = self._make_shape(block_type)
+        return self._shapes[block_type]
+
+    def _make_shape(self, block_type: BlockType) -> int:
+        if (half_m := _half_sides_m(block_type)) is not None:
+            return int(
+                self._bullet.createCollisionShape(
+                    self._bullet.GEOM_BOX, halfExtents=half_m, physicsClientId=self._client
+                )
+            )
+        with tempfile.TemporaryDirectory(prefix="phyblock-") as folder:
+            path = Path(folder, f"{block_type}.obj")
+            path.write_text(_hulls_as_obj(block_type), encoding="ascii")
+            shape = self._bullet.createCollisionShape(
+                self._bullet.GEOM_MESH, fileName=str(path), physicsClientId=self._client
+            )
+        if shape < 0:
+            raise SimulationError(f"PyBullet refused the collision shape of {block_type}")
+        return int(shape)
+
+
+def _half_sides_m(block_type: BlockType) -> list[float] | None:
+    """Half the sides of a block that is a box about its center of mass [m]; None for another.
+
+    Bullet keeps its margin inside a box, so that boxes need not be moved inward.
+    """
+    corners = solid_mesh(block_type).vertices_m - np.array(SHAPES[block_type].center_of_mass_m)
+    half: list[float] = corners.max(axis=0).tolist()
+    box = set(product(*((-side, side) for side in half)))
+    return half if set(map(tuple, corners.tolist())) == box else None
+
+
+def _hulls_as_obj(block_type: BlockType) -> str:
+    """The convex pieces as an OBJ of one object each, which Bullet reads as a compound of hulls.
+
+    A file, since PyBullet takes no more than one hull from memory. Its faces are a mere fan:
+    Bullet wraps a hull round the corners.
+    """
+    center = np.array(SHAPES[block_type].center_of_mass_m)
+    lines: list[str] = []
+    first = 1
+    for number, piece in enumerate(collision_pieces(block_type, _MESH_MARGIN_M)):
+        lines.append(f"o piece{number}")
+        lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in (piece.vertices_m - center).tolist()]
+        count = len(piece.vertices_m)
+        lines += [f"f {first} {first + i} {first + i + 1}" for i in range(1, count - 1)]
+        first += count
+    return "\n".join(lines) + "\n"

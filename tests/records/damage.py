@@ -1,0 +1,67 @@
+"""A sound record line, and ways in which a hand or a disk damages it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+Raw = dict[str, Any]
+
+BEFORE = Path(__file__).with_name("format-1.jsonl")
+"""A record of each track as the first version wrote it."""
+
+
+def lines_before() -> list[bytes]:
+    return BEFORE.read_bytes().splitlines()
+
+
+def plan_record() -> Raw:
+    """The record of a plan."""
+    found: Raw = json.loads(lines_before()[0])
+    return found
+
+
+def with_value(at: str, value: object) -> bytes:
+    """The record with another value at a dotted place, as a line."""
+    record = plan_record()
+    *above, last = at.split(".")
+    node: Any = record
+    for name in above:
+        node = node[int(name) if isinstance(node, list) else name]
+    node[int(last) if isinstance(node, list) else last] = value
+    return json.dumps(record).encode()
+
+
+def with_text(value: str, text: str) -> bytes:
+    """The record's line with JSON text in the place of a value that stands in it once."""
+    line = json.dumps(plan_record(), separators=(",", ":"))
+    assert line.count(value) == 1, value
+    return line.replace(value, text).encode()
+
+
+DAMAGED: dict[str, tuple[bytes, str, str]] = {
+    "nan": (with_text('"latency_s":0.0', '"latency_s":NaN'), "", "NaN"),
+    "infinity": (with_text('"latency_s":0.0', '"latency_s":-Infinity'), "", "Infinity"),
+    "too-large": (with_text('"latency_s":0.0', '"latency_s":1e999'), "", "1e999"),
+    "nan-undeclared": (with_text('"seed_sent":true', '"mine":{"x":NaN}'), "", "NaN"),
+    "huge-number": (with_value("reply.usage.completion_tokens", 10**30),
+        "reply.usage.completion_tokens", "out of range"),
+    "many-digits": (with_text('"latency_s":0.0', '"latency_s":' + "9" * 9999), "", "9,999 digits"),
+    "deep": (with_text('"latency_s":0.0', '"latency_s":' + "[" * 9999 + "]" * 9999), "", "deep"),
+    "text-for-number": (with_value("seed", "0"), "seed", "wrong type"),
+    "number-for-text": (with_value("reply.text", 5), "reply.text", "wrong type"),
+    "word": (with_value("outcome", "fine"), "outcome", "'api_error'"),
+    "finish": (with_value("reply.finish", "never"), "reply.finish", "'stop'"),
+    "truth": (with_value("n_blocks", True), "n_blocks", "wrong type"),
+    "score": (with_value("scores.1.tp", 1.5), "scores[1].tp", "wrong type"),
+    "parse": (with_value("parse.plan", "1, 2"), "parse.plan", "wrong type"),
+    "track": (with_value("track", "singing"), "track", "not known"),
+    "empty": (b"", "", "not a record"),
+    "blank": (b"  \r", "", "not a record"),
+    "no-object": (b"[1, 2]", "", "not a record"),
+    "not-utf8": (b'{"sample": "\xff"}', "", "UTF-8"),
+    "cut": (json.dumps(plan_record()).encode()[:300], "", "not a record"),
+    "zeros": (b"\0" * 64, "", "not a record"),
+}  # fmt: skip
+"""By name: a line, the field that is named, and what else is said."""

@@ -1,0 +1,164 @@
+"""Only a run's own records are counted, and only they go on in its folder."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from phyblock.errors import StoreError
+from phyblock.records import Belonging, Manifest, Turn
+from phyblock.report import load_run
+from phyblock.run.rescore import rescore
+from phyblock.tasks.record_types import RECORD_ADAPTER
+from tests.records.damage import Raw, plan_record
+from tests.workspace import Workspace
+
+IDENTITY = "5eed" * 16
+PROMPT = plan_record()["prompt"]
+
+
+def facts(**changes: Any) -> Manifest:
+    """The manifest of the run that `plan_record` belongs to."""
+    record = plan_record()
+    version = record["prompt"]["version"]
+    fields = {
+        "identity": IDENTITY,
+        "suite": {"tracks": ["full_planning"], "seeds": [0, 1]},
+        "models": [{"name": "random"}],
+        "tracks": {"full_planning": {"prompt": {"name": "default", "version": version}}},
+    }
+    return Manifest.model_validate({**fields, **changes})
+
+
+def differs(belonging: Belonging, record: Raw) -> str | None:
+    """The field that shows that a record is of another run."""
+    problem = belonging.problem("records.jsonl:7", RECORD_ADAPTER.validate_python(record))
+    if problem is None:
+        return None
+    assert problem.where == "records.jsonl:7"
+    assert problem.hint
+    return problem.field
+
+
+def renamed(**changes: Any) -> Raw:
+    record = {**plan_record(), **changes}
+    parts = (record["track"], record["model"], record["key"], f"s{record['seed']}")
+    return {**record, "sample": "/".join(parts)}
+
+
+def test_a_run_takes_its_own_records_old_and_new_and_those_scored_again() -> None:
+    old, new = plan_record(), {**plan_record(), "run": IDENTITY[:16]}
+    samples = {old["sample"]}
+    for identity in (IDENTITY, f"{IDENTITY} scored by official, paper"):
+        for record in (old, new):
+            assert differs(Belonging.of(facts(identity=identity), samples), record) is None
+
+
+@pytest.mark.parametrize(
+    ("record", "field"),
+    [
+        ({**plan_record(), "run": "0" * 16}, "run"),
+        (renamed(model="oracle"), "model"),
+        (renamed(seed=2), "seed"),
+        (renamed(seed=1), "sample"),
+        (renamed(key="another"), "sample"),
+        ({**plan_record(), "seed": 1}, "sample"),
+        (
+            {**plan_record(), "prompt": PROMPT | {"version": "0"}},
+            "prompt.version",
+        ),
+    ],
+)
+def test_a_foreign_record_is_known_by_what_differs(record: Raw, field: str) -> None:
+    assert differs(Belonging.of(facts(), {plan_record()["sample"]}), record) == field
+
+
+def test_a_track_that_was_not_asked_is_foreign() -> None:
+    suite = {"tracks": ["vqa"], "seeds": [0]}
+    assert differs(Belonging.of(facts(suite=suite)), plan_record()) == "track"
+
+
+def test_older_records_of_one_item_show_the_same_pictures() -> None:
+    models = [{"name": name} for name in ("random", "oracle")]
+    belonging = Belonging.of(facts(models=models))
+    assert differs(belonging, plan_record()) is None
+    other = renamed(model="oracle")
+    assert differs(belonging, other) is None
+    other["prompt"]["images"][0]["sha256"] = "0" * 64
+    assert differs(belonging, other) == "prompt.images"
+
+
+def test_a_turn_of_another_run_is_foreign() -> None:
+    reply = {"text": "", "usage": {"prompt_tokens": 1, "completion_tokens": 1}}
+    fields = {"sample": "s", "turn": 0, "reply": {**reply, "cost_usd": None, "cached": False}}
+    belonging = Belonging.of(facts(), {"s"})
+    assert belonging.problem("turns.jsonl:1", Turn.model_validate(fields)) is None
+    for changes in ({"sample": "t"}, {"run": "0" * 16}):
+        problem = belonging.problem("turns.jsonl:1", Turn.model_validate({**fields, **changes}))
+        assert problem is not None
+        assert problem.field in changes
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+    """Two runs that differ in the background of their pictures alone: `out` and `other`."""
+    made = Workspace(tmp_path_factory.mktemp("runs"), pictures_dir)
+    made.write_scenes()
+    for name, background in (("other", "white"), ("out", "checkerboard")):
+        made.out = made.root / name
+        made.write_suite(models=["random"], images={"size_px": 128, "background": background})
+        done = made.run()
+        assert done.code == 0, done.err
+    return made
+
+
+READERS: dict[str, Callable[[Path], object]] = {
+    "load": load_run,
+    "score": lambda folder: rescore(folder, "official", None, folder / "again"),
+}
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_records_that_were_copied_in_are_not_counted(
+    runs: Workspace, tmp_path: Path, reader: str
+) -> None:
+    folder = shutil.copytree(runs.out, tmp_path / "run")
+    READERS[reader](folder)
+    path = folder / "records.jsonl"
+    with path.open("ab") as file:
+        file.write((runs.root / "other" / "records.jsonl").read_bytes())
+    before = path.read_bytes()
+    with pytest.raises(StoreError) as caught:
+        READERS[reader](folder)
+    (problem,) = caught.value.problems
+    assert (problem.where, problem.field) == (f"{path}:6", "run")
+    assert path.read_bytes() == before
+
+
+def test_a_run_does_not_go_on_with_records_that_were_copied_in(
+    runs: Workspace, tmp_path: Path
+) -> None:
+    whole = runs.out
+    runs.out = Path(shutil.copytree(whole, tmp_path / "run"))
+    try:
+        assert runs.run().code == 0
+        path = runs.out / "records.jsonl"
+        shutil.copy(runs.root / "other" / "records.jsonl", path)
+        before = path.read_bytes()
+        done = runs.run()
+        assert done.code == 2
+        assert "records.jsonl:1: run: is of another run" in done.err
+        assert path.read_bytes() == before
+        lines = [json.loads(line) for line in (whole / "records.jsonl").read_bytes().splitlines()]
+        lines[2] |= {"key": "t9", "scene": "t9", "sample": "full_planning/random/t9/s0"}
+        path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+        done = runs.run()
+        assert done.code == 2
+        assert "records.jsonl:3: sample: is of another run" in done.err
+    finally:
+        runs.out = whole

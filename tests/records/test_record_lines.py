@@ -1,0 +1,120 @@
+"""Lines of records: read as they were written, refused where they are damaged."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.errors import StoreError
+from phyblock.models import Reply, Usage
+from phyblock.models.stored import reply_of, stored
+from phyblock.records import StoredReply
+from phyblock.report import load_run
+from phyblock.run.reading import any_records, newest_starts
+from phyblock.tasks.record_types import RECORD_ADAPTER
+from tests.records.damage import DAMAGED, lines_before, plan_record, with_value
+from tests.report.factory import manifest
+
+numbers = st.none() | st.integers(-(10**40), 10**40)
+amounts = st.none() | st.floats()
+
+
+def folder_with(path: Path, *lines: bytes) -> Path:
+    """A run folder with these lines, of a run that they belong to."""
+    suite = manifest(models=["random"], seeds=[0])
+    (path / "run.yaml").write_text(yaml.safe_dump(suite), encoding="utf-8")
+    (path / "records.jsonl").write_bytes(b"".join(line + b"\n" for line in lines))
+    return path
+
+
+def whole(line: bytes) -> bytes:
+    record = RECORD_ADAPTER.validate_json(line, strict=True)
+    return json.dumps(record.fields(), ensure_ascii=False, separators=(",", ":")).encode()
+
+
+@pytest.mark.parametrize("line", lines_before(), ids=["plan", "episode", "choice"])
+def test_lines_of_the_first_version_are_written_again_byte_for_byte(line: bytes) -> None:
+    assert whole(line) == line
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers(-(10**9), 10**9) | st.text(max_size=4),
+    lambda below: st.lists(below, max_size=2) | st.dictionaries(st.text(max_size=3), below),
+    max_leaves=5,
+)
+
+
+@given(st.dictionaries(st.text("xyz", min_size=1, max_size=3), json_values, max_size=3))
+def test_what_no_model_declares_is_kept(more: dict[str, object]) -> None:
+    record = plan_record()
+    line = json.dumps(record | more, ensure_ascii=False, separators=(",", ":")).encode()
+    assert whole(line) == line
+
+
+@pytest.mark.parametrize("name", DAMAGED)
+def test_a_damaged_line_is_named_with_its_field(tmp_path: Path, name: str) -> None:
+    line, field, says = DAMAGED[name]
+    sound = lines_before()[0]
+    with pytest.raises(StoreError) as caught:
+        load_run(folder_with(tmp_path, sound, line, sound))
+    (problem,) = caught.value.problems
+    assert problem.where.startswith(f"{tmp_path / 'records.jsonl'}:2")
+    assert problem.message.startswith("is not a record")
+    assert problem.hint
+    assert problem.field == field or not field
+    assert says in str(problem)
+
+
+@given(st.binary(max_size=40), st.integers(0, 2469), st.integers(0, 40))
+def test_any_bytes_are_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, noise: bytes, start: int, length: int
+) -> None:
+    sound = lines_before()[0]
+    damaged = sound[:start] + noise.replace(b"\n", b" ") + sound[start + length :]
+    folder = folder_with(tmp_path_factory.mktemp("run"), damaged, sound)
+    found = []
+    with contextlib.suppress(StoreError):
+        found += [record for _, record in any_records(folder)]
+    assert len(found) in (0, 2)
+    json.dumps([record.fields() for record in found], ensure_ascii=False).encode()
+
+
+def test_text_that_no_output_could_hold_is_read_without_it(tmp_path: Path) -> None:
+    line = with_value("reply.text", "half \ud83d of one")
+    run = load_run(folder_with(tmp_path, line))
+    assert run.records["text"].tolist() == ["half ? of one"]
+
+
+def test_lines_that_end_as_on_other_systems_are_read(tmp_path: Path) -> None:
+    folder = folder_with(tmp_path, *(line + b"\r" for line in lines_before()[:1] * 2))
+    assert len(load_run(folder).records) == 1
+
+
+def test_a_sample_is_taken_from_its_last_line(tmp_path: Path) -> None:
+    first, last = lines_before()[0], with_value("reply.text", "later")
+    lines = any_records(folder_with(tmp_path, first, last))
+    starts = newest_starts(lines)
+    assert list(starts.values()) == [len(first) + 1]
+    assert [record.reply.text for record in lines.at(starts.values()) if record.reply] == ["later"]
+
+
+@given(
+    st.text(st.characters(exclude_categories=()), max_size=9), numbers, numbers, amounts, amounts
+)
+def test_whatever_was_paid_for_is_stored_and_read(
+    text: str, sent: int | None, said: int | None, cost: float | None, billed: float | None
+) -> None:
+    reply = Reply(text, usage=Usage(sent, said), cost_usd=cost, billed_usd=billed)
+    line = stored(reply)
+    again = StoredReply.model_validate_json(json.dumps(line.fields()), strict=True)
+    assert again == line
+    kept = reply_of(line)
+    assert kept.text == text.encode("utf-8", "replace").decode()
+    assert kept.usage.completion_tokens in (said, None)
+    assert kept.cost_usd in (cost, None)

@@ -1,0 +1,126 @@
+"""Suites run on a renderer and a physics engine that are one module of tests each."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import pytest
+import yaml
+
+from phyblock.datasets import read_builtin
+from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
+from phyblock.sim.question_pictures import question_png
+from phyblock.sim.site import state_picture
+from phyblock.tasks.step_planning import StepPlanning
+from phyblock.tasks.step_rules import StepPhysics, StepRules
+from tests.sim.box_renderer import BOX_RENDERER
+from tests.sim.still_engine import STILL_ENGINE
+from tests.workspace import Done, Raw, Workspace, candidates
+
+OTHERS = {
+    "PHYBLOCK_RENDERER": BOX_RENDERER,
+    "PHYBLOCK_PHYSICS": STILL_ENGINE,
+    "PYTHONPATH": str(Path(__file__).parents[2]),
+}
+STYLE = PictureStyle(128)
+SMALL = ("--set", "images.size_px=128", "--set", "seeds=[0]", "--no-report")
+DATA = ("--set", "dataset.path=./data")
+
+
+def run(workspace: Workspace, suite: str, *args: str, env: dict[str, str] = OTHERS) -> Done:
+    few = ("--models", "oracle", "--limit", "3", *SMALL, *DATA)
+    return workspace.phyblock("run", suite, "--out", workspace.out, *few, *args, env=env)
+
+
+def digest(png: bytes) -> str:
+    return hashlib.sha256(png).hexdigest()
+
+
+def unsteady_scene() -> Raw:
+    """A plank that tips off its post until the second weight is on."""
+    places = [("cube", [0, 0, 0.025], 0), ("cuboid3", [0, 0, 0.0625], 90)]
+    places += [("cube", [0, 0.07, 0.1], 0), ("cube", [0, -0.07, 0.1], 0)]
+    depends = [[0], [1], [2], [2]]
+    blocks = [
+        {
+            "order": order,
+            "type": block_type,
+            "color": "red",
+            "layer": min(order, 3),
+            "depend": depends[order - 1],
+            "position": position,
+            "euler": [0, 0, turn],
+        }
+        for order, (block_type, position, turn) in enumerate(places, 1)
+    ]
+    plank = {"type": "cuboid3", "color": "red", "euler": [0, 0, 90], "required": 1}
+    cubes = {**candidates()[0], "required": 3}
+    others = [{**one, "required": 0} for one in candidates()[1:15]]
+    named = {"id": "beam", "levels": [3], "parents": ["beam"]}
+    return {**named, "blocks": blocks, "candidates": [cubes, plank, *others]}
+
+
+def test_full_shows_what_the_other_renderer_draws(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done = run(workspace, "full")
+    assert (done.code, done.err) == (0, "")
+    records = workspace.records()
+    assert len(records) == 3
+    assert workspace.tables()["table1.csv"]
+    monkeypatch.setenv("PHYBLOCK_RENDERER", BOX_RENDERER)
+    drawn = {
+        task.key: digest(
+            composite_png(goal_png(task.scene, STYLE), candidates_png(task.candidates, STYLE))
+        )
+        for task in read_builtin(workspace.root / "data").tasks
+    }
+    for record in records:
+        assert [image["sha256"] for image in record["prompt"]["images"]] == [drawn[record["key"]]]
+        assert {score["fp"] + score["fn"] for score in record["scores"]} == {0}
+
+
+def test_steps_let_blocks_go_in_the_other_engine_and_go_on_with_it_alone(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What tips over in PyBullet (see the laws of engines) stands where nothing falls."""
+    workspace.write_scenes(unsteady_scene())
+    strict = ("--set", "steps.physics=strict")
+    done = run(workspace, "steps", *strict)
+    assert (done.code, done.err) == (0, "")
+    (oracle,) = workspace.records()
+    assert oracle["ending"] == "completed"
+    track = yaml.safe_load((workspace.out / "run.yaml").read_bytes())["tracks"]["step_planning"]
+    assert track["physics"] == {"engine": "still", "still": "1"}
+
+    monkeypatch.setenv("PHYBLOCK_RENDERER", BOX_RENDERER)
+    (task,) = read_builtin(workspace.root / "data").tasks
+    first = {i["label"]: i["sha256"] for i in oracle["turns"][0]["prompt"]["images"]}
+    assert first["goal"] == digest(goal_png(task.scene, STYLE))
+    empty = state_picture(task.scene, (), STYLE)
+    assert first["current"] == digest(question_png(empty, STYLE))
+
+    before = workspace.files()
+    for variable in ("PHYBLOCK_RENDERER", "PHYBLOCK_PHYSICS"):
+        rest = {name: value for name, value in OTHERS.items() if name != variable}
+        done = run(workspace, "steps", *strict, env=rest)
+        assert (done.code, "holds another run" in done.err) == (2, True), variable
+    assert workspace.files() == before
+
+
+def test_an_unknown_engine_is_refused_before_anything_is_made(workspace: Workspace) -> None:
+    done = run(workspace, "steps", env={**OTHERS, "PHYBLOCK_PHYSICS": "bullet"})
+    assert done.code == 2
+    assert done.errors == [
+        "error: PHYBLOCK_PHYSICS: is not known\n    found: bullet\n"
+        "    allowed: pybullet, or module:factory"
+    ]
+    assert not workspace.out.exists()
+
+
+@pytest.mark.parametrize("physics", ["off", "settle", "strict"])
+def test_a_step_run_in_pybullet_is_told_as_it_always_was(physics: StepPhysics) -> None:
+    """So that runs from before there was a choice of engines go on."""
+    track = StepPlanning(StepRules(physics=physics))
+    assert track.identity() == {"prompt": None, "pictures": None}

@@ -1,0 +1,219 @@
+"""What every physics engine must do: those in the registry, and one that is a module of tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from phyblock.domain import BLOCK_TYPES, SHAPES, Block, BlockType
+from phyblock.errors import InputError, SimulationError
+from phyblock.sim.engine import FLOOR, GRAVITY_M_S2, Physics, PhysicsEngine, Simulation, Velocity
+from phyblock.sim.pose import Pose
+from phyblock.sim.registry import ENGINES, physics_engine
+from phyblock.sim.site import settle
+from tests.sim.still_engine import STILL_ENGINE
+from tests.sim.structures import block, block_types, counterweighted_beam, eulers, tower
+
+PHYSICS = Physics()
+heights = st.floats(0.5, 2.0)
+
+
+def chosen(word: str) -> PhysicsEngine:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PHYBLOCK_PHYSICS", word)
+        return physics_engine()
+
+
+@pytest.fixture(params=[*ENGINES, STILL_ENGINE], scope="module")
+def engine(request: pytest.FixtureRequest) -> PhysicsEngine:
+    """Any engine."""
+    return chosen(request.param)
+
+
+@pytest.fixture(params=list(ENGINES), scope="module")
+def moving_engine(request: pytest.FixtureRequest) -> PhysicsEngine:
+    """An engine in which blocks can fall."""
+    return chosen(request.param)
+
+
+@pytest.fixture
+def simulation(engine: PhysicsEngine) -> Iterator[Simulation]:
+    with engine.open(PHYSICS) as opened:
+        yield opened
+
+
+def add_all(simulation: Simulation, blocks: list[Block]) -> None:
+    for one in blocks:
+        simulation.add(one.order, one.type, Pose.goal(one))
+
+
+def bits(simulation: Simulation, blocks: list[Block]) -> str:
+    """Where blocks are and how they move, to the last bit."""
+    rows = []
+    for one in blocks:
+        pose, velocity = simulation.pose(one.order), simulation.velocity(one.order)
+        rows += [pose.position_m, pose.quat_xyzw, *map(np.array, velocity)]
+    return np.concatenate(rows).tobytes().hex()
+
+
+def fall(engine: PhysicsEngine, blocks: list[Block], steps: int) -> str:
+    with engine.open(PHYSICS) as opened:
+        add_all(opened, blocks)
+        opened.step(steps)
+        return bits(opened, blocks)
+
+
+def test_an_engine_says_what_it_is(engine: PhysicsEngine) -> None:
+    assert engine.name
+    assert all(name and version for name, version in engine.versions.items())
+    assert engine.versions
+    assert {engine: 1}[engine] == 1
+
+
+@given(block_types, heights, eulers)
+@settings(max_examples=20)
+def test_a_block_is_where_it_was_put_and_at_rest(
+    engine: PhysicsEngine, block_type: BlockType, height_m: float, euler_deg
+) -> None:
+    one = block(3, block_type, (0.3, -0.2, height_m), euler_deg)
+    with engine.open(PHYSICS) as opened:
+        add_all(opened, [one])
+        assert opened.pose(3).distance_m(Pose.goal(one)) < 1e-9
+        assert opened.pose(3).angle_deg(Pose.goal(one)) < 1e-3
+        assert_allclose(opened.velocity(3), 0.0)
+
+
+@pytest.mark.parametrize("block_type", BLOCK_TYPES)
+def test_a_block_on_the_floor_stands(simulation: Simulation, block_type: BlockType) -> None:
+    one = block(1, block_type, (0.1, 0.2, -SHAPES[block_type].low_m[2]))
+    add_all(simulation, [one])
+    simulation.step(120)
+    assert simulation.pose(1).distance_m(Pose.goal(one)) < 0.001
+    assert simulation.pose(1).angle_deg(Pose.goal(one)) < 1.0
+
+
+def test_contacts_tell_who_rests_on_whom(simulation: Simulation) -> None:
+    stack, aside = tower(2), block(3, "arch", (0.3, 0.0, 0.025))
+    add_all(simulation, [*stack, aside])
+    assert simulation.contacts() == ()
+    simulation.step(10)
+    contacts = simulation.contacts()
+    assert {(contact.first, contact.second) for contact in contacts} == {
+        *((FLOOR, 1), (1, 2), (FLOOR, 3))
+    }
+    for contact in contacts:
+        assert_allclose(contact.normal, (0.0, 0.0, 1.0), atol=0.02)
+        assert abs(contact.distance_m) < 0.002
+    simulation.remove(2)
+    simulation.step(1)
+    assert {contact.second for contact in simulation.contacts()} == {1, 3}
+
+
+def test_what_was_saved_comes_back_bit_for_bit(simulation: Simulation) -> None:
+    """In the middle of a fall, and so does what follows from it."""
+    falling = counterweighted_beam()[:3]
+    add_all(simulation, falling)
+    simulation.step(20)
+    saved, before = simulation.save(), bits(simulation, falling)
+    simulation.step(20)
+    after = bits(simulation, falling)
+    for _ in range(2):
+        simulation.restore(saved)
+        assert bits(simulation, falling) == before
+        simulation.step(20)
+        assert bits(simulation, falling) == after
+
+
+def test_what_was_saved_is_of_the_blocks_that_were_there(simulation: Simulation) -> None:
+    add_all(simulation, tower(2))
+    saved = simulation.save()
+    simulation.remove(2)
+    with pytest.raises(SimulationError, match="other blocks"):
+        simulation.restore(saved)
+
+
+def test_a_velocity_is_the_one_that_was_set(simulation: Simulation) -> None:
+    add_all(simulation, tower(2))
+    given_one = Velocity((0.1, -0.2, 0.3), (0.4, 0.5, -0.6))
+    simulation.set_velocity(2, given_one)
+    assert_allclose(simulation.velocity(2), given_one)
+    assert_allclose(simulation.velocity(1), 0.0)
+
+
+def test_a_number_is_free_again_when_its_block_is_gone(simulation: Simulation) -> None:
+    add_all(simulation, tower(2))
+    simulation.remove(2)
+    other = block(2, "arch", (0.4, 0.0, 0.025), (0.0, 0.0, 90.0))
+    add_all(simulation, [other])
+    simulation.step(24)
+    assert simulation.pose(2).distance_m(Pose.goal(other)) < 0.001
+    assert simulation.pose(1).distance_m(Pose.goal(tower(1)[0])) < 0.001
+
+
+def test_the_same_calls_give_the_same_bits_beside_others(engine: PhysicsEngine) -> None:
+    falling = counterweighted_beam()[:3]
+    alone = fall(engine, falling, 40)
+    with engine.open(Physics(1 / 300, 80, 0.1)) as other:
+        add_all(other, tower(3))
+        other.step(5)
+        assert fall(engine, falling, 40) == alone
+        other.step(5)
+    assert fall(engine, falling, 40) == alone
+
+
+def test_a_block_in_the_air_falls_the_way_of_gravity(moving_engine: PhysicsEngine) -> None:
+    downhill = (0.6, 0.0, -0.8)
+    x, y, z = (GRAVITY_M_S2 * part for part in downhill)
+    one, duration_s = block(1, "triangle", (0.0, 0.0, 3.0)), 0.25
+    with moving_engine.open(Physics(1 / 2000, gravity_m_s2=(x, y, z))) as opened:
+        add_all(opened, [one])
+        opened.step(500)
+        way = opened.pose(1).position_m - np.array(one.position_m)
+        speed = opened.velocity(1).linear_m_s
+    assert_allclose(way, GRAVITY_M_S2 * np.array(downhill) * duration_s**2 / 2, rtol=0.03)
+    assert_allclose(speed, GRAVITY_M_S2 * np.array(downhill) * duration_s, rtol=0.03)
+
+
+@pytest.mark.parametrize(("friction", "slides"), [(0.5, True), (0.7, False)])
+def test_friction_holds_a_block_on_a_floor_that_leans(
+    moving_engine: PhysicsEngine, friction: float, slides: bool
+) -> None:
+    """By 31 degrees: a coefficient over 0.6 holds."""
+    x, z = (GRAVITY_M_S2 * part for part in (0.6 * 0.857, -0.857))
+    one = block(1, "cuboid2", (0.0, 0.0, 0.0125))
+    with moving_engine.open(Physics(friction=friction, gravity_m_s2=(x, 0.0, z))) as opened:
+        add_all(opened, [one])
+        opened.step(60)
+        assert (opened.pose(1).distance_m(Pose.goal(one)) > 0.02) == slides
+
+
+def test_the_chosen_engine_decides_what_stands(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was found by one engine is not told as the other's."""
+    tipping = counterweighted_beam()[:3]
+    fallen = settle(tipping).fallen
+    monkeypatch.setenv("PHYBLOCK_PHYSICS", STILL_ENGINE)
+    assert settle(tipping).stands
+    monkeypatch.delenv("PHYBLOCK_PHYSICS")
+    assert settle(tipping).fallen == fallen != ()
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("bullet", "allowed: pybullet, or module:factory"),
+        ("", "is not known"),
+        (".engine:Engine", "is not known"),
+        ("phyblock.nowhere:Engine", "cannot be imported"),
+        ("phyblock.sim.engine:FLOOR", "can be called"),
+        ("phyblock.sim.engine:Engine", "cannot be imported"),
+        ("phyblock.sim.bullet.renderer:tiny_renderer", "names no physics engine"),
+    ],
+)
+def test_a_word_that_names_no_engine_is_refused(word: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        chosen(word)
