@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
+from phyblock.bounded import NotRegularError, open_regular
 from phyblock.errors import InputError, Problem, StoreError
 from phyblock.records.belonging import Belonging
 from phyblock.records.decode import decode, is_json, problem_of
@@ -52,7 +53,7 @@ class Lines(Generic[LineT]):
 
     def __iter__(self) -> Iterator[tuple[str, LineT]]:
         try:
-            with self.path.open("rb") as file:
+            with open_regular(self.path) as file:
                 for number, data in enumerate(self._raw(file), 1):
                     where = f"{self.path}:{number}"
                     self.lacks_newline = not data.endswith(b"\n")
@@ -68,12 +69,14 @@ class Lines(Generic[LineT]):
         except OSError as error:
             problem = Problem(str(self.path), f"cannot be read: {error.strerror}")
             raise self.error(problem) from error
+        except NotRegularError as error:
+            raise self.error(Problem(str(self.path), str(error))) from error
 
     def at(self, starts: Iterable[int]) -> Iterator[LineT]:
         """Lines that begin at these places [bytes], which were passed before."""
         if not self.path.exists():
             return
-        with self.path.open("rb") as file:
+        with open_regular(self.path) as file:
             for start in starts:
                 file.seek(start)
                 yield self._read(f"{self.path} (byte {start})", file.readline())
