@@ -17,6 +17,7 @@ MODULES = {
     "inspect_ai": "inspect-ai",
     "pydantic_core": "pydantic-core",
     "sklearn": "scikit-learn",
+    "typing_extensions": "typing-extensions",
     "yaml": "pyyaml",
 }
 """Import names that differ from the package's."""
