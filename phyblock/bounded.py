@@ -11,13 +11,15 @@ import math
 import os
 import stat
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, BinaryIO, NoReturn
 
 __all__ = [
     "LARGEST_FILE_BYTES",
     "LONGEST_INTEGER",
+    "NotRegularError",
     "RepeatedFieldError",
     "load_json",
+    "open_regular",
     "read_bytes",
     "read_text",
 ]
@@ -32,20 +34,34 @@ _LONGEST_SHOWN_INTEGER = 4300
 """Digits that Python turns into an integer and back."""
 
 
+class NotRegularError(ValueError):
+    """A pipe, a device, a socket: what an ordinary open would wait for, or read without end."""
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """A regular file, opened for reading where it is too large to be read whole.
+
+    Raises ValueError for what is no regular file (a pipe would block, a device has no end), OSError
+    where it cannot be opened.
+    """
+    # A pipe without a writer would block an ordinary open.
+    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    mode = os.fstat(number).st_mode
+    if stat.S_ISREG(mode):
+        return os.fdopen(number, "rb")
+    os.close(number)
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(21, "Is a directory", str(path))
+    raise NotRegularError("is not a regular file")
+
+
 def read_bytes(path: Path, most_bytes: int = LARGEST_FILE_BYTES) -> bytes:
     """The content of a regular file.
 
     Raises ValueError for what is no regular file (a pipe would block, a device has no end) or is
     larger than `most_bytes`, OSError where the file cannot be opened or read.
     """
-    # A pipe without a writer would block an ordinary open.
-    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-    with os.fdopen(number, "rb") as file:
-        mode = os.fstat(file.fileno()).st_mode
-        if stat.S_ISDIR(mode):
-            raise IsADirectoryError(21, "Is a directory", str(path))
-        if not stat.S_ISREG(mode):
-            raise ValueError("is not a regular file")
+    with open_regular(path) as file:
         data = file.read(most_bytes + 1)
     if len(data) > most_bytes:
         raise ValueError(f"is larger than {most_bytes / 1024**2:g} MB")

@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import phyblock.cli
+import phyblock_making.cli
 from tests.workspace import Done, small_files_only
 
 
@@ -63,8 +64,9 @@ class ForkServer:
 
 
 def serve() -> None:
-    for module in pkgutil.iter_modules(phyblock.cli.__path__):
-        importlib.import_module(f"phyblock.cli.{module.name}")
+    for package in (phyblock.cli, phyblock_making.cli):
+        for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+            importlib.import_module(module.name)
     for line in sys.stdin:
         pid = os.fork()
         if pid == 0:

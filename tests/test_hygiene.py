@@ -10,12 +10,14 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
+PACKAGES = ("phyblock", "phyblock_making")
 LOCKS = ("requirements.lock", "requirements-dev.lock")
 MODULES = {
     "PIL": "pillow",
     "inspect_ai": "inspect-ai",
     "pydantic_core": "pydantic-core",
     "sklearn": "scikit-learn",
+    "typing_extensions": "typing-extensions",
     "yaml": "pyyaml",
 }
 """Import names that differ from the package's."""
@@ -63,13 +65,13 @@ def test_litellm_ends_below_its_next_major_version() -> None:
 
 def test_every_package_that_is_imported_is_declared() -> None:
     imported: set[str] = set()
-    for path in (ROOT / "phyblock").rglob("*.py"):
+    for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Import):
                 imported |= {name.name.partition(".")[0] for name in node.names}
             elif isinstance(node, ast.ImportFrom) and not node.level:
                 imported.add(str(node.module).partition(".")[0])
-    outside = imported - sys.stdlib_module_names - {"phyblock"}
+    outside = imported - sys.stdlib_module_names - set(PACKAGES)
     missing = {name for name in outside if MODULES.get(name, name).lower() not in declared()}
     assert not missing
 

@@ -22,15 +22,15 @@ import psutil
 
 from phyblock.datasets import read_builtin
 from phyblock.domain import Scene
-from phyblock.generate import make_candidates
-from phyblock.generate.audit import audit_scene
-from phyblock.generate.compositions import beside
-from phyblock.generate.production import Order, produce, shares
-from phyblock.generate.sketch import make_scene
-from phyblock.generate.verify import SCENE_CHECKS
-from phyblock.generate.workers import Workers, open_workers
 from phyblock.resources import bundled
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
+from phyblock_making.auditing.scene_audit import audit_scene
+from phyblock_making.auditing.set_verification import verify_scene
+from phyblock_making.scenes import make_candidates
+from phyblock_making.scenes.compositions import beside
+from phyblock_making.scenes.scene_production import Order, produce, shares
+from phyblock_making.scenes.sketch import make_scene
+from phyblock_making.workers import Workers, open_workers
 
 SIZES = (4, 12, 22)
 STYLE = PictureStyle()
@@ -39,8 +39,7 @@ MEMORY_AFTER = (50, 100, 250, 500)
 
 
 def verify(scene: Scene) -> int:
-    candidates = make_candidates(scene)
-    return sum(len(tuple(find(scene, candidates))) for find in SCENE_CHECKS.values())
+    return sum(map(len, verify_scene((scene, make_candidates(scene))).values()))
 
 
 def audit(scene: Scene) -> int:

@@ -32,10 +32,18 @@ _VERBS = {
 }
 
 
+_MADE_ELSEWHERE = {
+    "scenes": "phyblock_making.cli.scenes_verbs",
+    "vqa": "phyblock_making.cli.vqa_verbs",
+}
+"""Verbs of the package beside this one, which the runner never imports but by these names."""
+
+
 @click.group(
     cls=Verbs,
     verbs=_VERBS,
     prefix="phyblock.cli.",
+    modules=_MADE_ELSEWHERE,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="Start with: phyblock run quick",
 )

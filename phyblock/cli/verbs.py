@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import click
@@ -14,14 +15,22 @@ __all__ = ["Verbs"]
 class Verbs(click.Group):
     """A group whose verbs' names and help texts are known without importing any of them.
 
-    `verbs` maps a name to its help; the verb is `command` in the module `prefix` + name, with
-    underscores for hyphens.
+    `verbs` maps a name to its help. The verb is `command` in the module that `modules` names, else
+    in the module `prefix` + name, with underscores for hyphens.
     """
 
-    def __init__(self, *, verbs: Mapping[str, str], prefix: str, **options: Any) -> None:
+    def __init__(
+        self,
+        *,
+        verbs: Mapping[str, str],
+        prefix: str,
+        modules: Mapping[str, str] = MappingProxyType({}),
+        **options: Any,
+    ) -> None:
         super().__init__(**options)
         self._verbs = verbs
         self._prefix = prefix
+        self._modules = modules
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """The names, in the order given."""
@@ -33,7 +42,8 @@ class Verbs(click.Group):
         del ctx
         if cmd_name not in self._verbs:
             return None
-        command = importlib.import_module(f"{self._prefix}{cmd_name.replace('-', '_')}").command
+        module = self._modules.get(cmd_name, self._prefix + cmd_name.replace("-", "_"))
+        command = importlib.import_module(module).command
         assert isinstance(command, click.Command)
         return command
 

@@ -5,23 +5,18 @@ from phyblock.datasets.builtin import SCENES_FILE, read_builtin
 from phyblock.datasets.official import official_prompt, read_official, recorded_models
 from phyblock.datasets.official_questions import read_official_questions
 from phyblock.datasets.questions import QUESTIONS_FILE, read_questions
-from phyblock.datasets.salvage import Fault, Salvage, SalvagedTask, salvage
 
 __all__ = [
     "QUESTIONS_FILE",
     "SCENES_FILE",
     "AssemblyTask",
     "Dataset",
-    "Fault",
     "QuestionSet",
     "QuestionTask",
-    "Salvage",
-    "SalvagedTask",
     "official_prompt",
     "read_builtin",
     "read_official",
     "read_official_questions",
     "read_questions",
     "recorded_models",
-    "salvage",
 ]

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
+from phyblock.bounded import NotRegularError, open_regular
 from phyblock.errors import InputError, Problem, StoreError
 from phyblock.records.belonging import Belonging
 from phyblock.records.decode import decode, is_cut, problem_of
@@ -53,10 +54,7 @@ class Lines(Generic[LineT]):
     def __iter__(self) -> Iterator[tuple[str, LineT]]:
         self.whole_bytes = 0
         try:
-            # A pipe without a writer would block.
-            if self.path.exists() and not self.path.is_file():
-                raise self.error(Problem(str(self.path), "is not a regular file"))
-            with self.path.open("rb") as file:
+            with open_regular(self.path) as file:
                 for number, data in enumerate(self._raw(file), 1):
                     where = f"{self.path}:{number}"
                     self.lacks_newline = not data.endswith(b"\n")
@@ -72,12 +70,14 @@ class Lines(Generic[LineT]):
         except OSError as error:
             problem = Problem(str(self.path), f"cannot be read: {error.strerror}")
             raise self.error(problem) from error
+        except NotRegularError as error:
+            raise self.error(Problem(str(self.path), str(error))) from error
 
     def at(self, starts: Iterable[int]) -> Iterator[LineT]:
         """Lines that begin at these places [bytes], which were passed before."""
         if not self.path.exists():
             return
-        with self.path.open("rb") as file:
+        with open_regular(self.path) as file:
             for start in starts:
                 file.seek(start)
                 yield self._read(f"{self.path} (byte {start})", file.readline())

@@ -14,8 +14,8 @@ from phyblock.datasets import QuestionSet, QuestionTask
 from phyblock.domain import LETTERS, Question, Scene, is_picture_option
 from phyblock.domain.rotation import rotated, rotated_label
 from phyblock.errors import Problem, SpecError
-from phyblock.generate.questions.probes import Guesses
 from phyblock.models.base import ChoiceSubject, Image, Request
+from phyblock.models.guesses import Guesses
 from phyblock.parsing import ParsedAnswer, parse_answer
 from phyblock.tasks.prompts import Prompt
 from phyblock.tasks.question_pictures import OptionsAs, QuestionPictures, Shown

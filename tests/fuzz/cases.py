@@ -79,14 +79,14 @@ def _argument_cases(args: list[str]) -> Case:
 
 def _place_case(place: str, is_there: bool, content: bytes) -> Case:
     """A run that is told to go somewhere, where something of the user's may be already."""
-    name = place.strip("/") or "nowhere"
-    inside = f"{name}/report/ch1/thesis.tex"
-    can_be_there = is_there and ".." not in place and "~" not in place and len(place) < 80
-    files = {inside: content} if can_be_there else {}
+    here = place.removeprefix("~/")
+    can_be_there = is_there and place[:1] not in ("", "/", "~") and len(place) < 80
+    can_be_there = can_be_there and not place.startswith("suite.yaml")
+    files = {f"{place}/report/ch1/thesis.tex": content} if can_be_there else {}
     return Case(
         ("run", "suite.yaml", "--out", place, "--no-report", "--models", "oracle"),
         files,
-        (".",) if name == "." else (name.split("/")[0],),
+        (place,) if place.startswith("/") else (here.partition("/")[0] or "nowhere",),
         (*LASTING, *files),
     )
 
@@ -239,7 +239,12 @@ KINDS: dict[str, Cases] = {
     "prompts": _file("mine.j2", TEMPLATES, (*RUN, *_PROMPTED), (*DRY, *_PROMPTED)),
     "pictures": st.builds(_official, PICTURES, st.none() | CANDIDATES),
     "replies": st.lists(_REPLY_FILES, min_size=2, max_size=2).map(_replies),
-    "places": st.builds(_place_case, _PLACES | _TEXTS, st.booleans(), NOISE),
+    "places": st.builds(
+        _place_case,
+        _PLACES | _TEXTS.filter(lambda text: ".." not in text and text[:1] not in ("/", "~")),
+        st.booleans(),
+        NOISE,
+    ),
 }
 """Cases beside a sound suite, by what is bad about them."""
 

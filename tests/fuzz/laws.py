@@ -92,6 +92,8 @@ def _judge(deed: Deed, places: Sequence[str]) -> Iterator[Broken]:
     if deed.event == "socket.connect":
         if not any(name in deed.about for name in _LOCAL):
             yield Broken(2, "a connection", deed.about)
+    elif deed.event == "os.mkdir" and any(_lies_in(place, [deed.about]) for place in places):
+        return  # that a folder above is there is found out by trying to make it
     elif not _lies_in(deed.about, [*places, *_DEVICES]):
         yield Broken(2, f"{deed.event} elsewhere", deed.about)
 

@@ -121,10 +121,12 @@ class Worker:
 def serve(sabotage: str) -> None:
     """Answer orders until there are no more."""
     import phyblock.cli
+    import phyblock_making.cli
     from phyblock.cli.main import main
 
-    for module in pkgutil.iter_modules(phyblock.cli.__path__):
-        importlib.import_module(f"phyblock.cli.{module.name}")
+    for package in (phyblock.cli, phyblock_making.cli):
+        for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+            importlib.import_module(module.name)
     resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY_BYTES, _MOST_MEMORY_BYTES))
     if sabotage:
         SABOTAGES[sabotage]()

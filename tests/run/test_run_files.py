@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -116,3 +117,18 @@ def test_every_record_names_a_prompt_that_is_there(tmp_path: Path, pictures_dir:
         canonical = json.dumps(fields, sort_keys=True, separators=(",", ":"))
         assert hashlib.sha256(canonical.encode()).hexdigest() == digest
     assert not (made.out / "turns.jsonl").exists()
+
+
+@pytest.mark.parametrize("name", ["turns.jsonl", "prompts.jsonl"])
+@pytest.mark.parametrize("stands_there", ["pipe", "device"])
+def test_what_is_no_file_is_not_waited_for(
+    workspace: Workspace, name: str, stands_there: str
+) -> None:
+    path = workspace.root / name
+    if stands_there == "pipe":
+        os.mkfifo(path)
+    else:
+        path.symlink_to("/dev/zero")
+    lines = {"turns": TurnLines, "prompts": PromptLines}[path.stem]
+    with pytest.raises(StoreError, match="is not a regular file"):
+        list(lines(workspace.root))

@@ -14,8 +14,6 @@ from PIL import Image
 
 from phyblock.domain import KIT_PALETTE, Candidate, CandidateSet, Scene
 from phyblock.errors import DataError
-from phyblock.generate import make_candidates
-from phyblock.generate.poses import POSES
 from phyblock.sim import (
     PictureStyle,
     candidates_key,
@@ -28,6 +26,8 @@ from phyblock.sim.compose import LABEL_STRIP, numbered_grid
 from phyblock.sim.pictures import candidate_camera, on_the_floor
 from phyblock.sim.render import picture, shoot
 from phyblock.sim.textures import BACKGROUNDS
+from phyblock_making.poses import POSES
+from phyblock_making.scenes import make_candidates
 from tests.designs.scenes import designed_scene
 from tests.sim.structures import block, scene_of
 

@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 
 from phyblock.domain import BLOCK_TYPES, SHAPES, BlockType
 from phyblock.errors import SimulationError
-from phyblock.generate.poses import POSES
 from phyblock.sim import Physics, Pose, World
 from phyblock.sim.steps import wait
 from phyblock.sim.support import drop_height_m
+from phyblock_making.poses import POSES
 from tests.sim.structures import block, counterweighted_beam, tower
 
 LINE_BALANCED = {"bowl", "bowl-turned"}
@@ -112,7 +112,7 @@ def test_the_same_scene_gives_the_same_bits_in_another_process() -> None:
 
 
 def test_importing_the_package_does_not_load_pybullet() -> None:
-    code = "import sys, phyblock.sim, phyblock.generate; print('pybullet' in sys.modules)"
+    code = "import sys, phyblock.sim, phyblock_making.scenes; print('pybullet' in sys.modules)"
     answer = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )

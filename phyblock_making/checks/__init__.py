@@ -1,0 +1,1 @@
+"""What must hold in a scene, and the scenes that are good enough for a data set."""

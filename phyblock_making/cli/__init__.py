@@ -1,0 +1,1 @@
+"""The verbs `phyblock scenes ...` and `phyblock vqa ...`, one module each."""

@@ -1,0 +1,102 @@
+"""`phyblock scenes generate`: a data set from a seed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import cast
+
+import click
+
+from phyblock.cli.console import shown_path
+from phyblock.cli.paths import UserPath
+from phyblock_making.cli.working import jobs_option, ray_option, tracked
+from phyblock_making.scenes.scene_card import card
+from phyblock_making.scenes.scene_draft import Palette
+from phyblock_making.scenes.scene_files import open_writer
+from phyblock_making.scenes.scene_production import Order, produce, shares
+from phyblock_making.workers import open_workers
+
+__all__ = ["command"]
+
+_PALETTE_TEXT: dict[Palette, str] = {
+    "kit": "the official kit's twelve pairs of type and color",
+    "full": "all forty pairs of eight types and five colors",
+}
+
+
+def _levels(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int, ...]:
+    words = value.split(",")
+    if not all(word in ("1", "2", "3", "4") for word in words) or len(set(words)) < len(words):
+        raise click.BadParameter(f"{value!r}: give levels like 1,2,3,4", ctx, param)
+    return tuple(sorted(int(word) for word in words))
+
+
+@click.command("generate")
+@click.option(
+    "--count",
+    type=click.IntRange(1),
+    default=400,
+    show_default=True,
+    metavar="N",
+    help="How many scenes.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    metavar="S",
+    help="Another seed gives other scenes.",
+)
+@click.option(
+    "--levels",
+    default="1,2,3,4",
+    show_default=True,
+    callback=_levels,
+    metavar="LEVELS",
+    help="Levels to make, in the proportions of the built-in set.",
+)
+@click.option(
+    "--palette",
+    type=click.Choice(["kit", "full"]),
+    default="kit",
+    show_default=True,
+    help="The kit's twelve pairs of type and color, or all forty.",
+)
+@jobs_option
+@ray_option
+@click.option(
+    *("--out", "-o"),
+    type=UserPath(),
+    required=True,
+    metavar="DIR",
+    help="Folder to write.",
+)
+@click.option("--replace", is_flag=True, help="Replace a data set that is in the folder.")
+def command(
+    count: int,
+    seed: int,
+    levels: tuple[int, ...],
+    palette: str,
+    jobs: int,
+    ray_address: str | None,
+    out: Path,
+    replace: bool,
+) -> None:
+    """Make N scenes with candidate sets, each checked by physics, and their data card.
+
+    The same N, seed, levels and palette give the same files, whatever runs the work.
+    """
+    kind = cast(Palette, palette)
+    order = Order(seed, kind, shares(count, levels))
+    with (
+        open_workers(jobs, ray_address) as workers,
+        open_writer(out, kind, replace) as writer,
+    ):
+        for scene in tracked(produce(order, workers), count, "Making"):
+            writer.add(scene)
+        chosen = ",".join(map(str, levels))
+        made_by = f"phyblock scenes generate --count {count} --seed {seed} --levels {chosen}"
+        made_by += f" --palette {palette} --out {out.name}"
+        writer.finish(card(out.name, writer, made_by, _PALETTE_TEXT[kind]))
+    click.echo(f"{count} scenes, all checks passed: {shown_path(out)}")

@@ -1,0 +1,164 @@
+"""What a question's picture shows: shares of blocks, where they are, and along which axes."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.domain.question import Question, QuestionPicture
+from phyblock.domain.scene import Block, Scene
+from phyblock.sim.camera import VIEWS, view_axes
+from phyblock.sim.pictures import PictureStyle, drawn, goal_camera
+from phyblock.sim.render import shoot
+from phyblock.sim.support import bounds_m
+from phyblock.sim.visibility import visible_shares
+from phyblock_making.questions.question_draft import UnfairError
+
+__all__ = [
+    "COUNTED",
+    "GOAL_VIEW",
+    "NAMED",
+    "SHAPED",
+    "SHAPED_AREA",
+    "STUDIED",
+    "are_seen",
+    "center_m",
+    "goal_picture",
+    "outermost",
+    "picture_axes",
+    "require_seen",
+    "require_shapes_seen",
+    "shares",
+    "shown_blocks",
+]
+
+GOAL_VIEW: tuple[float, float] = VIEWS["oblique"]
+"""Azimuth and elevation of the goal picture [degrees]."""
+COUNTED = 0.25
+"""The least visible share of a block that is to be counted."""
+NAMED = 0.4
+"""The least visible share of a block that is named in a question or an option."""
+STUDIED = 0.55
+"""The least visible share of a block whose shape, size or orientation is asked about."""
+SHAPED = 0.28
+"""The least visible share of every block where shapes are counted,"""
+SHAPED_AREA = 0.004
+"""and the least share of the picture that it covers."""
+_SIZE_PX = 256
+_MIDDLE_GAP = 0.1
+"""So much further out, of half the picture's width, is the middle of a block called leftmost,"""
+_EDGE_GAP = 0.05
+"""and so much its outer edge."""
+
+
+def goal_picture(scene: Scene) -> QuestionPicture:
+    """The whole scene from where goals are seen."""
+    return QuestionPicture("scene", scene.blocks, GOAL_VIEW)
+
+
+def shown_blocks(question: Question) -> tuple[Block, ...]:
+    """The blocks of the one picture of a static question; UnfairError for other pictures."""
+    labels = [picture.label for picture in question.pictures]
+    if labels != ["scene"] or question.pictures[0].view_deg != GOAL_VIEW:
+        raise UnfairError(f"has pictures {labels}, not the goal view alone")
+    return question.pictures[0].blocks
+
+
+def shares(blocks: Sequence[Block]) -> Mapping[int, float]:
+    """Visible share of each block, by order, in the goal view of these blocks."""
+    return _shares(tuple(_plain(block) for block in blocks))
+
+
+@functools.lru_cache(maxsize=512)
+def _shares(blocks: tuple[Block, ...]) -> Mapping[int, float]:
+    style = PictureStyle(_SIZE_PX, "checkerboard", *GOAL_VIEW)
+    return visible_shares(Scene("", (1,), blocks, ()), style)
+
+
+def are_seen(blocks: Sequence[Block], orders: Collection[int], least: float) -> bool:
+    """Whether each of the named blocks shows at least this share of itself."""
+    seen = shares(blocks)
+    return all(seen[order] >= least for order in orders)
+
+
+def require_seen(blocks: Sequence[Block], orders: Collection[int], least: float) -> None:
+    """Raise UnfairError that names the blocks that show less than `least`."""
+    seen = shares(blocks)
+    hidden = [order for order in sorted(orders) if seen[order] < least]
+    if hidden:
+        raise UnfairError(f"blocks {hidden} show less than {least:.0%} of themselves")
+
+
+@functools.lru_cache(maxsize=4096)
+def center_m(block: Block) -> NDArray[np.float64]:
+    """Middle of the box round a block, shape (3,) [m], world frame."""
+    middle: NDArray[np.float64] = bounds_m(block).mean(axis=0)
+    return middle
+
+
+def picture_axes() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """To the right of the picture and away from the viewer along the floor, unit (3,) vectors."""
+    right, _, forward = view_axes(*GOAL_VIEW)
+    away = np.array([forward[0], forward[1], 0.0])
+    return right, away / np.linalg.norm(away)
+
+
+def outermost(orders: Sequence[int], blocks: Sequence[Block], to_left: bool) -> int | None:
+    """Which of the named blocks is farthest to a side of the goal view; None when that is close.
+
+    Both its middle and its outer edge have to be clearly farther out than those of the others.
+    """
+    spans = _spans(tuple(blocks))
+    sign = -1.0 if to_left else 1.0
+    reach = {
+        order: (sign * sum(spans[order]) / 2, max(sign * end for end in spans[order]))
+        for order in orders
+    }
+    ranked = sorted(orders, key=lambda order: -reach[order][0])
+    first = reach[ranked[0]]
+    for other in ranked[1:]:
+        if first[0] - reach[other][0] < _MIDDLE_GAP or first[1] - reach[other][1] < _EDGE_GAP:
+            return None
+    return ranked[0]
+
+
+@functools.lru_cache(maxsize=512)
+def _spans(blocks: tuple[Block, ...]) -> Mapping[int, tuple[float, float]]:
+    """Left and right end of each block across the goal view, -1 to 1, by order."""
+    scene = Scene("", (1,), blocks, ())
+    camera = goal_camera(scene, PictureStyle(_SIZE_PX, "checkerboard", *GOAL_VIEW))
+    spans = {}
+    for block, one in zip(blocks, drawn(scene), strict=True):
+        across = camera.project(one.vertices_m)[:, 0]
+        spans[block.order] = (float(across.min()), float(across.max()))
+    return spans
+
+
+@functools.lru_cache(maxsize=512)
+def _areas(blocks: tuple[Block, ...]) -> Mapping[int, float]:
+    """Share of the goal view that each block covers, by order."""
+    scene = Scene("", (1,), blocks, ())
+    camera = goal_camera(scene, PictureStyle(_SIZE_PX, "checkerboard", *GOAL_VIEW))
+    seen = shoot(drawn(scene), camera, _SIZE_PX).block
+    counts = np.bincount(seen[seen >= 0], minlength=len(blocks))
+    return {
+        block.order: float(count) / _SIZE_PX**2 for block, count in zip(blocks, counts, strict=True)
+    }
+
+
+def require_shapes_seen(blocks: Sequence[Block]) -> None:
+    """Raise UnfairError unless every block shows enough of itself to tell its shape."""
+    require_seen(blocks, [block.order for block in blocks], SHAPED)
+    areas = _areas(tuple(_plain(block) for block in blocks))
+    small = [order for order, area in sorted(areas.items()) if area < SHAPED_AREA]
+    if small:
+        raise UnfairError(f"blocks {small} cover less than {SHAPED_AREA:.1%} of the picture")
+
+
+def _plain(block: Block) -> Block:
+    """The block as far as it decides what is hidden."""
+    return replace(block, color="red", depend=())

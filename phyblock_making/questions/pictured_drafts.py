@@ -1,0 +1,153 @@
+"""What makers of questions with several pictures share: recipes, likeness, differences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from phyblock.domain.question import LETTERS, Question, QuestionPicture
+from phyblock.domain.scene import Block, Scene
+from phyblock.sim.outcomes import DEFAULT_LIMITS, Limits
+from phyblock.sim.seeing import is_inside, least_difference, seen
+from phyblock.sim.world import Pose
+from phyblock_making.questions.choices import pick
+from phyblock_making.questions.question_draft import Draft, Option, UnfairError
+from phyblock_making.questions.wording import fill, wording_ids
+
+__all__ = [
+    "LEAST_PIXELS",
+    "are_alike",
+    "are_told_apart",
+    "draft",
+    "moved_between",
+    "of_kind",
+    "only_index",
+    "option_pictures",
+    "picture_of",
+    "relabeled",
+    "same_blocks",
+    "state",
+]
+
+LEAST_PIXELS = 220
+"""In so many pixels of 256 by 256 any two pictures that are compared differ, at the least."""
+_SAME = Limits(still_m=0.002, still_deg=2.0, moved_m=0.002, moved_deg=2.0)
+
+
+def state(
+    scene: Scene, blocks: Sequence[Block], view_deg: tuple[float, float], label: str = "scene"
+) -> QuestionPicture:
+    """Blocks of a scene, whose whole frames the picture, so that all its states share a camera."""
+    return QuestionPicture(label, tuple(blocks), view_deg, framed=scene.blocks)
+
+
+def are_told_apart(pictures: Sequence[QuestionPicture], least: int = LEAST_PIXELS) -> bool:
+    """Whether nothing is cut off, and any two of the pictures differ in enough pixels."""
+    if not all(is_inside(picture) for picture in pictures):
+        return False
+    return least_difference([seen(picture) for picture in pictures]) >= least
+
+
+def are_alike(one: Block, other: Block) -> bool:
+    """Whether two blocks look the same at the same place: within 2 mm and 2 degrees."""
+    if one.kind != other.kind:
+        return False
+    start, end = Pose.goal(one), Pose.goal(other)
+    if end.distance_m(start) > _SAME.still_m:
+        return False
+    return one.look == other.look or end.angle_deg(start) <= _SAME.still_deg
+
+
+def same_blocks(one: Sequence[Block], other: Sequence[Block]) -> bool:
+    """Whether two sets of blocks look the same, whatever their numbers."""
+    left = list(other)
+    for block in one:
+        match = next((b for b in left if are_alike(block, b)), None)
+        if match is None:
+            return False
+        left.remove(match)
+    return not left
+
+
+def moved_between(
+    scene: Scene, picture: QuestionPicture
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Orders of the scene's blocks that a picture lacks, and of those that it shows elsewhere.
+
+    UnfairError when it shows others, or a block neither at its place nor clearly elsewhere.
+    """
+    goal = {block.order: block for block in scene.blocks}
+    moved = []
+    for block in picture.blocks:
+        before = goal.get(block.order)
+        if before is None or before.kind != block.kind:
+            raise UnfairError(f"picture {picture.label} shows a block that the scene has not")
+        start, end = Pose.goal(before), Pose.goal(block)
+        distance_m, angle_deg = end.distance_m(start), end.angle_deg(start)
+        if distance_m > DEFAULT_LIMITS.moved_m or angle_deg > DEFAULT_LIMITS.moved_deg:
+            moved.append(block.order)
+        elif distance_m > DEFAULT_LIMITS.still_m or angle_deg > DEFAULT_LIMITS.still_deg:
+            raise UnfairError(f"picture {picture.label} shows block {block.order} hardly moved")
+    gone = set(goal) - {block.order for block in picture.blocks}
+    return tuple(sorted(gone)), tuple(sorted(moved))
+
+
+def draft(
+    scene: Scene,
+    rng: np.random.Generator,
+    stem: str,
+    options: Sequence[Option],
+    pictures: Sequence[QuestionPicture],
+    value: str,
+    slots: dict[str, str] | None = None,
+    facts: Mapping[str, object] | None = None,
+) -> Draft:
+    """A draft in a wording drawn from those of a stem; the stem is its kind."""
+    wording = pick(rng, wording_ids(stem))
+    held = slots or {}
+    return Draft(
+        scene=scene,
+        text=fill(wording, **held),
+        options=tuple(options),
+        pictures=tuple(pictures),
+        wording=wording,
+        value=value,
+        kind=stem,
+        evidence={"kind": stem, "slots": held, **(facts or {})},
+    )
+
+
+def of_kind(question: Question) -> str:
+    """The kind that a maker gave a question; UnfairError when it has none."""
+    kind = question.evidence.get("kind")
+    if not isinstance(kind, str):
+        raise UnfairError("its evidence names no kind")
+    return kind
+
+
+def picture_of(question: Question, label: str) -> QuestionPicture:
+    """The picture with a label; UnfairError unless there is exactly one."""
+    found = [picture for picture in question.pictures if picture.label == label]
+    if len(found) != 1:
+        raise UnfairError(f"has {len(found)} pictures labeled {label}")
+    return found[0]
+
+
+def option_pictures(question: Question) -> tuple[QuestionPicture, ...]:
+    """The pictures of the four options, in order."""
+    return tuple(picture_of(question, letter) for letter in LETTERS)
+
+
+def only_index(right: Sequence[bool]) -> tuple[int]:
+    """Index of the one option that is right; UnfairError when there is not exactly one."""
+    found = [index for index, is_right in enumerate(right) if is_right]
+    if len(found) != 1:
+        raise UnfairError(f"{len(found)} of {len(right)} options are right")
+    return (found[0],)
+
+
+def relabeled(picture: QuestionPicture, label: str) -> QuestionPicture:
+    """The same picture under another label."""
+    return replace(picture, label=label)

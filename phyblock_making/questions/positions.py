@@ -1,0 +1,177 @@
+"""Relative position: where one block is from another, and which block is outermost or nearest."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from phyblock.domain.question import Question, Subtask
+from phyblock.domain.scene import Block, Scene
+from phyblock.sim.support import bounds_m
+from phyblock_making.questions.block_measures import offset_m, top_m
+from phyblock_making.questions.choices import pick, shuffled
+from phyblock_making.questions.coloring import recolored
+from phyblock_making.questions.goal_view import (
+    NAMED,
+    center_m,
+    outermost,
+    require_seen,
+    shown_blocks,
+)
+from phyblock_making.questions.question_draft import Draft, UnfairError
+from phyblock_making.questions.referring import Feature, names, resolve_one
+from phyblock_making.questions.static_drafts import (
+    StaticMaker,
+    draft,
+    index_of,
+    seen_blocks,
+)
+from phyblock_making.questions.wording import slots_of
+
+__all__ = ["PositionMaker"]
+
+_PLAIN: tuple[Feature, ...] = ("color", "type")
+_CORNERS: tuple[str, ...] = (
+    "in front and to the left",
+    "in front and to the right",
+    "behind and to the left",
+    "behind and to the right",
+)
+_UPRIGHT: tuple[str, ...] = (
+    "above it",
+    "below it",
+    "to its left, at the same height",
+    "to its right, at the same height",
+)
+_CLEAR_M = 0.03
+_ABOVE_M = 0.015
+_LEVEL_M = 0.005
+_TRIES = 5
+_EXTREMES = ("farthest left", "farthest right", "highest")
+_HEIGHT_GAP_M = 0.024
+_NEARER = 0.75
+"""The nearest block is at most this share of the next one's distance away."""
+
+
+class PositionMaker(StaticMaker):
+    """RP: as seen in the picture; scenes are recolored so that most blocks have a name."""
+
+    subtask: Subtask = "RP"
+
+    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """Pairs of blocks, and choices of one of four."""
+        for _ in range(_TRIES):
+            shown = recolored(scene, rng)
+            named = {
+                block.order: expressions[0]
+                for block in seen_blocks(shown, NAMED)
+                if (expressions := names(block, shown.blocks, _PLAIN))
+            }
+            blocks = [block for block in shown.blocks if block.order in named]
+            yield from _of_pairs(shown, blocks, named, rng)
+            yield from _of_four(shown, blocks, named, rng)
+
+    def rederive(self, question: Question) -> tuple[int, ...]:
+        """From the places of the blocks that the text or the options name."""
+        blocks, slots = shown_blocks(question), slots_of(question)
+        if "extreme" in slots or "block" not in slots:
+            named = [resolve_one(option, blocks) for option in question.options]
+            anchor = resolve_one(slots["other"], blocks) if "other" in slots else None
+            seen = [*named, anchor] if anchor else named
+            require_seen(blocks, [block.order for block in seen], NAMED)
+            if anchor:
+                return (named.index(_nearest(anchor, named)),)
+            return (named.index(_extreme(slots["extreme"], named, blocks)),)
+        one, other = (resolve_one(slots[name], blocks) for name in ("block", "other"))
+        require_seen(blocks, [one.order, other.order], NAMED)
+        corners = set(question.options) == set(_CORNERS)
+        right = _corner(one, other) if corners else _upright(one, other)
+        return index_of(question, right)
+
+
+def _of_pairs(
+    scene: Scene, blocks: Sequence[Block], named: dict[int, str], rng: np.random.Generator
+) -> Iterator[Draft]:
+    pairs = shuffled(rng, list(itertools.permutations(blocks, 2)))[:4]
+    for one, other in pairs:
+        slots = {"block": named[one.order], "other": named[other.order]}
+        for stem, words, rule in (
+            ("corner", _CORNERS, _corner),
+            ("upright", _UPRIGHT, _upright),
+        ):
+            try:
+                right = rule(one, other)
+            except UnfairError:
+                continue
+            options = [right, *(word for word in words if word != right)]
+            offset = [round(float(x), 6) for x in offset_m(one, other)]
+            yield draft(scene, rng, f"rp-{stem}", slots, options, right, stem, offset_m=offset)
+
+
+def _of_four(
+    scene: Scene, blocks: Sequence[Block], named: dict[int, str], rng: np.random.Generator
+) -> Iterator[Draft]:
+    chosen = shuffled(rng, blocks)[:5]
+    if len(chosen) < 5:
+        return
+    anchor, four = chosen[0], chosen[1:]
+    kind = pick(rng, (*_EXTREMES, "nearest"))
+    try:
+        is_near = kind == "nearest"
+        right = _nearest(anchor, four) if is_near else _extreme(kind, four, scene.blocks)
+    except UnfairError:
+        return
+    ranked = [right, *(block for block in four if block is not right)]
+    options = [f"the {named[block.order]}" for block in ranked]
+    slots = {"other": named[anchor.order]} if kind == "nearest" else {"extreme": kind}
+    stem = "nearest" if kind == "nearest" else "extreme"
+    orders = {"ranked": [block.order for block in ranked]}
+    yield draft(scene, rng, f"rp-{stem}", slots, options, right.type, kind, **orders)
+
+
+def _corner(one: Block, other: Block) -> str:
+    """Which quarter of the floor round `other` holds `one`, as the viewer sees it."""
+    across, away, _ = offset_m(one, other)
+    if min(abs(across), abs(away)) < _CLEAR_M:
+        raise UnfairError("is neither clearly to a side nor clearly in front or behind")
+    depth = "behind" if away > 0 else "in front"
+    return f"{depth} and to the {'right' if across > 0 else 'left'}"
+
+
+def _upright(one: Block, other: Block) -> str:
+    """Over or under it, or beside it at its height; UnfairError for all that lies between."""
+    across, away, _ = offset_m(one, other)
+    low, high = bounds_m(one)[:, 2] - bounds_m(other)[::-1, 2]
+    if max(abs(across), abs(away)) < _ABOVE_M and (low > -_LEVEL_M or high < _LEVEL_M):
+        return "above it" if low > -_LEVEL_M else "below it"
+    bottoms = abs(bounds_m(one)[0, 2] - bounds_m(other)[0, 2])
+    if abs(across) > _CLEAR_M and bottoms < _LEVEL_M:
+        return f"to its {'right' if across > 0 else 'left'}, at the same height"
+    raise UnfairError("is neither over, under nor beside it")
+
+
+def _nearest(anchor: Block, blocks: Sequence[Block]) -> Block:
+    """The block whose middle is clearly nearest to that of another."""
+    far = {b.order: float(np.linalg.norm(center_m(b) - center_m(anchor))) for b in blocks}
+    ranked = sorted(blocks, key=lambda block: far[block.order])
+    if far[ranked[0].order] > _NEARER * far[ranked[1].order]:
+        raise UnfairError("two blocks are about as near")
+    return ranked[0]
+
+
+def _extreme(extreme: str, blocks: Sequence[Block], scene: Sequence[Block]) -> Block:
+    """The one of `blocks` that is clearly farthest to a side, or reaches highest."""
+    if extreme == "highest":
+        ranked = sorted(blocks, key=lambda block: -top_m(block))
+        if top_m(ranked[0]) - top_m(ranked[1]) < _HEIGHT_GAP_M:
+            raise UnfairError("two blocks are about as high")
+        return ranked[0]
+    if extreme not in _EXTREMES:
+        raise UnfairError(f"{extreme!r} is no place")
+    orders = [block.order for block in blocks]
+    order = outermost(orders, scene, to_left=extreme == "farthest left")
+    if order is None:
+        raise UnfairError(f"two blocks are about the {extreme}")
+    return blocks[orders.index(order)]

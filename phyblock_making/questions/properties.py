@@ -1,0 +1,92 @@
+"""Shape and color: scenes recolored from the full palette, so that neither tells the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from phyblock.domain.blocks import COLORS
+from phyblock.domain.question import Question, Subtask
+from phyblock.domain.scene import Block, Scene
+from phyblock_making.questions.block_measures import height_m
+from phyblock_making.questions.choices import shuffled
+from phyblock_making.questions.coloring import recolored
+from phyblock_making.questions.goal_view import NAMED, STUDIED, require_seen, shown_blocks
+from phyblock_making.questions.question_draft import Draft, UnfairError
+from phyblock_making.questions.referring import SHAPE_WORDS, Feature, resolve_one, shape_word
+from phyblock_making.questions.static_drafts import (
+    StaticMaker,
+    draft,
+    drawn_name,
+    index_of,
+    seen_blocks,
+    wrong_options,
+)
+from phyblock_making.questions.wording import slots_of
+
+__all__ = ["ColorMaker", "ShapeMaker"]
+
+_BY_LOOKS: tuple[Feature, ...] = ("color", "side", "layer", "support")
+_BY_SHAPE: tuple[Feature, ...] = ("type", "side", "layer", "support")
+_LYING_M = 0.03
+"""A half cylinder that lies on its flat face is lower than this."""
+
+
+class ShapeMaker(StaticMaker):
+    """SH: the shape of a block that is named by anything but a shape."""
+
+    subtask: Subtask = "SH"
+
+    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """One a block that shows enough of itself."""
+        for block in shuffled(rng, seen_blocks(scene, STUDIED)):
+            if _hides_its_shape(block, scene.blocks):
+                continue
+            shown = recolored(scene, rng)
+            again = next(b for b in shown.blocks if b.order == block.order)
+            name = drawn_name(rng, again, shown, _BY_LOOKS)
+            if name is not None:
+                right = shape_word(block.type)
+                options = [right, *wrong_options(rng, list(SHAPE_WORDS), right)]
+                yield draft(shown, rng, "sh", {"block": name}, options, right, block=block.order)
+
+    def rederive(self, question: Question) -> tuple[int, ...]:
+        """The word for the type of the block that the text names."""
+        blocks = shown_blocks(question)
+        block = resolve_one(slots_of(question)["block"], blocks)
+        require_seen(blocks, [block.order], STUDIED)
+        if _hides_its_shape(block, blocks):
+            raise UnfairError("a half cylinder that stands and carries looks like a cylinder")
+        return index_of(question, shape_word(block.type))
+
+
+class ColorMaker(StaticMaker):
+    """CO: the color of a block that is named by anything but a color."""
+
+    subtask: Subtask = "CO"
+
+    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """One a block that can be named."""
+        for block in shuffled(rng, seen_blocks(scene, NAMED)):
+            shown = recolored(scene, rng)
+            again = next(b for b in shown.blocks if b.order == block.order)
+            name = drawn_name(rng, again, shown, _BY_SHAPE)
+            if name is not None:
+                options = [again.color, *wrong_options(rng, COLORS, again.color)]
+                yield draft(
+                    shown, rng, "co", {"block": name}, options, again.color, block=block.order
+                )
+
+    def rederive(self, question: Question) -> tuple[int, ...]:
+        """The color of the block that the text names."""
+        blocks = shown_blocks(question)
+        block = resolve_one(slots_of(question)["block"], blocks)
+        require_seen(blocks, [block.order], NAMED)
+        return index_of(question, block.color)
+
+
+def _hides_its_shape(block: Block, blocks: Sequence[Block]) -> bool:
+    """Whether it is a standing half cylinder with something on its half disc."""
+    is_standing = block.type == "semi_cylinder" and height_m(block) > _LYING_M
+    return is_standing and any(block.order in other.depend for other in blocks)

@@ -1,0 +1,184 @@
+"""The data card of a set of questions: how they were made, what was refused, what is in it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
+from phyblock_making.questions.goal_view import COUNTED, NAMED, SHAPED, SHAPED_AREA, STUDIED
+from phyblock_making.questions.shortcuts import SubtaskAudit
+
+__all__ = ["question_card"]
+
+_TEXT = """# {name}
+
+{count} multiple-choice questions about {scenes} scenes of `{scenes_name}`, in {subtasks} subtasks
+(paper, section 3.3 and appendix A.4), each with an answer that is derived from geometry, from the
+dependency graph or from physics, and derived again by `phyblock vqa verify`. Made by
+
+    {made_by}
+
+which gives the same bytes with any number of processes. No picture is stored: each is a recipe
+(what differs from the scene, and from where it is seen) that is drawn when it is needed.
+
+## How they were made
+
+Every scene gives drafts: fair questions with their right option, distractors and evidence. From
+the drafts of all scenes a greedy choice takes the questions of a subtask so that sorts of
+questions, answer values, values under each set of options and under each word of the question,
+wordings, levels and scenes are as even as the scenes allow, and so that each option text, and each
+word in one, is right in one of four cases in which it is offered. The same block, color or number
+is not asked about twice in a scene. Letters go round within sets of options, so that each is right
+equally often; in ordering, all orders are drawn.
+
+Texts come from templates with slots (`wording`). Blocks are named by color, type, layer, place in
+the picture or what they rest on, so that exactly one block fits.
+
+## Colors
+
+The kit has one color for each shape but the cube, so that a color would tell a shape and a shape
+a size or a place in the structure. Scenes are therefore recolored from the full palette, eight
+types in five colors, for these subtasks:
+
+* shape, color, relative position, absolute position, relative dependency: every block gets a color
+  drawn for it;
+* size, relative rotation: the blocks that are compared have colors that no other block has.
+
+Other subtasks may recolor single blocks in pictures that are wrong options. `colors` in a line
+holds the blocks whose color differs from the stored scene.
+
+## What was refused, and the rules that came of it
+
+Questions were answered from picture and text alone, before the answer was looked up.
+What was unfair became a rule for all:
+
+* blocks that are named show at least {named:.0%} of themselves, those whose shape, size or
+  rotation is asked about {studied:.0%}; where blocks or layers are counted, every block of the
+  scene shows {counted:.0%};
+* where shapes or types are counted, every block shows {shaped:.0%} of itself and covers
+  {area:.1%} of the picture: a short rectangular prism far away was taken for a cube;
+* a name has to fit one block even for a reader who takes cubes for short rectangular prisms, or
+  half cylinders for cylinders: "the blue cube" beside blue short prisms is refused;
+* the shape of a half cylinder that stands upright and carries something is not asked for: seen
+  from its round side it looks like a cylinder;
+* "leftmost" and "farthest left" need a clear lead of the block's middle and of its outer edge: a
+  long prism and a cube that end at the same place were refused; "highest" and "topmost" need 2 cm;
+* left, right, in front and behind are offered in pairs ("behind and to the left"), because the
+  view is oblique and a block is rarely only to the left; each part has to be clear by 3 cm;
+* "nearest" needs at most three quarters of the distance of the next block;
+* distances along the ground are asked for only within one structure and along the edges of
+  blocks, where they can be counted in block lengths; between structures that stand apart depth
+  could only be guessed;
+* all lengths are multiples of 2.5 cm; values are at least 20 % apart;
+* the scale that the text gives is a block that can be seen in the picture;
+* the height of a block is asked for as its own ("from its lowest to its highest point"), because
+  "tall" was taken for how high it stands;
+* sizes compared differ by 30 % or more, or are a plain multiple;
+* "type" in type counting says what it means: shape and size, not color;
+* "layer" in layer counting says what it means: one more than the highest block below;
+* a block is not said to be turned when a quarter turn maps it to itself, turns are steps of 30
+  degrees, and a turned block rests on what it rested on;
+* a layer is counted only where what rests on what can be told from heights: a block wedged
+  between two roofs looks as if it stood beside them;
+* outcomes are tried under four settings (time step, solver, friction, and a floor that leans by 2
+  degrees to three sides), because weight exactly over an edge falls in every simulation and stays
+  on many a table; all must name the same blocks, each either clearly moved or clearly still;
+* a pushed block goes as far as the text says, in every setting, and came down or did not in all;
+  one that only slid did not turn by more than 10 degrees;
+* blocks are shifted and pushed by lengths that are no multiple of the grid of the structures;
+* of next steps at most one obviously floats; the others are blocks of the goal at wrong places;
+* of the pictures of removals at least one wrong one lacks the right block, so that to look for
+  what is gone is not enough; the removed block shows 40% of itself, the others 12%;
+* other viewpoints to a side are asked for from straight in front alone: a slanted view has a
+  mirror image that could be one of the same side;
+* options of viewpoints are four versions of one block, and the true one is drawn evenly;
+* places for a block hold, or do not, also 7 mm off in four directions, and blocks without a clear
+  middle are not put down;
+* pictures that are options differ in 220 of 256 x 256 pixels at least, and cut nothing off.
+
+## What is in it
+
+| subtask | | questions | scenes | wordings | A | B | C | D | most frequent answer |
+|---|---|---|---|---|---|---|---|---|---|
+{rows}
+
+A to D: share of questions whose right option has that letter (ordering: that comes first). The
+last column is the share of the most frequent right option text.
+{audit}
+## The file
+
+`questions.jsonl` holds one question a line; docs/vqa.md describes the fields.
+"""
+
+_AUDIT_TEXT = """
+## Audit
+
+From `phyblock vqa audit`:
+
+| subtask | letters | chance | majority | text only | alike | repeats | named | least seen | most | base scenes |
+|---|---|---|---|---|---|---|---|---|---|---|
+{rows}
+
+Letters: the rarest and the most frequent. Majority and text only: accuracy of the most frequent
+answer and of a classifier of the texts, on questions about other base scenes than those they were
+told the answers of; both stay under chance where answers are even, because what was frequent among
+the others is then rare among those held out. Alike: questions with options that read alike.
+Repeats: questions that ask what another asks. Named: blocks that words name, and the least that
+one of them shows of itself. Most: questions about the scene with most; base scenes: the scenes
+asked about are made from so many.
+"""  # noqa: E501
+
+
+def question_card(
+    name: str,
+    scenes_name: str,
+    questions: Sequence[Question],
+    made_by: str,
+    audits: Sequence[SubtaskAudit] = (),
+) -> str:
+    """Markdown text of the card of a set of questions called `name` about those scenes."""
+    by_subtask = {s: [q for q in questions if q.subtask == s] for s in SUBTASKS}
+    return _TEXT.format(
+        name=name,
+        scenes_name=scenes_name,
+        count=len(questions),
+        scenes=len({question.scene.id for question in questions}),
+        subtasks=sum(bool(asked) for asked in by_subtask.values()),
+        made_by=made_by,
+        named=NAMED,
+        studied=STUDIED,
+        counted=COUNTED,
+        shaped=SHAPED,
+        area=SHAPED_AREA,
+        rows="\n".join(_row(asked) for asked in by_subtask.values() if asked),
+        audit=_audit_text(audits) if audits else "",
+    )
+
+
+def _audit_text(audits: Sequence[SubtaskAudit]) -> str:
+    return _AUDIT_TEXT.format(rows="\n".join(map(_audit_row, audits)))
+
+
+def _audit_row(audit: SubtaskAudit) -> str:
+    low, high = audit.letter_shares
+    seen = "" if audit.least_seen is None else f"{audit.least_seen[0]:.0%}"
+    text_only = "" if audit.text_only is None else f"{audit.text_only:.0%}"
+    cells = [
+        *(audit.subtask, f"{low:.0%} to {high:.0%}", f"{audit.chance:.0%}"),
+        *(f"{audit.majority:.0%}", text_only, len(audit.ambiguous), len(audit.duplicates)),
+        *(audit.named or "", seen, audit.most_of_a_scene, audit.bases),
+    ]
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+def _row(questions: Sequence[Question]) -> str:
+    subtask, count = questions[0].subtask, len(questions)
+    letters = Counter(question.answer[0] for question in questions)
+    texts = Counter(question.options[question.answer[0]] for question in questions)
+    scenes = {question.scene.id for question in questions}
+    wordings = {question.wording for question in questions}
+    shares = [f"{letters[i] / count:.0%}" for i in range(len(LETTERS))]
+    most = "" if "<img1>" in texts or "place A" in texts else f"{max(texts.values()) / count:.0%}"
+    cells = [subtask, SUBTASK_NAMES[subtask], count, len(scenes), len(wordings), *shares, most]
+    return f"| {' | '.join(map(str, cells))} |"

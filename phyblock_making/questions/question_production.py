@@ -1,0 +1,165 @@
+"""Questions from one seed: drafts of all scenes, an even choice of them, letters dealt evenly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+
+from phyblock.domain.question import (
+    LETTERS,
+    SUBTASKS,
+    Mark,
+    Question,
+    QuestionPicture,
+    Subtask,
+)
+from phyblock.domain.scene import Block, Scene
+from phyblock.errors import DataError, Problem
+from phyblock_making.questions.makers import MAKERS
+from phyblock_making.questions.question_draft import Draft, Option
+from phyblock_making.questions.selection import Pooled, select
+from phyblock_making.workers import Workers
+
+__all__ = ["PER_SUBTASK", "make_questions", "tidy_picture"]
+
+PER_SUBTASK: Mapping[Subtask, int] = {
+    subtask: 50 if subtask in ("OR", "AD") else 150 for subtask in SUBTASKS
+}
+"""How many questions the built-in set has, as the paper's (appendix A.4)."""
+_DIGITS = 6
+
+
+def make_questions(
+    scenes: Sequence[Scene],
+    wanted: Mapping[Subtask, int],
+    seed: int,
+    workers: Workers,
+    report: Callable[[Subtask, int], None] = lambda _, __: None,
+) -> Iterator[Question]:
+    """The questions, subtask by subtask; the same for the same arguments, whatever the workers.
+
+    Drafts of a scene depend on seed, subtask and scene alone; what is taken of them, and which
+    letter is right, on seed and subtask. `report` hears of every scene that was asked, and of
+    how many there are to ask. Raises DataError when the scenes give too few.
+    """
+    for subtask, count in wanted.items():
+        pool: list[Pooled] = []
+        tasks = [(subtask, seed, scene) for scene in _tried(subtask, scenes, seed)]
+        for drafts in workers.map(_drafts, tasks):
+            pool += [Pooled(draft, _texts(draft.options)) for draft in drafts]
+            report(subtask, len(tasks))
+        rng = _rng(seed, subtask, "choice")
+        taken = select(pool, count, rng)
+        if len(taken) < count:
+            message = f"the scenes give no more than {len(taken)} of {count} questions"
+            raise DataError(Problem(subtask, message, hint="ask for fewer, or give more scenes"))
+        yield from _dealt(subtask, taken, rng)
+
+
+def tidy_picture(picture: QuestionPicture) -> QuestionPicture:
+    """The picture with its numbers as the file holds them, and orders that rise."""
+    blocks = sorted(map(_tidy_block, picture.blocks), key=lambda block: block.order)
+    marks = tuple(replace(mark, position_m=_round(mark.position_m)) for mark in picture.marks)
+    framed = tuple(map(_tidy_block, picture.framed))
+    azimuth, elevation = (round(float(angle), _DIGITS) + 0.0 for angle in picture.view_deg)
+    return replace(
+        picture, blocks=tuple(blocks), marks=marks, framed=framed, view_deg=(azimuth, elevation)
+    )
+
+
+def _rng(seed: int, *parts: str) -> np.random.Generator:
+    return np.random.default_rng(list("/".join((str(seed), *parts)).encode()))
+
+
+def _tried(subtask: Subtask, scenes: Sequence[Scene], seed: int) -> list[Scene]:
+    """The scenes that are asked: all, or as many of each level as there are to ask."""
+    rng = _rng(seed, subtask, "scenes")
+    drawn = [scenes[int(i)] for i in rng.permutation(len(scenes))]
+    by_level: dict[int, list[Scene]] = {}
+    for scene in drawn:
+        by_level.setdefault(scene.level, []).append(scene)
+    ranked = sorted(
+        ((i, level, scene) for level, group in by_level.items() for i, scene in enumerate(group)),
+        key=lambda entry: entry[:2],
+    )
+    return [scene for _, _, scene in ranked[: MAKERS[subtask].scenes_tried]]
+
+
+def _drafts(task: tuple[Subtask, int, Scene]) -> list[Draft]:
+    subtask, seed, scene = task
+    maker = MAKERS[subtask]
+    drafts = maker.drafts(scene, _rng(seed, subtask, scene.id))
+    return list(islice(drafts, maker.drafts_a_scene))
+
+
+def _texts(options: Sequence[Option]) -> tuple[str, ...]:
+    """The options as texts; of pictures and places, whose texts tell nothing, none."""
+    return tuple(option for option in options if isinstance(option, str))
+
+
+def _dealt(
+    subtask: Subtask, taken: Sequence[Pooled], rng: np.random.Generator
+) -> Iterator[Question]:
+    """Questions with letters: each order of the options, or each right letter, as often."""
+    width = max(3, len(str(len(taken))))
+    in_order = sorted(
+        taken, key=lambda one: (one.draft.kind, sorted(one.option_texts), one.draft.value)
+    )
+    places = [_places(subtask, number, rng) for number in range(len(in_order))]
+    dealt = list(zip(in_order, places, strict=True))
+    for number, i in enumerate(rng.permutation(len(dealt)).tolist(), 1):
+        one, order = dealt[i]
+        yield _question(f"{subtask.lower()}-{number:0{width}d}", subtask, one.draft, order)
+
+
+def _places(subtask: Subtask, number: int, rng: np.random.Generator) -> list[int]:
+    """For each option of a draft, where it is put.
+
+    The right option goes round the letters, which deals them evenly within every kind, set of
+    options and value; the others follow in an order drawn.
+    """
+    if subtask == "OR":
+        return [int(i) for i in rng.permutation(len(LETTERS))]
+    right = number % len(LETTERS)
+    rest = [place for place in range(len(LETTERS)) if place != right]
+    return [right, *(rest[int(i)] for i in rng.permutation(len(rest)))]
+
+
+def _question(name: str, subtask: Subtask, draft: Draft, places: Sequence[int]) -> Question:
+    options: list[str] = [""] * len(places)
+    pictures = list(draft.pictures)
+    marks: list[Mark] = []
+    shown: list[QuestionPicture] = []
+    for option, place in zip(draft.options, places, strict=True):
+        letter = LETTERS[place]
+        if isinstance(option, QuestionPicture):
+            options[place] = f"<img{place + 1}>"
+            shown.append(replace(option, label=letter))
+        elif isinstance(option, Mark):
+            options[place] = f"place {letter}"
+            marks.append(replace(option, letter=letter))
+        else:
+            options[place] = option
+    if marks:
+        lettered = tuple(sorted(marks, key=lambda mark: mark.letter))
+        pictures[0] = replace(pictures[0], marks=(*pictures[0].marks, *lettered))
+    pictures += sorted(shown, key=lambda picture: picture.label)
+    answer = tuple(places) if subtask == "OR" else (places[0],)
+    tidy = tuple(map(tidy_picture, pictures))
+    evidence = dict(draft.evidence)
+    text, wording = draft.text, draft.wording
+    return Question(
+        name, subtask, draft.scene, text, tuple(options), answer, tidy, wording, evidence
+    )
+
+
+def _tidy_block(block: Block) -> Block:
+    return replace(block, position_m=_round(block.position_m), euler_deg=_round(block.euler_deg))
+
+
+def _round(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = (round(float(number), _DIGITS) + 0.0 for number in vector)
+    return (x, y, z)

@@ -1,0 +1,154 @@
+"""Writing a data set scene by scene, in flat memory: lines, statistics, card and checksums."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import shutil
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from phyblock.domain.candidates import CandidateSet
+from phyblock.domain.scene import Scene
+from phyblock.errors import Problem, StoreError
+from phyblock.files import atomic_write, check_free, writing
+from phyblock_making.scenes.candidate_sets import make_candidates
+from phyblock_making.scenes.scene_draft import PALETTES, Palette
+
+__all__ = [
+    "CARD_FILE",
+    "SCENES_FILE",
+    "SUMS_FILE",
+    "LevelStatistics",
+    "SetWriter",
+    "open_writer",
+    "scene_line",
+    "sums_text",
+]
+
+SCENES_FILE = "scenes.jsonl"
+CARD_FILE = "README.md"
+SUMS_FILE = "SHA256SUMS"
+QUANTITIES = ("blocks", "types", "colors", "layers")
+
+
+@dataclass
+class LevelStatistics:
+    """Counts of one level: scenes, base scenes, sum and most of each of `QUANTITIES`."""
+
+    scenes: int = 0
+    base: int = 0
+    total: dict[str, int] = field(default_factory=lambda: dict.fromkeys(QUANTITIES, 0))
+    most: dict[str, int] = field(default_factory=lambda: dict.fromkeys(QUANTITIES, 0))
+
+    def add(self, scene: Scene) -> None:
+        """Count a scene."""
+        counts = {
+            "blocks": len(scene),
+            "types": len({block.type for block in scene.blocks}),
+            "colors": len({block.color for block in scene.blocks}),
+            "layers": max(scene.graph.layers),
+        }
+        self.scenes += 1
+        self.base += scene.parents == (scene.id,)
+        for name, number in counts.items():
+            self.total[name] += number
+            self.most[name] = max(self.most[name], number)
+
+
+class SetWriter:
+    """Takes scenes in the order in which they are made; every level's ids must rise."""
+
+    def __init__(self, folder: Path, parts: Path, palette: Palette) -> None:
+        self._folder, self._parts, self._palette = folder, parts, palette
+        self.levels: dict[int, LevelStatistics] = {}
+        self.shared = self.base = self.count = 0
+        self.sizes: set[int] = set()
+
+    def add(self, scene: Scene) -> None:
+        """Append a scene with a candidate set of its own."""
+        candidates = make_candidates(scene, palette=PALETTES[self._palette])
+        with (self._parts / f"{scene.levels[0]}").open("a", encoding="utf-8", newline="\n") as file:
+            file.write(scene_line(scene, candidates) + "\n")
+        for level in scene.levels:
+            self.levels.setdefault(level, LevelStatistics()).add(scene)
+        self.count += 1
+        self.shared += len(scene.levels) > 1
+        self.base += scene.parents == (scene.id,)
+        self.sizes.add(len(candidates))
+
+    def finish(self, card: str) -> None:
+        """Put the scenes together, sorted by id, and write the card and the checksums."""
+        whole = self._parts / SCENES_FILE
+        with whole.open("wb") as out:
+            for part in sorted(path for path in self._parts.iterdir() if path.name.isdigit()):
+                with part.open("rb") as file:
+                    shutil.copyfileobj(file, out)
+        whole.replace(self._folder / SCENES_FILE)
+        atomic_write(self._folder / CARD_FILE, card)
+        atomic_write(self._folder / SUMS_FILE, sums_text(self._folder))
+
+
+@contextlib.contextmanager
+def open_writer(folder: Path, palette: Palette, replace: bool = False) -> Iterator[SetWriter]:
+    """A writer into a folder; what is half written is gone when the with statement fails.
+
+    Raises StoreError when the folder holds scenes already (and not `replace`) or cannot be written.
+    """
+    if (folder / SCENES_FILE).exists() and not replace:
+        hint = "give another --out, or --replace"
+        raise StoreError(Problem(str(folder), "holds a data set already", hint=hint))
+    if not (folder / SCENES_FILE).exists():
+        others = [folder / name for name in (SCENES_FILE, CARD_FILE, SUMS_FILE)]
+        check_free(others, "give another --out")
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".making-", dir=folder) as parts:
+            yield SetWriter(folder, Path(parts), palette)
+
+
+def scene_line(scene: Scene, candidates: CandidateSet) -> str:
+    """A scene and its candidates as one line of JSON, no newline at its end."""
+    looks = {block.look for block in scene.blocks}
+    record = {
+        "id": scene.id,
+        "levels": list(scene.levels),
+        "parents": list(scene.parents),
+        "blocks": [
+            {
+                "order": block.order,
+                "type": block.type,
+                "color": block.color,
+                "layer": block.layer,
+                "depend": list(block.depend) or [0],
+                "position": [round(c, 6) + 0.0 for c in block.position_m],
+                "euler": [_plain(angle) for angle in block.euler_deg],
+            }
+            for block in scene.blocks
+        ],
+        "candidates": [
+            {
+                "type": candidate.type,
+                "color": candidate.color,
+                "euler": [_plain(angle) for angle in candidate.euler_deg],
+                "required": candidate.look in looks,
+            }
+            for candidate in candidates.candidates
+        ],
+    }
+    return json.dumps(record, allow_nan=False)
+
+
+def sums_text(folder: Path) -> str:
+    """Checksums of the scenes and the card, as `sha256sum -c` reads them."""
+    names = (CARD_FILE, SCENES_FILE)
+    sums = [hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in names]
+    return "".join(f"{one}  {name}\n" for one, name in zip(sums, names, strict=True))
+
+
+def _plain(angle_deg: float) -> float | int:
+    """Whole degrees as an integer, which reads better in a file."""
+    return int(angle_deg) if float(angle_deg).is_integer() else angle_deg

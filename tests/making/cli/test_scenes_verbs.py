@@ -1,0 +1,130 @@
+"""`phyblock scenes audit|show|render|stats` as a person calls them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+
+from phyblock.cli.main import phyblock
+from phyblock.datasets import read_builtin
+from phyblock.errors import DataError, StoreError
+from phyblock.folders import LIST
+from tests.workspace import SCENES, tower
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """The five towers of a workspace, and one whose middle block is lifted and misdeclared."""
+    spoiled = tower("t6", [3], ("red", "blue", "green"))
+    spoiled["blocks"][2]["position"][2] += 0.02
+    spoiled["blocks"][1] |= {"depend": [0], "layer": 1}
+    spoiled["blocks"][2]["depend"] = [1]
+    spoiled["blocks"][2]["layer"] = 2
+    folder = tmp_path / "data"
+    folder.mkdir()
+    text = "".join(json.dumps(scene) + "\n" for scene in (*SCENES, spoiled))
+    (folder / "scenes.jsonl").write_text(text, encoding="utf-8")
+    return folder
+
+
+def scenes(*args: object, columns: int = 160) -> str:
+    """What the command prints."""
+    done = CliRunner(env={"COLUMNS": str(columns)}).invoke(
+        phyblock, ["scenes", *map(str, args)], standalone_mode=False, catch_exceptions=False
+    )
+    return done.stdout
+
+
+def test_an_audit_tells_files_draws_and_mends(data: Path, tmp_path: Path) -> None:
+    table, fixed, pictures = tmp_path / "found.csv", tmp_path / "fixed", tmp_path / "worst"
+    told = scenes(
+        *("audit", data, "--jobs", 1, "--csv", table, "--fix", fixed, "--pictures", pictures)
+    )
+    assert "6 scenes read; 5 with no finding" in told
+    assert "5 stand when finished, 5 at every step as well" in told
+    assert "block 3 floats 20.00 mm above its support" in told
+    assert "3 green cube" in told
+    rows = list(csv.DictReader(io.StringIO(table.read_text(encoding="utf-8"))))
+    assert {row["check"] for row in rows if row["scene"] == "t6"} >= {"floating", "unstable"}
+    assert [path.name for path in sorted(pictures.glob("*.png"))] == ["t6.png"]
+    tasks = {task.scene.id: task.scene for task in read_builtin(fixed).tasks}
+    assert [b.depend for b in tasks["t6"].blocks] == [(), (1,), (1,)]
+    assert "t6" in (fixed / "changes.csv").read_text(encoding="utf-8")
+
+
+def test_an_audit_says_what_cannot_be_read(data: Path) -> None:
+    with (data / "scenes.jsonl").open("a", encoding="utf-8") as file:
+        file.write("{}\n")
+    assert "line 7" in scenes("audit", data, "--jobs", 1)
+
+
+def test_an_audit_refuses_to_write_over_before_it_works(data: Path) -> None:
+    with pytest.raises(StoreError, match="already there"):
+        scenes("audit", data, "--fix", data)
+    for option in (("--pictures", data / "scenes.jsonl"), ("--csv", data / "scenes.jsonl" / "x")):
+        with pytest.raises(StoreError, match=r"scenes\.jsonl: cannot be written"):
+            scenes("audit", data, *option)
+
+
+def test_show_prints_the_facts(data: Path) -> None:
+    told = scenes("show", data, "t3")
+    assert "scene t3 · level 3 · 3 blocks · 3 layers" in told
+    assert "0 0 75" in told
+    with pytest.raises(DataError, match="no such scene"):
+        scenes("show", data, "t9")
+
+
+def test_stats_count(data: Path) -> None:
+    told = scenes("stats", data)
+    assert "data: 6 scenes, 6 base scenes" in told
+    assert "100.0 %" in told
+
+
+def test_render_names_views_backgrounds_and_kinds(data: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    extras = ("--composite", "--exploded", "--filmstrip", "--gif", "--webp")
+    scenes("render", data, "t1", "--out", out, "--size", 128, *extras)
+    stem = "t1-oblique-checkerboard"
+    tails = (".png", "-composite.png", "-exploded.png", "-filmstrip.png", ".gif", ".webp")
+    assert {path.name for path in out.iterdir()} == {LIST, *(stem + tail for tail in tails)}
+    for path in out.glob("t1*"):
+        with Image.open(path) as image:
+            assert image.format == path.suffix[1:].upper()
+    scenes("render", data, "--out", tmp_path / "all", "--size", 128, "--view", "all")
+    assert len(list((tmp_path / "all").glob("*.png"))) == 6 * 4
+    scenes("render", data, "t1", "--out", tmp_path / "one", "--size", 128, "--azimuth", 20)
+    assert [path.name for path in (tmp_path / "one").glob("*.png")] == ["t1-20-22-checkerboard.png"]
+
+
+def test_views_that_turn_out_the_same_are_drawn_once(data: Path, tmp_path: Path) -> None:
+    words = ("--size", 128, "--view", "all", "--azimuth", 30, "--elevation", 30)
+    assert "1 file in" in scenes("render", data, "t1", "--out", tmp_path / "out", *words)
+
+
+@pytest.mark.parametrize("option", ["--azimuth", "--elevation"])
+def test_an_angle_that_is_no_number_is_refused(data: Path, tmp_path: Path, option: str) -> None:
+    with pytest.raises(click.BadParameter, match="nan is no angle"):
+        scenes("render", data, "t1", "--out", tmp_path / "out", option, "nan")
+
+
+def test_the_facts_of_a_scene_fit_a_narrow_terminal() -> None:
+    told = scenes("show", "phyblock-400", "l4-007-street", columns=80)
+    assert "semi_cylinder" in told
+    assert max(map(len, told.splitlines()[1:])) <= 80
+
+
+def test_a_folder_that_holds_no_data_set_is_refused_with_what_would_do(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"holds no data set\n.*scenes\.jsonl, an official"):
+        scenes("show", tmp_path, "t1")
+
+
+def test_a_data_set_that_is_not_there_is_refused_with_the_bundled_ones() -> None:
+    with pytest.raises(DataError, match="phyblock-400"):
+        scenes("stats", "nowhere")

@@ -1,0 +1,91 @@
+"""Subtasks with simulation and several pictures: one right option, told apart, found again."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+
+from phyblock.datasets import read_builtin
+from phyblock.domain import LETTERS, Question, Subtask
+from phyblock.resources import bundled
+from phyblock.sim.seeing import is_inside, least_difference, seen
+from phyblock_making.questions.counterfactual import OUTCOME_TEXTS
+from phyblock_making.questions.pictured_drafts import LEAST_PIXELS
+from phyblock_making.questions.question_lines import question_line
+from phyblock_making.questions.question_production import make_questions
+from phyblock_making.questions.rederiving import problem_of
+from phyblock_making.workers import open_workers
+
+DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
+SMALL = [task.scene for task in DATA.tasks if len(task.scene) in (4, 5)]
+SCENES = tuple(SMALL[::24])
+WANTED: dict[Subtask, int] = {"VP": 3, "CF": 3, "PD": 1, "OR": 2}
+
+
+def made(jobs: int = 1) -> list[Question]:
+    with open_workers(jobs) as workers:
+        return list(make_questions(SCENES, WANTED, 0, workers))
+
+
+@pytest.fixture(scope="module")
+def questions() -> list[Question]:
+    return made()
+
+
+def test_every_answer_is_derived_again(questions: list[Question]) -> None:
+    assert Counter(question.subtask for question in questions) == WANTED
+    assert [problem_of(question) for question in questions] == [None] * len(questions)
+
+
+def test_every_other_answer_is_found_out(questions: list[Question]) -> None:
+    for question in questions:
+        turned = question.answer[1:] + question.answer[:1]
+        wrong = turned if len(turned) > 1 else ((turned[0] + 1) % len(LETTERS),)
+        assert problem_of(replace(question, answer=wrong)) is not None
+
+
+def test_pictures_of_options_are_whole_and_told_apart(questions: list[Question]) -> None:
+    for question in questions:
+        options = [picture for picture in question.pictures if picture.label in LETTERS]
+        assert all(map(is_inside, question.pictures))
+        if options:
+            assert len(options) == len(LETTERS)
+            assert least_difference([seen(option) for option in options]) >= LEAST_PIXELS
+
+
+def test_texts_of_outcomes_are_always_all_offered(questions: list[Question]) -> None:
+    for question in questions:
+        if question.evidence["kind"] == "cf-count":
+            assert sorted(question.options) == sorted(OUTCOME_TEXTS)
+
+
+def test_a_changed_picture_is_found_out(questions: list[Question]) -> None:
+    """The right picture put in a wrong one's place: two options are right, or none."""
+    matching = next(q for q in questions if q.evidence["kind"] in ("vp-color", "vp-form"))
+    right = matching.pictures[1 + matching.answer[0]]
+    copied = [
+        replace(right, label=picture.label) if picture.label in LETTERS else picture
+        for picture in matching.pictures
+    ]
+    found = problem_of(replace(matching, pictures=tuple(copied)))
+    assert found == "4 of 4 options are right"
+
+
+@pytest.mark.slow
+def test_two_processes_give_the_same_bytes(questions: list[Question]) -> None:
+    originals = {scene.id: scene for scene in SCENES}
+    lines = [question_line(q, originals[q.scene.id]) for q in questions]
+    assert [question_line(q, originals[q.scene.id]) for q in made(jobs=2)] == lines
+
+
+@pytest.mark.slow
+def test_places_are_marked_of_which_one_holds() -> None:
+    scenes = [task.scene for task in DATA.tasks][83::50]
+    with open_workers(1) as workers:
+        question = next(iter(make_questions(scenes, {"AD": 1}, 0, workers)))
+    assert [mark.letter for mark in question.pictures[0].marks] == list(LETTERS)
+    assert problem_of(question) is None
+    wrong = ((question.answer[0] + 1) % len(LETTERS),)
+    assert problem_of(replace(question, answer=wrong)) is not None

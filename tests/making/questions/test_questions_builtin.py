@@ -1,0 +1,77 @@
+"""The built-in 2,200 questions: complete, even, about scenes that are there, derived again."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+
+from phyblock.datasets import QuestionSet, read_builtin, read_questions
+from phyblock.domain import LETTERS, SUBTASKS
+from phyblock.resources import bundled
+from phyblock_making.questions.question_production import PER_SUBTASK
+from phyblock_making.questions.rederiving import problem_of
+from phyblock_making.questions.shortcuts import duplicates_of
+
+FOLDER = bundled("benchmarks", "data", "phyblock-vqa")
+SAMPLE = slice(7, None, 50)
+
+
+@pytest.fixture(scope="module")
+def built_in() -> QuestionSet:
+    return read_questions(FOLDER, read_builtin(bundled("benchmarks", "data", "phyblock-400")))
+
+
+def test_all_subtasks_are_whole(built_in: QuestionSet) -> None:
+    assert Counter(task.question.subtask for task in built_in.tasks) == PER_SUBTASK
+    assert len(built_in.tasks) == 2200
+    assert not duplicates_of([task.question for task in built_in.tasks])
+
+
+def test_every_letter_is_right_about_as_often(built_in: QuestionSet) -> None:
+    for subtask in SUBTASKS:
+        answers = [t.question.answer for t in built_in.tasks if t.question.subtask == subtask]
+        if subtask == "OR":
+            assert len(set(answers)) > 12
+            continue
+        shares = [answers.count((index,)) / len(answers) for index in range(len(LETTERS))]
+        assert 0.22 <= min(shares) <= max(shares) <= 0.28
+
+
+def test_the_files_are_those_of_the_checksums() -> None:
+    for line in (FOLDER / "SHA256SUMS").read_text(encoding="utf-8").splitlines():
+        digest, name = line.split("  ")
+        assert hashlib.sha256((FOLDER / name).read_bytes()).hexdigest() == digest
+
+
+def test_a_sample_of_the_answers_is_derived_again(built_in: QuestionSet) -> None:
+    for task in built_in.tasks[SAMPLE]:
+        assert problem_of(task.question) is None, task.key
+
+
+def test_a_place_that_is_not_marked_is_found_out(built_in: QuestionSet) -> None:
+    question = next(t.question for t in built_in.tasks if t.question.subtask == "AD")
+    scene, block = question.pictures
+    bare = replace(question, pictures=(replace(scene, marks=scene.marks[1:]), block))
+    assert problem_of(bare) == "no place A is marked on a block"
+
+
+@pytest.mark.slow
+def test_all_answers_are_derived_again(built_in: QuestionSet) -> None:
+    problems = {task.key: problem_of(task.question) for task in built_in.tasks}
+    assert {key: problem for key, problem in problems.items() if problem} == {}
+
+
+@pytest.mark.slow
+def test_fifty_corrupted_answers_of_all_subtasks_are_found(built_in: QuestionSet) -> None:
+    found = 0
+    for number, task in enumerate(built_in.tasks[3::44]):
+        question = task.question
+        if question.subtask == "OR":
+            wrong = (*question.answer[1:], question.answer[0])
+        else:
+            wrong = ((question.answer[0] + 1 + number % 3) % len(LETTERS),)
+        found += problem_of(replace(question, answer=wrong)) is not None
+    assert found == 50

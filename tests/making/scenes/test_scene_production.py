@@ -1,0 +1,142 @@
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.datasets import read_builtin
+from phyblock.domain import Scene
+from phyblock.errors import DataError, StoreError
+from phyblock.sim.visibility import hidden_blocks
+from phyblock_making.scenes import accept
+from phyblock_making.scenes.scene_files import SetWriter, open_writer, sums_text
+from phyblock_making.scenes.scene_production import Order, Share, produce, shares
+from phyblock_making.symmetry import canonical_form
+from phyblock_making.workers import open_workers
+
+SMALL = Order(3, "kit", (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1)))
+
+
+def made(order: Order, jobs: int = 1) -> list[Scene]:
+    with open_workers(jobs) as workers:
+        return list(produce(order, workers))
+
+
+def write(folder: Path, scenes: list[Scene]) -> SetWriter:
+    with open_writer(folder, "kit") as writer:
+        for scene in scenes:
+            writer.add(scene)
+        writer.finish("card\n")
+    return writer
+
+
+@pytest.fixture(scope="module")
+def scenes() -> list[Scene]:
+    return made(SMALL)
+
+
+def test_the_built_in_shares() -> None:
+    count: Counter[int] = Counter()
+    for share in shares(400):
+        for level in map(int, share.group.split("+")):
+            count[level] += share.base + share.varied
+    assert count == {1: 36, 2: 121, 3: 138, 4: 119}
+    assert sum(share.base for share in shares(400)) == 150
+
+
+@given(st.integers(1, 5000), st.sets(st.integers(1, 4), min_size=1))
+def test_shares_add_up(count: int, levels: set[int]) -> None:
+    found = shares(count, sorted(levels))
+    assert sum(share.base + share.varied for share in found) == count
+    assert {level for share in found for level in map(int, share.group.split("+"))} <= levels
+
+
+def test_what_was_asked_for_comes_in_order(scenes: list[Scene]) -> None:
+    assert len(scenes) == 13
+    assert Counter(scene.levels for scene in scenes) == {(1,): 4, (2,): 6, (3,): 3}
+    for level in "123":
+        names = [scene.id for scene in scenes if scene.id[1] == level]
+        assert names == sorted(names)
+
+
+def test_every_scene_is_accepted_again_with_the_long_trial(scenes: list[Scene]) -> None:
+    for scene in scenes:
+        accept(scene)
+        assert hidden_blocks(scene) == ()
+
+
+def test_no_two_scenes_are_the_same(scenes: list[Scene]) -> None:
+    assert len({canonical_form(scene.blocks) for scene in scenes}) == len(scenes)
+
+
+def test_variations_name_base_scenes(scenes: list[Scene]) -> None:
+    bases = {scene.id for scene in scenes if scene.parents == (scene.id,)}
+    varied = [scene for scene in scenes if scene.id not in bases]
+    assert varied
+    assert all(set(scene.parents) <= bases for scene in varied)
+
+
+@pytest.mark.slow
+def test_two_processes_give_the_same_bytes(tmp_path: Path, scenes: list[Scene]) -> None:
+    for jobs, folder in ((1, tmp_path / "one" / "set"), (2, tmp_path / "two" / "set")):
+        write(folder, made(SMALL, jobs))
+    one, two = ((tmp_path / name / "set" / "scenes.jsonl").read_bytes() for name in ("one", "two"))
+    assert one == two
+    assert len(one.splitlines()) == len(scenes)
+
+
+def test_another_seed_gives_other_scenes() -> None:
+    order = Order(4, "kit", (Share("2", 3, 0),))
+    other = Order(5, "kit", (Share("2", 3, 0),))
+    assert made(order) == made(order)
+    assert made(order) != made(other)
+
+
+def test_what_is_written_is_read_back(tmp_path: Path, scenes: list[Scene]) -> None:
+    folder = tmp_path / "set"
+    writer = write(folder, scenes)
+    assert [task.scene for task in read_builtin(folder).tasks] == sorted(
+        scenes, key=lambda scene: scene.id
+    )
+    assert (folder / "SHA256SUMS").read_text() == sums_text(folder)
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "README.md",
+        "SHA256SUMS",
+        "scenes.jsonl",
+    ]
+    assert writer.levels[2].scenes == 6
+    with pytest.raises(StoreError, match="holds a data set already"), open_writer(folder, "kit"):
+        pass
+
+
+def test_a_failure_leaves_nothing_half_written(tmp_path: Path, scenes: list[Scene]) -> None:
+    folder = tmp_path / "set"
+    with pytest.raises(DataError, match="at most 16"):
+        write(folder, [scenes[0], too_many_looks(scenes[0])])
+    assert list(folder.iterdir()) == []
+
+
+def too_many_looks(scene: Scene) -> Scene:
+    block = scene.blocks[0]
+    blocks = tuple(replace(block, euler_deg=(0.0, 0.0, 3.0 * i)) for i in range(18))
+    return replace(scene, blocks=tuple(replace(b, type="arch", color="red") for b in blocks))
+
+
+def test_rules_that_give_no_more_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("phyblock_making.scenes.scene_production._PATIENCE", 3)
+    order = Order(0, "kit", (Share("1", 100_000, 0),))
+    with pytest.raises(DataError, match="new scenes of 100000"):
+        for _ in zip(range(400), produce(order, _Nothing()), strict=False):
+            pass
+
+
+class _Nothing:
+    """Workers whose rules never give a scene."""
+
+    def map(self, function, tasks):
+        del function
+        return (None for _ in tasks)
