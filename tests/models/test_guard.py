@@ -99,7 +99,7 @@ def test_arguments_that_litellm_chokes_on_end_a_call_and_no_run(
     monkeypatch.setenv(KEY_VARIABLE, KEY)
     with Running(OpenAIChat()) as running:
         config = ROUTES["openai"].config(running.url, params=params)
-        (answer,) = ask(make_model(config, policy=RetryPolicy(attempts=1)), make_request())
+        (answer,) = ask(make_model(config, policy=RetryPolicy(1, 0.0)), make_request())
     assert isinstance(answer, ModelError | Reply), answer
 
 

@@ -31,7 +31,7 @@ ENDINGS = {
     "unavailable": UnavailableError,
     "sample": SampleError,
 }
-ONCE = RetryPolicy(attempts=1)
+ONCE = RetryPolicy(1, 0.0)
 REDIRECTED = {
     **ROUTES,
     "xai": Route(OpenAIChat, "xai/m", "/v1", "litellm"),
