@@ -36,8 +36,10 @@ def expand(text: str, base: Path, environ: Mapping[str, str] | None = None) -> P
         path = Path(_VARIABLE.sub(value_of, text)).expanduser()
     except RuntimeError as error:
         raise ValueError("the home folder that ~ stands for is not known") from error
+    # What was written must be UTF-8; the folder that it is seen from is named as it is.
+    check_path(str(path))
     whole = os.path.normpath(base.absolute() / path)
-    check_path(whole)
+    _check_length(os.fsencode(whole))
     return Path(whole)
 
 
@@ -48,6 +50,10 @@ def check_path(text: str) -> None:
     data = text.encode()
     if b"\0" in data:
         raise ValueError("holds a NUL character")
+    _check_length(data)
+
+
+def _check_length(data: bytes) -> None:
     if len(data) > _LONGEST_PATH or any(len(part) > _LONGEST_NAME for part in data.split(b"/")):
         raise ValueError("is longer than a path can be")
 
