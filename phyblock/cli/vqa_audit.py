@@ -21,9 +21,9 @@ from phyblock.generate.questions.audit import (
     duplicates_of,
 )
 from phyblock.generate.questions.sheet import sheet_html
-from phyblock.run.vqa import select_questions
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
+from phyblock.tracks.vqa.opening import select_questions
 
 __all__ = ["command"]
 

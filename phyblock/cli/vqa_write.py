@@ -21,7 +21,7 @@ from phyblock.resources import bundled, reply_cache_file
 from phyblock.run.models import to_config
 from phyblock.run.wordings import Paraphrase, stems_of, write_wordings
 from phyblock.specs import SuiteSpec, did_you_mean, load_models
-from phyblock.tasks import TemplatePrompt
+from phyblock.tracks import TemplatePrompt
 
 __all__ = ["command"]
 

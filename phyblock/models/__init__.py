@@ -4,19 +4,14 @@ Importing this package imports neither litellm nor aiohttp: the first call throu
 """
 
 from phyblock.models.base import (
-    ChoiceSubject,
     Finish,
     Image,
     Message,
     Model,
-    PlanSubject,
     Reply,
     Request,
-    StepSubject,
-    Subject,
     Usage,
 )
-from phyblock.models.baselines import BASELINES
 from phyblock.models.build import build_model
 from phyblock.models.cache import CacheStats, ReplyCache, reply_key
 from phyblock.models.config import Kind, ModelConfig, Price
@@ -36,10 +31,8 @@ from phyblock.models.raw_replies import RawReply, read_raw_reply
 from phyblock.models.retry import RetryPolicy
 
 __all__ = [
-    "BASELINES",
     "Budget",
     "CacheStats",
-    "ChoiceSubject",
     "Estimate",
     "Finish",
     "Gate",
@@ -53,15 +46,12 @@ __all__ = [
     "ModelConfig",
     "ModelEvent",
     "Observer",
-    "PlanSubject",
     "Price",
     "RawReply",
     "Reply",
     "ReplyCache",
     "Request",
     "RetryPolicy",
-    "StepSubject",
-    "Subject",
     "Usage",
     "api_key_status",
     "build_model",

@@ -12,7 +12,7 @@ import pandas as pd
 from phyblock.report.load import Run, once_per_run
 from phyblock.run.reading import RecordLines
 from phyblock.scoring import ERROR_TYPES
-from phyblock.tasks import ENDINGS
+from phyblock.tracks.step_planning.rules import ENDINGS
 
 __all__ = [
     "STEP_OUTCOMES",

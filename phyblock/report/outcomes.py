@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
-from phyblock.tasks import Outcome
+from phyblock.tracks import Outcome
 
 __all__ = ["FAILURES", "HEADINGS", "OUTCOMES", "WITHOUT_REPLY"]
 

@@ -13,7 +13,7 @@ from phyblock.report.comparison import published_table
 from phyblock.report.episodes import STEP_OUTCOMES, TRACK, endings_frame
 from phyblock.report.load import Run
 from phyblock.report.text_table import NO_VALUE, Column, TextTable, number, spread
-from phyblock.tasks import ENDINGS
+from phyblock.tracks.step_planning.rules import ENDINGS
 
 __all__ = [
     "COUNTED",

@@ -9,7 +9,7 @@ from typing import Any
 
 from phyblock.errors import ModelError, RefusedError, RetryableError, SampleError
 from phyblock.models.base import Image, Message, Reply, Request
-from phyblock.tasks import Item, Outcome
+from phyblock.tracks import Item, Outcome
 
 __all__ = ["about_prompt", "is_answered", "is_final", "judged", "paid_usd", "to_record"]
 

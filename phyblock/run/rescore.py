@@ -18,11 +18,10 @@ from phyblock.parsing import PlanParser
 from phyblock.run.data import open_dataset
 from phyblock.run.reading import MANIFEST, RECORDS, read_manifest, read_records
 from phyblock.run.records import judged
-from phyblock.run.select import select_tasks
-from phyblock.run.tracks import planning_rules
 from phyblock.scoring import Matcher
-from phyblock.specs import SuiteSpec
-from phyblock.tasks import FullPlanning
+from phyblock.specs import SuiteSpec, suite_model
+from phyblock.tracks import kinds
+from phyblock.tracks.selection import select_tasks
 
 __all__ = ["rescore"]
 
@@ -44,22 +43,25 @@ def rescore(
     """
     manifest = read_manifest(folder)
     suite = _suite(folder, manifest, parser, matcher)
-    tasks = {task.scene.id: task for task in _tasks(folder, manifest, suite, data)}
-    track = FullPlanning(planning_rules(suite))
+    tasks = _tasks(folder, manifest, suite, data)
+    rescored = {kind.name: kind.rescored for kind in kinds().values() if kind.rescored is not None}
+    tracks = {name: rescored[name](suite, tasks) for name in suite.tracks if name in rescored}
+    items = {(name, item.key): item for name, track in tracks.items() for item in track.items}
     records = []
     for record in read_records(folder).values():
-        if record["track"] != track.name:
+        track = tracks.get(record["track"])
+        if track is None:
             records.append(record)
             continue
-        task = tasks.get(record["scene"])
-        if task is None:
+        item = items.get((track.name, record["key"]))
+        if item is None:
             where, hint = str(folder / RECORDS), "the file was changed: restore it from a copy"
             raise StoreError(
                 Problem(where, "names a scene that the run has not", "scene", record["scene"],
                         hint=hint)
             )  # fmt: skip
         text = None if record["reply"] is None else record["reply"]["text"]
-        judgement = track.judge(task, text)
+        judgement = track.judge(item, text)
         records.append(judged(record, judgement.is_read, judgement.fields()))
     target = out or folder / "scores" / f"{suite.parser}-{suite.scoring.matchers[0]}"
     identity = f"{manifest['identity']} scored by {suite.parser}, {suite.scoring.matchers[0]}"
@@ -79,7 +81,7 @@ def _suite(
 ) -> SuiteSpec:
     """The run's suite with parser and headline matcher replaced."""
     try:
-        suite = SuiteSpec.model_validate(manifest.get("suite"))
+        suite = suite_model().model_validate(manifest.get("suite"))
         matchers = suite.scoring.matchers
         if matcher is not None:
             matchers = (matcher, *(name for name in matchers if name != matcher))

@@ -11,7 +11,7 @@ from phyblock.models import Halt, Model, Reply, Request, Usage
 from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, judged, to_record
 from phyblock.run.writer import RecordWriter
-from phyblock.tasks import AnyTrack, Episode, EpisodeTrack, Item, SingleTrack
+from phyblock.tracks import AnyTrack, Episode, EpisodeTrack, Item, SingleTrack
 
 __all__ = ["Sample", "SampleRunner"]
 

@@ -5,10 +5,22 @@ The descriptions below become the JSON Schema's, which an editor shows beside ea
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import functools
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Tag,
+    create_model,
+    model_validator,
+)
 
+from phyblock.registry import known_tracks
 from phyblock.specs.fields import (
     Count,
     MaxTokens,
@@ -22,10 +34,8 @@ from phyblock.specs.fields import (
     refuse,
 )
 from phyblock.specs.rules import broken_rules, read_dotted
-from phyblock.specs.tracks import SECTIONS, StepsSpec, TrackName, VqaSpec
 
 __all__ = [
-    "BASELINES",
     "BUILTIN_DATASET",
     "PROMPT_WORDS",
     "RECORDED",
@@ -35,23 +45,18 @@ __all__ = [
     "SamplingSpec",
     "ScoringSpec",
     "SuiteSpec",
+    "default_tables",
+    "suite_model",
+    "table_names",
 ]
 
-BASELINES = (
-    "random",
-    "all-candidates",
-    "oracle",
-    "oracle-no-orientation",
-    "repeat",
-    "majority",
-    "text-only",
-)
-"""Models that are built in; no models file may use their names."""
 RECORDED = "recorded"
 """The word that stands for every folder of recorded replies."""
 BUILTIN_DATASET = "phyblock-400"
 """The bundled data set that is used when a suite names none."""
 PROMPT_WORDS = ("default", "official")
+PUBLISHED_TABLE = "published"
+"""The table that sets a run beside the paper's."""
 
 
 def _check_whole(level: object) -> object:
@@ -65,10 +70,31 @@ Setting = Literal["A", "B"]
 Matcher = Literal["optimal", "paper"]
 Picture = Literal["goal", "candidates"]
 Background = Literal["checkerboard", "white", "light-wood", "dark-wood", "concrete", "lawn"]
-Table = Literal[
-    "assembly", "table1", "table2", "table3", "endings", "progress", "errors", "published"
-]
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
+
+
+SectionT = TypeVar("SectionT", bound=BaseModel)
+
+
+def _one_of(name: str, names: Sequence[str]) -> str:
+    if name in names:
+        return name
+    raise refuse("is not one of the choices", allowed=", ".join(names), words=tuple(names))
+
+
+def table_names() -> tuple[str, ...]:
+    """Tables that a suite can ask for: those of its tracks, then the comparison with the paper."""
+    own = (name for kind in known_tracks().values() for name in kind.tables)
+    return (*dict.fromkeys(own), PUBLISHED_TABLE)
+
+
+def default_tables() -> tuple[str, ...]:
+    """Tables of a suite that names none."""
+    return tuple(name for name in table_names() if name != PUBLISHED_TABLE)
+
+
+TrackName = Annotated[str, AfterValidator(lambda name: _one_of(name, tuple(known_tracks())))]
+TableName = Annotated[str, AfterValidator(lambda name: _one_of(name, table_names()))]
 
 
 def _check_prompt(prompt: str) -> str:
@@ -203,9 +229,7 @@ class SuiteSpec(Section):
     )
     description: str = Field(default="", description="One line on what the suite is for.")
     tracks: UniqueSome[TrackName] = Field(
-        default=("full_planning",),
-        description="full_planning: a whole plan in one reply. step_planning: step by step in the "
-        "simulator. vqa: multiple-choice questions.",
+        default_factory=lambda: tuple(known_tracks())[:1], description="What is asked."
     )
     dataset: DatasetSpec = Field(default_factory=DatasetSpec, description="Which scenes are run.")
     levels: UniqueSome[Level] = Field(default=(1, 2, 3, 4), description="Difficulty levels.")
@@ -216,8 +240,7 @@ class SuiteSpec(Section):
     )
     seeds: UniqueSome[Seed] = Field(default=(0,), description="Each seed repeats every question.")
     models: ModelNames = Field(
-        description="Names from models.yaml or built-in baselines (random, all-candidates, "
-        "oracle, oracle-no-orientation, repeat, majority, text-only); or the word recorded: every "
+        description="Names from models.yaml or built-in baselines; or the word recorded: every "
         "folder of recorded replies in the official data."
     )
     prompt: Prompt = Field(
@@ -227,13 +250,6 @@ class SuiteSpec(Section):
     )
     images: ImagesSpec = Field(
         default_factory=ImagesSpec, description="Which pictures a model is shown."
-    )
-    vqa: VqaSpec = Field(
-        default_factory=VqaSpec,
-        description="The questions of the vqa track, and how they are shown.",
-    )
-    steps: StepsSpec = Field(
-        default_factory=StepsSpec, description="The rules of the step_planning track."
     )
     parser: Literal["steps", "official"] = Field(
         default="steps",
@@ -249,8 +265,8 @@ class SuiteSpec(Section):
         default_factory=LimitsSpec,
         description="Bounds of a run; they change how fast results come, not what they are.",
     )
-    tables: Unique[Table] = Field(
-        default=("assembly", "table1", "table2", "table3", "endings", "progress", "errors"),
+    tables: Unique[TableName] = Field(
+        default_factory=default_tables,
         description="Tables to write, as far as they belong to a track of the suite; published "
         "compares with the paper's numbers.",
     )
@@ -262,6 +278,14 @@ class SuiteSpec(Section):
             raise refuse("; ".join(f"{rule.field}: {rule.message}" for rule in broken), rules=True)
         return self
 
+    def section(self, model: type[SectionT]) -> SectionT:
+        """The section of a track; LookupError where the suite was made without it."""
+        values = (getattr(self, name) for name in type(self).model_fields)
+        found = next((value for value in values if isinstance(value, model)), None)
+        if found is None:
+            raise LookupError(f"the suite has no section of {model.__name__}")
+        return found
+
     def identity(self) -> dict[str, Any]:
         """What determines the results, as JSON-able data.
 
@@ -269,11 +293,26 @@ class SuiteSpec(Section):
         (of data and templates): a run stores the hashes of what stands there, which say more and
         survive a move.
         """
-        idle = {section for track, section in SECTIONS.items() if track not in self.tracks}
+        sections = {kind.section[0]: name for name, kind in known_tracks().items() if kind.section}
+        idle = {key for key, track in sections.items() if track not in self.tracks}
         spec = self.model_dump(mode="json", exclude={"description", "limits", "tables", *idle})
-        for section in ("dataset", "vqa"):
+        for section in ("dataset", *sections):
             spec.get(section, {}).pop("path", None)
-        for part in (spec, *(spec[name] for name in SECTIONS.values() if name in spec)):
-            if part["prompt"] not in PROMPT_WORDS:
+        for part in (spec, *(spec[key] for key in sections if key in spec)):
+            if part.get("prompt", PROMPT_WORDS[0]) not in PROMPT_WORDS:
                 part["prompt"] = "template"
         return spec
+
+
+def suite_model() -> type[SuiteSpec]:
+    """What a suite may hold: `SuiteSpec` with the sections of all tracks."""
+    return _composed(tuple(kind.section for kind in known_tracks().values() if kind.section))
+
+
+@functools.cache
+def _composed(sections: tuple[tuple[str, type[BaseModel], str], ...]) -> type[SuiteSpec]:
+    fields: dict[str, Any] = {
+        key: (model, Field(default_factory=model, description=description))
+        for key, model, description in sections
+    }
+    return create_model("SuiteSpec", __base__=SuiteSpec, __doc__=SuiteSpec.__doc__, **fields)

@@ -12,8 +12,8 @@ from phyblock.report.html.index import Item, Place, SampleIndex, item_key
 from phyblock.report.html.pack import Pack
 from phyblock.run.prompts import PromptLines
 from phyblock.run.reading import RECORDS
-from phyblock.tasks.question_pictures import Shown
-from phyblock.tasks.vqa import asked
+from phyblock.tracks.vqa.pictures import Shown
+from phyblock.tracks.vqa.track import asked
 
 __all__ = ["pack_prompts", "pack_samples", "pictures_sent", "questions_asked"]
 

@@ -13,8 +13,8 @@ from phyblock.files import atomic_write
 from phyblock.models import Image
 from phyblock.resources import cache_dir
 from phyblock.sim import PictureStyle
-from phyblock.tasks import PicturePolicy, Pictures
-from phyblock.tasks.question_pictures import QuestionPictures, Shown
+from phyblock.tracks import PicturePolicy, Pictures
+from phyblock.tracks.vqa.pictures import QuestionPictures, Shown
 
 __all__ = ["PictureShelf"]
 

@@ -14,8 +14,8 @@ from phyblock.datasets import AssemblyTask, Dataset, QuestionTask
 from phyblock.errors import DataError, Problem
 from phyblock.report.design import Design
 from phyblock.run.data import open_dataset
-from phyblock.run.select import select_tasks
-from phyblock.run.vqa import open_questions
+from phyblock.tracks.selection import select_tasks
+from phyblock.tracks.vqa.opening import open_questions
 
 __all__ = ["Sources", "open_sources"]
 

@@ -32,7 +32,7 @@ from phyblock.report.load import Run
 from phyblock.report.write import TablesWritten
 from phyblock.run.prompts import PROMPTS
 from phyblock.run.reading import MANIFEST, RECORDS
-from phyblock.tasks.question_pictures import Shown
+from phyblock.tracks.vqa.pictures import Shown
 
 __all__ = ["REPORT_FILE", "write_report"]
 

@@ -1,72 +1,16 @@
-"""What a suite says of single tracks: the sections `vqa` and `steps`."""
+"""What a suite says of the step-planning track: the section `steps`."""
 
 from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
-from phyblock.domain import SUBTASKS, Subtask
-from phyblock.specs.fields import Count, Section, UniqueSome, refuse
+from phyblock.specs.fields import Count, Flag, Section, TemplateName
 
-__all__ = ["BUILTIN_QUESTIONS", "SECTIONS", "StepsSpec", "TrackName", "VqaSpec"]
+__all__ = ["StepsSpec"]
 
-TrackName = Literal["full_planning", "step_planning", "vqa"]
-BUILTIN_QUESTIONS = "phyblock-vqa"
-"""The bundled question set that is used when a suite names none."""
-SECTIONS = {"vqa": "vqa", "step_planning": "steps"}
-"""The section of a suite that belongs to a track."""
-
-
-def _check_prompt(prompt: str) -> str:
-    if prompt == "default" or prompt.endswith(".j2"):
-        return prompt
-    raise refuse(
-        "is neither a known prompt nor a template",
-        allowed="default, or the path of a .j2 file",
-        words=("default",),
-    )
-
-
-TrackPrompt = Annotated[
-    str, AfterValidator(_check_prompt), Field(json_schema_extra={"pattern": r"^(default|.*\.j2)$"})
-]
-Flag = Annotated[bool, Field(strict=True)]
 PositiveUsd = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
-
-
-class VqaSpec(Section):
-    """The questions of the vqa track and how they are shown."""
-
-    format: Literal["builtin", "official"] = Field(
-        default="builtin",
-        description="builtin: a folder with questions.jsonl. official: a folder with question "
-        "files in the official JSON form and their pictures.",
-    )
-    path: str = Field(
-        default=BUILTIN_QUESTIONS,
-        min_length=1,
-        description="The name of a bundled question set (phyblock-vqa), or a folder; relative "
-        "as dataset.path. Its scenes are those of dataset.",
-    )
-    subtasks: UniqueSome[Subtask] = Field(default=SUBTASKS, description="Subtasks to ask about.")
-    per_subtask: Count | None = Field(
-        default=None, description="Questions of each subtask at most; null: all."
-    )
-    options_as: Literal["images", "letters"] = Field(
-        default="images",
-        description="Options that are pictures. images: each sent apart. letters: all on one "
-        "sheet, lettered.",
-    )
-    circular: Flag = Field(
-        default=False,
-        description="Ask every rotation of the options; a question is right only if all are.",
-    )
-    blind: Flag = Field(default=False, description="Send no picture.")
-    wrong_image: Flag = Field(default=False, description="Show pictures of another scene.")
-    prompt: TrackPrompt = Field(
-        default="default", description="default, or the path of a .j2 template."
-    )
 
 
 class StepsSpec(Section):
@@ -120,6 +64,6 @@ class StepsSpec(Section):
     max_episode_usd: PositiveUsd | None = Field(
         default=None, description="Dollars of an episode; null: no bound."
     )
-    prompt: TrackPrompt = Field(
+    prompt: TemplateName = Field(
         default="default", description="default, or the path of a .j2 template."
     )

@@ -13,7 +13,7 @@ from typing import Literal
 from phyblock.models.base import Image, Message
 from phyblock.parsing.move import MoveProblem
 from phyblock.scoring import Gating, MoveOutcome, Setting
-from phyblock.tasks.prompts import TemplatePrompt
+from phyblock.tracks.prompts import TemplatePrompt
 
 __all__ = ["FEEDBACKS", "Feedback", "PastStep", "StepOutcome", "StepPrompt"]
 

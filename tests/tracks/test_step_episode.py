@@ -21,9 +21,9 @@ from phyblock.models import BASELINES
 from phyblock.models.base import Reply, Request, StepSubject, Usage
 from phyblock.parsing.move import MOVE_PROBLEMS, parse_move
 from phyblock.scoring import MOVE_OUTCOMES, SETTINGS, Setting
-from phyblock.tasks import ENDINGS, StepLimits, StepPlanning, StepRules
-from phyblock.tasks.step_episode import StepEpisode
-from phyblock.tasks.step_rules import Tally, majority
+from phyblock.tracks import ENDINGS, StepLimits, StepPlanning, StepRules
+from phyblock.tracks.step_planning.episode import StepEpisode
+from phyblock.tracks.step_planning.rules import Tally, majority
 from tests.parsing.test_move_parser import REPLIES
 
 BUILT_IN = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400"

@@ -15,10 +15,11 @@ from phyblock.domain import LETTERS, Question, Scene, is_picture_option
 from phyblock.domain.rotation import rotated, rotated_label
 from phyblock.errors import Problem, SpecError
 from phyblock.generate.questions.probes import Guesses
-from phyblock.models.base import ChoiceSubject, Image, Request
+from phyblock.models.base import Image, Request
 from phyblock.parsing import ParsedAnswer, parse_answer
-from phyblock.tasks.prompts import Prompt
-from phyblock.tasks.question_pictures import OptionsAs, QuestionPictures, Shown
+from phyblock.tracks.prompts import Prompt
+from phyblock.tracks.vqa.baselines import ChoiceSubject
+from phyblock.tracks.vqa.pictures import OptionsAs, QuestionPictures, Shown
 
 __all__ = ["AskedQuestion", "ChoiceJudgement", "Vqa", "VqaRules", "asked"]
 
@@ -95,7 +96,6 @@ class Vqa:
     """Prompt, parse and score of the track."""
 
     name = "vqa"
-    subject = ChoiceSubject
 
     def __init__(
         self,

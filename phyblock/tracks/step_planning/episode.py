@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block
-from phyblock.models.base import Image, Message, Reply, Request, StepSubject
+from phyblock.models.base import Image, Message, Reply, Request
 from phyblock.parsing.move import MoveProblem, ParsedMove, parse_move
 from phyblock.scoring import (
     ERROR_TYPES,
@@ -20,8 +20,9 @@ from phyblock.scoring import (
     placed_counts,
 )
 from phyblock.sim.site import Settled
-from phyblock.tasks.step_prompt import PastStep, StepOutcome
-from phyblock.tasks.step_rules import Ending, StepRules, Tally, majority
+from phyblock.tracks.step_planning.baselines import StepSubject
+from phyblock.tracks.step_planning.prompt import PastStep, StepOutcome
+from phyblock.tracks.step_planning.rules import Ending, StepRules, Tally, majority
 
 __all__ = ["Desk", "StepEpisode"]
 

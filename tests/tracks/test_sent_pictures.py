@@ -14,7 +14,7 @@ from phyblock.datasets import AssemblyTask, read_builtin
 from phyblock.errors import DataError, StoreError
 from phyblock.models.base import Image
 from phyblock.sim import PictureStyle
-from phyblock.tasks import PicturePolicy, Pictures
+from phyblock.tracks import PicturePolicy, Pictures
 from tests.datasets.broken import write_scenes
 from tests.workspace import SCENES
 

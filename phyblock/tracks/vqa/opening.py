@@ -15,46 +15,42 @@ from phyblock.datasets import (
 )
 from phyblock.domain import SUBTASKS, Subtask
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.resources import bundled, cache_dir
-from phyblock.run.select import stratified
-from phyblock.sim import PictureStyle
-from phyblock.specs import LoadedSuite
-from phyblock.tasks import QuestionPictures, TemplatePrompt, Vqa, VqaRules
+from phyblock.resources import bundled
+from phyblock.tracks.kind import Opening
+from phyblock.tracks.opening import (
+    picture_folder,
+    picture_style,
+    render_workers,
+    template_prompt,
+)
+from phyblock.tracks.selection import stratified
+from phyblock.tracks.vqa.pictures import QuestionPictures
+from phyblock.tracks.vqa.spec import VqaSpec
+from phyblock.tracks.vqa.track import Vqa, VqaRules
 
 __all__ = ["open_questions", "open_vqa", "select_questions"]
 
 
-def open_vqa(
-    loaded: LoadedSuite,
-    dataset: Dataset,
-    limit: int | None,
-    *,
-    with_prompts: bool,
-    workers: int,
-) -> Vqa:
+def open_vqa(opening: Opening) -> Vqa:
     """The track; SpecError, DataError or PromptError with what is wrong."""
-    suite, spec = loaded.suite, loaded.suite.vqa
-    assert loaded.questions_path is not None
-    questions = open_questions(spec.format, loaded.questions_path, dataset)
-    tasks = select_questions(questions.tasks, spec.subtasks, suite.levels, spec.per_subtask, limit)
+    loaded, suite = opening.loaded, opening.loaded.suite
+    spec = suite.section(VqaSpec)
+    questions = open_questions(spec.format, loaded.folders[Vqa.name], opening.dataset)
+    tasks = select_questions(
+        questions.tasks, spec.subtasks, suite.levels, spec.per_subtask, opening.limit
+    )
     if not tasks:
         where = loaded.where("vqa", "subtasks")
         found = ", ".join(sorted({task.question.subtask for task in questions.tasks}))
         message = "no question is of these subtasks and levels"
         raise SpecError(Problem(where, message, "vqa.subtasks", found=f"questions of {found}"))
     rules = VqaRules(spec.options_as, spec.circular, spec.blind, spec.wrong_image)
-    if not with_prompts:
+    if not opening.with_prompts:
         return Vqa(rules, questions, tasks)
-    path = loaded.templates.get("vqa")
-    prompt = (
-        TemplatePrompt(bundled("prompts", "vqa.j2"), "default")
-        if path is None
-        else TemplatePrompt(path, path.stem)
+    pictures = QuestionPictures(
+        picture_folder(), picture_style(suite), spec.options_as, render_workers()
     )
-    images = suite.images
-    style = PictureStyle(size_px=images.size_px, background=images.background)
-    pictures = QuestionPictures(cache_dir() / "pictures", style, spec.options_as, workers)
-    return Vqa(rules, questions, tasks, prompt, pictures)
+    return Vqa(rules, questions, tasks, template_prompt(loaded, Vqa.name), pictures)
 
 
 def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSet:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from phyblock.datasets import AssemblyTask, read_builtin
 from phyblock.sim import PictureStyle
-from phyblock.tasks import (
+from phyblock.tracks import (
     FullPlanning,
     PicturePolicy,
     Pictures,

@@ -15,8 +15,8 @@ from phyblock.models.base import Image
 from phyblock.sim import PictureStyle
 from phyblock.sim.lettered import LETTERED_VERSION, lettered_sheet_png, sheet_size_px
 from phyblock.sim.question_pictures import question_key, question_png
-from phyblock.tasks.pictures import read_picture
-from phyblock.tasks.studio import Drawing, Studio, to_image
+from phyblock.tracks.pictures import read_picture
+from phyblock.tracks.studio import Drawing, Studio, to_image
 
 __all__ = ["OptionsAs", "QuestionPictures", "Shown"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.run.select import stratified
+from phyblock.tracks.selection import stratified
 
 SIZES = st.lists(st.integers(1, 200), min_size=1, max_size=4)
 

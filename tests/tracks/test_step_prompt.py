@@ -15,7 +15,7 @@ from phyblock.models.base import Image, Message, Reply
 from phyblock.resources import bundled
 from phyblock.scoring import MOVE_OUTCOMES, Setting
 from phyblock.sim import PictureStyle
-from phyblock.tasks import (
+from phyblock.tracks import (
     PicturePolicy,
     Pictures,
     StepPlanning,
@@ -23,7 +23,7 @@ from phyblock.tasks import (
     StepRules,
     TemplatePrompt,
 )
-from phyblock.tasks.step_prompt import FEEDBACKS, Feedback, PastStep
+from phyblock.tracks.step_planning.prompt import FEEDBACKS, Feedback, PastStep
 
 TEMPLATE = TemplatePrompt(bundled("prompts", "step_planning.j2"), "default")
 GOAL, CANDIDATES = Image(b"g", "goal", 1, 1), Image(b"c", "candidates", 1, 1)

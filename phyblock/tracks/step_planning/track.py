@@ -17,16 +17,17 @@ from typing import Any
 
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block
-from phyblock.models.base import Image, Message, Request, StepSubject
+from phyblock.models.base import Image, Message, Request
 from phyblock.scoring import Assembly
 from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.sim.site import ONE_SETTING, Settled, settle, state_picture
 from phyblock.sim.stability import DEFAULT_TRIAL
-from phyblock.tasks.pictures import Pictures
-from phyblock.tasks.step_episode import Desk, StepEpisode
-from phyblock.tasks.step_prompt import PastStep, StepPrompt
-from phyblock.tasks.step_rules import StepRules
-from phyblock.tasks.studio import Drawing
+from phyblock.tracks.pictures import Pictures
+from phyblock.tracks.step_planning.baselines import StepSubject
+from phyblock.tracks.step_planning.episode import Desk, StepEpisode
+from phyblock.tracks.step_planning.prompt import PastStep, StepPrompt
+from phyblock.tracks.step_planning.rules import StepRules
+from phyblock.tracks.studio import Drawing
 
 __all__ = ["StepPlanning"]
 
@@ -47,7 +48,6 @@ class StepPlanning:
     """Episodes of one operation a step; see `StepEpisode`."""
 
     name = "step_planning"
-    subject = StepSubject
 
     def __init__(
         self,

@@ -10,11 +10,12 @@ from typing import Any
 
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
-from phyblock.models.base import Image, PlanSubject, Request
+from phyblock.models.base import Image, Request
 from phyblock.parsing import ParsedPlan, PlanParser, parse_plan
 from phyblock.scoring import AssemblyScorer, Level1Criterion, Matcher, Score, Setting
-from phyblock.tasks.pictures import Pictures
-from phyblock.tasks.prompts import Prompt
+from phyblock.tracks.full_planning.baselines import PlanSubject
+from phyblock.tracks.pictures import Pictures
+from phyblock.tracks.prompts import Prompt
 
 __all__ = ["FullPlanning", "PlanJudgement", "PlanningRules"]
 
@@ -59,7 +60,6 @@ class FullPlanning:
     """Prompt, parse and score of the track; pure but for the pictures it asks for."""
 
     name = "full_planning"
-    subject = PlanSubject
 
     def __init__(
         self,

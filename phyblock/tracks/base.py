@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, Protocol, TypeVar, runtime_checkable
 
 from phyblock.domain import Scene
-from phyblock.models.base import Reply, Request, Subject
+from phyblock.models.base import Reply, Request
 
 __all__ = [
     "AnyTrack",
@@ -65,10 +65,6 @@ class Track(Protocol[ItemT]):
     @property
     def template(self) -> str:
         """Name of the prompt; "" where every model is a recording."""
-
-    @property
-    def subject(self) -> type[Subject]:
-        """What its requests are about: which rule a baseline follows."""
 
     def about(self, item: ItemT) -> dict[str, Any]:
         """What records say of an item besides its scene."""

@@ -24,7 +24,7 @@ from phyblock.sim import (
     goal_key,
     goal_png,
 )
-from phyblock.tasks.studio import Drawing, Studio, to_image
+from phyblock.tracks.studio import Drawing, Studio, to_image
 
 __all__ = ["PicturePolicy", "Pictures", "read_picture"]
 

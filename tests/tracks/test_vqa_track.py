@@ -22,7 +22,7 @@ from phyblock.models.base import ChoiceSubject, Image, Request
 from phyblock.resources import bundled
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
-from phyblock.tasks import QuestionPictures, TemplatePrompt, Vqa, VqaRules
+from phyblock.tracks import QuestionPictures, TemplatePrompt, Vqa, VqaRules
 from tests.vqa_set import write_questions
 from tests.workspace import Workspace
 

@@ -1,0 +1,24 @@
+"""Step planning: one operation at a time, with the assembly in view (paper section 4.1)."""
+
+from phyblock.resources import bundled
+from phyblock.tracks.kind import TrackKind
+from phyblock.tracks.step_planning.baselines import STEP_RULES, StepSubject
+from phyblock.tracks.step_planning.opening import open_step_planning
+from phyblock.tracks.step_planning.spec import StepsSpec
+from phyblock.tracks.step_planning.track import StepPlanning
+
+__all__ = ["TRACK"]
+
+TRACK = TrackKind(
+    name=StepPlanning.name,
+    title="Step planning",
+    item="episode",
+    about="step by step in the simulator",
+    open=open_step_planning,
+    subject=StepSubject,
+    baselines=STEP_RULES,
+    section=("steps", StepsSpec, "The rules of the step_planning track."),
+    template=bundled("prompts", "step_planning.j2"),
+    prompt_field=("steps", "prompt"),
+    tables=("table3", "endings", "progress"),
+)
