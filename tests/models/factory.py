@@ -16,13 +16,13 @@ from phyblock.models import (
     Model,
     ModelConfig,
     ModelEvent,
-    PlanSubject,
     Reply,
     ReplyCache,
     Request,
     RetryPolicy,
     build_model,
 )
+from phyblock.tracks.full_planning.baselines import PlanSubject
 
 T = TypeVar("T")
 

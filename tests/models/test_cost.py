@@ -18,7 +18,6 @@ from phyblock.models import (
     Image,
     Message,
     ModelConfig,
-    PlanSubject,
     Price,
     Reply,
     ReplyCache,
@@ -30,6 +29,7 @@ from phyblock.models import (
     most_usd,
     price_of,
 )
+from phyblock.tracks.full_planning.baselines import PlanSubject
 from tests.models.factory import CANDIDATES, SCENE, ask, make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Faults, Running

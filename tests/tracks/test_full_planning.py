@@ -11,13 +11,8 @@ from hypothesis import strategies as st
 
 from phyblock.datasets import AssemblyTask, read_builtin
 from phyblock.sim import PictureStyle
-from phyblock.tracks import (
-    FullPlanning,
-    PicturePolicy,
-    Pictures,
-    PlanningRules,
-    TemplatePrompt,
-)
+from phyblock.tracks import PicturePolicy, Pictures, TemplatePrompt
+from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
 from tests.datasets.broken import write_scenes
 from tests.workspace import SCENES
 

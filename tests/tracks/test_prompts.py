@@ -12,7 +12,8 @@ from phyblock.errors import PromptError
 from phyblock.models.base import Image, Message
 from phyblock.parsing import parse_plan
 from phyblock.resources import bundled
-from phyblock.tracks import FullPlanning, OfficialPrompt, PlanningRules, TemplatePrompt
+from phyblock.tracks import OfficialPrompt, TemplatePrompt
+from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
 from tests.workspace import Workspace
 
 GOAL = Image(b"goal", "goal", 8, 8)

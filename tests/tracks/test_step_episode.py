@@ -17,13 +17,13 @@ from hypothesis import strategies as st
 
 from phyblock.datasets import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Block, Candidate, CandidateSet, Scene
-from phyblock.models import BASELINES
-from phyblock.models.base import Reply, Request, StepSubject, Usage
+from phyblock.models.base import Reply, Request, Usage
 from phyblock.parsing.move import MOVE_PROBLEMS, parse_move
 from phyblock.scoring import MOVE_OUTCOMES, SETTINGS, Setting
-from phyblock.tracks import ENDINGS, StepLimits, StepPlanning, StepRules
+from phyblock.tracks.step_planning.baselines import STEP_RULES, StepSubject
 from phyblock.tracks.step_planning.episode import StepEpisode
-from phyblock.tracks.step_planning.rules import Tally, majority
+from phyblock.tracks.step_planning.rules import ENDINGS, StepLimits, StepRules, Tally, majority
+from phyblock.tracks.step_planning.track import StepPlanning
 from tests.parsing.test_move_parser import REPLIES
 
 BUILT_IN = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400"
@@ -61,7 +61,7 @@ def scripted(*texts: str) -> Agent:
 
 
 def baseline(name: str) -> Agent:
-    rule = BASELINES[name][StepSubject]
+    rule = STEP_RULES[name]
 
     def ask(request: Request) -> str:
         seed = zlib.crc32(f"{name} {request.key} {request.seed}".encode())

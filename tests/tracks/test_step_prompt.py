@@ -15,15 +15,10 @@ from phyblock.models.base import Image, Message, Reply
 from phyblock.resources import bundled
 from phyblock.scoring import MOVE_OUTCOMES, Setting
 from phyblock.sim import PictureStyle
-from phyblock.tracks import (
-    PicturePolicy,
-    Pictures,
-    StepPlanning,
-    StepPrompt,
-    StepRules,
-    TemplatePrompt,
-)
-from phyblock.tracks.step_planning.prompt import FEEDBACKS, Feedback, PastStep
+from phyblock.tracks import PicturePolicy, Pictures, TemplatePrompt
+from phyblock.tracks.step_planning.prompt import FEEDBACKS, Feedback, PastStep, StepPrompt
+from phyblock.tracks.step_planning.rules import StepRules
+from phyblock.tracks.step_planning.track import StepPlanning
 
 TEMPLATE = TemplatePrompt(bundled("prompts", "step_planning.j2"), "default")
 GOAL, CANDIDATES = Image(b"g", "goal", 1, 1), Image(b"c", "candidates", 1, 1)

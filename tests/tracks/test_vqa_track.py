@@ -18,11 +18,14 @@ from phyblock.datasets import QuestionSet, QuestionTask, read_builtin, read_ques
 from phyblock.domain import LETTERS, Question
 from phyblock.domain.rotation import rotated
 from phyblock.errors import DataError, SpecError
-from phyblock.models.base import ChoiceSubject, Image, Request
+from phyblock.models.base import Image, Request
 from phyblock.resources import bundled
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
-from phyblock.tracks import QuestionPictures, TemplatePrompt, Vqa, VqaRules
+from phyblock.tracks import TemplatePrompt
+from phyblock.tracks.vqa.baselines import ChoiceSubject
+from phyblock.tracks.vqa.pictures import QuestionPictures
+from phyblock.tracks.vqa.track import Vqa, VqaRules
 from tests.vqa_set import write_questions
 from tests.workspace import Workspace
 
