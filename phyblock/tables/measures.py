@@ -1,0 +1,98 @@
+"""What is measured: counts of samples that add up, and what sums of them are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import pandas as pd
+
+from phyblock.scoring.uncertainty import Metric
+
+if TYPE_CHECKING:
+    from phyblock.report.load import Run
+
+__all__ = ["CELL", "VARIANT", "Cell", "Counted", "Measure", "per_sample"]
+
+VARIANT = ("setting", "matcher", "criterion")
+"""How a sample was counted; "" where its track knows no such choice."""
+CELL = "cell"
+"""Column of the cell that a row of counts is pooled in."""
+
+Unit = Literal["%", "cm", "degrees", "steps", "blocks", ""]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A part of what a track asks about, as a level or a subtask: a column of its tables.
+
+    Samples of a cell are pooled. Where `of` names other cells, it is the unweighted mean of these
+    instead, and has no value where one of them has none.
+    """
+
+    name: str
+    heading: str
+    group: str = ""
+    of: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Counted:
+    """Counts of samples, from which one or several measures are made.
+
+    `frame` makes them out of a run: a row a sample and way of counting it, with the columns
+    `model`, `scene`, `item`, `seed`, `outcome`, those of `VARIANT`, `CELL`, and one of each name in
+    `columns`. Samples that the run leaves out have no row.
+    """
+
+    name: str
+    columns: tuple[str, ...]
+    frame: Callable[[Run], pd.DataFrame]
+    sample: Callable[[Any, Any], Sequence[float] | None] | None = None
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One number about a model.
+
+    `value` makes it of summed counts, shape (..., columns of `counted`), NaN where it is not
+    defined. `heading` and `meaning` are for people; `unit` "%" stands for values in [0, 1] that
+    tables show times 100. `over` names what is counted. `chance` says what guessing gives in a
+    cell, `floors` names baselines that never see the goal. Measures that are not `is_headline`
+    stand in a table of their own.
+    """
+
+    name: str
+    heading: str
+    counted: Counted
+    value: Metric
+    meaning: str = ""
+    unit: Unit = "%"
+    better: Literal["higher", "lower"] = "higher"
+    over: str = "samples"
+    variant: tuple[tuple[str, str], ...] = ()
+    chance: Callable[[Run, str], float] | None = None
+    floors: tuple[str, ...] = ()
+    is_headline: bool = field(default=True)
+
+    @property
+    def scale(self) -> float:
+        """What a value is multiplied by where it is shown."""
+        return 100.0 if self.unit == "%" else 1.0
+
+
+def per_sample(
+    name: str,
+    columns: tuple[str, ...],
+    sample: Callable[[Any, Any], Sequence[float] | None],
+) -> Counted:
+    """Counts that a function of one scored sample gives: an item and what its reply was read as.
+
+    They are counted when a reply is judged, and kept in its record; None counts nothing.
+    """
+
+    def frame(run: Run) -> pd.DataFrame:
+        raise NotImplementedError
+
+    return Counted(name, columns, frame, sample)
