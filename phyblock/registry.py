@@ -16,11 +16,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "TrackWords",
+    "add_measure",
+    "added_measures",
     "baseline_names",
     "baseline_rules",
     "known_track",
     "known_tracks",
     "register_track",
+    "remove_measure",
     "unregister_track",
 ]
 
@@ -68,6 +71,7 @@ class TrackWords(Protocol):
 
 
 _registered: dict[str, TrackWords] = {}
+_measures: dict[str, tuple[Any, ...]] = {}
 
 
 def known_tracks() -> Mapping[str, TrackWords]:
@@ -96,6 +100,21 @@ def register_track(kind: TrackWords) -> None:
 def unregister_track(name: str) -> None:
     """Take an added track away again; KeyError for one that was not added."""
     del _registered[name]
+
+
+def add_measure(track: str, measure: Any) -> None:
+    """Add a `phyblock.tables.Measure` to a track; KeyError for a track that there is not."""
+    _measures[known_track(track).name] = (*added_measures(track), measure)
+
+
+def remove_measure(track: str, name: str) -> None:
+    """Take an added measure away again."""
+    _measures[track] = tuple(one for one in added_measures(track) if one.name != name)
+
+
+def added_measures(track: str) -> tuple[Any, ...]:
+    """Measures that were added to a track, in the order in which they came."""
+    return _measures.get(track, ())
 
 
 def baseline_names() -> tuple[str, ...]:

@@ -10,8 +10,8 @@ from phyblock.cli.console import make_console, print_view, shown_path
 from phyblock.cli.names import split_names
 from phyblock.report.compare import compare_models, compare_runs
 from phyblock.report.compare_view import compare_view, flipped_lines, write_comparison
-from phyblock.report.load import load_run
 from phyblock.report.measures import MEASURES
+from phyblock.tables.load import load_run
 
 __all__ = ["command"]
 

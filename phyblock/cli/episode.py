@@ -13,13 +13,13 @@ from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.files import atomic_write
-from phyblock.report.table3 import ENDING_NAMES
-from phyblock.report.text_table import Column, TextTable
 from phyblock.run.data import open_dataset
 from phyblock.run.reading import RECORDS, read_manifest, read_records
 from phyblock.sim import PictureStyle
 from phyblock.sim.film import FilmStep, Tone, episode_gif, episode_images, episode_sheet
 from phyblock.sim.site import settle
+from phyblock.tables.text_table import Column, TextTable
+from phyblock.tracks.step_planning.table3 import ENDING_NAMES
 
 __all__ = ["command"]
 

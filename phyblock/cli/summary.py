@@ -12,8 +12,8 @@ from rich.console import Console
 from phyblock import report
 from phyblock.cli.console import print_view, shown_path
 from phyblock.cli.layout import width_of
-from phyblock.report.outcomes import HEADINGS
-from phyblock.report.text_table import NO_VALUE, number
+from phyblock.tables.outcomes import HEADINGS
+from phyblock.tables.text_table import NO_VALUE, number
 
 if TYPE_CHECKING:
     from phyblock.report import TablesWritten, TextTable

@@ -9,9 +9,9 @@ import click
 from phyblock.cli.console import make_console, print_view
 from phyblock.errors import Problem, SpecError
 from phyblock.report import TextTable, to_latex, to_markdown
-from phyblock.report.load import load_run
 from phyblock.report.paper import PAPER_TABLES
 from phyblock.report.write import make_tables, table_names
+from phyblock.tables.load import load_run
 
 __all__ = ["command"]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from phyblock.report import NO_VALUE
-from phyblock.report.outcomes import FAILURES
 from phyblock.run.records import paid_usd
 from phyblock.scoring import Counts
+from phyblock.tables.outcomes import FAILURES
 
 __all__ = ["Tally"]
 

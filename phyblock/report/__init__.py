@@ -8,24 +8,28 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
-from phyblock.report.text_table import NO_VALUE, Column, TextTable
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable
 
 if TYPE_CHECKING:
-    from phyblock.report.assembly import ASSEMBLY_COLUMNS, assembly_frame, table1_frame
-    from phyblock.report.comparison import (
+    from phyblock.report.html import write_report
+    from phyblock.report.write import TablesWritten, write_tables
+    from phyblock.tables.coverage import coverage_frame
+    from phyblock.tables.design import Design, read_design
+    from phyblock.tables.latex import to_latex
+    from phyblock.tables.load import Run, load_run
+    from phyblock.tables.markdown import to_markdown
+    from phyblock.tracks.full_planning.assembly import (
+        ASSEMBLY_COLUMNS,
+        assembly_frame,
+        table1_frame,
+    )
+    from phyblock.tracks.full_planning.errors import errors_frame
+    from phyblock.tracks.full_planning.published import (
         comparison_notes,
         largest_differences,
         published_frame,
         published_table,
     )
-    from phyblock.report.coverage import coverage_frame
-    from phyblock.report.design import Design, read_design
-    from phyblock.report.errors import errors_frame
-    from phyblock.report.html import write_report
-    from phyblock.report.latex import to_latex
-    from phyblock.report.load import Run, load_run
-    from phyblock.report.markdown import to_markdown
-    from phyblock.report.write import TablesWritten, write_tables
 
 __all__ = [
     "ASSEMBLY_COLUMNS",

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import pandas as pd
 
 from phyblock.errors import Problem, SpecError
-from phyblock.report.load import Run
-from phyblock.report.questions import showing
+from phyblock.tables.load import Run
+from phyblock.tracks.vqa.answers import showing
 
 __all__ = ["check_alike"]
 

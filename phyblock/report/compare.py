@@ -12,10 +12,10 @@ import pandas as pd
 
 from phyblock.errors import Problem, SpecError
 from phyblock.report.alike import check_alike
-from phyblock.report.intervals import parents_of, resampler
-from phyblock.report.load import Run
 from phyblock.report.measures import MEASURES, Measure
 from phyblock.scoring.uncertainty import CONFIDENCE, Clusters, Floats, bootstrap, holm
+from phyblock.tables.intervals import parents_of, resampler
+from phyblock.tables.load import Run
 
 __all__ = ["COMPARE_RESAMPLES", "Comparison", "Side", "compare", "compare_models", "compare_runs"]
 

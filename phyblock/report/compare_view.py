@@ -9,9 +9,9 @@ import pandas as pd
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
 from phyblock.report.compare import COMPARE_RESAMPLES, Comparison
-from phyblock.report.latex import to_latex
-from phyblock.report.markdown import to_markdown
-from phyblock.report.text_table import NO_VALUE, Column, TextTable, between, level_name, number
+from phyblock.tables.latex import to_latex
+from phyblock.tables.markdown import to_markdown
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, between, level_name, number
 
 __all__ = ["compare_view", "flipped_lines", "p_text", "write_comparison"]
 

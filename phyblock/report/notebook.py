@@ -10,12 +10,12 @@ from pathlib import Path
 import pandas as pd
 
 from phyblock.report.compare import Comparison, compare_models, compare_runs
-from phyblock.report.design import OVERALL
-from phyblock.report.load import Run
-from phyblock.report.load import load_run as load_frames
-from phyblock.report.text_table import TextTable, between, number
 from phyblock.report.track_intervals import step_intervals, vqa_intervals
 from phyblock.report.write import make_tables, table_names
+from phyblock.tables.design import OVERALL
+from phyblock.tables.load import Run
+from phyblock.tables.load import load_run as load_frames
+from phyblock.tables.text_table import TextTable, between, number
 
 __all__ = ["LoadedRun", "Tables", "load_run"]
 

@@ -11,19 +11,35 @@ import pandas as pd
 
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
-from phyblock.report.assembly import assembly_frame, table1_frame
-from phyblock.report.comparison import published_frame
-from phyblock.report.cost import cost_frame, cost_view
-from phyblock.report.coverage import coverage_frame
-from phyblock.report.episodes import endings_frame, moves_frame, progress_frame
-from phyblock.report.errors import errors_frame
-from phyblock.report.latex import to_latex
-from phyblock.report.load import Run, load_run
-from phyblock.report.markdown import to_markdown
-from phyblock.report.questions import letters_frame, questions_frame
-from phyblock.report.seeds import intervals_table, intervals_view, table5_frame, table5_view
-from phyblock.report.settings import settings_frame, settings_view
-from phyblock.report.table3 import (
+from phyblock.report.track_intervals import (
+    step_intervals,
+    track_intervals_view,
+    vqa_intervals,
+)
+from phyblock.tables.cost import cost_frame, cost_view
+from phyblock.tables.coverage import coverage_frame
+from phyblock.tables.latex import to_latex
+from phyblock.tables.load import Run, load_run
+from phyblock.tables.markdown import to_markdown
+from phyblock.tables.text_table import TextTable
+from phyblock.tracks.full_planning.assembly import assembly_frame, table1_frame
+from phyblock.tracks.full_planning.errors import errors_frame
+from phyblock.tracks.full_planning.published import published_frame
+from phyblock.tracks.full_planning.seeds import (
+    intervals_table,
+    intervals_view,
+    table5_frame,
+    table5_view,
+)
+from phyblock.tracks.full_planning.settings import settings_frame, settings_view
+from phyblock.tracks.full_planning.views import (
+    coverage_view,
+    errors_view,
+    published_view,
+    table1_view,
+)
+from phyblock.tracks.step_planning.episodes import endings_frame, moves_frame, progress_frame
+from phyblock.tracks.step_planning.table3 import (
     endings_view,
     moves_view,
     progress_view,
@@ -31,14 +47,8 @@ from phyblock.report.table3 import (
     table3_frame,
     table3_view,
 )
-from phyblock.report.text_table import TextTable
-from phyblock.report.track_intervals import (
-    step_intervals,
-    track_intervals_view,
-    vqa_intervals,
-)
-from phyblock.report.views import coverage_view, errors_view, published_view, table1_view
-from phyblock.report.vqa import letters_view, table2_frame, table2_view
+from phyblock.tracks.vqa.answers import letters_frame, questions_frame
+from phyblock.tracks.vqa.table2 import letters_view, table2_frame, table2_view
 
 __all__ = ["TablesWritten", "make_tables", "table_names", "write_tables"]
 

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from phyblock.report.intervals import CountCube, parents_of, resampler
-from phyblock.report.load import Run
-from phyblock.report.outcomes import WITHOUT_REPLY
 from phyblock.scoring.uncertainty import Floats, bootstrap
+from phyblock.tables.intervals import CountCube, parents_of, resampler
+from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, VARIANT, Cell, Counted, Measure
 
 __all__ = ["ESTIMATE_COLUMNS", "estimate_frame", "value_of_cells"]
@@ -36,9 +35,7 @@ ESTIMATE_COLUMNS = (
 """Columns of `estimate_frame`."""
 
 
-def estimate_frame(
-    run: Run, measures: Sequence[Measure], cells: Sequence[Cell]
-) -> pd.DataFrame:
+def estimate_frame(run: Run, measures: Sequence[Measure], cells: Sequence[Cell]) -> pd.DataFrame:
     """One row a measure, model, way of counting and cell, in `ESTIMATE_COLUMNS`.
 
     `value` is of the counts of all `n` samples, summed over scenes and seeds, in the measure's own
@@ -126,13 +123,12 @@ def _of_group(
     if table.empty:
         return pd.DataFrame()
     keys = [*_GROUP, CELL]
-    heard = table.assign(heard=~table["outcome"].isin(WITHOUT_REPLY)).groupby(["model", CELL])
-    heard_in = {key: bool(value) for key, value in heard["heard"].any().items()}
+    heard = table.groupby(["model", CELL])["replied"].any().to_dict()
     pool = _pool(run, table, counted, strata)
     sizes = table.groupby(keys).size().to_dict()
     n = np.array([[sizes.get((*g, s), 0) for s in strata] for g in pool.groups])
     behind = _clusters_of_cells(pool, cells)
-    silent = np.array([[not heard_in.get((g[0], s), False) for s in strata] for g in pool.groups])
+    silent = np.array([[not heard.get((g[0], s), False) for s in strata] for g in pool.groups])
     # Where a model said nothing, empty plans have counts, and no resample has a value.
     counts = np.where(silent[None, :, :, None], np.nan, pool.counts)
 
@@ -207,9 +203,9 @@ def _strata_of(cell: Cell, cells: Sequence[Cell]) -> frozenset[str]:
 
 def _clusters_of_cells(pool: _Pool, cells: Sequence[Cell]) -> np.ndarray:
     """Base scenes behind each group and cell; of a mean the fewest, where a part has under two."""
-    by_stratum = pool.cube.clusters.behind(
-        pool.present.reshape(len(pool.scenes), -1)
-    ).reshape(pool.present.shape[1:])
+    by_stratum = pool.cube.clusters.behind(pool.present.reshape(len(pool.scenes), -1)).reshape(
+        pool.present.shape[1:]
+    )
     columns = []
     for cell in cells:
         members = [name in _strata_of(cell, cells) for name in pool.strata]

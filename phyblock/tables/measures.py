@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import pandas as pd
@@ -11,7 +11,7 @@ import pandas as pd
 from phyblock.scoring.uncertainty import Metric
 
 if TYPE_CHECKING:
-    from phyblock.report.load import Run
+    from phyblock.tables.load import Run
 
 __all__ = ["CELL", "VARIANT", "Cell", "Counted", "Measure", "per_sample"]
 
@@ -41,9 +41,10 @@ class Cell:
 class Counted:
     """Counts of samples, from which one or several measures are made.
 
-    `frame` makes them out of a run: a row a sample and way of counting it, with the columns
-    `model`, `scene`, `item`, `seed`, `outcome`, those of `VARIANT`, `CELL`, and one of each name in
-    `columns`. Samples that the run leaves out have no row.
+    `frame` makes them out of a run: a row a sample, way of counting it and cell that it is pooled
+    in, with the columns `model`, `scene`, `item`, `seed`, those of `VARIANT`, `CELL`, `replied`
+    (whether the model said anything), and one of each name in `columns`. Samples that the run
+    leaves out have no row.
     """
 
     name: str
@@ -59,8 +60,8 @@ class Measure:
     `value` makes it of summed counts, shape (..., columns of `counted`), NaN where it is not
     defined. `heading` and `meaning` are for people; `unit` "%" stands for values in [0, 1] that
     tables show times 100. `over` names what is counted. `chance` says what guessing gives in a
-    cell, `floors` names baselines that never see the goal. Measures that are not `is_headline`
-    stand in a table of their own.
+    cell, `floors` names baselines that never see the goal. One that is not `in_tables` is in the
+    frame of estimates alone.
     """
 
     name: str
@@ -71,10 +72,9 @@ class Measure:
     unit: Unit = "%"
     better: Literal["higher", "lower"] = "higher"
     over: str = "samples"
-    variant: tuple[tuple[str, str], ...] = ()
     chance: Callable[[Run, str], float] | None = None
     floors: tuple[str, ...] = ()
-    is_headline: bool = field(default=True)
+    in_tables: bool = True
 
     @property
     def scale(self) -> float:

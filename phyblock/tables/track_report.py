@@ -15,17 +15,32 @@ if TYPE_CHECKING:
 
     from phyblock.tables.load import Run
 
-__all__ = ["Shown", "TableMaker", "TrackReport"]
+__all__ = ["PaperTable", "Shown", "TableMaker", "TrackReport"]
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A measure in a cell, as a column of a headline table; `criterion` says how it is counted."""
+    """A measure in a cell, as a column of a headline table.
+
+    `criterion` says how it is counted, where one measure is counted in several ways.
+    """
 
     measure: str
     cell: str
     heading: str
     criterion: str = ""
+
+
+@dataclass(frozen=True)
+class PaperTable:
+    """How a table of the paper is set beside ours.
+
+    `frame` has a row a cell with columns model, published_name, published, ours, difference; it is
+    empty where no model of the run has a row in that table.
+    """
+
+    frame: Callable[[Run], pd.DataFrame]
+    view: Callable[[pd.DataFrame, Run], TextTable]
 
 
 @dataclass(frozen=True)
@@ -48,12 +63,13 @@ def _no_references(_: Run) -> Mapping[str, Mapping[str, float]]:
 class TrackReport:
     """The measures of a track, and what is shown of them.
 
-    `cells` are those of a run. `headline` chooses the columns of the headline table out of a run,
-    of which `main` stands for all; without it every cell of the first measure is shown.
-    `references` are rows to hold models against, by name, with values by column heading. `notes`
-    stand under the headline. `tables` and `figures` are of its own, by name; a figure is None for
-    a run that has no numbers for it. `check_alike` raises SpecError where the second run cannot be
-    compared with the first.
+    `cells` are those of a run, the last of which stands for all. `headline` chooses the columns of
+    the headline table, the first measure in every cell where it is left out; the column headed
+    `main`, else the last, is the one that models are ranked by. `references` are rows to hold
+    models against, by name, with values [%] by heading. `notes` stand under the headline. `tables`,
+    `figures` and `paper_tables` (by their number in the paper) are its own; a figure is None for
+    a run that has no numbers for it. `check_alike` raises SpecError where the first run cannot be
+    compared with the second in these cells.
     """
 
     measures: tuple[Measure, ...]
@@ -64,4 +80,5 @@ class TrackReport:
     notes: Callable[[Run], Sequence[str]] = lambda _: ()
     tables: Mapping[str, TableMaker] = field(default_factory=dict)
     figures: Mapping[str, Callable[[Run], Figure | None]] = field(default_factory=dict)
+    paper_tables: Mapping[int, PaperTable] = field(default_factory=dict)
     check_alike: Callable[[Run, Run, Sequence[str]], None] | None = None

@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.registry import known_tracks
 from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.base import AnyTrack, SingleTrack
 
 __all__ = ["Opening", "TrackKind", "kind_of", "kinds"]
@@ -42,7 +43,9 @@ class TrackKind:
     a suite names another. `own_data` gives the folder of data of its own as a suite says it,
     `manifest` what the manifest says beyond what all tracks have. `rescored`
     makes the track out of a suite and scenes for reading stored replies again; None where
-    `phyblock score` takes its records over as they are.
+    `phyblock score` takes its records over as they are. `report` imports what tables and figures
+    are made by, which takes long; `counts` are functions of an item and its judgement, by name,
+    whose numbers are kept in the record (see `per_sample`).
     """
 
     name: str
@@ -50,6 +53,7 @@ class TrackKind:
     item: str
     about: str
     open: Callable[[Opening], AnyTrack]
+    report: Callable[[], TrackReport]
     subject: type[object]
     template: Path
     prompt_field: tuple[str, ...] = ("prompt",)
@@ -59,6 +63,7 @@ class TrackKind:
     own_data: Callable[[SuiteSpec], tuple[str, tuple[str, ...], bool] | None] | None = None
     manifest: Callable[[LoadedSuite], Mapping[str, Any]] | None = None
     rescored: Callable[[SuiteSpec, Sequence[AssemblyTask]], SingleTrack[Any]] | None = None
+    counts: Mapping[str, Callable[[Any, Any], Sequence[float] | None]] = field(default_factory=dict)
 
     def data_folder(self, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:
         """The folder of its own data: text, path of keys, whether it may be a bundled set."""

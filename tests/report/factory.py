@@ -12,9 +12,9 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 from phyblock.report import Run, read_design
-from phyblock.report.load import Frames, frames_of
-from phyblock.report.outcomes import OUTCOMES
 from phyblock.scoring import ERROR_TYPES
+from phyblock.tables.load import Frames, frames_of
+from phyblock.tables.outcomes import OUTCOMES
 
 laws = settings(max_examples=12, deadline=None)
 """Tables take some 50 ms each, so that few examples must do."""

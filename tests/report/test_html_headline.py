@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from phyblock.report.html.headline_tracks import steps_headline, vqa_headline
+from phyblock.report.track_intervals import step_intervals
 
 from phyblock.report import Run, assembly_frame, load_run
 from phyblock.report.html.headline import assembly_headline
-from phyblock.report.html.headline_tracks import steps_headline, vqa_headline
-from phyblock.report.questions import questions_frame
-from phyblock.report.table3 import table3_frame
-from phyblock.report.track_intervals import step_intervals
+from phyblock.tracks.step_planning.table3 import table3_frame
+from phyblock.tracks.vqa.answers import questions_frame
 from tests.report.factory import manifest, record, run_of, score
 from tests.report.html_run import make_run
 

@@ -16,7 +16,7 @@ from phyblock.report import (
     published_frame,
     published_table,
 )
-from phyblock.report.views import published_view
+from phyblock.tracks.full_planning.views import published_view
 from tests.report.factory import manifest, record, run_of, score
 
 LEVELS = ["1", "2", "3", "4", "overall"]

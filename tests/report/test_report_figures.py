@@ -11,9 +11,9 @@ from PIL import Image
 
 from phyblock.errors import StoreError
 from phyblock.report.figures import FIGURES, write_figures
-from phyblock.report.figures.style import COLORS
-from phyblock.report.figures.tracks import accuracy_by_subtask, step_progress, vqa_heat_map
-from phyblock.report.load import load_run
+from phyblock.tables.drawing import COLORS
+from phyblock.tables.load import load_run
+from phyblock.tracks.vqa.figure import accuracy_by_subtask, step_progress, vqa_heat_map
 from tests.report.factory import LEVELS, manifest, record, run_of, score, write_run
 
 matplotlib = pytest.importorskip("matplotlib", reason="matplotlib is not installed")

@@ -15,7 +15,7 @@ from phyblock.errors import StoreError
 from phyblock.report import Column, TextTable, load_run, to_latex, to_markdown, write_tables
 from phyblock.report.compare import compare_models
 from phyblock.report.compare_view import write_comparison
-from phyblock.report.text_table import NO_VALUE, number, spread
+from phyblock.tables.text_table import NO_VALUE, number, spread
 from tests.report.factory import laws, manifest, record, record_lists, score, write_run
 
 TABLE = TextTable(

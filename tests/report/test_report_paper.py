@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from phyblock.report.paper import PAPER_TABLES
 
 from phyblock.domain import SUBTASKS
 from phyblock.report import published_table
-from phyblock.report.load import load_run
-from phyblock.report.paper import PAPER_TABLES
+from phyblock.tables.load import load_run
 from tests.report.factory import LEVELS, manifest, record, score, write_run
 
 

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from phyblock.report.track_intervals import step_intervals, track_intervals_view, vqa_intervals
 
 from phyblock.domain import SUBTASKS
 from phyblock.report import Run, to_markdown
-from phyblock.report.questions import CELLS, questions_frame
-from phyblock.report.track_intervals import step_intervals, track_intervals_view, vqa_intervals
+from phyblock.tracks.vqa.answers import CELLS, questions_frame
 from tests.report.factory import LEVELS, manifest, record, run_of, score
 
 

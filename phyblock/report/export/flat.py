@@ -9,7 +9,7 @@ import pandas as pd
 
 from phyblock.files import atomic_write
 from phyblock.report.export.rows import as_json, export_rows, needs
-from phyblock.report.load import Run
+from phyblock.tables.load import Run
 
 __all__ = ["EXPORTS", "export_frame", "to_csv", "to_hf", "to_parquet"]
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from phyblock.report.export.rows import needs, newest_records, prompt_text
-from phyblock.report.load import Run
 from phyblock.run.prompts import read_prompts
 from phyblock.scoring import Counts, micro
+from phyblock.tables.load import Run
 
 if TYPE_CHECKING:
     from inspect_ai.log import EvalLog, EvalMetric, EvalSample

@@ -8,9 +8,9 @@ from importlib import import_module
 from typing import Any
 
 from phyblock.errors import Problem, SpecError
-from phyblock.report.load import Run
 from phyblock.run.prompts import read_prompts
 from phyblock.run.reading import read_records
+from phyblock.tables.load import Run
 
 __all__ = ["as_json", "export_rows", "needs", "newest_records", "prompt_text"]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from phyblock.errors import Problem, StoreError
 from phyblock.report.export.flat import EXPORTS
 from phyblock.report.export.inspect_log import to_inspect
-from phyblock.report.load import Run
+from phyblock.tables.load import Run
 
 __all__ = ["FORMATS", "export_run"]
 

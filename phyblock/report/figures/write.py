@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
 from phyblock.report.figures.data import dataset_levels
-from phyblock.report.figures.errors import error_bars
-from phyblock.report.figures.levels import f1_bars, f1_radar, settings_dots
-from phyblock.report.figures.scatter import f1_by_cost, f1_by_size
-from phyblock.report.figures.style import png_bytes, styled, svg_bytes
-from phyblock.report.figures.tracks import progress_by_turn, vqa_heat_map
-from phyblock.report.load import Run
+from phyblock.tables.drawing import png_bytes, styled, svg_bytes
+from phyblock.tables.load import Run
+from phyblock.tracks.full_planning.figures.errors import error_bars
+from phyblock.tracks.full_planning.figures.levels import f1_bars, f1_radar, settings_dots
+from phyblock.tracks.full_planning.figures.scatter import f1_by_cost, f1_by_size
+from phyblock.tracks.vqa.figure import progress_by_turn, vqa_heat_map
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,12 +9,13 @@ from typing import Literal
 
 import pandas as pd
 
-from phyblock.report.assembly import assembly_frame, headline_cells
-from phyblock.report.cells import METRICS
-from phyblock.report.comparison import PUBLISHED_SETTING, published_frame, published_table
-from phyblock.report.design import OVERALL
-from phyblock.report.load import Run
-from phyblock.report.text_table import NO_VALUE, number
+from phyblock.tables.cells import METRICS
+from phyblock.tables.design import OVERALL
+from phyblock.tables.load import Run
+from phyblock.tables.paper_numbers import published_table
+from phyblock.tables.text_table import NO_VALUE, number
+from phyblock.tracks.full_planning.assembly import assembly_frame, headline_cells
+from phyblock.tracks.full_planning.published import PUBLISHED_SETTING, published_frame
 
 __all__ = [
     "HUMAN_ACCURACY",

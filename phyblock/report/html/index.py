@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from phyblock.report.design import Design
 from phyblock.run.reading import RecordLines
 from phyblock.scoring import ERROR_TYPES
+from phyblock.tables.design import Design
 
 __all__ = ["Item", "Place", "SampleIndex", "item_key", "read_places"]
 

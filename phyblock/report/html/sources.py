@@ -12,8 +12,8 @@ from typing import Any
 
 from phyblock.datasets import AssemblyTask, Dataset, QuestionTask
 from phyblock.errors import DataError, Problem
-from phyblock.report.design import Design
 from phyblock.run.data import open_dataset
+from phyblock.tables.design import Design
 from phyblock.tracks.selection import select_tasks
 from phyblock.tracks.vqa.opening import open_questions
 

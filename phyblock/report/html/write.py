@@ -28,10 +28,10 @@ from phyblock.report.html.samples import (
 )
 from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.sources import Sources, open_sources
-from phyblock.report.load import Run
 from phyblock.report.write import TablesWritten
 from phyblock.run.prompts import PROMPTS
 from phyblock.run.reading import MANIFEST, RECORDS
+from phyblock.tables.load import Run
 from phyblock.tracks.vqa.pictures import Shown
 
 __all__ = ["REPORT_FILE", "write_report"]

@@ -1,6 +1,7 @@
 """Step planning: one operation at a time, with the assembly in view (paper section 4.1)."""
 
 from phyblock.resources import bundled
+from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.kind import TrackKind
 from phyblock.tracks.step_planning.baselines import STEP_RULES, StepSubject
 from phyblock.tracks.step_planning.opening import open_step_planning
@@ -9,12 +10,20 @@ from phyblock.tracks.step_planning.track import StepPlanning
 
 __all__ = ["TRACK"]
 
+
+def _report() -> TrackReport:
+    from phyblock.tracks.step_planning.report import REPORT
+
+    return REPORT
+
+
 TRACK = TrackKind(
     name=StepPlanning.name,
     title="Step planning",
     item="episode",
     about="step by step in the simulator",
     open=open_step_planning,
+    report=_report,
     subject=StepSubject,
     baselines=STEP_RULES,
     section=("steps", StepsSpec, "The rules of the step_planning track."),

@@ -5,6 +5,7 @@ from typing import Any
 
 from phyblock.resources import bundled
 from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.kind import TrackKind
 from phyblock.tracks.vqa.baselines import CHOICE_RULES, ChoiceSubject
 from phyblock.tracks.vqa.opening import open_vqa
@@ -24,12 +25,19 @@ def _manifest(loaded: LoadedSuite) -> Mapping[str, Any]:
     return {"questions": {"format": spec.format, "root": str(loaded.folders[Vqa.name])}}
 
 
+def _report() -> TrackReport:
+    from phyblock.tracks.vqa.report import REPORT
+
+    return REPORT
+
+
 TRACK = TrackKind(
     name=Vqa.name,
     title="VQA",
     item="question",
     about="multiple-choice questions",
     open=open_vqa,
+    report=_report,
     subject=ChoiceSubject,
     baselines=CHOICE_RULES,
     section=("vqa", VqaSpec, "The questions of the vqa track, and how they are shown."),

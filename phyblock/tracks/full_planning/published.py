@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
-
 import pandas as pd
 
-from phyblock.report.assembly import assembly_frame, headline_cells
-from phyblock.report.cells import METRICS
-from phyblock.report.design import OVERALL, Design
-from phyblock.report.load import Run
-from phyblock.report.text_table import number
+from phyblock.tables.cells import METRICS
+from phyblock.tables.design import OVERALL, Design
+from phyblock.tables.load import Run
+from phyblock.tables.paper_numbers import published_table
+from phyblock.tables.text_table import number
+from phyblock.tracks.full_planning.assembly import assembly_frame, headline_cells
 
 __all__ = [
     "PUBLISHED_LEVELS",
@@ -18,7 +17,6 @@ __all__ = [
     "comparison_notes",
     "largest_differences",
     "published_frame",
-    "published_table",
 ]
 
 PUBLISHED_LEVELS = ("1", "2", "3", "4", "overall")
@@ -41,15 +39,6 @@ _COLUMNS = (
     "matcher",
     "n",
 )
-
-
-def published_table(number: int) -> pd.DataFrame:
-    """A results table of the paper (1, 2, 3 or 5), one printed value [%] a row.
-
-    `published/README.md` says what the columns are and where the numbers come from.
-    """
-    with (files("phyblock.report") / "published" / f"table{number}.csv").open("rb") as file:
-        return pd.read_csv(file, dtype={"level": "object"})
 
 
 def published_frame(run: Run) -> pd.DataFrame:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from phyblock.report.text_table import Column, TextTable
+from phyblock.tables.text_table import Column, TextTable
 
 __all__ = ["to_markdown"]
 

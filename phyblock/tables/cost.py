@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pandas as pd
 
-from phyblock.report.coverage import coverage_frame
-from phyblock.report.episodes import TRACK as STEP_PLANNING
-from phyblock.report.load import Run
-from phyblock.report.text_table import NO_VALUE, Column, TextTable, number
+from phyblock.tables.coverage import coverage_frame
+from phyblock.tables.load import Run
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
+from phyblock.tracks.step_planning.episodes import TRACK as STEP_PLANNING
 
 __all__ = ["cost_frame", "cost_view"]
 

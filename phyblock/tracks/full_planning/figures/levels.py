@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from phyblock.report.design import OVERALL, Design
-from phyblock.report.figures.style import (
+from phyblock.tables.design import OVERALL, Design
+from phyblock.tables.drawing import (
     ACCENT,
     COLORS,
     GRID,
@@ -20,10 +20,10 @@ from phyblock.report.figures.style import (
     headed,
     new_figure,
 )
-from phyblock.report.load import Run
-from phyblock.report.seeds import intervals_table
-from phyblock.report.settings import settings_frame
-from phyblock.report.text_table import level_name
+from phyblock.tables.load import Run
+from phyblock.tables.text_table import level_name
+from phyblock.tracks.full_planning.seeds import intervals_table
+from phyblock.tracks.full_planning.settings import settings_frame
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

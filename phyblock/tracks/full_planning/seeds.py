@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pandas as pd
 
-from phyblock.report.assembly import assembly_frame, headline_cells
-from phyblock.report.design import OVERALL
-from phyblock.report.load import Run
-from phyblock.report.text_table import (
+from phyblock.scoring.uncertainty import RESAMPLES
+from phyblock.tables.design import OVERALL
+from phyblock.tables.load import Run
+from phyblock.tables.paper_numbers import beside, published_table
+from phyblock.tables.text_table import (
     NO_VALUE,
     SPREAD,
     Column,
@@ -16,9 +17,19 @@ from phyblock.report.text_table import (
     level_name,
     number,
 )
-from phyblock.scoring.uncertainty import RESAMPLES
+from phyblock.tracks.full_planning.assembly import assembly_frame, headline_cells
+from phyblock.tracks.full_planning.measures import is_asked
 
-__all__ = ["intervals_table", "intervals_view", "table5_frame", "table5_view"]
+__all__ = [
+    "intervals_table",
+    "intervals_view",
+    "paper_table5_frame",
+    "paper_table5_view",
+    "table5_frame",
+    "table5_view",
+]
+
+_PAPER_LEVELS = ("1", "2", "3", "4", OVERALL)
 
 
 def table5_frame(run: Run) -> pd.DataFrame:
@@ -29,7 +40,7 @@ def table5_frame(run: Run) -> pd.DataFrame:
     """
     design = run.design
     cells = headline_cells(assembly_frame(run), design)
-    names = design.model_names if design.tracks and len(design.suite.seeds) > 1 else ()
+    names = design.model_names if is_asked(run) and len(design.suite.seeds) > 1 else ()
     table = pd.DataFrame({"model": list(names)})
     for level in design.levels:
         name = level if level == OVERALL else f"level{level}"
@@ -120,3 +131,51 @@ def _sizes(table: pd.DataFrame, run: Run) -> list[str]:
     return (
         [f"Scenes (base scenes): {', '.join(parts)}."] if len(table) else [f"No cell: {NO_VALUE}"]
     )
+
+
+def paper_table5_frame(run: Run) -> pd.DataFrame:
+    """Mean and sd of F1 over seeds by level beside the paper's Table 5."""
+    table = table5_frame(run)
+    rows = [
+        (row["model"], level, f"f1_{kind}", row[f"{name}_{kind}"])
+        for row in table.to_dict("records")
+        for level in run.design.levels
+        for name in (level if level == OVERALL else f"level{level}",)
+        for kind in ("mean", "sd")
+    ]
+    ours = pd.DataFrame(rows, columns=["model", "level", "metric", "ours"])
+    printed = published_table(5) if is_asked(run) else published_table(5).iloc[:0]
+    return beside(printed, ours.astype({"ours": "float64"}), run, ["level", "metric"])
+
+
+def paper_table5_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """A row a model and statistic out of `paper_table5_frame`."""
+    cells = {
+        (row["model"], row["metric"], row["level"]): (
+            number(row["published"], 2),
+            number(row["ours"], 2),
+            number(row["difference"], 2, signed=True),
+        )
+        for row in table.to_dict("records")
+    }
+    kinds = {"f1_mean": "F1 mean", "f1_sd": "F1 sd"}
+    rows = [
+        (
+            label,
+            kinds[metric],
+            *(cell for level in _LEVELS for cell in cells[model, metric, level]),
+        )
+        for model, name in dict(zip(table["model"], table["published_name"], strict=True)).items()
+        for label, metric in zip((model, f"({name})"), kinds, strict=True)
+    ]
+    columns = (
+        Column("Model", is_text=True),
+        Column("Statistic", is_text=True),
+        *(
+            Column(name, level_name(level))
+            for level in _PAPER_LEVELS
+            for name in ("Paper", "Ours", "Diff")
+        ),
+    )
+    note = f"Ours: setting {run.design.setting}, matcher {run.design.matcher}; sd with ddof = 1."
+    return TextTable("Our numbers beside the paper's Table 5 (%)", columns, tuple(rows), (note,))

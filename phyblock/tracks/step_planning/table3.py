@@ -8,26 +8,32 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.report.cells import METRICS, measured, micro_averages
-from phyblock.report.comparison import published_table
-from phyblock.report.episodes import STEP_OUTCOMES, TRACK, endings_frame
-from phyblock.report.load import Run
-from phyblock.report.text_table import NO_VALUE, Column, TextTable, number, spread
+from phyblock.tables.cells import METRICS
+from phyblock.tables.headline import interval_frame, interval_view
+from phyblock.tables.load import Run
+from phyblock.tables.measures import CELL
+from phyblock.tables.paper_numbers import NOTHING, beside_view, interleaved, published_table
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number, spread
+from phyblock.tracks.estimates import track_estimates
+from phyblock.tracks.step_planning.episodes import STEP_OUTCOMES, endings_frame
+from phyblock.tracks.step_planning.measures import COUNTED, NAME, is_asked
 from phyblock.tracks.step_planning.rules import ENDINGS
 
 __all__ = [
-    "COUNTED",
     "ENDING_NAMES",
     "endings_view",
     "moves_view",
+    "paper_table3_frame",
+    "paper_table3_view",
     "progress_view",
+    "published_scores",
+    "step_intervals",
+    "step_intervals_view",
     "step_scores_frame",
     "table3_frame",
     "table3_view",
 ]
 
-COUNTED = ("placed", "attempted")
-"""What precision is over: the blocks in the world, or every move that was attempted."""
 _OURS, _PUBLISHED = "run", "published"
 _MODEL = Column("Model", is_text=True)
 _METRICS = dict(zip(METRICS, ("Prec", "Rec", "F1"), strict=True))
@@ -64,14 +70,11 @@ def step_scores_frame(run: Run) -> pd.DataFrame:
     without any reply has counts, if the suite counts empty plans, but no metrics.
     """
     scores = run.scores[
-        (run.scores["track"] == TRACK) & ~run.scores["outcome"].isin(run.design.outcomes_left_out)
+        (run.scores["track"] == NAME) & ~run.scores["outcome"].isin(run.design.outcomes_left_out)
     ]
     keys = ["model", "setting", "criterion"]
-    by_seed = micro_averages(scores, [*keys, "seed"]).groupby(keys, sort=False)
-    parts: dict[str, pd.Series[float]] = {}
-    for metric in METRICS:
-        parts[f"{metric}_mean"] = by_seed[metric].mean()
-        parts[f"{metric}_sd"] = by_seed[metric].std(ddof=1)
+    groups = scores.groupby(keys, sort=False)
+    counts = ["n", "tp", "fp", "fn"]
     cells = [
         (model, setting, criterion)
         for model in run.design.model_names
@@ -79,12 +82,38 @@ def step_scores_frame(run: Run) -> pd.DataFrame:
         for criterion in COUNTED
     ]
     frame = pd.DataFrame(cells, columns=keys)
-    frame = frame.join(micro_averages(scores, keys), on=keys).join(pd.DataFrame(parts), on=keys)
-    silent = ~frame["model"].isin(measured(scores, ["model"])["model"])
-    frame.loc[silent, [*METRICS, *parts]] = np.nan
-    counts = ["n", "tp", "fp", "fn"]
+    frame = frame.join(groups.size().rename("n"), on=keys).join(groups[counts[1:]].sum(), on=keys)
     frame[counts] = frame[counts].fillna(0).astype("int64")
+    found = track_estimates(run, NAME)
+    parts = {
+        (metric, kind): found[found["measure"] == metric].set_index(keys)[kind].astype("float64")
+        for metric in METRICS
+        for kind in ("value", "mean", "sd")
+    }
+    for metric in METRICS:
+        frame = frame.join(parts[metric, "value"].rename(metric), on=keys)
+    for metric in METRICS:
+        for kind in ("mean", "sd"):
+            frame = frame.join(parts[metric, kind].rename(f"{metric}_{kind}"), on=keys)
     return frame
+
+
+def step_intervals(run: Run) -> pd.DataFrame:
+    """F1 in the headline setting, pooled over seeds: a row a model and way of counting.
+
+    Columns are model, cell (`placed` or `attempted`), value, lo, hi, se [%], n, n_scenes,
+    n_clusters.
+    """
+    found = track_estimates(run, NAME)
+    found = found[found["measure"] == "f1"].drop(columns=CELL)
+    found = found.rename(columns={"criterion": CELL}).sort_values(CELL, kind="stable")
+    table = interval_frame(found, run.design, 100.0, [CELL])
+    return table.drop(columns="seeds")
+
+
+def step_intervals_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Out of `step_intervals`."""
+    return interval_view(table, run, list(dict.fromkeys(table[CELL])), "F1 of step planning")
 
 
 def table3_frame(run: Run) -> pd.DataFrame:
@@ -117,13 +146,14 @@ def table3_frame(run: Run) -> pd.DataFrame:
         ended = endings[model]
         row |= {"completion": 100 * ended["completion"], "detour": ended["detour"], "n": ended["n"]}
         rows.append(row)
-        if printed := _published(design.published.get(model, "")):
+        if printed := published_scores(design.published.get(model, "")):
             about = {"model": model, "source": _PUBLISHED}
             rows.append({**about, "published_name": design.published[model], **printed})
     return pd.DataFrame(rows)
 
 
-def _published(model: str) -> dict[str, float]:
+def published_scores(model: str) -> dict[str, float]:
+    """What Table 3 prints for a model [%], by `placed_<metric>`; empty where it has no row."""
     table = published_table(3)
     rows = table[table["model"] == model]
     return {f"placed_{m}": float(v) for m, v in zip(rows["metric"], rows["value"], strict=True)}
@@ -180,7 +210,7 @@ def _notes(table: pd.DataFrame, run: Run) -> list[str]:
     if seeds > 1:
         notes.append(f"Mean ± standard deviation over {seeds} seeds.")
     ours = table[table["source"] == _OURS]
-    expected = run.design.samples(TRACK)
+    expected = run.design.samples(NAME)
     short = [
         f"{row['model']} {row['n']:.0f}" for row in ours.to_dict("records") if row["n"] < expected
     ]
@@ -249,3 +279,16 @@ def progress_view(table: pd.DataFrame, run: Run) -> TextTable:
 
 def _share(count: int, whole: int) -> str:
     return number(100 * count / whole) if whole else NO_VALUE
+
+
+def paper_table3_frame(run: Run) -> pd.DataFrame:
+    """Precision, recall and F1 of step planning beside the paper's Table 3."""
+    cells = [f"placed_{metric}" for metric in METRICS]
+    return interleaved(table3_frame(run), cells) if is_asked(run) else NOTHING
+
+
+def paper_table3_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Out of `paper_table3_frame`."""
+    note = f"Setting {run.design.setting}; precision is over the blocks that were placed."
+    names = {f"placed_{metric}": name for metric, name in _METRICS.items()}
+    return beside_view(table, run, number_in_paper=3, names=names, note=note)

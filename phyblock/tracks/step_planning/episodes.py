@@ -9,21 +9,21 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.report.load import Run, once_per_run
 from phyblock.run.reading import RecordLines
 from phyblock.scoring import ERROR_TYPES
+from phyblock.tables.load import Run, once_per_run
 from phyblock.tracks.step_planning.rules import ENDINGS
 
 __all__ = [
+    "NAME",
     "STEP_OUTCOMES",
-    "TRACK",
     "endings_frame",
     "episodes_frame",
     "moves_frame",
     "progress_frame",
 ]
 
-TRACK = "step_planning"
+NAME = "step_planning"
 STEP_OUTCOMES = ("placed", *ERROR_TYPES, "invalid", "unread", "done")
 """What becomes of a step; `unread` are replies in which no single operation could be read."""
 
@@ -64,7 +64,7 @@ def _rows(run: Run) -> list[dict[str, Any]]:
     rows = {
         record["sample"]: _row(record)
         for _, record in RecordLines(run.path)
-        if record["track"] == TRACK
+        if record["track"] == NAME
     }
     kept = [row for row in rows.values() if row["outcome"] not in run.design.outcomes_left_out]
     return sorted(
@@ -99,7 +99,7 @@ def endings_frame(run: Run) -> pd.DataFrame:
         whole = mine[mine["ending"] == "completed"]
         counts: Counter[str] = Counter(mine["ending"].tolist())
         row: dict[str, Any] = {"model": model, "n": len(mine)}
-        row["expected"] = run.design.samples(TRACK)
+        row["expected"] = run.design.samples(NAME)
         row |= {name: counts[name] for name in ENDINGS}
         row["completion"] = len(whole) / len(mine) if len(mine) else np.nan
         row["steps"] = mine["steps"].mean()

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Hashable, Mapping
 
 import pandas as pd
 
-from phyblock.report.assembly import assembly_frame, headline_cells, level_column
-from phyblock.report.cells import METRICS
-from phyblock.report.comparison import (
+from phyblock.scoring import ERROR_TYPES, ErrorType
+from phyblock.tables.cells import METRICS
+from phyblock.tables.design import OVERALL, Design
+from phyblock.tables.load import Run
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, level_name, number, spread
+from phyblock.tracks.full_planning.assembly import assembly_frame, headline_cells, level_column
+from phyblock.tracks.full_planning.published import (
     PUBLISHED_LEVELS,
     PUBLISHED_SETTING,
     comparison_notes,
     largest_differences,
 )
-from phyblock.report.design import OVERALL, Design
-from phyblock.report.load import Run
-from phyblock.report.outcomes import HEADINGS, OUTCOMES
-from phyblock.report.text_table import NO_VALUE, Column, TextTable, level_name, number, spread
-from phyblock.scoring import ERROR_TYPES, ErrorType
 
 __all__ = ["ERROR_NAMES", "coverage_view", "errors_view", "published_view", "table1_view"]
 
@@ -188,70 +186,3 @@ def _difference_notes(table: pd.DataFrame, design: Design) -> list[str]:
         f"Ours: setting {PUBLISHED_SETTING}, matcher {matchers}{level1}.",
         "The last column has the largest absolute difference of each model.",
     ]
-
-
-def coverage_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """Outcomes, tokens, cost and time out of `coverage_frame`.
-
-    Tokens, latency, cached and requests are left out where no model has any, and the track where
-    there is one.
-    """
-    counts = {"expected": "Expected", "not_run": "Not run"}
-    counts |= {outcome: HEADINGS[outcome] for outcome in OUTCOMES}
-    parts: list[tuple[Column, list[str]]] = [(_MODEL, list(table["model"]))]
-    if len(run.design.suite.tracks) > 1:
-        tracks = [track.replace("_", " ") for track in table["track"]]
-        parts.append((Column("Track", is_text=True), tracks))
-    parts += [
-        (Column(heading), [str(count) for count in table[name]]) for name, heading in counts.items()
-    ]
-    usage = [
-        *(
-            (Column(f"Tokens {name}"), [_tokens(n) for n in table[f"{kind}_tokens"]])
-            for kind, name in (("prompt", "in"), ("completion", "out"), ("reasoning", "reasoning"))
-        ),
-        (Column("Latency (s)"), [number(seconds, 2) for seconds in table["latency_s"]]),
-        (Column("Cached"), [str(count) for count in table["cached"]]),
-        (Column("Requests"), [str(count) for count in table["attempts"]]),
-    ]
-    costs = zip(table["cost_usd"], table["cost_unknown"], table["replies"], strict=True)
-    parts.append((Column("Cost"), [_cost(*cost) for cost in costs]))
-    parts += [(column, cells) for column, cells in usage if set(cells) - {NO_VALUE, "0"}]
-    return TextTable(
-        f"Coverage{_of_suite(run.design)}: what became of every sample",
-        tuple(column for column, _ in parts),
-        tuple(zip(*(cells for _, cells in parts), strict=True)),
-        tuple(_coverage_notes(table, run)),
-    )
-
-
-def _tokens(total: int | None) -> str:
-    return NO_VALUE if total is None or pd.isna(total) else f"{total:,}"
-
-
-def _cost(known: float, unknown: int, replies: int) -> str:
-    if not replies:
-        return NO_VALUE
-    if math.isnan(known):
-        return "unknown"
-    dollars = f"${known:,.2f}" if known >= 1 or not known else f"${known:.4f}"
-    return dollars + (f" + {unknown} unknown" if unknown else "")
-
-
-def _coverage_notes(table: pd.DataFrame, run: Run) -> list[str]:
-    notes = []
-    if table["latency_s"].notna().any():
-        notes.append("Latency is the mean over replies that were asked for in this run.")
-    if table["cached"].any():
-        notes.append("Cost is what this run paid; replies from the cache cost it nothing.")
-    unanswered = table["recorded"] - table["missing"] - table["replies"]
-    if table["attempts"].any() and unanswered.any():
-        notes.append("Requests are those that led to a reply, with their retries.")
-    partly = table[table["tokens_unknown"].between(1, table["replies"] - 1)]
-    if len(partly):
-        counts = zip(partly["model"], partly["tokens_unknown"], partly["replies"], strict=True)
-        listed = ", ".join(f"{model} {unknown} of {replies}" for model, unknown, replies in counts)
-        notes.append(f"Tokens are sums over the replies that tell them; these do not: {listed}.")
-    if run.is_cut:
-        notes.append("The last line of records.jsonl was cut off and is ignored.")
-    return notes

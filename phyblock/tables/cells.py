@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from phyblock.report.design import OVERALL
-from phyblock.report.load import Run, once_per_run
-from phyblock.report.outcomes import WITHOUT_REPLY
+from phyblock.tables.design import OVERALL
+from phyblock.tables.load import Run, once_per_run
+from phyblock.tables.outcomes import WITHOUT_REPLY
 
 __all__ = ["METRICS", "cell_scores", "measured", "micro_averages", "with_levels"]
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from phyblock.report.intervals import count_cube, resampler
-from phyblock.report.load import Run, once_per_run
-from phyblock.report.text_table import Column, TextTable, between, level_name, number
 from phyblock.scoring.uncertainty import Floats, bootstrap, f1_of
+from phyblock.tables.cells import cell_scores, measured
+from phyblock.tables.intervals import CountCube, parents_of, resampler
+from phyblock.tables.load import Run, once_per_run
+from phyblock.tables.text_table import Column, TextTable, between, level_name, number
+from phyblock.tracks.full_planning.measures import NAME
 
 __all__ = ["settings_frame", "settings_view"]
 
@@ -19,18 +21,18 @@ _COLUMNS = ("model", "level", "f1_a", "f1_b", "difference", "lo", "hi", "n_scene
 def settings_frame(run: Run) -> pd.DataFrame:
     """One row a model and level: F1 in A and in B, B minus A with a 95 % interval; in [0, 1].
 
-    Headline matcher, first assembly track, the criterion of each level. Paired: a reply is scored
+    Headline matcher, the criterion of each level. Paired: a reply is scored
     under both. Empty where the run has one setting.
     """
     design = run.design
     parts = []
     for level in design.levels if {"A", "B"} <= set(design.suite.settings) else ():
-        cube = count_cube(run, level, ["track", "matcher", "model", "setting"])
+        cube = _counts(run, level)
         matcher = design.matchers(design.criterion(level))[0]
         kept = {
             (model, setting): place
-            for place, (track, by, model, setting) in enumerate(cube.cells)
-            if track in design.tracks[:1] and by == matcher
+            for place, (by, model, setting) in enumerate(cube.cells)
+            if by == matcher
         }
         models = [m for m in design.model_names if (m, "A") in kept and (m, "B") in kept]
         if not models:
@@ -59,6 +61,14 @@ def settings_frame(run: Run) -> pd.DataFrame:
     sizes = ["n_scenes", "n_clusters"]
     table[sizes] = table[sizes].fillna(0).astype("int64")
     return table
+
+
+def _counts(run: Run, level: str) -> CountCube:
+    """Counts tp, fp, fn of every scene by matcher, model and setting."""
+    scores = cell_scores(run)
+    scores = scores[(scores["level"] == level) & (scores["track"] == NAME)]
+    by = ["matcher", "model", "setting"]
+    return CountCube(measured(scores, ["model"]), parents_of(run), by, ["tp", "fp", "fn"])
 
 
 def _both_and_difference(sums: Floats) -> Floats:

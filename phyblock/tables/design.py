@@ -10,14 +10,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from pydantic_core import PydanticCustomError
 
 from phyblock.errors import Problem, StoreError
-from phyblock.report.outcomes import WITHOUT_REPLY
+from phyblock.registry import known_tracks
+from phyblock.tables.outcomes import WITHOUT_REPLY
 
 __all__ = ["OVERALL", "Design", "read_design"]
 
 OVERALL = "overall"
 """Name of the row that pools the scenes of all levels."""
-
-ASSEMBLY_TRACKS = ("full_planning",)
 
 
 class _Part(BaseModel):
@@ -34,12 +33,12 @@ class _Scoring(_Part):
 
 class _Suite(_Part):
     name: str = ""
-    tracks: tuple[str, ...] = ("full_planning",)
+    tracks: tuple[str, ...] = Field(default_factory=lambda: tuple(known_tracks())[:1])
     levels: tuple[int, ...] = Field(min_length=1)
     settings: tuple[str, ...] = Field(min_length=1)
     seeds: tuple[int, ...] = Field(min_length=1)
     scoring: _Scoring
-    tables: tuple[str, ...] = ("assembly", "table1", "table2", "table3", "errors", "published")
+    tables: tuple[str, ...] = ()
 
 
 class _Model(_Part):
@@ -79,11 +78,6 @@ class Design(_Part):
     def published(self) -> dict[str, str]:
         """What the paper calls each model that it knows; Table 1 need not have a row of it."""
         return {model.name: model.published for model in self.models if model.published}
-
-    @property
-    def tracks(self) -> tuple[str, ...]:
-        """The assembly tracks of the suite."""
-        return tuple(track for track in self.suite.tracks if track in ASSEMBLY_TRACKS)
 
     def samples(self, track: str) -> int:
         """Samples that a complete run holds of one model in a track."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pandas as pd
 
-from phyblock.report.cells import METRICS, cell_scores, micro_averages, with_levels
-from phyblock.report.design import OVERALL, Design
-from phyblock.report.intervals import INTERVALS, intervals_frame
-from phyblock.report.load import Run, once_per_run
-from phyblock.report.outcomes import FAILURES, WITHOUT_REPLY
+from phyblock.tables.cells import METRICS, cell_scores, with_levels
+from phyblock.tables.design import OVERALL, Design
+from phyblock.tables.load import Run, once_per_run
+from phyblock.tables.measures import CELL
+from phyblock.tables.outcomes import FAILURES
+from phyblock.tracks.estimates import track_estimates
+from phyblock.tracks.full_planning.measures import NAME, is_asked
 
 __all__ = ["ASSEMBLY_COLUMNS", "assembly_frame", "headline_cells", "level_column", "table1_frame"]
 
@@ -17,23 +18,23 @@ _CELL = ("model", "track", "setting", "matcher", "criterion", "level")
 _GROUP = ("model", "track", "level")
 _PLURALS = {"parse_failure": "parse_failures", "api_error": "api_errors", "refusal": "refusals"}
 _OUTCOMES = {outcome: _PLURALS.get(outcome, outcome) for outcome in FAILURES}
+_SUMS = ("tp", "fp", "fn")
 _SPREAD = tuple(f"{metric}_{what}" for metric in METRICS for what in ("mean", "sd"))
-_COUNTS = ("n", *_OUTCOMES.values(), "tp", "fp", "fn", "seeds", "n_scenes", "n_clusters")
+_INTERVALS = tuple(f"{metric}_{end}" for metric in METRICS for end in ("lo", "hi", "se"))
+_COUNTS = ("n", *_OUTCOMES.values(), *_SUMS, "seeds", "n_scenes", "n_clusters")
 
 ASSEMBLY_COLUMNS = (
     *_CELL,
     "n",
     "expected",
     *_OUTCOMES.values(),
-    "tp",
-    "fp",
-    "fn",
+    *_SUMS,
     *METRICS,
     "seeds",
     *_SPREAD,
     "n_scenes",
     "n_clusters",
-    *INTERVALS,
+    *_INTERVALS,
     "seed_note",
 )
 """Columns of `assembly.csv`."""
@@ -41,37 +42,35 @@ ASSEMBLY_COLUMNS = (
 
 @once_per_run
 def assembly_frame(run: Run) -> pd.DataFrame:
-    """Every model, track, setting, matcher and level, in the suite's order, in `ASSEMBLY_COLUMNS`.
+    """Every model, setting, matcher and level, in the suite's order, in `ASSEMBLY_COLUMNS`.
 
     `n` samples are scored of `expected`; tp, fp, fn are sums over them and precision, recall, f1
     the micro averages in [0, 1], NaN where undefined. `*_mean` and `*_sd` (ddof = 1) are taken
     over the micro averages of the `seeds` single seeds; `*_lo`, `*_hi` bound a 95 % interval and
     `*_se` is its standard error, from resampling the `n_clusters` base scenes that the `n_scenes`
-    scenes were made from (see `intervals_frame`). A cell in which no sample has a reply has
+    scenes were made from (see `estimate_frame`). A cell in which no sample has a reply has
     counts, if the suite counts empty plans, but no metrics: nothing was measured. `matcher` is ""
     for a Level-1 criterion that knows none.
     """
-    scores = cell_scores(run)
+    keys = list(_CELL)
     frame = (
-        _cells(run.design)
-        .join(micro_averages(scores, _CELL), on=list(_CELL))
-        .join(_over_seeds(scores), on=list(_CELL))
+        _cells(run)
+        .join(_sums(run), on=keys)
+        .join(_estimates(run), on=keys)
         .join(_outcomes(run), on=list(_GROUP))
-        .join(intervals_frame(run), on=list(_CELL))
     )
-    measured = [*METRICS, *_SPREAD, *INTERVALS]
-    frame.loc[frame["replied"].fillna(0) == 0, measured] = np.nan
     frame[list(_COUNTS)] = frame[list(_COUNTS)].fillna(0).astype("int64")
     notes = _seed_notes(run)
     frame["seed_note"] = [notes.get(model, "") for model in frame["model"]]
     return frame[list(ASSEMBLY_COLUMNS)]
 
 
-def _cells(design: Design) -> pd.DataFrame:
+def _cells(run: Run) -> pd.DataFrame:
+    design = run.design
     rows = [
-        (model, track, setting, matcher, criterion, level, design.expected(level))
+        (model, NAME, setting, matcher, criterion, level, design.expected(level))
         for model in design.model_names
-        for track in design.tracks
+        if is_asked(run)
         for setting in design.suite.settings
         for level, criterion in ((level, design.criterion(level)) for level in design.levels)
         for matcher in design.matchers(criterion)
@@ -79,25 +78,31 @@ def _cells(design: Design) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*_CELL, "expected"])
 
 
-def _over_seeds(scores: pd.DataFrame) -> pd.DataFrame:
-    """Mean and sample standard deviation over seeds, and the number of seeds, by cell."""
-    by_seed = micro_averages(scores, [*_CELL, "seed"])
-    groups = by_seed.groupby(list(_CELL), sort=False)
-    parts: dict[str, pd.Series[float]] = {"seeds": groups.size().astype("float64")}
+def _sums(run: Run) -> pd.DataFrame:
+    groups = cell_scores(run).groupby(list(_CELL), sort=False)
+    summed = groups[list(_SUMS)].sum()
+    summed.insert(0, "n", groups.size())
+    return summed
+
+
+def _estimates(run: Run) -> pd.DataFrame:
+    """Metrics with spread and interval by cell."""
+    names = {"value": "", "mean": "_mean", "sd": "_sd", "lo": "_lo", "hi": "_hi", "se": "_se"}
+    found = track_estimates(run, NAME).rename(columns={CELL: "level"}).assign(track=NAME)
+    parts = []
     for metric in METRICS:
-        parts[f"{metric}_mean"] = groups[metric].mean()
-        parts[f"{metric}_sd"] = groups[metric].std(ddof=1)
-    return pd.DataFrame(parts)
+        mine = found[found["measure"] == metric].set_index(list(_CELL))
+        named = mine[list(names)].rename(columns={k: f"{metric}{end}" for k, end in names.items()})
+        parts.append(named.astype("float64"))
+    return pd.concat([*parts, mine[["seeds", "n_scenes", "n_clusters"]]], axis=1)
 
 
 def _outcomes(run: Run) -> pd.DataFrame:
-    """How many samples ended other than well, and had a reply, by model, track and level."""
+    """How many samples ended other than well, by model, track and level."""
     samples = run.records[["sample", "model", "track"]]
     for outcome, column in _OUTCOMES.items():
         samples = samples.assign(**{column: (run.records["outcome"] == outcome).astype("int64")})
-    samples["replied"] = (~run.records["outcome"].isin(WITHOUT_REPLY)).astype("int64")
-    counts = [*_OUTCOMES.values(), "replied"]
-    return with_levels(samples, run).groupby(list(_GROUP))[counts].sum()
+    return with_levels(samples, run).groupby(list(_GROUP))[list(_OUTCOMES.values())].sum()
 
 
 def _seed_notes(run: Run) -> dict[str, str]:
@@ -111,8 +116,8 @@ def table1_frame(run: Run) -> pd.DataFrame:
     """The paper's Table 1: one row a model, in percent, unrounded, NaN where undefined.
 
     Columns are `model`, then for each level `level1_precision`, `level1_recall`, `level1_f1`, ...
-    to `overall_f1`, from the headline matcher and setting on the first assembly track. With more
-    than one seed the values are means over seeds and `level1_precision_sd` etc. stand beside them.
+    to `overall_f1`, from the headline matcher and setting. With more than one seed the values are
+    means over seeds and `level1_precision_sd` etc. stand beside them.
     """
     design = run.design
     kinds = ("_mean", "_sd") if len(design.suite.seeds) > 1 else ("",)
@@ -130,10 +135,9 @@ def table1_frame(run: Run) -> pd.DataFrame:
 def headline_cells(
     assembly: pd.DataFrame, design: Design, *, matcher: str = "", setting: str = ""
 ) -> pd.DataFrame:
-    """One row a model and level: first track, one matcher and setting (the headline ones)."""
+    """One row a model and level, of one matcher and setting (the headline ones)."""
     return assembly[
-        assembly["track"].isin(design.tracks[:1])
-        & (assembly["setting"] == (setting or design.setting))
+        (assembly["setting"] == (setting or design.setting))
         & assembly["matcher"].isin(["", matcher or design.matcher])
     ]
 

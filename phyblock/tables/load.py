@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from phyblock.errors import Problem, StoreError
-from phyblock.report.design import Design, read_design
-from phyblock.report.flat import TEXTS, flat_record, flat_scores, frame_of
 from phyblock.run.reading import MANIFEST, RecordLines, read_manifest
+from phyblock.tables.design import Design, read_design
+from phyblock.tables.flat import TEXTS, flat_record, flat_scores, frame_of
 
 __all__ = ["Frames", "Run", "frames_of", "load_run", "once_per_run"]
 
@@ -42,7 +42,7 @@ class Run:
     records: pd.DataFrame = field(repr=False)
     scores: pd.DataFrame = field(repr=False)
     is_cut: bool = False
-    _made: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False, init=False)
+    made: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False, init=False)
 
 
 def once_per_run(make: Callable[[Run], pd.DataFrame]) -> Callable[[Run], pd.DataFrame]:
@@ -51,9 +51,9 @@ def once_per_run(make: Callable[[Run], pd.DataFrame]) -> Callable[[Run], pd.Data
     @functools.wraps(make)
     def made(run: Run) -> pd.DataFrame:
         name = f"{make.__module__}.{make.__qualname__}"
-        if name not in run._made:
-            run._made[name] = make(run)
-        return run._made[name].copy()
+        if name not in run.made:
+            run.made[name] = make(run)
+        return run.made[name].copy()
 
     return made
 

@@ -9,12 +9,26 @@ import numpy as np
 import pandas as pd
 
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
-from phyblock.report.comparison import published_table
-from phyblock.report.load import Run
-from phyblock.report.questions import CELLS, OVERALL_CELL, questions_frame, showing
-from phyblock.report.text_table import Column, TextTable, number, spread
+from phyblock.tables.headline import interval_frame, interval_view
+from phyblock.tables.load import Run
+from phyblock.tables.measures import CELL
+from phyblock.tables.paper_numbers import NOTHING, beside_view, interleaved, published_table
+from phyblock.tables.text_table import Column, TextTable, number, spread
+from phyblock.tracks.estimates import track_estimates
+from phyblock.tracks.vqa.accuracy import questions_frame
+from phyblock.tracks.vqa.answers import CELLS, OVERALL_CELL, showing
+from phyblock.tracks.vqa.measures import ACCURACY, ALL_CELLS, NAME, is_asked, subtask_cells
 
-__all__ = ["letters_view", "published_cells", "table2_frame", "table2_view"]
+__all__ = [
+    "letters_view",
+    "paper_table2_frame",
+    "paper_table2_view",
+    "published_cells",
+    "table2_frame",
+    "table2_view",
+    "vqa_intervals",
+    "vqa_intervals_view",
+]
 
 OURS, PUBLISHED = "run", "published"
 _MODEL = Column("Model", is_text=True)
@@ -147,7 +161,7 @@ def _notes(table: pd.DataFrame, run: Run) -> list[str]:
         notes += _unanswered_notes(whole)
     asked = frame[(frame["cell"].isin(SUBTASKS)) & (frame["expected"] > 0)]
     if asked["cell"].nunique() < len(SUBTASKS):
-        notes.append("A mean of which a part was not asked has no value.")
+        notes.append("Means are over the subtasks that were asked.")
     if (table["source"] == PUBLISHED).any():
         notes.append("The published numbers are of the paper's own questions, which differ.")
     return [*notes, _AVERAGES_NOTE]
@@ -168,3 +182,42 @@ def _unanswered_notes(whole: pd.DataFrame) -> list[str]:
         f"{model} {count}" for model, count in zip(whole["model"], unanswered, strict=True) if count
     ]
     return [f"Without a reply, counted as wrong: {', '.join(listed)}."] if listed else []
+
+
+def paper_table2_frame(run: Run) -> pd.DataFrame:
+    """Accuracies by subtask, category and overall beside the paper's Table 2."""
+    if not is_asked(run):
+        return NOTHING
+    table = interleaved(table2_frame(run), CELLS)
+    asked = {cell.name: len(cell.of) for cell in subtask_cells(run)}
+    whole = {cell.name: len(cell.of) for cell in ALL_CELLS}
+    # A mean over a part of what the paper averages is not the same number.
+    partly = table["cell"].map(asked) != table["cell"].map(whole)
+    table.loc[partly, ["ours", "difference"]] = np.nan
+    return table
+
+
+def paper_table2_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Out of `paper_table2_frame`."""
+    note = (
+        "Averages are unweighted means. The questions are our own: the paper's are not published."
+    )
+    names = {**dict.fromkeys(CATEGORIES, "Avg"), "overall": "Overall"}
+    return beside_view(table, run, number_in_paper=2, names=names, note=note)
+
+
+def vqa_intervals(run: Run) -> pd.DataFrame:
+    """One row a model and cell of Table 2: value, lo, hi, se [%], n, n_scenes, n_clusters."""
+    found = track_estimates(run, NAME)
+    found = found[found["measure"] == ACCURACY.name]
+    table = interval_frame(found, run.design, ACCURACY.scale, [CELL])
+    place = {name: number for number, name in enumerate(CELLS)}
+    order = table.assign(m=pd.factorize(table["model"])[0], c=table[CELL].map(place))
+    table = table.loc[order.sort_values(["m", "c"], kind="stable").index]
+    return table.drop(columns="seeds").reset_index(drop=True)
+
+
+def vqa_intervals_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """The averages of `vqa_intervals`."""
+    wanted = [cell for cell in (*CATEGORIES, OVERALL_CELL) if cell in set(table[CELL])]
+    return interval_view(table, run, wanted, "Right answers")

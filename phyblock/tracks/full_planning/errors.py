@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pandas as pd
 
-from phyblock.report.cells import with_levels
-from phyblock.report.load import Run
 from phyblock.scoring import ERROR_TYPES
+from phyblock.tables.cells import with_levels
+from phyblock.tables.load import Run
+from phyblock.tracks.full_planning.measures import NAME
 
 __all__ = ["errors_frame"]
 
@@ -14,12 +15,12 @@ __all__ = ["errors_frame"]
 def errors_frame(run: Run) -> pd.DataFrame:
     """One row a model and level: n, wrong_steps, and each type's count and share.
 
-    Criterion `aov` at every level, headline matcher and setting, first assembly track. Shares are
+    Criterion `aov` at every level, headline matcher and setting. Shares are
     of all wrong steps, in [0, 1], NaN where no step was wrong.
     """
     design = run.design
     scores = run.scores[
-        run.scores["track"].isin(design.tracks[:1])
+        (run.scores["track"] == NAME)
         & (run.scores["criterion"] == "aov")
         & (run.scores["setting"] == design.setting)
         & (run.scores["matcher"] == design.matcher)

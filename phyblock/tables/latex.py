@@ -9,7 +9,7 @@ import itertools
 import re
 from collections.abc import Iterable
 
-from phyblock.report.text_table import NO_VALUE, SPREAD, Column, TextTable
+from phyblock.tables.text_table import NO_VALUE, SPREAD, Column, TextTable
 
 __all__ = ["escape", "to_latex"]
 

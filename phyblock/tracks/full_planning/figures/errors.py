@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from phyblock.report.design import OVERALL
-from phyblock.report.errors import errors_frame
-from phyblock.report.figures.levels import how_measured, ranked
-from phyblock.report.figures.style import COLORS, MUTED, bare_axes, headed, new_figure
-from phyblock.report.load import Run
-from phyblock.report.seeds import intervals_table
-from phyblock.report.views import ERROR_NAMES
 from phyblock.scoring import ERROR_TYPES
+from phyblock.tables.design import OVERALL
+from phyblock.tables.drawing import COLORS, MUTED, bare_axes, headed, new_figure
+from phyblock.tables.load import Run
+from phyblock.tracks.full_planning.errors import errors_frame
+from phyblock.tracks.full_planning.figures.levels import how_measured, ranked
+from phyblock.tracks.full_planning.seeds import intervals_table
+from phyblock.tracks.full_planning.views import ERROR_NAMES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

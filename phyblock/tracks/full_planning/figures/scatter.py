@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from phyblock.report.cost import cost_frame
-from phyblock.report.design import OVERALL
-from phyblock.report.figures.levels import how_measured
-from phyblock.report.figures.style import ACCENT, INK, MUTED, PALE, bare_axes, headed, new_figure
-from phyblock.report.load import Run
-from phyblock.report.seeds import intervals_table
+from phyblock.tables.cost import cost_frame
+from phyblock.tables.design import OVERALL
+from phyblock.tables.drawing import ACCENT, INK, MUTED, PALE, bare_axes, headed, new_figure
+from phyblock.tables.load import Run
+from phyblock.tracks.full_planning.figures.levels import how_measured
+from phyblock.tracks.full_planning.measures import NAME
+from phyblock.tracks.full_planning.seeds import intervals_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +36,7 @@ def f1_by_size(run: Run) -> Figure | None:
 def f1_by_cost(run: Run) -> Figure | None:
     """F1 against dollars for 100 replies; None where no model's replies cost anything known."""
     table = cost_frame(run)
-    table = table[table["track"].isin(run.design.tracks[:1])]
+    table = table[table["track"] == NAME]
     prices = dict(zip(table["model"], table["cost_per_100_usd"], strict=True))
     return _scatter(run, prices, "F1 by cost", ("cost", "Cost of 100 replies (USD, log scale)"))
 

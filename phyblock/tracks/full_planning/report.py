@@ -1,0 +1,104 @@
+"""What full planning brings to the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from phyblock.errors import Problem, SpecError
+from phyblock.tables.cells import METRICS
+from phyblock.tables.design import OVERALL
+from phyblock.tables.load import Run
+from phyblock.tables.paper_numbers import published_table
+from phyblock.tables.track_report import PaperTable, Shown, TableMaker, TrackReport
+from phyblock.tracks.full_planning.assembly import assembly_frame, table1_frame
+from phyblock.tracks.full_planning.errors import errors_frame
+from phyblock.tracks.full_planning.figures.errors import error_bars
+from phyblock.tracks.full_planning.figures.levels import f1_radar, settings_dots
+from phyblock.tracks.full_planning.figures.scatter import f1_by_cost, f1_by_size
+from phyblock.tracks.full_planning.measures import PLANNING_MEASURES, level_cells
+from phyblock.tracks.full_planning.published import published_frame
+from phyblock.tracks.full_planning.seeds import (
+    intervals_table,
+    intervals_view,
+    paper_table5_frame,
+    paper_table5_view,
+    table5_frame,
+    table5_view,
+)
+from phyblock.tracks.full_planning.settings import settings_frame, settings_view
+from phyblock.tracks.full_planning.views import errors_view, published_view, table1_view
+
+__all__ = ["REPORT"]
+
+_MAIN = "Overall F1"
+_HUMAN_ACCURACY = 94.7
+"""Human experts [%]: 378.83 points on 400 tasks of planning and VQA (paper, appendix)."""
+
+
+def _headline(run: Run) -> tuple[Shown, ...]:
+    levels = [
+        Shown("f1", level, _MAIN if level == OVERALL else f"Level {level}", "")
+        for level in run.design.levels
+    ]
+    sides = [Shown(name, OVERALL, name.capitalize()) for name in METRICS[:2]]
+    return (*levels, *sides)
+
+
+def _references(run: Run) -> Mapping[str, Mapping[str, float]]:
+    printed = published_table(1)
+    printed = printed[printed["model"] == "Random"].set_index(["level", "metric"])["value"]
+    random = {
+        column.heading: float(printed.get((column.cell, column.measure), float("nan")))
+        for column in _headline(run)
+    }
+    return {"Random, published": random}
+
+
+def _notes(run: Run) -> Sequence[str]:
+    return (f"F1 in percent, setting {run.design.setting}, matcher {run.design.matcher}.",)
+
+
+def _check_alike(run: Run, first: Run, levels: Sequence[str]) -> None:
+    suite, wanted = run.design.suite, first.design
+    needed: list[tuple[str, Sequence[str], str]] = [
+        ("settings", suite.settings, wanted.setting),
+        ("scoring.matchers", suite.scoring.matchers, wanted.matcher),
+    ]
+    known = ("aov", suite.scoring.level1)
+    needed += [("scoring.level1", known, wanted.criterion(level)) for level in levels]
+    for what, names, name in needed:
+        if name not in names:
+            hint = "phyblock score reads stored replies again under other rules"
+            message = f"was not scored as {first.path} was, by {name}"
+            raise SpecError(Problem(str(run.path), message, what, ", ".join(names), hint=hint))
+
+
+REPORT = TrackReport(
+    measures=PLANNING_MEASURES,
+    cells=level_cells,
+    headline=_headline,
+    main=_MAIN,
+    references=_references,
+    notes=_notes,
+    tables={
+        "assembly": TableMaker(assembly_frame),
+        "table1": TableMaker(table1_frame, table1_view),
+        "intervals": TableMaker(intervals_table, intervals_view, "table1"),
+        "table5": TableMaker(table5_frame, table5_view, "table1"),
+        "settings": TableMaker(settings_frame, settings_view, "table1"),
+        "errors": TableMaker(errors_frame, errors_view),
+        "published": TableMaker(published_frame, published_view),
+    },
+    figures={
+        "f1-radar": f1_radar,
+        "settings": settings_dots,
+        "error-types": error_bars,
+        "f1-size": f1_by_size,
+        "f1-cost": f1_by_cost,
+    },
+    paper_tables={
+        1: PaperTable(published_frame, published_view),
+        5: PaperTable(paper_table5_frame, paper_table5_view),
+    },
+    check_alike=_check_alike,
+)

@@ -1,0 +1,72 @@
+"""What questions bring to the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from phyblock.domain import CATEGORIES
+from phyblock.errors import Problem, SpecError
+from phyblock.tables.load import Run
+from phyblock.tables.track_report import PaperTable, Shown, TableMaker, TrackReport
+from phyblock.tracks.vqa.accuracy import questions_frame
+from phyblock.tracks.vqa.answers import OVERALL_CELL, letters_frame, showing
+from phyblock.tracks.vqa.figure import vqa_heat_map
+from phyblock.tracks.vqa.measures import ACCURACY, CATEGORY_NAMES, NAME, VQA_MEASURES, subtask_cells
+from phyblock.tracks.vqa.table2 import (
+    letters_view,
+    paper_table2_frame,
+    paper_table2_view,
+    published_cells,
+    table2_frame,
+    table2_view,
+    vqa_intervals,
+    vqa_intervals_view,
+)
+
+__all__ = ["REPORT"]
+
+_COLUMNS = (
+    *(Shown(ACCURACY.name, name, CATEGORY_NAMES[name]) for name in CATEGORIES),
+    Shown(ACCURACY.name, OVERALL_CELL, "Overall"),
+)
+
+
+def _references(_: Run) -> Mapping[str, Mapping[str, float]]:
+    printed = published_cells("Random")
+    return {"Random, published": {column.heading: printed[column.cell] for column in _COLUMNS}}
+
+
+def _notes(_: Run) -> Sequence[str]:
+    macro = "A category is the unweighted mean of its four subtasks, overall that of the categories"
+    return (f"Accuracy in percent. {macro}.",)
+
+
+def _check_alike(run: Run, first: Run, _: Sequence[str]) -> None:
+    circular = [showing(one).circular for one in (run, first)]
+    if circular[0] != circular[1]:
+        found, allowed = (str(one).lower() for one in circular)
+        message = f"counts right answers in another way than {first.path}"
+        raise SpecError(Problem(str(run.path), message, "vqa.circular", found, allowed))
+    # Digests of the sets that questions were chosen from.
+    sets = [one.manifest.get("tracks", {}).get(NAME, {}).get("questions") for one in (run, first)]
+    if sets[0] != sets[1]:
+        message = f"asked questions of another set than {first.path}"
+        raise SpecError(Problem(str(run.path), message, "questions", str(sets[0]), str(sets[1])))
+
+
+REPORT = TrackReport(
+    measures=VQA_MEASURES,
+    cells=subtask_cells,
+    headline=lambda _: _COLUMNS,
+    references=_references,
+    notes=_notes,
+    tables={
+        "table2": TableMaker(table2_frame, table2_view),
+        "vqa_intervals": TableMaker(vqa_intervals, vqa_intervals_view, "table2"),
+        "letters": TableMaker(letters_frame, letters_view, "table2"),
+        "questions": TableMaker(questions_frame, None, "table2"),
+    },
+    figures={"vqa-subtasks": vqa_heat_map},
+    paper_tables={2: PaperTable(paper_table2_frame, paper_table2_view)},
+    check_alike=_check_alike,
+)
