@@ -43,6 +43,14 @@ class TrackWords(Protocol):
         """What suites and records call it."""
 
     @property
+    def title(self) -> str:
+        """What people read in the place of the name."""
+
+    @property
+    def plays(self) -> bool:
+        """Whether a sample is an episode of several turns."""
+
+    @property
     def about(self) -> str:
         """What it asks, for the documentation of suites."""
 
@@ -65,6 +73,10 @@ class TrackWords(Protocol):
     @property
     def prompt_field(self) -> tuple[str, ...]:
         """Where a suite names its prompt, as a path of keys."""
+
+    @property
+    def record(self) -> type[Any] | None:
+        """The model of its records; None for one that adds nothing to them."""
 
     def data_folder(self, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:
         """The folder of its own data as a suite says it: text, path of keys, may be bundled."""

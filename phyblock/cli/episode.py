@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -13,17 +12,18 @@ from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.files import atomic_write
+from phyblock.records import MANIFEST, RECORDS, read_manifest
+from phyblock.records.reading import newest_starts, run_records
 from phyblock.run.data import open_dataset
-from phyblock.run.reading import RECORDS, read_manifest, read_records
 from phyblock.sim import PictureStyle
 from phyblock.sim.film import FilmStep, Tone, episode_gif, episode_images, episode_sheet
 from phyblock.sim.site import settle
 from phyblock.tables.text_table import Column, TextTable
+from phyblock.tracks.step_planning.record import EpisodeRecord, EpisodeTurn
 from phyblock.tracks.step_planning.table3 import ENDING_NAMES
 
 __all__ = ["command"]
 
-_TRACK = "step_planning"
 _SIZE_PX = 256
 _NAMED = 5
 """Episodes that a message names when it is unclear which one is meant."""
@@ -68,90 +68,92 @@ def command(
             console.print(f"{len(images)} frames in {shown_path(path)}", markup=False)
 
 
-def _find(run: Path, sample: str) -> dict[str, Any]:
+def _find(run: Path, sample: str) -> EpisodeRecord:
     """The one episode that `sample` means; StoreError with the others when there is not one."""
-    read_manifest(run)
-    episodes = {k: r for k, r in read_records(run).items() if r["track"] == _TRACK}
+    lines = run_records(run)
+    starts = newest_starts(lines, EpisodeRecord)
+    episodes = list(starts)
     if not episodes:
         hint = "phyblock run steps makes runs with episodes"
         message = "holds no episodes of step planning"
         raise StoreError(Problem(str(run / RECORDS), message, hint=hint))
     found = [sample] if sample in episodes else [name for name in episodes if sample in name]
     if len(found) == 1:
-        return episodes[found[0]]
+        return next(r for r in lines.at([starts[found[0]]]) if isinstance(r, EpisodeRecord))
     message = "holds no such episode" if not found else f"holds {len(found)} such episodes"
-    offered = found or list(episodes)
+    offered = found or episodes
     more = [f"and {len(offered) - _NAMED} more"] if len(offered) > _NAMED else []
     allowed = ", ".join([*offered[:_NAMED], *more])
     problem = Problem(str(run / RECORDS), message, "sample", sample, allowed)
     raise StoreError(problem)
 
 
-def _task(run: Path, record: Mapping[str, Any], data: Path | None) -> AssemblyTask:
-    about = read_manifest(run)["dataset"]
-    root = data or Path(about["root"])
+def _task(run: Path, record: EpisodeRecord, data: Path | None) -> AssemblyTask:
+    about = read_manifest(run).dataset
     hint = "name the folder where it is now with --data"
+    if about is None:
+        raise StoreError(Problem(str(run / MANIFEST), "names no data set", "dataset"))
+    root = data or Path(about.root)
     if not root.is_dir():
         raise DataError(Problem(str(root), "the data set of the run is not there", hint=hint))
-    tasks = {task.scene.id: task for task in open_dataset(about["format"], root).tasks}
-    if record["scene"] not in tasks:
+    tasks = {task.scene.id: task for task in open_dataset(about.format, root).tasks}
+    if record.scene not in tasks:
         message = "holds no such scene"
-        raise DataError(Problem(str(root), message, "scene", record["scene"], hint=hint))
-    return tasks[record["scene"]]
+        raise DataError(Problem(str(root), message, "scene", record.scene, hint=hint))
+    return tasks[record.scene]
 
 
-def _steps(record: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The turns that a step was taken with: one of each vote."""
-    return [turn for turn in record["turns"] if turn["outcome"] is not None]
-
-
-def _operation(turn: Mapping[str, Any]) -> str:
-    move = turn["parse"]["move"]
+def _operation(turn: EpisodeTurn) -> str:
+    move = turn.parse.move
     if move is None:
         return "(no operation)"
     return "Done" if move == "Done" else f"Move({move})"
 
 
-def _as_text(record: Mapping[str, Any]) -> TextTable:
+def _as_text(record: EpisodeRecord) -> TextTable:
     columns = ("Step", "Operation", "Outcome", "Rule", "Placed")
     rows = tuple(
         (
-            str(turn["step"]),
+            str(turn.step),
             _operation(turn),
-            turn["outcome"].replace("_", " "),
-            (turn["parse"]["rule"] or "none").replace("_", " "),
-            f"{len(turn['world'])} of {record['n_blocks']}",
+            _words(turn.outcome),
+            _words(turn.parse.rule),
+            f"{len(turn.world)} of {record.n_blocks}",
         )
-        for turn in _steps(record)
+        for turn in record.steps
     )
     return TextTable(
-        f"{record['sample']}: {_ending(record)}",
+        f"{record.sample}: {_ending(record)}",
         tuple(Column(name, is_text=name not in ("Step", "Placed")) for name in columns),
         rows,
     )
 
 
-def _film(record: Mapping[str, Any], task: AssemblyTask) -> Iterator[FilmStep]:
+def _words(name: str | None) -> str:
+    return (name or "none").replace("_", " ")
+
+
+def _film(record: EpisodeRecord, task: AssemblyTask) -> Iterator[FilmStep]:
     """A frame for the empty ground, one a step, and one for how it ended."""
-    yield FilmStep(f"{record['model']}, {task.scene.id}", "plain", None, ())
+    yield FilmStep(f"{record.model}, {task.scene.id}", "plain", None, ())
     blocks: tuple[Block, ...] = ()
-    for turn in _steps(record):
-        blocks = tuple(task.scene.blocks[vertex] for vertex in turn["world"])
-        tone: Tone = {"placed": "good", "done": "plain"}.get(turn["outcome"], "bad")  # type: ignore[assignment]
-        told = turn["outcome"].replace("_", " ")
-        move = turn["parse"]["move"]
-        caption = f"{turn['step']}. {_operation(turn)}" + ("" if told == "done" else f": {told}")
+    for turn in record.steps:
+        blocks = tuple(task.scene.blocks[vertex] for vertex in turn.world)
+        tone: Tone = {"placed": "good", "done": "plain"}.get(turn.outcome or "", "bad")  # type: ignore[assignment]
+        told = _words(turn.outcome)
+        move = turn.parse.move
+        caption = f"{turn.step}. {_operation(turn)}" + ("" if told == "done" else f": {told}")
         yield FilmStep(caption, tone, move if isinstance(move, int) else None, blocks)
-    if record["ending"] == "collapsed":
+    if record.ending == "collapsed":
         blocks = settle(blocks).blocks
-    tone = "good" if record["ending"] == "completed" else "bad"
-    placed = record["progress"][-1] if record["progress"] else 0
-    caption = f"{_ending(record)}: {placed} of {record['n_blocks']} blocks"
+    tone = "good" if record.ending == "completed" else "bad"
+    placed = record.progress[-1] if record.progress else 0
+    caption = f"{_ending(record)}: {placed} of {record.n_blocks} blocks"
     yield FilmStep(caption, tone, None, blocks)
 
 
-def _ending(record: Mapping[str, Any]) -> str:
-    return ENDING_NAMES[record["ending"]]
+def _ending(record: EpisodeRecord) -> str:
+    return ENDING_NAMES[record.ending]
 
 
 def _write(path: Path, data: bytes) -> None:

@@ -22,6 +22,7 @@ from phyblock.run.events import (
     SampleDone,
     Stopping,
 )
+from phyblock.run.standing import Summary
 
 __all__ = ["ProgressView"]
 
@@ -62,13 +63,13 @@ class ProgressView:
     def __call__(self, event: RunEvent) -> None:
         """Take note of an event."""
         if isinstance(event, SampleDone):
-            self._tallies[event.record["model"]].add(event.record, fresh=True)
+            self._tallies[event.record.model].add(Summary.of(event.record), fresh=True)
             self._plain_line()
         elif isinstance(event, RunStarted):
             self._tallies = {name: Tally(n) for name, n in event.expected.items()}
-            for name, records in event.earlier.items():
-                for record in records:
-                    self._tallies[name].add(record, fresh=False)
+            for name, samples in event.earlier.items():
+                for sample in samples:
+                    self._tallies[name].add(sample, fresh=False)
         elif isinstance(event, ModelNotice):
             tally = self._tallies[event.model]
             tally.retries += event.kind == "retry"

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from phyblock import report
 from phyblock.cli.console import print_view, shown_path
 from phyblock.cli.layout import width_of
 from phyblock.tables.outcomes import HEADINGS
 from phyblock.tables.text_table import NO_VALUE, number
+from phyblock.tracks.full_planning.published import comparison_notes, largest_differences
 
 if TYPE_CHECKING:
     from phyblock.report import TablesWritten, TextTable
@@ -103,7 +103,7 @@ def _print_failures(console: Console, written: TablesWritten) -> None:
 
 def _print_comparison(console: Console, written: TablesWritten) -> None:
     frame = written.frames["published"]
-    largest = report.largest_differences(frame)
+    largest = largest_differences(frame)
     cells = Counter(frame.dropna(subset=["difference"])["model"])
     width = max(map(len, largest.index), default=0)
     console.print("Beside the paper's Table 1: largest difference in points", style="bold")
@@ -113,7 +113,7 @@ def _print_comparison(console: Console, written: TablesWritten) -> None:
         console.print(
             f"{name:<{width}}  {number(points, 3):>7}  {cells[name]} cells, {mark}", markup=False
         )
-    for note in report.comparison_notes(frame, written.run.design):
+    for note in comparison_notes(frame, written.run.design):
         console.print(note, markup=False, soft_wrap=True)
     console.print()
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from phyblock.report import NO_VALUE
-from phyblock.run.records import paid_usd
+from phyblock.run.standing import Summary
 from phyblock.scoring import Counts
 from phyblock.tables.outcomes import FAILURES
 
@@ -30,25 +28,21 @@ class Tally:
     failures: dict[str, int] = field(default_factory=dict)
     notice: str = ""
 
-    def add(self, record: Mapping[str, Any], *, fresh: bool) -> None:
-        """Count one record; `fresh` ones were written by this command."""
+    def add(self, sample: Summary, *, fresh: bool) -> None:
+        """Count one sample; `fresh` ones were written by this command."""
         self.done += 1
         self.fresh += fresh
-        outcome = record["outcome"]
+        outcome = sample.outcome
         if outcome in FAILURES:
             self.failures[outcome] = self.failures.get(outcome, 0) + 1
-        headline = next((s for s in record["scores"] if s["criterion"] == "aov"), None)
-        if headline is not None:
-            self.counts += Counts(headline["tp"], headline["fp"], headline["fn"])
-        reply = record["reply"]
-        if reply is None:
+        if sample.counts is not None:
+            self.counts += sample.counts
+        if sample.cached is None:
             return
-        self.cached += reply["cached"]
-        usage = reply["usage"]
-        self.tokens += (usage["prompt_tokens"] or 0) + (usage["completion_tokens"] or 0)
-        paid = paid_usd(record)
-        self.unpriced += paid is None
-        self.cost_usd += paid or 0.0
+        self.cached += sample.cached
+        self.tokens += sample.tokens
+        self.unpriced += sample.paid_usd is None
+        self.cost_usd += sample.paid_usd or 0.0
 
     @property
     def cost_text(self) -> str:

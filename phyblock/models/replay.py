@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from phyblock.errors import DataError, Problem, RefusedError, SampleError
-from phyblock.models.base import Reply, Request, Usage
+from phyblock.models.base import Reply, Request
 from phyblock.models.config import ModelConfig
 from phyblock.models.raw_replies import RawReply, read_raw_reply
+from phyblock.models.stored import reply_of
+from phyblock.records import RECORDS, Recorded, RecordedLines
 
 __all__ = ["ReplayModel", "open_replay"]
-
-RECORDS = "records.jsonl"
 
 
 class ReplayModel:
@@ -68,15 +68,13 @@ class RunReplayModel:
         record = self._records.get((request.key, request.seed))
         if record is None:
             return None
-        error = record.get("error")
-        if isinstance(error, dict) and error.get("kind") in ("sample", "refused"):
-            cls = RefusedError if error["kind"] == "refused" else SampleError
-            raise cls(str(error.get("message")), status=error.get("status"))
-        reply = record.get("reply")
-        if not isinstance(reply, dict):
+        error = record.error
+        if error is not None and error.kind in ("sample", "refused"):
+            cls = RefusedError if error.kind == "refused" else SampleError
+            raise cls(error.message, status=error.status)
+        if record.reply is None:
             return None
-        kept = {**reply, "usage": Usage(**reply.get("usage") or {})}
-        return Reply(**{**kept, "cost_usd": 0.0, "attempts": 0, "cached": False})
+        return replace(reply_of(record.reply), cost_usd=0.0, attempts=0, cached=False)
 
     async def aclose(self) -> None:
         """Nothing is held open."""
@@ -124,23 +122,15 @@ def _read_json(path: Path) -> object:
         raise DataError(Problem(where, f"is not JSON: {error}")) from error
 
 
-def _read_records(path: Path, model: str) -> dict[tuple[str, int], dict[str, Any]]:
+def _read_records(path: Path, model: str) -> dict[tuple[str, int], Recorded]:
     """Records of one model by key and seed; the last one counts where a sample has several.
 
     An unfinished last line, which a killed run leaves, is not there yet. A run of one model is
     that model's whatever its name.
     """
-    found: dict[str, dict[tuple[str, int], dict[str, Any]]] = {}
-    for number, line in enumerate(path.read_bytes().split(b"\n")[:-1], 1):
-        where = f"{path}:{number}"
-        try:
-            record = json.loads(line)
-            by_sample = found.setdefault(record["model"], {})
-            by_sample[str(record["key"]), record["seed"]] = record
-        except ValueError as error:
-            raise DataError(Problem(where, f"is not a record: {error}")) from error
-        except (KeyError, TypeError) as error:
-            raise DataError(Problem(where, f"is not a record: lacks {error}")) from error
+    found: dict[str, dict[tuple[str, int], Recorded]] = {}
+    for _, record in RecordedLines(path):
+        found.setdefault(record.model, {})[record.key, record.seed] = record
     if model in found:
         return found[model]
     if len(found) == 1:

@@ -1,4 +1,4 @@
-"""Stored records as data frames, and tables as CSV, Markdown and LaTeX; nothing is re-scored.
+"""A run as tables, figures and a page; nothing is re-scored.
 
 Names are imported when they are first used: pandas takes longer to import than most commands run.
 """
@@ -18,37 +18,19 @@ if TYPE_CHECKING:
     from phyblock.tables.latex import to_latex
     from phyblock.tables.load import Run, load_run
     from phyblock.tables.markdown import to_markdown
-    from phyblock.tracks.full_planning.assembly import (
-        ASSEMBLY_COLUMNS,
-        assembly_frame,
-        table1_frame,
-    )
-    from phyblock.tracks.full_planning.errors import errors_frame
-    from phyblock.tracks.full_planning.published import (
-        comparison_notes,
-        largest_differences,
-        published_frame,
-        published_table,
-    )
+    from phyblock.tables.paper_numbers import published_table
 
 __all__ = [
-    "ASSEMBLY_COLUMNS",
     "NO_VALUE",
     "Column",
     "Design",
     "Run",
     "TablesWritten",
     "TextTable",
-    "assembly_frame",
-    "comparison_notes",
     "coverage_frame",
-    "errors_frame",
-    "largest_differences",
     "load_run",
-    "published_frame",
     "published_table",
     "read_design",
-    "table1_frame",
     "to_latex",
     "to_markdown",
     "write_report",
@@ -56,28 +38,21 @@ __all__ = [
 ]
 
 _HOMES = {
-    "ASSEMBLY_COLUMNS": "assembly",
-    "assembly_frame": "assembly",
-    "table1_frame": "assembly",
-    "comparison_notes": "comparison",
-    "largest_differences": "comparison",
-    "published_frame": "comparison",
-    "published_table": "comparison",
-    "coverage_frame": "coverage",
-    "Design": "design",
-    "read_design": "design",
-    "errors_frame": "errors",
-    "to_latex": "latex",
-    "Run": "load",
-    "load_run": "load",
-    "to_markdown": "markdown",
-    "TablesWritten": "write",
-    "write_report": "html",
-    "write_tables": "write",
+    "coverage_frame": "tables.coverage",
+    "Design": "tables.design",
+    "read_design": "tables.design",
+    "to_latex": "tables.latex",
+    "Run": "tables.load",
+    "load_run": "tables.load",
+    "to_markdown": "tables.markdown",
+    "published_table": "tables.paper_numbers",
+    "TablesWritten": "report.write",
+    "write_report": "report.html",
+    "write_tables": "report.write",
 }
 
 
 def __getattr__(name: str) -> object:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return getattr(importlib.import_module(f"phyblock.{_HOMES[name]}"), name)

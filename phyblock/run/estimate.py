@@ -20,11 +20,10 @@ from phyblock.models import (
     reply_key,
 )
 from phyblock.models import estimate as estimate_call
+from phyblock.records.reading import run_records
 from phyblock.resources import reply_cache_file
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
-from phyblock.run.reading import read_records
-from phyblock.run.records import is_final
 from phyblock.run.samples import Sample
 from phyblock.run.store import holds_run
 
@@ -66,8 +65,7 @@ class Estimate:
 
 def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
     """Estimates in the order of the plan's models; StoreError for the folder of another run."""
-    earlier = read_records(folder) if holds_run(folder, plan.manifest) else {}
-    settled = {sample for sample, record in earlier.items() if is_final(record)}
+    settled = _settled(plan, folder) if holds_run(folder, plan.manifest) else set()
     path = reply_cache_file()
     with ReplyCache(path) if use_cache and path.exists() else nullcontext() as cache:
         rows = [
@@ -81,6 +79,15 @@ def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
                     sample = partial(Sample, track, model.name, item)
                     _add(row, plan, model, sample, outlines, settled, cache)
     return rows
+
+
+def _settled(plan: RunPlan, folder: Path) -> set[str]:
+    """Samples whose newest record is final."""
+    newest = {
+        record.sample: record.is_final
+        for _, record in run_records(folder, plan.manifest, plan.sample_ids())
+    }
+    return {sample for sample, is_final in newest.items() if is_final}
 
 
 def _add(

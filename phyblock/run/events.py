@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+
+from phyblock.records import Record
+from phyblock.run.standing import Summary
 
 __all__ = [
     "ModelNotice",
@@ -19,17 +21,17 @@ __all__ = [
 
 @dataclass(frozen=True)
 class RunStarted:
-    """Samples in all, and the final records already on disk, by model."""
+    """Samples in all, and the final records already on disk summed up, by model."""
 
     expected: Mapping[str, int]
-    earlier: Mapping[str, tuple[Mapping[str, Any], ...]]
+    earlier: Mapping[str, tuple[Summary, ...]]
 
 
 @dataclass(frozen=True)
 class SampleDone:
     """A record was written."""
 
-    record: Mapping[str, Any]
+    record: Record
 
 
 @dataclass(frozen=True)

@@ -10,16 +10,14 @@ import asyncio
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from phyblock.errors import BudgetReachedError, PhyblockError, UnavailableError
 from phyblock.models import Halt, HaltedError, Model
 from phyblock.run.events import ModelStopped, SampleDone, Stopping, Watcher
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
-from phyblock.run.reading import read_turns
-from phyblock.run.records import is_answered, is_final
 from phyblock.run.samples import Sample, SampleRunner
+from phyblock.run.standing import Summary
 from phyblock.run.store import RunStore
 from phyblock.run.writer import RecordWriter
 
@@ -47,7 +45,7 @@ class RunResult:
 class Executor:
     """Asks every model about every sample that has no final record yet.
 
-    `settled` are the records of those that had one from the start, by sample.
+    `settled` sums up those that had one from the start, by sample.
     """
 
     INTERRUPTED = "interrupted"
@@ -59,25 +57,28 @@ class Executor:
         models: Mapping[str, Model],
         watch: Watcher,
         halt: Halt,
-        earlier: Mapping[str, Mapping[str, Any]],
         *,
         retry_failed: bool = False,
     ) -> None:
-        """`halt` is the switch that `models` were built with; `earlier` are the records that are
-        there, by sample; `retry_failed` asks again also where a request was rejected for good.
+        """`halt` is the switch that `models` were built with; `retry_failed` asks again also where
+        a request was rejected for good.
         """
-        is_settled = is_answered if retry_failed else is_final
-        self.settled = {sample: record for sample, record in earlier.items() if is_settled(record)}
+        self.settled: Mapping[str, Summary] = {
+            sample: summary
+            for sample, summary in store.standing.samples.items()
+            if (summary.is_answered if retry_failed else summary.is_final)
+        }
         self._plan = plan
         self._writer = RecordWriter(store.records)
         self._turns = RecordWriter(store.turns)
-        begun = read_turns(store.folder, self.settled) if plan.has_episodes else {}
-        self._samples = SampleRunner(self._turns, store.prompts, halt, begun)
+        begun = store.turns_of_others(self.settled) if plan.has_episodes else {}
+        run = plan.manifest.run
+        self._samples = SampleRunner(self._turns, store.prompts, halt, begun, run)
         self._models = models
         self._watch = watch
         self._halt = halt
         self.result = RunResult(plan.samples_per_model * len(plan.models))
-        self.result.failed = sum(not is_answered(record) for record in self.settled.values())
+        self.result.failed = sum(not summary.is_answered for summary in self.settled.values())
         self._in_flight = 0
         self._failure: PhyblockError | None = None
 
@@ -143,8 +144,8 @@ class Executor:
         model = self._models[planned.name]
         record = await self._samples.record(sample, model, planned.config.params)
         await self._writer.put(record)
-        self.result.settled += is_final(record)
-        self.result.failed += is_final(record) and not is_answered(record)
+        self.result.settled += record.is_final
+        self.result.failed += record.is_final and not record.is_answered
         self._watch(SampleDone(record))
 
     def _stop_model(self, name: str, reason: str) -> None:

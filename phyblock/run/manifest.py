@@ -11,13 +11,13 @@ from importlib.metadata import version
 from typing import Any
 
 from phyblock.datasets import Dataset
+from phyblock.records import FORMAT, Manifest
 from phyblock.run.models import PlannedModel
 from phyblock.specs import LoadedSuite
 from phyblock.tracks import AnyTrack, kind_of
 
 __all__ = ["make_manifest"]
 
-_FORMAT = 1
 _LIBRARIES = ("phyblock", "litellm", "pybullet", "numpy", "pillow", "jinja2")
 
 
@@ -27,13 +27,13 @@ def make_manifest(
     dataset: Dataset,
     tracks: Sequence[AnyTrack],
     limit: int | None,
-) -> dict[str, Any]:
+) -> Manifest:
     """The manifest; `identity` digests what decides the results, so that only the same run goes
     on in a folder. Limits, prices, tables and paths are no part of it.
     """
     suite = loaded.suite
     inputs: dict[str, Any] = {
-        "format": _FORMAT,
+        "format": FORMAT,
         "suite": suite.identity(),
         "models": [
             {"name": m.name, "published": m.published, "size_b": m.size_b, **_identity(m)}
@@ -45,7 +45,7 @@ def make_manifest(
     }
     canonical = json.dumps(inputs, sort_keys=True, separators=(",", ":"))
     scenes = [task.scene for task in dataset.tasks]
-    return {
+    fields = {
         "identity": hashlib.sha256(canonical.encode()).hexdigest(),
         "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         **inputs,
@@ -59,6 +59,7 @@ def make_manifest(
         },
         "versions": {"python": platform.python_version(), **{n: version(n) for n in _LIBRARIES}},
     }
+    return Manifest.model_validate(fields)
 
 
 def _identity(model: PlannedModel) -> dict[str, object]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from phyblock.datasets import Dataset
 from phyblock.errors import Problem, SpecError
+from phyblock.records import Manifest
 from phyblock.run.data import open_dataset
 from phyblock.run.manifest import make_manifest
 from phyblock.run.models import PlannedModel, plan_models
@@ -27,7 +27,7 @@ class RunPlan:
     models: tuple[PlannedModel, ...]
     dataset: Dataset
     tracks: tuple[AnyTrack, ...]
-    manifest: Mapping[str, Any]
+    manifest: Manifest
 
     @property
     def samples_per_model(self) -> int:
@@ -42,7 +42,11 @@ class RunPlan:
     @property
     def folder_name(self) -> str:
         """Name of the run's folder when none is given: the same command finds it again."""
-        return f"{self.suite.name}-{self.manifest['identity'][:8]}"
+        return f"{self.suite.name}-{self.manifest.identity[:8]}"
+
+    def sample_ids(self) -> frozenset[str]:
+        """The ids of all samples of all models."""
+        return frozenset(sample.id for m in self.models for sample in self.samples(m.name))
 
     def samples(self, model: str) -> Iterator[Sample]:
         """All samples of a model: seed by seed, in each the tracks in the suite's order."""

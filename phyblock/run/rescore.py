@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import yaml
 from pydantic import ValidationError
@@ -15,8 +14,9 @@ from phyblock.datasets import AssemblyTask
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.files import atomic_write
 from phyblock.parsing import PlanParser
+from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
+from phyblock.records.reading import read_records
 from phyblock.run.data import open_dataset
-from phyblock.run.reading import MANIFEST, RECORDS, read_manifest, read_records
 from phyblock.run.records import judged
 from phyblock.scoring import Matcher
 from phyblock.specs import SuiteSpec, suite_model
@@ -47,26 +47,26 @@ def rescore(
     rescored = {kind.name: kind.rescored for kind in kinds().values() if kind.rescored is not None}
     tracks = {name: rescored[name](suite, tasks) for name in suite.tracks if name in rescored}
     items = {(name, item.key): item for name, track in tracks.items() for item in track.items}
-    records = []
-    for record in read_records(folder).values():
-        track = tracks.get(record["track"])
+    records: list[Record] = []
+    for record in read_records(folder, manifest):
+        track = tracks.get(record.track)
         if track is None:
             records.append(record)
             continue
-        item = items.get((track.name, record["key"]))
+        item = items.get((track.name, record.item))
         if item is None:
             where, hint = str(folder / RECORDS), "the file was changed: restore it from a copy"
             raise StoreError(
-                Problem(where, "names a scene that the run has not", "scene", record["scene"],
+                Problem(where, "names a scene that the run has not", "scene", record.scene,
                         hint=hint)
             )  # fmt: skip
-        text = None if record["reply"] is None else record["reply"]["text"]
-        judgement = track.judge(item, text)
-        records.append(judged(record, judgement.is_read, judgement.fields()))
+        judgement = track.judge(item, None if record.reply is None else record.reply.text)
+        records.append(judged(record.as_given(), judgement.is_read, judgement.fields()))
     target = out or folder / "scores" / f"{suite.parser}-{suite.scoring.matchers[0]}"
-    identity = f"{manifest['identity']} scored by {suite.parser}, {suite.scoring.matchers[0]}"
-    scored = {**manifest, "identity": identity, "suite": suite.model_dump(mode="json")}
-    if (target / MANIFEST).exists() and read_manifest(target)["identity"] != identity:
+    identity = f"{manifest.identity} scored by {suite.parser}, {suite.scoring.matchers[0]}"
+    told = {"identity": identity, "suite": suite.model_dump(mode="json")}
+    scored = manifest.model_copy(update=told)
+    if (target / MANIFEST).exists() and read_manifest(target).identity != identity:
         hint = "choose another folder with --out: what a run stored is never changed"
         raise StoreError(Problem(str(target), "holds another run", hint=hint))
     _write(target, scored, records)
@@ -75,13 +75,13 @@ def rescore(
 
 def _suite(
     folder: Path,
-    manifest: Mapping[str, Any],
+    manifest: Manifest,
     parser: PlanParser | None,
     matcher: Matcher | None,
 ) -> SuiteSpec:
     """The run's suite with parser and headline matcher replaced."""
     try:
-        suite = suite_model().model_validate(manifest.get("suite"))
+        suite = suite_model().model_validate(manifest.suite)
         matchers = suite.scoring.matchers
         if matcher is not None:
             matchers = (matcher, *(name for name in matchers if name != matcher))
@@ -92,24 +92,22 @@ def _suite(
 
 
 def _tasks(
-    folder: Path, manifest: Mapping[str, Any], suite: SuiteSpec, data: Path | None
+    folder: Path, manifest: Manifest, suite: SuiteSpec, data: Path | None
 ) -> tuple[AssemblyTask, ...]:
     """The tasks of the run, known to be those that it was made on."""
-    recorded = manifest.get("dataset")
-    if not isinstance(recorded, dict) or not {"root", "sha256"} <= recorded.keys():
+    recorded = manifest.dataset
+    if recorded is None:
         raise _broken(folder, "dataset")
     hint = "name the folder where it is now with --data"
-    root = data or Path(recorded["root"])
+    root = data or Path(recorded.root)
     if not root.is_dir():
         raise DataError(Problem(str(root), "the data set of the run is not there", hint=hint))
     dataset = open_dataset(suite.dataset.format, root)
-    dataset = replace(
-        dataset, tasks=select_tasks(dataset.tasks, suite.levels, manifest.get("limit"))
-    )
-    if dataset.sha256 != recorded["sha256"]:
+    dataset = replace(dataset, tasks=select_tasks(dataset.tasks, suite.levels, manifest.limit))
+    if dataset.sha256 != recorded.sha256:
         message = "is not the data set that the run was made on, or it was changed since"
         raise DataError(
-            Problem(str(root), message, "sha256", dataset.sha256, recorded["sha256"], hint)
+            Problem(str(root), message, "sha256", dataset.sha256, recorded.sha256, hint)
         )
     return dataset.tasks
 
@@ -119,10 +117,10 @@ def _broken(folder: Path, field: str) -> StoreError:
     return StoreError(Problem(str(folder / MANIFEST), "is missing or wrong", field, hint=hint))
 
 
-def _write(folder: Path, manifest: Mapping[str, Any], records: list[dict[str, Any]]) -> None:
-    lines = (json.dumps(r, ensure_ascii=False, separators=(",", ":")) for r in records)
+def _write(folder: Path, manifest: Manifest, records: Sequence[Record]) -> None:
+    lines = (json.dumps(r.fields(), ensure_ascii=False, separators=(",", ":")) for r in records)
     texts = {
-        MANIFEST: yaml.safe_dump(dict(manifest), sort_keys=False, allow_unicode=True, width=100),
+        MANIFEST: yaml.safe_dump(manifest.fields(), sort_keys=False, allow_unicode=True, width=100),
         RECORDS: "".join(line + "\n" for line in lines),
     }
     try:

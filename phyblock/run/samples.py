@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
 from phyblock.models import Halt, Model, Reply, Request, Usage
+from phyblock.models.stored import reply_of, stored
+from phyblock.records import Record, StoredPrompt, StoredReply, Turn
 from phyblock.run.prompts import PromptFile
-from phyblock.run.records import about_prompt, judged, to_record
+from phyblock.run.records import about_prompt, begun, judged
 from phyblock.run.writer import RecordWriter
 from phyblock.tracks import AnyTrack, Episode, EpisodeTrack, Item, SingleTrack
 
@@ -36,7 +38,8 @@ class Sample:
 class SampleRunner:
     """Turns samples into records; answered turns of episodes are on disk before the next is asked.
 
-    `earlier` are the replies of episodes that an earlier run began, by sample id.
+    `earlier` are the replies of episodes that an earlier command began, by sample id; `run` is the
+    digest that shows whose the records are.
     """
 
     def __init__(
@@ -44,16 +47,16 @@ class SampleRunner:
         turns: RecordWriter,
         prompts: PromptFile,
         halt: Halt,
-        earlier: Mapping[str, Sequence[Mapping[str, Any]]],
+        earlier: Mapping[str, Sequence[StoredReply]],
+        run: str,
     ) -> None:
         self._turns = turns
         self._prompts = prompts
         self._halt = halt
         self._earlier = earlier
+        self._run = run
 
-    async def record(
-        self, sample: Sample, model: Model, params: Mapping[str, object]
-    ) -> dict[str, Any]:
+    async def record(self, sample: Sample, model: Model, params: Mapping[str, object]) -> Record:
         """Ask, and say what came of it.
 
         Raises UnavailableError, BudgetReachedError and HaltedError as models do, and what making
@@ -69,16 +72,15 @@ class SampleRunner:
         track: SingleTrack[Any],
         model: Model,
         params: Mapping[str, object],
-    ) -> dict[str, Any]:
+    ) -> Record:
         with self._halt.giving_up():
             request = await track.request(
                 sample.item, sample.seed, params, with_messages=model.needs_messages
             )
         answer = await _answer(model.ask(request))
-        record = self._begin(sample, answer)
-        record["prompt"] = self._prompt(track, request)
+        fields = {**self._begin(sample, answer), "prompt": self._prompt(track, request)}
         judgement = track.judge(sample.item, answer.text if isinstance(answer, Reply) else None)
-        return judged(record, judgement.is_read, judgement.fields())
+        return judged(fields, judgement.is_read, judgement.fields())
 
     async def _play(
         self,
@@ -86,25 +88,26 @@ class SampleRunner:
         track: EpisodeTrack[Any],
         model: Model,
         params: Mapping[str, object],
-    ) -> dict[str, Any]:
+    ) -> Record:
         episode = track.start(sample.item, sample.seed, params, with_messages=model.needs_messages)
-        stored = [_reply(raw) for raw in self._earlier.get(sample.id, ())]
+        earlier = [reply_of(line) for line in self._earlier.get(sample.id, ())]
         turns: list[dict[str, Any]] = []
         replies: list[Reply] = []
         answer: Reply | ModelError | None = None
         while (request := await self._next(episode)) is not None:
             turn = {"prompt": self._prompt(track, request)}
-            if len(replies) < len(stored):
-                answer = stored[len(replies)]
+            if len(replies) < len(earlier):
+                answer = earlier[len(replies)]
             else:
                 answer = await _answer(model.ask(request))
                 if isinstance(answer, Reply):
-                    number = len(replies)
-                    line = {"sample": sample.id, "turn": number, "reply": asdict(answer)}
-                    await self._turns.put(line)
+                    number, reply = len(replies), stored(answer)
+                    await self._turns.put(
+                        Turn(sample=sample.id, turn=number, reply=reply, run=self._run)
+                    )
             if not isinstance(answer, Reply):
                 break
-            turns.append({"reply": asdict(answer), **turn})
+            turns.append({"reply": stored(answer), **turn})
             replies.append(answer)
             episode.take(request, answer)
         failed = answer if isinstance(answer, ModelError) else None
@@ -117,28 +120,28 @@ class SampleRunner:
         turns: Sequence[Mapping[str, Any]],
         replies: Sequence[Reply],
         failed: ModelError | None,
-    ) -> dict[str, Any]:
-        record = self._begin(sample, failed)
-        record["reply"] = asdict(_pooled(replies)) if replies else None
-        record["prompt"] = turns[0]["prompt"] if turns else None
-        fields = episode.fields()
-        told = zip(turns, fields["turns"], strict=True)
-        fields["turns"] = [{"n": n, **turn, **more} for n, (turn, more) in enumerate(told, 1)]
-        return judged(record, episode.is_read, fields)
+    ) -> Record:
+        fields = self._begin(sample, failed)
+        fields["reply"] = stored(_pooled(replies)) if replies else None
+        fields["prompt"] = turns[0]["prompt"] if turns else None
+        told = episode.fields()
+        both = zip(turns, told["turns"], strict=True)
+        told["turns"] = [{"n": n, **turn, **more} for n, (turn, more) in enumerate(both, 1)]
+        return judged(fields, episode.is_read, told)
 
     async def _next(self, episode: Episode) -> Request | None:
         with self._halt.giving_up():
             return await episode.request()
 
-    def _prompt(self, track: AnyTrack, request: Request) -> dict[str, Any] | None:
+    def _prompt(self, track: AnyTrack, request: Request) -> StoredPrompt | None:
         if not request.messages:
             return None
         return about_prompt(request, track.template, self._prompts.keep(request.messages))
 
     def _begin(self, sample: Sample, answer: Reply | ModelError | None) -> dict[str, Any]:
         name, item = sample.track.name, sample.item
-        record = to_record(sample.id, name, sample.model, item, sample.seed, answer)
-        return {**record, **sample.track.about(item)}
+        fields = begun(sample.id, name, sample.model, item, sample.seed, answer)
+        return {**fields, "run": self._run, **sample.track.about(item)}
 
 
 async def _answer(asked: Awaitable[Reply | None]) -> Reply | ModelError | None:
@@ -149,10 +152,6 @@ async def _answer(asked: Awaitable[Reply | None]) -> Reply | ModelError | None:
         raise
     except ModelError as error:
         return error
-
-
-def _reply(raw: Mapping[str, Any]) -> Reply:
-    return Reply(**{**raw, "usage": Usage(**raw["usage"])})
 
 
 def _pooled(replies: Sequence[Reply]) -> Reply:

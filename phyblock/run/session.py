@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 from phyblock.errors import Problem, SpecError
 from phyblock.models import (
@@ -23,7 +21,6 @@ from phyblock.resources import reply_cache_file
 from phyblock.run.events import ModelNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.plan import RunPlan
-from phyblock.run.reading import RecordLines, TurnLines, read_records
 from phyblock.run.store import RunStore
 
 __all__ = ["SERVERS", "Session", "check_ready"]
@@ -77,7 +74,7 @@ class Session:
     async def __aenter__(self) -> Session:
         plan = self._plan
         try:
-            self._store = RunStore(self._folder, plan.manifest)
+            self._store = RunStore(self._folder, plan.manifest, plan.sample_ids())
             if self._use_cache and any(m.config.kind == "litellm" for m in plan.models):
                 self._cache = ReplyCache(reply_cache_file())
             limits = plan.suite.limits
@@ -85,7 +82,7 @@ class Session:
             halt = Halt()
             budget = None
             if limits.max_cost_usd is not None:
-                budget = Budget(limits.max_cost_usd, _spent_usd(self._folder))
+                budget = Budget(limits.max_cost_usd, self._store.standing.limit_usd)
             for model in plan.models:
                 self._models[model.name] = build_model(
                     model.config,
@@ -102,7 +99,6 @@ class Session:
                 self._models,
                 self._watch,
                 halt,
-                read_records(self._folder),
                 retry_failed=self._retry_failed,
             )
         except BaseException:
@@ -128,7 +124,7 @@ class Session:
             RunStarted(
                 {model.name: self._plan.samples_per_model for model in self._plan.models},
                 {
-                    model.name: tuple(r for r in settled if r["model"] == model.name)
+                    model.name: tuple(s for s in settled if s.model == model.name)
                     for model in self._plan.models
                 },
             )
@@ -149,26 +145,3 @@ class Session:
         for resource in (self._cache, self._store):
             if resource is not None:
                 resource.close()
-
-
-def _spent_usd(folder: Path) -> float:
-    """What the run cost so far: of every line, also of those that later ones replaced.
-
-    Replies of episodes are counted where each was written when it came, as turns.
-    """
-    turns = sum(_billed_usd(turn["reply"]) for _, turn in TurnLines(folder))
-    return turns + sum(_record_usd(record) for _, record in RecordLines(folder))
-
-
-def _record_usd(record: Mapping[str, Any]) -> float:
-    reply = {} if "turns" in record else record["reply"] or {}
-    failed = (record["error"] or {}).get("billed_usd") or 0.0
-    return _billed_usd(reply) if reply else failed
-
-
-def _billed_usd(reply: Mapping[str, Any]) -> float:
-    """What a limit counted for a reply, else its cost unless that was paid elsewhere."""
-    billed_usd: float | None = reply.get("billed_usd")
-    if billed_usd is None and not reply.get("cached"):
-        billed_usd = reply.get("cost_usd")
-    return billed_usd or 0.0

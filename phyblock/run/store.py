@@ -9,19 +9,33 @@ from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Collection, Container, Iterator
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 
 import yaml
 
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
+from phyblock.records import (
+    MANIFEST,
+    Belonging,
+    Line,
+    Lines,
+    Manifest,
+    PromptLines,
+    StoredReply,
+    TurnLines,
+    read_manifest,
+)
+from phyblock.records.reading import any_records, collect_turns, run_records
 from phyblock.run.appending import AppendFile
-from phyblock.run.prompts import PromptFile, PromptLines
-from phyblock.run.reading import MANIFEST, Lines, RecordLines, TurnLines, read_manifest
+from phyblock.run.prompts import PromptFile
+from phyblock.run.standing import Standing
 
 __all__ = ["RunStore", "holds_run"]
+
+LineT = TypeVar("LineT", bound=Line)
 
 _LOCK = ".lock"
 _NOT_IDENTITY = (
@@ -38,15 +52,18 @@ class RunStore:
     """A run folder opened for writing; one process at a time.
 
     `records` and `turns` are synced line by line; `prompts` hold what could be made again.
+    `standing` is how far the run was when it was opened.
     """
 
-    def __init__(self, folder: Path, manifest: Mapping[str, Any]) -> None:
+    def __init__(self, folder: Path, manifest: Manifest, samples: Collection[str]) -> None:
         """Open `folder` for the run that `manifest` describes, creating it when it is new.
 
-        Raises StoreError when the folder cannot be written, holds records of another run (its
-        identity differs), or is being written by another process.
+        `samples` are the ids of the run's samples. Raises StoreError when the folder cannot be
+        written, holds records of another run, or is being written by another process.
         """
-        self.folder = folder
+        self.standing = Standing()
+        self._folder = folder
+        self._belonging = Belonging.of(manifest, samples)
         self._lock: IO[str] | None = None
         self._files: list[AppendFile] = []
         try:
@@ -54,8 +71,10 @@ class RunStore:
             self._lock = (folder / _LOCK).open("w")
             self._acquire()
             self._claim(manifest)
-            self.records = self._open(RecordLines(folder))
-            self.turns = self._open(TurnLines(folder))
+            records = run_records(folder, manifest, samples)
+            self.records = self._open(records, self.standing.add)
+            turns = TurnLines(folder, self._belonging)
+            self.turns = self._open(turns, self.standing.add_turn)
             known = PromptLines(folder)
             self.prompts = PromptFile(self._open(known, sync=False), known.digests)
         except OSError as error:
@@ -81,12 +100,22 @@ class RunStore:
             self._lock.close()
             self._lock = None
 
-    def _open(self, lines: Lines, *, sync: bool = True) -> AppendFile:
-        """Open a file for appending, rid of a line that a kill cut short."""
+    def turns_of_others(self, done: Container[str]) -> dict[str, list[StoredReply]]:
+        """The replies of episodes that have begun and are not `done`, by sample id."""
+        return collect_turns(TurnLines(self._folder, self._belonging), done)
+
+    def _open(
+        self,
+        lines: Lines[LineT],
+        take: Callable[[LineT], None] = lambda _: None,
+        *,
+        sync: bool = True,
+    ) -> AppendFile:
+        """Open a file for appending, rid of a line that a kill cut short; `take` sees the rest."""
         file = AppendFile(lines.path, sync=sync)
         self._files.append(file)
-        for _ in lines:
-            pass
+        for _, line in lines:
+            take(line)
         if lines.is_cut:
             os.truncate(lines.path, lines.whole_bytes)
         elif lines.lacks_newline:
@@ -100,26 +129,27 @@ class RunStore:
         except BlockingIOError as error:
             hint = "wait for it to end, or choose another folder with --out"
             message = "is being written by another phyblock run"
-            raise StoreError(Problem(str(self.folder), message, hint=hint)) from error
+            raise StoreError(Problem(str(self._folder), message, hint=hint)) from error
 
-    def _claim(self, manifest: Mapping[str, Any]) -> None:
-        if holds_run(self.folder, manifest):
+    def _claim(self, manifest: Manifest) -> None:
+        if holds_run(self._folder, manifest):
             return
-        path = self.folder / MANIFEST
-        text = yaml.safe_dump(dict(manifest), sort_keys=False, allow_unicode=True, width=100)
+        path = self._folder / MANIFEST
+        text = yaml.safe_dump(manifest.fields(), sort_keys=False, allow_unicode=True, width=100)
         atomic_write(path, text)
 
 
-def holds_run(folder: Path, manifest: Mapping[str, Any]) -> bool:
+def holds_run(folder: Path, manifest: Manifest) -> bool:
     """Whether `folder` holds the run that `manifest` describes; reads alone.
 
-    Raises StoreError when it holds records of another run. A manifest without records is no run
-    yet: one that failed at once leaves it behind, and nothing would be lost with it.
+    Raises StoreError when it holds records or turns of another run. A manifest without any is no
+    run yet: one that failed at once leaves it behind, and nothing would be lost with it.
     """
     found = read_manifest(folder) if (folder / MANIFEST).exists() else None
-    if found is not None and found["identity"] == manifest["identity"]:
+    if found is not None and found.identity == manifest.identity:
         return True
-    if next(iter(RecordLines(folder)), None) is None:
+    paid: tuple[Lines[Any], ...] = (any_records(folder), TurnLines(folder))
+    if all(next(iter(lines), None) is None for lines in paid):
         return False
     changed = f"records, and no {MANIFEST}"
     if found is not None:
@@ -129,7 +159,7 @@ def holds_run(folder: Path, manifest: Mapping[str, Any]) -> bool:
     raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=hint))
 
 
-def _changed(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
+def _changed(found: Manifest, wanted: Manifest) -> list[str]:
     """Dotted names of the parts in which two manifests differ and that make them two runs."""
     old, new = dict(_parts(found)), dict(_parts(wanted))
     names = [name for name in new if name not in _NOT_IDENTITY and old.get(name) != new[name]]
@@ -138,13 +168,14 @@ def _changed(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
     return [name for name in names if not (chosen and name.endswith("sha256"))]
 
 
-def _parts(manifest: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def _parts(manifest: Manifest) -> Iterator[tuple[str, Any]]:
     """Dotted names and values of what a run is made of, digests of pictures left out."""
+    fields = manifest.fields()
     for part in ("suite", "models", "dataset", "limit"):
-        value = manifest.get(part)
+        value = fields.get(part)
         if isinstance(value, dict):
             yield from ((f"{part}.{key}", below) for key, below in value.items())
         else:
             yield part, value
-    for track, about in manifest.get("tracks", {}).items():
+    for track, about in manifest.tracks.items():
         yield from ((f"{track}.{k}", below) for k, below in about.items() if k != "pictures")

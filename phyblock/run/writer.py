@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
-from typing import Any
 
+from phyblock.records import Line
 from phyblock.run.appending import AppendFile
 
 __all__ = ["RecordWriter"]
@@ -16,10 +15,10 @@ class RecordWriter:
 
     def __init__(self, file: AppendFile) -> None:
         self._file = file
-        self._waiting: list[tuple[Mapping[str, Any], asyncio.Future[None]]] = []
+        self._waiting: list[tuple[Line, asyncio.Future[None]]] = []
         self._flusher: asyncio.Task[None] | None = None
 
-    async def put(self, record: Mapping[str, Any]) -> None:
+    async def put(self, record: Line) -> None:
         """Append a record and wait until it is on disk; StoreError when the disk refuses."""
         written: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._waiting.append((record, written))
@@ -37,7 +36,7 @@ class RecordWriter:
             batch, self._waiting = self._waiting, []
             failure: Exception | None = None
             try:
-                await asyncio.to_thread(self._file.append, [record for record, _ in batch])
+                await asyncio.to_thread(self._file.append, [line.fields() for line, _ in batch])
             except Exception as error:
                 # Whatever it is, those who wait must hear of it, or they wait for ever.
                 failure = error

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pandas as pd
 
+from phyblock.registry import known_track
 from phyblock.tables.coverage import coverage_frame
 from phyblock.tables.load import Run
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
-from phyblock.tracks.step_planning.episodes import TRACK as STEP_PLANNING
 
 __all__ = ["cost_frame", "cost_view"]
 
@@ -66,8 +66,12 @@ def cost_view(table: pd.DataFrame, run: Run) -> TextTable:
     ]
     name = f", suite {run.design.suite.name}" if run.design.suite.name else ""
     notes = ["Replies from the cache cost this run nothing; 100 replies are priced as if asked."]
-    if (table["track"] == STEP_PLANNING).any():
-        notes.append("Of step planning, a reply is a whole episode: all its steps together.")
+    episodes = [known_track(name) for name in run.design.suite.tracks if known_track(name).plays]
+    notes += [
+        f"Of {kind.title.lower()}, a reply is a whole episode: all its steps together."
+        for kind in episodes
+        if (table["track"] == kind.name).any()
+    ]
     return TextTable(f"Tokens, cost and latency{name}", columns, tuple(rows), tuple(notes))
 
 

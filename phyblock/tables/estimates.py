@@ -13,7 +13,7 @@ from phyblock.tables.intervals import CountCube, parents_of, resampler
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, VARIANT, Cell, Counted, Measure
 
-__all__ = ["ESTIMATE_COLUMNS", "estimate_frame", "value_of_cells"]
+__all__ = ["ESTIMATE_COLUMNS", "estimate_frame", "strata_of", "value_of_cells"]
 
 _GROUP = ("model", *VARIANT)
 ESTIMATE_COLUMNS = (
@@ -35,8 +35,15 @@ ESTIMATE_COLUMNS = (
 """Columns of `estimate_frame`."""
 
 
-def estimate_frame(run: Run, measures: Sequence[Measure], cells: Sequence[Cell]) -> pd.DataFrame:
+def estimate_frame(
+    run: Run,
+    measures: Sequence[Measure],
+    cells: Sequence[Cell],
+    counts_of: Callable[[Counted], pd.DataFrame],
+) -> pd.DataFrame:
     """One row a measure, model, way of counting and cell, in `ESTIMATE_COLUMNS`.
+
+    `counts_of` gives the counts of a family of measures, as `Counted` says.
 
     `value` is of the counts of all `n` samples, summed over scenes and seeds, in the measure's own
     unit; `mean` and `sd` (ddof = 1) are over the values of the `seeds` single seeds. `lo` and `hi`
@@ -49,7 +56,7 @@ def estimate_frame(run: Run, measures: Sequence[Measure], cells: Sequence[Cell])
     for measure in measures:
         families.setdefault(measure.counted.name, []).append(measure)
     for family in families.values():
-        table = family[0].counted.frame(run)
+        table = counts_of(family[0].counted)
         parts += [_of_group(run, table, family, group) for group in _joined(cells)]
     known = [part for part in parts if len(part)]
     if not known:
@@ -144,7 +151,7 @@ def _of_group(
         n_clusters=np.repeat(behind[:, :, None], len(measures), axis=-1),
     )
     spread = _over_seeds(table, pool, counted, silent, all_values)
-    members = np.array([[name in _strata_of(cell, cells) for name in strata] for cell in cells])
+    members = np.array([[name in strata_of(cell, cells) for name in strata] for cell in cells])
     scenes = np.any(pool.present[:, :, None, :] & members, axis=-1).sum(axis=0)
     rows = []
     for g, group in enumerate(pool.groups):
@@ -193,12 +200,12 @@ def _over_seeds(
     return count, mean, sd
 
 
-def _strata_of(cell: Cell, cells: Sequence[Cell]) -> frozenset[str]:
+def strata_of(cell: Cell, cells: Sequence[Cell]) -> frozenset[str]:
     """The pooled cells that a cell is made of."""
     if not cell.of:
         return frozenset([cell.name])
     by_name: Mapping[str, Cell] = {other.name: other for other in cells}
-    return frozenset().union(*(_strata_of(by_name[name], cells) for name in cell.of))
+    return frozenset().union(*(strata_of(by_name[name], cells) for name in cell.of))
 
 
 def _clusters_of_cells(pool: _Pool, cells: Sequence[Cell]) -> np.ndarray:
@@ -208,7 +215,7 @@ def _clusters_of_cells(pool: _Pool, cells: Sequence[Cell]) -> np.ndarray:
     )
     columns = []
     for cell in cells:
-        members = [name in _strata_of(cell, cells) for name in pool.strata]
+        members = [name in strata_of(cell, cells) for name in pool.strata]
         seen = np.any(pool.present[:, :, members], axis=-1)
         whole = pool.cube.clusters.behind(seen)
         least = by_stratum[:, members].min(axis=-1)

@@ -1,18 +1,25 @@
-"""Stored records as flat rows, and rows as data frames of fixed columns and types."""
+"""Records as data frames of fixed columns and types, column by column as they are read.
+
+A record is let go as soon as its values are in the columns. Equal values are one object, so that
+what is kept of a record is little more than its numbers.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from array import array
+from collections.abc import Callable, Iterable
+from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from phyblock.run.records import paid_usd
+from phyblock.records import Record, Score
+from phyblock.records.known import record_types
 from phyblock.scoring import ERROR_TYPES
 
-__all__ = ["TEXTS", "flat_record", "flat_scores", "frame_of"]
+__all__ = ["Flattened"]
 
-TEXTS = ("text", "reasoning")
+_TEXTS = ("text", "reasoning")
 """Columns that may be long."""
 
 _RECORD_TYPES: dict[str, str] = {
@@ -20,6 +27,7 @@ _RECORD_TYPES: dict[str, str] = {
     "track": "object",
     "model": "object",
     "scene": "object",
+    "item": "object",
     "levels": "object",
     "parents": "object",
     "n_blocks": "Int64",
@@ -43,17 +51,11 @@ _RECORD_TYPES: dict[str, str] = {
     "error_message": "object",
     "template": "object",
     "prompt_version": "object",
-    "parser": "object",
     "rule": "object",
-    "plan": "object",
-    "dropped": "object",
-    "question": "object",
-    "subtask": "object",
-    "rotation": "Int64",
-    "right": "object",
-    "given": "object",
     "time": "object",
+    "counts": "object",
 }
+"""Columns that records of all tracks have; each track adds its own."""
 
 _SCORE_TYPES: dict[str, str] = {
     "sample": "object",
@@ -71,94 +73,146 @@ _SCORE_TYPES: dict[str, str] = {
     **dict.fromkeys(ERROR_TYPES, "Int64"),
 }
 
-_TYPES = {"records": _RECORD_TYPES, "scores": _SCORE_TYPES}
-
-
-def flat_record(record: Mapping[str, Any]) -> dict[str, Any]:
-    """One row of the records frame.
-
-    Raises KeyError, TypeError, ValueError or AttributeError for what is not a record.
-    """
-    reply = record.get("reply") or {}
-    error = record.get("error") or {}
-    prompt = record.get("prompt") or {}
-    parse = record.get("parse") or {}
-    return {
-        **_sample(record),
-        "levels": tuple(int(level) for level in record["levels"]),
-        "parents": tuple(record.get("parents") or ()),
-        "n_blocks": record.get("n_blocks"),
-        **{name: reply.get(name) for name in _REPLY},
-        **{name: (reply.get("usage") or {}).get(name) for name in _USAGE},
-        "paid_usd": paid_usd(record) if reply else None,
-        "error_kind": error.get("kind"),
-        "error_status": error.get("status"),
-        "error_message": error.get("message"),
-        "template": prompt.get("template"),
-        "prompt_version": prompt.get("version"),
-        **{name: parse.get(name) for name in ("parser", "rule", "plan", "dropped")},
-        **_question(record),
-        "time": record.get("time"),
-    }
-
-
-_REPLY = (
-    *TEXTS,
-    "finish",
-    "cost_usd",
-    "latency_s",
-    "provider_model",
-    "attempts",
-    "cached",
-    "seed_sent",
-)
+_OF_SAMPLE = ("sample", "track", "model", "scene", "seed", "outcome")
+"""Columns of scores that are those of the record."""
+_REPLY = ("finish", "cost_usd", "latency_s", "provider_model", "attempts", "cached", "seed_sent")
 _USAGE = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
+_COUNTS = ("tp", "fp", "fn", *ERROR_TYPES)
+_LABELS = ("criterion", "matcher", "setting")
+_UNKNOWN = -(2**62)
+"""Stands for a count that there is not."""
 
 
-def _question(record: Mapping[str, Any]) -> dict[str, Any]:
-    """Which question it is, the letters that are right and those given; for other tracks None."""
-    question, answer = record.get("question") or {}, record.get("answer") or {}
+class Flattened:
+    """The columns of both frames while records are read; `texts` keeps those of replies."""
+
+    def __init__(self, *, texts: bool = True) -> None:
+        self._texts = texts
+        self._rows: dict[str, int] = {}
+        self._types = dict(_RECORD_TYPES)
+        for kind in record_types():
+            self._types.update(kind.columns)
+        self._records: dict[str, list[Any]] = {name: [] for name in self._types}
+        self._first, self._n_scores = array("q"), array("q")
+        self._labels: dict[str, list[str]] = {name: [] for name in _LABELS}
+        self._counts = {name: array("q") for name in _COUNTS}
+        self._shared: dict[Any, Any] = {}
+
+    def add(self, record: Record) -> None:
+        """Take in a record; it replaces an earlier one of its sample."""
+        row = self._rows.setdefault(record.sample, len(self._rows))
+        # A slice beyond the end appends.
+        values = self._flat(record)
+        for name, column in self._records.items():
+            column[row : row + 1] = (values.get(name),)
+        self._first[row : row + 1] = array("q", (len(self._counts["tp"]),))
+        self._n_scores[row : row + 1] = array("q", (len(record.scores),))
+        for score in record.scores:
+            self._add_score(score)
+
+    def frames(self, place: Callable[[str], int]) -> tuple[pd.DataFrame, pd.DataFrame]:
+        """One row a sample, and one a score, by track, `place` of the model, scene and seed.
+
+        Columns and types do not depend on the records. Columns of text stay Python objects, so
+        that long replies are never copied.
+        """
+        order = self._order(place)
+        columns = {name: _objects(column) for name, column in self._records.items()}
+        records = pd.DataFrame(
+            {
+                name: pd.Series(columns[name][order].tolist(), dtype=kind)
+                for name, kind in self._types.items()
+            }
+        )
+        return records, self._scores(columns, order)
+
+    def _order(self, place: Callable[[str], int]) -> np.ndarray[Any, np.dtype[np.intp]]:
+        names = ("track", "model", "scene", "seed", "sample")
+        track, model, scene, seed, sample = (self._records[name] for name in names)
+        rows = sorted(
+            range(len(sample)),
+            key=lambda n: (track[n], place(model[n]), model[n], scene[n], seed[n], sample[n]),
+        )
+        return np.array(rows, dtype=np.intp)
+
+    def _scores(
+        self,
+        columns: dict[str, np.ndarray[Any, Any]],
+        order: np.ndarray[Any, np.dtype[np.intp]],
+    ) -> pd.DataFrame:
+        lengths = np.array(self._n_scores, dtype=np.intp)[order]
+        ends = np.cumsum(lengths)
+        shifts = np.array(self._first, dtype=np.intp)[order] - (ends - lengths)
+        kept = np.repeat(shifts, lengths) + np.arange(lengths.sum())
+        owners = np.repeat(order, lengths)
+        made = {name: columns[name][owners] for name in _OF_SAMPLE}
+        made |= {name: _objects(column)[kept] for name, column in self._labels.items()}
+        numbers = {name: np.array(column, dtype=np.int64) for name, column in self._counts.items()}
+        made |= {name: column[kept] for name, column in numbers.items()}
+        return pd.DataFrame(
+            {name: _series(made[name], kind) for name, kind in _SCORE_TYPES.items()}
+        )
+
+    def _add_score(self, score: Score) -> None:
+        for name, label in zip(
+            _LABELS, (score.criterion, score.matcher or "", score.setting), strict=True
+        ):
+            self._labels[name].append(self._share(label))
+        errors = score.errors or {}
+        found = (score.tp, score.fp, score.fn, *(errors.get(n, _UNKNOWN) for n in ERROR_TYPES))
+        for name, count in zip(_COUNTS, found, strict=True):
+            self._counts[name].append(count)
+
+    def _share(self, value: Any) -> Any:
+        """The one object that stands for all that equal it."""
+        return self._shared.setdefault(value, value)
+
+    def _flat(self, record: Record) -> dict[str, Any]:
+        """One row of the records frame."""
+        row = _row(record)
+        if not self._texts:
+            row.update(dict.fromkeys(_TEXTS))
+        for name, value in row.items():
+            if isinstance(value, (str, tuple)) and name not in _TEXTS:
+                row[name] = self._share(value)
+        return row
+
+
+def _row(record: Record) -> dict[str, Any]:
+    reply, error, prompt = record.reply, record.error, record.prompt
     return {
-        "question": question.get("id"),
-        "subtask": question.get("subtask"),
-        "rotation": question.get("rotation"),
-        "right": answer.get("right"),
-        "given": answer.get("given"),
+        **{name: getattr(record, name) for name in _OF_SAMPLE},
+        **{name: getattr(record, name) for name in ("item", "levels", "parents", "n_blocks")},
+        **{name: getattr(reply, name, None) for name in (*_TEXTS, *_REPLY)},
+        **{name: getattr(reply and reply.usage, name, None) for name in _USAGE},
+        "paid_usd": reply and record.paid_usd,
+        "error_kind": error and error.kind,
+        "error_status": error and error.status,
+        "error_message": error and error.message,
+        "template": prompt and prompt.template,
+        "prompt_version": prompt and prompt.version,
+        "rule": _rule(record.parse),
+        "time": record.time or None,
+        "counts": record.counts or None,
+        **record.row(),
     }
 
 
-def flat_scores(record: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Rows of the scores frame; raises as `flat_record`."""
-    sample = _sample(record)
-    return [
-        {
-            **sample,
-            "criterion": score["criterion"],
-            "matcher": score["matcher"] or "",
-            "setting": score["setting"],
-            **{name: int(score[name]) for name in ("tp", "fp", "fn")},
-            **{name: (score.get("errors") or {}).get(name) for name in ERROR_TYPES},
-        }
-        for score in record["scores"] or ()
-    ]
+def _objects(values: Iterable[Any]) -> np.ndarray[Any, Any]:
+    """Values as they are, also where they are sequences themselves."""
+    found = list(values)
+    made = np.empty(len(found), dtype=object)
+    made[:] = found
+    return made
 
 
-def _sample(record: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        **{name: str(record[name]) for name in ("sample", "track", "model", "scene")},
-        "seed": int(record["seed"]),
-        "outcome": str(record["outcome"]),
-    }
+def _series(values: np.ndarray[Any, Any], kind: str) -> pd.Series[Any]:
+    if kind != "Int64":
+        return pd.Series(values, dtype=kind)
+    return pd.Series(pd.array(values, dtype="Int64")).mask(values == _UNKNOWN)
 
 
-def frame_of(kind: Literal["records", "scores"], rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    """Rows as a frame whose columns and types do not depend on the rows.
-
-    Columns of text stay Python objects, so that long replies are never copied.
-    """
-    return pd.DataFrame(
-        {
-            name: pd.Series([row[name] for row in rows], dtype=dtype)
-            for name, dtype in _TYPES[kind].items()
-        }
-    )
+def _rule(parse: Any) -> str | None:
+    """The rule that matched, of whatever a track says of its parsing."""
+    found = parse.get("rule") if isinstance(parse, dict) else getattr(parse, "rule", None)
+    return None if found is None else str(found)

@@ -83,7 +83,7 @@ def interval_frame(
 def interval_view(
     table: pd.DataFrame, run: Run, cells: Sequence[str], caption: str, by: str = CELL
 ) -> TextTable:
-    """Values with their intervals out of `interval_frame`, a row a model, a pair of columns a cell."""
+    """Values with intervals out of `interval_frame`: a row a model, a pair of columns a cell."""
     rows = []
     for model, part in table.groupby("model", sort=False):
         of_cell = part.set_index(by).to_dict("index")

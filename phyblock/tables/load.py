@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pandas as pd
 
-from phyblock.errors import Problem, StoreError
-from phyblock.run.reading import MANIFEST, RecordLines, read_manifest
+from phyblock.records import MANIFEST, Record, read_manifest
+from phyblock.records.reading import run_records
 from phyblock.tables.design import Design, read_design
-from phyblock.tables.flat import TEXTS, flat_record, flat_scores, frame_of
+from phyblock.tables.flat import Flattened
 
 __all__ = ["Frames", "Run", "frames_of", "load_run", "once_per_run"]
 
@@ -61,56 +61,22 @@ def once_per_run(make: Callable[[Run], pd.DataFrame]) -> Callable[[Run], pd.Data
 def load_run(path: str | Path, *, texts: bool = True) -> Run:
     """Read a run folder; without `texts` the replies' texts are left on disk.
 
-    Raises StoreError for a folder that is no run, a broken `run.yaml`, or a corrupt line of
-    `records.jsonl` other than an unfinished last one.
+    Raises StoreError for a folder that is no run, a broken `run.yaml`, or a line of `records.jsonl`
+    that is corrupt, other than an unfinished last one, or of another run.
     """
     folder = Path(path)
-    manifest = read_manifest(folder)
+    facts = read_manifest(folder)
+    manifest = facts.fields()
     design = read_design(manifest, str(folder / MANIFEST))
-    lines = RecordLines(folder)
-    records, scores = frames_of(lines, design, texts=texts)
+    lines = run_records(folder, facts)
+    records, scores = frames_of((record for _, record in lines), design, texts=texts)
     return Run(folder, manifest, design, records, scores, lines.is_cut)
 
 
-def frames_of(
-    records: Iterable[tuple[str, Mapping[str, Any]]], design: Design, *, texts: bool = True
-) -> Frames:
-    """Frames of records, each with where it stands; a later record of a sample replaces it.
-
-    Raises StoreError for a record that lacks what tables need.
-    """
-    samples: dict[str, tuple[dict[str, Any], list[dict[str, Any]]]] = {}
-    for where, record in records:
-        row, scores = _flatten(where, record)
-        if not texts:
-            row.update(dict.fromkeys(TEXTS))
-        samples[row["sample"]] = (row, scores)
+def frames_of(records: Iterable[Record], design: Design, *, texts: bool = True) -> Frames:
+    """Frames of records, each taken in and let go; a later record of a sample replaces it."""
+    flattened = Flattened(texts=texts)
+    for record in records:
+        flattened.add(record)
     order = {name: place for place, name in enumerate(design.model_names)}
-    rows = sorted(
-        samples.values(),
-        key=lambda sample: (
-            sample[0]["track"],
-            order.get(sample[0]["model"], len(order)),
-            sample[0]["model"],
-            sample[0]["scene"],
-            sample[0]["seed"],
-            sample[0]["sample"],
-        ),
-    )
-    return Frames(
-        frame_of("records", [row for row, _ in rows]),
-        frame_of("scores", [score for _, scores in rows for score in scores]),
-    )
-
-
-def _flatten(where: str, record: Mapping[str, Any]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    try:
-        return flat_record(record), flat_scores(record)
-    except KeyError as error:
-        problem = Problem(where, f"the record has no {error}", hint=_HINT)
-    except (TypeError, ValueError, AttributeError) as error:
-        problem = Problem(where, f"the record is not in the run format: {error}", hint=_HINT)
-    raise StoreError(problem)
-
-
-_HINT = "remove this line; the next `phyblock run` asks for the sample again"
+    return Frames(*flattened.frames(lambda model: order.get(model, len(order))))

@@ -13,7 +13,7 @@ from phyblock.scoring.uncertainty import Metric
 if TYPE_CHECKING:
     from phyblock.tables.load import Run
 
-__all__ = ["CELL", "VARIANT", "Cell", "Counted", "Measure", "per_sample"]
+__all__ = ["CELL", "VARIANT", "Cell", "Counted", "Measure"]
 
 VARIANT = ("setting", "matcher", "criterion")
 """How a sample was counted; "" where its track knows no such choice."""
@@ -44,12 +44,14 @@ class Counted:
     `frame` makes them out of a run: a row a sample, way of counting it and cell that it is pooled
     in, with the columns `model`, `scene`, `item`, `seed`, those of `VARIANT`, `CELL`, `replied`
     (whether the model said anything), and one of each name in `columns`. Samples that the run
-    leaves out have no row.
+    leaves out have no row. Instead of it, `sample` counts one sample, given the item that was asked
+    about and what its reply was read as (the track's judgement), when the reply is judged: its
+    numbers, one of each name in `columns`, are kept in the record. None counts nothing.
     """
 
     name: str
     columns: tuple[str, ...]
-    frame: Callable[[Run], pd.DataFrame]
+    frame: Callable[[Run], pd.DataFrame] | None = None
     sample: Callable[[Any, Any], Sequence[float] | None] | None = None
 
 
@@ -77,22 +79,11 @@ class Measure:
     in_tables: bool = True
 
     @property
+    def best(self) -> float:
+        """The value of a perfect sample, as it is shown."""
+        return self.scale if self.better == "higher" else 0.0
+
+    @property
     def scale(self) -> float:
         """What a value is multiplied by where it is shown."""
         return 100.0 if self.unit == "%" else 1.0
-
-
-def per_sample(
-    name: str,
-    columns: tuple[str, ...],
-    sample: Callable[[Any, Any], Sequence[float] | None],
-) -> Counted:
-    """Counts that a function of one scored sample gives: an item and what its reply was read as.
-
-    They are counted when a reply is judged, and kept in its record; None counts nothing.
-    """
-
-    def frame(run: Run) -> pd.DataFrame:
-        raise NotImplementedError
-
-    return Counted(name, columns, frame, sample)

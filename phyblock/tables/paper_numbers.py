@@ -10,7 +10,24 @@ import pandas as pd
 from phyblock.tables.load import Run
 from phyblock.tables.text_table import Column, TextTable, number
 
-__all__ = ["NOTHING", "beside", "beside_view", "interleaved", "published_table"]
+__all__ = [
+    "HUMAN_ACCURACY",
+    "HUMAN_NOTE",
+    "NOTHING",
+    "beside",
+    "beside_view",
+    "interleaved",
+    "published_table",
+]
+
+HUMAN_ACCURACY = 94.7
+"""Human experts [%]: 378.83 points on 400 tasks of planning and VQA (paper, appendix)."""
+
+HUMAN_NOTE = (
+    "Human experts scored 378.83 of 400 tasks drawn from planning and VQA together (paper, "
+    "appendix): an accuracy, shown for scale."
+)
+"""What stands under every table that shows it."""
 
 _KINDS = {"published": "paper", "ours": "ours", "difference": "difference"}
 NOTHING = pd.DataFrame(

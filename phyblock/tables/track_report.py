@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from phyblock.tables.measures import Cell, Measure
+from phyblock.tables.measures import CELL, Cell, Measure
 from phyblock.tables.text_table import TextTable
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from phyblock.tables.load import Run
 
-__all__ = ["PaperTable", "Shown", "TableMaker", "TrackReport"]
+__all__ = ["WHOLE", "PaperTable", "Shown", "TableMaker", "TrackReport", "in_whole"]
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,15 @@ class TableMaker:
     comes_with: str = ""
 
 
+WHOLE = Cell("overall", "Overall")
+"""The one cell of a track that has no parts."""
+
+
+def in_whole(rows: pd.DataFrame, _: Run) -> pd.DataFrame:
+    """All samples in one cell."""
+    return rows.assign(**{CELL: WHOLE.name})
+
+
 def _no_references(_: Run) -> Mapping[str, Mapping[str, float]]:
     return {}
 
@@ -63,22 +72,27 @@ def _no_references(_: Run) -> Mapping[str, Mapping[str, float]]:
 class TrackReport:
     """The measures of a track, and what is shown of them.
 
-    `cells` are those of a run, the last of which stands for all. `headline` chooses the columns of
-    the headline table, the first measure in every cell where it is left out; the column headed
-    `main`, else the last, is the one that models are ranked by. `references` are rows to hold
-    models against, by name, with values [%] by heading. `notes` stand under the headline. `tables`,
-    `figures` and `paper_tables` (by their number in the paper) are its own; a figure is None for
-    a run that has no numbers for it. `check_alike` raises SpecError where the first run cannot be
-    compared with the second in these cells.
+    `cells` are those of a run, the last of which stands for all; `in_cells` repeats rows of samples
+    for each cell that they are pooled in, which it names in the column `CELL`. `headline` chooses
+    the columns of the headline table, the first measure in every cell where it is left out; the
+    column headed `main`, else the last, is the one that models are ranked by. `references` are
+    rows to hold models against, by name, with values [%] by heading. `notes` stand under the
+    headline. `tables`, `figures` and `paper_tables` (by their number in the paper) are its own; a
+    figure is None for a run that has no numbers for it. `bars` is the name of the figure of its
+    first measure. `check_alike` raises SpecError where the first run cannot be compared with the
+    second in these cells.
     """
 
     measures: tuple[Measure, ...]
-    cells: Callable[[Run], tuple[Cell, ...]]
+    cells: Callable[[Run], tuple[Cell, ...]] = lambda _: (WHOLE,)
+    in_cells: Callable[[pd.DataFrame, Run], pd.DataFrame] = in_whole
     headline: Callable[[Run], tuple[Shown, ...]] | None = None
     main: str = ""
     references: Callable[[Run], Mapping[str, Mapping[str, float]]] = _no_references
     notes: Callable[[Run], Sequence[str]] = lambda _: ()
     tables: Mapping[str, TableMaker] = field(default_factory=dict)
+    bars: str = ""
     figures: Mapping[str, Callable[[Run], Figure | None]] = field(default_factory=dict)
+    figure_titles: Mapping[str, str] = field(default_factory=dict)
     paper_tables: Mapping[int, PaperTable] = field(default_factory=dict)
     check_alike: Callable[[Run, Run, Sequence[str]], None] | None = None

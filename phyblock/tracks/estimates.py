@@ -7,10 +7,11 @@ import pandas as pd
 from phyblock.registry import added_measures
 from phyblock.tables.estimates import ESTIMATE_COLUMNS, estimate_frame
 from phyblock.tables.load import Run
-from phyblock.tables.measures import Measure
+from phyblock.tables.measures import VARIANT, Counted, Measure
+from phyblock.tables.outcomes import WITHOUT_REPLY
 from phyblock.tracks.kind import kind_of
 
-__all__ = ["all_estimates", "track_estimates", "track_measures"]
+__all__ = ["all_estimates", "counted_samples", "track_estimates", "track_measures"]
 
 
 def track_measures(track: str) -> tuple[Measure, ...]:
@@ -22,8 +23,12 @@ def track_estimates(run: Run, track: str) -> pd.DataFrame:
     """See `estimate_frame`; the same frame whenever it is asked for, not to be changed."""
     key = f"estimates of {track}"
     if key not in run.made:
-        cells = kind_of(track).report().cells(run)
-        run.made[key] = estimate_frame(run, track_measures(track), cells)
+        run.made[key] = estimate_frame(
+            run,
+            track_measures(track),
+            kind_of(track).report().cells(run),
+            lambda counted: counted_samples(run, track, counted),
+        )
     return run.made[key]
 
 
@@ -33,3 +38,24 @@ def all_estimates(run: Run) -> pd.DataFrame:
     known = [part for part in parts if len(part)]
     columns = ["track", *ESTIMATE_COLUMNS]
     return pd.concat(known, ignore_index=True)[columns] if known else pd.DataFrame(columns=columns)
+
+
+def counted_samples(run: Run, track: str, counted: Counted) -> pd.DataFrame:
+    """The counts of samples that measures of a track are made from; see `Counted`."""
+    if counted.frame is not None:
+        return counted.frame(run)
+    records = run.records
+    left_out = records["outcome"].isin(run.design.outcomes_left_out)
+    rows = records[(records["track"] == track) & ~left_out]
+    found = [(counts or {}).get(counted.name) for counts in rows["counts"]]
+    rows = rows[[numbers is not None for numbers in found]]
+    numbers = pd.DataFrame(
+        [list(numbers) for numbers in found if numbers is not None],
+        columns=list(counted.columns),
+        index=rows.index,
+        dtype="float64",
+    )
+    kept = rows[["sample", "model", "scene", "seed", "item"]].assign(
+        **dict.fromkeys(VARIANT, ""), replied=~rows["outcome"].isin(WITHOUT_REPLY)
+    )
+    return kind_of(track).report().in_cells(pd.concat([kept, numbers], axis=1), run)

@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from phyblock.datasets import AssemblyTask, Dataset
+from phyblock.records import Record
 from phyblock.registry import known_tracks
 from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tables.track_report import TrackReport
@@ -44,7 +45,9 @@ class TrackKind:
     `manifest` what the manifest says beyond what all tracks have. `rescored`
     makes the track out of a suite and scenes for reading stored replies again; None where
     `phyblock score` takes its records over as they are. `report` imports what tables and figures
-    are made by, which takes long; `counts` are functions of an item and its judgement, by name,
+    are made by, which takes long; With `plays`, samples are episodes of
+    several turns. `record` is the model of its records,
+    where it adds something to them. `counts` are functions of an item and its judgement, by name,
     whose numbers are kept in the record (see `per_sample`).
     """
 
@@ -56,12 +59,14 @@ class TrackKind:
     report: Callable[[], TrackReport]
     subject: type[object]
     template: Path
+    record: type[Record] | None = None
     prompt_field: tuple[str, ...] = ("prompt",)
     section: tuple[str, type[BaseModel], str] | None = None
     baselines: Mapping[str, Callable[..., str]] = field(default_factory=dict)
     tables: tuple[str, ...] = ()
     own_data: Callable[[SuiteSpec], tuple[str, tuple[str, ...], bool] | None] | None = None
     manifest: Callable[[LoadedSuite], Mapping[str, Any]] | None = None
+    plays: bool = False
     rescored: Callable[[SuiteSpec, Sequence[AssemblyTask]], SingleTrack[Any]] | None = None
     counts: Mapping[str, Callable[[Any, Any], Sequence[float] | None]] = field(default_factory=dict)
 

@@ -11,6 +11,7 @@ import yaml
 from hypothesis import settings
 from hypothesis import strategies as st
 
+from phyblock.records.known import known_records
 from phyblock.report import Run, read_design
 from phyblock.scoring import ERROR_TYPES
 from phyblock.tables.load import Frames, frames_of
@@ -119,8 +120,8 @@ def record(
 
 
 def frames_from(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Frames:
-    numbered = ((f"record {number}", one) for number, one in enumerate(records, 1))
-    return frames_of(numbered, read_design(facts))
+    read = (known_records().validate_python(one) for one in records)
+    return frames_of(read, read_design(facts))
 
 
 def run_of(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Run:

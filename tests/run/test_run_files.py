@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 from phyblock.errors import StoreError
 from phyblock.models import Image, Message
+from phyblock.records import PromptLines, TurnLines
+from phyblock.records.reading import collect_turns
 from phyblock.run.appending import AppendFile
-from phyblock.run.prompts import PromptFile, PromptLines, read_prompts
-from phyblock.run.reading import TurnLines, read_turns
+from phyblock.run.prompts import PromptFile, read_prompts
 from tests.workspace import Workspace
 
 REPLY = {
@@ -55,7 +56,7 @@ def turn_lines(folder: Path, *numbers: int) -> None:
 
 def test_turns_are_read_in_their_order_and_a_later_line_counts(tmp_path: Path) -> None:
     turn_lines(tmp_path, 0, 1, 0, 2)
-    assert [reply["text"] for reply in read_turns(tmp_path)["s"]] == [
+    assert [reply.text for reply in collect_turns(TurnLines(tmp_path))["s"]] == [
         "Move(0)",
         "Move(1)",
         "Move(2)",
@@ -64,13 +65,13 @@ def test_turns_are_read_in_their_order_and_a_later_line_counts(tmp_path: Path) -
 
 def test_turns_of_samples_that_are_done_are_left_on_disk(tmp_path: Path) -> None:
     turn_lines(tmp_path, 0, 2)
-    assert read_turns(tmp_path, {"s"}) == {}
+    assert collect_turns(TurnLines(tmp_path), {"s"}) == {}
 
 
 def test_a_turn_that_is_missing_is_an_error_at_the_next(tmp_path: Path) -> None:
     turn_lines(tmp_path, 0, 2)
     with pytest.raises(StoreError, match="is turn 2 of a sample of which 1"):
-        read_turns(tmp_path)
+        collect_turns(TurnLines(tmp_path))
 
 
 def test_a_turn_that_a_kill_cut_short_is_not_there(tmp_path: Path) -> None:
@@ -80,7 +81,7 @@ def test_a_turn_that_a_kill_cut_short_is_not_there(tmp_path: Path) -> None:
     lines = TurnLines(tmp_path)
     assert len(list(lines)) == 1
     assert lines.is_cut
-    assert len(read_turns(tmp_path)["s"]) == 1
+    assert len(collect_turns(TurnLines(tmp_path))["s"]) == 1
 
 
 def test_a_prompt_is_kept_once_without_its_pictures(tmp_path: Path) -> None:
@@ -97,9 +98,9 @@ def test_a_prompt_is_kept_once_without_its_pictures(tmp_path: Path) -> None:
     (digest,) = digests
     assert len(path.read_text(encoding="utf-8").splitlines()) == 1
     assert "secret" not in path.read_text(encoding="utf-8")
-    assert read_prompts(tmp_path)[digest] == [
-        {"role": "system", "parts": ["Be brief."]},
-        {"role": "user", "parts": [{"image": "goal"}, "Which?"]},
+    assert [message.fields() for message in read_prompts(tmp_path)[digest]] == [
+        {"role": "system", "parts": ("Be brief.",)},
+        {"role": "user", "parts": ({"image": "goal"}, "Which?")},
     ]
 
 
@@ -111,6 +112,7 @@ def test_every_record_names_a_prompt_that_is_there(tmp_path: Path, pictures_dir:
     prompts = read_prompts(made.out)
     assert {record["prompt"]["messages"] for record in made.records()} == set(prompts)
     for digest, messages in prompts.items():
-        canonical = json.dumps(messages, sort_keys=True, separators=(",", ":"))
+        fields = [message.fields() for message in messages]
+        canonical = json.dumps(fields, sort_keys=True, separators=(",", ":"))
         assert hashlib.sha256(canonical.encode()).hexdigest() == digest
     assert not (made.out / "turns.jsonl").exists()

@@ -8,10 +8,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from phyblock.records import PromptMessage, Record, StoredReply
+from phyblock.records import Score as StoredScore
 from phyblock.report.export.rows import needs, newest_records, prompt_text
 from phyblock.run.prompts import read_prompts
 from phyblock.scoring import Counts, micro
 from phyblock.tables.load import Run
+from phyblock.tracks.vqa.record import ChoiceRecord
 
 if TYPE_CHECKING:
     from inspect_ai.log import EvalLog, EvalMetric, EvalSample
@@ -31,9 +34,9 @@ def to_inspect(run: Run, folder: Path) -> tuple[Path, ...]:
     from inspect_ai.log import write_eval_log
 
     prompts = read_prompts(run.path)
-    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    groups: dict[tuple[str, str], list[Record]] = {}
     for record in newest_records(run):
-        groups.setdefault((record["track"], record["model"]), []).append(record)
+        groups.setdefault((record.track, record.model), []).append(record)
     files = []
     for (track, model), records in groups.items():
         files.append(folder / f"{track}_{_UNSAFE.sub('-', model)}.eval")
@@ -42,7 +45,7 @@ def to_inspect(run: Run, folder: Path) -> tuple[Path, ...]:
 
 
 def inspect_log(
-    run: Run, records: Sequence[Mapping[str, Any]], prompts: Mapping[str, Any]
+    run: Run, records: Sequence[Record], prompts: Mapping[str, Sequence[PromptMessage]]
 ) -> EvalLog:
     """The log of one track and model: a sample a record, its seed the epoch.
 
@@ -52,11 +55,11 @@ def inspect_log(
     """
     from inspect_ai.log import EvalConfig, EvalDataset, EvalLog, EvalResults, EvalSpec
 
-    track, model = records[0]["track"], records[0]["model"]
+    track, model = records[0].track, records[0].model
     seeds = run.design.suite.seeds
     name = f"phyblock/{track}"
     digest = hashlib.sha256(f"{run.manifest['identity']} {track} {model}".encode()).hexdigest()[:22]
-    counted = [r for r in records if r["outcome"] not in run.design.outcomes_left_out]
+    counted = [r for r in records if r.outcome not in run.design.outcomes_left_out]
     samples = [_sample(record, prompts, seeds) for record in records]
     keys = sorted({str(sample.id) for sample in samples})
     return EvalLog(
@@ -65,7 +68,7 @@ def inspect_log(
             eval_id=digest,
             run_id=digest,
             task_id=digest,
-            created=min(record["time"] for record in records),
+            created=min(record.time for record in records),
             task=name,
             dataset=EvalDataset(
                 name=str(run.manifest.get("dataset", {}).get("name") or run.design.suite.name),
@@ -78,7 +81,7 @@ def inspect_log(
         ),
         results=EvalResults(
             total_samples=len(samples),
-            completed_samples=sum(record["reply"] is not None for record in records),
+            completed_samples=sum(record.reply is not None for record in records),
             scores=_results(counted),
         ),
         samples=samples,
@@ -86,19 +89,19 @@ def inspect_log(
 
 
 def _sample(
-    record: Mapping[str, Any], prompts: Mapping[str, Any], seeds: Sequence[int]
+    record: Record, prompts: Mapping[str, Sequence[PromptMessage]], seeds: Sequence[int]
 ) -> EvalSample:
     from inspect_ai.log import EvalError, EvalSample
     from inspect_ai.model import ChatMessageAssistant, ChatMessageUser, ModelOutput
 
     text = prompt_text(record, prompts) or ""
-    reply, error = record["reply"], record["error"]
-    output = ModelOutput(model=record["model"])
+    reply, error = record.reply, record.error
+    output = ModelOutput(model=record.model)
     messages: list[Any] = [ChatMessageUser(content=text)]
     if reply is not None:
-        output = ModelOutput.from_content(record["model"], reply["text"])
+        output = ModelOutput.from_content(record.model, reply.text)
         output.usage = _usage(reply)
-        messages.append(ChatMessageAssistant(content=reply["text"], model=record["model"]))
+        messages.append(ChatMessageAssistant(content=reply.text, model=record.model))
     kept = (
         "sample",
         "key",
@@ -109,67 +112,71 @@ def _sample(
         "outcome",
         "parse",
         "question",
+        "turns",
+        "ending",
+        "progress",
     )
-    about = {name: record[name] for name in kept if name in record}
-    about |= {name: record[name] for name in ("turns", "ending", "progress") if name in record}
-    said = None if error is None else str(error.get("message"))
+    fields = record.fields()
+    about = {name: fields[name] for name in kept if name in fields}
+    answer = record.answer if isinstance(record, ChoiceRecord) else None
     return EvalSample(
         # The key tells rotations of one question apart; older records have none.
-        id=str(record.get("key", record["scene"])),
-        epoch=list(seeds).index(record["seed"]) + 1 if record["seed"] in seeds else 1,
+        id=record.item,
+        epoch=list(seeds).index(record.seed) + 1 if record.seed in seeds else 1,
         input=text,
-        target=(record.get("answer") or {}).get("right") or "",
+        target="" if answer is None else answer.right,
         messages=messages,
         output=output,
         scores=_scores(record),
         metadata=about,
-        total_time=None if reply is None else reply.get("latency_s"),
-        error=None if said is None else EvalError(message=said, traceback="", traceback_ansi=""),
+        total_time=None if reply is None else reply.latency_s,
+        error=None
+        if error is None
+        else EvalError(message=error.message, traceback="", traceback_ansi=""),
     )
 
 
-def _usage(reply: Mapping[str, Any]) -> Any:
+def _usage(reply: StoredReply) -> Any:
     from inspect_ai.model import ModelUsage
 
-    usage = reply.get("usage") or {}
-    sent, said = usage.get("prompt_tokens") or 0, usage.get("completion_tokens") or 0
+    sent, said = reply.usage.prompt_tokens or 0, reply.usage.completion_tokens or 0
     return ModelUsage(
         input_tokens=sent,
         output_tokens=said,
         total_tokens=sent + said,
-        reasoning_tokens=usage.get("reasoning_tokens"),
-        total_cost=reply.get("cost_usd"),
+        reasoning_tokens=reply.usage.reasoning_tokens,
+        total_cost=reply.cost_usd,
     )
 
 
-def _name(score: Mapping[str, Any]) -> str:
-    parts = (score["setting"], score.get("matcher") or "", score["criterion"])
+def _name(score: StoredScore) -> str:
+    parts = (score.setting, score.matcher or "", score.criterion)
     return "-".join(part for part in parts if part)
 
 
-def _scores(record: Mapping[str, Any]) -> dict[str, Score]:
+def _scores(record: Record) -> dict[str, Score]:
     from inspect_ai.scorer import CORRECT, INCORRECT, Score
 
-    plan = (record.get("parse") or {}).get("plan")
+    plan = getattr(record.parse, "plan", None)
     said = None if plan is None else " ".join(map(str, plan))
     found = {}
-    for score in record["scores"]:
-        counts = Counts(score["tp"], score["fp"], score["fn"])
+    for score in record.scores:
+        counts = Counts(score.tp, score.fp, score.fn)
         value = {"tp": counts.tp, "fp": counts.fp, "fn": counts.fn, "f1": counts.f1 or 0.0}
         found[_name(score)] = Score(value=value, answer=said)
-    if answer := record.get("answer"):
-        value_of = CORRECT if answer["correct"] else INCORRECT
-        found["answer"] = Score(value=value_of, answer=answer["given"])
+    if isinstance(record, ChoiceRecord) and record.answer is not None:
+        value_of = CORRECT if record.answer.correct else INCORRECT
+        found["answer"] = Score(value=value_of, answer=record.answer.given)
     return found
 
 
-def _results(records: Sequence[Mapping[str, Any]]) -> list[Any]:
+def _results(records: Sequence[Record]) -> list[Any]:
     from inspect_ai.log import EvalScore
 
     counts: dict[str, list[Counts]] = {}
     for record in records:
-        for score in record["scores"]:
-            one = Counts(score["tp"], score["fp"], score["fn"])
+        for score in record.scores:
+            one = Counts(score.tp, score.fp, score.fn)
             counts.setdefault(_name(score), []).append(one)
     found = []
     for name, all_counts in counts.items():
@@ -183,7 +190,11 @@ def _results(records: Sequence[Mapping[str, Any]]) -> list[Any]:
                 metrics=_metrics({k: v for k, v in metrics.items() if v is not None}),
             )
         )
-    answers = [record["answer"]["correct"] for record in records if record.get("answer")]
+    answers = [
+        record.answer.correct
+        for record in records
+        if isinstance(record, ChoiceRecord) and record.answer is not None
+    ]
     if answers:
         accuracy = _metrics({"accuracy": sum(answers) / len(answers)})
         found.append(

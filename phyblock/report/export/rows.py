@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
 from typing import Any
 
 from phyblock.errors import Problem, SpecError
+from phyblock.records import PictureMark, PromptMessage, Record
+from phyblock.records.reading import read_records
 from phyblock.run.prompts import read_prompts
-from phyblock.run.reading import read_records
 from phyblock.tables.load import Run
+from phyblock.tracks.step_planning.record import EpisodeRecord
+from phyblock.tracks.vqa.record import ChoiceRecord
 
 __all__ = ["as_json", "export_rows", "needs", "newest_records", "prompt_text"]
 
+_SAMPLE = ("sample", "track", "model", "scene", "seed")
 _REPLY = ("finish", "cost_usd", "latency_s", "provider_model", "attempts", "cached")
 _USAGE = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
 _QUESTION = ("id", "subtask", "category", "rotation")
@@ -29,12 +33,12 @@ def needs(package: str, extra: str, form: str) -> None:
         raise SpecError(Problem(f"--to {form}", f"needs the package {name}", hint=hint)) from error
 
 
-def newest_records(run: Run) -> list[dict[str, Any]]:
+def newest_records(run: Run) -> list[Record]:
     """The newest record of every sample, models in the suite's order."""
     order = {name: place for place, name in enumerate(run.design.model_names)}
     return sorted(
-        read_records(run.path).values(),
-        key=lambda r: (r["track"], order.get(r["model"], len(order)), r["sample"]),
+        read_records(run.path),
+        key=lambda r: (r.track, order.get(r.model, len(order)), r.sample),
     )
 
 
@@ -47,55 +51,53 @@ def export_rows(run: Run) -> Iterator[dict[str, Any]]:
     """
     prompts = read_prompts(run.path)
     for record in newest_records(run):
-        reply, error = record.get("reply") or {}, record.get("error") or {}
-        question, answer = record.get("question") or {}, record.get("answer") or {}
-        parse = record.get("parse") or {}
-        usage = reply.get("usage") or {}
+        reply, error = record.reply, record.error
+        question = record.question if isinstance(record, ChoiceRecord) else None
+        answer = record.answer if isinstance(record, ChoiceRecord) else None
+        plan = getattr(record.parse, "plan", None)
         yield {
-            **{name: record[name] for name in ("sample", "track", "model", "scene", "seed")},
-            "levels": [int(level) for level in record["levels"]],
-            "parents": [str(parent) for parent in record.get("parents") or ()],
-            "n_blocks": record["n_blocks"],
-            "outcome": record["outcome"],
+            **{name: getattr(record, name) for name in _SAMPLE},
+            "levels": list(record.levels),
+            "parents": list(record.parents),
+            "n_blocks": record.n_blocks,
+            "outcome": record.outcome,
             "prompt": prompt_text(record, prompts),
-            "reply": reply.get("text"),
-            "reasoning": reply.get("reasoning"),
-            **{name: reply.get(name) for name in _REPLY},
-            **{name: usage.get(name) for name in _USAGE},
-            "error": error.get("message"),
-            "rule": parse.get("rule"),
-            "plan": parse.get("plan"),
-            **{f"question_{name}": question.get(name) for name in _QUESTION},
-            **{f"answer_{name}": answer.get(name) for name in _ANSWER},
-            "ending": record.get("ending"),
+            "reply": reply and reply.text,
+            "reasoning": reply and reply.reasoning,
+            **{name: getattr(reply, name, None) for name in _REPLY},
+            **{name: getattr(reply and reply.usage, name, None) for name in _USAGE},
+            "error": error and error.message,
+            "rule": getattr(record.parse, "rule", None),
+            "plan": None if plan is None else list(plan),
+            **{f"question_{name}": getattr(question, name, None) for name in _QUESTION},
+            **{f"answer_{name}": getattr(answer, name, None) for name in _ANSWER},
+            "ending": record.ending if isinstance(record, EpisodeRecord) else None,
             **_counts(run, record),
         }
 
 
-def prompt_text(record: Mapping[str, Any], prompts: Mapping[str, Any]) -> str | None:
+def prompt_text(record: Record, prompts: Mapping[str, Sequence[PromptMessage]]) -> str | None:
     """The prompt as it was sent, pictures by their labels; None where none was stored."""
-    messages = prompts.get((record.get("prompt") or {}).get("messages") or "")
+    messages = None if record.prompt is None else prompts.get(record.prompt.messages)
     if messages is None:
         return None
-    parts = (part for message in messages for part in message["parts"])
+    parts = (part for message in messages for part in message.parts)
     return "\n".join(
-        part if isinstance(part, str) else f"[picture: {part['image']}]" for part in parts
+        f"[picture: {part.image}]" if isinstance(part, PictureMark) else part for part in parts
     )
 
 
-def _counts(run: Run, record: Mapping[str, Any]) -> dict[str, int | None]:
+def _counts(run: Run, record: Record) -> dict[str, int | None]:
     found: dict[str, int | None] = {
         f"{name}_{setting.lower()}": None
         for setting in run.design.suite.settings
         for name in ("tp", "fp", "fn")
     }
-    for score in record["scores"]:
-        if score["criterion"] in ("aov", "placed") and score.get("matcher") in (
-            None,
-            "",
-            run.design.matcher,
-        ):
-            found |= {f"{n}_{score['setting'].lower()}": score[n] for n in ("tp", "fp", "fn")}
+    for score in record.scores:
+        is_headline = score.matcher in (None, "", run.design.matcher)
+        if is_headline and score.criterion in ("aov", "placed"):
+            counts = {"tp": score.tp, "fp": score.fp, "fn": score.fn}
+            found |= {f"{name}_{score.setting.lower()}": n for name, n in counts.items()}
     return found
 
 

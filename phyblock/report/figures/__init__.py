@@ -1,5 +1,5 @@
 """Figures of a run: SVG and PNG, legible in print, for color-blind readers too."""
 
-from phyblock.report.figures.write import FIGURES, write_figures
+from phyblock.report.figures.write import figure_names, figure_titles, write_figures
 
-__all__ = ["FIGURES", "write_figures"]
+__all__ = ["figure_names", "figure_titles", "write_figures"]

@@ -7,11 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from phyblock.run.reading import RecordLines
+from phyblock.records import Record
+from phyblock.records.reading import run_records
 from phyblock.scoring import ERROR_TYPES
 from phyblock.tables.design import Design
+from phyblock.tracks.vqa.record import ChoiceRecord
 
-__all__ = ["Item", "Place", "SampleIndex", "item_key", "read_places"]
+__all__ = ["Item", "Place", "SampleIndex", "read_places"]
 
 
 class Place(NamedTuple):
@@ -36,13 +38,11 @@ def read_places(folder: Path, design: Design) -> list[Place]:
 
     Raises StoreError for a line that is no record.
     """
-    lines = RecordLines(folder)
+    lines = run_records(folder)
     found: dict[str, Place] = {}
     start = 0
     for _, record in lines:
-        found[record["sample"]] = Place(
-            record["track"], item_key(record), record["model"], record["seed"], start
-        )
+        found[record.sample] = Place(record.track, record.item, record.model, record.seed, start)
         start = lines.whole_bytes
     tracks = {name: n for n, name in enumerate(design.suite.tracks)}
     models = {name: n for n, name in enumerate(design.model_names)}
@@ -56,11 +56,6 @@ def read_places(folder: Path, design: Design) -> list[Place]:
             place.seed,
         ),
     )
-
-
-def item_key(record: Mapping[str, Any]) -> str:
-    """The name of a record's item inside its track; of older records, that of the scene."""
-    return str(record.get("key", record["scene"]))
 
 
 @dataclass
@@ -104,20 +99,20 @@ class SampleIndex:
         """The items in the order of their numbers."""
         return self._items.values
 
-    def add(self, record: Mapping[str, Any]) -> None:
+    def add(self, record: Record) -> None:
         """Append the sample of a record."""
-        item = Item(record["track"], item_key(record))
+        item = Item(record.track, record.item)
         if item not in self._items.numbers:
             self._add_item(record)
-        answer = record.get("answer")
-        self._seeds.add(record["seed"])
+        answer = record.answer if isinstance(record, ChoiceRecord) else None
+        self._seeds.add(record.seed)
         row = {
-            "track": self._tracks.number(record["track"]),
-            "model": self._models.number(record["model"]),
+            "track": self._tracks.number(record.track),
+            "model": self._models.number(record.model),
             "item": self._items.number(item),
-            "seed": record["seed"],
-            "outcome": self._outcomes.number(record["outcome"]),
-            "correct": None if answer is None else int(answer["correct"]),
+            "seed": record.seed,
+            "outcome": self._outcomes.number(record.outcome),
+            "correct": None if answer is None else int(answer.correct),
         }
         for name, value in row.items():
             self._rows[name].append(value)
@@ -125,21 +120,20 @@ class SampleIndex:
             for name, value in self._score(record, setting).items():
                 columns[name].append(value)
 
-    def _add_item(self, record: Mapping[str, Any]) -> None:
-        question = record.get("question") or {}
-        subtask = question.get("subtask")
-        self._about["scene"].append(self._scenes.number(record["scene"]))
-        self._about["levels"].append(record["levels"])
+    def _add_item(self, record: Record) -> None:
+        subtask = record.question.subtask if isinstance(record, ChoiceRecord) else None
+        self._about["scene"].append(self._scenes.number(record.scene))
+        self._about["levels"].append(record.levels)
         self._about["subtask"].append(None if subtask is None else self._subtasks.number(subtask))
 
-    def _score(self, record: Mapping[str, Any], setting: str) -> dict[str, int | None]:
+    def _score(self, record: Record, setting: str) -> dict[str, int | None]:
         """Counts under a setting by the headline matcher, and a bit for each type of wrong step."""
-        scores = [score for score in record["scores"] if score["setting"] == setting]
-        headline = [score for score in scores if score.get("matcher") == self._design.matcher]
+        scores = [score for score in record.scores if score.setting == setting]
+        headline = [score for score in scores if score.matcher == self._design.matcher]
         for score in headline or scores:
-            errors = score.get("errors") or {}
+            errors = score.errors or {}
             wrong = sum(1 << n for n, name in enumerate(ERROR_TYPES) if errors.get(name))
-            return {**{name: score[name] for name in ("tp", "fp", "fn")}, "wrong": wrong}
+            return {"tp": score.tp, "fp": score.fp, "fn": score.fn, "wrong": wrong}
         return dict.fromkeys(("tp", "fp", "fn", "wrong"))
 
     def columns(self, questions: Mapping[Item, int]) -> dict[str, Any]:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from phyblock.datasets import QuestionTask
-from phyblock.report.html.index import Item, Place, SampleIndex, item_key
+from phyblock.records import PromptLines, Record, StoredPrompt
+from phyblock.records.reading import any_records
+from phyblock.report.html.index import Item, Place, SampleIndex
 from phyblock.report.html.pack import Pack
-from phyblock.run.prompts import PromptLines
-from phyblock.run.reading import RECORDS
+from phyblock.tracks.step_planning.record import EpisodeRecord
 from phyblock.tracks.vqa.pictures import Shown
+from phyblock.tracks.vqa.record import ChoiceRecord
 from phyblock.tracks.vqa.track import asked
 
 __all__ = ["pack_prompts", "pack_samples", "pictures_sent", "questions_asked"]
@@ -20,14 +21,17 @@ __all__ = ["pack_prompts", "pack_samples", "pictures_sent", "questions_asked"]
 _IN_INDEX = frozenset(
     {
         *("sample", "track", "model", "key", "scene", "levels", "parents", "n_blocks", "seed"),
-        "outcome",
+        *("outcome", "run"),
     }
 )
 
 
 def pack_prompts(folder: Path, pack: Pack) -> dict[str, int]:
     """Pack the prompts of a run as they were sent, and number them by digest."""
-    return {line["sha256"]: pack.add(line["messages"]) for _, line in PromptLines(folder)}
+    return {
+        line.sha256: pack.add([message.fields() for message in line.messages])
+        for _, line in PromptLines(folder)
+    }
 
 
 def pack_samples(
@@ -51,7 +55,8 @@ def pictures_sent(folder: Path, places: Sequence[Place]) -> bool:
     """Whether the first record of any track tells of a picture that was sent."""
     first = {place.track: place for place in reversed(places)}
     return any(
-        (record.get("prompt") or {}).get("images") for record in _records(folder, first.values())
+        record.prompt is not None and record.prompt.images
+        for record in _records(folder, first.values())
     )
 
 
@@ -62,54 +67,48 @@ def questions_asked(
     if not questions:
         return {}
     first = {Item(place.track, place.key): place for place in reversed(places)}
-    asked_first = [place for place in first.values() if place.track == "vqa"]
+    first_asked = sorted(first.values(), key=lambda place: place.start)
     shown = {}
-    for record in _records(folder, sorted(asked_first, key=lambda place: place.start)):
-        about = record["question"]
-        if about["id"] in questions:
-            task = asked(questions[about["id"]], about["rotation"])
-            shown[Item(record["track"], item_key(record))] = task.shown
+    for record in _records(folder, first_asked):
+        if isinstance(record, ChoiceRecord) and record.question.id in questions:
+            task = asked(questions[record.question.id], record.question.rotation)
+            shown[Item(record.track, record.item)] = task.shown
     return shown
 
 
-def _records(folder: Path, places: Iterable[Place]) -> Iterable[dict[str, Any]]:
-    path = folder / RECORDS
-    if not path.exists():
-        return
-    with path.open("rb") as file:
-        for place in places:
-            file.seek(place.start)
-            yield json.loads(file.readline())
+def _records(folder: Path, places: Iterable[Place]) -> Iterable[Record]:
+    return any_records(folder).at(place.start for place in places)
 
 
 def _entry(
-    record: Mapping[str, Any], prompts: Mapping[str, int], pictures: Mapping[str, str]
+    record: Record, prompts: Mapping[str, int], pictures: Mapping[str, str]
 ) -> dict[str, Any]:
-    entry = {name: value for name, value in record.items() if name not in _IN_INDEX}
-    entry["prompt"] = _prompt(record.get("prompt"), prompts, pictures)
-    entry["scores"] = [_score(score) for score in record["scores"]]
-    if record.get("turns") is not None:
+    entry = {name: value for name, value in record.fields().items() if name not in _IN_INDEX}
+    entry["prompt"] = _prompt(record.prompt, prompts, pictures)
+    entry["scores"] = [_score(score.fields()) for score in record.scores]
+    if isinstance(record, EpisodeRecord):
         entry["turns"] = [
-            {**turn, "prompt": _prompt(turn.get("prompt"), prompts, pictures)}
-            for turn in record["turns"]
+            {**turn.fields(), "prompt": _prompt(turn.prompt, prompts, pictures)}
+            for turn in record.turns
         ]
     return entry
 
 
 def _prompt(
-    prompt: Mapping[str, Any] | None, prompts: Mapping[str, int], pictures: Mapping[str, str]
+    prompt: StoredPrompt | None, prompts: Mapping[str, int], pictures: Mapping[str, str]
 ) -> dict[str, Any] | None:
     if prompt is None:
         return None
     images = [
         {
-            **{name: image[name] for name in ("label", "width_px", "height_px")},
-            "file": pictures.get(image["sha256"]),
+            "label": image.label,
+            "width_px": image.width_px,
+            "height_px": image.height_px,
+            "file": pictures.get(image.sha256),
         }
-        for image in prompt.get("images") or ()
+        for image in prompt.images
     ]
-    digest = prompt.get("messages")
-    return {"template": prompt.get("template"), "n": prompts.get(digest or ""), "images": images}
+    return {"template": prompt.template, "n": prompts.get(prompt.messages), "images": images}
 
 
 def _score(score: Mapping[str, Any]) -> dict[str, Any]:

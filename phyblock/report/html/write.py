@@ -13,10 +13,10 @@ from typing import Any
 from phyblock.domain import SUBTASK_NAMES
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
-from phyblock.report.figures import FIGURES, write_figures
+from phyblock.records import MANIFEST, PROMPTS, RECORDS
+from phyblock.report.figures import figure_titles, write_figures
 from phyblock.report.html.drawable import kit, question_entry, scene_entry
-from phyblock.report.html.headline import assembly_headline
-from phyblock.report.html.headline_tracks import steps_headline, vqa_headline
+from phyblock.report.html.headline import headlines
 from phyblock.report.html.index import Item, SampleIndex, read_places
 from phyblock.report.html.pack import Pack, write_script
 from phyblock.report.html.page import Figure, render_page
@@ -29,8 +29,6 @@ from phyblock.report.html.samples import (
 from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.sources import Sources, open_sources
 from phyblock.report.write import TablesWritten
-from phyblock.run.prompts import PROMPTS
-from phyblock.run.reading import MANIFEST, RECORDS
 from phyblock.tables.load import Run
 from phyblock.tracks.vqa.pictures import Shown
 
@@ -40,23 +38,12 @@ REPORT_FILE = "report.html"
 _FOLDER = "report"
 _PICTURES = "pictures"
 _UNFINISHED = ".new"
-_FIGURES = {
-    "f1-levels": "F1 by level",
-    "f1-radar": "F1 by level, as in the paper",
-    "settings": "Setting A against setting B",
-    "error-types": "Wrong steps by type",
-    "f1-size": "F1 by model size",
-    "f1-cost": "F1 by cost",
-    "vqa-subtasks": "VQA accuracy by subtask",
-    "step-progress": "Blocks placed, turn by turn",
-    "scenes": "The scenes of the run by level",
-}
 _NOT_SHOWN = ("table1",)
 """Tables that a headline table replaces."""
 
 
 def write_report(
-    written: TablesWritten, data: Path | None = None, figures: Sequence[str] = FIGURES
+    written: TablesWritten, data: Path | None = None, figures: Sequence[str] = ()
 ) -> Path:
     """Write figures, `report.html` and `report/` of a run whose tables were; the page's path.
 
@@ -136,8 +123,8 @@ def _keep_pictures(
 ) -> dict[str, str]:
     """Addresses of the pictures at hand as seen from the page, by digest."""
     shelf = PictureShelf(folder, run.manifest["suite"])
-    if set(run.design.suite.tracks) - {"vqa"}:
-        known = (sources.tasks.get(scene) for scene in _scenes(run))
+    if scenes := _scenes(run):
+        known = (sources.tasks.get(scene) for scene in scenes)
         shelf.add_scenes(task for task in known if task is not None)
     if asked:
         shelf.add_questions(asked.values())
@@ -145,16 +132,16 @@ def _keep_pictures(
 
 
 def _scenes(run: Run) -> list[str]:
-    return list(run.records.loc[run.records["track"] != "vqa", "scene"].unique())
+    """Scenes that were asked about as such: their names are those of the items."""
+    return list(run.records.loc[run.records["item"] == run.records["scene"], "scene"].unique())
 
 
 def _page(written: TablesWritten, figures: Sequence[Path], build: str) -> str:
     run = written.run
-    headlines = [assembly_headline(run), vqa_headline(run), steps_headline(run)]
     return render_page(
         about=_about(run),
-        headlines=[headline for headline in headlines if headline],
-        figures=_figures(figures),
+        headlines=headlines(run),
+        figures=_figures(run, figures),
         tables=[view for name, view in written.views.items() if name not in _NOT_SHOWN],
         folder=f"{_FOLDER}/{build}",
         build=build,
@@ -182,9 +169,10 @@ def _about(run: Run) -> dict[str, Any]:
     }
 
 
-def _figures(files: Sequence[Path]) -> list[Figure]:
+def _figures(run: Run, files: Sequence[Path]) -> list[Figure]:
+    titles = figure_titles(run)
     return [
-        Figure(f"{path.parent.name}/{path.name}", _FIGURES.get(path.stem, path.stem))
+        Figure(f"{path.parent.name}/{path.name}", titles.get(path.stem, path.stem))
         for path in files
         if path.suffix == ".svg"
     ]

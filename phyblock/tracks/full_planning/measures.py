@@ -5,13 +5,13 @@ from __future__ import annotations
 import pandas as pd
 
 from phyblock.scoring.uncertainty import f1_of, precision_of, recall_of
-from phyblock.tables.cells import cell_scores
+from phyblock.tables.cells import cell_scores, with_levels
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Cell, Counted, Measure
 from phyblock.tables.outcomes import WITHOUT_REPLY
 from phyblock.tables.text_table import level_name
 
-__all__ = ["NAME", "PLANNING_MEASURES", "is_asked", "level_cells"]
+__all__ = ["NAME", "PLANNING_MEASURES", "in_levels", "is_asked", "level_cells"]
 
 NAME = "full_planning"
 
@@ -24,6 +24,11 @@ def is_asked(run: Run) -> bool:
 def level_cells(run: Run) -> tuple[Cell, ...]:
     """The levels of the suite, then all scenes together."""
     return tuple(Cell(level, level_name(level)) for level in run.design.levels)
+
+
+def in_levels(rows: pd.DataFrame, run: Run) -> pd.DataFrame:
+    """Rows of samples, repeated for each level of their scene."""
+    return with_levels(rows, run).rename(columns={"level": CELL})
 
 
 def _steps(run: Run) -> pd.DataFrame:

@@ -8,14 +8,14 @@ from phyblock.errors import Problem, SpecError
 from phyblock.tables.cells import METRICS
 from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run
-from phyblock.tables.paper_numbers import published_table
+from phyblock.tables.paper_numbers import HUMAN_ACCURACY, HUMAN_NOTE, published_table
 from phyblock.tables.track_report import PaperTable, Shown, TableMaker, TrackReport
 from phyblock.tracks.full_planning.assembly import assembly_frame, table1_frame
 from phyblock.tracks.full_planning.errors import errors_frame
 from phyblock.tracks.full_planning.figures.errors import error_bars
 from phyblock.tracks.full_planning.figures.levels import f1_radar, settings_dots
 from phyblock.tracks.full_planning.figures.scatter import f1_by_cost, f1_by_size
-from phyblock.tracks.full_planning.measures import PLANNING_MEASURES, level_cells
+from phyblock.tracks.full_planning.measures import PLANNING_MEASURES, in_levels, level_cells
 from phyblock.tracks.full_planning.published import published_frame
 from phyblock.tracks.full_planning.seeds import (
     intervals_table,
@@ -31,8 +31,6 @@ from phyblock.tracks.full_planning.views import errors_view, published_view, tab
 __all__ = ["REPORT"]
 
 _MAIN = "Overall F1"
-_HUMAN_ACCURACY = 94.7
-"""Human experts [%]: 378.83 points on 400 tasks of planning and VQA (paper, appendix)."""
 
 
 def _headline(run: Run) -> tuple[Shown, ...]:
@@ -46,16 +44,19 @@ def _headline(run: Run) -> tuple[Shown, ...]:
 
 def _references(run: Run) -> Mapping[str, Mapping[str, float]]:
     printed = published_table(1)
-    printed = printed[printed["model"] == "Random"].set_index(["level", "metric"])["value"]
+    printed = printed[printed["model"] == "Random"].set_index(["level", "metric"])
+    values = printed["value"].to_dict()
     random = {
-        column.heading: float(printed.get((column.cell, column.measure), float("nan")))
+        column.heading: float(values.get((column.cell, column.measure), float("nan")))
         for column in _headline(run)
     }
-    return {"Random, published": random}
+    human = {_MAIN: HUMAN_ACCURACY}
+    return {"Random, published": random, "Human experts, published": human}
 
 
 def _notes(run: Run) -> Sequence[str]:
-    return (f"F1 in percent, setting {run.design.setting}, matcher {run.design.matcher}.",)
+    how = f"F1 in percent, setting {run.design.setting}, matcher {run.design.matcher}."
+    return (how, HUMAN_NOTE)
 
 
 def _check_alike(run: Run, first: Run, levels: Sequence[str]) -> None:
@@ -76,6 +77,7 @@ def _check_alike(run: Run, first: Run, levels: Sequence[str]) -> None:
 REPORT = TrackReport(
     measures=PLANNING_MEASURES,
     cells=level_cells,
+    in_cells=in_levels,
     headline=_headline,
     main=_MAIN,
     references=_references,
@@ -89,12 +91,21 @@ REPORT = TrackReport(
         "errors": TableMaker(errors_frame, errors_view),
         "published": TableMaker(published_frame, published_view),
     },
+    bars="f1-levels",
     figures={
         "f1-radar": f1_radar,
         "settings": settings_dots,
         "error-types": error_bars,
         "f1-size": f1_by_size,
         "f1-cost": f1_by_cost,
+    },
+    figure_titles={
+        "f1-levels": "F1 by level",
+        "f1-radar": "F1 by level, as in the paper",
+        "settings": "Setting A against setting B",
+        "error-types": "Wrong steps by type",
+        "f1-size": "F1 by model size",
+        "f1-cost": "F1 by cost",
     },
     paper_tables={
         1: PaperTable(published_frame, published_view),

@@ -163,7 +163,7 @@ def paper_table5_view(table: pd.DataFrame, run: Run) -> TextTable:
         (
             label,
             kinds[metric],
-            *(cell for level in _LEVELS for cell in cells[model, metric, level]),
+            *(cell for level in _PAPER_LEVELS for cell in cells[model, metric, level]),
         )
         for model, name in dict(zip(table["model"], table["published_name"], strict=True)).items()
         for label, metric in zip((model, f"({name})"), kinds, strict=True)

@@ -19,7 +19,7 @@ from phyblock.tracks.full_planning.published import (
     largest_differences,
 )
 
-__all__ = ["ERROR_NAMES", "coverage_view", "errors_view", "published_view", "table1_view"]
+__all__ = ["ERROR_NAMES", "errors_view", "published_view", "table1_view"]
 
 _MODEL = Column("Model", is_text=True)
 _METRIC_NAMES = dict(zip(METRICS, ("Prec", "Rec", "F1"), strict=True))

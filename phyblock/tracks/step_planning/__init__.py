@@ -5,6 +5,7 @@ from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.kind import TrackKind
 from phyblock.tracks.step_planning.baselines import STEP_RULES, StepSubject
 from phyblock.tracks.step_planning.opening import open_step_planning
+from phyblock.tracks.step_planning.record import EpisodeRecord
 from phyblock.tracks.step_planning.spec import StepsSpec
 from phyblock.tracks.step_planning.track import StepPlanning
 
@@ -26,7 +27,9 @@ TRACK = TrackKind(
     report=_report,
     subject=StepSubject,
     baselines=STEP_RULES,
+    plays=True,
     section=("steps", StepsSpec, "The rules of the step_planning track."),
+    record=EpisodeRecord,
     template=bundled("prompts", "step_planning.j2"),
     prompt_field=("steps", "prompt"),
     tables=("table3", "endings", "progress"),

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from phyblock.run.reading import RecordLines
+from phyblock.records.reading import run_records
 from phyblock.scoring import ERROR_TYPES
 from phyblock.tables.load import Run, once_per_run
+from phyblock.tracks.step_planning.record import EpisodeRecord
 from phyblock.tracks.step_planning.rules import ENDINGS
 
 __all__ = [
@@ -62,9 +62,9 @@ def _rows(run: Run) -> list[dict[str, Any]]:
     """What is kept of each episode's newest record; never all records at once."""
     order = {name: place for place, name in enumerate(run.design.model_names)}
     rows = {
-        record["sample"]: _row(record)
-        for _, record in RecordLines(run.path)
-        if record["track"] == NAME
+        record.sample: _row(record)
+        for _, record in run_records(run.path)
+        if isinstance(record, EpisodeRecord)
     }
     kept = [row for row in rows.values() if row["outcome"] not in run.design.outcomes_left_out]
     return sorted(
@@ -72,15 +72,12 @@ def _rows(run: Run) -> list[dict[str, Any]]:
     )
 
 
-def _row(record: Mapping[str, Any]) -> dict[str, Any]:
-    outcomes = tuple(record.get("outcomes", ()))
+def _row(record: EpisodeRecord) -> dict[str, Any]:
+    kept = ("model", "scene", "seed", "n_blocks", "outcome", "ending", "max_steps", "progress")
     return {
-        **{name: record[name] for name in ("model", "scene", "seed", "n_blocks", "outcome")},
-        "ending": record.get("ending", "unanswered"),
-        "steps": len(outcomes),
-        "max_steps": record.get("max_steps", 0),
-        "progress": tuple(record.get("progress", ())),
-        "outcomes": outcomes,
+        **{name: getattr(record, name) for name in kept},
+        "steps": len(record.outcomes),
+        "outcomes": record.outcomes,
     }
 
 

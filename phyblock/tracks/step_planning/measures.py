@@ -8,16 +8,15 @@ import pandas as pd
 
 from phyblock.scoring.uncertainty import f1_of, precision_of, ratio_of, recall_of
 from phyblock.tables.load import Run
-from phyblock.tables.measures import CELL, VARIANT, Cell, Counted, Measure
+from phyblock.tables.measures import CELL, VARIANT, Counted, Measure
 from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.tables.track_report import WHOLE
 from phyblock.tracks.step_planning.episodes import NAME, episodes_frame
 
-__all__ = ["CELLS", "COUNTED", "NAME", "STEP_MEASURES", "is_asked"]
+__all__ = ["COUNTED", "NAME", "STEP_MEASURES", "is_asked"]
 
 COUNTED = ("placed", "attempted")
 """What precision is over: the blocks in the world, or every move that was attempted."""
-_WHOLE = "overall"
-CELLS = (Cell(_WHOLE, "Overall"),)
 
 
 def is_asked(run: Run) -> bool:
@@ -45,7 +44,7 @@ def _episodes(run: Run) -> pd.DataFrame:
 
 def _about(rows: pd.DataFrame) -> dict[str, Any]:
     replied = ~rows["outcome"].isin(WITHOUT_REPLY)
-    return {CELL: _WHOLE, "item": rows["scene"], "replied": replied}
+    return {CELL: WHOLE.name, "item": rows["scene"], "replied": replied}
 
 
 _MOVES = Counted("moves", ("tp", "fp", "fn"), _moves)

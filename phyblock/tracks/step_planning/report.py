@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 from phyblock.errors import Problem, SpecError
 from phyblock.tables.load import Run
-from phyblock.tables.track_report import PaperTable, Shown, TableMaker, TrackReport
+from phyblock.tables.track_report import WHOLE, PaperTable, Shown, TableMaker, TrackReport
 from phyblock.tracks.step_planning.episodes import endings_frame, moves_frame, progress_frame
 from phyblock.tracks.step_planning.figure import progress_by_turn
-from phyblock.tracks.step_planning.measures import CELLS, STEP_MEASURES
+from phyblock.tracks.step_planning.measures import STEP_MEASURES
 from phyblock.tracks.step_planning.table3 import (
     endings_view,
     moves_view,
@@ -26,13 +26,12 @@ from phyblock.tracks.step_planning.table3 import (
 
 __all__ = ["REPORT"]
 
-_WHOLE = CELLS[0].name
 _COLUMNS = (
-    Shown("precision", _WHOLE, "Precision", "placed"),
-    Shown("recall", _WHOLE, "Recall", "placed"),
-    Shown("f1", _WHOLE, "F1", "placed"),
-    Shown("f1", _WHOLE, "F1 of attempts", "attempted"),
-    Shown("completion", _WHOLE, "Completed"),
+    Shown("precision", WHOLE.name, "Precision", "placed"),
+    Shown("recall", WHOLE.name, "Recall", "placed"),
+    Shown("f1", WHOLE.name, "F1", "placed"),
+    Shown("f1", WHOLE.name, "F1 of attempts", "attempted"),
+    Shown("completion", WHOLE.name, "Completed"),
 )
 
 
@@ -64,7 +63,6 @@ def _check_alike(run: Run, first: Run, _: Sequence[str]) -> None:
 
 REPORT = TrackReport(
     measures=STEP_MEASURES,
-    cells=lambda _: CELLS,
     headline=lambda _: _COLUMNS,
     main="F1",
     references=_references,
@@ -78,6 +76,7 @@ REPORT = TrackReport(
         "progress": TableMaker(progress_frame, progress_view),
     },
     figures={"step-progress": progress_by_turn},
+    figure_titles={"step-progress": "Blocks placed, turn by turn"},
     paper_tables={3: PaperTable(paper_table3_frame, paper_table3_view)},
     check_alike=_check_alike,
 )

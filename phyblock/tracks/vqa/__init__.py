@@ -9,6 +9,7 @@ from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.kind import TrackKind
 from phyblock.tracks.vqa.baselines import CHOICE_RULES, ChoiceSubject
 from phyblock.tracks.vqa.opening import open_vqa
+from phyblock.tracks.vqa.record import ChoiceRecord
 from phyblock.tracks.vqa.spec import VqaSpec
 from phyblock.tracks.vqa.track import Vqa
 
@@ -41,6 +42,7 @@ TRACK = TrackKind(
     subject=ChoiceSubject,
     baselines=CHOICE_RULES,
     section=("vqa", VqaSpec, "The questions of the vqa track, and how they are shown."),
+    record=ChoiceRecord,
     template=bundled("prompts", "vqa.j2"),
     prompt_field=("vqa", "prompt"),
     tables=("table2",),

@@ -28,6 +28,7 @@ __all__ = [
     "NAME",
     "VQA_MEASURES",
     "guessing",
+    "in_subtasks",
     "is_asked",
     "subtask_cells",
 ]
@@ -51,6 +52,12 @@ def subtask_cells(run: Run) -> tuple[Cell, ...]:
     return _cells(expected_answers(run) or set(run.records["subtask"].dropna()))
 
 
+def in_subtasks(rows: pd.DataFrame, run: Run) -> pd.DataFrame:
+    """Rows of samples with the subtask of their question."""
+    subtasks = run.records.set_index("sample")["subtask"]
+    return rows.assign(**{CELL: rows["sample"].map(subtasks)})
+
+
 def _cells(asked: Container[str]) -> tuple[Cell, ...]:
     parts = {
         category: tuple(name for name in subtasks if name in asked)
@@ -70,7 +77,8 @@ def _answers(run: Run) -> pd.DataFrame:
     asked = questions_counted(run)
     return asked.assign(
         **dict.fromkeys(VARIANT, ""),
-        **{CELL: asked["subtask"], "item": asked["question"], "replied": True},
+        **{CELL: asked["subtask"], "item": asked["question"]},
+        replied=True,
     )
 
 

@@ -7,11 +7,19 @@ from collections.abc import Mapping, Sequence
 from phyblock.domain import CATEGORIES
 from phyblock.errors import Problem, SpecError
 from phyblock.tables.load import Run
+from phyblock.tables.paper_numbers import HUMAN_ACCURACY, HUMAN_NOTE
 from phyblock.tables.track_report import PaperTable, Shown, TableMaker, TrackReport
 from phyblock.tracks.vqa.accuracy import questions_frame
 from phyblock.tracks.vqa.answers import OVERALL_CELL, letters_frame, showing
 from phyblock.tracks.vqa.figure import vqa_heat_map
-from phyblock.tracks.vqa.measures import ACCURACY, CATEGORY_NAMES, NAME, VQA_MEASURES, subtask_cells
+from phyblock.tracks.vqa.measures import (
+    ACCURACY,
+    CATEGORY_NAMES,
+    NAME,
+    VQA_MEASURES,
+    in_subtasks,
+    subtask_cells,
+)
 from phyblock.tracks.vqa.table2 import (
     letters_view,
     paper_table2_frame,
@@ -33,12 +41,15 @@ _COLUMNS = (
 
 def _references(_: Run) -> Mapping[str, Mapping[str, float]]:
     printed = published_cells("Random")
-    return {"Random, published": {column.heading: printed[column.cell] for column in _COLUMNS}}
+    return {
+        "Random, published": {column.heading: printed[column.cell] for column in _COLUMNS},
+        "Human experts, published": {_COLUMNS[-1].heading: HUMAN_ACCURACY},
+    }
 
 
 def _notes(_: Run) -> Sequence[str]:
     macro = "A category is the unweighted mean of its four subtasks, overall that of the categories"
-    return (f"Accuracy in percent. {macro}.",)
+    return (f"Accuracy in percent. {macro}.", HUMAN_NOTE)
 
 
 def _check_alike(run: Run, first: Run, _: Sequence[str]) -> None:
@@ -57,6 +68,7 @@ def _check_alike(run: Run, first: Run, _: Sequence[str]) -> None:
 REPORT = TrackReport(
     measures=VQA_MEASURES,
     cells=subtask_cells,
+    in_cells=in_subtasks,
     headline=lambda _: _COLUMNS,
     references=_references,
     notes=_notes,
@@ -67,6 +79,7 @@ REPORT = TrackReport(
         "questions": TableMaker(questions_frame, None, "table2"),
     },
     figures={"vqa-subtasks": vqa_heat_map},
+    figure_titles={"vqa-subtasks": "VQA accuracy by subtask"},
     paper_tables={2: PaperTable(paper_table2_frame, paper_table2_view)},
     check_alike=_check_alike,
 )

@@ -189,8 +189,8 @@ def paper_table2_frame(run: Run) -> pd.DataFrame:
     if not is_asked(run):
         return NOTHING
     table = interleaved(table2_frame(run), CELLS)
-    asked = {cell.name: len(cell.of) for cell in subtask_cells(run)}
-    whole = {cell.name: len(cell.of) for cell in ALL_CELLS}
+    asked: Mapping[str, int] = {cell.name: len(cell.of) for cell in subtask_cells(run)}
+    whole: Mapping[str, int] = {cell.name: len(cell.of) for cell in ALL_CELLS}
     # A mean over a part of what the paper averages is not the same number.
     partly = table["cell"].map(asked) != table["cell"].map(whole)
     table.loc[partly, ["ours", "difference"]] = np.nan
@@ -202,7 +202,7 @@ def paper_table2_view(table: pd.DataFrame, run: Run) -> TextTable:
     note = (
         "Averages are unweighted means. The questions are our own: the paper's are not published."
     )
-    names = {**dict.fromkeys(CATEGORIES, "Avg"), "overall": "Overall"}
+    names: dict[str, str] = {**dict.fromkeys(CATEGORIES, "Avg"), OVERALL_CELL: "Overall"}
     return beside_view(table, run, number_in_paper=2, names=names, note=note)
 
 

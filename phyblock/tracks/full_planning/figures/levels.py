@@ -9,10 +9,8 @@ import pandas as pd
 
 from phyblock.tables.design import OVERALL, Design
 from phyblock.tables.drawing import (
-    ACCENT,
     COLORS,
     GRID,
-    INK,
     MARKERS,
     MUTED,
     PALE,
@@ -28,7 +26,7 @@ from phyblock.tracks.full_planning.settings import settings_frame
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["f1_bars", "f1_radar", "how_measured", "ranked", "settings_dots"]
+__all__ = ["f1_radar", "how_measured", "ranked", "settings_dots"]
 
 _ROW_IN = 0.24
 _RADAR_MODELS = 8
@@ -48,41 +46,6 @@ def ranked(table: pd.DataFrame, column: str) -> list[str]:
     """
     overall = table[table["level"] == OVERALL].dropna(subset=[column])
     return list(overall.sort_values([column, "model"], ascending=[False, True])["model"])
-
-
-def f1_bars(run: Run) -> Figure | None:
-    """A panel a level, a bar a model with its 95 % interval; None where nothing was measured."""
-    table = intervals_table(run)
-    models, levels = ranked(table, "f1"), run.design.levels
-    if not models:
-        return None
-    cells = table.set_index(["model", "level"])
-    figure = new_figure(1.05 + _ROW_IN * len(models))
-    axes = figure.subplots(1, len(levels), sharey=True, squeeze=False)[0]
-    places = np.arange(len(models))
-    for ax, level in zip(axes, levels, strict=True):
-        rows = cells.loc[[(model, level) for model in models]]
-        color = INK if level == OVERALL else ACCENT
-        ax.barh(places, rows["f1"].fillna(0), height=0.62, color=color, alpha=0.85, linewidth=0)
-        f1, lo, hi = rows[["f1", "lo", "hi"]].to_numpy(float).T
-        sure = ~np.isnan(f1) & ~np.isnan(lo)
-        for line, width in (("white", 2.8), (MUTED, 1.1)):
-            ax.hlines(places[sure], lo[sure], hi[sure], color=line, linewidth=width)
-        for place in np.flatnonzero(~np.isnan(f1)):
-            end = np.nanmax([f1[place], hi[place]]) + 2
-            ax.text(end, place, f"{f1[place]:.1f}", va="center", fontsize=6.5, color=INK)
-        ax.set(title=level_name(level), xlim=(0, 118), xticks=[0, 50, 100], xlabel="F1 (%)")
-    axes[0].set_yticks(places, models)
-    axes[0].set_ylim(len(models) - 0.4, -0.6)
-    bare_axes(axes)
-    headed(figure, "Assembly planning by level", f"{how_measured(run.design)}; lines: {_ci(run)}")
-    return figure
-
-
-def _ci(run: Run) -> str:
-    table = intervals_table(run)
-    clusters = int(table["n_clusters"].max()) if len(table) else 0
-    return f"95 % intervals, {clusters} base scenes resampled"
 
 
 def f1_radar(run: Run) -> Figure | None:

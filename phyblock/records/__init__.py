@@ -1,0 +1,53 @@
+"""Every line and file that a run writes and reads again, each declared once.
+
+A model of a line reads it, says what is wrong with it, writes it and documents itself.
+"""
+
+from phyblock.records.belonging import Belonging
+from phyblock.records.line import Line
+from phyblock.records.lines import PROMPTS, RECORDS, TURNS, Lines, PromptLines, TurnLines
+from phyblock.records.manifest import FORMAT, MANIFEST, Manifest, read_manifest
+from phyblock.records.others import PictureMark, Prompt, PromptMessage, Turn
+from phyblock.records.record import (
+    Outcome,
+    Record,
+    Recorded,
+    Score,
+    StoredError,
+    StoredImage,
+    StoredPrompt,
+    StoredReply,
+    StoredUsage,
+)
+from phyblock.records.record_lines import RecordedLines, RecordLines, record_adapter
+
+__all__ = [
+    "FORMAT",
+    "MANIFEST",
+    "PROMPTS",
+    "RECORDS",
+    "TURNS",
+    "Belonging",
+    "Line",
+    "Lines",
+    "Manifest",
+    "Outcome",
+    "PictureMark",
+    "Prompt",
+    "PromptLines",
+    "PromptMessage",
+    "Record",
+    "RecordLines",
+    "Recorded",
+    "RecordedLines",
+    "Score",
+    "StoredError",
+    "StoredImage",
+    "StoredPrompt",
+    "StoredReply",
+    "StoredUsage",
+    "Turn",
+    "TurnLines",
+    "read_manifest",
+    "record_adapter",
+]

@@ -1,0 +1,85 @@
+"""Decoding one line: fast where it is sound, and with the reason where it is not."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from phyblock.bounded import load_json
+from phyblock.errors import Problem
+from phyblock.records.line import encodable
+
+__all__ = ["decode", "is_json", "problem_of"]
+
+_LONGEST_SHOWN = 60
+_MISSING = "missing"
+
+
+def decode(adapter: TypeAdapter[Any], line: bytes) -> Any:
+    """Read a line by its model, in bounds and without changing the type of anything.
+
+    Raises ValueError with what was wrong with it: a JSONDecodeError for broken syntax, pydantic's
+    ValidationError for fields, any other with a text that can be shown. Lone surrogates, which no
+    output could hold, become "?".
+    """
+    try:
+        return adapter.validate_json(line, strict=True)
+    except ValidationError:
+        found = load_json(line.decode("utf-8"))
+    return adapter.validate_json(json.dumps(_clean(found)), strict=True)
+
+
+def is_json(line: bytes) -> bool:
+    """Whether a line is JSON of any kind, within bounds or not."""
+    try:
+        json.loads(line)
+    except (ValueError, RecursionError):
+        return False
+    return True
+
+
+def problem_of(error: Any, where: str, is_not: str, hint: str) -> Problem:
+    """What pydantic found, in our words."""
+    field = _dotted(error["loc"])
+    if error["type"] == _MISSING:
+        return Problem(where, f"{is_not}: missing", field, hint=hint)
+    allowed = _ALLOWED.get(error["type"], _expected)(error.get("ctx") or {}, error["msg"])
+    found = _shown(error["input"])
+    message = f"{is_not}: of the wrong type or out of range"
+    return Problem(where, message, field, found, allowed, hint)
+
+
+def _dotted(place: Sequence[int | str]) -> str:
+    text = ""
+    for part in place:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}"
+    return text.lstrip(".")
+
+
+def _shown(value: object) -> str:
+    text = encodable(json.dumps(value, default=str, ensure_ascii=False))
+    return text if len(text) <= _LONGEST_SHOWN else text[: _LONGEST_SHOWN - 3] + "..."
+
+
+def _expected(_: Mapping[str, Any], message: str) -> str:
+    """What pydantic asks for, without its preamble."""
+    return message.removeprefix("Input should be ").removeprefix("Value error, ")
+
+
+_ALLOWED: Mapping[str, Callable[[Mapping[str, Any], str], str]] = {
+    "literal_error": lambda context, _: str(context["expected"]),
+}
+
+
+def _clean(value: Any) -> Any:
+    """A decoded value whose texts UTF-8 can hold."""
+    if isinstance(value, str):
+        return encodable(value)
+    if isinstance(value, list):
+        return [_clean(below) for below in value]
+    if isinstance(value, dict):
+        return {encodable(name): _clean(below) for name, below in value.items()}
+    return value

@@ -1,0 +1,125 @@
+"""`run.yaml`: what a run is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import yaml
+from pydantic import Field, ValidationError
+
+from phyblock.bounded import read_text
+from phyblock.errors import Problem, StoreError
+from phyblock.records.decode import problem_of
+from phyblock.records.line import Line
+
+__all__ = [
+    "FORMAT",
+    "MANIFEST",
+    "Manifest",
+    "ManifestDataset",
+    "ManifestModel",
+    "ManifestQuestions",
+    "read_manifest",
+]
+
+FORMAT = 1
+"""Version of run folders; one that adds fields alone stays the same."""
+MANIFEST = "run.yaml"
+_HINT = "run.yaml is written by `phyblock run` and never edited: restore it from a copy"
+_DIGITS = 16
+
+
+class ManifestModel(Line):
+    """A model of the run; what decides its replies stands beside it."""
+
+    name: str
+    """Its name in the run."""
+    published: str | None = None
+    """What the paper calls it."""
+    size_b: float | None = None
+    """Its size [billion parameters]."""
+
+
+class ManifestDataset(Line):
+    """The data set."""
+
+    name: str
+    """Its name."""
+    sha256: str
+    """Digest of the scenes that were asked about."""
+    format: str = "builtin"
+    """Its layout."""
+    root: str = ""
+    """Where it was."""
+
+
+class ManifestQuestions(Line):
+    """The question set."""
+
+    format: str
+    """Its layout."""
+    root: str
+    """Where it was."""
+
+
+class Manifest(Line):
+    """What a run is: written before anything is asked, and never changed."""
+
+    identity: str
+    """Digest of what decides the results: only the same run goes on in a folder."""
+    created: str = ""
+    """When it was begun, UTC."""
+    format: Annotated[int, Field(ge=1, le=FORMAT)] = FORMAT
+    """Version of the run folder."""
+    suite: dict[str, Any] = Field(default_factory=dict)
+    """The suite with everything that it left out."""
+    models: tuple[ManifestModel, ...] = ()
+    """The models as they are called."""
+    dataset: ManifestDataset | None = None
+    """The data set."""
+    tracks: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    """By track, digests of what decides its results: prompt, pictures, questions."""
+    limit: int | None = None
+    """Items at most of each track."""
+    questions: ManifestQuestions | None = None
+    """The question set, where one is asked."""
+    items: dict[str, int] = Field(default_factory=dict)
+    """How many items each track asks about."""
+    scenes: int = 0
+    """Distinct scenes."""
+    scenes_by_level: dict[int, int] = Field(default_factory=dict)
+    """Scenes of each level; one scene may be of several."""
+    versions: dict[str, str] = Field(default_factory=dict)
+    """Of Python and of libraries."""
+
+    @property
+    def run(self) -> str:
+        """What its records carry to show that they are its own."""
+        return self.identity[:_DIGITS]
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """The run's manifest; StoreError when there is none or it cannot be read."""
+    path = folder / MANIFEST
+    try:
+        found = yaml.safe_load(read_text(path))
+    except (FileNotFoundError, NotADirectoryError) as error:
+        allowed = "a folder that phyblock run wrote"
+        raise StoreError(Problem(str(folder), f"holds no {MANIFEST}", allowed=allowed)) from error
+    except OSError as error:
+        raise StoreError(Problem(str(path), f"cannot be read: {error.strerror}")) from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"{path}:{mark.line + 1}:{mark.column + 1}" if mark else str(path)
+        raise StoreError(Problem(where, "is not YAML", hint=_HINT)) from error
+    if not isinstance(found, dict) or "identity" not in found:
+        message, said = "is not a run manifest", "no such key"
+        raise StoreError(Problem(str(path), message, "identity", said, hint=_HINT))
+    try:
+        return Manifest.model_validate(found)
+    except ValidationError as error:
+        raise StoreError(
+            problem_of(one, str(path), "is not a run manifest", _HINT)
+            for one in error.errors(include_url=False)
+        ) from error

@@ -1,0 +1,270 @@
+"""A line of `records.jsonl`: what was asked of whom, what came back, and what it is worth.
+
+`Record` declares what all tracks have in common. A track declares what it adds in a subclass of
+its own, with its name as the literal type of `track`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, TypeVar
+
+from pydantic import Field
+from typing_extensions import Self
+
+from phyblock.records.line import LARGEST_WHOLE, Amount, Line, Whole, encodable
+
+__all__ = [
+    "ErrorKind",
+    "Finish",
+    "Outcome",
+    "Record",
+    "Recorded",
+    "Score",
+    "StoredError",
+    "StoredImage",
+    "StoredPrompt",
+    "StoredReply",
+    "StoredUsage",
+]
+
+Outcome = Literal["ok", "parse_failure", "refusal", "truncated", "api_error", "missing"]
+Finish = Literal["stop", "length", "refusal", "unknown"]
+ErrorKind = Literal["retryable", "sample", "refused", "unavailable"]
+
+
+_NumberT = TypeVar("_NumberT", int, float)
+
+
+def _sane(number: _NumberT | None) -> _NumberT | None:
+    return number if number is not None and abs(number) <= LARGEST_WHOLE else None
+
+
+class StoredUsage(Line):
+    """Tokens of a reply as the provider counted them; null where it did not say."""
+
+    prompt_tokens: Whole | None
+    """Tokens of the prompt, pictures included."""
+    completion_tokens: Whole | None
+    """Tokens of the reply."""
+    reasoning_tokens: Whole | None = None
+    """Those of `completion_tokens` that were spent on reasoning."""
+
+
+class StoredReply(Line):
+    """An answer that was read."""
+
+    text: str
+    """The answer."""
+    reasoning: str = ""
+    """The reasoning that the provider showed beside it."""
+    finish: Finish = "stop"
+    """Why it ended: by itself, at the token limit, by a content filter, or not said."""
+    usage: StoredUsage
+    """Its tokens."""
+    cost_usd: Amount | None
+    """Its price [US dollars]; null: not known."""
+    billed_usd: Amount | None = None
+    """What `max_cost_usd` counted [US dollars], failed attempts included, a reply without token
+    counts at its dearest; null: no limit was set."""
+    latency_s: Amount = 0.0
+    """Time of the successful request alone [s]."""
+    provider_model: str = ""
+    """The model that the provider says it used."""
+    attempts: Whole = 1
+    """Requests sent for it, 0 from the cache."""
+    cached: bool
+    """Whether it came from the cache."""
+    seed_sent: bool = True
+    """Whether the provider takes a seed; where not, seeds are independent repeats."""
+
+    @classmethod
+    def of(cls, reply: Mapping[str, Any]) -> Self:
+        """Store a reply, given by its fields, without what no file could hold.
+
+        It is paid for: an absurd number in it is one that is not known.
+        """
+        texts = {name: encodable(text) for name, text in reply.items() if isinstance(text, str)}
+        counts = {name: _sane(count) for name, count in reply["usage"].items()}
+        money = {name: _sane(reply.get(name)) for name in ("cost_usd", "billed_usd")}
+        return cls.model_validate({**reply, **texts, **money, "usage": counts})
+
+    @property
+    def tokens(self) -> int:
+        """Tokens of prompt and reply, as far as they are known."""
+        return (self.usage.prompt_tokens or 0) + (self.usage.completion_tokens or 0)
+
+    @property
+    def limit_usd(self) -> float:
+        """What a limit counted for it, else its cost unless that was paid elsewhere."""
+        if self.billed_usd is not None:
+            return self.billed_usd
+        return 0.0 if self.cached else self.cost_usd or 0.0
+
+
+class StoredError(Line):
+    """Why there is no reply."""
+
+    kind: ErrorKind
+    """`retryable`: every attempt failed; `sample`: this request cannot succeed; `refused`: by a
+    content policy."""
+    status: Whole | None = None
+    """HTTP status, where there was one."""
+    message: str = ""
+    """What was said."""
+    billed_usd: Amount | None = None
+    """As of a reply."""
+
+
+class StoredImage(Line):
+    """A picture that was sent."""
+
+    label: str
+    """What it shows."""
+    sha256: str
+    """Digest of the bytes sent."""
+    width_px: Whole
+    """Width [pixels]."""
+    height_px: Whole
+    """Height [pixels]."""
+
+
+class StoredPrompt(Line):
+    """What was sent."""
+
+    template: str
+    """Name of the template."""
+    version: str
+    """Digest of the template."""
+    messages: str
+    """Digest of the prompt as sent, which stands in `prompts.jsonl`."""
+    images: tuple[StoredImage, ...] = ()
+    """The pictures in the order sent."""
+
+
+class Score(Line):
+    """Steps counted by one criterion under one setting."""
+
+    criterion: str
+    """What is counted."""
+    matcher: str | None = None
+    """How steps and goal blocks are matched; null where the criterion knows no choice."""
+    setting: str
+    """`A`: with orientation; `B`: without."""
+    tp: Whole
+    """Right steps."""
+    fp: Whole
+    """Wrong steps."""
+    fn: Whole
+    """Blocks that are missing."""
+    errors: dict[str, Whole] | None = None
+    """Wrong steps by type, where the criterion tells them apart."""
+    placed: tuple[Whole | None, ...] | None = None
+    """The goal block, from 0, that each step placed, or null."""
+    why: tuple[str | None, ...] | None = None
+    """The error type of each wrong step, null for right ones."""
+
+
+class Record(Line):
+    """A sample's stored outcome."""
+
+    sample: str
+    """`track/model/key/s<seed>`, unique in the run."""
+    track: str
+    """The track that asked."""
+    model: str
+    """The model that was asked."""
+    key: str = ""
+    """Names the item in its track: the scene, or the question; empty in older records of scenes."""
+    scene: str
+    """The scene that it is about."""
+    levels: tuple[Whole, ...]
+    """Levels that the scene counts in."""
+    parents: tuple[str, ...] = ()
+    """Base scenes that the scene was made from."""
+    n_blocks: Whole
+    """Blocks in the goal."""
+    seed: Whole
+    """The repeat."""
+    outcome: Outcome
+    """What became of the request."""
+    reply: StoredReply | None
+    """The reply, null when there is none; of an episode, all its replies together."""
+    error: StoredError | None
+    """The error, null when there is none."""
+    prompt: StoredPrompt | None = None
+    """What was sent, null for recordings; of an episode, with the first turn."""
+    parse: Any = None
+    """What was read in the reply, as the track says; null: nothing was."""
+    scores: tuple[Score, ...]
+    """Counts for every setting, matcher and criterion; none for questions."""
+    time: str = ""
+    """When it was written, UTC."""
+    run: str = ""
+    """Digest of the run that it belongs to; older records have none."""
+    counts: dict[str, tuple[Amount, ...]] = Field(default_factory=dict)
+    """By name, what was counted for measures beside `scores`."""
+
+    columns: ClassVar[Mapping[str, str]] = {}
+    """Columns that the track adds to the frame of records, with their types in pandas."""
+
+    def row(self) -> Mapping[str, Any]:
+        """The values of `columns`."""
+        return {}
+
+    @property
+    def item(self) -> str:
+        """The name of its item inside the track."""
+        return self.key or self.scene
+
+    @property
+    def is_answered(self) -> bool:
+        """Whether the model answered, if only by refusing; a recording may have no reply."""
+        return self.error is None or self.error.kind == "refused"
+
+    @property
+    def is_final(self) -> bool:
+        """Whether asking again would be wrong: answered, or an error that asking cannot mend."""
+        return self.error is None or self.error.kind in ("refused", "sample")
+
+    @property
+    def replies(self) -> tuple[StoredReply, ...]:
+        """Every single reply in it."""
+        return () if self.reply is None else (self.reply,)
+
+    @property
+    def paid_usd(self) -> float | None:
+        """What the run paid for its replies [US dollars]; None where a price is not known.
+
+        Replies from the cache were paid for elsewhere; an episode can hold both kinds.
+        """
+        paid = [reply.cost_usd for reply in self.replies if not reply.cached]
+        known = [cost for cost in paid if cost is not None]
+        return sum(known) if len(known) == len(paid) else None
+
+    @property
+    def limit_usd(self) -> float:
+        """What the run's cost limit counted for this line [US dollars]."""
+        if self.reply is not None:
+            return self.reply.limit_usd
+        return self.failed_usd
+
+    @property
+    def failed_usd(self) -> float:
+        """What the run's cost limit counted for a request that failed [US dollars]."""
+        return 0.0 if self.error is None else self.error.billed_usd or 0.0
+
+
+class Recorded(Line):
+    """What a recording needs of a record: whose reply it is, and to what."""
+
+    model: str
+    """The model that was asked."""
+    key: str
+    """The item that it was asked about."""
+    seed: Whole
+    """The repeat."""
+    reply: StoredReply | None = None
+    """The reply."""
+    error: StoredError | None = None
+    """The error."""
