@@ -46,12 +46,6 @@ class Comparable:
     parts: tuple[Part, ...]
     how: str
 
-    @property
-    def heading(self) -> str:
-        """What the values are called, with their unit."""
-        unit = f" ({self.measure.unit})" if self.measure.unit else ""
-        return f"{self.measure.heading}{unit}"
-
     def strata(self, part: Part) -> tuple[str, ...]:
         """The pooled cells that a part is made of."""
         (cell,) = (cell for cell in self.cells if cell.name == part.cell)
@@ -73,30 +67,40 @@ class Comparable:
         return {str(model): mine[columns] for model, mine in indexed.groupby("model", sort=False)}
 
     def counts(self, both: pd.DataFrame, part: Part) -> Floats:
-        """Counts of paired samples, flat over strata: (samples, 2, strata x columns)."""
+        """Counts of paired samples, flat over strata: (samples, 2, strata x (columns + 1)).
+
+        Behind the columns of each stratum stands how many samples it has.
+        """
         columns = list(self.measure.counted.columns)
         n_strata = len(self.strata(part))
-        counts = np.zeros((len(both), 2, n_strata, len(columns)))
+        counts = np.zeros((len(both), 2, n_strata, len(columns) + 1))
         rows = np.arange(len(both))
         for side, name in enumerate("ab"):
             stratum = both[name, "stratum"].to_numpy(np.intp)
-            counts[rows, side, stratum] = both[name][columns].to_numpy(np.float64)
+            counts[rows, side, stratum, :-1] = both[name][columns].to_numpy(np.float64)
+            counts[rows, side, stratum, -1] = 1
         return counts.reshape(len(both), 2, -1)
 
     def n_counts(self, part: Part) -> int:
         """Length of the last axis of `counts`."""
-        return len(self.strata(part)) * len(self.measure.counted.columns)
+        return len(self.strata(part)) * (len(self.measure.counted.columns) + 1)
 
     def each(self, part: Part) -> Metric:
         """What one sample is worth."""
         unflat = self._unflat(part)
-        return lambda sums: self.measure.value(unflat(sums).sum(axis=-2))
+        return lambda sums: self.measure.value(unflat(sums)[..., :-1].sum(axis=-2))
 
-    def whole(self, part: Part) -> Metric:
-        """What sums over all samples are worth."""
+    def whole(self, part: Part, totals: Floats) -> Metric:
+        """What sums are worth; means are over the strata of which `totals` have samples."""
         unflat, strata = self._unflat(part), self.strata(part)
         values = value_of_cells(self.measure, self.cells_of(part), strata)
-        return lambda sums: values(unflat(sums))[..., -1]
+        asked = unflat(totals)[..., -1] > 0
+
+        def metric(sums: Floats) -> Floats:
+            # A resample without a stratum that was asked has no value.
+            return np.asarray(values(unflat(sums)[..., :-1], asked)[..., -1])
+
+        return metric
 
     def cells_of(self, part: Part) -> tuple[Cell, ...]:
         """The cells below a part, and its own as the last."""
@@ -106,7 +110,7 @@ class Comparable:
         return (*below, own)
 
     def _unflat(self, part: Part) -> Callable[[Floats], Floats]:
-        shape = (len(self.strata(part)), len(self.measure.counted.columns))
+        shape = (len(self.strata(part)), len(self.measure.counted.columns) + 1)
         return lambda sums: np.asarray(sums.reshape(*sums.shape[:-1], *shape))
 
 

@@ -41,16 +41,17 @@ class Comparison:
     """What `compare` found.
 
     `table` has one row a pair and part of the track (levels, categories of questions): a, b, part,
-    value_a, value_b, difference (a minus b), se, lo, hi [all in percent], p, p_holm (corrected for
+    value_a, value_b, difference (a minus b), se, lo, hi [all in `unit`], p, p_holm (corrected for
     all rows), verdict, better, worse and same (samples on which a has the higher, lower, same
     value), n_samples, n_scenes, n_clusters. `flipped` has one row a pair and sample that one side
     alone got wholly right: a, b, scene, item (scene or question), seed, right (that side's label),
-    value_a, value_b [percent]. `name` is what the values are called, `how` says what they are.
+    value_a, value_b. `name` is what the values are called, `unit` theirs, `how` says what they are.
     """
 
     table: pd.DataFrame
     flipped: pd.DataFrame
     name: str
+    unit: str
     how: str
 
 
@@ -165,7 +166,9 @@ def compare(
     verdicts = [_verdict(row, what) for row in table.to_dict("records")]
     table.insert(list(table).index("p_holm") + 1, "verdict", verdicts)
     flipped = pd.concat([pd.DataFrame(columns=_FLIPPED), *(f for f in flips if len(f))])
-    return Comparison(table, flipped.reset_index(drop=True), what.heading, what.how)
+    return Comparison(
+        table, flipped.reset_index(drop=True), what.measure.heading, what.measure.unit, what.how
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +223,7 @@ def _resampled(
             np.add.at(counts[:, n], rows, one.counts)
             seen[rows, n] = True
     totals = counts.sum(axis=0)
-    whole = what.whole(part)
+    whole = what.whole(part, totals)
     sizes = clusters.behind(seen)
     found = bootstrap(
         counts,

@@ -26,7 +26,10 @@ def compare_view(found: Comparison) -> TextTable:
         Column("A", is_text=True),
         Column("B", is_text=True),
         *([] if one_part else [Column("Part", is_text=True)]),
-        *(Column(name, found.name) for name in ("A", "B", "A - B", "SE", "95 % CI")),
+        *(
+            Column(name, f"{found.name} ({found.unit})" if found.unit else found.name)
+            for name in ("A", "B", "A - B", "SE", "95 % CI")
+        ),
         Column("p (Holm)"),
         Column("Verdict", is_text=True),
         *(Column(name, "Samples") for name in ("A better", "B better", "same")),

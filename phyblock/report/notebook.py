@@ -64,15 +64,16 @@ class LoadedRun(Run):
     def summary(self) -> pd.DataFrame:
         """One row a model: samples, answered, and the headline of each track with its interval.
 
-        A track's headline is in a column of its name [%, where it is a share], with `*_lo` and
-        `*_hi`. Only of tracks that were run.
+        A track's headline is in a column of its short name or its name [%, where it is a share],
+        with `*_lo` and `*_hi`. Only of tracks that were run.
         """
         counts = self.tables["coverage"].groupby("model", sort=False)
         table = counts[["expected", "ok"]].sum()
         table = table.reindex(list(self.design.model_names))
         for track in self.design.suite.tracks:
             values, main = headline_of(self, track), main_heading(self, track)
-            for name, end in {track: "shown", f"{track}_lo": "lo", f"{track}_hi": "hi"}.items():
+            short = kind_of(track).report().short or track
+            for name, end in {short: "shown", f"{short}_lo": "lo", f"{short}_hi": "hi"}.items():
                 found = (values.get((model, main)) for model in table.index)
                 numbers = [math.nan if value is None else getattr(value, end) for value in found]
                 table[name] = pd.Series(numbers, table.index, dtype="float64")
@@ -99,7 +100,9 @@ class LoadedRun(Run):
         summary = self.summary()
         titles = {"expected": "Samples", "ok": "Answered"}
         for track in self.design.suite.tracks:
-            titles[track] = f"{kind_of(track).title}: {main_heading(self, track)}, 95 % CI"
+            titles[kind_of(track).report().short or track] = (
+                f"{kind_of(track).title}: {main_heading(self, track)}, 95 % CI"
+            )
         heads = ["Model", *titles.values()]
         lines = []
         for model, row in zip(summary.index, summary.to_dict("records"), strict=True):

@@ -106,16 +106,25 @@ def _pool(run: Run, table: pd.DataFrame, counted: Counted, strata: Sequence[str]
 
 def value_of_cells(
     measure: Measure, cells: Sequence[Cell], strata: Sequence[str]
-) -> Callable[[Floats], Floats]:
-    """From sums of counts (..., strata, columns) to values of the cells (..., cells)."""
+) -> Callable[..., Floats]:
+    """From sums of counts (..., strata, columns) to values of the cells (..., cells).
 
-    def values(sums: Floats) -> Floats:
+    With `asked`, of shape (..., strata), means are over the strata that were asked alone.
+    """
+
+    def values(sums: Floats, asked: np.ndarray | None = None) -> Floats:
         single = measure.value(sums)
-        known = {name: single[..., place] for place, name in enumerate(strata)}
+        mask = np.ones(single.shape, dtype=bool) if asked is None else asked
+        mask = np.broadcast_to(mask, single.shape)
+        known = {name: (single[..., n], mask[..., n]) for n, name in enumerate(strata)}
         for cell in cells:
             if cell.of:
-                known[cell.name] = np.mean([known[name] for name in cell.of], axis=0)
-        return np.stack([known[cell.name] for cell in cells], axis=-1)
+                parts = np.stack([known[name][0] for name in cell.of], axis=-1)
+                there = np.stack([known[name][1] for name in cell.of], axis=-1)
+                whole = there.sum(axis=-1)
+                mean = np.where(there, parts, 0).sum(axis=-1) / np.where(whole, whole, 1)
+                known[cell.name] = np.where(whole > 0, mean, np.nan), whole > 0
+        return np.stack([known[cell.name][0] for cell in cells], axis=-1)
 
     return values
 

@@ -76,7 +76,9 @@ class TrackReport:
     for each cell that they are pooled in, which it names in the column `CELL`. `headline` chooses
     the columns of the headline table, the first measure in every cell where it is left out; the
     column headed `main`, else the last, is the one that models are ranked by. `references` are
-    rows to hold models against, by name, with values [%] by heading. `notes` stand under the
+    rows to hold models against, by name, with values [%] by heading, `published` what the paper
+    prints of `main` for models of the run. `short` is the name of the column that stands for the
+    track in a summary. `notes` stand under the
     headline. `tables`, `figures` and `paper_tables` (by their number in the paper) are its own; a
     figure is None for a run that has no numbers for it. `bars` is the name of the figure of its
     first measure. `check_alike` raises SpecError where the first run cannot be compared with the
@@ -88,6 +90,8 @@ class TrackReport:
     in_cells: Callable[[pd.DataFrame, Run], pd.DataFrame] = in_whole
     headline: Callable[[Run], tuple[Shown, ...]] | None = None
     main: str = ""
+    short: str = ""
+    published: Callable[[Run], Mapping[str, float]] = lambda _: {}
     references: Callable[[Run], Mapping[str, Mapping[str, float]]] = _no_references
     notes: Callable[[Run], Sequence[str]] = lambda _: ()
     tables: Mapping[str, TableMaker] = field(default_factory=dict)

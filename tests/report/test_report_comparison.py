@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from phyblock.datasets.published_names import PUBLISHED_NAMES, match_published
-from phyblock.report import (
-    NO_VALUE,
+from phyblock.report import NO_VALUE, published_table
+from phyblock.tracks.full_planning.published import (
     comparison_notes,
     largest_differences,
     published_frame,
-    published_table,
 )
 from phyblock.tracks.full_planning.views import published_view
 from tests.report.factory import manifest, record, run_of, score

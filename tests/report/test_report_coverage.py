@@ -7,9 +7,9 @@ from hypothesis import given
 
 from phyblock.cli.tally import Tally
 from phyblock.report import coverage_frame
+from phyblock.tables.coverage import coverage_view
 from phyblock.tables.outcomes import HEADINGS, OUTCOMES
 from phyblock.tables.text_table import NO_VALUE
-from phyblock.tracks.full_planning.views import coverage_view
 from tests.report.factory import laws, manifest, record, record_lists, run_of
 
 

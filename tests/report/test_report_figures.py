@@ -10,10 +10,11 @@ import pytest
 from PIL import Image
 
 from phyblock.errors import StoreError
-from phyblock.report.figures import FIGURES, write_figures
+from phyblock.report.figures import figure_names, write_figures
 from phyblock.tables.drawing import COLORS
 from phyblock.tables.load import load_run
-from phyblock.tracks.vqa.figure import accuracy_by_subtask, step_progress, vqa_heat_map
+from phyblock.tracks.step_planning.figure import step_progress
+from phyblock.tracks.vqa.figure import accuracy_by_subtask, vqa_heat_map
 from tests.report.factory import LEVELS, manifest, record, run_of, score, write_run
 
 matplotlib = pytest.importorskip("matplotlib", reason="matplotlib is not installed")
@@ -74,7 +75,7 @@ def test_every_figure_is_drawn_and_drawing_again_gives_the_same_bytes(tmp_path: 
     more += [episode("alpha", "000", 1, 2, 3, 4), episode("beta", "000", 0, 1)]
     run = load_run(folder_of(tmp_path / "run", *more), texts=False)
     first = {file: file.read_bytes() for file in write_figures(run)}
-    assert [file.stem for file in first][::2] == list(FIGURES)
+    assert [file.stem for file in first][::2] == list(figure_names(load_run(folder)))
     assert {file: file.read_bytes() for file in write_figures(run)} == first
     for file, data in first.items():
         if file.suffix == ".svg":

@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from phyblock.report.track_intervals import step_intervals
 
 from phyblock.domain import SUBTASKS
 from phyblock.errors import SpecError
 from phyblock.report import Run
 from phyblock.report.compare import compare_models, compare_runs
 from phyblock.report.compare_view import compare_view, flipped_lines
-from phyblock.tracks.vqa.answers import questions_frame
+from phyblock.tracks.step_planning.table3 import step_intervals
+from phyblock.tracks.vqa.accuracy import questions_frame
 from tests.report.factory import LEVELS, manifest, record, run_of, score
 
 SCENES = tuple(f"{n:03}" for n in range(30))

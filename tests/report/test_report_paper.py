@@ -4,12 +4,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from phyblock.report.paper import PAPER_TABLES
 
 from phyblock.domain import SUBTASKS
 from phyblock.report import published_table
 from phyblock.tables.load import load_run
+from phyblock.tracks.kind import kinds
 from tests.report.factory import LEVELS, manifest, record, score, write_run
+
+PAPER_TABLES = dict(
+    sorted((n, t) for kind in kinds().values() for n, t in kind.report().paper_tables.items())
+)
 
 
 def asked(model: str, subtask: str, seed: int, right: bool) -> dict[str, Any]:

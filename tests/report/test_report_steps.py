@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 import yaml
-from phyblock.report.track_intervals import step_intervals
 
 from phyblock.report import load_run
 from phyblock.report.write import write_tables
@@ -20,7 +19,7 @@ from phyblock.tracks.step_planning.episodes import (
     moves_frame,
     progress_frame,
 )
-from phyblock.tracks.step_planning.table3 import step_scores_frame, table3_frame
+from phyblock.tracks.step_planning.table3 import step_intervals, step_scores_frame, table3_frame
 from tests.report.factory import manifest, record
 
 STEPS = {"gating": "aov", "physics": "settle", "feedback": "success", "history": "text"}

@@ -65,27 +65,36 @@ def _headline(run: Run, track: str) -> Headline:
     report, columns = kind.report(), headline_columns(run, track)
     values = headline_of(run, track)
     headings = [column.heading for column in columns]
+    published = report.published(run)
     main = headings.index(main_heading(run, track))
     rows = []
     for name, sort in kinds_of(run).items():
         found = [values.get((name, heading)) for heading in headings]
-        rows.append(Row(name, sort, tuple(map(_cell, found)), _strip(found[main])))
+        cells = [
+            *map(_cell, found),
+            *([_plain(published.get(name), NO_VALUE)] if published else []),
+        ]
+        rows.append(Row(name, sort, tuple(cells), _strip(found[main])))
     references = report.references(run)
     for name, numbers in references.items():
-        cells = tuple(_plain(numbers.get(heading)) for heading in headings)
-        rows.append(Row(name, "reference", cells))
+        cells = [_plain(numbers.get(heading)) for heading in headings]
+        rows.append(Row(name, "reference", (*cells, *([Cell("")] if published else []))))
     marked = {name: numbers.get(headings[main]) for name, numbers in references.items()}
     seeds = len(run.design.suite.seeds)
     mean = (f"Mean of {seeds} seeds.",) if seeds > 1 else ()
     below = (_BELOW,) if any(cell.below for row in rows for cell in row.cells) else ()
     return Headline(
         kind.title,
-        tuple(headings),
+        (*headings, *(["Published"] if published else [])),
         tuple(rows),
         (" ".join((*report.notes(run), *mean, *below)),),
         main,
         headings[main],
-        {name.partition(",")[0]: value for name, value in marked.items() if value is not None},
+        {
+            name.partition(" ")[0].rstrip(","): value
+            for name, value in marked.items()
+            if value is not None
+        },
     )
 
 
@@ -103,9 +112,9 @@ def _strip(value: Value | None) -> tuple[float, float, float] | None:
     return (value.shown, *ends)
 
 
-def _plain(value: float | None) -> Cell:
+def _plain(value: float | None, blank: str = "") -> Cell:
     """A percentage with nothing under it."""
-    return Cell("") if value is None else Cell(number(value), value)
+    return Cell(blank) if value is None else Cell(number(value), value)
 
 
 def kinds_of(run: Run) -> dict[str, Kind]:

@@ -54,6 +54,15 @@ def _references(run: Run) -> Mapping[str, Mapping[str, float]]:
     return {"Random, published": random, "Human experts, published": human}
 
 
+def _published(run: Run) -> Mapping[str, float]:
+    """What the paper's Table 1 prints as overall F1."""
+    if run.design.setting != PUBLISHED_SETTING:
+        return {}
+    frame = published_frame(run)
+    frame = frame[(frame["level"] == OVERALL) & (frame["metric"] == "f1")]
+    return dict(zip(frame["model"], frame["published"], strict=True))
+
+
 def _notes(run: Run) -> Sequence[str]:
     how = f"F1 in percent, setting {run.design.setting}, matcher {run.design.matcher}."
     return (how, HUMAN_NOTE)
@@ -80,6 +89,8 @@ REPORT = TrackReport(
     in_cells=in_levels,
     headline=_headline,
     main=_MAIN,
+    short="f1",
+    published=_published,
     references=_references,
     notes=_notes,
     tables={

@@ -65,6 +65,7 @@ REPORT = TrackReport(
     measures=STEP_MEASURES,
     headline=lambda _: _COLUMNS,
     main="F1",
+    short="steps_f1",
     references=_references,
     notes=_notes,
     tables={
