@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
 __all__ = [
+    "PUBLISHED_TABLE",
     "TrackWords",
     "add_measure",
     "added_measures",
@@ -24,6 +25,7 @@ __all__ = [
     "known_tracks",
     "register_track",
     "remove_measure",
+    "table_names",
     "unregister_track",
 ]
 
@@ -33,6 +35,9 @@ _PACKAGES = (
     "phyblock.tracks.vqa",
 )
 """Packages that hold a `TRACK`, in the order in which tracks are listed."""
+
+PUBLISHED_TABLE = "published"
+"""The comparison with the paper, which a suite has only if it asks for it."""
 
 
 class TrackWords(Protocol):
@@ -127,6 +132,12 @@ def remove_measure(track: str, name: str) -> None:
 def added_measures(track: str) -> tuple[Any, ...]:
     """Measures that were added to a track, in the order in which they came."""
     return _measures.get(track, ())
+
+
+def table_names() -> tuple[str, ...]:
+    """Tables that a suite can ask for: those of its tracks, then the comparison with the paper."""
+    own = (name for kind in known_tracks().values() for name in kind.tables)
+    return (*dict.fromkeys(own), PUBLISHED_TABLE)
 
 
 def baseline_names() -> tuple[str, ...]:

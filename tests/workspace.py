@@ -105,6 +105,8 @@ class Workspace:
         self.env = {
             "PATH": os.environ["PATH"],
             "HOME": str(root),
+            # What is tested is what stands beside the tests, wherever phyblock is installed from.
+            "PYTHONPATH": str(Path(__file__).parents[1]),
             "PHYBLOCK_CACHE": str(self.cache),
             "LITELLM_LOCAL_MODEL_COST_MAP": "True",
         }

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from phyblock.registry import baseline_names, known_tracks
+from phyblock.registry import baseline_names, known_tracks, table_names
 from phyblock.specs.model import ModelSpec
-from phyblock.specs.suite import RECORDED, suite_model, table_names
+from phyblock.specs.suite import RECORDED, suite_model
 
 __all__ = ["models_schema", "render", "suite_schema", "write_schemas"]
 

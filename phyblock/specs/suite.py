@@ -20,7 +20,7 @@ from pydantic import (
     model_validator,
 )
 
-from phyblock.registry import known_tracks
+from phyblock.registry import PUBLISHED_TABLE, known_tracks, table_names
 from phyblock.specs.fields import (
     Count,
     MaxTokens,
@@ -47,7 +47,6 @@ __all__ = [
     "SuiteSpec",
     "default_tables",
     "suite_model",
-    "table_names",
 ]
 
 RECORDED = "recorded"
@@ -55,8 +54,6 @@ RECORDED = "recorded"
 BUILTIN_DATASET = "phyblock-400"
 """The bundled data set that is used when a suite names none."""
 PROMPT_WORDS = ("default", "official")
-PUBLISHED_TABLE = "published"
-"""The table that sets a run beside the paper's."""
 
 
 def _check_whole(level: object) -> object:
@@ -80,12 +77,6 @@ def _one_of(name: str, names: Sequence[str]) -> str:
     if name in names:
         return name
     raise refuse("is not one of the choices", allowed=", ".join(names), words=tuple(names))
-
-
-def table_names() -> tuple[str, ...]:
-    """Tables that a suite can ask for: those of its tracks, then the comparison with the paper."""
-    own = (name for kind in known_tracks().values() for name in kind.tables)
-    return (*dict.fromkeys(own), PUBLISHED_TABLE)
 
 
 def default_tables() -> tuple[str, ...]:

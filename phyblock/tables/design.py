@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from pydantic_core import PydanticCustomError
 
 from phyblock.errors import Problem, StoreError
-from phyblock.registry import known_tracks
+from phyblock.registry import known_tracks, table_names
 from phyblock.tables.outcomes import WITHOUT_REPLY
 
 __all__ = ["OVERALL", "Design", "read_design"]
@@ -38,7 +38,7 @@ class _Suite(_Part):
     settings: tuple[str, ...] = Field(min_length=1)
     seeds: tuple[int, ...] = Field(min_length=1)
     scoring: _Scoring
-    tables: tuple[str, ...] = ()
+    tables: tuple[str, ...] = Field(default_factory=table_names)
 
 
 class _Model(_Part):

@@ -143,7 +143,9 @@ def _of_group(
     pool = _pool(run, table, counted, strata)
     sizes = table.groupby(keys).size().to_dict()
     n = np.array([[sizes.get((*g, s), 0) for s in strata] for g in pool.groups])
-    behind = _clusters_of_cells(pool, cells)
+    behind, fewest = _clusters_of_cells(pool, cells)
+    # A part of a single base scene leaves a mean without an interval.
+    resampled = np.where(fewest < 2, fewest, behind)
     silent = np.array([[not heard.get((g[0], s), False) for s in strata] for g in pool.groups])
     # Where a model said nothing, empty plans have counts, and no resample has a value.
     counts = np.where(silent[None, :, :, None], np.nan, pool.counts)
@@ -157,7 +159,7 @@ def _of_group(
         pool.cube.clusters,
         all_values,
         resampler(),
-        n_clusters=np.repeat(behind[:, :, None], len(measures), axis=-1),
+        n_clusters=np.repeat(resampled[:, :, None], len(measures), axis=-1),
     )
     spread = _over_seeds(table, pool, counted, silent, all_values)
     members = np.array([[name in strata_of(cell, cells) for name in strata] for cell in cells])
@@ -217,16 +219,15 @@ def strata_of(cell: Cell, cells: Sequence[Cell]) -> frozenset[str]:
     return frozenset().union(*(strata_of(by_name[name], cells) for name in cell.of))
 
 
-def _clusters_of_cells(pool: _Pool, cells: Sequence[Cell]) -> np.ndarray:
-    """Base scenes behind each group and cell; of a mean the fewest, where a part has under two."""
+def _clusters_of_cells(pool: _Pool, cells: Sequence[Cell]) -> tuple[np.ndarray, np.ndarray]:
+    """Base scenes behind each group and cell, and the fewest that are behind a part of it."""
     by_stratum = pool.cube.clusters.behind(pool.present.reshape(len(pool.scenes), -1)).reshape(
         pool.present.shape[1:]
     )
-    columns = []
+    behind, fewest = [], []
     for cell in cells:
         members = [name in strata_of(cell, cells) for name in pool.strata]
         seen = np.any(pool.present[:, :, members], axis=-1)
-        whole = pool.cube.clusters.behind(seen)
-        least = by_stratum[:, members].min(axis=-1)
-        columns.append(np.where(least < 2, least, whole))
-    return np.stack(columns, axis=-1)
+        behind.append(pool.cube.clusters.behind(seen))
+        fewest.append(by_stratum[:, members].min(axis=-1))
+    return np.stack(behind, axis=-1), np.stack(fewest, axis=-1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
-from phyblock.tracks import Outcome
+from phyblock.records import Outcome
 
 __all__ = ["FAILURES", "HEADINGS", "OUTCOMES", "WITHOUT_REPLY"]
 

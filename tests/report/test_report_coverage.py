@@ -6,7 +6,9 @@ import pandas as pd
 from hypothesis import given
 
 from phyblock.cli.tally import Tally
+from phyblock.records.known import known_records
 from phyblock.report import coverage_frame
+from phyblock.run.standing import Summary
 from phyblock.tables.coverage import coverage_view
 from phyblock.tables.outcomes import HEADINGS, OUTCOMES
 from phyblock.tables.text_table import NO_VALUE
@@ -68,12 +70,23 @@ def test_an_episode_that_is_partly_from_the_cache_cost_what_was_asked_anew() -> 
     facts = manifest(models=["alpha"])
     one = record("alpha", cost_usd=0.75)
     priced = [(0.5, True), (0.25, False)]
-    turns = [{"reply": {**one["reply"], "cost_usd": usd, "cached": old}} for usd, old in priced]
-    run = run_of([{**one, "turns": turns}], facts)
+    parse = {"rule": "move", "move": 1, "problem": None}
+    turns = [
+        {
+            "n": n,
+            "reply": {**one["reply"], "cost_usd": usd, "cached": old},
+            "step": n,
+            "parse": parse,
+        }
+        for n, (usd, old) in enumerate(priced, 1)
+    ]
+    facts["suite"]["tracks"] = ["step_planning"]
+    episode = {**one, "track": "step_planning", "turns": turns}
+    run = run_of([episode], facts)
     assert coverage_frame(run)[["cost_usd", "cost_unknown"]].values.tolist() == [[0.25, 0]]
     assert run.records["cost_usd"].tolist() == [0.75]
     tally = Tally(1)
-    tally.add({**one, "turns": turns}, fresh=True)
+    tally.add(Summary.of(known_records().validate_python(episode)), fresh=True)
     assert (tally.cost_usd, tally.unpriced) == (0.25, 0)
 
 

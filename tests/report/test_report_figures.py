@@ -54,6 +54,7 @@ def asked(model: str, subtask: str, *correct: bool) -> list[dict[str, Any]]:
         | {
             "sample": f"vqa/{model}/{subtask}-{n}/s0",
             "track": "vqa",
+            "key": f"{subtask}-{n}",
             "question": {"id": f"{subtask}-{n}", "subtask": subtask, "rotation": 0},
             "answer": {"right": "A", "given": "A" if right else None, "correct": right},
         }
@@ -75,7 +76,7 @@ def test_every_figure_is_drawn_and_drawing_again_gives_the_same_bytes(tmp_path: 
     more += [episode("alpha", "000", 1, 2, 3, 4), episode("beta", "000", 0, 1)]
     run = load_run(folder_of(tmp_path / "run", *more), texts=False)
     first = {file: file.read_bytes() for file in write_figures(run)}
-    assert [file.stem for file in first][::2] == list(figure_names(load_run(folder)))
+    assert [file.stem for file in first][::2] == list(figure_names(run))
     assert {file: file.read_bytes() for file in write_figures(run)} == first
     for file, data in first.items():
         if file.suffix == ".svg":

@@ -20,6 +20,7 @@ def asked(model: str, subtask: str, seed: int, right: bool) -> dict[str, Any]:
     return record(model, "000", seed) | {
         "sample": f"vqa/{model}/{subtask}/s{seed}",
         "track": "vqa",
+        "key": subtask,
         "question": {"id": subtask, "subtask": subtask, "rotation": 0},
         "answer": {"right": "A", "given": "A" if right else "B", "correct": right},
     }

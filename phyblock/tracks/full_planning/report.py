@@ -16,7 +16,7 @@ from phyblock.tracks.full_planning.figures.errors import error_bars
 from phyblock.tracks.full_planning.figures.levels import f1_radar, settings_dots
 from phyblock.tracks.full_planning.figures.scatter import f1_by_cost, f1_by_size
 from phyblock.tracks.full_planning.measures import PLANNING_MEASURES, in_levels, level_cells
-from phyblock.tracks.full_planning.published import published_frame
+from phyblock.tracks.full_planning.published import PUBLISHED_SETTING, published_frame
 from phyblock.tracks.full_planning.seeds import (
     intervals_table,
     intervals_view,

@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.records.reading import run_records
 from phyblock.scoring import ERROR_TYPES
 from phyblock.tables.load import Run, once_per_run
-from phyblock.tracks.step_planning.record import EpisodeRecord
 from phyblock.tracks.step_planning.rules import ENDINGS
 
 __all__ = [
@@ -49,36 +47,11 @@ def episodes_frame(run: Run) -> pd.DataFrame:
     a step: what became of it, and the blocks that were placed by then. Episodes that got no reply
     are left out where the suite says `missing: skip`.
     """
-    rows = _rows(run)
-    return pd.DataFrame(
-        {
-            name: pd.Series([row[name] for row in rows], dtype=dtype)
-            for name, dtype in _EPISODE_TYPES.items()
-        }
-    )
-
-
-def _rows(run: Run) -> list[dict[str, Any]]:
-    """What is kept of each episode's newest record; never all records at once."""
-    order = {name: place for place, name in enumerate(run.design.model_names)}
-    rows = {
-        record.sample: _row(record)
-        for _, record in run_records(run.path)
-        if isinstance(record, EpisodeRecord)
-    }
-    kept = [row for row in rows.values() if row["outcome"] not in run.design.outcomes_left_out]
-    return sorted(
-        kept, key=lambda row: (order.get(row["model"], len(order)), row["scene"], row["seed"])
-    )
-
-
-def _row(record: EpisodeRecord) -> dict[str, Any]:
-    kept = ("model", "scene", "seed", "n_blocks", "outcome", "ending", "max_steps", "progress")
-    return {
-        **{name: getattr(record, name) for name in kept},
-        "steps": len(record.outcomes),
-        "outcomes": record.outcomes,
-    }
+    records = run.records
+    left_out = records["outcome"].isin(run.design.outcomes_left_out)
+    kept = records[(records["track"] == NAME) & ~left_out]
+    kept = kept.assign(steps=kept["outcomes"].map(len))
+    return kept[list(_EPISODE_TYPES)].astype(_EPISODE_TYPES).reset_index(drop=True)
 
 
 def endings_frame(run: Run) -> pd.DataFrame:

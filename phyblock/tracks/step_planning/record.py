@@ -74,11 +74,18 @@ class EpisodeRecord(Record):
     turns: tuple[EpisodeTurn, ...] = ()
     """Every request, with its reply and what came of it."""
 
-    columns: ClassVar[Mapping[str, str]] = PLAN_COLUMNS
+    columns: ClassVar[Mapping[str, str]] = {
+        **PLAN_COLUMNS,
+        "ending": "object",
+        "max_steps": "Int64",
+        "outcomes": "object",
+        "progress": "object",
+    }
 
     def row(self) -> Mapping[str, Any]:
-        """The moves that were attempted, as a plan."""
-        return plan_row(self.parse)
+        """The moves that were attempted, as a plan, and how the episode went."""
+        went = ("ending", "max_steps", "outcomes", "progress")
+        return {**plan_row(self.parse), **{name: getattr(self, name) for name in went}}
 
     @property
     def replies(self) -> tuple[StoredReply, ...]:

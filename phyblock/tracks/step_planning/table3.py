@@ -105,7 +105,7 @@ def step_intervals(run: Run) -> pd.DataFrame:
     n_clusters.
     """
     found = track_estimates(run, NAME)
-    found = found[found["measure"] == "f1"].drop(columns=CELL)
+    found = found[(found["measure"] == "f1") & found["value"].notna()].drop(columns=CELL)
     found = found.rename(columns={"criterion": CELL}).sort_values(CELL, kind="stable")
     table = interval_frame(found, run.design, 100.0, [CELL])
     return table.drop(columns="seeds")
