@@ -104,10 +104,10 @@ class Comparable:
 
     def cells_of(self, part: Part) -> tuple[Cell, ...]:
         """The cells below a part, and its own as the last."""
-        (own,) = (cell for cell in self.cells if cell.name == part.cell)
-        members = strata_of(own, self.cells)
-        below = [c for c in self.cells if strata_of(c, self.cells) <= members and c is not own]
-        return (*below, own)
+        reached = {part.cell}
+        for cell in reversed(self.cells):
+            reached |= set(cell.of) if cell.name in reached else set()
+        return tuple(cell for cell in self.cells if cell.name in reached)
 
     def _unflat(self, part: Part) -> Callable[[Floats], Floats]:
         shape = (len(self.strata(part)), len(self.measure.counted.columns) + 1)

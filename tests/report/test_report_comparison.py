@@ -166,5 +166,6 @@ def test_the_published_numbers_come_out_of_the_official_counts(official_dir: Pat
         level1="membership",
     )
     table = published_frame(run_of(records, facts))
-    assert len(table) == 15 * len(models)
+    with_row = [model for model in models if match_published(model)]
+    assert len(table) == 15 * len(with_row) >= 15 * 7
     assert largest_differences(table).max() <= 0.06

@@ -64,15 +64,20 @@ def asked(model: str, subtask: str, *correct: bool) -> list[dict[str, Any]]:
 
 def episode(model: str, scene: str, *progress: int) -> dict[str, Any]:
     """An episode of a goal of four blocks, so many of which are placed after each step."""
+    placed = progress[-1]
+    scores = [score(placed, 0, 4 - placed, criterion=name) for name in ("placed", "attempted")]
     more = {"outcomes": ["placed"] * len(progress), "progress": list(progress)}
     sample = f"step_planning/{model}/{scene}/s0"
     return (
-        record(model, scene) | {"sample": sample, "track": "step_planning", "ending": "done"} | more
+        record(model, scene, scores=scores)
+        | {"sample": sample, "track": "step_planning", "ending": "done"}
+        | more
     )
 
 
 def test_every_figure_is_drawn_and_drawing_again_gives_the_same_bytes(tmp_path: Path) -> None:
-    more = [*asked("alpha", "SH", True, False), *asked("beta", "OR", True)]
+    more = [*asked("alpha", "SH", True, False), *asked("alpha", "OR", False)]
+    more += [*asked("beta", "SH", False), *asked("beta", "OR", True)]
     more += [episode("alpha", "000", 1, 2, 3, 4), episode("beta", "000", 0, 1)]
     run = load_run(folder_of(tmp_path / "run", *more), texts=False)
     first = {file: file.read_bytes() for file in write_figures(run)}
