@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.errors import Problem, SpecError
+from phyblock.report.measure_table import headline_columns
 from phyblock.scoring.uncertainty import Floats, Metric
 from phyblock.tables.design import Design
 from phyblock.tables.estimates import strata_of, value_of_cells
@@ -140,8 +141,10 @@ def comparable(run: Run, track: str, measure: str = "") -> Comparable:
             for part in parts
             for criterion in reversed(criteria)
         ]
-    how = f"{chosen.heading}: {chosen.meaning}. {' '.join(report.notes(run))} "
-    return Comparable(track, chosen, cells, tuple(parts), f"{how}Samples that both have.")
+    is_headline = chosen.name in {column.measure for column in headline_columns(run, track)}
+    notes = report.notes(run) if is_headline else ()
+    how = " ".join((f"{chosen.heading}: {chosen.meaning}.", *notes, "Samples that both have."))
+    return Comparable(track, chosen, cells, tuple(parts), how)
 
 
 def _is_single(cell: Cell, cells: tuple[Cell, ...]) -> bool:

@@ -42,7 +42,7 @@ class Comparison:
 
     `table` has one row a pair and part of the track (levels, categories of questions): a, b, part,
     value_a, value_b, difference (a minus b), se, lo, hi [all in `unit`], p, p_holm (corrected for
-    all rows), verdict, better, worse and same (samples on which a has the higher, lower, same
+    all rows), verdict, better, worse and same (samples on which a has the better, worse, same
     value), n_samples, n_scenes, n_clusters. `flipped` has one row a pair and sample that one side
     alone got wholly right: a, b, scene, item (scene or question), seed, right (that side's label),
     value_a, value_b. `name` is what the values are called, `unit` theirs, `how` says what they are.
@@ -250,6 +250,7 @@ def _tally(one: _Paired | None, what: Comparable, part: Part) -> dict[str, int]:
     """On how many samples the first side is better, worse, the same, and how many there are."""
     # A plan without a step for a goal without a block would have no F1; there is none.
     sign = np.sign(np.nan_to_num(_difference(what.each(part)(one.counts)))) if one else np.zeros(0)
+    sign = sign if what.measure.better == "higher" else -sign
     counts = {"better": int((sign == 1).sum()), "worse": int((sign == -1).sum())}
     return {**counts, "same": int((sign == 0).sum()), "n_samples": len(sign)}
 

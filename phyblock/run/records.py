@@ -18,7 +18,8 @@ from phyblock.records import (
     StoredReply,
 )
 from phyblock.records.known import known_records
-from phyblock.tracks import Item
+from phyblock.tracks import Episode, Item, Judgement
+from phyblock.tracks.counting import sample_counts
 
 __all__ = ["about_prompt", "begun", "judged"]
 
@@ -52,13 +53,23 @@ def begun(
     }
 
 
-def judged(fields: Mapping[str, Any], is_read: bool, told: Mapping[str, Any]) -> Record:
-    """The record with its outcome and what the track says of it, the first time or anew.
+def judged(
+    fields: Mapping[str, Any],
+    item: Item,
+    judgement: Judgement | Episode,
+    more: Mapping[str, Any] | None = None,
+) -> Record:
+    """The record with its outcome and what the track says and counts of it, for the first time or
+    anew.
 
-    `fields` are those of a record that was begun, or of one that was judged before.
+    `fields` are those of a record that was begun, or of one that was judged before; `more` replaces
+    some of what the judgement says.
     """
-    outcome = _outcome(fields["reply"], fields["error"], is_read)
-    return known_records().validate_python({**fields, "outcome": outcome, **told})
+    outcome = _outcome(fields["reply"], fields["error"], judgement.is_read)
+    told = {**fields, "outcome": outcome, **judgement.fields(), **(more or {})}
+    if counts := sample_counts(fields["track"], item, judgement):
+        told["counts"] = {**fields.get("counts", {}), **counts}
+    return known_records().validate_python(told)
 
 
 def about_prompt(request: Request, template: str, digest: str) -> StoredPrompt:

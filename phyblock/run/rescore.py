@@ -61,7 +61,7 @@ def rescore(
                         hint=hint)
             )  # fmt: skip
         judgement = track.judge(item, None if record.reply is None else record.reply.text)
-        records.append(judged(record.as_given(), judgement.is_read, judgement.fields()))
+        records.append(judged(record.as_given(), item, judgement))
     target = out or folder / "scores" / f"{suite.parser}-{suite.scoring.matchers[0]}"
     identity = f"{manifest.identity} scored by {suite.parser}, {suite.scoring.matchers[0]}"
     told = {"identity": identity, "suite": suite.model_dump(mode="json")}

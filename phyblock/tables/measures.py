@@ -6,11 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-import pandas as pd
-
-from phyblock.scoring.uncertainty import Metric
-
 if TYPE_CHECKING:
+    import pandas as pd
+
+    from phyblock.scoring.uncertainty import Metric
     from phyblock.tables.load import Run
 
 __all__ = ["CELL", "VARIANT", "Cell", "Counted", "Measure"]
@@ -44,9 +43,10 @@ class Counted:
     `frame` makes them out of a run: a row a sample, way of counting it and cell that it is pooled
     in, with the columns `model`, `scene`, `item`, `seed`, those of `VARIANT`, `CELL`, `replied`
     (whether the model said anything), and one of each name in `columns`. Samples that the run
-    leaves out have no row. Instead of it, `sample` counts one sample, given the item that was asked
-    about and what its reply was read as (the track's judgement), when the reply is judged: its
-    numbers, one of each name in `columns`, are kept in the record. None counts nothing.
+    leaves out have no row. Instead of it, `sample` counts one sample when its reply is judged: it
+    is given the item that was asked about and the track's judgement of the reply (or the episode
+    that was played), and its numbers, one of each name in `columns`, are kept in the record. Where
+    it returns None, the sample is not counted.
     """
 
     name: str

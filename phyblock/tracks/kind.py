@@ -13,6 +13,7 @@ from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.records import Record
 from phyblock.registry import known_tracks
 from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.tables.measures import Counted
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.base import AnyTrack, SingleTrack
 
@@ -38,17 +39,16 @@ class TrackKind:
 
     `title` and `item` (the noun for what it asks about) are for people, `about` says in a suite's
     documentation what it asks. `open` raises SpecError, DataError or PromptError with what is
-    wrong. `subject` is the type that the rules of its `baselines` take, with a random generator,
-    to answer in the benchmark's own reply form. `section` is the key, model and description of
-    the part of a suite that is its own. `template` is the bundled prompt and `prompt_field` where
-    a suite names another. `own_data` gives the folder of data of its own as a suite says it,
-    `manifest` what the manifest says beyond what all tracks have. `rescored`
-    makes the track out of a suite and scenes for reading stored replies again; None where
-    `phyblock score` takes its records over as they are. `report` imports what tables and figures
-    are made by, which takes long; With `plays`, samples are episodes of
-    several turns. `record` is the model of its records,
-    where it adds something to them. `counts` are functions of an item and its judgement, by name,
-    whose numbers are kept in the record (see `per_sample`).
+    wrong. `report` imports what tables and figures are made by, which takes long. `subject` is the
+    type that the rules of its `baselines` take, with a random generator, to answer in the
+    benchmark's own reply form. `section` is the key, model and description of the part of a suite
+    that is its own. `template` is the bundled prompt, None where it has none, and `prompt_field`
+    where a suite names another. `own_data` gives the folder of data of its own as a suite says it,
+    `manifest` what the manifest says beyond what all tracks have. `rescored` makes the track out of
+    a suite and scenes for reading stored replies again; None where `phyblock score` takes its
+    records over as they are. With `plays`, samples are episodes of several turns. `record` is the
+    model of its records, where it adds something to them. `counted` is what its measures count of
+    every sample as it is judged.
     """
 
     name: str
@@ -58,7 +58,7 @@ class TrackKind:
     open: Callable[[Opening], AnyTrack]
     report: Callable[[], TrackReport]
     subject: type[object]
-    template: Path
+    template: Path | None = None
     record: type[Record] | None = None
     prompt_field: tuple[str, ...] = ("prompt",)
     section: tuple[str, type[BaseModel], str] | None = None
@@ -68,7 +68,7 @@ class TrackKind:
     manifest: Callable[[LoadedSuite], Mapping[str, Any]] | None = None
     plays: bool = False
     rescored: Callable[[SuiteSpec, Sequence[AssemblyTask]], SingleTrack[Any]] | None = None
-    counts: Mapping[str, Callable[[Any, Any], Sequence[float] | None]] = field(default_factory=dict)
+    counted: tuple[Counted, ...] = ()
 
     def data_folder(self, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:
         """The folder of its own data: text, path of keys, whether it may be a bundled set."""

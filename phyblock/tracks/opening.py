@@ -57,9 +57,11 @@ def template_prompt(loaded: LoadedSuite, name: str) -> TemplatePrompt:
     Raises PromptError for a broken one.
     """
     path = loaded.templates.get(name)
-    if path is None:
-        return TemplatePrompt(kind_of(name).template, "default")
-    return TemplatePrompt(path, path.stem)
+    if path is not None:
+        return TemplatePrompt(path, path.stem)
+    own = kind_of(name).template
+    assert own is not None, f"{name} has no prompt of its own"
+    return TemplatePrompt(own, "default")
 
 
 def render_workers() -> int:
