@@ -12,7 +12,7 @@ from phyblock.tables.text_table import NO_VALUE, Column, TextTable
 
 if TYPE_CHECKING:
     from phyblock.report.html import write_report
-    from phyblock.report.write import TablesWritten, write_tables
+    from phyblock.report.write import TablesWritten, table_makers, write_tables
     from phyblock.tables.coverage import coverage_frame
     from phyblock.tables.design import Design, read_design
     from phyblock.tables.latex import to_latex
@@ -31,6 +31,7 @@ __all__ = [
     "load_run",
     "published_table",
     "read_design",
+    "table_makers",
     "to_latex",
     "to_markdown",
     "write_report",
@@ -47,6 +48,7 @@ _HOMES = {
     "to_markdown": "tables.markdown",
     "published_table": "tables.paper_numbers",
     "TablesWritten": "report.write",
+    "table_makers": "report.write",
     "write_report": "report.html",
     "write_tables": "report.write",
 }

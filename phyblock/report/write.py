@@ -19,7 +19,7 @@ from phyblock.report.measure_table import (
     measures_view,
 )
 from phyblock.tables.cost import cost_frame, cost_view
-from phyblock.tables.coverage import coverage_frame, coverage_view
+from phyblock.tables.coverage import coverage_frame, coverage_in_terminal, coverage_view
 from phyblock.tables.latex import to_latex
 from phyblock.tables.load import Run, load_run
 from phyblock.tables.markdown import to_markdown
@@ -28,7 +28,7 @@ from phyblock.tables.track_report import TableMaker
 from phyblock.tracks.estimates import all_estimates
 from phyblock.tracks.kind import kind_of
 
-__all__ = ["TablesWritten", "make_tables", "table_names", "write_tables"]
+__all__ = ["TablesWritten", "make_tables", "table_makers", "table_names", "write_tables"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,26 +70,33 @@ _ESTIMATES = "estimates"
 _OF_ANY_TRACK = {
     _ESTIMATES: TableMaker(all_estimates),
     "measures": TableMaker(measures_frame, measures_view, _ESTIMATES),
-    "coverage": TableMaker(coverage_frame, coverage_view),
+    "coverage": TableMaker(coverage_frame, coverage_view, in_terminal=coverage_in_terminal),
     "cost": TableMaker(cost_frame, cost_view, "coverage"),
 }
 """Tables that every run has."""
 
 
-def _makers(run: Run) -> dict[str, TableMaker]:
+def table_makers(run: Run) -> dict[str, TableMaker]:
     """Tables of a run by name: of its tracks, in their order, then those of any run."""
     makers: dict[str, TableMaker] = {}
     for track in run.design.suite.tracks:
         own = kind_of(track).report().tables
-        makers |= own or {
-            track: TableMaker(partial(headline_frame, track), partial(headline_view, track))
-        }
+        makers |= own or {track: _headline_maker(track)}
     return makers | _OF_ANY_TRACK
+
+
+def _headline_maker(track: str) -> TableMaker:
+    """The table of a track that has none of its own."""
+    return TableMaker(
+        partial(headline_frame, track),
+        partial(headline_view, track),
+        in_terminal=lambda view, _: (view,),
+    )
 
 
 def table_names(run: Run) -> tuple[str, ...]:
     """Tables that the tracks of a run have."""
-    return tuple(_makers(run))
+    return tuple(table_makers(run))
 
 
 def make_tables(
@@ -103,7 +110,7 @@ def make_tables(
     wanted = {_ESTIMATES, "coverage", *plain, *names}
     makers = {
         name: maker
-        for name, maker in _makers(run).items()
+        for name, maker in table_makers(run).items()
         if name in wanted or maker.comes_with in wanted
     }
     frames = {name: maker.frame(run) for name, maker in makers.items()}

@@ -11,9 +11,21 @@ from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run, once_per_run
 from phyblock.tables.outcomes import WITHOUT_REPLY
 
-__all__ = ["METRICS", "cell_scores", "measured", "micro_averages", "with_levels"]
+__all__ = [
+    "METRICS",
+    "METRIC_NAMES",
+    "SIDE_METRICS",
+    "cell_scores",
+    "measured",
+    "micro_averages",
+    "with_levels",
+]
 
 METRICS = ("precision", "recall", "f1")
+METRIC_NAMES = dict(zip(METRICS, ("Prec", "Rec", "F1"), strict=True))
+"""Their names as headings of columns."""
+SIDE_METRICS = ("Prec", "Rec")
+"""Headings that narrow tables do without."""
 
 
 def with_levels(frame: pd.DataFrame, run: Run) -> pd.DataFrame:

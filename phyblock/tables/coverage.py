@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pandas as pd
 
@@ -10,7 +11,7 @@ from phyblock.tables.load import Run
 from phyblock.tables.outcomes import HEADINGS, OUTCOMES
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
 
-__all__ = ["coverage_frame", "coverage_view"]
+__all__ = ["coverage_frame", "coverage_in_terminal", "coverage_view"]
 
 _TOKENS = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
 _COUNTS = ("recorded", *OUTCOMES, "replies", "tokens_unknown", "cost_unknown", "cached", "attempts")
@@ -146,3 +147,18 @@ def _coverage_notes(table: pd.DataFrame, run: Run) -> list[str]:
 
 def _of_suite(run: Run) -> str:
     return f", suite {run.design.suite.name}" if run.design.suite.name else ""
+
+
+def coverage_in_terminal(view: TextTable, table: pd.DataFrame) -> tuple[TextTable, ...]:
+    """Samples and the outcomes that occurred, where not all were answered."""
+    if not (table["ok"] < table["expected"]).any():
+        return ()
+    always = ("Model", "Track", "Expected", "OK")
+    told = ("Not run", *HEADINGS.values())
+    dropped = [
+        column.name
+        for i, column in enumerate(view.columns)
+        if column.name not in always
+        and (column.name not in told or all(row[i] == "0" for row in view.rows))
+    ]
+    return (replace(view.without(dropped), notes=()),)

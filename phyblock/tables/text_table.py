@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 
 __all__ = [
     "NO_VALUE",
@@ -39,6 +40,20 @@ class TextTable:
     columns: tuple[Column, ...]
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
+
+    def without(self, names: Collection[str]) -> TextTable:
+        """The table but for the columns of these names."""
+        return self.with_columns(
+            [place for place, column in enumerate(self.columns) if column.name not in names]
+        )
+
+    def with_columns(self, kept: Sequence[int]) -> TextTable:
+        """The columns with these numbers, from 0."""
+        return replace(
+            self,
+            columns=tuple(self.columns[place] for place in kept),
+            rows=tuple(tuple(row[place] for place in kept) for row in self.rows),
+        )
 
 
 def number(value: float, digits: int = 1, *, signed: bool = False) -> str:

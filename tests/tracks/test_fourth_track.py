@@ -111,7 +111,10 @@ class Counter(OpenAIChat):
 
 
 def test_a_track_runs_from_yaml_to_the_report(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+    workspace: Workspace,
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     registry.register_track(TRACK)
     request.addfinalizer(lambda: registry.unregister_track("counting"))
@@ -128,6 +131,7 @@ def test_a_track_runs_from_yaml_to_the_report(
         (workspace.out / "records.jsonl").write_text(text[: len(text) // 2])
         assert not phyblock.main(run, standalone_mode=False)
         assert running.server.requests == 5
+    assert "Counting, suite trial" in capsys.readouterr().out
     assert sorted(r["sample"] for r in workspace.records()) == sorted(r["sample"] for r in whole)
     assert len(whole) == 15
     estimates = pd.read_csv(workspace.out / "tables" / "estimates.csv")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import pandas as pd
 
 from phyblock.tables.cells import METRICS
@@ -17,6 +19,7 @@ __all__ = [
     "comparison_notes",
     "largest_differences",
     "published_frame",
+    "published_lines",
 ]
 
 PUBLISHED_LEVELS = ("1", "2", "3", "4", "overall")
@@ -24,6 +27,8 @@ PUBLISHED_LEVELS = ("1", "2", "3", "4", "overall")
 PUBLISHED_SETTING = "A"
 """The setting of every number in it."""
 
+_MET = 0.06
+"""Largest difference that rounding of the published numbers and of ours explains [points]."""
 _OVERALL_LEVELS = frozenset({2, 3, 4})
 """Levels whose scenes the paper's overall numbers pool."""
 
@@ -104,3 +109,16 @@ def comparison_notes(published: pd.DataFrame, design: Design) -> tuple[str, ...]
     if not set(design.suite.levels) >= _OVERALL_LEVELS:
         notes.append("Overall is not compared: the paper's pools the levels 2, 3 and 4.")
     return tuple(notes)
+
+
+def published_lines(published: pd.DataFrame, run: Run) -> tuple[str, ...]:
+    """How near each model comes to its row, and what could not be compared."""
+    largest = largest_differences(published)
+    cells = Counter(published.dropna(subset=["difference"])["model"])
+    width = max(map(len, largest.index), default=0)
+    lines = ["Beside the paper's Table 1: largest difference in points"]
+    for name, points in largest.items():
+        # Where nothing was compared, there is no difference to judge.
+        mark = ("as published" if points <= _MET else "differs") if cells[name] else "not compared"
+        lines.append(f"{name:<{width}}  {number(points, 3):>7}  {cells[name]} cells, {mark}")
+    return (*lines, *comparison_notes(published, run.design))

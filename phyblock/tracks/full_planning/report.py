@@ -16,7 +16,11 @@ from phyblock.tracks.full_planning.figures.errors import error_bars
 from phyblock.tracks.full_planning.figures.levels import f1_radar, settings_dots
 from phyblock.tracks.full_planning.figures.scatter import f1_by_cost, f1_by_size
 from phyblock.tracks.full_planning.measures import PLANNING_MEASURES, in_levels, level_cells
-from phyblock.tracks.full_planning.published import PUBLISHED_SETTING, published_frame
+from phyblock.tracks.full_planning.published import (
+    PUBLISHED_SETTING,
+    published_frame,
+    published_lines,
+)
 from phyblock.tracks.full_planning.seeds import (
     intervals_table,
     intervals_view,
@@ -26,7 +30,13 @@ from phyblock.tracks.full_planning.seeds import (
     table5_view,
 )
 from phyblock.tracks.full_planning.settings import settings_frame, settings_view
-from phyblock.tracks.full_planning.views import errors_view, published_view, table1_view
+from phyblock.tracks.full_planning.views import (
+    errors_in_terminal,
+    errors_view,
+    published_view,
+    table1_in_terminal,
+    table1_view,
+)
 
 __all__ = ["REPORT"]
 
@@ -95,12 +105,12 @@ REPORT = TrackReport(
     notes=_notes,
     tables={
         "assembly": TableMaker(assembly_frame),
-        "table1": TableMaker(table1_frame, table1_view),
+        "table1": TableMaker(table1_frame, table1_view, in_terminal=table1_in_terminal),
         "intervals": TableMaker(intervals_table, intervals_view, "table1"),
         "table5": TableMaker(table5_frame, table5_view, "table1"),
         "settings": TableMaker(settings_frame, settings_view, "table1"),
-        "errors": TableMaker(errors_frame, errors_view),
-        "published": TableMaker(published_frame, published_view),
+        "errors": TableMaker(errors_frame, errors_view, in_terminal=errors_in_terminal),
+        "published": TableMaker(published_frame, published_view, lines=published_lines),
     },
     bars="f1-levels",
     figures={

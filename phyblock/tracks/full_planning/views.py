@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
+from dataclasses import replace
 
 import pandas as pd
 
 from phyblock.scoring import ERROR_TYPES, ErrorType
-from phyblock.tables.cells import METRICS
+from phyblock.tables.cells import METRIC_NAMES, METRICS, SIDE_METRICS
 from phyblock.tables.design import OVERALL, Design
 from phyblock.tables.load import Run
-from phyblock.tables.text_table import NO_VALUE, Column, TextTable, level_name, number, spread
+from phyblock.tables.text_table import (
+    NO_VALUE,
+    SPREAD,
+    Column,
+    TextTable,
+    level_name,
+    number,
+    spread,
+)
 from phyblock.tracks.full_planning.assembly import assembly_frame, headline_cells, level_column
 from phyblock.tracks.full_planning.published import (
     PUBLISHED_LEVELS,
@@ -19,10 +28,16 @@ from phyblock.tracks.full_planning.published import (
     largest_differences,
 )
 
-__all__ = ["ERROR_NAMES", "errors_view", "published_view", "table1_view"]
+__all__ = [
+    "ERROR_NAMES",
+    "errors_in_terminal",
+    "errors_view",
+    "published_view",
+    "table1_in_terminal",
+    "table1_view",
+]
 
 _MODEL = Column("Model", is_text=True)
-_METRIC_NAMES = dict(zip(METRICS, ("Prec", "Rec", "F1"), strict=True))
 ERROR_NAMES: dict[ErrorType, str] = {
     "shape_not_in_gt": "Shape not in GT",
     "overflow": "Overflow",
@@ -40,7 +55,7 @@ def table1_view(table: pd.DataFrame, run: Run) -> TextTable:
     design = run.design
     cells = [level_column(level, metric) for level in design.levels for metric in METRICS]
     columns = [
-        Column(_METRIC_NAMES[metric], level_name(level))
+        Column(METRIC_NAMES[metric], level_name(level))
         for level in design.levels
         for metric in METRICS
     ]
@@ -163,7 +178,7 @@ def published_view(table: pd.DataFrame, run: Run) -> TextTable:
     rows = [
         (
             label,
-            _METRIC_NAMES[metric],
+            METRIC_NAMES[metric],
             *(cell for level in PUBLISHED_LEVELS for cell in cells[model, level, metric]),
             number(largest[model], 3) if metric == METRICS[0] else "",
         )
@@ -186,3 +201,23 @@ def _difference_notes(table: pd.DataFrame, design: Design) -> list[str]:
         f"Ours: setting {PUBLISHED_SETTING}, matcher {matchers}{level1}.",
         "The last column has the largest absolute difference of each model.",
     ]
+
+
+def table1_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
+    """All of Table 1, else F1 alone, else F1 without its spread."""
+    # The last note is about the labels of the columns that are left out.
+    note = "F1 alone, to fit; precision and recall are in tables/table1.md."
+    short = replace(view.without(SIDE_METRICS), notes=(note, *view.notes[:-1]))
+    bare = tuple(tuple(cell.partition(SPREAD)[0] for cell in row) for row in short.rows)
+    return view, short, replace(short, rows=bare)
+
+
+def errors_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
+    """The rows over all levels, each with its model's name; shares alone where space is short."""
+    rows, model = [], ""
+    for row in view.rows:
+        model = row[0] or model
+        if row[1] == level_name(OVERALL):
+            rows.append((model, *row[1:]))
+    whole = replace(view, rows=tuple(rows)).without(("Level", "n"))
+    return whole, whole.without(("Plans", "Wrong steps"))

@@ -12,6 +12,7 @@ from phyblock.tracks.step_planning.figure import progress_by_turn
 from phyblock.tracks.step_planning.measures import STEP_MEASURES
 from phyblock.tracks.step_planning.table3 import (
     endings_view,
+    episodes_in_terminal,
     moves_view,
     paper_table3_frame,
     paper_table3_view,
@@ -69,10 +70,10 @@ REPORT = TrackReport(
     references=_references,
     notes=_notes,
     tables={
-        "table3": TableMaker(table3_frame, table3_view),
+        "table3": TableMaker(table3_frame, table3_view, in_terminal=episodes_in_terminal),
         "step_intervals": TableMaker(step_intervals, step_intervals_view, "table3"),
         "step_scores": TableMaker(step_scores_frame, None, "table3"),
-        "endings": TableMaker(endings_frame, endings_view),
+        "endings": TableMaker(endings_frame, endings_view, in_terminal=episodes_in_terminal),
         "moves": TableMaker(moves_frame, moves_view, "endings"),
         "progress": TableMaker(progress_frame, progress_view),
     },

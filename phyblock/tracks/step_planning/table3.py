@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from phyblock.tables.cells import METRICS
+from phyblock.tables.cells import METRIC_NAMES, METRICS, SIDE_METRICS
 from phyblock.tables.headline import interval_frame, interval_view
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
@@ -22,6 +23,7 @@ from phyblock.tracks.step_planning.rules import ENDINGS
 __all__ = [
     "ENDING_NAMES",
     "endings_view",
+    "episodes_in_terminal",
     "moves_view",
     "paper_table3_frame",
     "paper_table3_view",
@@ -36,7 +38,6 @@ __all__ = [
 
 _OURS, _PUBLISHED = "run", "published"
 _MODEL = Column("Model", is_text=True)
-_METRICS = dict(zip(METRICS, ("Prec", "Rec", "F1"), strict=True))
 _GROUPS = {"placed": "Placed blocks", "attempted": "All attempted moves"}
 ENDING_NAMES = {
     "completed": "Completed",
@@ -161,7 +162,9 @@ def published_scores(model: str) -> dict[str, float]:
 
 def table3_view(table: pd.DataFrame, run: Run) -> TextTable:
     """Table 3 in the paper's layout out of `table3_frame`, and what more an episode tells."""
-    columns = [Column(_METRICS[m], _GROUPS[criterion]) for criterion in COUNTED for m in METRICS]
+    columns = [
+        Column(METRIC_NAMES[m], _GROUPS[criterion]) for criterion in COUNTED for m in METRICS
+    ]
     cells = [f"{criterion}_{metric}" for criterion in COUNTED for metric in METRICS]
     rows = tuple(
         (
@@ -290,5 +293,11 @@ def paper_table3_frame(run: Run) -> pd.DataFrame:
 def paper_table3_view(table: pd.DataFrame, run: Run) -> TextTable:
     """Out of `paper_table3_frame`."""
     note = f"Setting {run.design.setting}; precision is over the blocks that were placed."
-    names = {f"placed_{metric}": name for metric, name in _METRICS.items()}
+    names = {f"placed_{metric}": name for metric, name in METRIC_NAMES.items()}
     return beside_view(table, run, number_in_paper=3, names=names, note=note)
+
+
+def episodes_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
+    """A table of episodes without its notes, and without side metrics where it is too wide."""
+    whole = replace(view, notes=())
+    return whole, whole.without(SIDE_METRICS)

@@ -26,6 +26,7 @@ from phyblock.tracks.vqa.table2 import (
     paper_table2_view,
     published_cells,
     table2_frame,
+    table2_in_terminal,
     table2_view,
     vqa_intervals,
     vqa_intervals_view,
@@ -73,7 +74,7 @@ REPORT = TrackReport(
     references=_references,
     notes=_notes,
     tables={
-        "table2": TableMaker(table2_frame, table2_view),
+        "table2": TableMaker(table2_frame, table2_view, in_terminal=table2_in_terminal),
         "vqa_intervals": TableMaker(vqa_intervals, vqa_intervals_view, "table2"),
         "letters": TableMaker(letters_frame, letters_view, "table2"),
         "questions": TableMaker(questions_frame, None, "table2"),

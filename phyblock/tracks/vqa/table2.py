@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from phyblock.tables.headline import interval_frame, interval_view
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
 from phyblock.tables.paper_numbers import NOTHING, beside_view, interleaved, published_table
-from phyblock.tables.text_table import Column, TextTable, number, spread
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number, spread
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.vqa.accuracy import questions_frame
 from phyblock.tracks.vqa.answers import CELLS, OVERALL_CELL, showing
@@ -25,6 +26,7 @@ __all__ = [
     "paper_table2_view",
     "published_cells",
     "table2_frame",
+    "table2_in_terminal",
     "table2_view",
     "vqa_intervals",
     "vqa_intervals_view",
@@ -221,3 +223,17 @@ def vqa_intervals_view(table: pd.DataFrame, run: Run) -> TextTable:
     """The averages of `vqa_intervals`."""
     wanted = [cell for cell in (*CATEGORIES, OVERALL_CELL) if cell in set(table[CELL])]
     return interval_view(table, run, wanted, "Right answers")
+
+
+def table2_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
+    """The columns that were asked, or averages alone where those do not fit."""
+    asked = [
+        place
+        for place in range(len(view.columns))
+        if any(row[place] != NO_VALUE for row in view.rows if not row[0].startswith(" "))
+    ]
+    notes = view.notes[:-1]
+    whole = replace(view.with_columns(asked), notes=notes)
+    means = [n for n, column in enumerate(whole.columns) if column.name in ("Model", "Avg")]
+    note = "Averages alone, to fit; every subtask is in tables/table2.md."
+    return whole, replace(whole.with_columns(means), notes=(note, *notes))
