@@ -11,17 +11,16 @@ import click
 from phyblock.cli.console import make_console, shown_path
 from phyblock.errors import Problem, StoreError
 from phyblock.resources import bundled
+from phyblock.tracks import kinds
 
 __all__ = ["command"]
 
 _SUITE = "quick.yaml"
-_OWN_PROMPT = "prompt: ../prompts/full_planning.j2   # change it as you like\n"
 _FILES = (
     ("models.yaml",),
     ("benchmarks", _SUITE),
     ("benchmarks", "schemas", "suite.schema.json"),
     ("benchmarks", "schemas", "models.schema.json"),
-    ("prompts", "full_planning.j2"),
 )
 
 
@@ -32,19 +31,21 @@ def command(folder: Path) -> None:
 
     Files that are already there are never written over.
     """
-    taken = [folder.joinpath(*parts) for parts in _FILES if folder.joinpath(*parts).exists()]
+    (template, *_) = (kind.template for kind in kinds().values() if kind.template is not None)
+    files = (*_FILES, ("prompts", template.name))
+    taken = [folder.joinpath(*parts) for parts in files if folder.joinpath(*parts).exists()]
     if taken:
         hint = "choose another folder"
         raise StoreError([Problem(str(path), "is already there", hint=hint) for path in taken])
     console = make_console()
     try:
-        for parts in _FILES:
+        for parts in files:
             target = folder.joinpath(*parts)
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(bundled(*parts), target)
             if target.name == _SUITE:
                 with target.open("a", encoding="utf-8") as suite:
-                    suite.write(_OWN_PROMPT)
+                    suite.write(f"prompt: ../prompts/{template.name}   # change it as you like\n")
             console.print(f"  {shown_path(target)}")
     except OSError as error:
         problem = Problem(str(folder), f"cannot be written: {error.strerror}")

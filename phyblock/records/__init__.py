@@ -9,6 +9,7 @@ from phyblock.records.lines import PROMPTS, RECORDS, TURNS, Lines, PromptLines, 
 from phyblock.records.manifest import FORMAT, MANIFEST, Manifest, read_manifest
 from phyblock.records.others import PictureMark, Prompt, PromptMessage, Turn
 from phyblock.records.record import (
+    AskedTurn,
     Outcome,
     Record,
     Recorded,
@@ -27,6 +28,7 @@ __all__ = [
     "PROMPTS",
     "RECORDS",
     "TURNS",
+    "AskedTurn",
     "Belonging",
     "Line",
     "Lines",

@@ -15,6 +15,7 @@ from typing_extensions import Self
 from phyblock.records.line import LARGEST_WHOLE, Amount, Line, Whole, encodable
 
 __all__ = [
+    "AskedTurn",
     "ErrorKind",
     "Finish",
     "Outcome",
@@ -165,6 +166,17 @@ class Score(Line):
     """The error type of each wrong step, null for right ones."""
 
 
+class AskedTurn(Line):
+    """One request of an episode, with its reply."""
+
+    n: Whole
+    """Its place in the episode, from 1."""
+    reply: StoredReply
+    """The reply."""
+    prompt: StoredPrompt | None = None
+    """What was sent."""
+
+
 class Record(Line):
     """A sample's stored outcome."""
 
@@ -208,9 +220,42 @@ class Record(Line):
     columns: ClassVar[Mapping[str, str]] = {}
     """Columns that the track adds to the frame of records, with their types in pandas."""
 
+    exported: ClassVar[Mapping[str, str]] = {}
+    """Columns that the track adds to exports, with their types in pandas."""
+
     def row(self) -> Mapping[str, Any]:
         """The values of `columns`."""
         return {}
+
+    def export_row(self) -> Mapping[str, Any]:
+        """The values of `exported`."""
+        return {}
+
+    @property
+    def part(self) -> str | None:
+        """The part of its track that the item belongs to, as a subtask; None: there are none."""
+        return None
+
+    @property
+    def is_correct(self) -> bool | None:
+        """Whether it is right, where it can only be right or wrong; else None."""
+        return None
+
+    @property
+    def target(self) -> str:
+        """The one right answer; "" where there is none."""
+        return ""
+
+    @property
+    def said(self) -> str | None:
+        """What was read in the reply, in short."""
+        plan = getattr(self.parse, "plan", None)
+        return None if plan is None else " ".join(map(str, plan))
+
+    @property
+    def asked_turns(self) -> tuple[AskedTurn, ...]:
+        """The requests of an episode; none for what is asked once."""
+        return ()
 
     @property
     def item(self) -> str:

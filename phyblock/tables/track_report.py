@@ -4,18 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 from phyblock.tables.measures import CELL, Cell, Measure
 from phyblock.tables.text_table import TextTable
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from phyblock.datasets import Dataset
+    from phyblock.models import Image
+    from phyblock.records import Record
+    from phyblock.sim import PictureStyle
     from phyblock.tables.load import Run
 
-__all__ = ["WHOLE", "PaperTable", "Shown", "TableMaker", "TrackReport", "in_whole"]
+__all__ = [
+    "WHOLE",
+    "KeptPictures",
+    "PageItems",
+    "PaperTable",
+    "Shown",
+    "TableMaker",
+    "TrackReport",
+    "in_whole",
+]
 
 
 @dataclass(frozen=True)
@@ -41,6 +56,29 @@ class PaperTable:
 
     frame: Callable[[Run], pd.DataFrame]
     view: Callable[[pd.DataFrame, Run], TextTable]
+
+
+class KeptPictures(Protocol):
+    """Pictures of items in a folder of kept ones."""
+
+    def outline(self, item: Any) -> tuple[Sequence[Image], bool]:
+        """The pictures of an item as far as they are at hand, and whether all are."""
+
+    def keys(self, item: Any) -> Sequence[str]:
+        """Names under which they are kept."""
+
+
+@dataclass(frozen=True)
+class PageItems:
+    """What the page of a report shows of items that are more than their scene.
+
+    `shown` gives what a record asked about, as it was shown, None where that is not known. `entry`
+    is what the page takes of it, `pictures` finds those that were sent in a folder of kept ones.
+    """
+
+    shown: Callable[[Record], Any | None]
+    entry: Callable[[Any], Mapping[str, Any]]
+    pictures: Callable[[Path, PictureStyle], KeptPictures]
 
 
 @dataclass(frozen=True)
@@ -87,7 +125,9 @@ class TrackReport:
     headline. `tables`, `figures` and `paper_tables` (by their number in the paper) are its own; a
     figure is None for a run that has no numbers for it. `bars` is the name of the figure of its
     first measure. `check_alike` raises SpecError where the first run cannot be compared with the
-    second in these cells.
+    second in these cells. `part_names` say what `Record.part` stands for. `items` opens, for the
+    page and out of a manifest, what was asked about where that is more than scenes; it raises
+    DataError where that is not what the run was made on.
     """
 
     measures: tuple[Measure, ...]
@@ -105,3 +145,5 @@ class TrackReport:
     figure_titles: Mapping[str, str] = field(default_factory=dict)
     paper_tables: Mapping[int, PaperTable] = field(default_factory=dict)
     check_alike: Callable[[Run, Run, Sequence[str]], None] | None = None
+    part_names: Mapping[str, str] = field(default_factory=dict)
+    items: Callable[[Mapping[str, Any], Dataset], PageItems] | None = None

@@ -11,12 +11,18 @@ from phyblock.tables.measures import VARIANT, Counted, Measure
 from phyblock.tables.outcomes import WITHOUT_REPLY
 from phyblock.tracks.kind import kind_of
 
-__all__ = ["all_estimates", "counted_samples", "track_estimates", "track_measures"]
+__all__ = ["all_estimates", "counted_samples", "stored_counts", "track_estimates", "track_measures"]
 
 
 def track_measures(track: str) -> tuple[Measure, ...]:
     """The measures of a track, those that were added behind its own."""
     return (*kind_of(track).report().measures, *added_measures(track))
+
+
+def stored_counts(track: str) -> tuple[Counted, ...]:
+    """What measures of a track count of each sample as it is judged."""
+    counted = {measure.counted.name: measure.counted for measure in track_measures(track)}
+    return tuple(one for one in counted.values() if one.sample is not None)
 
 
 def track_estimates(run: Run, track: str) -> pd.DataFrame:

@@ -10,27 +10,21 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from phyblock.domain import SUBTASK_NAMES
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write
 from phyblock.records import MANIFEST, PROMPTS, RECORDS
 from phyblock.report.figures import figure_titles, write_figures
-from phyblock.report.html.drawable import kit, question_entry, scene_entry
 from phyblock.report.html.headline import headlines
 from phyblock.report.html.index import Item, SampleIndex, read_places
 from phyblock.report.html.pack import Pack, write_script
 from phyblock.report.html.page import Figure, render_page
-from phyblock.report.html.samples import (
-    pack_prompts,
-    pack_samples,
-    pictures_sent,
-    questions_asked,
-)
+from phyblock.report.html.samples import items_shown, pack_prompts, pack_samples, pictures_sent
 from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.sources import Sources, open_sources
 from phyblock.report.write import TablesWritten
 from phyblock.tables.load import Run
-from phyblock.tracks.vqa.pictures import Shown
+from phyblock.tracks.drawable import kit, scene_entry
+from phyblock.tracks.kind import kind_of
 
 __all__ = ["REPORT_FILE", "write_report"]
 
@@ -92,7 +86,7 @@ def _write_data(run: Run, sources: Sources, folder: Path, new: Path, build: str)
     kinds = ("records", "scenes", "questions", "prompts")
     packs = {kind: Pack(new, kind, build) for kind in kinds}
     places = read_places(run.path, run.design)
-    asked = questions_asked(run.path, places, sources.questions)
+    asked = items_shown(run.path, places, sources.items)
     pictures = {}
     if pictures_sent(run.path, places):
         pictures = _keep_pictures(run, sources, asked, folder / _PICTURES)
@@ -103,7 +97,7 @@ def _write_data(run: Run, sources: Sources, folder: Path, new: Path, build: str)
         task = sources.tasks.get(scene)
         packs["scenes"].add(task and scene_entry(task.scene, task.candidates))
     questions = {
-        item: packs["questions"].add(question_entry(shown.question))
+        item: packs["questions"].add(dict(sources.items[item.track].entry(shown)))
         for item, shown in asked.items()
     }
     for pack in packs.values():
@@ -113,22 +107,30 @@ def _write_data(run: Run, sources: Sources, folder: Path, new: Path, build: str)
         "starts": {kind: pack.starts for kind, pack in packs.items()},
         "kit": kit(),
         "no_scenes": sources.lacking,
-        "subtask_names": SUBTASK_NAMES,
+        "subtask_names": _part_names(run),
     }
     write_script(new, "index", build, content)
 
 
 def _keep_pictures(
-    run: Run, sources: Sources, asked: Mapping[Item, Shown], folder: Path
+    run: Run, sources: Sources, asked: Mapping[Item, Any], folder: Path
 ) -> dict[str, str]:
     """Addresses of the pictures at hand as seen from the page, by digest."""
     shelf = PictureShelf(folder, run.manifest["suite"])
     if scenes := _scenes(run):
         known = (sources.tasks.get(scene) for scene in scenes)
         shelf.add_scenes(task for task in known if task is not None)
-    if asked:
-        shelf.add_questions(asked.values())
+    for track, items in sources.items.items():
+        shelf.add_items(items, [shown for item, shown in asked.items() if item.track == track])
     return {digest: f"{_FOLDER}/{_PICTURES}/{name}" for digest, name in shelf.names.items()}
+
+
+def _part_names(run: Run) -> dict[str, str]:
+    """What parts of tracks are called, by their short names."""
+    names: dict[str, str] = {}
+    for track in run.design.suite.tracks:
+        names |= kind_of(track).report().part_names
+    return names
 
 
 def _scenes(run: Run) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
-from phyblock.records import Line, Record, StoredPrompt, StoredReply
+from phyblock.records import AskedTurn, Line, Record, StoredReply
 from phyblock.records.line import Whole
 from phyblock.tracks.full_planning.record import PLAN_COLUMNS, PlanParse, plan_row
 from phyblock.tracks.step_planning.prompt import StepOutcome
@@ -25,15 +25,9 @@ class MoveParse(Line):
     """Why no single operation could be read."""
 
 
-class EpisodeTurn(Line):
+class EpisodeTurn(AskedTurn):
     """One request of an episode, with its reply and what came of it."""
 
-    n: Whole
-    """Its place in the episode, from 1."""
-    reply: StoredReply
-    """The reply."""
-    prompt: StoredPrompt | None = None
-    """What was sent."""
     key: str = ""
     """The scene, the step, and the vote where a step has several."""
     seed: Whole = 0
@@ -86,6 +80,17 @@ class EpisodeRecord(Record):
         """The moves that were attempted, as a plan, and how the episode went."""
         went = ("ending", "max_steps", "outcomes", "progress")
         return {**plan_row(self.parse), **{name: getattr(self, name) for name in went}}
+
+    exported: ClassVar[Mapping[str, str]] = {"ending": "string"}
+
+    def export_row(self) -> Mapping[str, Any]:
+        """How it ended."""
+        return {"ending": self.ending}
+
+    @property
+    def asked_turns(self) -> tuple[AskedTurn, ...]:
+        """Every request, with its reply."""
+        return self.turns
 
     @property
     def replies(self) -> tuple[StoredReply, ...]:

@@ -11,6 +11,10 @@ from phyblock.records.line import Whole
 __all__ = ["ChoiceParse", "ChoiceRecord", "GivenAnswer", "QuestionShown"]
 
 
+_QUESTION = ("id", "subtask", "category", "rotation")
+_ANSWER = ("right", "given", "correct")
+
+
 class ChoiceParse(Line):
     """The answer that was read in a reply."""
 
@@ -80,3 +84,42 @@ class ChoiceRecord(Record):
             "right": answer and answer.right,
             "given": answer and answer.given,
         }
+
+    exported: ClassVar[Mapping[str, str]] = {
+        "question_id": "string",
+        "question_subtask": "string",
+        "question_category": "string",
+        "question_rotation": "Int64",
+        "answer_right": "string",
+        "answer_given": "string",
+        "answer_correct": "boolean",
+    }
+
+    def export_row(self) -> Mapping[str, Any]:
+        """Which question it is, the right answer, and the one that was given."""
+        question = {name: getattr(self.question, name) for name in _QUESTION}
+        answer = {name: getattr(self.answer, name, None) for name in _ANSWER}
+        return {
+            **{f"question_{name}": value for name, value in question.items()},
+            **{f"answer_{name}": value for name, value in answer.items()},
+        }
+
+    @property
+    def part(self) -> str:
+        """The subtask."""
+        return self.question.subtask
+
+    @property
+    def is_correct(self) -> bool | None:
+        """Whether the answer is right."""
+        return None if self.answer is None else self.answer.correct
+
+    @property
+    def target(self) -> str:
+        """The right letters."""
+        return "" if self.answer is None else self.answer.right
+
+    @property
+    def said(self) -> str | None:
+        """The letters given."""
+        return None if self.answer is None else self.answer.given

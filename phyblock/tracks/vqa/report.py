@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from phyblock.domain import CATEGORIES
+from phyblock.domain import CATEGORIES, SUBTASK_NAMES
 from phyblock.errors import Problem, SpecError
 from phyblock.tables.load import Run
 from phyblock.tables.paper_numbers import HUMAN_ACCURACY, HUMAN_NOTE
@@ -20,6 +20,7 @@ from phyblock.tracks.vqa.measures import (
     in_subtasks,
     subtask_cells,
 )
+from phyblock.tracks.vqa.page import question_items
 from phyblock.tracks.vqa.table2 import (
     letters_view,
     paper_table2_frame,
@@ -83,4 +84,6 @@ REPORT = TrackReport(
     figure_titles={"vqa-subtasks": "VQA accuracy by subtask"},
     paper_tables={2: PaperTable(paper_table2_frame, paper_table2_view)},
     check_alike=_check_alike,
+    part_names={str(short): name for short, name in SUBTASK_NAMES.items()},
+    items=question_items,
 )
