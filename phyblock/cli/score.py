@@ -8,9 +8,8 @@ from typing import cast
 import click
 
 from phyblock.cli.report import show_tables
-from phyblock.parsing import PLAN_PARSERS, PlanParser
 from phyblock.run.rescore import rescore
-from phyblock.scoring import MATCHERS, Matcher
+from phyblock.words import MATCHERS, PLAN_PARSERS, Matcher, PlanParser
 
 __all__ = ["command"]
 

@@ -4,7 +4,6 @@ Importing this package imports neither litellm nor aiohttp: the first call throu
 """
 
 from phyblock.models.base import (
-    Finish,
     Image,
     Message,
     Model,
@@ -34,7 +33,6 @@ __all__ = [
     "Budget",
     "CacheStats",
     "Estimate",
-    "Finish",
     "Gate",
     "Halt",
     "HaltedError",

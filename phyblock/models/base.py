@@ -6,10 +6,11 @@ import functools
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Protocol
+
+from phyblock.words import Finish, Role
 
 __all__ = [
-    "Finish",
     "Image",
     "Message",
     "Model",
@@ -17,9 +18,6 @@ __all__ = [
     "Request",
     "Usage",
 ]
-
-Finish = Literal["stop", "length", "refusal", "unknown"]
-"""Why a reply ended: by itself, at the token limit, by a content filter, or not said."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,7 @@ class Image:
 class Message:
     """One chat message: text and pictures in the order in which they are sent."""
 
-    role: Literal["system", "user", "assistant"]
+    role: Role
     parts: tuple[str | Image, ...]
 
 

@@ -8,11 +8,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-__all__ = ["DIRECT_PROVIDERS", "Kind", "ModelConfig", "Price", "SeedMode", "Transport"]
+from phyblock.words import SeedMode, TransportName
+
+__all__ = [
+    "DIRECT_PROVIDERS",
+    "Kind",
+    "ModelConfig",
+    "Price",
+]
 
 Kind = Literal["litellm", "replay", "baseline"]
-Transport = Literal["auto", "litellm", "direct"]
-SeedMode = Literal["auto", "always", "never"]
 
 DIRECT_PROVIDERS = ("openai", "hosted_vllm", "lm_studio")
 """Provider prefixes that mean the plain OpenAI protocol: litellm has nothing to translate."""
@@ -46,7 +51,7 @@ class ModelConfig:
     id: str = ""
     api_base: str | None = None
     api_key_env: str | None = None
-    transport: Transport = "auto"
+    transport: TransportName = "auto"
     params: Mapping[str, object] = field(default_factory=dict)
     max_concurrency: int = 32
     rpm: int | None = None

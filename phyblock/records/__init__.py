@@ -10,7 +10,6 @@ from phyblock.records.manifest import FORMAT, MANIFEST, Manifest, read_manifest
 from phyblock.records.others import PictureMark, Prompt, PromptMessage, Turn
 from phyblock.records.record import (
     AskedTurn,
-    Outcome,
     Record,
     Recorded,
     Score,
@@ -33,7 +32,6 @@ __all__ = [
     "Line",
     "Lines",
     "Manifest",
-    "Outcome",
     "PictureMark",
     "Prompt",
     "PromptLines",

@@ -13,12 +13,11 @@ from pydantic import Field
 from typing_extensions import Self
 
 from phyblock.records.line import LARGEST_WHOLE, Amount, Line, Whole, encodable
+from phyblock.words import Finish, Outcome
 
 __all__ = [
     "AskedTurn",
     "ErrorKind",
-    "Finish",
-    "Outcome",
     "Record",
     "Recorded",
     "Score",
@@ -29,8 +28,6 @@ __all__ = [
     "StoredUsage",
 ]
 
-Outcome = Literal["ok", "parse_failure", "refusal", "truncated", "api_error", "missing"]
-Finish = Literal["stop", "length", "refusal", "unknown"]
 ErrorKind = Literal["retryable", "sample", "refused", "unavailable"]
 
 

@@ -10,7 +10,6 @@ from phyblock.errors import ModelError, RefusedError, RetryableError, SampleErro
 from phyblock.models.base import Image, Message, Reply, Request
 from phyblock.models.stored import stored
 from phyblock.records import (
-    Outcome,
     Record,
     StoredError,
     StoredImage,
@@ -20,6 +19,7 @@ from phyblock.records import (
 from phyblock.records.known import known_records
 from phyblock.tracks import Episode, Item, Judgement
 from phyblock.tracks.counting import sample_counts
+from phyblock.words import Outcome
 
 __all__ = ["about_prompt", "begun", "judged"]
 

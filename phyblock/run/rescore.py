@@ -13,15 +13,14 @@ from pydantic import ValidationError
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.files import atomic_write
-from phyblock.parsing import PlanParser
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
 from phyblock.records.reading import read_records
 from phyblock.run.data import open_dataset
 from phyblock.run.records import judged
-from phyblock.scoring import Matcher
 from phyblock.specs import SuiteSpec, suite_model
 from phyblock.tracks import kinds
 from phyblock.tracks.selection import select_tasks
+from phyblock.words import Matcher, PlanParser
 
 __all__ = ["rescore"]
 

@@ -27,7 +27,7 @@ from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
 from phyblock.sim.compose import GRID_COLUMNS, LABEL_STRIP, numbered_grid, side_by_side, to_png
 from phyblock.sim.render import DrawnBlock, picture
 from phyblock.sim.renderer import renderer
-from phyblock.sim.textures import BACKGROUNDS, Background
+from phyblock.words import BACKGROUNDS, Background
 
 __all__ = [
     "RENDER_VERSION",

@@ -21,7 +21,8 @@ from phyblock.sim.camera import Camera
 from phyblock.sim.geometry import corners_m, edge_bars, solid_mesh
 from phyblock.sim.renderer import renderer
 from phyblock.sim.stage import Prop, stage
-from phyblock.sim.textures import Background, floor, shadow
+from phyblock.sim.textures import floor, shadow
+from phyblock.words import Background
 
 __all__ = ["COLOR_RGB", "SUPERSAMPLE", "DrawnBlock", "Shot", "empty_ground", "picture", "shoot"]
 

@@ -34,6 +34,18 @@ from phyblock.specs.fields import (
     refuse,
 )
 from phyblock.specs.rules import broken_rules, read_dotted
+from phyblock.words import (
+    Background,
+    Criterion,
+    DataFormat,
+    Matcher,
+    MissingPolicy,
+    PictureLayout,
+    PictureName,
+    PictureSource,
+    PlanParser,
+    Setting,
+)
 
 __all__ = [
     "BUILTIN_DATASET",
@@ -63,10 +75,6 @@ def _check_whole(level: object) -> object:
 
 
 Level = Annotated[Literal[1, 2, 3, 4], BeforeValidator(_check_whole)]
-Setting = Literal["A", "B"]
-Matcher = Literal["optimal", "paper"]
-Picture = Literal["goal", "candidates"]
-Background = Literal["checkerboard", "white", "light-wood", "dark-wood", "concrete", "lawn"]
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
 
 
@@ -118,7 +126,7 @@ ModelNames = Annotated[
 class DatasetSpec(Section):
     """Which scenes are run."""
 
-    format: Literal["builtin", "official"] = Field(
+    format: DataFormat = Field(
         default="builtin",
         description="builtin: the project's own format. official: a checkout of the official "
         "PhyBlock repository.",
@@ -136,17 +144,17 @@ class DatasetSpec(Section):
 class ImagesSpec(Section):
     """Which pictures a model is shown."""
 
-    source: Literal["render", "dataset"] = Field(
+    source: PictureSource = Field(
         default="render",
         description="render: drawn from the scene. dataset: the official composites, or "
         "their two halves apart; a scene without one is an error.",
     )
-    layout: Literal["composite", "separate"] = Field(
+    layout: PictureLayout = Field(
         default="composite",
         description="composite: goal and candidates in one picture. separate: two pictures.",
     )
     order: Annotated[
-        tuple[Picture, ...],
+        tuple[PictureName, ...],
         Field(min_length=2, max_length=2, json_schema_extra={"uniqueItems": True}),
         AfterValidator(check_unique),
     ] = Field(
@@ -170,12 +178,12 @@ class ScoringSpec(Section):
         description="optimal: interchangeable blocks are matched so that most steps count. paper: "
         "greedy, the paper's Algorithm 1. The first one makes the headline numbers.",
     )
-    level1: Literal["selection", "membership", "aov"] = Field(
+    level1: Criterion = Field(
         default="selection",
         description="Criterion of Level 1. selection: one-to-one, order ignored. membership: what "
         "the paper's Level-1 columns are. aov: as at the other levels.",
     )
-    missing: Literal["count", "skip"] = Field(
+    missing: MissingPolicy = Field(
         default="count",
         description="A missing reply: count its blocks as not placed, or skip the scene (as the "
         "paper did).",
@@ -242,7 +250,7 @@ class SuiteSpec(Section):
     images: ImagesSpec = Field(
         default_factory=ImagesSpec, description="Which pictures a model is shown."
     )
-    parser: Literal["steps", "official"] = Field(
+    parser: PlanParser = Field(
         default="steps",
         description="steps: reads the step list and records the rule that matched. official: the "
         "official expression over the whole reply.",

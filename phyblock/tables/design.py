@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 from pydantic_core import PydanticCustomError
@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 from phyblock.errors import Problem, StoreError
 from phyblock.registry import known_tracks, table_names
 from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.words import Criterion, MissingPolicy
 
 __all__ = ["OVERALL", "Design", "read_design"]
 
@@ -27,8 +28,8 @@ class _Part(BaseModel):
 
 class _Scoring(_Part):
     matchers: tuple[str, ...] = Field(min_length=1)
-    level1: Literal["selection", "membership", "aov"]
-    missing: Literal["skip", "count"]
+    level1: Criterion
+    missing: MissingPolicy
 
 
 class _Suite(_Part):

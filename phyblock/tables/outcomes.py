@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
-from phyblock.records import Outcome
+from phyblock.words import Outcome
 
 __all__ = ["FAILURES", "HEADINGS", "OUTCOMES", "WITHOUT_REPLY"]
 

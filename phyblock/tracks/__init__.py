@@ -9,7 +9,6 @@ from phyblock.tracks.base import (
     EpisodeTrack,
     Item,
     Judgement,
-    Outcome,
     SingleTrack,
     Track,
 )
@@ -28,7 +27,6 @@ __all__ = [
     "Judgement",
     "OfficialPrompt",
     "Opening",
-    "Outcome",
     "PicturePolicy",
     "Pictures",
     "Prompt",

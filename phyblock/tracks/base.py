@@ -6,7 +6,7 @@ Most tracks ask once a sample; step planning plays an episode of several turns.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Literal, Protocol, TypeVar, runtime_checkable
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from phyblock.domain import Scene
 from phyblock.models.base import Reply, Request
@@ -17,12 +17,9 @@ __all__ = [
     "EpisodeTrack",
     "Item",
     "Judgement",
-    "Outcome",
     "SingleTrack",
     "Track",
 ]
-
-Outcome = Literal["ok", "parse_failure", "refusal", "truncated", "api_error", "missing"]
 
 
 class Item(Protocol):

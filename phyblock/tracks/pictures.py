@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Literal
 
 from PIL import Image as PillowImage
 from PIL import UnidentifiedImageError
@@ -25,6 +24,7 @@ from phyblock.sim import (
     goal_png,
 )
 from phyblock.tracks.studio import Drawing, Studio, to_image
+from phyblock.words import PictureLayout, PictureName, PictureSource
 
 __all__ = ["PicturePolicy", "Pictures", "read_picture"]
 
@@ -37,9 +37,9 @@ class PicturePolicy:
     pictures apart in `order`.
     """
 
-    source: Literal["render", "dataset"]
-    layout: Literal["composite", "separate"]
-    order: tuple[Literal["goal", "candidates"], ...]
+    source: PictureSource
+    layout: PictureLayout
+    order: tuple[PictureName, ...]
     style: PictureStyle
 
 

@@ -19,11 +19,12 @@ from phyblock.datasets import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Block, Candidate, CandidateSet, Scene
 from phyblock.models.base import Reply, Request, Usage
 from phyblock.parsing.move import MOVE_PROBLEMS, parse_move
-from phyblock.scoring import MOVE_OUTCOMES, SETTINGS, Setting
+from phyblock.scoring import MOVE_OUTCOMES
 from phyblock.tracks.step_planning.baselines import STEP_RULES, StepSubject
 from phyblock.tracks.step_planning.episode import StepEpisode
 from phyblock.tracks.step_planning.rules import ENDINGS, StepLimits, StepRules, Tally, majority
 from phyblock.tracks.step_planning.track import StepPlanning
+from phyblock.words import SETTINGS, Setting
 from tests.parsing.test_move_parser import REPLIES
 
 BUILT_IN = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400"

@@ -13,12 +13,13 @@ from phyblock.datasets import read_builtin
 from phyblock.errors import PromptError
 from phyblock.models.base import Image, Message, Reply
 from phyblock.resources import bundled
-from phyblock.scoring import MOVE_OUTCOMES, Setting
+from phyblock.scoring import MOVE_OUTCOMES
 from phyblock.sim import PictureStyle
 from phyblock.tracks import PicturePolicy, Pictures, TemplatePrompt
 from phyblock.tracks.step_planning.prompt import FEEDBACKS, Feedback, PastStep, StepPrompt
 from phyblock.tracks.step_planning.rules import StepRules
 from phyblock.tracks.step_planning.track import StepPlanning
+from phyblock.words import Setting
 
 TEMPLATE = TemplatePrompt(bundled("prompts", "step_planning.j2"), "default")
 GOAL, CANDIDATES = Image(b"g", "goal", 1, 1), Image(b"c", "candidates", 1, 1)

@@ -11,11 +11,12 @@ from typing import Any
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
 from phyblock.models.base import Image, Request
-from phyblock.parsing import ParsedPlan, PlanParser, parse_plan
-from phyblock.scoring import AssemblyScorer, Level1Criterion, Matcher, Score, Setting
+from phyblock.parsing import ParsedPlan, parse_plan
+from phyblock.scoring import AssemblyScorer, Score
 from phyblock.tracks.full_planning.baselines import PlanSubject
 from phyblock.tracks.pictures import Pictures
 from phyblock.tracks.prompts import Prompt
+from phyblock.words import Level1Criterion, Matcher, PlanParser, Setting
 
 __all__ = ["FullPlanning", "PlanJudgement", "PlanningRules"]
 

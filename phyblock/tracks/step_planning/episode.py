@@ -15,7 +15,6 @@ from phyblock.scoring import (
     Assembly,
     Counts,
     ErrorType,
-    Setting,
     attempted_counts,
     placed_counts,
 )
@@ -23,6 +22,7 @@ from phyblock.sim.site import Settled
 from phyblock.tracks.step_planning.baselines import StepSubject
 from phyblock.tracks.step_planning.prompt import PastStep, StepOutcome
 from phyblock.tracks.step_planning.rules import Ending, StepRules, Tally, majority
+from phyblock.words import Setting
 
 __all__ = ["Desk", "StepEpisode"]
 

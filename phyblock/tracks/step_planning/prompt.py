@@ -8,17 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from phyblock.models.base import Image, Message
 from phyblock.parsing.move import MoveProblem
-from phyblock.scoring import Gating, MoveOutcome, Setting
+from phyblock.scoring import MoveOutcome
 from phyblock.tracks.prompts import TemplatePrompt
+from phyblock.words import Gating, Setting
 
-__all__ = ["FEEDBACKS", "Feedback", "PastStep", "StepOutcome", "StepPrompt"]
+__all__ = ["FEEDBACKS", "Feedback", "History", "PastStep", "StepOutcome", "StepPrompt"]
 
 Feedback = Literal["none", "success", "error_type"]
-FEEDBACKS: tuple[Feedback, ...] = ("none", "success", "error_type")
+FEEDBACKS: tuple[Feedback, ...] = get_args(Feedback)
+History = Literal["text", "turns"]
 StepOutcome = MoveOutcome | Literal["done"] | MoveProblem
 """What became of a step; a problem is a reply in which no single operation could be read."""
 
@@ -70,7 +72,7 @@ class StepPrompt:
 
     template: TemplatePrompt
     feedback: Feedback
-    history: Literal["text", "turns"]
+    history: History
     memory: int | None
     cot: bool
     gating: Gating = "aov"

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from phyblock.parsing.move import ParsedMove
-from phyblock.scoring import Gating, Setting
+from phyblock.words import Gating, Physics, Setting
 
-__all__ = ["ENDINGS", "Ending", "StepLimits", "StepPhysics", "StepRules", "Tally", "majority"]
+__all__ = ["ENDINGS", "Ending", "StepLimits", "StepRules", "Tally", "majority"]
 
-StepPhysics = Literal["off", "settle", "strict"]
 Ending = Literal[
     "completed",
     "done",
@@ -57,7 +56,7 @@ class StepRules:
     accepts: Setting = "A"
     settings: tuple[Setting, ...] = ("A", "B")
     gating: Gating = "aov"
-    physics: StepPhysics = "off"
+    physics: Physics = "off"
     samples: int = 1
     limits: StepLimits = StepLimits()
 

@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from phyblock.specs.fields import Count, Flag, Section, TemplateName
+from phyblock.tracks.step_planning.prompt import Feedback, History
+from phyblock.words import Gating, Physics, Setting
 
 __all__ = ["StepsSpec"]
 
@@ -16,26 +18,26 @@ PositiveUsd = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 class StepsSpec(Section):
     """The rules of the step_planning track: the simulator, what is shown, when it ends."""
 
-    setting: Literal["A", "B"] | None = Field(
+    setting: Setting | None = Field(
         default=None,
         description="By which the simulator lets a step succeed; null: by the first of settings. "
         "With B, blocks that are turned wrongly are placed, and count as wrong in A.",
     )
-    gating: Literal["aov", "layer"] = Field(
+    gating: Gating = Field(
         default="aov",
         description="aov: a block can be placed when all it rests on is. layer: when all lower "
         "layers are complete, as in the official code.",
     )
-    physics: Literal["off", "settle", "strict"] = Field(
+    physics: Physics = Field(
         default="settle",
         description="off: placed blocks stay where they are. settle: every new state is simulated; "
         "what would fall is recorded and held. strict: a structure that collapses ends the "
         "episode.",
     )
-    feedback: Literal["none", "success", "error_type"] = Field(
+    feedback: Feedback = Field(
         default="success", description="What the model is told of each of its steps."
     )
-    history: Literal["text", "turns"] = Field(
+    history: History = Field(
         default="text",
         description="Earlier steps as a text in one message, or as the turns of a conversation.",
     )

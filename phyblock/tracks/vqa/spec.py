@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import Field
 
 from phyblock.domain import SUBTASKS, Subtask
 from phyblock.specs.fields import Count, Flag, Section, TemplateName, UniqueSome
+from phyblock.tracks.vqa.pictures import OptionsAs
+from phyblock.words import DataFormat
 
 __all__ = ["BUILTIN_QUESTIONS", "VqaSpec"]
 
@@ -18,7 +18,7 @@ BUILTIN_QUESTIONS = "phyblock-vqa"
 class VqaSpec(Section):
     """The questions of the vqa track and how they are shown."""
 
-    format: Literal["builtin", "official"] = Field(
+    format: DataFormat = Field(
         default="builtin",
         description="builtin: a folder with questions.jsonl. official: a folder with question "
         "files in the official JSON form and their pictures.",
@@ -33,7 +33,7 @@ class VqaSpec(Section):
     per_subtask: Count | None = Field(
         default=None, description="Questions of each subtask at most; null: all."
     )
-    options_as: Literal["images", "letters"] = Field(
+    options_as: OptionsAs = Field(
         default="images",
         description="Options that are pictures. images: each sent apart. letters: all on one "
         "sheet, lettered.",
