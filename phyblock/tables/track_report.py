@@ -118,16 +118,17 @@ class TrackReport:
     `cells` are those of a run, the last of which stands for all; `in_cells` repeats rows of samples
     for each cell that they are pooled in, which it names in the column `CELL`. `headline` chooses
     the columns of the headline table, the first measure in every cell where it is left out; the
-    column headed `main`, else the last, is the one that models are ranked by. `references` are
-    rows to hold models against, by name, with values [%] by heading, `published` what the paper
-    prints of `main` for models of the run. `short` is the name of the column that stands for the
-    track in a summary. `notes` stand under the
-    headline. `tables`, `figures` and `paper_tables` (by their number in the paper) are its own; a
-    figure is None for a run that has no numbers for it. `bars` is the name of the figure of its
-    first measure. `check_alike` raises SpecError where the first run cannot be compared with the
-    second in these cells. `part_names` say what `Record.part` stands for. `items` opens, for the
-    page and out of a manifest, what was asked about where that is more than scenes; it raises
-    DataError where that is not what the run was made on.
+    column headed `main`, else the last, is the one that models are ranked by. `notes` say how its
+    values are counted. `references` are rows to hold models against, by name, with values [%] by
+    heading, and `reference_note` says what they are; `published` is what the paper prints of `main`
+    for models of the run. `short` is the name of the column that stands for the track in a summary.
+
+    `tables`, `figures` and `paper_tables` (by their number in the paper) are its own; a figure is
+    None for a run that has no numbers for it. `bars` is the name of the figure of its first
+    measure. `check_alike` raises SpecError where the first run cannot be compared with the second
+    in these cells. `part_names` say what `Record.part` stands for. `items` opens, for the page and
+    out of a manifest, what was asked about where that is more than scenes; it raises DataError
+    where that is not what the run was made on.
     """
 
     measures: tuple[Measure, ...]
@@ -139,6 +140,7 @@ class TrackReport:
     published: Callable[[Run], Mapping[str, float]] = lambda _: {}
     references: Callable[[Run], Mapping[str, Mapping[str, float]]] = _no_references
     notes: Callable[[Run], Sequence[str]] = lambda _: ()
+    reference_note: str = ""
     tables: Mapping[str, TableMaker] = field(default_factory=dict)
     bars: str = ""
     figures: Mapping[str, Callable[[Run], Figure | None]] = field(default_factory=dict)

@@ -83,11 +83,12 @@ def _headline(run: Run, track: str) -> Headline:
     seeds = len(run.design.suite.seeds)
     mean = (f"Mean of {seeds} seeds.",) if seeds > 1 else ()
     below = (_BELOW,) if any(cell.below for row in rows for cell in row.cells) else ()
+    about = (report.reference_note,) if report.reference_note else ()
     return Headline(
         kind.title,
         (*headings, *(["Published"] if published else [])),
         tuple(rows),
-        (" ".join((*report.notes(run), *mean, *below)),),
+        (" ".join((*report.notes(run), *about, *mean, *below)),),
         main,
         headings[main],
         {

@@ -75,7 +75,7 @@ def _published(run: Run) -> Mapping[str, float]:
 
 def _notes(run: Run) -> Sequence[str]:
     how = f"F1 in percent, setting {run.design.setting}, matcher {run.design.matcher}."
-    return (how, HUMAN_NOTE)
+    return (how,)
 
 
 def _check_alike(run: Run, first: Run, levels: Sequence[str]) -> None:
@@ -103,6 +103,7 @@ REPORT = TrackReport(
     published=_published,
     references=_references,
     notes=_notes,
+    reference_note=HUMAN_NOTE,
     tables={
         "assembly": TableMaker(assembly_frame),
         "table1": TableMaker(table1_frame, table1_view, in_terminal=table1_in_terminal),

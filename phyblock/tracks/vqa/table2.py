@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
+from phyblock.tables.estimates import strata_of
 from phyblock.tables.headline import interval_frame, interval_view
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
@@ -191,8 +192,9 @@ def paper_table2_frame(run: Run) -> pd.DataFrame:
     if not is_asked(run):
         return NOTHING
     table = interleaved(table2_frame(run), CELLS)
-    asked: Mapping[str, int] = {cell.name: len(cell.of) for cell in subtask_cells(run)}
-    whole: Mapping[str, int] = {cell.name: len(cell.of) for cell in ALL_CELLS}
+    cells = subtask_cells(run)
+    asked = {cell.name: strata_of(cell, cells) for cell in cells}
+    whole = {cell.name: strata_of(cell, ALL_CELLS) for cell in ALL_CELLS}
     # A mean over a part of what the paper averages is not the same number.
     partly = table["cell"].map(asked) != table["cell"].map(whole)
     table.loc[partly, ["ours", "difference"]] = np.nan
