@@ -117,3 +117,24 @@ def test_scoring_again_fills_in_what_older_records_lack(
         assert json.dumps({**line, "counts": again["counts"]}, sort_keys=True) == json.dumps(
             again, sort_keys=True
         )
+
+
+def first_is_placed(_: Any, episode: Any) -> tuple[float, float]:
+    return episode.fields()["outcomes"][:1] == ["placed"], 1
+
+
+def test_episodes_are_counted_when_they_have_ended(
+    here: Workspace, request: pytest.FixtureRequest
+) -> None:
+    counted = Counted("first_steps", ("placed", "n"), sample=first_is_placed)
+    measure = Measure("first_step", "First step", counted, ratio_of, "first steps that placed")
+    registry.add_measure("step_planning", measure)
+    request.addfinalizer(lambda: registry.remove_measure("step_planning", "first_step"))
+    here.write_suite(tracks=["step_planning"], steps={"physics": "off"}, levels=[3])
+    assert not command("run", "suite.yaml", "--out", here.out, "--no-report")
+    assert {record["counts"]["first_steps"][1] for record in here.records()} == {1}
+    with (here.out / "tables" / "estimates.csv").open(newline="") as file:
+        values = {
+            row["model"]: row for row in csv.DictReader(file) if row["measure"] == measure.name
+        }
+    assert float(values["oracle"]["value"]) == 1
