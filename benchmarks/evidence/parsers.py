@@ -15,8 +15,9 @@ from pathlib import Path
 from phyblock.datasets import read_official, recorded_models
 from phyblock.domain import Plan
 from phyblock.models.raw_replies import read_raw_reply
-from phyblock.parsing import PLAN_PARSERS, parse_plan
+from phyblock.parsing import parse_plan
 from phyblock.scoring import Goal, match_plan, micro
+from phyblock.words import PLAN_PARSERS
 
 
 def kind_of_difference(default: tuple[int, ...], official: tuple[int, ...]) -> str:

@@ -11,8 +11,7 @@ from phyblock.cli.names import split_names
 from phyblock.cli.paths import UserPath
 from phyblock.report.compare import compare_models, compare_runs
 from phyblock.report.compare_view import compare_view, flipped_lines, write_comparison
-from phyblock.report.load import load_run
-from phyblock.report.measures import MEASURES
+from phyblock.tables.load import load_run
 
 __all__ = ["command"]
 
@@ -21,10 +20,16 @@ __all__ = ["command"]
 @click.argument("run", type=UserPath())
 @click.argument("other", type=UserPath(), required=False)
 @click.option("--models", metavar="A,B", help="Only these models; of two runs, A of the first.")
-@click.option("--track", type=click.Choice(list(MEASURES)), help="[default: the first they have]")
+@click.option("--track", metavar="NAME", help="[default: the first that they have]")
+@click.option("--measure", metavar="NAME", help="[default: the first of the track]")
 @click.option("--out", type=UserPath(), help="Folder for CSV, Markdown and LaTeX.")
 def command(
-    run: Path, other: Path | None, models: str | None, track: str | None, out: Path | None
+    run: Path,
+    other: Path | None,
+    models: str | None,
+    track: str | None,
+    measure: str | None,
+    out: Path | None,
 ) -> None:
     """Compare the models of the folder RUN with one another, or those of RUN with OTHER's.
 
@@ -34,9 +39,9 @@ def command(
     names = split_names(models)
     first = load_run(run, texts=False)
     found = (
-        compare_models(first, names, track or "")
+        compare_models(first, names, track or "", measure or "")
         if other is None
-        else compare_runs(first, load_run(other, texts=False), names, track or "")
+        else compare_runs(first, load_run(other, texts=False), names, track or "", measure or "")
     )
     console = make_console()
     print_view(console, compare_view(found))

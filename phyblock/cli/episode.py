@@ -14,14 +14,14 @@ from phyblock.domain import Block
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.files import write_named
 from phyblock.records import MANIFEST, RECORDS, read_manifest
-from phyblock.report.table3 import ENDING_NAMES
-from phyblock.report.text_table import Column, TextTable
+from phyblock.records.reading import newest_starts, run_records
 from phyblock.run.data import open_dataset
-from phyblock.run.reading import newest_starts, run_records
 from phyblock.sim import PictureStyle
 from phyblock.sim.film import FilmStep, Tone, episode_gif, episode_images, episode_sheet
 from phyblock.sim.site import settle
-from phyblock.tasks.episode_record import EpisodeRecord, EpisodeTurn
+from phyblock.tables.text_table import Column, TextTable
+from phyblock.tracks.step_planning.record import EpisodeRecord, EpisodeTurn
+from phyblock.tracks.step_planning.table3 import ENDING_NAMES
 
 __all__ = ["command"]
 

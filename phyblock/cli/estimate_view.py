@@ -10,6 +10,7 @@ from phyblock.cli.console import print_view
 from phyblock.report import NO_VALUE, Column, TextTable
 from phyblock.run.estimate import Estimate
 from phyblock.run.plan import RunPlan
+from phyblock.tracks import kind_of
 
 __all__ = ["show_estimate"]
 
@@ -18,12 +19,11 @@ _HEADINGS = (
     *("tokens in", "tokens out", "cost", "at most"),
 )
 _TEXTS = ("model", "kind")
-_ITEMS = {"full_planning": "scene", "step_planning": "episode", "vqa": "question"}
 
 
 def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> None:
     """Print what each model would take, and the sum."""
-    items = [_counted(len(track.items), _ITEMS[track.name]) for track in plan.tracks]
+    items = [_counted(len(track.items), kind_of(track.name).item) for track in plan.tracks]
     caption = (
         f"{plan.suite.name}: {', '.join(items)} of {plan.dataset.name}, "
         f"{_counted(len(plan.suite.seeds), 'seed')}, {_counted(len(plan.models), 'model')}"

@@ -9,7 +9,7 @@ import click
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
 from phyblock.report.export.write import FORMATS, export_run
-from phyblock.report.load import load_run
+from phyblock.tables.load import load_run
 
 __all__ = ["command"]
 

@@ -14,9 +14,9 @@ from phyblock.domain import SUBTASKS
 from phyblock.report.export.questions import QUESTION_FORMATS, export_questions
 from phyblock.resources import bundled, cache_dir
 from phyblock.run.data import open_dataset
-from phyblock.run.vqa import open_questions, select_questions
 from phyblock.sim import PictureStyle
-from phyblock.tasks import QuestionPictures
+from phyblock.tracks.vqa.opening import open_questions, select_questions
+from phyblock.tracks.vqa.pictures import QuestionPictures
 
 __all__ = ["command"]
 

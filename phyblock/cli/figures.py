@@ -8,23 +8,27 @@ import click
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
-from phyblock.report.figures import FIGURES, write_figures
-from phyblock.report.load import load_run
+from phyblock.errors import Problem, SpecError
+from phyblock.report.figures import figure_names, write_figures
+from phyblock.tables.load import load_run
 
 __all__ = ["command"]
 
 
 @click.command("figures")
 @click.argument("run", type=UserPath())
-@click.option(
-    "--only", "names", multiple=True, type=click.Choice(FIGURES), help="Only this figure; repeat."
-)
+@click.option("--only", "names", multiple=True, metavar="NAME", help="Only this figure; repeat.")
 def command(run: Path, names: tuple[str, ...]) -> None:
     """Draw the figures of the folder RUN into RUN/figures, as SVG and PNG.
 
     Figures that the run has no numbers for are left out.
     """
-    files = write_figures(load_run(run, texts=False), names or FIGURES)
+    loaded = load_run(run, texts=False)
+    known = figure_names(loaded)
+    if unknown := [name for name in names if name not in known]:
+        found, allowed = ", ".join(unknown), ", ".join(known)
+        raise SpecError(Problem(str(run), "has no such figure", "--only", found, allowed))
+    files = write_figures(loaded, names)
     console = make_console()
     for file in files:
         console.print(shown_path(file), markup=False, soft_wrap=True)

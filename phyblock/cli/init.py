@@ -11,17 +11,16 @@ from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
 from phyblock.files import check_free, writing
 from phyblock.resources import bundled
+from phyblock.tracks import kinds
 
 __all__ = ["command"]
 
 _SUITE = "quick.yaml"
-_OWN_PROMPT = "prompt: ../prompts/full_planning.j2   # change it as you like\n"
 _FILES = (
     ("models.yaml",),
     ("benchmarks", _SUITE),
     ("benchmarks", "schemas", "suite.schema.json"),
     ("benchmarks", "schemas", "models.schema.json"),
-    ("prompts", "full_planning.j2"),
 )
 
 
@@ -32,13 +31,16 @@ def command(folder: Path) -> None:
 
     Files that are already there are never written over.
     """
-    files = [folder.joinpath(*parts) for parts in _FILES]
+    (template, *_) = (kind.template for kind in kinds().values() if kind.template is not None)
+    names = (*_FILES, ("prompts", template.name))
+    files = [folder.joinpath(*parts) for parts in names]
     check_free(files, "choose another folder")
     console = make_console()
+    own_prompt = f"prompt: ../prompts/{template.name}   # change it as you like\n"
     with writing(folder):
-        for target, parts in zip(files, _FILES, strict=True):
+        for target, parts in zip(files, names, strict=True):
             target.parent.mkdir(parents=True, exist_ok=True)
-            more = _OWN_PROMPT if target.name == _SUITE else ""
+            more = own_prompt if target.name == _SUITE else ""
             with target.open("xb") as file:
                 file.write(bundled(*parts).read_bytes() + more.encode())
             console.print(f"  {shown_path(target)}")

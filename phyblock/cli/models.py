@@ -11,10 +11,11 @@ from phyblock.cli.files import find_models_file
 from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.errors import ModelError, Problem, SpecError
 from phyblock.models import ModelConfig, api_key_status, price_of
+from phyblock.registry import baseline_names
 from phyblock.report import NO_VALUE
 from phyblock.run.check import check_model
 from phyblock.run.models import to_config
-from phyblock.specs import BASELINES, ModelSpec, SuiteSpec, did_you_mean, load_models
+from phyblock.specs import ModelSpec, SuiteSpec, did_you_mean, load_models
 
 __all__ = ["command"]
 
@@ -37,7 +38,7 @@ def command(ctx: click.Context, models_file: str | None) -> None:
     if ctx.invoked_subcommand is not None:
         return
     console = make_console()
-    names = [*BASELINES, *ctx.obj]
+    names = [*baseline_names(), *ctx.obj]
     rows = [_row(name, _config(name, ctx.obj)) for name in names]
     if console.width < _WIDE:
         rows = [(name, model_id, key) for name, _, model_id, key, *_ in rows]
@@ -55,7 +56,7 @@ def command(ctx: click.Context, models_file: str | None) -> None:
 @click.pass_obj
 def check(known: dict[str, ModelSpec], name: str) -> int:
     """Make one tiny call to the model NAME and say what came back."""
-    names = [*BASELINES, *known]
+    names = [*baseline_names(), *known]
     if name not in names:
         hint = did_you_mean(name, names) or "list them: phyblock models"
         raise SpecError(Problem("models check", "is not in the models file", "", name, hint=hint))

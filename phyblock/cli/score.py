@@ -9,9 +9,8 @@ import click
 
 from phyblock.cli.paths import UserPath
 from phyblock.cli.report import show_tables
-from phyblock.parsing import PLAN_PARSERS, PlanParser
 from phyblock.run.rescore import rescore
-from phyblock.scoring import MATCHERS, Matcher
+from phyblock.words import MATCHERS, PLAN_PARSERS, Matcher, PlanParser
 
 __all__ = ["command"]
 

@@ -10,9 +10,9 @@ from phyblock.cli.console import make_console, print_view
 from phyblock.cli.paths import UserPath
 from phyblock.errors import Problem, SpecError
 from phyblock.report import TextTable, to_latex, to_markdown
-from phyblock.report.load import load_run
-from phyblock.report.paper import PAPER_TABLES
 from phyblock.report.write import make_tables, table_names
+from phyblock.tables.load import load_run
+from phyblock.tracks.kind import kinds
 
 __all__ = ["command"]
 
@@ -37,7 +37,8 @@ def command(run: Path, paper: bool, names: tuple[str, ...], form: str) -> None:
     loaded = load_run(run, texts=False)
     if paper:
         views = {}
-        for number, table in PAPER_TABLES.items():
+        known = [kind.report().paper_tables for kind in kinds().values()]
+        for number, table in sorted((n, t) for tables in known for n, t in tables.items()):
             frame = table.frame(loaded)
             if len(frame):
                 views[f"paper{number}"] = table.view(frame, loaded)

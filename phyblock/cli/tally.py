@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from phyblock.report import NO_VALUE
-from phyblock.report.outcomes import FAILURES
 from phyblock.run.standing import Summary
 from phyblock.scoring import Counts
+from phyblock.tables.outcomes import FAILURES
 
 __all__ = ["Tally", "failure_text"]
 

@@ -16,12 +16,12 @@ from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
 from phyblock.resources import bundled
 from phyblock.run.plan import make_plan
-from phyblock.specs import SuiteSpec, load_models, load_suite
+from phyblock.specs import load_models, load_suite, suite_model
 
 __all__ = ["command"]
 
 # A models file has model names at its top level, a suite has these.
-_SUITE_KEY = re.compile(rf"^(?:{'|'.join(SuiteSpec.model_fields)})[ \t]*:", re.MULTILINE)
+_SUITE_KEY = re.compile(rf"^(?:{'|'.join(suite_model().model_fields)})[ \t]*:", re.MULTILINE)
 
 
 @click.command("validate")

@@ -22,17 +22,16 @@ from phyblock.datasets import AssemblyTask
 from phyblock.domain import MAX_CANDIDATES, Block
 from phyblock.env.scenes import read_tasks
 from phyblock.errors import DataError, Problem
-from phyblock.scoring import GATINGS, SETTINGS, Assembly, Gating, Setting
+from phyblock.scoring import Assembly
 from phyblock.sim import PictureStyle, candidates_png
 from phyblock.sim.site import ONE_SETTING, Lookout, Settled, Site
 from phyblock.sim.stability import DEFAULT_TRIAL
-from phyblock.sim.textures import Background
+from phyblock.words import GATINGS, SETTINGS, Background, Gating, Physics, Setting
 
-__all__ = ["DONE", "EnvPhysics", "Observation", "PhyBlockEnv"]
+__all__ = ["DONE", "Observation", "PhyBlockEnv"]
 
 DONE = 0
 """The action that ends the assembly; any other is the number of a candidate."""
-EnvPhysics = Literal["off", "settle", "strict"]
 Observation = dict[str, NDArray[Any]]
 Observe = Literal["pictures", "state"]
 _PICTURES = ("current", "goal", "candidates")
@@ -61,7 +60,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
         *,
         setting: Setting = "A",
         gating: Gating = "aov",
-        physics: EnvPhysics = "settle",
+        physics: Physics = "settle",
         observe: Observe = "pictures",
         size_px: int = 512,
         background: Background = "checkerboard",
@@ -241,7 +240,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
 _OPTIONS: Mapping[str, tuple[str, ...]] = {
     "setting": SETTINGS,
     "gating": GATINGS,
-    "physics": get_args(EnvPhysics),
+    "physics": get_args(Physics),
     "observe": get_args(Observe),
 }
 

@@ -4,19 +4,13 @@ Importing this package imports neither litellm nor aiohttp: the first call throu
 """
 
 from phyblock.models.base import (
-    ChoiceSubject,
-    Finish,
     Image,
     Message,
     Model,
-    PlanSubject,
     Reply,
     Request,
-    StepSubject,
-    Subject,
     Usage,
 )
-from phyblock.models.baselines import BASELINES
 from phyblock.models.breaker import Breakers
 from phyblock.models.build import build_model
 from phyblock.models.cache import CacheStats, ReplyCache, reply_key
@@ -38,13 +32,10 @@ from phyblock.models.retry import RetryPolicy
 from phyblock.models.shared_cache import SharedCache
 
 __all__ = [
-    "BASELINES",
     "Breakers",
     "Budget",
     "CacheStats",
-    "ChoiceSubject",
     "Estimate",
-    "Finish",
     "Gate",
     "Halt",
     "HaltedError",
@@ -56,7 +47,6 @@ __all__ = [
     "ModelConfig",
     "ModelEvent",
     "Observer",
-    "PlanSubject",
     "Price",
     "RawReply",
     "Reply",
@@ -64,8 +54,6 @@ __all__ = [
     "Request",
     "RetryPolicy",
     "SharedCache",
-    "StepSubject",
-    "Subject",
     "Tell",
     "Usage",
     "api_key_status",

@@ -6,26 +6,18 @@ import functools
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Protocol
 
-from phyblock.domain import CandidateSet, Question, Scene
+from phyblock.words import Finish, Role
 
 __all__ = [
-    "ChoiceSubject",
-    "Finish",
     "Image",
     "Message",
     "Model",
-    "PlanSubject",
     "Reply",
     "Request",
-    "StepSubject",
-    "Subject",
     "Usage",
 ]
-
-Finish = Literal["stop", "length", "refusal", "unknown"]
-"""Why a reply ended: by itself, at the token limit, by a content filter, or not said."""
 
 
 @dataclass(frozen=True)
@@ -47,47 +39,8 @@ class Image:
 class Message:
     """One chat message: text and pictures in the order in which they are sent."""
 
-    role: Literal["system", "user", "assistant"]
+    role: Role
     parts: tuple[str | Image, ...]
-
-
-@dataclass(frozen=True)
-class PlanSubject:
-    """A whole plan is asked for."""
-
-    scene: Scene
-    candidates: CandidateSet
-
-
-@dataclass(frozen=True)
-class StepSubject:
-    """The next step is asked for.
-
-    `valid` are the candidates that would be placed now, in ascending order; empty when the goal
-    is complete. `exact` are those of them that are also turned as the goal is. `last_failed` is
-    the candidate whose move failed last, if the last move did.
-    """
-
-    scene: Scene
-    candidates: CandidateSet
-    valid: tuple[int, ...]
-    exact: tuple[int, ...]
-    last_failed: int | None = None
-
-
-@dataclass(frozen=True)
-class ChoiceSubject:
-    """One of several options is asked for, of a question as it is shown.
-
-    `guesses` holds what rules over the whole question set answer, by the rule's name: the 0-based
-    indices of `question.answer`'s form.
-    """
-
-    question: Question
-    guesses: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
-
-
-Subject = PlanSubject | StepSubject | ChoiceSubject
 
 
 @dataclass(frozen=True)
@@ -97,7 +50,8 @@ class Request:
     `key` names the question inside its track (a scene id for full planning) and is what a
     recording is looked up by; `seed` is the sample's seed, which also tells repeats apart;
     `params` are sampling parameters by their OpenAI names; `prompt_version` hashes the template.
-    `subject` is what the question is about: only baselines look at it.
+    `subject` is what the question is about, of the type that its track says: only the rules of
+    baselines look at it.
     """
 
     key: str
@@ -105,7 +59,7 @@ class Request:
     messages: tuple[Message, ...]
     params: Mapping[str, object]
     prompt_version: str
-    subject: Subject
+    subject: object
 
 
 @dataclass(frozen=True)

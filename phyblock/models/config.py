@@ -10,6 +10,7 @@ from typing import Literal
 
 from phyblock.addresses import address_fault
 from phyblock.errors import Problem, SpecError
+from phyblock.words import SeedMode, TransportName
 
 __all__ = [
     "DIRECT_PROVIDERS",
@@ -17,13 +18,9 @@ __all__ = [
     "Kind",
     "ModelConfig",
     "Price",
-    "SeedMode",
-    "Transport",
 ]
 
 Kind = Literal["litellm", "replay", "baseline"]
-Transport = Literal["auto", "litellm", "direct"]
-SeedMode = Literal["auto", "always", "never"]
 
 DIRECT_PROVIDERS = ("openai", "hosted_vllm", "lm_studio")
 """Provider prefixes that mean the plain OpenAI protocol: litellm has nothing to translate."""
@@ -63,7 +60,7 @@ class ModelConfig:
     id: str = ""
     api_base: str | None = None
     api_key_env: str | None = None
-    transport: Transport = "auto"
+    transport: TransportName = "auto"
     params: Mapping[str, object] = field(default_factory=dict)
     max_concurrency: int = 32
     rpm: int | None = None

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from phyblock.errors import DataError, Problem
-from phyblock.models.base import Finish, Usage
+from phyblock.models.base import Usage
+from phyblock.words import Finish
 
 __all__ = [
     "RawReply",

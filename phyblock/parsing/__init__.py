@@ -8,7 +8,7 @@ from phyblock.parsing.move import (
     ParsedMove,
     parse_move,
 )
-from phyblock.parsing.plan import PLAN_PARSERS, ParsedPlan, PlanParser, parse_plan
+from phyblock.parsing.plan import ParsedPlan, parse_plan
 
 __all__ = [
     "MOVE_PROBLEMS",

@@ -11,15 +11,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 from phyblock.domain import Plan
 from phyblock.parsing.reasoning import after_reasoning
+from phyblock.words import PlanParser
 
-__all__ = ["PLAN_PARSERS", "ParsedPlan", "PlanParser", "parse_plan"]
-
-PlanParser = Literal["steps", "official"]
-PLAN_PARSERS: tuple[PlanParser, ...] = get_args(PlanParser)
+__all__ = ["ParsedPlan", "parse_plan"]
 
 
 @dataclass(frozen=True)

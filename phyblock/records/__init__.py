@@ -9,7 +9,7 @@ from phyblock.records.lines import PROMPTS, RECORDS, TURNS, Lines, PromptLines, 
 from phyblock.records.manifest import FORMAT, MANIFEST, Manifest, read_manifest
 from phyblock.records.others import PictureMark, Prompt, PromptMessage, Turn
 from phyblock.records.record import (
-    Outcome,
+    AskedTurn,
     Record,
     Recorded,
     Score,
@@ -27,11 +27,11 @@ __all__ = [
     "PROMPTS",
     "RECORDS",
     "TURNS",
+    "AskedTurn",
     "Belonging",
     "Line",
     "Lines",
     "Manifest",
-    "Outcome",
     "PictureMark",
     "Prompt",
     "PromptLines",

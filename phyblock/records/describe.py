@@ -90,8 +90,9 @@ def _with_parts(kinds: Sequence[type[Line]]) -> list[type[Line]]:
         kind = waiting.pop(0)
         if kind not in found:
             found.append(kind)
-            for hint in typing.get_type_hints(kind).values():
-                waiting += _parts(hint)
+            hints = typing.get_type_hints(kind)
+            for name in kind.model_fields:
+                waiting += _parts(hints[name])
     return found
 
 
@@ -104,6 +105,7 @@ def _docs(kind: type[Line]) -> dict[str, str]:
         if (
             isinstance(field, ast.AnnAssign)
             and isinstance(field.target, ast.Name)
+            and field.target.id in kind.model_fields
             and isinstance(below, ast.Expr)
             and isinstance(below.value, ast.Constant)
         ):

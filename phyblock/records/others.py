@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from phyblock.records.line import Line, Whole
 from phyblock.records.record import StoredReply
+from phyblock.words import Role
 
 __all__ = ["PictureMark", "Prompt", "PromptMessage", "Turn"]
 
@@ -33,7 +32,7 @@ class PictureMark(Line):
 class PromptMessage(Line):
     """One chat message."""
 
-    role: Literal["system", "user", "assistant"]
+    role: Role
     """Who speaks."""
     parts: tuple[str | PictureMark, ...]
     """Texts and pictures in the order sent."""

@@ -7,16 +7,17 @@ its own, with its name as the literal type of `track`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar
 
+from pydantic import Field
 from typing_extensions import Self
 
 from phyblock.records.line import LARGEST_WHOLE, Amount, Line, Usd, Whole, encodable
+from phyblock.words import Finish, Outcome
 
 __all__ = [
+    "AskedTurn",
     "ErrorKind",
-    "Finish",
-    "Outcome",
     "Record",
     "Recorded",
     "Score",
@@ -27,8 +28,6 @@ __all__ = [
     "StoredUsage",
 ]
 
-Outcome = Literal["ok", "parse_failure", "refusal", "truncated", "api_error", "missing"]
-Finish = Literal["stop", "length", "refusal", "unknown"]
 ErrorKind = Literal["retryable", "sample", "refused", "unavailable"]
 
 _NumberT = TypeVar("_NumberT", int, float)
@@ -164,6 +163,17 @@ class Score(Line):
     """The error type of each wrong step, null for right ones."""
 
 
+class AskedTurn(Line):
+    """One request of an episode, with its reply."""
+
+    n: Whole
+    """Its place in the episode, from 1."""
+    reply: StoredReply
+    """The reply."""
+    prompt: SentPrompt | None = None
+    """What was sent."""
+
+
 class Record(Line):
     """A sample's stored outcome."""
 
@@ -201,6 +211,48 @@ class Record(Line):
     """When it was written, UTC."""
     run: str = ""
     """Digest of the run that it belongs to; older records have none."""
+    counts: dict[str, tuple[Amount, ...]] = Field(default_factory=dict)
+    """By name, what was counted for measures beside `scores`."""
+
+    columns: ClassVar[Mapping[str, str]] = {}
+    """Columns that the track adds to the frame of records, with their types in pandas."""
+
+    exported: ClassVar[Mapping[str, str]] = {}
+    """Columns that the track adds to exports, with their types in pandas."""
+
+    def row(self) -> Mapping[str, Any]:
+        """The values of `columns`."""
+        return {}
+
+    def export_row(self) -> Mapping[str, Any]:
+        """The values of `exported`."""
+        return {}
+
+    @property
+    def part(self) -> str | None:
+        """The part of its track that the item belongs to, as a subtask; None: there are none."""
+        return None
+
+    @property
+    def is_correct(self) -> bool | None:
+        """Whether it is right, where it can only be right or wrong; else None."""
+        return None
+
+    @property
+    def target(self) -> str:
+        """The one right answer; "" where there is none."""
+        return ""
+
+    @property
+    def said(self) -> str | None:
+        """What was read in the reply, in short."""
+        plan = getattr(self.parse, "plan", None)
+        return None if plan is None else " ".join(map(str, plan))
+
+    @property
+    def asked_turns(self) -> tuple[AskedTurn, ...]:
+        """The requests of an episode; none for what is asked once."""
+        return ()
 
     @property
     def item(self) -> str:

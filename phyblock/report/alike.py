@@ -7,50 +7,22 @@ from collections.abc import Sequence
 import pandas as pd
 
 from phyblock.errors import Problem, SpecError
-from phyblock.report.load import Run
-from phyblock.report.questions import showing
+from phyblock.tables.load import Run
+from phyblock.tracks.kind import kind_of
 
 __all__ = ["check_alike"]
 
 
-def check_alike(run: Run, first: Run, parts: Sequence[str], track: str) -> None:
-    """Raise SpecError where `run` cannot be compared with `first` in these parts of a track.
+def check_alike(run: Run, first: Run, cells: Sequence[str], track: str) -> None:
+    """Raise SpecError where `run` cannot be compared with `first` in these cells of a track.
 
-    It must have been scored in its headline setting (and for plans by its matcher and criteria),
-    or have been asked the same questions and count them alike; scenes of a name must be the same.
+    The track says what must agree in how the two were asked and scored; scenes of a name must be
+    the same.
     """
-    if track == "vqa":
-        _check_questions(run, first)
-    else:
-        _check_scores(run, first, parts, track)
+    check = kind_of(track).report().check_alike
+    if check is not None:
+        check(run, first, cells)
     _check_scenes(run, first)
-
-
-def _check_scores(run: Run, first: Run, parts: Sequence[str], track: str) -> None:
-    suite, wanted = run.design.suite, first.design
-    needed: list[tuple[str, Sequence[str], str]] = [("settings", suite.settings, wanted.setting)]
-    if track == "full_planning":
-        needed.append(("scoring.matchers", suite.scoring.matchers, wanted.matcher))
-        known = ("aov", suite.scoring.level1)
-        needed += [("scoring.level1", known, wanted.criterion(level)) for level in parts]
-    for what, names, name in needed:
-        if name not in names:
-            hint = "phyblock score reads stored replies again under other rules"
-            message = f"was not scored as {first.path} was, by {name}"
-            raise SpecError(Problem(str(run.path), message, what, ", ".join(names), hint=hint))
-
-
-def _check_questions(run: Run, first: Run) -> None:
-    circular = [showing(one).circular for one in (run, first)]
-    if circular[0] != circular[1]:
-        found, allowed = (str(one).lower() for one in circular)
-        message = f"counts right answers in another way than {first.path}"
-        raise SpecError(Problem(str(run.path), message, "vqa.circular", found, allowed))
-    # Digests of the sets that questions were chosen from.
-    sets = [one.manifest.get("tracks", {}).get("vqa", {}).get("questions") for one in (run, first)]
-    if sets[0] != sets[1]:
-        message = f"asked questions of another set than {first.path}"
-        raise SpecError(Problem(str(run.path), message, "questions", str(sets[0]), str(sets[1])))
 
 
 def _check_scenes(run: Run, first: Run) -> None:

@@ -12,10 +12,10 @@ import pandas as pd
 
 from phyblock.errors import Problem, SpecError
 from phyblock.report.alike import check_alike
-from phyblock.report.intervals import parents_of, resampler
-from phyblock.report.load import Run
-from phyblock.report.measures import MEASURES, Measure
+from phyblock.report.comparable import Comparable, Part, comparable, comparable_tracks
 from phyblock.scoring.uncertainty import CONFIDENCE, Clusters, Floats, bootstrap, holm
+from phyblock.tables.intervals import parents_of, resampler
+from phyblock.tables.load import Run
 
 __all__ = ["COMPARE_RESAMPLES", "Comparison", "Side", "compare", "compare_models", "compare_runs"]
 
@@ -41,40 +41,45 @@ class Comparison:
     """What `compare` found.
 
     `table` has one row a pair and part of the track (levels, categories of questions): a, b, part,
-    value_a, value_b, difference (a minus b), se, lo, hi [all in percent], p, p_holm (corrected for
-    all rows), verdict, better, worse and same (samples on which a has the higher, lower, same
+    value_a, value_b, difference (a minus b), se, lo, hi [all in `unit`], p, p_holm (corrected for
+    all rows), verdict, better, worse and same (samples on which a has the better, worse, same
     value), n_samples, n_scenes, n_clusters. `flipped` has one row a pair and sample that one side
     alone got wholly right: a, b, scene, item (scene or question), seed, right (that side's label),
-    value_a, value_b [percent]. `name` is what the values are called, `how` says what they are.
+    value_a, value_b. `name` is what the values are called, `unit` theirs, `how` says what they are.
     """
 
     table: pd.DataFrame
     flipped: pd.DataFrame
     name: str
+    unit: str
     how: str
 
 
-def compare_models(run: Run, models: Sequence[str] = (), track: str = "") -> Comparison:
+def compare_models(
+    run: Run, models: Sequence[str] = (), track: str = "", measure: str = ""
+) -> Comparison:
     """Every pair of models of a run as a whole; in every part where there are but two.
 
-    `models` limits it to those named; `track` is the first of `MEASURES` that the run has, if it is
-    not named. Raises SpecError for a name that the run has not, or when fewer than two are left.
+    `models` limits it to those named; `track` is the first that the run has and `measure` the first
+    of the track, if they are not named. Raises SpecError for a name that the run has not, or when
+    fewer than two are left.
     """
     sides = [Side(name, name, run) for name in _checked(run, models)]
     if len(sides) < 2:
         allowed = f"two of: {', '.join(run.design.model_names)}"
         raise SpecError(Problem(str(run.path), "needs two models to compare", allowed=allowed))
-    track = _shared_track([run], track)
-    parts = MEASURES[track].parts(run.design)
-    return compare(list(combinations(sides, 2)), parts if len(sides) == 2 else parts[-1:], track)
+    what = comparable(run, _shared_track([run], track), measure)
+    parts = what.parts if len(sides) == 2 else what.parts[-1:]
+    return compare(list(combinations(sides, 2)), parts, what)
 
 
 def compare_runs(
-    first: Run, second: Run, models: Sequence[str] = (), track: str = ""
+    first: Run, second: Run, models: Sequence[str] = (), track: str = "", measure: str = ""
 ) -> Comparison:
     """Each model that both runs have; or, with two `models`, one of the first and one of the other.
 
-    In every part where that is one pair, else as a whole; `track` as for `compare_models`. Raises
+    In every part where that is one pair, else as a whole; `track` and `measure` as for
+    `compare_models`. Raises
     SpecError for names that are not there.
     """
     if len(models) == 2:
@@ -93,15 +98,18 @@ def compare_runs(
     pairs = [
         (Side(f"{a} ({tags[0]})", a, first), Side(f"{b} ({tags[1]})", b, second)) for a, b in names
     ]
-    track = _shared_track([first, second], track)
-    known = MEASURES[track].parts(second.design)
-    parts = [name for name in MEASURES[track].parts(first.design) if name in known]
-    return compare(pairs, parts if len(pairs) == 1 else parts[-1:], track)
+    what, other = (
+        comparable(run, _shared_track([first, second], track), measure) for run in (first, second)
+    )
+    parts = [part for part in what.parts if part in other.parts]
+    return compare(pairs, parts if len(pairs) == 1 else parts[-1:], what)
 
 
 def _shared_track(runs: Sequence[Run], wanted: str) -> str:
     """The track that is compared: `wanted`, else the first one that all runs have."""
-    shared = [name for name in MEASURES if all(name in run.design.suite.tracks for run in runs)]
+    shared = [
+        name for name in comparable_tracks() if all(name in run.design.suite.tracks for run in runs)
+    ]
     if not shared or (wanted and wanted not in shared):
         where, allowed = ", ".join(str(run.path) for run in runs), ", ".join(shared) or "none"
         raise SpecError(Problem(where, "has no such track to compare", "track", wanted, allowed))
@@ -126,39 +134,41 @@ def _checked(run: Run, models: Sequence[str]) -> Sequence[str]:
     return models or known
 
 
-def compare(pairs: Sequence[tuple[Side, Side]], parts: Sequence[str], track: str) -> Comparison:
+def compare(
+    pairs: Sequence[tuple[Side, Side]], parts: Sequence[Part], what: Comparable
+) -> Comparison:
     """Compare the sides of each pair in each part of a track on the samples that both have.
 
     Setting, matcher, criteria and what becomes of missing replies are those of the first run.
     Raises SpecError when a run was not scored so, asked other questions, or has other blocks in a
     scene of the same name.
     """
-    measure = MEASURES[track]
     design = pairs[0][0].run.design
     sides = {side.label: side for pair in pairs for side in pair}
     runs = list({id(side.run): side.run for side in sides.values()}.values())
     for run in runs[1:]:
-        check_alike(run, runs[0], parts, track)
+        check_alike(run, runs[0], [part.cell for part in parts], what.track)
     parents = pd.concat([parents_of(run) for run in runs]).groupby(level=0).first()
     labels = [(a.label, b.label) for a, b in pairs]
     tables: list[pd.DataFrame] = []
     flips: list[pd.DataFrame] = []
     for part in parts:
-        of_run = {id(run): measure.samples(run, part, design) for run in runs}
+        of_run = {id(run): what.samples(run, part, design) for run in runs}
         samples = {name: of_run[id(side.run)].get(side.model) for name, side in sides.items()}
-        counted = [_paired(samples[a], samples[b], measure) for a, b in labels]
-        tables.append(_differences(labels, counted, parents, part, measure))
+        counted = [_paired(samples[a], samples[b], what, part) for a, b in labels]
+        tables.append(_differences(labels, counted, parents, part, what))
         if part == parts[-1]:
             flips = [
-                _flipped(*pair, one, measure) for pair, one in zip(labels, counted, strict=True)
+                _flipped(*pair, one, what, part) for pair, one in zip(labels, counted, strict=True)
             ]
     table = pd.concat(tables, ignore_index=True)
     table.insert(list(table).index("p") + 1, "p_holm", holm(table["p"]))
-    verdicts = [_verdict(row) for row in table.to_dict("records")]
+    verdicts = [_verdict(row, what) for row in table.to_dict("records")]
     table.insert(list(table).index("p_holm") + 1, "verdict", verdicts)
     flipped = pd.concat([pd.DataFrame(columns=_FLIPPED), *(f for f in flips if len(f))])
-    how = measure.how(design)
-    return Comparison(table, flipped.reset_index(drop=True), measure.name, how)
+    return Comparison(
+        table, flipped.reset_index(drop=True), what.measure.heading, what.measure.unit, what.how
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,30 +179,32 @@ class _Paired:
     counts: Floats
 
 
-def _paired(a: pd.DataFrame | None, b: pd.DataFrame | None, measure: Measure) -> _Paired | None:
+def _paired(
+    a: pd.DataFrame | None, b: pd.DataFrame | None, what: Comparable, part: Part
+) -> _Paired | None:
     """None where a side has no sample."""
     if a is None or b is None:
         return None
     both = pd.concat([a, b], axis=1, join="inner", keys=["a", "b"])
-    return _Paired(both.index.to_frame(index=False), measure.counts(both)) if len(both) else None
+    return _Paired(both.index.to_frame(index=False), what.counts(both, part)) if len(both) else None
 
 
 def _differences(
     labels: Sequence[tuple[str, str]],
     paired: Sequence[_Paired | None],
     parents: pd.Series[Any],
-    part: str,
-    measure: Measure,
+    part: Part,
+    what: Comparable,
 ) -> pd.DataFrame:
     """Rows of `Comparison.table` but for corrected p values and verdicts."""
     scenes = sorted({scene for one in paired if one for scene in one.keys["scene"]})
     place = {scene: n for n, scene in enumerate(scenes)}
     clusters = Clusters.of([tuple(parents[scene]) or (scene,) for scene in scenes])
     batches = [
-        _resampled(paired[start : start + _AT_ONCE], place, clusters, measure)
+        _resampled(paired[start : start + _AT_ONCE], place, clusters, what, part)
         for start in range(0, len(paired), _AT_ONCE)
     ]
-    keys = pd.DataFrame(list(labels), columns=["a", "b"]).assign(part=part)
+    keys = pd.DataFrame(list(labels), columns=["a", "b"]).assign(part=part.name)
     return pd.concat([keys, pd.concat(batches, ignore_index=True)], axis=1)
 
 
@@ -200,9 +212,10 @@ def _resampled(
     paired: Sequence[_Paired | None],
     place: Mapping[str, int],
     clusters: Clusters,
-    measure: Measure,
+    what: Comparable,
+    part: Part,
 ) -> pd.DataFrame:
-    counts = np.zeros((len(place), len(paired), 2, measure.n_counts))
+    counts = np.zeros((len(place), len(paired), 2, what.n_counts(part)))
     seen = np.zeros((len(place), len(paired)), dtype=bool)
     for n, one in enumerate(paired):
         if one:
@@ -210,7 +223,7 @@ def _resampled(
             np.add.at(counts[:, n], rows, one.counts)
             seen[rows, n] = True
     totals = counts.sum(axis=0)
-    whole = measure.whole(totals)
+    whole = what.whole(part, totals)
     sizes = clusters.behind(seen)
     found = bootstrap(
         counts,
@@ -223,8 +236,8 @@ def _resampled(
     values = whole(totals)
     numbers = {"value_a": values[:, 0], "value_b": values[:, 1], "difference": found.value}
     numbers |= {"se": found.se, "lo": found.lo, "hi": found.hi}
-    table = pd.DataFrame({name: 100 * value for name, value in numbers.items()})
-    tallies = pd.DataFrame([_tally(one, measure) for one in paired])
+    table = pd.DataFrame({name: what.measure.scale * value for name, value in numbers.items()})
+    tallies = pd.DataFrame([_tally(one, what, part) for one in paired])
     more = {"n_scenes": seen.sum(axis=0), "n_clusters": sizes}
     return pd.concat([table.assign(p=found.p), tallies], axis=1).assign(**more)
 
@@ -233,30 +246,32 @@ def _difference(values: Floats) -> Floats:
     return np.asarray(values[..., 0] - values[..., 1])
 
 
-def _tally(one: _Paired | None, measure: Measure) -> dict[str, int]:
+def _tally(one: _Paired | None, what: Comparable, part: Part) -> dict[str, int]:
     """On how many samples the first side is better, worse, the same, and how many there are."""
     # A plan without a step for a goal without a block would have no F1; there is none.
-    sign = np.sign(np.nan_to_num(_difference(measure.each(one.counts)))) if one else np.zeros(0)
+    sign = np.sign(np.nan_to_num(_difference(what.each(part)(one.counts)))) if one else np.zeros(0)
+    sign = sign if what.measure.better == "higher" else -sign
     counts = {"better": int((sign == 1).sum()), "worse": int((sign == -1).sum())}
     return {**counts, "same": int((sign == 0).sum()), "n_samples": len(sign)}
 
 
-def _flipped(a: str, b: str, one: _Paired | None, measure: Measure) -> pd.DataFrame:
+def _flipped(a: str, b: str, one: _Paired | None, what: Comparable, part: Part) -> pd.DataFrame:
     if one is None:
         return pd.DataFrame(columns=_FLIPPED)
-    values = 100 * np.nan_to_num(measure.each(one.counts))
+    values = what.measure.scale * np.nan_to_num(what.each(part)(one.counts))
     table = one.keys.assign(a=a, b=b, value_a=values[:, 0], value_b=values[:, 1])
-    right = values == 100
+    right = values == what.measure.best
     table["right"] = np.where(right[:, 0], a, b)
     rows = table.loc[right[:, 0] != right[:, 1], _FLIPPED]
     return rows.sort_values(["right", "scene", "item", "seed"])
 
 
-def _verdict(row: Mapping[Any, Any]) -> str:
+def _verdict(row: Mapping[Any, Any], what: Comparable) -> str:
     if np.isnan(row["difference"]):
         return "nothing to compare"
     if np.isnan(row["p_holm"]):
         return "cannot tell: a single base scene"
     if row["p_holm"] >= 1 - CONFIDENCE:
         return "cannot tell"
-    return f"{row['a'] if row['difference'] > 0 else row['b']} is better"
+    a_is_better = (row["difference"] > 0) == (what.measure.better == "higher")
+    return f"{row['a' if a_is_better else 'b']} is better"

@@ -8,10 +8,10 @@ import pandas as pd
 
 from phyblock.folders import OutFolder
 from phyblock.report.compare import COMPARE_RESAMPLES, Comparison
-from phyblock.report.csv_text import to_csv
-from phyblock.report.latex import to_latex
-from phyblock.report.markdown import to_markdown
-from phyblock.report.text_table import NO_VALUE, Column, TextTable, between, level_name, number
+from phyblock.tables.csv_text import to_csv
+from phyblock.tables.latex import to_latex
+from phyblock.tables.markdown import to_markdown
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, between, level_name, number
 
 __all__ = ["compare_view", "flipped_lines", "p_text", "write_comparison"]
 
@@ -26,7 +26,10 @@ def compare_view(found: Comparison) -> TextTable:
         Column("A", is_text=True),
         Column("B", is_text=True),
         *([] if one_part else [Column("Part", is_text=True)]),
-        *(Column(name, f"{found.name} (%)") for name in ("A", "B", "A - B", "SE", "95 % CI")),
+        *(
+            Column(name, f"{found.name} ({found.unit})" if found.unit else found.name)
+            for name in ("A", "B", "A - B", "SE", "95 % CI")
+        ),
         Column("p (Holm)"),
         Column("Verdict", is_text=True),
         *(Column(name, "Samples") for name in ("A better", "B better", "same")),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from html import escape
@@ -10,12 +11,12 @@ from pathlib import Path
 import pandas as pd
 
 from phyblock.report.compare import Comparison, compare_models, compare_runs
-from phyblock.report.design import OVERALL
-from phyblock.report.load import Run
-from phyblock.report.load import load_run as load_frames
-from phyblock.report.text_table import TextTable, between, number
-from phyblock.report.track_intervals import step_intervals, vqa_intervals
+from phyblock.report.measure_table import headline_of, main_heading
 from phyblock.report.write import make_tables, table_names
+from phyblock.tables.load import Run
+from phyblock.tables.load import load_run as load_frames
+from phyblock.tables.text_table import TextTable, between, number
+from phyblock.tracks.kind import kind_of
 
 __all__ = ["LoadedRun", "Tables", "load_run"]
 
@@ -61,54 +62,53 @@ class LoadedRun(Run):
         return Tables(self)
 
     def summary(self) -> pd.DataFrame:
-        """One row a model: samples, answered, and the headline of each track with its interval [%].
+        """One row a model: samples, answered, and the headline of each track with its interval.
 
-        `f1` is of full planning overall (headline setting and matcher), `vqa` the macro accuracy,
-        `steps_f1` that of step planning, over the blocks placed; each with `*_lo` and `*_hi`. Only
-        of tracks that were run.
+        A track's headline is in a column of its short name or its name [%, where it is a share],
+        with `*_lo` and `*_hi`. Only of tracks that were run.
         """
         counts = self.tables["coverage"].groupby("model", sort=False)
         table = counts[["expected", "ok"]].sum()
         table = table.reindex(list(self.design.model_names))
-        if self.design.tracks:
-            cells = self.tables["intervals"]
-            overall = cells[cells["level"] == OVERALL].set_index("model")
-            for name, column in {"f1": "f1", "f1_lo": "lo", "f1_hi": "hi"}.items():
-                table[name] = overall[column]
-        for track, name, source, column, made, cell in (
-            ("vqa", "vqa", "table2", OVERALL, vqa_intervals, OVERALL),
-            ("step_planning", "steps_f1", "table3", "placed_f1", step_intervals, "placed"),
-        ):
-            if track in self.design.suite.tracks:
-                rows = self.tables[source]
-                table[name] = rows[rows["source"] == "run"].set_index("model")[column]
-                ends = made(self)
-                ends = ends[ends["cell"] == cell].set_index("model")
-                for end in ("lo", "hi"):
-                    table[f"{name}_{end}"] = ends[end].astype("float64")
+        for track in self.design.suite.tracks:
+            values, main = headline_of(self, track), main_heading(self, track)
+            short = kind_of(track).report().short or track
+            for name, end in {short: "shown", f"{short}_lo": "lo", f"{short}_hi": "hi"}.items():
+                found = (values.get((model, main)) for model in table.index)
+                numbers = [math.nan if value is None else getattr(value, end) for value in found]
+                table[name] = pd.Series(numbers, table.index, dtype="float64")
         return table
 
     def compare(
-        self, other: Run | None = None, models: Sequence[str] = (), track: str = ""
+        self,
+        other: Run | None = None,
+        models: Sequence[str] = (),
+        track: str = "",
+        measure: str = "",
     ) -> Comparison:
         """The models of this run with one another, or with those of `other`; see `Comparison`.
 
         Raises SpecError for names that are not there or runs that cannot be compared.
         """
         if other is None:
-            return compare_models(self, models, track)
-        return compare_runs(self, other, models, track)
+            return compare_models(self, models, track, measure)
+        return compare_runs(self, other, models, track, measure)
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the headline of every model."""
         name = self.design.suite.name or self.path.name
         summary = self.summary()
-        heads = ["Model", *(_HEADS[column] for column in summary.columns if column in _HEADS)]
+        titles = {"expected": "Samples", "ok": "Answered"}
+        for track in self.design.suite.tracks:
+            titles[kind_of(track).report().short or track] = (
+                f"{kind_of(track).title}: {main_heading(self, track)}, 95 % CI"
+            )
+        heads = ["Model", *titles.values()]
         lines = []
         for model, row in zip(summary.index, summary.to_dict("records"), strict=True):
             cells = []
             for column in summary.columns:
-                if column in _HEADS:
+                if column in titles:
                     text = f"{row[column]:,}" if column in _WHOLE else number(row[column])
                     if f"{column}_lo" in row and not pd.isna(row[f"{column}_lo"]):
                         text += f" {between(row[f'{column}_lo'], row[f'{column}_hi'])}"
@@ -125,13 +125,6 @@ class LoadedRun(Run):
 
 
 _WHOLE = ("expected", "ok")
-_HEADS = {
-    "expected": "Samples",
-    "ok": "Answered",
-    "f1": "F1 (%), 95 % CI",
-    "vqa": "VQA (%), 95 % CI",
-    "steps_f1": "Step F1 (%), 95 % CI",
-}
 
 
 def load_run(path: str | Path, *, texts: bool = True) -> LoadedRun:

@@ -2,49 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
-from phyblock.report.assembly import assembly_frame, table1_frame
-from phyblock.report.comparison import published_frame
-from phyblock.report.cost import cost_frame, cost_view
-from phyblock.report.coverage import coverage_frame
-from phyblock.report.csv_text import to_csv
-from phyblock.report.episodes import endings_frame, moves_frame, progress_frame
-from phyblock.report.errors import errors_frame
-from phyblock.report.latex import to_latex
-from phyblock.report.load import Run, load_run
-from phyblock.report.markdown import to_markdown
-from phyblock.report.questions import letters_frame, questions_frame
-from phyblock.report.seeds import intervals_table, intervals_view, table5_frame, table5_view
-from phyblock.report.settings import settings_frame, settings_view
-from phyblock.report.table3 import (
-    endings_view,
-    moves_view,
-    progress_view,
-    step_scores_frame,
-    table3_frame,
-    table3_view,
+from phyblock.report.measure_table import (
+    headline_frame,
+    headline_view,
+    measures_frame,
+    measures_view,
 )
-from phyblock.report.text_table import TextTable
-from phyblock.report.track_intervals import (
-    step_intervals,
-    track_intervals_view,
-    vqa_intervals,
-)
-from phyblock.report.views import coverage_view, errors_view, published_view, table1_view
-from phyblock.report.vqa import letters_view, table2_frame, table2_view
 from phyblock.run.folder import run_folder
+from phyblock.tables.cost import cost_frame, cost_view
+from phyblock.tables.coverage import coverage_frame, coverage_in_terminal, coverage_view
+from phyblock.tables.csv_text import to_csv
+from phyblock.tables.latex import to_latex
+from phyblock.tables.load import Run, load_run
+from phyblock.tables.markdown import to_markdown
+from phyblock.tables.text_table import TextTable
+from phyblock.tables.track_report import TableMaker
+from phyblock.tracks.estimates import all_estimates
+from phyblock.tracks.kind import kind_of, kinds
 
-__all__ = ["TablesWritten", "make_tables", "table_files", "table_names", "write_tables"]
+__all__ = [
+    "TablesWritten",
+    "make_tables",
+    "table_files",
+    "table_makers",
+    "table_names",
+    "write_tables",
+]
 
 _FOLDER = "tables"
 _FORMS = ("csv", "md", "tex")
-
-_View = Callable[[pd.DataFrame, Run], TextTable]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,61 +80,57 @@ def write_tables(path: str | Path, tables: Sequence[str] | None = None) -> Table
 
 def table_files() -> tuple[str, ...]:
     """Every file of tables that a run folder may hold, by its name in it."""
-    return tuple(f"{_FOLDER}/{name}.{form}" for form in _FORMS for name in _MAKERS)
+    tables = [kind.report().tables or (kind.name,) for kind in kinds().values()]
+    names = [*(name for of_track in tables for name in of_track), *_OF_ANY_TRACK]
+    return tuple(f"{_FOLDER}/{name}.{form}" for form in _FORMS for name in names)
 
 
-@dataclass(frozen=True)
-class _Maker:
-    """How a table is made; `track` is the one it needs, "" where it takes any.
-
-    `comes_with` names the table that it accompanies, where it has rows at all.
-    """
-
-    frame: Callable[[Run], pd.DataFrame]
-    view: _View | None
-    track: str = ""
-    comes_with: str = ""
-
-
-_MAKERS: dict[str, _Maker] = {
-    "assembly": _Maker(assembly_frame, None, "full_planning"),
-    "table1": _Maker(table1_frame, table1_view, "full_planning"),
-    "intervals": _Maker(intervals_table, intervals_view, "full_planning", "table1"),
-    "table5": _Maker(table5_frame, table5_view, "full_planning", "table1"),
-    "settings": _Maker(settings_frame, settings_view, "full_planning", "table1"),
-    "table2": _Maker(table2_frame, table2_view, "vqa"),
-    "vqa_intervals": _Maker(vqa_intervals, track_intervals_view, "vqa", "table2"),
-    "letters": _Maker(letters_frame, letters_view, "vqa", "table2"),
-    "questions": _Maker(questions_frame, None, "vqa", "table2"),
-    "table3": _Maker(table3_frame, table3_view, "step_planning"),
-    "step_intervals": _Maker(step_intervals, track_intervals_view, "step_planning", "table3"),
-    "step_scores": _Maker(step_scores_frame, None, "step_planning", "table3"),
-    "endings": _Maker(endings_frame, endings_view, "step_planning"),
-    "moves": _Maker(moves_frame, moves_view, "step_planning", "endings"),
-    "progress": _Maker(progress_frame, progress_view, "step_planning"),
-    "errors": _Maker(errors_frame, errors_view, "full_planning"),
-    "coverage": _Maker(coverage_frame, coverage_view),
-    "cost": _Maker(cost_frame, cost_view, "", "coverage"),
-    "published": _Maker(published_frame, published_view, "full_planning"),
+_ESTIMATES = "estimates"
+_OF_ANY_TRACK = {
+    _ESTIMATES: TableMaker(all_estimates),
+    "measures": TableMaker(measures_frame, measures_view, _ESTIMATES),
+    "coverage": TableMaker(coverage_frame, coverage_view, in_terminal=coverage_in_terminal),
+    "cost": TableMaker(cost_frame, cost_view, "coverage"),
 }
+"""Tables that every run has."""
+
+
+def table_makers(run: Run) -> dict[str, TableMaker]:
+    """Tables of a run by name: of its tracks, in their order, then those of any run."""
+    makers: dict[str, TableMaker] = {}
+    for track in run.design.suite.tracks:
+        own = kind_of(track).report().tables
+        makers |= own or {track: _headline_maker(track)}
+    return makers | _OF_ANY_TRACK
+
+
+def _headline_maker(track: str) -> TableMaker:
+    """The table of a track that has none of its own."""
+    return TableMaker(
+        partial(headline_frame, track),
+        partial(headline_view, track),
+        in_terminal=lambda view, _: (view,),
+    )
 
 
 def table_names(run: Run) -> tuple[str, ...]:
     """Tables that the tracks of a run have."""
-    tracks = ("", *run.design.suite.tracks)
-    return tuple(name for name, maker in _MAKERS.items() if maker.track in tracks)
+    return tuple(table_makers(run))
 
 
 def make_tables(
     run: Run, names: Sequence[str]
 ) -> tuple[dict[str, pd.DataFrame], dict[str, TextTable]]:
-    """Frames and views by name: of `names`, of what comes with them, and of coverage."""
-    wanted = {"coverage", *names}
-    tracks = ("", *run.design.suite.tracks)
+    """Frames and views by name: of `names`, of what comes with them, and of any run.
+
+    The table of a track that has none of its own comes unasked.
+    """
+    plain = [track for track in run.design.suite.tracks if not kind_of(track).report().tables]
+    wanted = {_ESTIMATES, "coverage", *plain, *names}
     makers = {
         name: maker
-        for name, maker in _MAKERS.items()
-        if maker.track in tracks and (name in wanted or maker.comes_with in wanted)
+        for name, maker in table_makers(run).items()
+        if name in wanted or maker.comes_with in wanted
     }
     frames = {name: maker.frame(run) for name, maker in makers.items()}
     frames = {name: frame for name, frame in frames.items() if name in wanted or len(frame)}

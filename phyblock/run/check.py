@@ -7,13 +7,11 @@ from dataclasses import replace
 
 from PIL import Image as PillowImage
 
-from phyblock.domain import CandidateSet, Scene
 from phyblock.models import (
     Gate,
     Image,
     Message,
     ModelConfig,
-    PlanSubject,
     Reply,
     Request,
     RetryPolicy,
@@ -35,8 +33,7 @@ async def check_model(config: ModelConfig) -> Reply:
     PillowImage.new("RGB", (_SIDE_PX, _SIDE_PX), (216, 49, 49)).save(buffer, "PNG")
     picture = Image(buffer.getvalue(), "check", _SIDE_PX, _SIDE_PX)
     messages = (Message("user", (picture, _QUESTION)),)
-    subject = PlanSubject(Scene("check", (1,), (), ()), CandidateSet(()))
-    request = Request("check", 0, messages, {}, "", subject)
+    request = Request("check", 0, messages, {}, "", None)
     model = build_model(
         replace(config, sends_seed="never"),
         cache=None,

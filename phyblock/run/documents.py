@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 
 from phyblock.records import Line, Manifest, Prompt, Record, Turn
 from phyblock.records.describe import field_tables, json_schema, put_between
-from phyblock.tasks.record_types import RECORD_ADAPTER, RECORD_TYPES
+from phyblock.records.known import known_records, record_types
 
 __all__ = ["make_documents", "write_documents"]
 
@@ -23,7 +23,7 @@ def make_documents(root: Path) -> dict[Path, str]:
     known: set[type[Line]] = set()
     tables = [
         field_tables("A record", (Record,), known),
-        field_tables("What the tracks add", RECORD_TYPES, known),
+        field_tables("What the tracks add", record_types(), known),
         field_tables("A turn", (Turn,), known),
         field_tables("A prompt", (Prompt,), known),
         field_tables("The manifest", (Manifest,), known),
@@ -46,7 +46,7 @@ def write_documents(root: Path) -> list[Path]:
 
 def _schemas() -> dict[str, Any]:
     return {
-        "record": json_schema("phyblock record", RECORD_ADAPTER, RECORD_TYPES),
+        "record": json_schema("phyblock record", known_records(), record_types()),
         "turn": json_schema("phyblock turn", TypeAdapter(Turn), (Turn,)),
         "prompt": json_schema("phyblock prompt", TypeAdapter(Prompt), (Prompt,)),
         "manifest": json_schema("phyblock run.yaml", TypeAdapter(Manifest), (Manifest,)),

@@ -20,10 +20,10 @@ from phyblock.models import (
     reply_key,
 )
 from phyblock.models import estimate as estimate_call
+from phyblock.records.reading import run_records
 from phyblock.resources import reply_cache_file
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
-from phyblock.run.reading import run_records
 from phyblock.run.samples import Sample
 from phyblock.run.store import holds_run
 

@@ -8,14 +8,13 @@ import platform
 from collections.abc import Sequence
 from datetime import datetime, timezone
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 from phyblock.datasets import Dataset
 from phyblock.records import FORMAT, Manifest
 from phyblock.run.models import PlannedModel
-from phyblock.specs import SuiteSpec
-from phyblock.tasks import AnyTrack
+from phyblock.specs import LoadedSuite
+from phyblock.tracks import AnyTrack, kind_of
 
 __all__ = ["make_manifest"]
 
@@ -23,18 +22,16 @@ _LIBRARIES = ("phyblock", "litellm", "pybullet", "numpy", "pillow", "jinja2")
 
 
 def make_manifest(
-    suite: SuiteSpec,
+    loaded: LoadedSuite,
     models: Sequence[PlannedModel],
     dataset: Dataset,
     tracks: Sequence[AnyTrack],
     limit: int | None,
-    questions: Path | None = None,
 ) -> Manifest:
     """The manifest; `identity` digests what decides the results, so that only the same run goes
     on in a folder. Limits, prices, tables and paths are no part of it.
-
-    `questions` is where those of the vqa track are.
     """
+    suite = loaded.suite
     inputs: dict[str, Any] = {
         "format": FORMAT,
         "suite": suite.identity(),
@@ -54,7 +51,7 @@ def make_manifest(
         **inputs,
         "suite": suite.model_dump(mode="json"),
         "dataset": {**inputs["dataset"], "format": suite.dataset.format, "root": str(dataset.root)},
-        "questions": questions and {"format": suite.vqa.format, "root": str(questions)},
+        **_of_tracks(loaded),
         "items": {track.name: len(track.items) for track in tracks},
         "scenes": len(scenes),
         "scenes_by_level": {
@@ -74,3 +71,14 @@ def _identity(model: PlannedModel) -> dict[str, object]:
     for path in sorted((*folder.glob("*.json"), *folder.glob("records.jsonl"))):
         digest.update(f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
     return {**model.config.identity(), "recording": digest.hexdigest()}
+
+
+def _of_tracks(loaded: LoadedSuite) -> dict[str, Any]:
+    """What single tracks say beyond what all of them have."""
+    kinds = [kind_of(name) for name in loaded.suite.tracks]
+    return {
+        key: value
+        for kind in kinds
+        if kind.manifest is not None
+        for key, value in kind.manifest(loaded).items()
+    }

@@ -10,8 +10,8 @@ from phyblock.datasets import recorded_models
 from phyblock.datasets.published_names import match_published
 from phyblock.errors import Problem, SpecError
 from phyblock.models import ModelConfig, Price, server_address
+from phyblock.registry import baseline_names
 from phyblock.specs import (
-    BASELINES,
     RECORDED,
     LoadedSuite,
     ModelSpec,
@@ -49,9 +49,8 @@ def plan_models(
             for name in dict.fromkeys(only) or folders
         )
     if only:
-        _check_known(
-            only, [*BASELINES, *known], "is neither in the models file nor a built-in baseline"
-        )
+        names = [*baseline_names(), *known]
+        _check_known(only, names, "is neither in the models file nor a built-in baseline")
         specs = {name: known.get(name) for name in only}
     else:
         specs = resolve_models(loaded, known)
@@ -77,7 +76,7 @@ def _planned(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> PlannedMode
 def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfig:
     """How to call one model; None as spec is a built-in baseline."""
     if spec is None:
-        assert name in BASELINES, name
+        assert name in baseline_names(), name
         return ModelConfig(name=name, kind="baseline", id=name)
     if spec.replay is not None:
         return _replay(name, Path(spec.replay))

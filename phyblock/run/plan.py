@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 
 from phyblock.datasets import Dataset
 from phyblock.errors import Problem, SpecError
-from phyblock.models import BASELINES
 from phyblock.records import Manifest
 from phyblock.run.data import open_dataset
 from phyblock.run.manifest import make_manifest
 from phyblock.run.models import PlannedModel, plan_models
 from phyblock.run.samples import Sample
-from phyblock.run.select import select_tasks
-from phyblock.run.tracks import open_tracks
 from phyblock.specs import LoadedSuite, ModelSpec, SuiteSpec
-from phyblock.tasks import AnyTrack, EpisodeTrack
+from phyblock.tracks import AnyTrack, EpisodeTrack, Opening, kind_of, open_tracks
+from phyblock.tracks.selection import select_tasks
 
 __all__ = ["RunPlan", "make_plan"]
 
@@ -75,13 +73,13 @@ def make_plan(
     dataset = open_dataset(suite.dataset.format, loaded.dataset_path)
     models = plan_models(loaded, known, only)
     asks = any(model.config.kind != "replay" for model in models)
-    tracks = open_tracks(loaded, dataset, limit, with_prompts=asks)
+    tracks = open_tracks(Opening(loaded, dataset, limit, asks), suite.tracks)
     _check_models(models, tracks)
     tasks = select_tasks(dataset.tasks, suite.levels, limit)
     selected = replace(dataset, tasks=tasks)
     if not any(track.items for track in tracks):
         raise SpecError(_nothing(loaded, dataset, limit))
-    manifest = make_manifest(suite, models, selected, tracks, limit, loaded.questions_path)
+    manifest = make_manifest(loaded, models, selected, tracks, limit)
     return RunPlan(suite, models, selected, tracks, manifest)
 
 
@@ -101,9 +99,9 @@ def _check_models(models: Sequence[PlannedModel], tracks: Sequence[AnyTrack]) ->
             if model.config.kind == "replay" and isinstance(track, EpisodeTrack):
                 message = f"is a recording, which cannot answer in {track.name}"
                 problems.append(Problem(where, message, "tracks", track.name))
-            if model.config.kind != "baseline" or track.subject in BASELINES[model.config.id]:
+            able = kind_of(track.name).baselines
+            if model.config.kind != "baseline" or model.config.id in able:
                 continue
-            able = [name for name, rules in BASELINES.items() if track.subject in rules]
             message = f"has no rule for {track.name}"
             problems.append(Problem(where, message, "models", allowed=", ".join(able)))
     if problems:

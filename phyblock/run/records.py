@@ -10,15 +10,16 @@ from phyblock.errors import ModelError, RefusedError, RetryableError, SampleErro
 from phyblock.models.base import Image, Message, Reply, Request
 from phyblock.models.stored import stored
 from phyblock.records import (
-    Outcome,
     Record,
     SentImage,
     SentPrompt,
     StoredError,
     StoredReply,
 )
-from phyblock.tasks import Item
-from phyblock.tasks.record_types import RECORD_ADAPTER
+from phyblock.records.known import known_records
+from phyblock.tracks import Episode, Item, Judgement
+from phyblock.tracks.counting import sample_counts
+from phyblock.words import Outcome
 
 __all__ = ["about_prompt", "begun", "judged"]
 
@@ -52,13 +53,23 @@ def begun(
     }
 
 
-def judged(fields: Mapping[str, Any], is_read: bool, told: Mapping[str, Any]) -> Record:
-    """The record with its outcome and what the track says of it, the first time or anew.
+def judged(
+    fields: Mapping[str, Any],
+    item: Item,
+    judgement: Judgement | Episode,
+    more: Mapping[str, Any] | None = None,
+) -> Record:
+    """The record with its outcome and what the track says and counts of it, for the first time or
+    anew.
 
-    `fields` are those of a record that was begun, or of one that was judged before.
+    `fields` are those of a record that was begun, or of one that was judged before; `more` replaces
+    some of what the judgement says.
     """
-    outcome = _outcome(fields["reply"], fields["error"], is_read)
-    return RECORD_ADAPTER.validate_python({**fields, "outcome": outcome, **told})
+    outcome = _outcome(fields["reply"], fields["error"], judgement.is_read)
+    told = {**fields, "outcome": outcome, **judgement.fields(), **(more or {})}
+    if counts := sample_counts(fields["track"], item, judgement):
+        told["counts"] = {**fields.get("counts", {}), **counts}
+    return known_records().validate_python(told)
 
 
 def about_prompt(request: Request, template: str, digest: str) -> SentPrompt:

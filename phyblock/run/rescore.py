@@ -13,17 +13,15 @@ from pydantic import ValidationError
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.files import atomic_write, writing
-from phyblock.parsing import PlanParser
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
+from phyblock.records.reading import read_records
 from phyblock.run.data import open_dataset
 from phyblock.run.folder import check_place, run_folder
-from phyblock.run.reading import read_records
 from phyblock.run.records import judged
-from phyblock.run.select import select_tasks
-from phyblock.run.tracks import planning_rules
-from phyblock.scoring import Matcher
-from phyblock.specs import SuiteSpec
-from phyblock.tasks import FullPlanning
+from phyblock.specs import SuiteSpec, suite_model
+from phyblock.tracks import kinds
+from phyblock.tracks.selection import select_tasks
+from phyblock.words import Matcher, PlanParser
 
 __all__ = ["rescore"]
 
@@ -51,22 +49,25 @@ def rescore(
     if out is None:
         run_folder(folder).check([f"{name}/"])
     _check_target(target, identity)
-    tasks = {task.scene.id: task for task in _tasks(folder, manifest, suite, data)}
-    track = FullPlanning(planning_rules(suite))
+    tasks = _tasks(folder, manifest, suite, data)
+    rescored = {kind.name: kind.rescored for kind in kinds().values() if kind.rescored is not None}
+    tracks = {name: rescored[name](suite, tasks) for name in suite.tracks if name in rescored}
+    items = {(name, item.key): item for name, track in tracks.items() for item in track.items}
     records: list[Record] = []
     for record in read_records(folder, manifest):
-        if record.track != track.name:
+        track = tracks.get(record.track)
+        if track is None:
             records.append(record)
             continue
-        task = tasks.get(record.scene)
-        if task is None:
+        item = items.get((track.name, record.item))
+        if item is None:
             where, hint = str(folder / RECORDS), "the file was changed: restore it from a copy"
             raise StoreError(
                 Problem(where, "names a scene that the run has not", "scene", record.scene,
                         hint=hint)
             )  # fmt: skip
-        judgement = track.judge(task, None if record.reply is None else record.reply.text)
-        records.append(judged(record.as_given(), judgement.is_read, judgement.fields()))
+        judgement = track.judge(item, None if record.reply is None else record.reply.text)
+        records.append(judged(record.as_given(), item, judgement))
     told = {"identity": identity, "suite": suite.model_dump(mode="json")}
     _write(target, manifest.model_copy(update=told), records)
     return target
@@ -88,7 +89,7 @@ def _suite(
 ) -> SuiteSpec:
     """The run's suite with parser and headline matcher replaced."""
     try:
-        suite = SuiteSpec.model_validate(manifest.suite)
+        suite = suite_model().model_validate(manifest.suite)
         matchers = suite.scoring.matchers
         if matcher is not None:
             matchers = (matcher, *(name for name in matchers if name != matcher))

@@ -13,7 +13,7 @@ from phyblock.records import Record, SentPrompt, StoredReply, Turn
 from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, begun, judged
 from phyblock.run.writer import RecordWriter
-from phyblock.tasks import AnyTrack, Episode, EpisodeTrack, Item, SingleTrack
+from phyblock.tracks import AnyTrack, Episode, EpisodeTrack, Item, SingleTrack
 
 __all__ = ["Sample", "SampleRunner"]
 
@@ -80,7 +80,7 @@ class SampleRunner:
         answer = await _answer(model.ask(request))
         fields = {**self._begin(sample, answer), "prompt": self._prompt(track, request)}
         judgement = track.judge(sample.item, answer.text if isinstance(answer, Reply) else None)
-        return judged(fields, judgement.is_read, judgement.fields())
+        return judged(fields, sample.item, judgement)
 
     async def _play(
         self,
@@ -124,10 +124,9 @@ class SampleRunner:
         fields = self._begin(sample, failed)
         fields["reply"] = stored(_pooled(replies)) if replies else None
         fields["prompt"] = turns[0]["prompt"] if turns else None
-        told = episode.fields()
-        both = zip(turns, told["turns"], strict=True)
-        told["turns"] = [{"n": n, **turn, **more} for n, (turn, more) in enumerate(both, 1)]
-        return judged(fields, episode.is_read, told)
+        both = zip(turns, episode.fields()["turns"], strict=True)
+        whole = [{"n": n, **turn, **more} for n, (turn, more) in enumerate(both, 1)]
+        return judged(fields, sample.item, episode, {"turns": whole})
 
     async def _next(self, episode: Episode) -> Request | None:
         with self._halt.giving_up():

@@ -28,10 +28,10 @@ from phyblock.records import (
     TurnLines,
     read_manifest,
 )
+from phyblock.records.reading import any_records, collect_turns, run_records
 from phyblock.run.appending import AppendFile
 from phyblock.run.folder import LOCK, check_place, run_folder
 from phyblock.run.prompts import PromptFile
-from phyblock.run.reading import any_records, collect_turns, run_records
 from phyblock.run.standing import Standing
 
 __all__ = ["RunStore", "holds_run"]

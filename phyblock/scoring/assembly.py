@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 from phyblock.domain import CandidateSet, Plan, Scene
 from phyblock.scoring.error_types import ErrorType, count_errors, step_errors
-from phyblock.scoring.level1 import Level1Criterion, level1_counts
-from phyblock.scoring.match import Goal, Matcher, Setting, match_plan
+from phyblock.scoring.level1 import level1_counts
+from phyblock.scoring.match import Goal, match_plan
 from phyblock.scoring.metrics import Counts
+from phyblock.words import Criterion, Level1Criterion, Matcher, Setting
 
-__all__ = ["AssemblyScorer", "Criterion", "Score"]
-
-Criterion = Literal["aov", "selection", "membership"]
+__all__ = ["AssemblyScorer", "Score"]
 
 
 @dataclass(frozen=True)

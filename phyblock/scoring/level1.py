@@ -8,16 +8,13 @@ of false negatives may fall below zero. It exists to reproduce those columns.
 from __future__ import annotations
 
 from collections import Counter
-from typing import Literal, get_args
 
 from phyblock.domain import Plan
 from phyblock.scoring.match import Goal
 from phyblock.scoring.metrics import Counts
+from phyblock.words import Level1Criterion
 
-__all__ = ["LEVEL1_CRITERIA", "Level1Criterion", "level1_counts"]
-
-Level1Criterion = Literal["selection", "membership"]
-LEVEL1_CRITERIA: tuple[Level1Criterion, ...] = get_args(Level1Criterion)
+__all__ = ["level1_counts"]
 
 
 def level1_counts(goal: Goal, plan: Plan, criterion: Level1Criterion) -> Counts:

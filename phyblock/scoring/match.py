@@ -8,17 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 from phyblock.domain import AOVGraph, CandidateSet, Plan, Scene
 from phyblock.scoring.metrics import Counts
+from phyblock.words import Matcher, Setting
 
-__all__ = ["MATCHERS", "SETTINGS", "Goal", "Match", "Matcher", "Setting", "match_plan"]
-
-Setting = Literal["A", "B"]
-Matcher = Literal["paper", "optimal"]
-SETTINGS: tuple[Setting, ...] = get_args(Setting)
-MATCHERS: tuple[Matcher, ...] = get_args(Matcher)
+__all__ = ["Goal", "Match", "match_plan"]
 
 
 @dataclass(frozen=True)

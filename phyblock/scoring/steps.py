@@ -12,18 +12,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 from phyblock.domain import CandidateSet, Scene
 from phyblock.scoring.error_types import ERROR_TYPES, ErrorType, error_type
-from phyblock.scoring.match import Goal, Setting
+from phyblock.scoring.match import Goal
 from phyblock.scoring.metrics import Counts
+from phyblock.words import Gating, Setting
 
 __all__ = [
-    "GATINGS",
     "MOVE_OUTCOMES",
     "Assembly",
-    "Gating",
     "Move",
     "MoveOutcome",
     "attempted_counts",
@@ -31,8 +30,6 @@ __all__ = [
     "placed_counts",
 ]
 
-Gating = Literal["aov", "layer"]
-GATINGS: tuple[Gating, ...] = get_args(Gating)
 MoveOutcome = Literal["placed", "invalid"] | ErrorType
 MOVE_OUTCOMES: tuple[MoveOutcome, ...] = ("placed", *ERROR_TYPES, "invalid")
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from PIL import Image, ImageDraw, ImageFont
 
 from phyblock.sim.surfaces import SURFACES
-from phyblock.sim.textures import Background
+from phyblock.words import Background
 
 __all__ = ["GRID_COLUMNS", "LABEL_STRIP", "ink_on", "numbered_grid", "side_by_side", "to_png"]
 

@@ -27,7 +27,7 @@ from phyblock.sim.compose import GRID_COLUMNS, LABEL_STRIP, numbered_grid, side_
 from phyblock.sim.registry import renderer
 from phyblock.sim.render import DrawnBlock, picture
 from phyblock.sim.renderer import Renderer
-from phyblock.sim.textures import BACKGROUNDS, Background
+from phyblock.words import BACKGROUNDS, Background
 
 __all__ = [
     "RENDER_VERSION",

@@ -22,7 +22,8 @@ from phyblock.sim.geometry import corners_m, edge_bars, solid_mesh
 from phyblock.sim.pose import Pose
 from phyblock.sim.registry import renderer
 from phyblock.sim.renderer import Light, Prop, Renderer, Rgb
-from phyblock.sim.textures import Background, floor, shadow
+from phyblock.sim.textures import floor, shadow
+from phyblock.words import Background
 
 __all__ = ["COLOR_RGB", "SUPERSAMPLE", "DrawnBlock", "Shot", "empty_ground", "picture", "shoot"]
 

@@ -7,7 +7,6 @@ file, has no far edge, and costs less than drawing a textured plane in the softw
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +14,9 @@ from PIL import Image, ImageDraw, ImageFilter
 
 from phyblock.sim.camera import Camera
 from phyblock.sim.surfaces import PERIOD_M, SURFACES, Surface, sample
+from phyblock.words import Background
 
-__all__ = ["BACKGROUNDS", "Background", "floor", "shadow"]
-
-Background = Literal["white", "checkerboard", "light-wood", "dark-wood", "concrete", "lawn"]
-BACKGROUNDS: tuple[Background, ...] = get_args(Background)
-"""The six backgrounds of the paper; the checkerboard is dark."""
+__all__ = ["floor", "shadow"]
 
 _TILE_M = 0.4
 _LIGHT_TILE = np.array([39.0, 56.0, 75.0], dtype=np.float32)

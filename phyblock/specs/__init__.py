@@ -5,7 +5,6 @@ from phyblock.specs.model import ModelSpec, PriceSpec
 from phyblock.specs.models_file import load_models
 from phyblock.specs.schema import models_schema, suite_schema
 from phyblock.specs.suite import (
-    BASELINES,
     BUILTIN_DATASET,
     RECORDED,
     DatasetSpec,
@@ -14,11 +13,11 @@ from phyblock.specs.suite import (
     SamplingSpec,
     ScoringSpec,
     SuiteSpec,
+    suite_model,
 )
 from phyblock.specs.words import did_you_mean
 
 __all__ = [
-    "BASELINES",
     "BUILTIN_DATASET",
     "RECORDED",
     "DatasetSpec",
@@ -35,5 +34,6 @@ __all__ = [
     "load_suite",
     "models_schema",
     "resolve_models",
+    "suite_model",
     "suite_schema",
 ]

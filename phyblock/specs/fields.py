@@ -10,10 +10,12 @@ from pydantic_core import PydanticCustomError
 
 __all__ = [
     "Count",
+    "Flag",
     "MaxTokens",
     "ModelName",
     "Section",
     "Temperature",
+    "TemplateName",
     "TimeoutS",
     "TopP",
     "Unique",
@@ -70,3 +72,22 @@ TimeoutS = Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False
 
 ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._:+-]{0,79}$")]
 """Names of models become names of folders and rows of tables, hence the narrow alphabet."""
+
+Flag = Annotated[bool, Field(strict=True)]
+
+
+def _check_template(prompt: str) -> str:
+    if prompt == "default" or prompt.endswith(".j2"):
+        return prompt
+    raise refuse(
+        "is neither a known prompt nor a template",
+        allowed="default, or the path of a .j2 file",
+        words=("default",),
+    )
+
+
+TemplateName = Annotated[
+    str,
+    AfterValidator(_check_template),
+    Field(json_schema_extra={"pattern": r"^(default|.*\.j2)$"}),
+]

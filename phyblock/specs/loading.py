@@ -12,16 +12,17 @@ from typing import Any
 from pydantic import BaseModel
 
 from phyblock.errors import Problem, SpecError
+from phyblock.registry import baseline_names, known_track
 from phyblock.specs.model import ModelSpec
 from phyblock.specs.overrides import apply_overrides
 from phyblock.specs.paths import expand, sort_problems
-from phyblock.specs.rules import broken_rules
+from phyblock.specs.rules import broken_rules, read_dotted
 from phyblock.specs.suite import (
-    BASELINES,
     BUILTIN_DATASET,
     PROMPT_WORDS,
     RECORDED,
     SuiteSpec,
+    suite_model,
 )
 from phyblock.specs.validation import MOST_HINTS, check, find_secrets, merge_problems
 from phyblock.specs.words import did_you_mean, show
@@ -36,16 +37,15 @@ _BARE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
 class LoadedSuite:
     """A suite and the file it was read from.
 
-    `dataset_path` is the absolute folder of the data set, `questions_path` that of the questions
-    where the suite has the vqa track; `templates` the absolute paths of prompts that are files, by
-    track.
+    `dataset_path` is the absolute folder of the data set; by track, `folders` are those of data of
+    its own, and `templates` the absolute paths of prompts that are files.
     """
 
     suite: SuiteSpec
     path: Path
     dataset_path: Path
     source: YamlSource = field(repr=False, compare=False)
-    questions_path: Path | None = None
+    folders: Mapping[str, Path] = field(default_factory=dict)
     templates: Mapping[str, Path] = field(default_factory=dict)
 
     def where(self, *path: str | int) -> str:
@@ -63,7 +63,7 @@ def load_suite(path: Path, overrides: Sequence[str] = (), *, data_dir: Path) -> 
     apply_overrides(source, overrides)
     if source.data is None:
         raise SpecError([*source.problems, Problem(str(path), "is empty", allowed="a suite")])
-    suite, problems = check(SuiteSpec, source.data, source)
+    suite, problems = check(suite_model(), source.data, source)
     secrets = list(find_secrets(source.data, source))
     if suite is None and isinstance(source.data, dict):
         problems += _broken_rules(source, problems)
@@ -84,7 +84,7 @@ def resolve_models(
     names = loaded.suite.models
     if names == RECORDED:
         raise ValueError("the models of a suite of recorded replies are listed by its data set")
-    allowed = [*BASELINES, *known]
+    allowed = [*baseline_names(), *known]
     unknown = [(index, name) for index, name in enumerate(names) if name not in allowed]
     problems = [
         Problem(
@@ -126,7 +126,7 @@ def _raw_reader(data: Mapping[str, Any]) -> Callable[[str], Any]:
 
 
 def _default(name: str) -> Any:
-    value: Any = SuiteSpec
+    value: Any = suite_model()
     for key in name.split("."):
         value = (
             value.model_fields[key].get_default(call_default_factory=True)
@@ -147,24 +147,22 @@ def _locate(suite: SuiteSpec, path: Path, source: YamlSource, data_dir: Path) ->
     scenes = suite.dataset
     is_bundled = scenes.format == "builtin"
     dataset = finder.data(scenes.path or BUILTIN_DATASET, ("dataset", "path"), is_bundled)
-    questions = None
-    if "vqa" in suite.tracks:
-        is_bundled = suite.vqa.format == "builtin"
-        questions = finder.data(suite.vqa.path, ("vqa", "path"), is_bundled)
-    prompts: dict[str, tuple[str, FieldPath]] = {
-        "full_planning": (suite.prompt, ("prompt",)),
-        "vqa": (suite.vqa.prompt, ("vqa", "prompt")),
-        "step_planning": (suite.steps.prompt, ("steps", "prompt")),
-    }
-    found = {
-        track: finder.file(*prompts[track])
-        for track in suite.tracks
-        if prompts[track][0] not in PROMPT_WORDS
-    }
+    folders: dict[str, Path | None] = {}
+    templates: dict[str, Path | None] = {}
+    for name in suite.tracks:
+        kind = known_track(name)
+        if (own := kind.data_folder(suite)) is not None:
+            folders[name] = finder.data(*own)
+        prompt = read_dotted(suite, ".".join(kind.prompt_field))
+        if prompt not in PROMPT_WORDS:
+            templates[name] = finder.file(prompt, kind.prompt_field)
     if dataset is None or finder.problems:
         raise SpecError(sort_problems(finder.problems))
-    templates: dict[str, Path] = {track: file for track, file in found.items() if file is not None}
-    return LoadedSuite(suite, path, dataset, source, questions, templates)
+    return LoadedSuite(suite, path, dataset, source, _there(folders), _there(templates))
+
+
+def _there(paths: Mapping[str, Path | None]) -> dict[str, Path]:
+    return {name: path for name, path in paths.items() if path is not None}
 
 
 class _Finder:

@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field, JsonValue, model_validator
 from phyblock.addresses import address_fault
 from phyblock.specs.fields import Count, MaxTokens, Section, Temperature, TimeoutS, TopP, refuse
 from phyblock.specs.suite import SamplingSpec
+from phyblock.words import SeedMode, TransportName
 
 __all__ = ["ModelSpec", "PriceSpec"]
 
@@ -95,7 +96,7 @@ class ModelSpec(Section):
         description="Name of the environment variable that holds the key, where it is not the "
         "provider's usual one. Never the key itself.",
     )
-    transport: Literal["auto", "litellm", "direct"] = Field(
+    transport: TransportName = Field(
         default="auto",
         description="litellm: through the library. direct: straight HTTP, for servers that speak "
         "the OpenAI chat protocol. auto: direct where it can.",
@@ -124,7 +125,7 @@ class ModelSpec(Section):
     price: PriceSpec | None = Field(
         default=None, description="Price; null: litellm's price map, or unknown."
     )
-    seed: Literal["auto", "always", "never"] = Field(
+    seed: SeedMode = Field(
         default="auto",
         description="auto: seeds are sent until the provider refuses one, then repeats are "
         "independent. always: a refused seed is an error. never: none is sent.",

@@ -8,10 +8,11 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from phyblock.errors import Problem, SpecError
+from phyblock.registry import baseline_names
 from phyblock.specs.fields import ModelName
 from phyblock.specs.model import ModelSpec
 from phyblock.specs.paths import expand, sort_problems
-from phyblock.specs.suite import BASELINES, RECORDED
+from phyblock.specs.suite import RECORDED
 from phyblock.specs.validation import MOST_HINTS, check, find_secrets, merge_problems
 from phyblock.specs.words import show
 from phyblock.specs.yaml_source import YamlSource, read_yaml
@@ -70,8 +71,8 @@ def _read_entry(
 
 def _check_name(name: str, source: YamlSource) -> list[Problem]:
     where = source.where((name,), key=True)
-    if name in (*BASELINES, RECORDED):
-        taken = ", ".join((*BASELINES, RECORDED))
+    if name in (*baseline_names(), RECORDED):
+        taken = ", ".join((*baseline_names(), RECORDED))
         return [Problem(where, "is a name of phyblock's own", name, allowed=f"not {taken}",
                         hint="choose another name")]  # fmt: skip
     try:

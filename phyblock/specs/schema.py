@@ -6,8 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
+from phyblock.registry import baseline_names, known_tracks, table_names
 from phyblock.specs.model import ModelSpec
-from phyblock.specs.suite import BASELINES, RECORDED, SuiteSpec
+from phyblock.specs.suite import RECORDED, suite_model
 
 __all__ = ["models_schema", "render", "suite_schema", "write_schemas"]
 
@@ -17,8 +18,13 @@ _NAME = r"^[A-Za-z0-9][A-Za-z0-9._:+-]{0,79}$"
 
 def suite_schema() -> dict[str, Any]:
     """The schema of a suite file."""
-    schema = SuiteSpec.model_json_schema()
-    names = {"enum": list(BASELINES)}, {"type": "string", "pattern": _NAME}
+    schema = suite_model().model_json_schema()
+    properties = schema["properties"]
+    kinds = known_tracks()
+    properties["tracks"]["items"]["enum"] = list(kinds)
+    properties["tracks"]["description"] = " ".join(f"{k.name}: {k.about}." for k in kinds.values())
+    properties["tables"]["items"]["enum"] = list(table_names())
+    names = {"enum": list(baseline_names())}, {"type": "string", "pattern": _NAME}
     for branch in schema["properties"]["models"]["oneOf"]:
         if "items" in branch:
             branch["items"] = {"anyOf": list(names)}
@@ -36,7 +42,7 @@ def models_schema() -> dict[str, Any]:
         "$defs": {**definitions, "ModelSpec": spec},
         "type": ["object", "null"],
         "description": "Models by the name that suites use.",
-        "propertyNames": {"pattern": _NAME, "not": {"enum": [*BASELINES, RECORDED]}},
+        "propertyNames": {"pattern": _NAME, "not": {"enum": [*baseline_names(), RECORDED]}},
         "additionalProperties": {"anyOf": [one, {"$ref": "#/$defs/ModelSpec"}]},
     }
     return _finish(schema, "phyblock models")

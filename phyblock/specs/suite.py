@@ -5,10 +5,22 @@ The descriptions below become the JSON Schema's, which an editor shows beside ea
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import functools
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Tag,
+    create_model,
+    model_validator,
+)
 
+from phyblock.registry import PUBLISHED_TABLE, known_tracks, table_names
 from phyblock.specs.fields import (
     Count,
     MaxTokens,
@@ -23,10 +35,20 @@ from phyblock.specs.fields import (
     refuse,
 )
 from phyblock.specs.rules import broken_rules, read_dotted
-from phyblock.specs.tracks import SECTIONS, StepsSpec, TrackName, VqaSpec
+from phyblock.words import (
+    Background,
+    Criterion,
+    DataFormat,
+    Matcher,
+    MissingPolicy,
+    PictureLayout,
+    PictureName,
+    PictureSource,
+    PlanParser,
+    Setting,
+)
 
 __all__ = [
-    "BASELINES",
     "BUILTIN_DATASET",
     "PROMPT_WORDS",
     "RECORDED",
@@ -36,18 +58,10 @@ __all__ = [
     "SamplingSpec",
     "ScoringSpec",
     "SuiteSpec",
+    "default_tables",
+    "suite_model",
 ]
 
-BASELINES = (
-    "random",
-    "all-candidates",
-    "oracle",
-    "oracle-no-orientation",
-    "repeat",
-    "majority",
-    "text-only",
-)
-"""Models that are built in; no models file may use their names."""
 RECORDED = "recorded"
 """The word that stands for every folder of recorded replies."""
 BUILTIN_DATASET = "phyblock-400"
@@ -62,14 +76,25 @@ def _check_whole(level: object) -> object:
 
 
 Level = Annotated[Literal[1, 2, 3, 4], BeforeValidator(_check_whole)]
-Setting = Literal["A", "B"]
-Matcher = Literal["optimal", "paper"]
-Picture = Literal["goal", "candidates"]
-Background = Literal["checkerboard", "white", "light-wood", "dark-wood", "concrete", "lawn"]
-Table = Literal[
-    "assembly", "table1", "table2", "table3", "endings", "progress", "errors", "published"
-]
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
+
+
+SectionT = TypeVar("SectionT", bound=BaseModel)
+
+
+def _one_of(name: str, names: Sequence[str]) -> str:
+    if name in names:
+        return name
+    raise refuse("is not one of the choices", allowed=", ".join(names), words=tuple(names))
+
+
+def default_tables() -> tuple[str, ...]:
+    """Tables of a suite that names none."""
+    return tuple(name for name in table_names() if name != PUBLISHED_TABLE)
+
+
+TrackName = Annotated[str, AfterValidator(lambda name: _one_of(name, tuple(known_tracks())))]
+TableName = Annotated[str, AfterValidator(lambda name: _one_of(name, table_names()))]
 
 
 def _check_prompt(prompt: str) -> str:
@@ -102,7 +127,7 @@ ModelNames = Annotated[
 class DatasetSpec(Section):
     """Which scenes are run."""
 
-    format: Literal["builtin", "official"] = Field(
+    format: DataFormat = Field(
         default="builtin",
         description="builtin: the project's own format. official: a checkout of the official "
         "PhyBlock repository.",
@@ -120,17 +145,17 @@ class DatasetSpec(Section):
 class ImagesSpec(Section):
     """Which pictures a model is shown."""
 
-    source: Literal["render", "dataset"] = Field(
+    source: PictureSource = Field(
         default="render",
         description="render: drawn from the scene. dataset: the official composites, or "
         "their two halves apart; a scene without one is an error.",
     )
-    layout: Literal["composite", "separate"] = Field(
+    layout: PictureLayout = Field(
         default="composite",
         description="composite: goal and candidates in one picture. separate: two pictures.",
     )
     order: Annotated[
-        tuple[Picture, ...],
+        tuple[PictureName, ...],
         Field(min_length=2, max_length=2, json_schema_extra={"uniqueItems": True}),
         AfterValidator(check_unique),
     ] = Field(
@@ -154,12 +179,12 @@ class ScoringSpec(Section):
         description="optimal: interchangeable blocks are matched so that most steps count. paper: "
         "greedy, the paper's Algorithm 1. The first one makes the headline numbers.",
     )
-    level1: Literal["selection", "membership", "aov"] = Field(
+    level1: Criterion = Field(
         default="selection",
         description="Criterion of Level 1. selection: one-to-one, order ignored. membership: what "
         "the paper's Level-1 columns are. aov: as at the other levels.",
     )
-    missing: Literal["count", "skip"] = Field(
+    missing: MissingPolicy = Field(
         default="count",
         description="A missing reply: count its blocks as not placed, or skip the scene (as the "
         "paper did).",
@@ -211,9 +236,7 @@ class SuiteSpec(Section):
     )
     description: str = Field(default="", description="One line on what the suite is for.")
     tracks: UniqueSome[TrackName] = Field(
-        default=("full_planning",),
-        description="full_planning: a whole plan in one reply. step_planning: step by step in the "
-        "simulator. vqa: multiple-choice questions.",
+        default_factory=lambda: tuple(known_tracks())[:1], description="What is asked."
     )
     dataset: DatasetSpec = Field(default_factory=DatasetSpec, description="Which scenes are run.")
     levels: UniqueSome[Level] = Field(default=(1, 2, 3, 4), description="Difficulty levels.")
@@ -224,8 +247,7 @@ class SuiteSpec(Section):
     )
     seeds: UniqueSome[Seed] = Field(default=(0,), description="Each seed repeats every question.")
     models: ModelNames = Field(
-        description="Names from models.yaml or built-in baselines (random, all-candidates, "
-        "oracle, oracle-no-orientation, repeat, majority, text-only); or the word recorded: every "
+        description="Names from models.yaml or built-in baselines; or the word recorded: every "
         "folder of recorded replies in the official data."
     )
     prompt: Prompt = Field(
@@ -236,14 +258,7 @@ class SuiteSpec(Section):
     images: ImagesSpec = Field(
         default_factory=ImagesSpec, description="Which pictures a model is shown."
     )
-    vqa: VqaSpec = Field(
-        default_factory=VqaSpec,
-        description="The questions of the vqa track, and how they are shown.",
-    )
-    steps: StepsSpec = Field(
-        default_factory=StepsSpec, description="The rules of the step_planning track."
-    )
-    parser: Literal["steps", "official"] = Field(
+    parser: PlanParser = Field(
         default="steps",
         description="steps: reads the step list and records the rule that matched. official: the "
         "official expression over the whole reply.",
@@ -257,8 +272,8 @@ class SuiteSpec(Section):
         default_factory=LimitsSpec,
         description="Bounds of a run; they change how fast results come, not what they are.",
     )
-    tables: Unique[Table] = Field(
-        default=("assembly", "table1", "table2", "table3", "endings", "progress", "errors"),
+    tables: Unique[TableName] = Field(
+        default_factory=default_tables,
         description="Tables to write, as far as they belong to a track of the suite; published "
         "compares with the paper's numbers.",
     )
@@ -270,6 +285,14 @@ class SuiteSpec(Section):
             raise refuse("; ".join(f"{rule.field}: {rule.message}" for rule in broken), rules=True)
         return self
 
+    def section(self, model: type[SectionT]) -> SectionT:
+        """The section of a track; LookupError where the suite was made without it."""
+        values = (getattr(self, name) for name in type(self).model_fields)
+        found = next((value for value in values if isinstance(value, model)), None)
+        if found is None:
+            raise LookupError(f"the suite has no section of {model.__name__}")
+        return found
+
     def identity(self) -> dict[str, Any]:
         """What determines the results, as JSON-able data.
 
@@ -277,11 +300,26 @@ class SuiteSpec(Section):
         (of data and templates): a run stores the hashes of what stands there, which say more and
         survive a move.
         """
-        idle = {section for track, section in SECTIONS.items() if track not in self.tracks}
+        sections = {kind.section[0]: name for name, kind in known_tracks().items() if kind.section}
+        idle = {key for key, track in sections.items() if track not in self.tracks}
         spec = self.model_dump(mode="json", exclude={"description", "limits", "tables", *idle})
-        for section in ("dataset", "vqa"):
+        for section in ("dataset", *sections):
             spec.get(section, {}).pop("path", None)
-        for part in (spec, *(spec[name] for name in SECTIONS.values() if name in spec)):
-            if part["prompt"] not in PROMPT_WORDS:
+        for part in (spec, *(spec[key] for key in sections if key in spec)):
+            if part.get("prompt", PROMPT_WORDS[0]) not in PROMPT_WORDS:
                 part["prompt"] = "template"
         return spec
+
+
+def suite_model() -> type[SuiteSpec]:
+    """What a suite may hold: `SuiteSpec` with the sections of all tracks."""
+    return _composed(tuple(kind.section for kind in known_tracks().values() if kind.section))
+
+
+@functools.cache
+def _composed(sections: tuple[tuple[str, type[BaseModel], str], ...]) -> type[SuiteSpec]:
+    fields: dict[str, Any] = {
+        key: (model, Field(default_factory=model, description=description))
+        for key, model, description in sections
+    }
+    return create_model("SuiteSpec", __base__=SuiteSpec, __doc__=SuiteSpec.__doc__, **fields)

@@ -16,7 +16,7 @@ from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
 from phyblock.sim.assembly import animation, filmstrip_png
 from phyblock.sim.camera import VIEWS
 from phyblock.sim.exploded import exploded_png
-from phyblock.sim.textures import BACKGROUNDS, Background
+from phyblock.words import BACKGROUNDS, Background
 from phyblock_making.cli.scene_sets import find_scenes, read_data_set
 
 __all__ = ["command"]

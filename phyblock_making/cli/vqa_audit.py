@@ -13,9 +13,9 @@ from phyblock.cli.console import counted, make_console, plain_table, shown_path
 from phyblock.cli.paths import UserPath
 from phyblock.domain import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
 from phyblock.files import make_folder, write_named
-from phyblock.run.vqa import select_questions
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
+from phyblock.tracks.vqa.opening import select_questions
 from phyblock_making.cli.question_sets import (
     data_option,
     questions_argument,

@@ -19,7 +19,7 @@ from phyblock.models import Breakers, Gate, ModelConfig, RetryPolicy, SharedCach
 from phyblock.resources import bundled, reply_cache_file
 from phyblock.run.models import to_config
 from phyblock.specs import SuiteSpec, did_you_mean, load_models
-from phyblock.tasks import TemplatePrompt
+from phyblock.tracks import TemplatePrompt
 from phyblock_making.cli.question_sets import data_option, questions_option, read_question_set
 from phyblock_making.cli.subtasks_option import subtasks_option
 from phyblock_making.questions.paraphrases import Paraphrase, stems_of, write_wordings

@@ -21,9 +21,9 @@ import numpy as np
 
 from phyblock.bounded import load_json
 from phyblock.domain import LETTERS, Question, Subtask, is_picture_option
-from phyblock.models import ChoiceSubject, Message, Model, Request
+from phyblock.models import Message, Model, Request
 from phyblock.parsing import parse_answer
-from phyblock.tasks import TemplatePrompt
+from phyblock.tracks import TemplatePrompt
 from phyblock_making.questions.rederiving import problem_of
 from phyblock_making.questions.wording import WORDINGS, fill_template, stem_of, wording_ids
 
@@ -172,8 +172,7 @@ async def _ask(
     question: Question,
 ) -> str:
     messages = (Message("user", (prompt.text(block, facts),)),)
-    subject = ChoiceSubject(question)
-    reply = await model.ask(Request(key, seed, messages, {}, prompt.version, subject))
+    reply = await model.ask(Request(key, seed, messages, {}, prompt.version, question))
     return "" if reply is None else reply.text
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.cli.layout import lay_out, width_of
-from phyblock.report.text_table import Column, TextTable
+from phyblock.tables.text_table import Column, TextTable
 
 WORDS = st.text("abc01%", min_size=1, max_size=9)
 GROUPS = st.sampled_from(["", "Level", "A long name"])

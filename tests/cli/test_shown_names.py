@@ -12,9 +12,9 @@ import pytest
 from phyblock.cli.console import make_console, plain_table, print_view
 from phyblock.cli.progress import ProgressView
 from phyblock.report import Column, TextTable, load_run, to_latex, to_markdown, write_tables
-from phyblock.report.csv_text import to_csv
 from phyblock.report.export.write import export_run
 from phyblock.run.events import RunStarted
+from phyblock.tables.csv_text import to_csv
 from tests.report.factory import LEVELS, manifest, record, score, write_run
 
 NAME = ":b: [red]x[/red]\n=2 \x1b[31m\u202e|&\r"

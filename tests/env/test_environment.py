@@ -17,7 +17,7 @@ from phyblock.datasets import AssemblyTask, read_builtin
 from phyblock.domain import Block, Candidate, CandidateSet, Scene
 from phyblock.env import DONE, PhyBlockEnv, read_tasks
 from phyblock.errors import DataError
-from phyblock.scoring import SETTINGS, Setting
+from phyblock.words import SETTINGS, Setting
 
 ROOT = Path(__file__).parents[2]
 SOME = read_tasks("phyblock-400")[::20]

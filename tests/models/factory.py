@@ -18,7 +18,6 @@ from phyblock.models import (
     Model,
     ModelConfig,
     ModelEvent,
-    PlanSubject,
     Reply,
     ReplyCache,
     Request,
@@ -26,6 +25,7 @@ from phyblock.models import (
     SharedCache,
     build_model,
 )
+from phyblock.tracks.full_planning.baselines import PlanSubject
 
 T = TypeVar("T")
 

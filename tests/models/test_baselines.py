@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 
 from phyblock.domain import Candidate, CandidateSet
 from phyblock.errors import DataError, SpecError
-from phyblock.models import BASELINES, Gate, ModelConfig, PlanSubject, Reply, Request, build_model
+from phyblock.models import Gate, ModelConfig, Reply, Request, build_model
+from phyblock.tracks.full_planning.baselines import PLAN_RULES, PlanSubject
 from tests.models.factory import CANDIDATES, SCENE, make_request
 
-PLANNERS = [name for name, rules in BASELINES.items() if PlanSubject in rules]
+PLANNERS = list(PLAN_RULES)
 keys = st.text(min_size=1, max_size=5)
 seeds = st.integers(0, 10**6)
 

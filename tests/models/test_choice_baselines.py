@@ -10,9 +10,10 @@ import pytest
 
 from phyblock.domain import LETTERS, Question, Scene, Subtask
 from phyblock.errors import SpecError
-from phyblock.models import ChoiceSubject, ModelConfig, Request
+from phyblock.models import ModelConfig, Request
 from phyblock.models.baselines import BaselineModel
 from phyblock.parsing import parse_answer
+from phyblock.tracks.vqa.baselines import ChoiceSubject
 
 OPTIONS = ("cube", "arch", "cylinder", "cuboid")
 

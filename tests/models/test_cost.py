@@ -25,7 +25,6 @@ from phyblock.models import (
     Image,
     Message,
     ModelConfig,
-    PlanSubject,
     Price,
     Reply,
     ReplyCache,
@@ -38,6 +37,7 @@ from phyblock.models import (
     price_of,
 )
 from phyblock.models.cost import plausible
+from phyblock.tracks.full_planning.baselines import PlanSubject
 from tests.models.factory import CANDIDATES, SCENE, ask, make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Faults, Running, Seen

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from phyblock.parsing import PLAN_PARSERS, PlanParser, parse_plan
+from phyblock.parsing import parse_plan
+from phyblock.words import PLAN_PARSERS, PlanParser
 
 # Fragments that the rules look for, so that random texts reach deep into them.
 FRAGMENTS = st.sampled_from(

@@ -12,9 +12,9 @@ import pytest
 
 from phyblock.errors import StoreError
 from phyblock.records import Belonging, Manifest, Turn
+from phyblock.records.known import RECORD_ADAPTER
 from phyblock.report import load_run
 from phyblock.run.rescore import rescore
-from phyblock.tasks.record_types import RECORD_ADAPTER
 from tests.records.damage import Raw, plan_record
 from tests.workspace import Workspace
 

@@ -17,9 +17,9 @@ from phyblock.errors import StoreError
 from phyblock.models import Reply, Usage
 from phyblock.models.stored import reply_of, stored
 from phyblock.records import StoredReply, lines
+from phyblock.records.known import RECORD_ADAPTER
+from phyblock.records.reading import any_records, newest_starts
 from phyblock.report import load_run
-from phyblock.run.reading import any_records, newest_starts
-from phyblock.tasks.record_types import RECORD_ADAPTER
 from tests.records.damage import DAMAGED, lines_before, plan_record, with_value
 from tests.report.factory import manifest
 

@@ -11,11 +11,11 @@ import yaml
 from hypothesis import settings
 from hypothesis import strategies as st
 
+from phyblock.records.known import known_records
 from phyblock.report import Run, read_design
-from phyblock.report.load import Frames, frames_of
-from phyblock.report.outcomes import OUTCOMES
 from phyblock.scoring import ERROR_TYPES
-from phyblock.tasks.record_types import RECORD_ADAPTER
+from phyblock.tables.load import Frames, frames_of
+from phyblock.tables.outcomes import OUTCOMES
 
 laws = settings(max_examples=12, deadline=None)
 """Tables take some 50 ms each, so that few examples must do."""
@@ -120,7 +120,7 @@ def record(
 
 
 def frames_from(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Frames:
-    read = (RECORD_ADAPTER.validate_python(one) for one in records)
+    read = (known_records().validate_python(one) for one in records)
     return frames_of(read, read_design(facts))
 
 

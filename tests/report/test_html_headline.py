@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.report import Run, assembly_frame, load_run
-from phyblock.report.html.headline import assembly_headline
-from phyblock.report.html.headline_tracks import steps_headline, vqa_headline
-from phyblock.report.questions import questions_frame
-from phyblock.report.table3 import table3_frame
-from phyblock.report.track_intervals import step_intervals
+from phyblock.report import Run, load_run
+from phyblock.report.html.headline import headlines
+from phyblock.tracks.full_planning.assembly import assembly_frame
+from phyblock.tracks.step_planning.table3 import step_intervals, table3_frame
+from phyblock.tracks.vqa.accuracy import questions_frame
 from tests.report.factory import manifest, record, run_of, score
 from tests.report.html_run import make_run
 
@@ -29,8 +28,7 @@ def planning_run() -> Run:
 
 def test_the_headline_of_plans_says_what_the_tables_say() -> None:
     run = planning_run()
-    headline = assembly_headline(run)
-    assert headline is not None
+    (headline,) = headlines(run)
     assert [row.name for row in headline.rows] == [
         *("alpha", "guess", "Random, published", "Human experts, published"),
     ]
@@ -54,9 +52,7 @@ def test_the_headline_of_plans_says_what_the_tables_say() -> None:
 
 
 def test_a_run_has_headlines_of_its_own_tracks_alone() -> None:
-    run = planning_run()
-    assert vqa_headline(run) is None
-    assert steps_headline(run) is None
+    assert [headline.title for headline in headlines(planning_run())] == ["Full planning"]
 
 
 def test_headlines_of_questions_and_episodes(
@@ -64,15 +60,17 @@ def test_headlines_of_questions_and_episodes(
 ) -> None:
     made = make_run(tmp_path_factory.mktemp("headline"), pictures_dir)
     run = load_run(made.out, texts=False)
-    answers, steps = vqa_headline(run), steps_headline(run)
-    assert answers is not None
-    assert steps is not None
+    by_title = {headline.title: headline for headline in headlines(run)}
+    answers, steps = by_title["VQA"], by_title["Step planning"]
     accuracy = questions_frame(run).set_index(["model", "cell"])["accuracy_mean"]
     for row in answers.rows[:2]:
-        # Subtasks that were not asked leave means without a value.
-        assert [cell.text for cell in row.cells] == ["–"] * 5  # noqa: RUF001
-        assert accuracy[row.name].drop(["SH", "OR", "AD"]).isna().all()
-    assert not any(cell.below for row in answers.rows for cell in row.cells)
+        # Means are over what was asked; the other categories have no column.
+        known = accuracy[row.name].dropna()
+        means = ["object_property", "dynamic_reasoning", "overall"]
+        assert set(known.index) == {"SH", "OR", "AD", *means}
+        shown = dict(zip(answers.columns, row.cells, strict=True))
+        values = [shown[name].value for name in ("Property", "Dynamics", "Overall")]
+        assert values == pytest.approx((100 * known[means]).tolist())
     table = table3_frame(run).set_index("model")
     intervals = step_intervals(run).set_index(["model", "cell"])
     for row in steps.rows[:2]:

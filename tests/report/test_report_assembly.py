@@ -10,10 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.report import ASSEMBLY_COLUMNS, assembly_frame, errors_frame, table1_frame
-from phyblock.report.settings import settings_frame
-from phyblock.report.views import table1_view
 from phyblock.scoring import ERROR_TYPES, Counts, micro
+from phyblock.tracks.full_planning.assembly import ASSEMBLY_COLUMNS, assembly_frame, table1_frame
+from phyblock.tracks.full_planning.errors import errors_frame
+from phyblock.tracks.full_planning.settings import settings_frame
+from phyblock.tracks.full_planning.views import table1_view
 from tests.report.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
 
 Records = list[dict[str, Any]]

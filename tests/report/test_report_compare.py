@@ -9,6 +9,7 @@ from hypothesis import given
 
 from phyblock.errors import SpecError
 from phyblock.report import Run
+from phyblock.report.comparable import comparable
 from phyblock.report.compare import Side, compare, compare_models, compare_runs
 from phyblock.report.compare_view import compare_view, flipped_lines, p_text, write_comparison
 from tests.report.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
@@ -173,13 +174,13 @@ def test_the_first_runs_policy_on_missing_replies_holds_for_both() -> None:
 def test_levels_are_rows_of_one_pair_alone() -> None:
     run = one_seed(*plans("alpha", {"000": 4, "001": 1}), *plans("beta", {"000": 4, "001": 2}))
     sides = [Side(name, name, run) for name in ("alpha", "beta")]
-    one = compare_view(compare([(sides[0], sides[1])], ["2", "overall"], "full_planning"))
+    what = comparable(run, "full_planning")
+    parts = [part for part in what.parts if part.name in ("2", "overall")]
+    one = compare_view(compare([(sides[0], sides[1])], parts, what))
     assert [row[:3] for row in one.rows] == [("alpha", "beta", "Level-2"), ("", "", "Overall")]
     assert "Part" not in [
         column.name
-        for column in compare_view(
-            compare([(sides[0], sides[1])], ["overall"], "full_planning")
-        ).columns
+        for column in compare_view(compare([(sides[0], sides[1])], parts[-1:], what)).columns
     ]
 
 

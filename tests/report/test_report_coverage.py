@@ -6,12 +6,12 @@ import pandas as pd
 from hypothesis import given
 
 from phyblock.cli.tally import Tally
+from phyblock.records.known import known_records
 from phyblock.report import coverage_frame
-from phyblock.report.outcomes import HEADINGS, OUTCOMES
-from phyblock.report.text_table import NO_VALUE
-from phyblock.report.views import coverage_view
 from phyblock.run.standing import Summary
-from phyblock.tasks.record_types import RECORD_ADAPTER
+from phyblock.tables.coverage import coverage_view
+from phyblock.tables.outcomes import HEADINGS, OUTCOMES
+from phyblock.tables.text_table import NO_VALUE
 from tests.report.factory import laws, manifest, record, record_lists, run_of
 
 
@@ -86,7 +86,7 @@ def test_an_episode_that_is_partly_from_the_cache_cost_what_was_asked_anew() -> 
     assert coverage_frame(run)[["cost_usd", "cost_unknown"]].values.tolist() == [[0.25, 0]]
     assert run.records["cost_usd"].tolist() == [0.75]
     tally = Tally(1)
-    tally.add(Summary.of(RECORD_ADAPTER.validate_python(episode)), fresh=True)
+    tally.add(Summary.of(known_records().validate_python(episode)), fresh=True)
     assert (tally.cost_usd, tally.unpriced) == (0.25, 0)
 
 

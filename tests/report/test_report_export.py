@@ -12,7 +12,7 @@ import phyblock
 from phyblock.errors import SpecError, StoreError
 from phyblock.report.export.flat import export_frame
 from phyblock.report.export.write import FORMATS, export_run
-from phyblock.report.load import load_run
+from phyblock.tables.load import load_run
 from tests.report.factory import LEVELS, manifest, record, score, write_run
 
 HF = "the package datasets is not installed"

@@ -16,7 +16,7 @@ from phyblock.domain import LETTERS, is_picture_option
 from phyblock.errors import SpecError, StoreError
 from phyblock.report.export.questions import export_questions
 from phyblock.sim import PictureStyle
-from phyblock.tasks import QuestionPictures
+from phyblock.tracks.vqa.pictures import QuestionPictures
 from tests.vqa_set import write_questions
 from tests.workspace import Workspace
 

@@ -10,10 +10,11 @@ import pytest
 from PIL import Image
 
 from phyblock.errors import StoreError
-from phyblock.report.figures import FIGURES, write_figures
-from phyblock.report.figures.style import COLORS
-from phyblock.report.figures.tracks import accuracy_by_subtask, step_progress, vqa_heat_map
-from phyblock.report.load import load_run
+from phyblock.report.figures import figure_names, write_figures
+from phyblock.tables.drawing import COLORS
+from phyblock.tables.load import load_run
+from phyblock.tracks.step_planning.figure import step_progress
+from phyblock.tracks.vqa.figure import accuracy_by_subtask, vqa_heat_map
 from tests.report.factory import LEVELS, manifest, record, run_of, score, write_run
 
 matplotlib = pytest.importorskip("matplotlib", reason="matplotlib is not installed")
@@ -53,6 +54,7 @@ def asked(model: str, subtask: str, *correct: bool) -> list[dict[str, Any]]:
         | {
             "sample": f"vqa/{model}/{subtask}-{n}/s0",
             "track": "vqa",
+            "key": f"{subtask}-{n}",
             "question": {"id": f"{subtask}-{n}", "subtask": subtask, "rotation": 0},
             "answer": {"right": "A", "given": "A" if right else None, "correct": right},
         }
@@ -62,19 +64,24 @@ def asked(model: str, subtask: str, *correct: bool) -> list[dict[str, Any]]:
 
 def episode(model: str, scene: str, *progress: int) -> dict[str, Any]:
     """An episode of a goal of four blocks, so many of which are placed after each step."""
+    placed = progress[-1]
+    scores = [score(placed, 0, 4 - placed, criterion=name) for name in ("placed", "attempted")]
     more = {"outcomes": ["placed"] * len(progress), "progress": list(progress)}
     sample = f"step_planning/{model}/{scene}/s0"
     return (
-        record(model, scene) | {"sample": sample, "track": "step_planning", "ending": "done"} | more
+        record(model, scene, scores=scores)
+        | {"sample": sample, "track": "step_planning", "ending": "done"}
+        | more
     )
 
 
 def test_every_figure_is_drawn_and_drawing_again_gives_the_same_bytes(tmp_path: Path) -> None:
-    more = [*asked("alpha", "SH", True, False), *asked("beta", "OR", True)]
+    more = [*asked("alpha", "SH", True, False), *asked("alpha", "OR", False)]
+    more += [*asked("beta", "SH", False), *asked("beta", "OR", True)]
     more += [episode("alpha", "000", 1, 2, 3, 4), episode("beta", "000", 0, 1)]
     run = load_run(folder_of(tmp_path / "run", *more), texts=False)
     first = {file: file.read_bytes() for file in write_figures(run)}
-    assert [file.stem for file in first][::2] == list(FIGURES)
+    assert [file.stem for file in first][::2] == list(figure_names(run))
     assert {file: file.read_bytes() for file in write_figures(run)} == first
     for file, data in first.items():
         if file.suffix == ".svg":

@@ -16,7 +16,7 @@ from phyblock.folders import LIST
 from phyblock.report import Column, TextTable, load_run, to_latex, to_markdown, write_tables
 from phyblock.report.compare import compare_models
 from phyblock.report.compare_view import write_comparison
-from phyblock.report.text_table import NO_VALUE, number, spread
+from phyblock.tables.text_table import NO_VALUE, number, spread
 from tests.report.factory import laws, manifest, record, record_lists, score, write_run
 
 TABLE = TextTable(
@@ -124,14 +124,14 @@ def records_of(model: str) -> list[dict[str, Any]]:
 def test_all_tables_are_written(tmp_path: Path) -> None:
     facts = manifest(models=[("alpha", "GPT-4o"), "beta"])
     written = write_tables(write_run(tmp_path / "run", records_of("alpha"), facts))
-    names = ["assembly", "table1", "intervals", "table5", "settings", "errors"]
-    names += ["coverage", "cost", "published"]
-    assert list(written.frames) == names
-    assert list(written.views) == names[1:]
+    viewed = ["table1", "intervals", "table5", "settings", "errors", "published"]
+    viewed += ["coverage", "cost"]
+    assert list(written.frames) == ["assembly", *viewed[:6], "estimates", *viewed[6:]]
+    assert list(written.views) == viewed
     assert {file.name for file in written.folder.iterdir()} == {
-        *(f"{name}.csv" for name in names),
-        *(f"{name}.md" for name in names[1:]),
-        *(f"{name}.tex" for name in names[1:]),
+        *(f"{name}.csv" for name in written.frames),
+        *(f"{name}.md" for name in viewed),
+        *(f"{name}.tex" for name in viewed),
     }
     assert set(written.files) == set(written.folder.iterdir())
 
@@ -140,7 +140,7 @@ def test_only_the_tables_that_the_suite_asks_for_are_written(tmp_path: Path) -> 
     facts = manifest(models=[("alpha", "GPT-4o")])
     facts["suite"]["tables"] = ["errors"]
     written = write_tables(write_run(tmp_path / "run", [], facts))
-    assert {file.stem for file in written.files} == {"errors", "coverage", "cost"}
+    assert {file.stem for file in written.files} == {"errors", "estimates", "coverage", "cost"}
 
 
 @pytest.mark.parametrize(
@@ -151,8 +151,9 @@ def test_tables_asked_for_by_name_are_written_whatever_the_suite_says(
 ) -> None:
     folder = write_run(tmp_path / "run", [], manifest(models=[("alpha", "GPT-4o")]))
     written = write_tables(folder, asked)
-    assert set(written.frames) == {"coverage", "cost", *made}
-    assert {file.stem for file in written.folder.iterdir()} == {"coverage", "cost", *made}
+    always = {"estimates", "coverage", "cost"}
+    assert set(written.frames) == always | made
+    assert {file.stem for file in written.folder.iterdir()} == always | made
 
 
 def test_csv_files_hold_numbers_and_empty_cells(tmp_path: Path) -> None:

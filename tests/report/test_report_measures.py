@@ -12,8 +12,8 @@ from phyblock.errors import SpecError
 from phyblock.report import Run
 from phyblock.report.compare import compare_models, compare_runs
 from phyblock.report.compare_view import compare_view, flipped_lines
-from phyblock.report.questions import questions_frame
-from phyblock.report.track_intervals import step_intervals
+from phyblock.tracks.step_planning.table3 import step_intervals
+from phyblock.tracks.vqa.accuracy import questions_frame
 from tests.report.factory import LEVELS, manifest, record, run_of, score
 
 SCENES = tuple(f"{n:03}" for n in range(30))
@@ -79,6 +79,7 @@ def test_only_questions_that_both_answered_count_and_means_are_of_what_was_asked
     records += [asked("alpha", "002", "OR", True), asked("alpha", "003", "CO", True)]
     records += [asked("beta", "000", "SH", False), asked("beta", "001", "SH", False)]
     records += [asked("beta", "002", "OR", True), asked("beta", "003", "CO", True, "missing")]
+    records += [asked("alpha", "000", "TC", True), asked("beta", "000", "TC", True, "missing")]
     found = compare_models(run_of(records, facts("vqa")))
     overall = found.table.set_index("part").loc["overall"]
     assert (overall["value_a"], overall["value_b"], overall["n_samples"]) == (75, 50, 3)

@@ -68,7 +68,7 @@ def test_the_summary_has_intervals_of_questions_and_episodes_too(tmp_path: Path)
             name = f"{subtask}-{scene}"
             question = {"id": name, "subtask": subtask, "rotation": 0}
             answer = {"right": "A", "given": "AB"[n % 2], "correct": n % 2 == 0}
-            about = {"sample": f"vqa/alpha/{name}/s0", "track": "vqa"}
+            about = {"sample": f"vqa/alpha/{name}/s0", "track": "vqa", "key": name}
             records.append(record(scene=scene) | about | {"question": question, "answer": answer})
         scores = [score(n, 0, 4 - n, criterion=name) for name in ("placed", "attempted")]
         about = {"sample": f"step_planning/alpha/{scene}/s0", "track": "step_planning"}

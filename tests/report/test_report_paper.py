@@ -7,15 +7,20 @@ import pytest
 
 from phyblock.domain import SUBTASKS
 from phyblock.report import published_table
-from phyblock.report.load import load_run
-from phyblock.report.paper import PAPER_TABLES
+from phyblock.tables.load import load_run
+from phyblock.tracks.kind import kinds
 from tests.report.factory import LEVELS, manifest, record, score, write_run
+
+PAPER_TABLES = dict(
+    sorted((n, t) for kind in kinds().values() for n, t in kind.report().paper_tables.items())
+)
 
 
 def asked(model: str, subtask: str, seed: int, right: bool) -> dict[str, Any]:
     return record(model, "000", seed) | {
         "sample": f"vqa/{model}/{subtask}/s{seed}",
         "track": "vqa",
+        "key": subtask,
         "question": {"id": subtask, "subtask": subtask, "rotation": 0},
         "answer": {"right": "A", "given": "A" if right else "B", "correct": right},
     }

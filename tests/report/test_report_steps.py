@@ -11,11 +11,15 @@ import pytest
 import yaml
 
 from phyblock.report import load_run
-from phyblock.report.cost import cost_frame, cost_view
-from phyblock.report.episodes import endings_frame, episodes_frame, moves_frame, progress_frame
-from phyblock.report.table3 import step_scores_frame, table3_frame
-from phyblock.report.track_intervals import step_intervals
 from phyblock.report.write import write_tables
+from phyblock.tables.cost import cost_frame, cost_view
+from phyblock.tracks.step_planning.episodes import (
+    endings_frame,
+    episodes_frame,
+    moves_frame,
+    progress_frame,
+)
+from phyblock.tracks.step_planning.table3 import step_intervals, step_scores_frame, table3_frame
 from tests.report.factory import manifest, record
 
 STEPS = {"gating": "aov", "physics": "settle", "feedback": "success", "history": "text"}

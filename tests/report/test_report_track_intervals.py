@@ -7,8 +7,10 @@ import pytest
 
 from phyblock.domain import SUBTASKS
 from phyblock.report import Run, to_markdown
-from phyblock.report.questions import CELLS, questions_frame
-from phyblock.report.track_intervals import step_intervals, track_intervals_view, vqa_intervals
+from phyblock.tracks.step_planning.table3 import step_intervals, step_intervals_view
+from phyblock.tracks.vqa.accuracy import questions_frame
+from phyblock.tracks.vqa.answers import CELLS
+from phyblock.tracks.vqa.table2 import vqa_intervals, vqa_intervals_view
 from tests.report.factory import LEVELS, manifest, record, run_of, score
 
 
@@ -75,10 +77,10 @@ def test_step_planning_has_f1_by_way_of_counting(run: Run) -> None:
 
 
 def test_views_say_averages_with_intervals(run: Run) -> None:
-    text = to_markdown(track_intervals_view(vqa_intervals(run), run))
+    text = to_markdown(vqa_intervals_view(vqa_intervals(run), run))
     assert "Object property %" in text
     assert "Overall 95 % CI" in text
-    assert "Placed %" in to_markdown(track_intervals_view(step_intervals(run), run))
+    assert "Placed %" in to_markdown(step_intervals_view(step_intervals(run), run))
 
 
 def test_nothing_asked_is_an_empty_table() -> None:

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 import yaml
+from phyblock.tracks.step_rules import StepPhysics, StepRules
 
 from phyblock.datasets import read_builtin
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
 from phyblock.sim.question_pictures import question_png
 from phyblock.sim.site import state_picture
-from phyblock.tasks.step_planning import StepPlanning
-from phyblock.tasks.step_rules import StepPhysics, StepRules
+from phyblock.tracks.step_planning import StepPlanning
 from tests.sim.box_renderer import BOX_RENDERER
 from tests.sim.still_engine import STILL_ENGINE
 from tests.workspace import Done, Raw, Workspace, candidates

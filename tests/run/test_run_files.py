@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from phyblock.errors import StoreError
 from phyblock.models import Image, Message
 from phyblock.records import PromptLines, TurnLines
+from phyblock.records.reading import collect_turns
 from phyblock.run.appending import AppendFile
 from phyblock.run.prompts import PromptFile, read_prompts
-from phyblock.run.reading import collect_turns
 from tests.workspace import Workspace
 
 REPLY = {

@@ -9,19 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring import (
-    LEVEL1_CRITERIA,
-    MATCHERS,
-    SETTINGS,
-    AssemblyScorer,
-    Counts,
-    Goal,
-    Level1Criterion,
-    Setting,
-    level1_counts,
-    match_plan,
-    micro,
-)
+from phyblock.scoring import AssemblyScorer, Counts, Goal, level1_counts, match_plan, micro
+from phyblock.words import LEVEL1_CRITERIA, MATCHERS, SETTINGS, Level1Criterion, Setting
 from tests.scoring.cases import Case, cases, equal
 
 each_setting = pytest.mark.parametrize("setting", SETTINGS)

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring import MATCHERS, SETTINGS, Counts, Goal, Match, Matcher, Setting, match_plan
+from phyblock.scoring import Counts, Goal, Match, match_plan
+from phyblock.words import MATCHERS, SETTINGS, Matcher, Setting
 from tests.scoring.cases import Case, cases, choices, greatest_tp, greedy_tp
 
 each_setting = pytest.mark.parametrize("setting", SETTINGS)

@@ -10,8 +10,9 @@ import pytest
 
 from phyblock.datasets import AssemblyTask, read_official
 from phyblock.domain import Plan
-from phyblock.parsing import PLAN_PARSERS, PlanParser, parse_plan
-from phyblock.scoring import MATCHERS, SETTINGS, AssemblyScorer, Goal, match_plan
+from phyblock.parsing import parse_plan
+from phyblock.scoring import AssemblyScorer, Goal, match_plan
+from phyblock.words import MATCHERS, PLAN_PARSERS, SETTINGS, PlanParser
 from tests.official_replies import reply_texts
 
 Row = tuple[str, str, str, str]

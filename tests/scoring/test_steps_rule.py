@@ -11,16 +11,9 @@ from hypothesis import strategies as st
 
 from phyblock.datasets import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring import ERROR_TYPES, SETTINGS, Goal, Setting, match_plan
-from phyblock.scoring.steps import (
-    GATINGS,
-    MOVE_OUTCOMES,
-    Assembly,
-    Gating,
-    attempted_counts,
-    gated,
-    placed_counts,
-)
+from phyblock.scoring import ERROR_TYPES, Goal, match_plan
+from phyblock.scoring.steps import MOVE_OUTCOMES, Assembly, attempted_counts, gated, placed_counts
+from phyblock.words import GATINGS, SETTINGS, Gating, Setting
 from tests.scoring.cases import Case, cases
 
 ORDERS = 20

@@ -25,7 +25,7 @@ from phyblock.sim import (
 from phyblock.sim.compose import LABEL_STRIP, numbered_grid
 from phyblock.sim.pictures import candidate_camera, on_the_floor
 from phyblock.sim.render import picture, shoot
-from phyblock.sim.textures import BACKGROUNDS
+from phyblock.words import BACKGROUNDS
 from phyblock_making.poses import POSES
 from phyblock_making.scenes import make_candidates
 from tests.designs.scenes import designed_scene

@@ -19,8 +19,8 @@ from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.pose import quat_xyzw_to_euler_deg
 from phyblock.sim.question_pictures import question_camera, question_key, question_png
 from phyblock.sim.seeing import block_mark, differing_pixels, is_inside, seen, seen_order
-from phyblock.sim.textures import BACKGROUNDS
 from phyblock.sim.world import Pose
+from phyblock.words import BACKGROUNDS
 
 STYLE = PictureStyle(256)
 VIEW = (45.0, 22.0)

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import Problem, SpecError
+from phyblock.registry import baseline_names
 from phyblock.specs import (
-    BASELINES,
     LoadedSuite,
     ModelSpec,
     SamplingSpec,
@@ -255,8 +255,8 @@ def test_names_resolve_in_the_suites_order(tmp_path: Path) -> None:
 
 
 def test_every_baseline_resolves_without_a_models_file(tmp_path: Path) -> None:
-    loaded = load_naming(tmp_path, "".join(f"  - {name}\n" for name in BASELINES))
-    assert resolve_models(loaded, {}) == dict.fromkeys(BASELINES)
+    loaded = load_naming(tmp_path, "".join(f"  - {name}\n" for name in baseline_names()))
+    assert resolve_models(loaded, {}) == dict.fromkeys(baseline_names())
 
 
 def test_every_unknown_name_is_pointed_at(tmp_path: Path) -> None:

@@ -14,9 +14,11 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from phyblock.errors import SpecError
-from phyblock.specs import LoadedSuite, SuiteSpec, load_suite
+from phyblock.specs import LoadedSuite, load_suite, suite_model
 from phyblock.specs.yaml_source import CoreLoader
 from tests.specs.strategies import FIELDS, REQUIRED, SECTIONS, SUITES
+
+SUITE_MODEL = suite_model()
 
 
 class CoreDumper(yaml.SafeDumper):
@@ -41,7 +43,7 @@ def load(folder: Path, text: str, *overrides: str) -> LoadedSuite:
 
 @given(raw=SUITES)
 def test_a_dumped_suite_loads_equal(folder: Path, raw: dict[str, Any]) -> None:
-    spec = SuiteSpec.model_validate(raw)
+    spec = SUITE_MODEL.model_validate(raw)
     dumped = spec.model_dump(mode="json")
     assert load(folder, yaml.dump(dumped, Dumper=CoreDumper, allow_unicode=True)).suite == spec
     assert load(folder, json.dumps(dumped)).suite == spec
@@ -50,12 +52,12 @@ def test_a_dumped_suite_loads_equal(folder: Path, raw: dict[str, Any]) -> None:
 
 @given(raw=SUITES)
 def test_identity_is_json_and_holds_no_bounds(raw: dict[str, Any]) -> None:
-    spec = SuiteSpec.model_validate(raw)
+    spec = SUITE_MODEL.model_validate(raw)
     identity = spec.identity()
     assert json.loads(json.dumps(identity)) == identity
     assert not {"description", "limits", "tables"} & set(identity)
     kept = {k: v for k, v in raw.items() if k not in ("description", "limits", "tables")}
-    assert SuiteSpec.model_validate(kept).identity() == identity
+    assert SUITE_MODEL.model_validate(kept).identity() == identity
 
 
 @given(raw=SUITES, key=st.sampled_from(["seeds", "levels", "settings", "models", "name"]))
@@ -67,8 +69,8 @@ def test_identity_tells_apart_what_matters(raw: dict[str, Any], key: str) -> Non
         "models": ["a", "b", "c", "d", "e"],
         "name": "another-name-that-is-longer",
     }
-    spec = SuiteSpec.model_validate(raw)
-    other = SuiteSpec.model_validate({**raw, key: changed[key]})
+    spec = SUITE_MODEL.model_validate(raw)
+    other = SUITE_MODEL.model_validate({**raw, key: changed[key]})
     assert (spec.identity() == other.identity()) == (spec == other)
 
 
@@ -118,7 +120,7 @@ def test_overrides_equal_editing_the_file(
 @given(raw=SUITES)
 def test_a_suite_made_in_python_obeys_the_rules_between_fields(raw: dict[str, Any]) -> None:
     with pytest.raises(ValidationError, match="recorded replies come with the official data"):
-        SuiteSpec.model_validate({**raw, "models": "recorded"})
+        SUITE_MODEL.model_validate({**raw, "models": "recorded"})
 
 
 @given(raw=SUITES)
@@ -126,6 +128,6 @@ def test_identity_does_not_depend_on_where_things_lie(raw: dict[str, Any]) -> No
     here = {**raw, "dataset": {"path": "./a"}, "prompt": "a.j2"}
     there = {**raw, "dataset": {"path": "/b"}, "prompt": "b/c.j2"}
     default = {**raw, "dataset": {}, "prompt": "default"}
-    identity = SuiteSpec.model_validate(here).identity()
-    assert SuiteSpec.model_validate(there).identity() == identity
-    assert SuiteSpec.model_validate(default).identity() != identity
+    identity = SUITE_MODEL.model_validate(here).identity()
+    assert SUITE_MODEL.model_validate(there).identity() == identity
+    assert SUITE_MODEL.model_validate(default).identity() != identity

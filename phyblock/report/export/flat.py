@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from phyblock.report.csv_text import to_csv as csv_text
-from phyblock.report.export.rows import as_json, export_rows, needs
-from phyblock.report.load import Run
+from phyblock.report.export.rows import as_json, export_rows, needs, track_columns
+from phyblock.tables.csv_text import to_csv as csv_text
+from phyblock.tables.load import Run
 
 __all__ = ["EXPORTS", "export_frame", "to_csv", "to_hf", "to_parquet"]
 
@@ -19,9 +19,8 @@ _WHOLE = (
     "prompt_tokens",
     "completion_tokens",
     "reasoning_tokens",
-    "question_rotation",
 )
-_TRUTH = ("cached", "answer_correct")
+_TRUTH = ("cached",)
 _NUMBERS = ("cost_usd", "latency_s")
 _NOT_TEXT = ("seed", "levels", "parents", "plan")
 
@@ -33,6 +32,8 @@ def export_frame(run: Run) -> pd.DataFrame:
     counts = tuple(name for name in columns if name[:3] in ("tp_", "fp_", "fn_"))
     kinds = dict.fromkeys((*_WHOLE, *counts), "Int64")
     kinds |= dict.fromkeys(_TRUTH, "boolean") | dict.fromkeys(_NUMBERS, "Float64")
+    kinds |= dict.fromkeys((name for name in columns if name.startswith("count_")), "Float64")
+    kinds |= track_columns()
     data = {}
     for name in columns:
         kind = kinds.get(name, "object" if name in _NOT_TEXT[1:] else "string")

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from phyblock.records import PromptMessage, Record, StoredReply
 from phyblock.records import Score as StoredScore
 from phyblock.report.export.rows import needs, newest_records, prompt_text
-from phyblock.report.load import Run
 from phyblock.run.prompts import read_prompts
 from phyblock.scoring import Counts, micro
-from phyblock.tasks.choice_record import ChoiceRecord
+from phyblock.tables.load import Run
+from phyblock.tracks.estimates import stored_counts
 
 if TYPE_CHECKING:
     from inspect_ai.log import EvalLog, EvalMetric, EvalSample
@@ -118,13 +118,12 @@ def _sample(
     )
     fields = record.fields()
     about = {name: fields[name] for name in kept if name in fields}
-    answer = record.answer if isinstance(record, ChoiceRecord) else None
     return EvalSample(
         # The key tells rotations of one question apart; older records have none.
         id=record.item,
         epoch=list(seeds).index(record.seed) + 1 if record.seed in seeds else 1,
         input=text,
-        target="" if answer is None else answer.right,
+        target=record.target,
         messages=messages,
         output=output,
         scores=_scores(record),
@@ -157,16 +156,18 @@ def _name(score: StoredScore) -> str:
 def _scores(record: Record) -> dict[str, Score]:
     from inspect_ai.scorer import CORRECT, INCORRECT, Score
 
-    plan = getattr(record.parse, "plan", None)
-    said = None if plan is None else " ".join(map(str, plan))
     found = {}
     for score in record.scores:
         counts = Counts(score.tp, score.fp, score.fn)
         value = {"tp": counts.tp, "fp": counts.fp, "fn": counts.fn, "f1": counts.f1 or 0.0}
-        found[_name(score)] = Score(value=value, answer=said)
-    if isinstance(record, ChoiceRecord) and record.answer is not None:
-        value_of = CORRECT if record.answer.correct else INCORRECT
-        found["answer"] = Score(value=value_of, answer=record.answer.given)
+        found[_name(score)] = Score(value=value, answer=record.said)
+    if record.is_correct is not None:
+        value_of = CORRECT if record.is_correct else INCORRECT
+        found["answer"] = Score(value=value_of, answer=record.said)
+    for counted in stored_counts(record.track):
+        if counted.name in record.counts:
+            counts_of = dict(zip(counted.columns, record.counts[counted.name], strict=True))
+            found[counted.name] = Score(value=counts_of, answer=record.said)
     return found
 
 
@@ -190,11 +191,7 @@ def _results(records: Sequence[Record]) -> list[Any]:
                 metrics=_metrics({k: v for k, v in metrics.items() if v is not None}),
             )
         )
-    answers = [
-        record.answer.correct
-        for record in records
-        if isinstance(record, ChoiceRecord) and record.answer is not None
-    ]
+    answers = [record.is_correct for record in records if record.is_correct is not None]
     if answers:
         accuracy = _metrics({"accuracy": sum(answers) / len(answers)})
         found.append(

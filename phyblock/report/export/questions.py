@@ -17,8 +17,7 @@ from phyblock.files import writing
 from phyblock.folders import OutFolder
 from phyblock.models.base import Image
 from phyblock.report.export.rows import needs
-from phyblock.tasks import QuestionPictures
-from phyblock.tasks.question_pictures import Shown
+from phyblock.tracks.vqa.pictures import QuestionPictures, Shown
 
 __all__ = ["QUESTION_FORMATS", "export_questions"]
 

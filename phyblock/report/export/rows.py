@@ -9,19 +9,17 @@ from typing import Any
 
 from phyblock.errors import Problem, SpecError
 from phyblock.records import PictureMark, PromptMessage, Record
-from phyblock.report.load import Run
+from phyblock.records.known import record_types
+from phyblock.records.reading import read_records
 from phyblock.run.prompts import read_prompts
-from phyblock.run.reading import read_records
-from phyblock.tasks.choice_record import ChoiceRecord
-from phyblock.tasks.episode_record import EpisodeRecord
+from phyblock.tables.load import Run
+from phyblock.tracks.estimates import stored_counts
 
-__all__ = ["as_json", "export_rows", "needs", "newest_records", "prompt_text"]
+__all__ = ["as_json", "export_rows", "needs", "newest_records", "prompt_text", "track_columns"]
 
 _SAMPLE = ("sample", "track", "model", "scene", "seed")
 _REPLY = ("finish", "cost_usd", "latency_s", "provider_model", "attempts", "cached")
 _USAGE = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
-_QUESTION = ("id", "subtask", "category", "rotation")
-_ANSWER = ("right", "given", "correct")
 
 
 def needs(package: str, extra: str, form: str) -> None:
@@ -46,14 +44,13 @@ def export_rows(run: Run) -> Iterator[dict[str, Any]]:
     """One row a sample: what was asked, of whom, the reply, what was read, and the counts.
 
     Counts are `tp_<setting>`, `fp_<setting>`, `fn_<setting>` of the headline matcher, all levels
-    by the `aov` criterion (step planning: over placed blocks). Every row has the same columns;
+    by the `aov` criterion (of episodes: over placed blocks); `count_<name>_<column>` are those of
+    other measures. Every row has the same columns;
     what a track does not have is None. `levels`, `parents` and `plan` are lists.
     """
     prompts = read_prompts(run.path)
     for record in newest_records(run):
         reply, error = record.reply, record.error
-        question = record.question if isinstance(record, ChoiceRecord) else None
-        answer = record.answer if isinstance(record, ChoiceRecord) else None
         plan = getattr(record.parse, "plan", None)
         yield {
             **{name: getattr(record, name) for name in _SAMPLE},
@@ -69,10 +66,10 @@ def export_rows(run: Run) -> Iterator[dict[str, Any]]:
             "error": error and error.message,
             "rule": getattr(record.parse, "rule", None),
             "plan": None if plan is None else list(plan),
-            **{f"question_{name}": getattr(question, name, None) for name in _QUESTION},
-            **{f"answer_{name}": getattr(answer, name, None) for name in _ANSWER},
-            "ending": record.ending if isinstance(record, EpisodeRecord) else None,
+            **dict.fromkeys(track_columns()),
+            **record.export_row(),
             **_counts(run, record),
+            **_own_counts(run, record),
         }
 
 
@@ -99,6 +96,27 @@ def _counts(run: Run, record: Record) -> dict[str, int | None]:
             counts = {"tp": score.tp, "fp": score.fp, "fn": score.fn}
             found |= {f"{name}_{score.setting.lower()}": n for name, n in counts.items()}
     return found
+
+
+def track_columns() -> dict[str, str]:
+    """Columns that tracks add, with their types in pandas."""
+    return {name: kind for record in record_types() for name, kind in record.exported.items()}
+
+
+def _own_counts(run: Run, record: Record) -> dict[str, float | None]:
+    """What measures count beside `scores`: `count_<name>_<column>`."""
+    return {
+        f"count_{counted.name}_{column}": number
+        for track in run.design.suite.tracks
+        for counted in stored_counts(track)
+        for column, number in zip(
+            counted.columns,
+            record.counts.get(counted.name, (None,) * len(counted.columns))
+            if record.track == track
+            else (None,) * len(counted.columns),
+            strict=True,
+        )
+    }
 
 
 def as_json(value: object) -> object:

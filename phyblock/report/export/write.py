@@ -9,8 +9,8 @@ from phyblock.files import writing
 from phyblock.folders import OutFolder
 from phyblock.report.export.flat import EXPORTS
 from phyblock.report.export.inspect_log import to_inspect
-from phyblock.report.load import Run
 from phyblock.run.folder import run_folder
+from phyblock.tables.load import Run
 
 __all__ = ["FORMATS", "export_run"]
 

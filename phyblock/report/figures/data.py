@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from phyblock.report.design import OVERALL
-from phyblock.report.figures.style import ACCENT, COLORS, INK, PALE, bare_axes, headed, new_figure
-from phyblock.report.load import Run
-from phyblock.report.text_table import level_name
+from phyblock.tables.design import OVERALL
+from phyblock.tables.drawing import ACCENT, COLORS, INK, PALE, bare_axes, headed, new_figure
+from phyblock.tables.load import Run
+from phyblock.tables.text_table import level_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

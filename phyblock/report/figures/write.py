@@ -3,56 +3,70 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from phyblock.report.figures.bars import main_measure, measure_bars
 from phyblock.report.figures.data import dataset_levels
-from phyblock.report.figures.errors import error_bars
-from phyblock.report.figures.levels import f1_bars, f1_radar, settings_dots
-from phyblock.report.figures.scatter import f1_by_cost, f1_by_size
-from phyblock.report.figures.style import png_bytes, styled, svg_bytes
-from phyblock.report.figures.tracks import progress_by_turn, vqa_heat_map
-from phyblock.report.load import Run
 from phyblock.run.folder import run_folder
+from phyblock.tables.drawing import png_bytes, styled, svg_bytes
+from phyblock.tables.load import Run
+from phyblock.tracks.kind import kind_of, kinds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["FIGURES", "figure_files", "write_figures"]
+__all__ = ["figure_files", "figure_names", "figure_titles", "write_figures"]
 
 _FOLDER = "figures"
 _FORMS = {"svg": svg_bytes, "png": png_bytes}
 
-_PLANNING: dict[str, Callable[[Run], Figure | None]] = {
-    "f1-levels": f1_bars,
-    "f1-radar": f1_radar,
-    "settings": settings_dots,
-    "error-types": error_bars,
-    "f1-size": f1_by_size,
-    "f1-cost": f1_by_cost,
-}
-_ANY: dict[str, Callable[[Run], Figure | None]] = {
-    "vqa-subtasks": vqa_heat_map,
-    "step-progress": progress_by_turn,
-    "scenes": dataset_levels,
-}
-FIGURES = (*_PLANNING, *_ANY)
-"""Names of all figures, in the order in which they are shown."""
+_SCENES = "scenes"
 
 
-def write_figures(run: Run, names: Sequence[str] = FIGURES) -> tuple[Path, ...]:
-    """Draw figures into `figures/` of the run's folder, NAME.svg and NAME.png.
+def _makers(run: Run) -> dict[str, Callable[[Run], Figure | None]]:
+    """Figures of a run by name: of its tracks, in their order, then of its scenes."""
+    makers: dict[str, Callable[[Run], Figure | None]] = {}
+    for track in run.design.suite.tracks:
+        makers[_bars_name(track)] = partial(measure_bars, track=track)
+        makers |= kind_of(track).report().figures
+    return {**makers, _SCENES: dataset_levels}
+
+
+def _bars_name(track: str) -> str:
+    return kind_of(track).report().bars or f"{track.replace('_', '-')}-{main_measure(track).name}"
+
+
+def figure_names(run: Run) -> tuple[str, ...]:
+    """Names of all figures that a run may have, in the order in which they are shown."""
+    return tuple(_makers(run))
+
+
+def figure_titles(run: Run) -> dict[str, str]:
+    """What people read in the place of the names."""
+    titles = {_SCENES: "The scenes of the run by level"}
+    for track in run.design.suite.tracks:
+        report = kind_of(track).report()
+        titles[_bars_name(track)] = f"{kind_of(track).title}: {main_measure(track).heading}"
+        titles |= report.figure_titles
+    return titles
+
+
+def write_figures(run: Run, names: Sequence[str] = ()) -> tuple[Path, ...]:
+    """Draw figures into `figures/` of the run's folder, NAME.svg and NAME.png; all without `names`.
 
     Figures that the run has no numbers for are left out. The same records give the same bytes.
     Raises StoreError for a folder that cannot be written, and, before anything is drawn, naming
     every file in the way that we never wrote.
     """
-    makers = {**(_PLANNING if run.design.tracks else {}), **_ANY}
+    makers = _makers(run)
+    wanted = [name for name in makers if not names or name in names]
     folder = run_folder(run.path)
-    folder.check(figure_files(names))
+    folder.check(figure_files(wanted))
     files: list[Path] = []
     with styled():
-        for name in (name for name in makers if name in names):
+        for name in wanted:
             figure = makers[name](run)
             if figure is None:
                 continue
@@ -63,6 +77,13 @@ def write_figures(run: Run, names: Sequence[str] = FIGURES) -> tuple[Path, ...]:
     return tuple(files)
 
 
-def figure_files(names: Sequence[str] = FIGURES) -> tuple[str, ...]:
-    """Every file of these figures, by its name in a run folder."""
-    return tuple(f"{_FOLDER}/{name}.{ending}" for name in names for ending in _FORMS)
+def figure_files(names: Sequence[str] = ()) -> tuple[str, ...]:
+    """Every file of these figures, by its name in a run folder; of all that there are without."""
+    known = [
+        name
+        for kind in kinds().values()
+        for name in (_bars_name(kind.name), *kind.report().figures)
+    ]
+    return tuple(
+        f"{_FOLDER}/{name}.{ending}" for name in names or (*known, _SCENES) for ending in _FORMS
+    )

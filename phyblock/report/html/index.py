@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from phyblock.records import Record
-from phyblock.report.design import Design
-from phyblock.run.reading import run_records
+from phyblock.records.reading import run_records
 from phyblock.scoring import ERROR_TYPES
-from phyblock.tasks.choice_record import ChoiceRecord
+from phyblock.tables.design import Design
+from phyblock.tracks.kind import kinds
 
 __all__ = ["Item", "Place", "SampleIndex", "read_places"]
 
@@ -104,7 +104,6 @@ class SampleIndex:
         item = Item(record.track, record.item)
         if item not in self._items.numbers:
             self._add_item(record)
-        answer = record.answer if isinstance(record, ChoiceRecord) else None
         self._seeds.add(record.seed)
         row = {
             "track": self._tracks.number(record.track),
@@ -112,7 +111,7 @@ class SampleIndex:
             "item": self._items.number(item),
             "seed": record.seed,
             "outcome": self._outcomes.number(record.outcome),
-            "correct": None if answer is None else int(answer.correct),
+            "correct": None if record.is_correct is None else int(record.is_correct),
         }
         for name, value in row.items():
             self._rows[name].append(value)
@@ -121,10 +120,10 @@ class SampleIndex:
                 columns[name].append(value)
 
     def _add_item(self, record: Record) -> None:
-        subtask = record.question.subtask if isinstance(record, ChoiceRecord) else None
+        part = record.part
         self._about["scene"].append(self._scenes.number(record.scene))
         self._about["levels"].append(record.levels)
-        self._about["subtask"].append(None if subtask is None else self._subtasks.number(subtask))
+        self._about["subtask"].append(None if part is None else self._subtasks.number(part))
 
     def _score(self, record: Record, setting: str) -> dict[str, int | None]:
         """Counts under a setting by the headline matcher, and a bit for each type of wrong step."""
@@ -141,6 +140,8 @@ class SampleIndex:
         items = self.items
         return {
             "tracks": self._tracks.values,
+            "track_titles": [kinds()[name].title for name in self._tracks.values],
+            "track_items": [kinds()[name].item for name in self._tracks.values],
             "models": self._models.values,
             "outcomes": self._outcomes.values,
             "subtasks": self._subtasks.values,

@@ -12,7 +12,7 @@ from typing import Any
 import jinja2
 
 from phyblock.report.html.headline import Headline
-from phyblock.report.text_table import Column, TextTable
+from phyblock.tables.text_table import Column, TextTable
 
 __all__ = ["Figure", "render_page"]
 

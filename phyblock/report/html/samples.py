@@ -6,17 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from phyblock.datasets import QuestionTask
 from phyblock.records import PromptLines, Record, SentPrompt
+from phyblock.records.reading import any_records
 from phyblock.report.html.index import Item, Place, SampleIndex
 from phyblock.report.html.pack import Pack
-from phyblock.run.reading import any_records
-from phyblock.tasks.choice_record import ChoiceRecord
-from phyblock.tasks.episode_record import EpisodeRecord
-from phyblock.tasks.question_pictures import Shown
-from phyblock.tasks.vqa import asked
+from phyblock.tables.track_report import PageItems
 
-__all__ = ["pack_prompts", "pack_samples", "pictures_sent", "questions_asked"]
+__all__ = ["items_shown", "pack_prompts", "pack_samples", "pictures_sent"]
 
 _IN_INDEX = frozenset(
     {
@@ -60,19 +56,19 @@ def pictures_sent(folder: Path, places: Sequence[Place]) -> bool:
     )
 
 
-def questions_asked(
-    folder: Path, places: Sequence[Place], questions: Mapping[str, QuestionTask]
-) -> dict[Item, Shown]:
-    """The question of every item that is one, as it was shown; {} without `questions`."""
-    if not questions:
-        return {}
-    first = {Item(place.track, place.key): place for place in reversed(places)}
+def items_shown(
+    folder: Path, places: Sequence[Place], known: Mapping[str, PageItems]
+) -> dict[Item, Any]:
+    """What every item of the tracks in `known` was about, as it was shown."""
+    first = {
+        Item(place.track, place.key): place for place in reversed(places) if place.track in known
+    }
     first_asked = sorted(first.values(), key=lambda place: place.start)
     shown = {}
     for record in _records(folder, first_asked):
-        if isinstance(record, ChoiceRecord) and record.question.id in questions:
-            task = asked(questions[record.question.id], record.question.rotation)
-            shown[Item(record.track, record.item)] = task.shown
+        found = known[record.track].shown(record)
+        if found is not None:
+            shown[Item(record.track, record.item)] = found
     return shown
 
 
@@ -86,10 +82,10 @@ def _entry(
     entry = {name: value for name, value in record.fields().items() if name not in _IN_INDEX}
     entry["prompt"] = _prompt(record.prompt, prompts, pictures)
     entry["scores"] = [_score(score.fields()) for score in record.scores]
-    if isinstance(record, EpisodeRecord):
+    if record.asked_turns:
         entry["turns"] = [
             {**turn.fields(), "prompt": _prompt(turn.prompt, prompts, pictures)}
-            for turn in record.turns
+            for turn in record.asked_turns
         ]
     return entry
 

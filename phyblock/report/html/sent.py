@@ -13,8 +13,8 @@ from phyblock.files import atomic_write
 from phyblock.models import Image
 from phyblock.resources import cache_dir
 from phyblock.sim import PictureStyle
-from phyblock.tasks import PicturePolicy, Pictures
-from phyblock.tasks.question_pictures import QuestionPictures, Shown
+from phyblock.tables.track_report import PageItems
+from phyblock.tracks import PicturePolicy, Pictures
 
 __all__ = ["PictureShelf"]
 
@@ -51,11 +51,10 @@ class PictureShelf:
             if are_real:
                 self._keep(found, pictures.keys(task) if is_drawn else ())
 
-    def add_questions(self, questions: Iterable[Shown]) -> None:
-        """Keep the pictures of questions; raises OSError where the disk refuses."""
-        options_as = self._suite["vqa"]["options_as"]
-        pictures = QuestionPictures(self._cache, self._style, options_as, 1)
-        for shown in questions:
+    def add_items(self, items: PageItems, asked: Iterable[Any]) -> None:
+        """Keep the pictures of what was asked about; raises OSError where the disk refuses."""
+        pictures = items.pictures(self._cache, self._style)
+        for shown in asked:
             found, are_real = pictures.outline(shown)
             if are_real:
                 self._keep(found, pictures.keys(shown))

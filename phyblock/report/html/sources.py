@@ -1,4 +1,4 @@
-"""What a report takes from outside the run folder: the scenes and questions that were asked about.
+"""What a report takes from outside the run folder: the scenes and what else was asked about.
 
 Without them the page still shows every reply, plan and score; it cannot draw.
 """
@@ -10,12 +10,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from phyblock.datasets import AssemblyTask, Dataset, QuestionTask
+from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.errors import DataError, Problem
-from phyblock.report.design import Design
 from phyblock.run.data import open_dataset
-from phyblock.run.select import select_tasks
-from phyblock.run.vqa import open_questions
+from phyblock.tables.design import Design
+from phyblock.tables.track_report import PageItems
+from phyblock.tracks.kind import kind_of
+from phyblock.tracks.selection import select_tasks
 
 __all__ = ["Sources", "open_sources"]
 
@@ -25,15 +26,18 @@ _CHANGED = "is not the data set that the run was made on, or it was changed sinc
 
 @dataclass(frozen=True)
 class Sources:
-    """Tasks by scene id, questions by id; where there are none, `lacking` says why."""
+    """Tasks by scene id, and items that are more than scenes by track; where there are none,
+    `lacking` says why.
+    """
 
     tasks: Mapping[str, AssemblyTask] = field(default_factory=dict)
-    questions: Mapping[str, QuestionTask] = field(default_factory=dict)
+    items: Mapping[str, PageItems] = field(default_factory=dict)
     lacking: str = ""
 
 
 def open_sources(manifest: Mapping[str, Any], design: Design, data: Path | None) -> Sources:
-    """The scenes of a run, from `data` or from where the run found them, and its questions.
+    """The scenes of a run, from `data` or from where the run found them, and what else
+    its tracks asked about.
 
     Raises DataError when `data` is given and is not what the run was made on.
     """
@@ -41,7 +45,7 @@ def open_sources(manifest: Mapping[str, Any], design: Design, data: Path | None)
     try:
         dataset = _dataset(manifest, design, data or Path(recorded.get("root", "")))
         tasks = {task.scene.id: task for task in dataset.tasks}
-        return Sources(tasks, _questions(manifest, dataset))
+        return Sources(tasks, _items(manifest, design, dataset))
     except DataError as error:
         if data is not None:
             raise
@@ -64,12 +68,9 @@ def _dataset(manifest: Mapping[str, Any], design: Design, root: Path) -> Dataset
     return dataset
 
 
-def _questions(manifest: Mapping[str, Any], dataset: Dataset) -> dict[str, QuestionTask]:
-    """The questions of the vqa track, by id; {} for a run without it."""
-    recorded = manifest.get("questions")
-    if recorded is None:
-        return {}
-    questions = open_questions(recorded["format"], Path(recorded["root"]), dataset)
-    if questions.sha256 != manifest["tracks"]["vqa"]["questions"]:
-        raise DataError(Problem(str(questions.root), _CHANGED, "sha256", questions.sha256))
-    return {task.question.id: task for task in questions.tasks}
+def _items(manifest: Mapping[str, Any], design: Design, dataset: Dataset) -> dict[str, PageItems]:
+    """What was asked about, by track, where it is more than scenes."""
+    openers = {name: kind_of(name).report().items for name in design.suite.tracks}
+    return {
+        name: opener(manifest, dataset) for name, opener in openers.items() if opener is not None
+    }

@@ -9,29 +9,22 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from phyblock.domain import SUBTASK_NAMES
 from phyblock.files import writing
 from phyblock.records import MANIFEST, PROMPTS, RECORDS
-from phyblock.report.figures import FIGURES, write_figures
+from phyblock.report.figures import figure_titles, write_figures
 from phyblock.report.html.builds import clear, put_in_place, remove_build, remove_others
-from phyblock.report.html.drawable import kit, question_entry, scene_entry
-from phyblock.report.html.headline import assembly_headline
-from phyblock.report.html.headline_tracks import steps_headline, vqa_headline
+from phyblock.report.html.headline import headlines
 from phyblock.report.html.index import Item, SampleIndex, read_places
 from phyblock.report.html.pack import Pack, write_script
 from phyblock.report.html.page import Figure, render_page
-from phyblock.report.html.samples import (
-    pack_prompts,
-    pack_samples,
-    pictures_sent,
-    questions_asked,
-)
+from phyblock.report.html.samples import items_shown, pack_prompts, pack_samples, pictures_sent
 from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.sources import Sources, open_sources
-from phyblock.report.load import Run
 from phyblock.report.write import TablesWritten
 from phyblock.run.folder import run_folder
-from phyblock.tasks.question_pictures import Shown
+from phyblock.tables.load import Run
+from phyblock.tracks.drawable import kit, scene_entry
+from phyblock.tracks.kind import kind_of
 
 __all__ = ["REPORT_FILE", "page_files", "write_report"]
 
@@ -39,23 +32,12 @@ REPORT_FILE = "report.html"
 _FOLDER = "report"
 _PICTURES = "pictures"
 _CHUNK_BYTES = 2**20
-_FIGURES = {
-    "f1-levels": "F1 by level",
-    "f1-radar": "F1 by level, as in the paper",
-    "settings": "Setting A against setting B",
-    "error-types": "Wrong steps by type",
-    "f1-size": "F1 by model size",
-    "f1-cost": "F1 by cost",
-    "vqa-subtasks": "VQA accuracy by subtask",
-    "step-progress": "Blocks placed, turn by turn",
-    "scenes": "The scenes of the run by level",
-}
 _NOT_SHOWN = ("table1",)
 """Tables that a headline table replaces."""
 
 
 def write_report(
-    written: TablesWritten, data: Path | None = None, figures: Sequence[str] = FIGURES
+    written: TablesWritten, data: Path | None = None, figures: Sequence[str] = ()
 ) -> Path:
     """Write figures, `report.html` and `report/` of a run whose tables were; the page's path.
 
@@ -107,7 +89,7 @@ def _write_data(run: Run, sources: Sources, folder: Path, new: Path, build: str)
     kinds = ("records", "scenes", "questions", "prompts")
     packs = {kind: Pack(new, kind, build) for kind in kinds}
     places = read_places(run.path, run.design)
-    asked = questions_asked(run.path, places, sources.questions)
+    asked = items_shown(run.path, places, sources.items)
     pictures = {}
     if pictures_sent(run.path, places):
         pictures = _keep_pictures(run, sources, asked, folder / _PICTURES)
@@ -118,7 +100,7 @@ def _write_data(run: Run, sources: Sources, folder: Path, new: Path, build: str)
         task = sources.tasks.get(scene)
         packs["scenes"].add(task and scene_entry(task.scene, task.candidates))
     questions = {
-        item: packs["questions"].add(question_entry(shown.question))
+        item: packs["questions"].add(dict(sources.items[item.track].entry(shown)))
         for item, shown in asked.items()
     }
     for pack in packs.values():
@@ -128,35 +110,43 @@ def _write_data(run: Run, sources: Sources, folder: Path, new: Path, build: str)
         "starts": {kind: pack.starts for kind, pack in packs.items()},
         "kit": kit(),
         "no_scenes": sources.lacking,
-        "subtask_names": SUBTASK_NAMES,
+        "subtask_names": _part_names(run),
     }
     write_script(new, "index", build, content)
 
 
 def _keep_pictures(
-    run: Run, sources: Sources, asked: Mapping[Item, Shown], folder: Path
+    run: Run, sources: Sources, asked: Mapping[Item, Any], folder: Path
 ) -> dict[str, str]:
     """Addresses of the pictures at hand as seen from the page, by digest."""
     shelf = PictureShelf(folder, run.manifest["suite"])
-    if set(run.design.suite.tracks) - {"vqa"}:
-        known = (sources.tasks.get(scene) for scene in _scenes(run))
+    if scenes := _scenes(run):
+        known = (sources.tasks.get(scene) for scene in scenes)
         shelf.add_scenes(task for task in known if task is not None)
-    if asked:
-        shelf.add_questions(asked.values())
+    for track, items in sources.items.items():
+        shelf.add_items(items, [shown for item, shown in asked.items() if item.track == track])
     return {digest: f"{_FOLDER}/{_PICTURES}/{name}" for digest, name in shelf.names.items()}
 
 
+def _part_names(run: Run) -> dict[str, str]:
+    """What parts of tracks are called, by their short names."""
+    names: dict[str, str] = {}
+    for track in run.design.suite.tracks:
+        names |= kind_of(track).report().part_names
+    return names
+
+
 def _scenes(run: Run) -> list[str]:
-    return list(run.records.loc[run.records["track"] != "vqa", "scene"].unique())
+    """Scenes that were asked about as such: their names are those of the items."""
+    return list(run.records.loc[run.records["item"] == run.records["scene"], "scene"].unique())
 
 
 def _page(written: TablesWritten, figures: Sequence[Path], build: str) -> str:
     run = written.run
-    headlines = [assembly_headline(run), vqa_headline(run), steps_headline(run)]
     return render_page(
         about=_about(run),
-        headlines=[headline for headline in headlines if headline],
-        figures=_figures(figures),
+        headlines=headlines(run),
+        figures=_figures(run, figures),
         tables=[view for name, view in written.views.items() if name not in _NOT_SHOWN],
         folder=f"{_FOLDER}/{build}",
         build=build,
@@ -184,9 +174,10 @@ def _about(run: Run) -> dict[str, Any]:
     }
 
 
-def _figures(files: Sequence[Path]) -> list[Figure]:
+def _figures(run: Run, files: Sequence[Path]) -> list[Figure]:
+    titles = figure_titles(run)
     return [
-        Figure(f"{path.parent.name}/{path.name}", _FIGURES.get(path.stem, path.stem))
+        Figure(f"{path.parent.name}/{path.name}", titles.get(path.stem, path.stem))
         for path in files
         if path.suffix == ".svg"
     ]

@@ -15,7 +15,6 @@ function el(tag, attributes = {}, ...children) {
 
 const Words = (() => {
   const names = {
-    full_planning: "Full planning", step_planning: "Step planning", vqa: "VQA",
     ok: "OK", parse_failure: "Unparsed", refusal: "Refusal", truncated: "Truncated",
     api_error: "API error", missing: "Missing",
     shape_not_in_gt: "Shape not in GT", overflow: "Overflow",

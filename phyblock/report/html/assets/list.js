@@ -35,7 +35,7 @@ const List = (() => {
           apply();
           choose(rows.length ? rows[0] : -1);
         },
-      }, Words.named(track));
+      }, Data.index.track_titles[i]);
       place.append(button);
     });
   }
@@ -47,29 +47,43 @@ const List = (() => {
     buildFilters();
   }
 
-  const isVqa = () => Data.index.tracks[state.track] === "vqa";
+  /** Whether a row of the chosen track has a value in a column. */
+  const hasValue = (column) => column.some((value, row) =>
+    value !== null && Data.index.rows.track[row] === state.track);
+
+  /** What the chosen track asks about, where that is more than a scene. */
+  function nounOfItems() {
+    const { rows: columns, items, scenes, track_items: nouns } = Data.index;
+    const isMore = columns.item.some((item, row) =>
+      columns.track[row] === state.track && items.key[item] !== scenes[items.scene[item]]);
+    const noun = nouns[state.track];
+    return isMore ? `${noun[0].toUpperCase()}${noun.slice(1)} or scene` : "Scene";
+  }
 
   function buildFilters() {
     const { index } = Data;
     const of = (values, label) => values.map((value, i) => [i, label ? label(value) : value]);
     Object.keys(filters).forEach((name) => delete filters[name]);
     const levels = [...new Set(index.items.levels.flat())].sort();
+    const scores = index.rows.scores[state.setting];
+    const hasScores = scores !== undefined && hasValue(scores.tp);
+    const hasParts = hasValue(index.rows.item.map((item) => index.items.subtask[item]));
     const fields = [
       select("model", "Model", of(index.models)),
       levels.length > 1 && select("level", "Level", levels.map((level) => [level, `Level ${level}`])),
-      isVqa() && select("subtask", "Subtask", of(index.subtasks, (s) => `${s} ${index.subtask_names[s] || ""}`)),
-      isVqa() && select("answer", "Answer", [[1, "Right"], [0, "Wrong"]]),
+      hasParts && select("subtask", "Subtask", of(index.subtasks, (s) => `${s} ${index.subtask_names[s] || ""}`)),
+      hasValue(index.rows.correct) && select("answer", "Answer", [[1, "Right"], [0, "Wrong"]]),
       select("outcome", "Outcome", of(index.outcomes, Words.named)),
-      !isVqa() && select("error", "Error type", of(index.error_types, Words.named)),
+      hasScores && select("error", "Error type", of(index.error_types, Words.named)),
       index.seeds.length > 1 && select("seed", "Seed", index.seeds.map((seed) => [seed, `Seed ${seed}`])),
-      !isVqa() && index.settings.length > 1 && settingField(),
+      hasScores && index.settings.length > 1 && settingField(),
       sortField(),
     ];
     form.replaceChildren(searchField(), ...fields.filter(Boolean));
   }
 
   function searchField() {
-    return el("label", { class: "wide" }, el("span", {}, isVqa() ? "Question or scene" : "Scene"),
+    return el("label", { class: "wide" }, el("span", {}, nounOfItems()),
       el("input", {
         type: "search", id: "search", placeholder: "Search", autocomplete: "off", spellcheck: "false",
         oninput: (event) => {

@@ -1,0 +1,154 @@
+"""The tracks that there are, and the baselines that they bring: the one place that names them.
+
+Layers below the tracks ask here for the words that tracks add (sections of a suite, names of
+baselines and tables) without importing them: a track's package is loaded when it is first asked
+for.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+__all__ = [
+    "PUBLISHED_TABLE",
+    "TrackWords",
+    "add_measure",
+    "added_measures",
+    "baseline_names",
+    "baseline_rules",
+    "known_track",
+    "known_tracks",
+    "register_track",
+    "remove_measure",
+    "table_names",
+    "unregister_track",
+]
+
+_PACKAGES = (
+    "phyblock.tracks.full_planning",
+    "phyblock.tracks.step_planning",
+    "phyblock.tracks.vqa",
+)
+"""Packages that hold a `TRACK`, in the order in which tracks are listed."""
+
+PUBLISHED_TABLE = "published"
+"""The comparison with the paper, which a suite has only if it asks for it."""
+
+
+class TrackWords(Protocol):
+    """What lower layers know of a track; `phyblock.tracks.TrackKind` is the whole."""
+
+    @property
+    def name(self) -> str:
+        """What suites and records call it."""
+
+    @property
+    def title(self) -> str:
+        """What people read in the place of the name."""
+
+    @property
+    def plays(self) -> bool:
+        """Whether a sample is an episode of several turns."""
+
+    @property
+    def about(self) -> str:
+        """What it asks, for the documentation of suites."""
+
+    @property
+    def section(self) -> tuple[str, type[BaseModel], str] | None:
+        """Key, model and description of the section of a suite that is its own."""
+
+    @property
+    def baselines(self) -> Mapping[str, Callable[..., str]]:
+        """Rules that answer without a model, by name of the baseline."""
+
+    @property
+    def subject(self) -> type[object]:
+        """What its requests are about: the first argument of its rules."""
+
+    @property
+    def tables(self) -> tuple[str, ...]:
+        """Names of tables that a suite can ask for, in the order in which they are listed."""
+
+    @property
+    def prompt_field(self) -> tuple[str, ...]:
+        """Where a suite names its prompt, as a path of keys."""
+
+    @property
+    def record(self) -> type[Any] | None:
+        """The model of its records; None for one that adds nothing to them."""
+
+    def data_folder(self, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:
+        """The folder of its own data as a suite says it: text, path of keys, may be bundled."""
+
+
+_registered: dict[str, TrackWords] = {}
+_measures: dict[str, tuple[Any, ...]] = {}
+
+
+def known_tracks() -> Mapping[str, TrackWords]:
+    """Every track by name, the built-in ones first."""
+    built_in = [importlib.import_module(package).TRACK for package in _PACKAGES]
+    return {kind.name: kind for kind in built_in} | _registered
+
+
+def known_track(name: str) -> TrackWords:
+    """The track of a name; KeyError for one that there is not."""
+    return known_tracks()[name]
+
+
+def register_track(kind: TrackWords) -> None:
+    """Add a track. Raises ValueError for a name, section or table that is taken."""
+    known = known_tracks().values()
+    taken = {other.name for other in known} | {
+        other.section[0] for other in known if other.section is not None
+    }
+    wanted = {kind.name} | ({kind.section[0]} if kind.section is not None else set())
+    if clash := sorted(wanted & taken):
+        raise ValueError(f"a track or section has this name already: {', '.join(clash)}")
+    _registered[kind.name] = kind
+
+
+def unregister_track(name: str) -> None:
+    """Take an added track away again; KeyError for one that was not added."""
+    del _registered[name]
+
+
+def add_measure(track: str, measure: Any) -> None:
+    """Add a `phyblock.tables.Measure` to a track; KeyError for a track that there is not."""
+    _measures[known_track(track).name] = (*added_measures(track), measure)
+
+
+def remove_measure(track: str, name: str) -> None:
+    """Take an added measure away again."""
+    _measures[track] = tuple(one for one in added_measures(track) if one.name != name)
+
+
+def added_measures(track: str) -> tuple[Any, ...]:
+    """Measures that were added to a track, in the order in which they came."""
+    return _measures.get(track, ())
+
+
+def table_names() -> tuple[str, ...]:
+    """Tables that a suite can ask for: those of its tracks, then the comparison with the paper."""
+    own = (name for kind in known_tracks().values() for name in kind.tables)
+    return (*dict.fromkeys(own), PUBLISHED_TABLE)
+
+
+def baseline_names() -> tuple[str, ...]:
+    """Names of all baselines, in the order of the tracks that bring them."""
+    return tuple(dict.fromkeys(name for kind in known_tracks().values() for name in kind.baselines))
+
+
+def baseline_rules(name: str) -> Mapping[type[object], Callable[..., str]]:
+    """The rules of one baseline by what they answer about; empty for a name that is none."""
+    return {
+        kind.subject: kind.baselines[name]
+        for kind in known_tracks().values()
+        if name in kind.baselines
+    }

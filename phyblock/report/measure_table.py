@@ -1,0 +1,120 @@
+"""Tables that any track has: its headline measures, and measures that stand in no other table."""
+
+from __future__ import annotations
+
+import math
+
+import pandas as pd
+
+from phyblock.tables.headline import Value, headline_rows, headline_values
+from phyblock.tables.load import Run
+from phyblock.tables.measures import CELL
+from phyblock.tables.text_table import Column, TextTable, between, number
+from phyblock.tables.track_report import Shown
+from phyblock.tracks.estimates import track_estimates, track_measures
+from phyblock.tracks.kind import kind_of
+
+__all__ = [
+    "headline_columns",
+    "headline_frame",
+    "headline_of",
+    "headline_view",
+    "main_heading",
+    "measures_frame",
+    "measures_view",
+]
+
+_NUMBERS = ("value", "lo", "hi", "se", "mean", "sd")
+
+
+def headline_columns(run: Run, track: str) -> tuple[Shown, ...]:
+    """The columns of a track's headline: those it chooses, else its first measure in every cell."""
+    report = kind_of(track).report()
+    if report.headline is not None:
+        return report.headline(run)
+    (first, *_) = report.measures
+    return tuple(Shown(first.name, cell.name, cell.heading) for cell in report.cells(run))
+
+
+def main_heading(run: Run, track: str) -> str:
+    """Heading of the column that models are ranked by."""
+    headings = [column.heading for column in headline_columns(run, track)]
+    main = kind_of(track).report().main
+    return main if main in headings else headings[-1]
+
+
+def headline_of(run: Run, track: str) -> dict[tuple[str, str], Value]:
+    """Values of a track's headline by model and heading."""
+    found, measures = track_estimates(run, track), track_measures(track)
+    return dict(headline_values(found, run.design, measures, headline_columns(run, track)))
+
+
+def headline_frame(track: str, run: Run) -> pd.DataFrame:
+    """One row a model and column of the headline, in the unit of its measure."""
+    values = headline_of(run, track)
+    rows = [
+        {"model": model, "column": heading, "value": value.shown, "lo": value.lo, "hi": value.hi}
+        for (model, heading), value in values.items()
+    ]
+    return pd.DataFrame(rows, columns=["model", "column", "value", "lo", "hi"])
+
+
+def headline_view(track: str, table: pd.DataFrame, run: Run) -> TextTable:
+    """Values with their intervals out of `headline_frame`."""
+    headings = [column.heading for column in headline_columns(run, track)]
+    values = {(row["model"], row["column"]): row for row in table.to_dict("records")}
+    rows = []
+    for model in run.design.model_names:
+        texts = [model]
+        for heading in headings:
+            row = values.get((model, heading), {"value": math.nan, "lo": math.nan, "hi": math.nan})
+            texts += [number(row["value"]), between(row["lo"], row["hi"])]
+        rows.append(tuple(texts))
+    columns = [Column(name, heading) for heading in headings for name in ("Value", "95 % CI")]
+    kind = kind_of(track)
+    suite = f", suite {run.design.suite.name}" if run.design.suite.name else ""
+    return TextTable(
+        f"{kind.title}{suite}",
+        (Column("Model", is_text=True), *columns),
+        tuple(rows),
+        tuple(kind.report().notes(run)),
+    )
+
+
+def measures_frame(run: Run) -> pd.DataFrame:
+    """Measures that stand in no table of their track: a row a track, measure, model and cell."""
+    parts = []
+    for track in run.design.suite.tracks:
+        found = headline_rows(track_estimates(run, track), run.design)
+        shown = {column.measure for column in headline_columns(run, track)}
+        for measure in track_measures(track):
+            if measure.in_tables and measure.name not in shown:
+                mine = found[found["measure"] == measure.name].copy()
+                mine[list(_NUMBERS)] = measure.scale * mine[list(_NUMBERS)].astype("float64")
+                parts.append(mine.assign(track=track, unit=measure.unit))
+    columns = ["track", "measure", "unit", "model", CELL, "n", *_NUMBERS]
+    return pd.concat(parts)[columns] if parts else pd.DataFrame(columns=columns)
+
+
+def measures_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """A row a model and measure out of `measures_frame`, with its value over everything."""
+    whole = {
+        track: kind_of(track).report().cells(run)[-1].name for track in run.design.suite.tracks
+    }
+    rows, notes = [], {}
+    for row in table.to_dict("records"):
+        if row[CELL] != whole[row["track"]]:
+            continue
+        (measure,) = (m for m in track_measures(row["track"]) if m.name == row["measure"])
+        unit = f" ({measure.unit})" if measure.unit else ""
+        value, interval = number(row["value"], 2), between(row["lo"], row["hi"])
+        rows.append((row["model"], f"{measure.heading}{unit}", value, interval, str(row["n"])))
+        notes[measure.name] = f"{measure.heading}: {measure.meaning}; {measure.better} is better."
+    columns = (
+        Column("Model", is_text=True),
+        Column("Measure", is_text=True),
+        Column("Value"),
+        Column("95 % CI"),
+        Column("n"),
+    )
+    return TextTable("Further measures", columns, tuple(rows), tuple(notes.values()))

@@ -1,0 +1,1 @@
+"""What stored records come to: measures, estimates with their intervals, tables as text."""

@@ -1,0 +1,144 @@
+"""What a run was meant to be: models x scenes x seeds, settings, matchers, criteria."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic_core import PydanticCustomError
+
+from phyblock.errors import Problem, StoreError
+from phyblock.registry import known_tracks, table_names
+from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.words import Criterion, MissingPolicy
+
+__all__ = ["OVERALL", "Design", "read_design"]
+
+OVERALL = "overall"
+"""Name of the row that pools the scenes of all levels."""
+
+
+class _Part(BaseModel):
+    """A part of run.yaml of which only some keys are read here."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+
+class _Scoring(_Part):
+    matchers: tuple[str, ...] = Field(min_length=1)
+    level1: Criterion
+    missing: MissingPolicy
+
+
+class _Suite(_Part):
+    name: str = ""
+    tracks: tuple[str, ...] = Field(default_factory=lambda: tuple(known_tracks())[:1])
+    levels: tuple[int, ...] = Field(min_length=1)
+    settings: tuple[str, ...] = Field(min_length=1)
+    seeds: tuple[int, ...] = Field(min_length=1)
+    scoring: _Scoring
+    tables: tuple[str, ...] = Field(default_factory=table_names)
+
+
+class _Model(_Part):
+    name: str
+    published: str | None = None
+    size_b: float | None = None
+
+
+class Design(_Part):
+    """The plan of a run as its `run.yaml` states it; the rows and columns of every table.
+
+    `items` counts what each track asks about; `scenes_by_level` counts the scenes of each level
+    (one scene may be of several), `scenes` all distinct ones. The first matcher and the first
+    setting are the headline.
+    """
+
+    suite: _Suite
+    models: tuple[_Model, ...]
+    items: dict[str, int]
+    scenes_by_level: dict[int, int]
+    scenes: int
+
+    @field_validator("models")
+    @classmethod
+    def _differ(cls, models: tuple[_Model, ...]) -> tuple[_Model, ...]:
+        counts = Counter(model.name for model in models)
+        if twice := [name for name, count in counts.items() if count > 1]:
+            raise PydanticCustomError("twice", f"names models twice: {', '.join(twice)}")
+        return models
+
+    @property
+    def model_names(self) -> tuple[str, ...]:
+        """Names of the models in the order of the suite."""
+        return tuple(model.name for model in self.models)
+
+    @property
+    def published(self) -> dict[str, str]:
+        """What the paper calls each model that it knows; Table 1 need not have a row of it."""
+        return {model.name: model.published for model in self.models if model.published}
+
+    def samples(self, track: str) -> int:
+        """Samples that a complete run holds of one model in a track."""
+        return self.items.get(track, 0) * len(self.suite.seeds)
+
+    @property
+    def levels(self) -> tuple[str, ...]:
+        """Level names in ascending order, then `overall`."""
+        return (*(str(level) for level in sorted(self.suite.levels)), OVERALL)
+
+    @property
+    def matcher(self) -> str:
+        """The headline matcher."""
+        return self.suite.scoring.matchers[0]
+
+    @property
+    def setting(self) -> str:
+        """The headline setting."""
+        return self.suite.settings[0]
+
+    @property
+    def outcomes_left_out(self) -> frozenset[str]:
+        """Outcomes whose samples enter no score under the policy on missing replies."""
+        return frozenset(WITHOUT_REPLY) if self.suite.scoring.missing == "skip" else frozenset()
+
+    def criterion(self, level: str) -> str:
+        """The criterion that scores a level.
+
+        Level 1 has its own. `overall` counts every scene once by `aov`, or by the Level-1
+        criterion where no other level was run.
+        """
+        only_level1 = set(self.suite.levels) == {1}
+        if level == "1" or (level == OVERALL and only_level1):
+            return self.suite.scoring.level1
+        return "aov"
+
+    def matchers(self, criterion: str) -> tuple[str, ...]:
+        """Matchers that a criterion distinguishes; `("",)` for those that know none."""
+        return self.suite.scoring.matchers if criterion == "aov" else ("",)
+
+    def expected(self, level: str) -> int:
+        """Samples that a complete run holds of one model at a level."""
+        scenes = self.scenes if level == OVERALL else self.scenes_by_level.get(int(level), 0)
+        return scenes * len(self.suite.seeds)
+
+
+def read_design(manifest: Mapping[str, Any], where: str = "run.yaml") -> Design:
+    """Read the parts of a run's manifest that tables need.
+
+    Raises StoreError naming `where` and every field that is missing or wrong.
+    """
+    try:
+        return Design.model_validate(dict(manifest))
+    except ValidationError as error:
+        raise StoreError(
+            Problem(
+                where=where,
+                field=".".join(str(part) for part in found["loc"]),
+                message=found["msg"],
+                hint="run.yaml is written by `phyblock run` and is never edited",
+            )
+            for found in error.errors()
+        ) from error

@@ -1,0 +1,107 @@
+"""The estimates that stand for a track: its headline columns, with their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+
+from phyblock.tables.design import Design
+from phyblock.tables.load import Run
+from phyblock.tables.measures import CELL, Measure
+from phyblock.tables.text_table import Column, TextTable, between, number
+from phyblock.tables.track_report import Shown
+
+__all__ = ["Value", "headline_rows", "headline_values", "interval_frame", "interval_view"]
+
+
+@dataclass(frozen=True)
+class Value:
+    """An estimate as tables show it, in the unit of its measure (percent for shares).
+
+    `shown` is the mean over seeds where there are several, else the pooled value; `lo` and `hi`
+    are NaN where there is no interval.
+    """
+
+    shown: float
+    pooled: float
+    sd: float
+    lo: float
+    hi: float
+
+
+def headline_rows(found: pd.DataFrame, design: Design) -> pd.DataFrame:
+    """The rows of a frame of estimates in the headline setting and matcher."""
+    return found[
+        found["setting"].isin(["", design.setting]) & found["matcher"].isin(["", design.matcher])
+    ]
+
+
+def headline_values(
+    found: pd.DataFrame, design: Design, measures: Sequence[Measure], columns: Sequence[Shown]
+) -> Mapping[tuple[str, str], Value]:
+    """Values by model and heading."""
+    scale = {measure.name: measure.scale for measure in measures}
+    several = len(design.suite.seeds) > 1
+    rows = headline_rows(found, design)
+    values = {}
+    for column in columns:
+        mine = rows[(rows["measure"] == column.measure) & (rows[CELL] == column.cell)]
+        if column.criterion:
+            mine = mine[mine["criterion"] == column.criterion]
+        for row in mine.to_dict("records"):
+            numbers = {
+                name: scale[column.measure] * float(row[name])
+                for name in ("value", "mean", "sd", "lo", "hi")
+            }
+            shown = numbers["mean"] if several else numbers["value"]
+            values[str(row["model"]), column.heading] = Value(
+                shown, numbers["value"], numbers["sd"], numbers["lo"], numbers["hi"]
+            )
+    return values
+
+
+def interval_frame(
+    found: pd.DataFrame, design: Design, scale: float, by: Sequence[str]
+) -> pd.DataFrame:
+    """Pooled values with intervals, a row an estimate, models in the order of the suite.
+
+    Columns are `model`, those of `by`, value, lo, hi, se (times `scale`), n, seeds, n_scenes,
+    n_clusters.
+    """
+    place = {name: number for number, name in enumerate(design.model_names)}
+    rows = headline_rows(found, design)
+    rows = rows[rows["model"].isin(place)]
+    rows = rows.sort_values("model", key=lambda names: names.map(place), kind="stable")
+    numbers = ["value", "lo", "hi", "se"]
+    table = rows[["model", *by, *numbers, "n", "seeds", "n_scenes", "n_clusters"]].copy()
+    table[numbers] = scale * table[numbers].astype("float64")
+    return table.reset_index(drop=True)
+
+
+def interval_view(
+    table: pd.DataFrame, run: Run, cells: Sequence[str], caption: str, by: str = CELL
+) -> TextTable:
+    """Values with intervals out of `interval_frame`: a row a model, a pair of columns a cell."""
+    rows = []
+    for model, part in table.groupby("model", sort=False):
+        of_cell = part.set_index(by).to_dict("index")
+        pairs = [
+            (number(of_cell[cell]["value"]), between(of_cell[cell]["lo"], of_cell[cell]["hi"]))
+            for cell in cells
+        ]
+        rows.append((str(model), *(text for pair in pairs for text in pair)))
+    columns = [
+        Column(name, cell.replace("_", " ").capitalize())
+        for cell in cells
+        for name in ("%", "95 % CI")
+    ]
+    suite = f", suite {run.design.suite.name}" if run.design.suite.name else ""
+    most = f", at most {table['n_clusters'].max()} of them" if len(table) else ""
+    return TextTable(
+        f"{caption} with 95 % intervals{suite}",
+        (Column("Model", is_text=True), *columns),
+        tuple(rows),
+        (f"Intervals: base scenes resampled{most}.",),
+    )

@@ -1,0 +1,89 @@
+"""What is measured: counts of samples that add up, and what sums of them are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from phyblock.scoring.uncertainty import Metric
+    from phyblock.tables.load import Run
+
+__all__ = ["CELL", "VARIANT", "Cell", "Counted", "Measure"]
+
+VARIANT = ("setting", "matcher", "criterion")
+"""How a sample was counted; "" where its track knows no such choice."""
+CELL = "cell"
+"""Column of the cell that a row of counts is pooled in."""
+
+Unit = Literal["%", "cm", "degrees", "steps", "blocks", ""]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A part of what a track asks about, as a level or a subtask: a column of its tables.
+
+    Samples of a cell are pooled. Where `of` names other cells, it is the unweighted mean of these
+    instead, and has no value where one of them has none.
+    """
+
+    name: str
+    heading: str
+    group: str = ""
+    of: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Counted:
+    """Counts of samples, from which one or several measures are made.
+
+    `frame` makes them out of a run: a row a sample, way of counting it and cell that it is pooled
+    in, with the columns `model`, `scene`, `item`, `seed`, those of `VARIANT`, `CELL`, `replied`
+    (whether the model said anything), and one of each name in `columns`. Samples that the run
+    leaves out have no row. Instead of it, `sample` counts one sample when its reply is judged: it
+    is given the item that was asked about and the track's judgement of the reply (or the episode
+    that was played), and its numbers, one of each name in `columns`, are kept in the record. Where
+    it returns None, the sample is not counted.
+    """
+
+    name: str
+    columns: tuple[str, ...]
+    frame: Callable[[Run], pd.DataFrame] | None = None
+    sample: Callable[[Any, Any], Sequence[float] | None] | None = None
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One number about a model.
+
+    `value` makes it of summed counts, shape (..., columns of `counted`), NaN where it is not
+    defined. `heading` and `meaning` are for people; `unit` "%" stands for values in [0, 1] that
+    tables show times 100. `over` names what is counted. `chance` says what guessing gives in a
+    cell, `floors` names baselines that never see the goal. One that is not `in_tables` is in the
+    frame of estimates alone.
+    """
+
+    name: str
+    heading: str
+    counted: Counted
+    value: Metric
+    meaning: str = ""
+    unit: Unit = "%"
+    better: Literal["higher", "lower"] = "higher"
+    over: str = "samples"
+    chance: Callable[[Run, str], float] | None = None
+    floors: tuple[str, ...] = ()
+    in_tables: bool = True
+
+    @property
+    def best(self) -> float:
+        """The value of a perfect sample, as it is shown."""
+        return self.scale if self.better == "higher" else 0.0
+
+    @property
+    def scale(self) -> float:
+        """What a value is multiplied by where it is shown."""
+        return 100.0 if self.unit == "%" else 1.0

@@ -1,0 +1,28 @@
+"""The outcomes of samples as tables count and call them."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+from phyblock.words import Outcome
+
+__all__ = ["FAILURES", "HEADINGS", "OUTCOMES", "WITHOUT_REPLY"]
+
+OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
+"""Every outcome, in the order of columns."""
+
+FAILURES: tuple[Outcome, ...] = tuple(outcome for outcome in OUTCOMES if outcome != "ok")
+"""Every outcome but `ok`."""
+
+WITHOUT_REPLY: tuple[Outcome, ...] = ("api_error", "missing")
+"""Outcomes of samples that the model said nothing about; a refusal is an answer."""
+
+HEADINGS: dict[Outcome, str] = {
+    "ok": "OK",
+    "parse_failure": "Unparsed",
+    "refusal": "Refusal",
+    "truncated": "Truncated",
+    "api_error": "API error",
+    "missing": "Missing",
+}
+"""What heads the column of each outcome."""

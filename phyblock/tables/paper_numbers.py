@@ -1,0 +1,103 @@
+"""The numbers that the paper prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+
+import pandas as pd
+
+from phyblock.tables.load import Run
+from phyblock.tables.text_table import Column, TextTable, number
+
+__all__ = [
+    "HUMAN_ACCURACY",
+    "HUMAN_NOTE",
+    "NOTHING",
+    "beside",
+    "beside_view",
+    "interleaved",
+    "published_table",
+]
+
+HUMAN_ACCURACY = 94.7
+"""Human experts [%]: 378.83 points on 400 tasks of planning and VQA (paper, appendix)."""
+
+HUMAN_NOTE = (
+    "Human experts scored 378.83 of 400 tasks drawn from planning and VQA together (paper, "
+    "appendix): an accuracy, shown for scale."
+)
+"""What stands under every table that shows it."""
+
+_KINDS = {"published": "paper", "ours": "ours", "difference": "difference"}
+NOTHING = pd.DataFrame(
+    columns=["model", "published_name", "cell", "published", "ours", "difference"]
+)
+"""What a run that lacks the track of a table has beside it."""
+
+
+def published_table(number: int) -> pd.DataFrame:
+    """A results table of the paper (1, 2, 3 or 5), one printed value [%] a row.
+
+    `published/README.md` says what the columns are and where the numbers come from.
+    """
+    with (files("phyblock.tables") / "published" / f"table{number}.csv").open("rb") as file:
+        return pd.read_csv(file, dtype={"level": "object"})
+
+
+def beside(printed: pd.DataFrame, ours: pd.DataFrame, run: Run, keys: list[str]) -> pd.DataFrame:
+    """Published cells of the run's models with our value and ours minus published [%].
+
+    `printed` is a `published_table`; `ours` has the columns model, `keys` and ours [%].
+    """
+    names = pd.DataFrame(
+        list(run.design.published.items()), columns=["model", "published_name"], dtype="object"
+    )
+    cells = names.merge(
+        printed.rename(columns={"model": "published_name", "value": "published"}),
+        on="published_name",
+    )
+    table = cells.merge(ours, on=["model", *keys], how="left")
+    table["difference"] = table["ours"] - table["published"]
+    return table[["model", "published_name", *keys, "published", "ours", "difference"]]
+
+
+def interleaved(table: pd.DataFrame, cells: Sequence[str]) -> pd.DataFrame:
+    """Cells of a table in which a published row may follow that of a model."""
+    sources = table.to_dict("records")
+    ours = {row["model"]: row for row in sources if row["source"] == "run"}
+    rows = [
+        (row["model"], row["published_name"], cell, row[cell], ours[row["model"]][cell])
+        for row in sources
+        if row["source"] == "published"
+        for cell in cells
+    ]
+    names = ["model", "published_name", "cell", "published", "ours"]
+    found = pd.DataFrame(rows, columns=names).astype({"published": "float64", "ours": "float64"})
+    return found.assign(difference=found["ours"] - found["published"])
+
+
+def beside_view(
+    table: pd.DataFrame, run: Run, *, number_in_paper: int, names: Mapping[str, str], note: str
+) -> TextTable:
+    """Three rows a model: published, ours, difference; a column a cell."""
+    cells = list(dict.fromkeys(table["cell"]))
+    rows = []
+    for model, part in table.groupby("model", sort=False):
+        by_cell = part.set_index("cell").to_dict()
+        label = f"{model} ({part['published_name'].iloc[0]})"
+        for head, kind, signed in (
+            (label, "published", False),
+            ("", "ours", False),
+            ("", "difference", True),
+        ):
+            values = (number(by_cell[kind][cell], signed=signed) for cell in cells)
+            rows.append((head, _KINDS[kind], *values))
+    columns = [Column(names.get(cell, cell)) for cell in cells]
+    suite = f", suite {run.design.suite.name}" if run.design.suite.name else ""
+    return TextTable(
+        f"Our numbers beside the paper's Table {number_in_paper}{suite} (%)",
+        (Column("Model", is_text=True), Column("", is_text=True), *columns),
+        tuple(rows),
+        (note,),
+    )

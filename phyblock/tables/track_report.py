@@ -1,0 +1,151 @@
+"""What a track brings to the report: its measures, its cells, and tables and figures of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+from phyblock.tables.measures import CELL, Cell, Measure
+from phyblock.tables.text_table import TextTable
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from phyblock.datasets import Dataset
+    from phyblock.models import Image
+    from phyblock.records import Record
+    from phyblock.sim import PictureStyle
+    from phyblock.tables.load import Run
+
+__all__ = [
+    "WHOLE",
+    "KeptPictures",
+    "PageItems",
+    "PaperTable",
+    "Shown",
+    "TableMaker",
+    "TrackReport",
+    "in_whole",
+]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A measure in a cell, as a column of a headline table.
+
+    `criterion` says how it is counted, where one measure is counted in several ways.
+    """
+
+    measure: str
+    cell: str
+    heading: str
+    criterion: str = ""
+
+
+@dataclass(frozen=True)
+class PaperTable:
+    """How a table of the paper is set beside ours.
+
+    `frame` has a row a cell with columns model, published_name, published, ours, difference; it is
+    empty where no model of the run has a row in that table.
+    """
+
+    frame: Callable[[Run], pd.DataFrame]
+    view: Callable[[pd.DataFrame, Run], TextTable]
+
+
+class KeptPictures(Protocol):
+    """Pictures of items in a folder of kept ones."""
+
+    def outline(self, item: Any) -> tuple[Sequence[Image], bool]:
+        """The pictures of an item as far as they are at hand, and whether all are."""
+
+    def keys(self, item: Any) -> Sequence[str]:
+        """Names under which they are kept."""
+
+
+@dataclass(frozen=True)
+class PageItems:
+    """What the page of a report shows of items that are more than their scene.
+
+    `shown` gives what a record asked about, as it was shown, None where that is not known. `entry`
+    is what the page takes of it, `pictures` finds those that were sent in a folder of kept ones.
+    """
+
+    shown: Callable[[Record], Any | None]
+    entry: Callable[[Any], Mapping[str, Any]]
+    pictures: Callable[[Path, PictureStyle], KeptPictures]
+
+
+@dataclass(frozen=True)
+class TableMaker:
+    """How a table is made and how people read it; without `view` it is a CSV file alone.
+
+    `comes_with` names the table that it accompanies, where it has rows at all. `in_terminal` gives
+    the forms of the view that the terminal shows, the widest first: it takes the first that fits,
+    else the last; without it, or where it gives none, the table stands in the files alone. `lines`
+    say in the terminal what is in the table, the first of them as a headline.
+    """
+
+    frame: Callable[[Run], pd.DataFrame]
+    view: Callable[[pd.DataFrame, Run], TextTable] | None = None
+    comes_with: str = ""
+    in_terminal: Callable[[TextTable, pd.DataFrame], Sequence[TextTable]] | None = None
+    lines: Callable[[pd.DataFrame, Run], Sequence[str]] | None = None
+
+
+WHOLE = Cell("overall", "Overall")
+"""The one cell of a track that has no parts."""
+
+
+def in_whole(rows: pd.DataFrame, _: Run) -> pd.DataFrame:
+    """All samples in one cell."""
+    return rows.assign(**{CELL: WHOLE.name})
+
+
+def _no_references(_: Run) -> Mapping[str, Mapping[str, float]]:
+    return {}
+
+
+@dataclass(frozen=True)
+class TrackReport:
+    """The measures of a track, and what is shown of them.
+
+    `cells` are those of a run, the last of which stands for all; `in_cells` repeats rows of samples
+    for each cell that they are pooled in, which it names in the column `CELL`. `headline` chooses
+    the columns of the headline table, the first measure in every cell where it is left out; the
+    column headed `main`, else the last, is the one that models are ranked by. `notes` say how its
+    values are counted. `references` are rows to hold models against, by name, with values [%] by
+    heading, and `reference_note` says what they are; `published` is what the paper prints of `main`
+    for models of the run. `short` is the name of the column that stands for the track in a summary.
+
+    `tables`, `figures` and `paper_tables` (by their number in the paper) are its own; a figure is
+    None for a run that has no numbers for it. `bars` is the name of the figure of its first
+    measure. `check_alike` raises SpecError where the first run cannot be compared with the second
+    in these cells. `part_names` say what `Record.part` stands for. `items` opens, for the page and
+    out of a manifest, what was asked about where that is more than scenes; it raises DataError
+    where that is not what the run was made on.
+    """
+
+    measures: tuple[Measure, ...]
+    cells: Callable[[Run], tuple[Cell, ...]] = lambda _: (WHOLE,)
+    in_cells: Callable[[pd.DataFrame, Run], pd.DataFrame] = in_whole
+    headline: Callable[[Run], tuple[Shown, ...]] | None = None
+    main: str = ""
+    short: str = ""
+    published: Callable[[Run], Mapping[str, float]] = lambda _: {}
+    references: Callable[[Run], Mapping[str, Mapping[str, float]]] = _no_references
+    notes: Callable[[Run], Sequence[str]] = lambda _: ()
+    reference_note: str = ""
+    tables: Mapping[str, TableMaker] = field(default_factory=dict)
+    bars: str = ""
+    figures: Mapping[str, Callable[[Run], Figure | None]] = field(default_factory=dict)
+    figure_titles: Mapping[str, str] = field(default_factory=dict)
+    paper_tables: Mapping[int, PaperTable] = field(default_factory=dict)
+    check_alike: Callable[[Run, Run, Sequence[str]], None] | None = None
+    part_names: Mapping[str, str] = field(default_factory=dict)
+    items: Callable[[Mapping[str, Any], Dataset], PageItems] | None = None

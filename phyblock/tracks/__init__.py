@@ -1,0 +1,41 @@
+"""One folder a track: what it asks, how replies are read and scored, its baselines and measures.
+
+`phyblock.registry` lists the tracks; nothing outside this package names one.
+"""
+
+from phyblock.tracks.base import (
+    AnyTrack,
+    Episode,
+    EpisodeTrack,
+    Item,
+    Judgement,
+    SingleTrack,
+    Track,
+)
+from phyblock.tracks.kind import Opening, TrackKind, kind_of, kinds
+from phyblock.tracks.opening import open_tracks
+from phyblock.tracks.pictures import PicturePolicy, Pictures
+from phyblock.tracks.prompts import OfficialPrompt, Prompt, TemplatePrompt
+from phyblock.tracks.studio import Drawing, Studio
+
+__all__ = [
+    "AnyTrack",
+    "Drawing",
+    "Episode",
+    "EpisodeTrack",
+    "Item",
+    "Judgement",
+    "OfficialPrompt",
+    "Opening",
+    "PicturePolicy",
+    "Pictures",
+    "Prompt",
+    "SingleTrack",
+    "Studio",
+    "TemplatePrompt",
+    "Track",
+    "TrackKind",
+    "kind_of",
+    "kinds",
+    "open_tracks",
+]

@@ -1,0 +1,130 @@
+"""What a track is: the items it asks about, and how it asks and judges.
+
+Most tracks ask once a sample; step planning plays an episode of several turns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+from phyblock.domain import Scene
+from phyblock.models.base import Reply, Request
+
+__all__ = [
+    "AnyTrack",
+    "Episode",
+    "EpisodeTrack",
+    "Item",
+    "Judgement",
+    "SingleTrack",
+    "Track",
+]
+
+
+class Item(Protocol):
+    """What one sample is about: a scene with its candidates, or a question."""
+
+    @property
+    def key(self) -> str:
+        """Its name inside the track."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene it is about, by whose parents statistics cluster."""
+
+
+ItemT = TypeVar("ItemT", bound=Item)
+
+
+class Judgement(Protocol):
+    """What a reply was read as, and what that is worth."""
+
+    @property
+    def is_read(self) -> bool:
+        """Whether anything could be read."""
+
+    def fields(self) -> dict[str, Any]:
+        """`parse`, `scores` and what else the record says of it."""
+
+
+class Track(Protocol[ItemT]):
+    """What all tracks have in common."""
+
+    @property
+    def name(self) -> str:
+        """Its name in suites and records."""
+
+    @property
+    def items(self) -> Sequence[ItemT]:
+        """What it asks about; every seed repeats all of them."""
+
+    @property
+    def template(self) -> str:
+        """Name of the prompt; "" where every model is a recording."""
+
+    def about(self, item: ItemT) -> dict[str, Any]:
+        """What records say of an item besides its scene."""
+
+    def identity(self) -> dict[str, Any]:
+        """Digests of what decides its results: data, prompt, pictures; JSON-able."""
+
+    def outlines(self, item: ItemT) -> Iterable[tuple[Request, bool]]:
+        """The requests of an item as far as they can be told before any is answered.
+
+        With seed 0 and no parameters, made without rendering; with each, whether its pictures are
+        the real ones.
+        """
+
+    def close(self) -> None:
+        """Release worker processes."""
+
+
+@runtime_checkable
+class SingleTrack(Track[ItemT], Protocol[ItemT]):
+    """A track that asks once a sample."""
+
+    async def request(
+        self, item: ItemT, seed: int, params: Mapping[str, object], *, with_messages: bool
+    ) -> Request:
+        """The request of one sample; without messages for models that need none."""
+
+    def judge(self, item: ItemT, text: str | None) -> Judgement:
+        """Read and score a reply; None, where there is no reply, is scored as nothing said."""
+
+
+class Episode(Protocol):
+    """One sample of several turns, as a state machine that replies alone drive.
+
+    The same replies lead to the same requests, so that a killed run goes on in the middle of an
+    episode by taking the replies it has.
+    """
+
+    async def request(self) -> Request | None:
+        """The next request, or None when the episode has ended."""
+
+    def take(self, request: Request, reply: Reply) -> None:
+        """Go on with the reply to the last request."""
+
+    @property
+    def is_read(self) -> bool:
+        """Whether anything could be read in any reply."""
+
+    def fields(self) -> dict[str, Any]:
+        """`parse`, `scores`, `turns` (a mapping for each reply taken), `ending` and what else the
+        record says, as things stand.
+        """
+
+
+@runtime_checkable
+class EpisodeTrack(Track[ItemT], Protocol[ItemT]):
+    """A track whose samples are episodes."""
+
+    def start(
+        self, item: ItemT, seed: int, params: Mapping[str, object], *, with_messages: bool
+    ) -> Episode:
+        """An episode that has not begun."""
+
+
+AnyTrack = SingleTrack[Any] | EpisodeTrack[Any]
+"""A track of either kind."""

@@ -1,0 +1,67 @@
+"""The estimates of a track in a run: all its measures, in all its cells, made once."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from phyblock.registry import added_measures
+from phyblock.tables.estimates import ESTIMATE_COLUMNS, estimate_frame
+from phyblock.tables.load import Run
+from phyblock.tables.measures import VARIANT, Counted, Measure
+from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.tracks.kind import kind_of
+
+__all__ = ["all_estimates", "counted_samples", "stored_counts", "track_estimates", "track_measures"]
+
+
+def track_measures(track: str) -> tuple[Measure, ...]:
+    """The measures of a track, those that were added behind its own."""
+    return (*kind_of(track).report().measures, *added_measures(track))
+
+
+def stored_counts(track: str) -> tuple[Counted, ...]:
+    """What measures of a track count of each sample as it is judged."""
+    counted = {measure.counted.name: measure.counted for measure in track_measures(track)}
+    return tuple(one for one in counted.values() if one.sample is not None)
+
+
+def track_estimates(run: Run, track: str) -> pd.DataFrame:
+    """See `estimate_frame`; the same frame whenever it is asked for, not to be changed."""
+    key = f"estimates of {track}"
+    if key not in run.made:
+        run.made[key] = estimate_frame(
+            run,
+            track_measures(track),
+            kind_of(track).report().cells(run),
+            lambda counted: counted_samples(run, track, counted),
+        )
+    return run.made[key]
+
+
+def all_estimates(run: Run) -> pd.DataFrame:
+    """One long frame: every track of the run, measure, way of counting, model and cell."""
+    parts = [track_estimates(run, track).assign(track=track) for track in run.design.suite.tracks]
+    known = [part for part in parts if len(part)]
+    columns = ["track", *ESTIMATE_COLUMNS]
+    return pd.concat(known, ignore_index=True)[columns] if known else pd.DataFrame(columns=columns)
+
+
+def counted_samples(run: Run, track: str, counted: Counted) -> pd.DataFrame:
+    """The counts of samples that measures of a track are made from; see `Counted`."""
+    if counted.frame is not None:
+        return counted.frame(run)
+    records = run.records
+    left_out = records["outcome"].isin(run.design.outcomes_left_out)
+    rows = records[(records["track"] == track) & ~left_out]
+    found = [(counts or {}).get(counted.name) for counts in rows["counts"]]
+    rows = rows[[numbers is not None for numbers in found]]
+    numbers = pd.DataFrame(
+        [list(numbers) for numbers in found if numbers is not None],
+        columns=list(counted.columns),
+        index=rows.index,
+        dtype="float64",
+    )
+    kept = rows[["sample", "model", "scene", "seed", "item"]].assign(
+        **dict.fromkeys(VARIANT, ""), replied=~rows["outcome"].isin(WITHOUT_REPLY)
+    )
+    return kind_of(track).report().in_cells(pd.concat([kept, numbers], axis=1), run)

@@ -1,0 +1,33 @@
+"""Full planning: one picture and prompt in, one whole plan out (paper section 4.1)."""
+
+from phyblock.resources import bundled
+from phyblock.tables.track_report import TrackReport
+from phyblock.tracks.full_planning.baselines import PLAN_RULES, PlanSubject
+from phyblock.tracks.full_planning.opening import open_full_planning, rescored_planning
+from phyblock.tracks.full_planning.record import PlanRecord
+from phyblock.tracks.full_planning.track import FullPlanning
+from phyblock.tracks.kind import TrackKind
+
+__all__ = ["TRACK"]
+
+
+def _report() -> TrackReport:
+    from phyblock.tracks.full_planning.report import REPORT
+
+    return REPORT
+
+
+TRACK = TrackKind(
+    name=FullPlanning.name,
+    title="Full planning",
+    item="scene",
+    about="a whole plan in one reply",
+    open=open_full_planning,
+    report=_report,
+    subject=PlanSubject,
+    baselines=PLAN_RULES,
+    record=PlanRecord,
+    template=bundled("prompts", "full_planning.j2"),
+    tables=("assembly", "table1", "errors"),
+    rescored=rescored_planning,
+)

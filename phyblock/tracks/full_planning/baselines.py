@@ -1,0 +1,78 @@
+"""What baselines answer where a whole plan is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from phyblock.domain import Block, CandidateSet, Scene
+from phyblock.errors import DataError, Problem
+
+__all__ = ["PLAN_RULES", "PlanSubject"]
+
+_RANDOM_STEPS = 4
+"""As in the paper's Random row."""
+
+
+@dataclass(frozen=True)
+class PlanSubject:
+    """A whole plan is asked for."""
+
+    scene: Scene
+    candidates: CandidateSet
+
+
+def _plan(steps: Iterable[int]) -> str:
+    return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(steps, 1))
+
+
+def _random_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
+    return _plan(int(n) for n in rng.integers(1, len(subject.candidates) + 1, _RANDOM_STEPS))
+
+
+def _all_candidates(subject: PlanSubject, _: np.random.Generator) -> str:
+    return _plan(range(1, len(subject.candidates) + 1))
+
+
+def _oracle_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
+    blocks = subject.scene.blocks
+    return _plan(_needed(subject, blocks[v]) for v in subject.scene.graph.random_order(rng))
+
+
+def _unoriented_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
+    """A valid order in which every block stands wrongly, wherever a wrong one can be chosen."""
+    blocks = subject.scene.blocks
+    order = subject.scene.graph.random_order(rng)
+    return _plan(
+        _turned(subject.candidates, blocks[v], rng) or _needed(subject, blocks[v]) for v in order
+    )
+
+
+def _needed(subject: PlanSubject, block: Block) -> int:
+    index = subject.candidates.index_of(block.look)
+    if index is None:
+        found = f"{block.color} {block.type} turned {block.euler_deg}"
+        where = f"scene {subject.scene.id}"
+        message = "no candidate looks like this block"
+        raise DataError(Problem(where, message, f"blocks[order={block.order}]", found))
+    return index
+
+
+def _turned(candidates: CandidateSet, block: Block, rng: np.random.Generator) -> int | None:
+    """Number of a candidate of the block's kind that looks otherwise, or None."""
+    numbers = range(1, len(candidates) + 1)
+    wrong = [
+        n for n in numbers if candidates[n].kind == block.kind and candidates[n].look != block.look
+    ]
+    return wrong[int(rng.integers(len(wrong)))] if wrong else None
+
+
+PLAN_RULES = {
+    "random": _random_plan,
+    "all-candidates": _all_candidates,
+    "oracle": _oracle_plan,
+    "oracle-no-orientation": _unoriented_plan,
+}
+"""Rules by name of the baseline."""

@@ -1,0 +1,67 @@
+"""Why steps were wrong: stacked bars, one a model."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from phyblock.scoring import ERROR_TYPES
+from phyblock.tables.design import OVERALL
+from phyblock.tables.drawing import COLORS, MUTED, bare_axes, headed, new_figure
+from phyblock.tables.load import Run
+from phyblock.tracks.full_planning.errors import errors_frame
+from phyblock.tracks.full_planning.figures.levels import how_measured, ranked
+from phyblock.tracks.full_planning.seeds import intervals_table
+from phyblock.tracks.full_planning.views import ERROR_NAMES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["error_bars"]
+
+_COLORS = (COLORS[0], COLORS[5], COLORS[4], COLORS[1])
+_INKS = ("white", "black", "black", "white")
+_LEAST_LABEL = 6.0
+
+
+def error_bars(run: Run) -> Figure | None:
+    """Shares of the four error types in each model's wrong steps; None without a wrong step."""
+    table = errors_frame(run)
+    table = table[(table["level"] == OVERALL) & (table["wrong_steps"] > 0)]
+    if table.empty:
+        return None
+    order = {model: place for place, model in enumerate(ranked(intervals_table(run), "f1"))}
+    table = table.sort_values("model", key=lambda names: names.map(order), kind="stable")
+    figure = new_figure(1.35 + 0.26 * len(table))
+    ax = figure.subplots()
+    places = np.arange(len(table))
+    start = np.zeros(len(table))
+    for name, color, ink in zip(ERROR_TYPES, _COLORS, _INKS, strict=True):
+        shares = 100 * table[f"{name}_share"].to_numpy(float)
+        ax.barh(
+            places,
+            shares,
+            left=start,
+            height=0.66,
+            color=color,
+            edgecolor="white",
+            linewidth=0.8,
+            label=ERROR_NAMES[name],
+        )
+        for place, share in enumerate(shares):
+            if share >= _LEAST_LABEL:
+                middle = start[place] + share / 2
+                ax.text(
+                    middle, place, f"{share:.0f}", ha="center", va="center", color=ink, fontsize=7
+                )
+        start = start + shares
+    for place, wrong in enumerate(table["wrong_steps"]):
+        ax.text(101.5, place, f"{wrong:,}", va="center", color=MUTED, fontsize=7)
+    ax.text(101.5, -0.72, "wrong steps", va="bottom", color=MUTED, fontsize=7)
+    ax.set(xlim=(0, 100), xlabel="Share of wrong steps (%)", ylim=(len(table) - 0.4, -0.7))
+    ax.set_yticks(places, list(table["model"]))
+    bare_axes([ax])
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    headed(figure, "Why steps were wrong", f"{how_measured(run.design)}; all levels")
+    return figure

@@ -1,0 +1,109 @@
+"""F1 against what a model is and costs: its size, its price."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from phyblock.tables.cost import cost_frame
+from phyblock.tables.design import OVERALL
+from phyblock.tables.drawing import ACCENT, INK, MUTED, PALE, bare_axes, headed, new_figure
+from phyblock.tables.load import Run
+from phyblock.tracks.full_planning.figures.levels import how_measured
+from phyblock.tracks.full_planning.measures import NAME
+from phyblock.tracks.full_planning.seeds import intervals_table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["f1_by_cost", "f1_by_size"]
+
+_LINE_POINTS = 8.5
+"""Height of a label, with what it keeps free [points]."""
+_LETTER_POINTS = 4.4
+_SHIFTS = sorted((sign * 9.0 * n for n in range(60) for sign in (1, -1)), key=abs)
+"""How far a label may be moved, the nearest first [points]."""
+
+
+def f1_by_size(run: Run) -> Figure | None:
+    """F1 against billions of parameters; None where the size of no model is known."""
+    sizes = {model.name: model.size_b for model in run.design.models}
+    return _scatter(run, sizes, "F1 by model size", ("size", "Parameters (billions, log scale)"))
+
+
+def f1_by_cost(run: Run) -> Figure | None:
+    """F1 against dollars for 100 replies; None where no model's replies cost anything known."""
+    table = cost_frame(run)
+    table = table[table["track"] == NAME]
+    prices = dict(zip(table["model"], table["cost_per_100_usd"], strict=True))
+    return _scatter(run, prices, "F1 by cost", ("cost", "Cost of 100 replies (USD, log scale)"))
+
+
+def _scatter(
+    run: Run, x_of: dict[str, float | None], title: str, axis: tuple[str, str]
+) -> Figure | None:
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    table = intervals_table(run)
+    table = table[table["level"] == OVERALL].dropna(subset=["f1"])
+    known = {model: float(x) for model, x in x_of.items() if x is not None and x > 0}
+    table = table[table["model"].isin(list(known))]
+    if table.empty:
+        return None
+    table = table.assign(x=table["model"].map(known)).sort_values(["f1", "model"])
+    figure = new_figure(3.9)
+    ax = figure.subplots()
+    ends = table[["lo", "hi"]].to_numpy(float)
+    ax.vlines(table["x"], ends[:, 0], ends[:, 1], color=PALE, linewidth=2.2)
+    ax.plot(table["x"], table["f1"], "o", color=ACCENT, markersize=5)
+    ax.set_xscale("log")
+    least, most = float(table["x"].min()), float(table["x"].max())
+    ax.set(xlim=(least / 1.7, most * 2.9), xlabel=axis[1], ylabel="F1 overall (%)")
+    ax.set_ylim(0, min(104.0, 8 + float(table["hi"].fillna(table["f1"]).max())))
+    ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
+    bare_axes([ax], "both")
+    subtitle = f"{how_measured(run.design)}; lines: 95 % intervals"
+    if left_out := len(run.design.model_names) - len(table):
+        subtitle += f"; {left_out} of unknown {axis[0]} left out"
+    headed(figure, title, subtitle)
+    _label(figure, ax, table)
+    return figure
+
+
+def _label(figure: Figure, ax: Axes, table: pd.DataFrame) -> None:
+    """Names to the right of their points, moved up or down where they would cover another."""
+    from matplotlib.patheffects import withStroke
+
+    figure.draw_without_rendering()
+    points = ax.transData.transform(table[["x", "f1"]].to_numpy(float)) * 72 / figure.dpi
+    taken = [(x - 4.0, x + 4.0, y) for x, y in points]
+    for (x, y), name in zip(points, table["model"], strict=True):
+        start, end = x + 6.5, x + 7 + _LETTER_POINTS * len(name)
+        shift = next(
+            shift
+            for shift in _SHIFTS
+            if not any(
+                abs(y + shift - other) < _LINE_POINTS and left < end and start < right
+                for left, right, other in taken
+            )
+        )
+        taken.append((start, end, y + shift))
+        ax.annotate(
+            name,
+            (x, y),
+            xycoords="figure points",
+            xytext=(start, y + shift - 2.6),
+            textcoords="figure points",
+            fontsize=7,
+            color=INK,
+            annotation_clip=False,
+            arrowprops={"arrowstyle": "-", "color": MUTED, "linewidth": 0.5, "relpos": (0, 0.5)}
+            if shift
+            else None,
+            path_effects=[withStroke(linewidth=2, foreground="white")],
+            zorder=4,
+        )

@@ -1,0 +1,60 @@
+"""Open the full-planning track of a suite."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from phyblock.datasets import AssemblyTask, Dataset, official_prompt
+from phyblock.errors import DataError, Problem, SpecError
+from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
+from phyblock.tracks.kind import Opening
+from phyblock.tracks.opening import assembly_pictures, template_prompt
+from phyblock.tracks.prompts import OfficialPrompt, Prompt
+from phyblock.tracks.selection import select_tasks
+
+__all__ = ["open_full_planning", "rescored_planning"]
+
+
+def open_full_planning(opening: Opening) -> FullPlanning:
+    """The track; SpecError, DataError or PromptError with what is wrong."""
+    suite = opening.loaded.suite
+    tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit)
+    if not opening.with_prompts:
+        return FullPlanning(_rules(suite), items=tasks)
+    if suite.images.source == "dataset":
+        _check_composites(opening.dataset, tasks)
+    pictures = assembly_pictures(suite)
+    return FullPlanning(_rules(suite), _prompt(opening.loaded), pictures, tasks)
+
+
+def rescored_planning(suite: SuiteSpec, tasks: Sequence[AssemblyTask]) -> FullPlanning:
+    """The track for reading stored replies again; nothing is asked."""
+    return FullPlanning(_rules(suite), items=tasks)
+
+
+def _rules(suite: SuiteSpec) -> PlanningRules:
+    """How a suite reads and scores plans."""
+    level1 = suite.scoring.level1
+    criterion = None if level1 == "aov" else level1
+    return PlanningRules(suite.parser, suite.settings, suite.scoring.matchers, criterion)
+
+
+def _prompt(loaded: LoadedSuite) -> Prompt:
+    if loaded.suite.prompt != "official":
+        return template_prompt(loaded, FullPlanning.name)
+    if loaded.suite.dataset.format != "official":
+        message = "the official prompt is read from the official data set"
+        hint = "set dataset.format to official and dataset.path to its checkout"
+        raise SpecError(Problem(str(loaded.path), message, "prompt", "official", hint=hint))
+    return OfficialPrompt(official_prompt(loaded.dataset_path))
+
+
+def _check_composites(dataset: Dataset, tasks: Sequence[AssemblyTask]) -> None:
+    """Raise DataError when the data set has no picture of a scene."""
+    lacking = [task.key for task in tasks if task.composite is None]
+    if lacking:
+        message = f"has no picture of {len(lacking)} of {len(tasks)} scenes"
+        found = ", ".join(lacking[:8]) + (", ..." if len(lacking) > 8 else "")
+        hint = "render them: --set images.source=render"
+        raise DataError(Problem(str(dataset.root), message, "images.source", found, hint=hint))

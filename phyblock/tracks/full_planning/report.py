@@ -1,0 +1,137 @@
+"""What full planning brings to the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from phyblock.errors import Problem, SpecError
+from phyblock.tables.cells import METRICS
+from phyblock.tables.design import OVERALL
+from phyblock.tables.load import Run
+from phyblock.tables.paper_numbers import HUMAN_ACCURACY, HUMAN_NOTE, published_table
+from phyblock.tables.track_report import PaperTable, Shown, TableMaker, TrackReport
+from phyblock.tracks.full_planning.assembly import assembly_frame, table1_frame
+from phyblock.tracks.full_planning.errors import errors_frame
+from phyblock.tracks.full_planning.figures.errors import error_bars
+from phyblock.tracks.full_planning.figures.levels import f1_radar, settings_dots
+from phyblock.tracks.full_planning.figures.scatter import f1_by_cost, f1_by_size
+from phyblock.tracks.full_planning.measures import PLANNING_MEASURES, in_levels, level_cells
+from phyblock.tracks.full_planning.published import (
+    PUBLISHED_SETTING,
+    published_frame,
+    published_lines,
+)
+from phyblock.tracks.full_planning.seeds import (
+    intervals_table,
+    intervals_view,
+    paper_table5_frame,
+    paper_table5_view,
+    table5_frame,
+    table5_view,
+)
+from phyblock.tracks.full_planning.settings import settings_frame, settings_view
+from phyblock.tracks.full_planning.views import (
+    errors_in_terminal,
+    errors_view,
+    published_view,
+    table1_in_terminal,
+    table1_view,
+)
+
+__all__ = ["REPORT"]
+
+_MAIN = "Overall F1"
+
+
+def _headline(run: Run) -> tuple[Shown, ...]:
+    levels = [
+        Shown("f1", level, _MAIN if level == OVERALL else f"Level {level}", "")
+        for level in run.design.levels
+    ]
+    sides = [Shown(name, OVERALL, name.capitalize()) for name in METRICS[:2]]
+    return (*levels, *sides)
+
+
+def _references(run: Run) -> Mapping[str, Mapping[str, float]]:
+    printed = published_table(1)
+    printed = printed[printed["model"] == "Random"].set_index(["level", "metric"])
+    values = printed["value"].to_dict()
+    random = {
+        column.heading: float(values.get((column.cell, column.measure), float("nan")))
+        for column in _headline(run)
+    }
+    human = {_MAIN: HUMAN_ACCURACY}
+    return {"Random, published": random, "Human experts, published": human}
+
+
+def _published(run: Run) -> Mapping[str, float]:
+    """What the paper's Table 1 prints as overall F1."""
+    if run.design.setting != PUBLISHED_SETTING:
+        return {}
+    frame = published_frame(run)
+    frame = frame[(frame["level"] == OVERALL) & (frame["metric"] == "f1")]
+    return dict(zip(frame["model"], frame["published"], strict=True))
+
+
+def _notes(run: Run) -> Sequence[str]:
+    how = f"F1 in percent, setting {run.design.setting}, matcher {run.design.matcher}."
+    return (how,)
+
+
+def _check_alike(run: Run, first: Run, levels: Sequence[str]) -> None:
+    suite, wanted = run.design.suite, first.design
+    needed: list[tuple[str, Sequence[str], str]] = [
+        ("settings", suite.settings, wanted.setting),
+        ("scoring.matchers", suite.scoring.matchers, wanted.matcher),
+    ]
+    known = ("aov", suite.scoring.level1)
+    needed += [("scoring.level1", known, wanted.criterion(level)) for level in levels]
+    for what, names, name in needed:
+        if name not in names:
+            hint = "phyblock score reads stored replies again under other rules"
+            message = f"was not scored as {first.path} was, by {name}"
+            raise SpecError(Problem(str(run.path), message, what, ", ".join(names), hint=hint))
+
+
+REPORT = TrackReport(
+    measures=PLANNING_MEASURES,
+    cells=level_cells,
+    in_cells=in_levels,
+    headline=_headline,
+    main=_MAIN,
+    short="f1",
+    published=_published,
+    references=_references,
+    notes=_notes,
+    reference_note=HUMAN_NOTE,
+    tables={
+        "assembly": TableMaker(assembly_frame),
+        "table1": TableMaker(table1_frame, table1_view, in_terminal=table1_in_terminal),
+        "intervals": TableMaker(intervals_table, intervals_view, "table1"),
+        "table5": TableMaker(table5_frame, table5_view, "table1"),
+        "settings": TableMaker(settings_frame, settings_view, "table1"),
+        "errors": TableMaker(errors_frame, errors_view, in_terminal=errors_in_terminal),
+        "published": TableMaker(published_frame, published_view, lines=published_lines),
+    },
+    bars="f1-levels",
+    figures={
+        "f1-radar": f1_radar,
+        "settings": settings_dots,
+        "error-types": error_bars,
+        "f1-size": f1_by_size,
+        "f1-cost": f1_by_cost,
+    },
+    figure_titles={
+        "f1-levels": "F1 by level",
+        "f1-radar": "F1 by level, as in the paper",
+        "settings": "Setting A against setting B",
+        "error-types": "Wrong steps by type",
+        "f1-size": "F1 by model size",
+        "f1-cost": "F1 by cost",
+    },
+    paper_tables={
+        1: PaperTable(published_frame, published_view),
+        5: PaperTable(paper_table5_frame, paper_table5_view),
+    },
+    check_alike=_check_alike,
+)

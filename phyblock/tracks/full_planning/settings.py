@@ -1,0 +1,104 @@
+"""Setting A against setting B: what orientation costs a model, on the same replies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from phyblock.scoring.uncertainty import Floats, bootstrap, f1_of
+from phyblock.tables.cells import cell_scores, measured
+from phyblock.tables.intervals import CountCube, parents_of, resampler
+from phyblock.tables.load import Run, once_per_run
+from phyblock.tables.text_table import Column, TextTable, between, level_name, number
+from phyblock.tracks.full_planning.measures import NAME
+
+__all__ = ["settings_frame", "settings_view"]
+
+_COLUMNS = ("model", "level", "f1_a", "f1_b", "difference", "lo", "hi", "n_scenes", "n_clusters")
+
+
+@once_per_run
+def settings_frame(run: Run) -> pd.DataFrame:
+    """One row a model and level: F1 in A and in B, B minus A with a 95 % interval; in [0, 1].
+
+    Headline matcher, the criterion of each level. Paired: a reply is scored
+    under both. Empty where the run has one setting.
+    """
+    design = run.design
+    parts = []
+    for level in design.levels if {"A", "B"} <= set(design.suite.settings) else ():
+        cube = _counts(run, level)
+        matcher = design.matchers(design.criterion(level))[0]
+        kept = {
+            (model, setting): place
+            for place, (by, model, setting) in enumerate(cube.cells)
+            if by == matcher
+        }
+        models = [m for m in design.model_names if (m, "A") in kept and (m, "B") in kept]
+        if not models:
+            continue
+        both = np.array([[kept[model, setting] for setting in "AB"] for model in models])
+        n_clusters = cube.clusters.behind(cube.present[:, both[:, 0]])
+        found = bootstrap(
+            cube.counts[:, both],
+            cube.clusters,
+            _both_and_difference,
+            resampler(),
+            n_clusters=np.repeat(n_clusters[:, None], 3, axis=1),
+        )
+        part = pd.DataFrame({"model": models, "level": level})
+        part["f1_a"], part["f1_b"], part["difference"] = found.value.T
+        part["lo"], part["hi"] = found.lo[:, 2], found.hi[:, 2]
+        part["n_scenes"] = cube.present[:, both[:, 0]].sum(axis=0)
+        part["n_clusters"] = n_clusters
+        parts.append(part)
+    if not parts:
+        return pd.DataFrame(columns=list(_COLUMNS))
+    known = pd.concat(parts).set_index(["model", "level"])
+    models = [name for name in design.model_names if name in set(known.index.get_level_values(0))]
+    cells = pd.MultiIndex.from_product([models, design.levels], names=["model", "level"])
+    table = known.reindex(cells).reset_index()[list(_COLUMNS)]
+    sizes = ["n_scenes", "n_clusters"]
+    table[sizes] = table[sizes].fillna(0).astype("int64")
+    return table
+
+
+def _counts(run: Run, level: str) -> CountCube:
+    """Counts tp, fp, fn of every scene by matcher, model and setting."""
+    scores = cell_scores(run)
+    scores = scores[(scores["level"] == level) & (scores["track"] == NAME)]
+    by = ["matcher", "model", "setting"]
+    return CountCube(measured(scores, ["model"]), parents_of(run), by, ["tp", "fp", "fn"])
+
+
+def _both_and_difference(sums: Floats) -> Floats:
+    f1 = f1_of(sums)
+    return np.concatenate([f1, np.diff(f1, axis=-1)], axis=-1)
+
+
+def settings_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """F1 in A, in B and the difference with its interval out of `settings_frame`, by level."""
+    design = run.design
+    cells = {(row["model"], row["level"]): row for row in table.to_dict("records")}
+    rows = []
+    for model in dict.fromkeys(table["model"]):
+        row = [model]
+        for level in design.levels:
+            cell = cells[model, level]
+            row += [number(100 * cell["f1_a"]), number(100 * cell["f1_b"])]
+            row.append(between(100 * cell["lo"], 100 * cell["hi"], signed=True))
+        rows.append(tuple(row))
+    columns = [
+        Column(name, level_name(level))
+        for level in design.levels
+        for name in ("A", "B", "B - A, 95 % CI")
+    ]
+    note = f"Matcher {design.matcher}; the difference is paired"
+    if len(table):
+        note += f", its interval from resampling {table['n_clusters'].max()} base scenes"
+    return TextTable(
+        "F1 in setting A (with orientation) and in setting B (without), in percent",
+        (Column("Model", is_text=True), *columns),
+        tuple(rows),
+        (f"{note}.",),
+    )

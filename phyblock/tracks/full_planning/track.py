@@ -1,0 +1,161 @@
+"""The full-planning track: one picture and prompt in, one whole plan out (paper section 4.1)."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from phyblock.datasets import AssemblyTask
+from phyblock.domain import Plan
+from phyblock.models.base import Image, Request
+from phyblock.parsing import ParsedPlan, parse_plan
+from phyblock.scoring import AssemblyScorer, Score
+from phyblock.tracks.full_planning.baselines import PlanSubject
+from phyblock.tracks.pictures import Pictures
+from phyblock.tracks.prompts import Prompt
+from phyblock.words import Level1Criterion, Matcher, PlanParser, Setting
+
+__all__ = ["FullPlanning", "PlanJudgement", "PlanningRules"]
+
+
+@dataclass(frozen=True)
+class PlanningRules:
+    """How replies are read and scored; the first matcher is the headline."""
+
+    parser: PlanParser
+    settings: tuple[Setting, ...]
+    matchers: tuple[Matcher, ...]
+    level1: Level1Criterion | None
+
+
+@dataclass(frozen=True)
+class PlanJudgement:
+    """What a reply was read as, and what that is worth."""
+
+    parser: PlanParser
+    parsed: ParsedPlan
+    scores: tuple[Score, ...]
+
+    @property
+    def is_read(self) -> bool:
+        """Whether a rule matched."""
+        return self.parsed.rule is not None
+
+    def fields(self) -> dict[str, Any]:
+        """`parse` and `scores` of the record (docs/results.md)."""
+        return {
+            "parse": {
+                "parser": self.parser,
+                "rule": self.parsed.rule,
+                "plan": list(self.parsed.plan.steps),
+                "dropped": list(self.parsed.dropped),
+            },
+            "scores": [_score(score) for score in self.scores],
+        }
+
+
+class FullPlanning:
+    """Prompt, parse and score of the track; pure but for the pictures it asks for."""
+
+    name = "full_planning"
+
+    def __init__(
+        self,
+        rules: PlanningRules,
+        prompt: Prompt | None = None,
+        pictures: Pictures | None = None,
+        items: Sequence[AssemblyTask] = (),
+    ) -> None:
+        """`prompt` and `pictures` are None where every model is a recording."""
+        self.rules = rules
+        self.items = items
+        self.template = "" if prompt is None else prompt.name
+        self._prompt = prompt
+        self._pictures = pictures
+        self._scorers: dict[str, AssemblyScorer] = {}
+
+    def about(self, item: AssemblyTask) -> dict[str, Any]:
+        """Nothing: the scene says it all."""
+        del item
+        return {}
+
+    def identity(self) -> dict[str, Any]:
+        """Name and version of the prompt, and a digest of all that decides the pictures."""
+        if self._prompt is None or self._pictures is None:
+            return {"prompt": None, "pictures": None}
+        keys = [self._pictures.keys(task) for task in self.items]
+        return {
+            "prompt": {"name": self._prompt.name, "version": self._prompt.version},
+            "pictures": hashlib.sha256(json.dumps(keys).encode()).hexdigest(),
+        }
+
+    async def request(
+        self, item: AssemblyTask, seed: int, params: Mapping[str, object], *, with_messages: bool
+    ) -> Request:
+        """The request of one sample; without messages for models that need none."""
+        if not with_messages or self._prompt is None or self._pictures is None:
+            return Request(item.key, seed, (), params, "", PlanSubject(item.scene, item.candidates))
+        return self._request(item, seed, params, self._prompt, await self._pictures.of(item))
+
+    def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
+        """The one request, made without rendering, and whether its pictures are the real ones."""
+        if self._prompt is None or self._pictures is None:
+            yield Request(item.key, 0, (), {}, "", PlanSubject(item.scene, item.candidates)), True
+            return
+        pictures, real = self._pictures.outline(item)
+        yield self._request(item, 0, {}, self._prompt, pictures), real
+
+    def _request(
+        self,
+        item: AssemblyTask,
+        seed: int,
+        params: Mapping[str, object],
+        prompt: Prompt,
+        pictures: tuple[Image, ...],
+    ) -> Request:
+        messages = prompt.messages(pictures, self.facts(item, pictures))
+        subject = PlanSubject(item.scene, item.candidates)
+        return Request(item.key, seed, messages, params, prompt.version, subject)
+
+    def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
+        """What templates may use; nothing in it gives an answer away."""
+        return {
+            "pictures": [picture.label for picture in pictures],
+            "n_candidates": len(item.candidates),
+        }
+
+    def judge(self, item: AssemblyTask, text: str | None) -> PlanJudgement:
+        """Read and score a reply; None, where there is no reply, is scored as an empty plan."""
+        parsed = (
+            ParsedPlan(Plan(), None)
+            if text is None
+            else parse_plan(text, len(item.candidates), self.rules.parser)
+        )
+        scorer = self._scorers.get(item.key)
+        if scorer is None:
+            scorer = AssemblyScorer(item.scene, item.candidates, self.rules.settings)
+            self._scorers[item.key] = scorer
+        scores = scorer.score(parsed.plan, self.rules.matchers, self.rules.level1)
+        return PlanJudgement(self.rules.parser, parsed, scores)
+
+    def close(self) -> None:
+        """Stop the processes that draw pictures."""
+        if self._pictures is not None:
+            self._pictures.close()
+
+
+def _score(score: Score) -> dict[str, Any]:
+    return {
+        "criterion": score.criterion,
+        "matcher": score.matcher,
+        "setting": score.setting,
+        "tp": score.counts.tp,
+        "fp": score.counts.fp,
+        "fn": score.counts.fn,
+        "errors": score.errors,
+        "placed": None if score.vertices is None else list(score.vertices),
+        "why": None if score.step_errors is None else list(score.step_errors),
+    }

@@ -1,0 +1,223 @@
+"""The frames as tables a person reads: captions, headings, rounded cells, notes."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import replace
+
+import pandas as pd
+
+from phyblock.scoring import ERROR_TYPES, ErrorType
+from phyblock.tables.cells import METRIC_NAMES, METRICS, SIDE_METRICS
+from phyblock.tables.design import OVERALL, Design
+from phyblock.tables.load import Run
+from phyblock.tables.text_table import (
+    NO_VALUE,
+    SPREAD,
+    Column,
+    TextTable,
+    level_name,
+    number,
+    spread,
+)
+from phyblock.tracks.full_planning.assembly import assembly_frame, headline_cells, level_column
+from phyblock.tracks.full_planning.published import (
+    PUBLISHED_LEVELS,
+    PUBLISHED_SETTING,
+    comparison_notes,
+    largest_differences,
+)
+
+__all__ = [
+    "ERROR_NAMES",
+    "errors_in_terminal",
+    "errors_view",
+    "published_view",
+    "table1_in_terminal",
+    "table1_view",
+]
+
+_MODEL = Column("Model", is_text=True)
+ERROR_NAMES: dict[ErrorType, str] = {
+    "shape_not_in_gt": "Shape not in GT",
+    "overflow": "Overflow",
+    "incorrect_orientation": "Incorrect orientation",
+    "dependency_not_met": "Dependency not met",
+}
+_LABELS_NOTE = (
+    "Prec, Rec, F1 are labeled by what they are. The paper prints its model rows as precision, "
+    "recall, F1 under the header “Rec, Prec, F1”; only its Random row is as that header says."
+)
+
+
+def table1_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Table 1 in the paper's layout out of `table1_frame`."""
+    design = run.design
+    cells = [level_column(level, metric) for level in design.levels for metric in METRICS]
+    columns = [
+        Column(METRIC_NAMES[metric], level_name(level))
+        for level in design.levels
+        for metric in METRICS
+    ]
+    rows = [
+        (row["model"], *(_percent(row, cell) for cell in cells)) for row in table.to_dict("records")
+    ]
+    return TextTable(
+        f"Assembly planning (%){_of_suite(design)}",
+        (_MODEL, *columns),
+        tuple(rows),
+        (_how(design), *_table1_notes(run), _LABELS_NOTE),
+    )
+
+
+def _percent(row: Mapping[Hashable, float], cell: str) -> str:
+    return spread(row[cell], row[f"{cell}_sd"]) if f"{cell}_sd" in row else number(row[cell])
+
+
+def _table1_notes(run: Run) -> list[str]:
+    cells = headline_cells(assembly_frame(run), run.design)
+    overall = cells[cells["level"] == OVERALL]
+    seeds = len(run.design.suite.seeds)
+    short = overall[overall["n"] < overall["expected"]]
+    notes = [f"Mean ± standard deviation over {seeds} seeds."] if seeds > 1 else []
+    if len(short):
+        counts = zip(short["model"], short["n"], strict=True)
+        listed = ", ".join(f"{model} {n}" for model, n in counts)
+        notes.append(f"Scored of {run.design.expected(OVERALL)} samples: {listed}.")
+    if run.design.suite.scoring.missing == "count":
+        notes += _empty_plan_notes(cells)
+    for note, rows in overall[overall["seed_note"] != ""].groupby("seed_note", sort=False):
+        notes.append(f"{', '.join(rows['model'])}: {note}.")
+    return notes
+
+
+def _empty_plan_notes(cells: pd.DataFrame) -> list[str]:
+    """Which models have samples without a reply, by kind; a lone kind needs no number."""
+    listed = []
+    for row in cells[cells["level"] == OVERALL].to_dict("records"):
+        kinds = {"API errors": row["api_errors"], "missing replies": row["missing"]}
+        kinds = {name: count for name, count in kinds.items() if count}
+        if kinds:
+            each = [f"{name} {count}" for name, count in kinds.items()]
+            why = ", ".join(kinds if len(kinds) == 1 else each)
+            listed.append(f"{row['model']} {sum(kinds.values())} of {row['n']} ({why})")
+    notes = [f"Counted as empty plans: {', '.join(listed)}."] if listed else []
+    unanswered = cells["api_errors"] + cells["missing"]
+    if ((unanswered > 0) & (unanswered == cells["n"])).any():
+        notes.append("No value stands where a model has no reply at all.")
+    return notes
+
+
+def _how(design: Design) -> str:
+    scoring = design.suite.scoring
+    level1 = f", Level-1 by {scoring.level1}" if 1 in design.suite.levels else ""
+    missing = "left out" if scoring.missing == "skip" else "counted as empty plans"
+    return (
+        f"Setting {design.setting}, matcher {design.matcher}{level1}; micro averages; "
+        f"missing replies and API errors are {missing}."
+    )
+
+
+def _of_suite(design: Design) -> str:
+    return f", suite {design.suite.name}" if design.suite.name else ""
+
+
+def errors_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Error types out of `errors_frame`: a count and a share (%) a type."""
+    design = run.design
+    pairs = [Column(kind, ERROR_NAMES[name]) for name in ERROR_TYPES for kind in ("n", "%")]
+    rows = [
+        (
+            row["model"] if row["level"] == design.levels[0] else "",
+            level_name(row["level"]),
+            str(row["n"]),
+            str(row["wrong_steps"]),
+            *(
+                cell
+                for name in ERROR_TYPES
+                for cell in (str(row[name]), number(100 * row[f"{name}_share"]))
+            ),
+        )
+        for row in table.to_dict("records")
+    ]
+    return TextTable(
+        f"Wrong steps by type{_of_suite(design)}",
+        (_MODEL, Column("Level", is_text=True), Column("Plans"), Column("Wrong steps"), *pairs),
+        tuple(rows),
+        (
+            f"Setting {design.setting}, matcher {design.matcher}, every level by aov; "
+            "shares are of all wrong steps.",
+        ),
+    )
+
+
+def published_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Published, ours and difference out of `published_frame`: a row a model and metric.
+
+    Under the name of a model stands the name that it was published by.
+    """
+    columns = (
+        _MODEL,
+        Column("Metric", is_text=True),
+        *(
+            Column(name, level_name(level))
+            for level in PUBLISHED_LEVELS
+            for name in ("Paper", "Ours", "Diff")
+        ),
+        Column("Largest"),
+    )
+    cells = {
+        (row["model"], row["level"], row["metric"]): (
+            number(row["published"]),
+            number(row["ours"], 2),
+            number(row["difference"], 2, signed=True),
+        )
+        for row in table.to_dict("records")
+    }
+    largest = largest_differences(table)
+    rows = [
+        (
+            label,
+            METRIC_NAMES[metric],
+            *(cell for level in PUBLISHED_LEVELS for cell in cells[model, level, metric]),
+            number(largest[model], 3) if metric == METRICS[0] else "",
+        )
+        for model, name in dict(zip(table["model"], table["published_name"], strict=True)).items()
+        for label, metric in zip((model, f"({name})", ""), METRICS, strict=True)
+    ]
+    return TextTable(
+        f"Our numbers beside the paper's Table 1{_of_suite(run.design)} (%)",
+        columns,
+        tuple(rows),
+        tuple(_difference_notes(table, run.design)),
+    )
+
+
+def _difference_notes(table: pd.DataFrame, design: Design) -> list[str]:
+    matchers = "/".join(sorted(set(table["matcher"]) - {""})) or NO_VALUE
+    level1 = f", Level-1 by {design.suite.scoring.level1}" if 1 in design.suite.levels else ""
+    return [
+        *comparison_notes(table, design),
+        f"Ours: setting {PUBLISHED_SETTING}, matcher {matchers}{level1}.",
+        "The last column has the largest absolute difference of each model.",
+    ]
+
+
+def table1_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
+    """All of Table 1, else F1 alone, else F1 without its spread."""
+    # The last note is about the labels of the columns that are left out.
+    note = "F1 alone, to fit; precision and recall are in tables/table1.md."
+    short = replace(view.without(SIDE_METRICS), notes=(note, *view.notes[:-1]))
+    bare = tuple(tuple(cell.partition(SPREAD)[0] for cell in row) for row in short.rows)
+    return view, short, replace(short, rows=bare)
+
+
+def errors_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
+    """The rows over all levels, each with its model's name; shares alone where space is short."""
+    rows, model = [], ""
+    for row in view.rows:
+        model = row[0] or model
+        if row[1] == level_name(OVERALL):
+            rows.append((model, *row[1:]))
+    whole = replace(view, rows=tuple(rows)).without(("Level", "n"))
+    return whole, whole.without(("Plans", "Wrong steps"))

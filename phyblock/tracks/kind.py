@@ -1,0 +1,85 @@
+"""What a track declares about itself: everything outside its folder goes by this."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from phyblock.datasets import AssemblyTask, Dataset
+from phyblock.records import Record
+from phyblock.registry import known_tracks
+from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.tables.measures import Counted
+from phyblock.tables.track_report import TrackReport
+from phyblock.tracks.base import AnyTrack, SingleTrack
+
+__all__ = ["Opening", "TrackKind", "kind_of", "kinds"]
+
+
+@dataclass(frozen=True)
+class Opening:
+    """What a track is opened with; without `with_prompts` nothing is asked of anyone.
+
+    `limit` is how many items the user wants at most, None for all.
+    """
+
+    loaded: LoadedSuite
+    dataset: Dataset
+    limit: int | None
+    with_prompts: bool
+
+
+@dataclass(frozen=True)
+class TrackKind:
+    """A track: what it is called, what it adds to a suite, how it is opened.
+
+    `title` and `item` (the noun for what it asks about) are for people, `about` says in a suite's
+    documentation what it asks. `open` raises SpecError, DataError or PromptError with what is
+    wrong. `report` imports what tables and figures are made by, which takes long. `subject` is the
+    type that the rules of its `baselines` take, with a random generator, to answer in the
+    benchmark's own reply form. `section` is the key, model and description of the part of a suite
+    that is its own. `template` is the bundled prompt, None where it has none, and `prompt_field`
+    where a suite names another. `own_data` gives the folder of data of its own as a suite says it,
+    `manifest` what the manifest says beyond what all tracks have. `rescored` makes the track out of
+    a suite and scenes for reading stored replies again; None where `phyblock score` takes its
+    records over as they are. With `plays`, samples are episodes of several turns. `record` is the
+    model of its records, where it adds something to them. `counted` is what its measures count of
+    every sample as it is judged.
+    """
+
+    name: str
+    title: str
+    item: str
+    about: str
+    open: Callable[[Opening], AnyTrack]
+    report: Callable[[], TrackReport]
+    subject: type[object]
+    template: Path | None = None
+    record: type[Record] | None = None
+    prompt_field: tuple[str, ...] = ("prompt",)
+    section: tuple[str, type[BaseModel], str] | None = None
+    baselines: Mapping[str, Callable[..., str]] = field(default_factory=dict)
+    tables: tuple[str, ...] = ()
+    own_data: Callable[[SuiteSpec], tuple[str, tuple[str, ...], bool] | None] | None = None
+    manifest: Callable[[LoadedSuite], Mapping[str, Any]] | None = None
+    plays: bool = False
+    rescored: Callable[[SuiteSpec, Sequence[AssemblyTask]], SingleTrack[Any]] | None = None
+    counted: tuple[Counted, ...] = ()
+
+    def data_folder(self, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:
+        """The folder of its own data: text, path of keys, whether it may be a bundled set."""
+        return None if self.own_data is None else self.own_data(suite)
+
+
+def kinds() -> Mapping[str, TrackKind]:
+    """Every track by name, in the order in which they are listed."""
+    return {name: kind for name, kind in known_tracks().items() if isinstance(kind, TrackKind)}
+
+
+def kind_of(name: str) -> TrackKind:
+    """The track of a name; KeyError for one that there is not."""
+    return kinds()[name]

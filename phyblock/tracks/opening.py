@@ -1,0 +1,69 @@
+"""What tracks share when they are opened: picture style, worker processes, prompts."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from phyblock.resources import cache_dir
+from phyblock.sim import PictureStyle
+from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.tracks.base import AnyTrack
+from phyblock.tracks.kind import Opening, kind_of
+from phyblock.tracks.pictures import PicturePolicy, Pictures
+from phyblock.tracks.prompts import TemplatePrompt
+
+__all__ = [
+    "assembly_pictures",
+    "open_tracks",
+    "picture_folder",
+    "picture_style",
+    "render_workers",
+    "template_prompt",
+]
+
+_RENDER_WORKERS = 4
+
+
+def open_tracks(opening: Opening, names: Sequence[str]) -> tuple[AnyTrack, ...]:
+    """The tracks of these names, in their order.
+
+    Raises SpecError, DataError or PromptError with what is wrong.
+    """
+    return tuple(kind_of(name).open(opening) for name in names)
+
+
+def picture_folder() -> Path:
+    """Where drawn pictures are kept."""
+    return cache_dir() / "pictures"
+
+
+def picture_style(suite: SuiteSpec) -> PictureStyle:
+    """How a suite wants pictures drawn."""
+    return PictureStyle(size_px=suite.images.size_px, background=suite.images.background)
+
+
+def assembly_pictures(suite: SuiteSpec) -> Pictures:
+    """Pictures of goals and candidates as a suite wants them."""
+    images = suite.images
+    policy = PicturePolicy(images.source, images.layout, images.order, picture_style(suite))
+    return Pictures(picture_folder(), policy, render_workers())
+
+
+def template_prompt(loaded: LoadedSuite, name: str) -> TemplatePrompt:
+    """The prompt of a track: the suite's own template, else the bundled one.
+
+    Raises PromptError for a broken one.
+    """
+    path = loaded.templates.get(name)
+    if path is not None:
+        return TemplatePrompt(path, path.stem)
+    own = kind_of(name).template
+    assert own is not None, f"{name} has no prompt of its own"
+    return TemplatePrompt(own, "default")
+
+
+def render_workers() -> int:
+    """How many processes draw pictures."""
+    return min(_RENDER_WORKERS, os.cpu_count() or 1)

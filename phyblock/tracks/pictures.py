@@ -1,0 +1,121 @@
+"""Pictures of samples: rendered in worker processes while calls run, made once, kept on disk."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from phyblock.datasets import AssemblyTask
+from phyblock.errors import DataError, Problem
+from phyblock.models.base import Image
+from phyblock.picture_files import decoded, read_picture
+from phyblock.sim import (
+    PictureStyle,
+    candidates_key,
+    candidates_png,
+    composite_png,
+    goal_key,
+    goal_png,
+)
+from phyblock.sim.compose import to_png
+from phyblock.tracks.studio import Drawing, Studio, to_image
+from phyblock.words import PictureLayout, PictureName, PictureSource
+
+__all__ = ["PicturePolicy", "Pictures"]
+
+
+@dataclass(frozen=True)
+class PicturePolicy:
+    """Which pictures a sample carries, in which order.
+
+    `source`: rendered here, or the data set's own composite. `layout`: one composite, or the two
+    pictures apart in `order`.
+    """
+
+    source: PictureSource
+    layout: PictureLayout
+    order: tuple[PictureName, ...]
+    style: PictureStyle
+
+
+class Pictures(Studio):
+    """The pictures of assembly tasks under one policy."""
+
+    def __init__(self, folder: Path, policy: PicturePolicy, workers: int) -> None:
+        super().__init__(folder, workers)
+        self.policy = policy
+
+    async def of(self, task: AssemblyTask) -> tuple[Image, ...]:
+        """The pictures of one task as they are sent.
+
+        Raises DataError when the data set has no picture of it or a broken one, StoreError when
+        the cache folder cannot be written.
+        """
+        if (recent := self.recalled(task.key)) is not None:
+            return recent
+        if self.policy.source == "dataset":
+            return self.remembered(task.key, self._from_dataset(task))
+        return self.remembered(task.key, await self.images(self._drawings(task)))
+
+    def outline(self, task: AssemblyTask) -> tuple[tuple[Image, ...], bool]:
+        """The pictures as far as they are at hand, and whether all are; nothing is rendered.
+
+        A picture that is not made yet is stood in for by an empty one of its size.
+        """
+        if self.policy.source == "dataset":
+            return self._from_dataset(task), True
+        drawings = self._drawings(task)
+        side = self.policy.style.size_px
+        wide = 2 * side if self.policy.layout == "composite" else side
+        return self.outlined(drawings, (wide, side))
+
+    def keys(self, task: AssemblyTask) -> tuple[str, ...]:
+        """What decides the pixels of a task's pictures: digests of content, style and renderer."""
+        if self.policy.source == "dataset":
+            data = b"" if task.composite is None else read_picture(task.composite)
+            return (hashlib.sha256(data).hexdigest(),)
+        return tuple(drawing.key for drawing in self._drawings(task))
+
+    def _drawings(self, task: AssemblyTask) -> tuple[Drawing, ...]:
+        scene, candidates, style = task.scene, task.candidates, self.policy.style
+        goal = Drawing("goal", goal_key(scene, style), partial(goal_png, scene, style))
+        grid = Drawing(
+            "candidates",
+            candidates_key(candidates, style),
+            partial(candidates_png, candidates, style),
+        )
+        if self.policy.layout == "separate":
+            apart = {"goal": goal, "candidates": grid}
+            return tuple(apart[label] for label in self.policy.order)
+        key = hashlib.sha256(f"composite {goal.key} {grid.key}".encode()).hexdigest()
+        return (Drawing("composite", key, partial(_composite, goal.make, grid.make)),)
+
+    def _from_dataset(self, task: AssemblyTask) -> tuple[Image, ...]:
+        if task.composite is None:
+            where = f"scene {task.scene.id}"
+            hint = "render the pictures: --set images.source=render"
+            raise DataError(Problem(where, "the data set has no picture of it", hint=hint))
+        data = read_picture(task.composite)
+        if self.policy.layout == "composite":
+            return (to_image(data, "composite"),)
+        halves = dict(zip(("goal", "candidates"), _halves(data, task.composite), strict=True))
+        return tuple(to_image(halves[label], label) for label in self.policy.order)
+
+
+def _composite(make_goal: Callable[[], bytes], make_grid: Callable[[], bytes]) -> bytes:
+    return composite_png(make_goal(), make_grid())
+
+
+def _halves(composite: bytes, path: Path) -> tuple[bytes, bytes]:
+    """Goal and candidates cut out of a 2:1 composite: two squares but for the gap between."""
+    with decoded(composite, str(path)) as picture:
+        # PNG knows no CMYK, in which JPEG files may come.
+        picture = picture.convert("RGB") if picture.mode == "CMYK" else picture
+        width, height = picture.size
+        side = width // 2 - width // 256
+        left = picture.crop((0, 0, side, height))
+        right = picture.crop((width - side, 0, width, height))
+        return to_png(left), to_png(right)

@@ -1,0 +1,138 @@
+"""Prompts: Jinja templates of the project or the user, and the exact official text."""
+
+from __future__ import annotations
+
+import hashlib
+import traceback
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import jinja2
+
+from phyblock.bounded import read_text
+from phyblock.errors import Problem, PromptError, said
+from phyblock.models.base import Image, Message
+from phyblock.tracks.template_bounds import BoundedEnvironment, render_block
+
+__all__ = ["OfficialPrompt", "Prompt", "TemplatePrompt"]
+
+_BLOCKS = ("system", "user")
+_LARGEST_BYTES = 256 * 1024
+
+
+class Prompt(Protocol):
+    """Turns pictures and facts about a sample into chat messages."""
+
+    @property
+    def name(self) -> str:
+        """What records call it."""
+
+    @property
+    def version(self) -> str:
+        """Hex digest of the text it is made from."""
+
+    def messages(
+        self, pictures: Sequence[Image], facts: Mapping[str, object]
+    ) -> tuple[Message, ...]:
+        """The messages to send; pictures stand before the text, in the order given."""
+
+
+@dataclass(frozen=True)
+class OfficialPrompt:
+    """The official prompt, read out of the user's own checkout; it has no system part."""
+
+    text: str
+    name: str = "official"
+
+    @property
+    def version(self) -> str:
+        """Hex digest of the text."""
+        return _digest(self.text)
+
+    def messages(
+        self, pictures: Sequence[Image], facts: Mapping[str, object]
+    ) -> tuple[Message, ...]:
+        """One user message; `facts` are not used, the text is fixed."""
+        del facts
+        return (Message("user", (*pictures, self.text)),)
+
+
+class TemplatePrompt:
+    """A Jinja template with a block `user` and, if wanted, blocks `system` and `caption`.
+
+    `caption` is rendered for each picture, with its `label` and its `number` from 1, and stands
+    before it.
+
+    Raises PromptError, naming file and line, when the template cannot be read, is not valid,
+    has no user block, or uses a name that is not there.
+    """
+
+    def __init__(self, path: Path, name: str) -> None:
+        self.name = name
+        self._path = path
+        try:
+            source = read_text(path, _LARGEST_BYTES)
+        except OSError as error:
+            raise PromptError(Problem(str(path), f"cannot be read: {said(error)}")) from error
+        except ValueError as error:
+            raise PromptError(Problem(str(path), f"cannot be read: it {error}")) from error
+        self.version = _digest(source)
+        try:
+            self._template = BoundedEnvironment().bounded_template(source)
+        except jinja2.TemplateSyntaxError as error:
+            where = f"{path}:{error.lineno}"
+            raise PromptError(Problem(where, f"is not valid Jinja: {error.message}")) from error
+        except Exception as error:
+            # Python compiles what Jinja makes of it, and has bounds of its own.
+            raise PromptError(Problem(str(path), f"is not valid Jinja: {said(error)}")) from error
+        self.require("user", "and, if wanted, a block system")
+
+    def require(self, block: str, more: str) -> None:
+        """Raise PromptError where the template lacks a block; `more` is told of what is allowed."""
+        if block not in self._template.blocks:
+            found = ", ".join(sorted(self._template.blocks)) or "no block"
+            allowed = f"{{% block {block} %}} ... {{% endblock %}} {more}"
+            problem = Problem(str(self._path), f"has no {block} block", "", found, allowed)
+            raise PromptError(problem)
+
+    def messages(
+        self, pictures: Sequence[Image], facts: Mapping[str, object]
+    ) -> tuple[Message, ...]:
+        """A system message, when that block gives text, and a user message with the pictures."""
+        texts = {name: self.text(name, facts) for name in _BLOCKS}
+        system = (Message("system", (texts["system"],)),) if texts["system"] else ()
+        return (*system, Message("user", (*self._captioned(pictures, facts), texts["user"])))
+
+    def _captioned(
+        self, pictures: Sequence[Image], facts: Mapping[str, object]
+    ) -> Iterator[str | Image]:
+        for number, picture in enumerate(pictures, 1):
+            about = {**facts, "label": picture.label, "number": number}
+            if caption := self.text("caption", about):
+                yield caption
+            yield picture
+
+    def text(self, block: str, facts: Mapping[str, object]) -> str:
+        """What a block of the template says, "" for one that it lacks; raises PromptError."""
+        if block not in self._template.blocks:
+            return ""
+        try:
+            return render_block(self._template, block, dict(facts)).strip()
+        except Exception as error:
+            # A template is a program: what it computes can fail in any way.
+            known = "names that are there: " + ", ".join(sorted(facts))
+            message = f"cannot be rendered: {said(error)}"
+            where = f"{self._path}:{self._line_of(error)}"
+            raise PromptError(Problem(where, message, f"block {block}", "", known)) from error
+
+    def _line_of(self, error: Exception) -> int:
+        """The template's line at which rendering failed."""
+        frames = traceback.extract_tb(error.__traceback__)
+        compiled = [frame.lineno or 1 for frame in frames if frame.filename == "<template>"]
+        return self._template.get_corresponding_lineno(compiled[-1]) if compiled else 1
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,36 @@
+"""Step planning: one operation at a time, with the assembly in view (paper section 4.1)."""
+
+from phyblock.resources import bundled
+from phyblock.tables.track_report import TrackReport
+from phyblock.tracks.kind import TrackKind
+from phyblock.tracks.step_planning.baselines import STEP_RULES, StepSubject
+from phyblock.tracks.step_planning.opening import open_step_planning
+from phyblock.tracks.step_planning.record import EpisodeRecord
+from phyblock.tracks.step_planning.spec import StepsSpec
+from phyblock.tracks.step_planning.track import StepPlanning
+
+__all__ = ["TRACK"]
+
+
+def _report() -> TrackReport:
+    from phyblock.tracks.step_planning.report import REPORT
+
+    return REPORT
+
+
+TRACK = TrackKind(
+    name=StepPlanning.name,
+    title="Step planning",
+    item="episode",
+    about="step by step in the simulator",
+    open=open_step_planning,
+    report=_report,
+    subject=StepSubject,
+    baselines=STEP_RULES,
+    plays=True,
+    section=("steps", StepsSpec, "The rules of the step_planning track."),
+    record=EpisodeRecord,
+    template=bundled("prompts", "step_planning.j2"),
+    prompt_field=("steps", "prompt"),
+    tables=("table3", "endings", "progress"),
+)

@@ -1,0 +1,70 @@
+"""What baselines answer where the next step is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from phyblock.domain import CandidateSet, Scene
+
+__all__ = ["STEP_RULES", "StepSubject"]
+
+
+@dataclass(frozen=True)
+class StepSubject:
+    """The next step is asked for.
+
+    `valid` are the candidates that would be placed now, in ascending order; empty when the goal
+    is complete. `exact` are those of them that are also turned as the goal is. `last_failed` is
+    the candidate whose move failed last, if the last move did.
+    """
+
+    scene: Scene
+    candidates: CandidateSet
+    valid: tuple[int, ...]
+    exact: tuple[int, ...]
+    last_failed: int | None = None
+
+
+def _random_step(subject: StepSubject, rng: np.random.Generator) -> str:
+    return _step(int(rng.integers(1, len(subject.candidates) + 1)))
+
+
+def _oracle_step(subject: StepSubject, rng: np.random.Generator) -> str:
+    """One of the right moves, so that every valid order can come; Done where there is none."""
+    moves = subject.exact or subject.valid
+    return _step(moves[int(rng.integers(len(moves)))] if moves else None)
+
+
+def _unoriented_step(subject: StepSubject, rng: np.random.Generator) -> str:
+    """A right move, but with the block turned wrongly wherever there is such a candidate."""
+    index = subject.exact[int(rng.integers(len(subject.exact)))] if subject.exact else None
+    if index is None:
+        return _oracle_step(subject, rng)
+    kind, candidates = subject.candidates[index].kind, subject.candidates
+    looks = {block.look for block in subject.scene.blocks}
+    wrong = [
+        n
+        for n in range(1, len(candidates) + 1)
+        if candidates[n].kind == kind and candidates[n].look not in looks
+    ]
+    return _step(wrong[int(rng.integers(len(wrong)))] if wrong else index)
+
+
+def _repeated_step(subject: StepSubject, rng: np.random.Generator) -> str:
+    """Any move at random until one fails, then that one for ever."""
+    return _random_step(subject, rng) if subject.last_failed is None else _step(subject.last_failed)
+
+
+def _step(index: int | None) -> str:
+    return "Next plan: Done" if index is None else f"Next plan: Move({index})"
+
+
+STEP_RULES = {
+    "random": _random_step,
+    "oracle": _oracle_step,
+    "oracle-no-orientation": _unoriented_step,
+    "repeat": _repeated_step,
+}
+"""Rules by name of the baseline."""

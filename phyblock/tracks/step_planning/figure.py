@@ -1,0 +1,73 @@
+"""The figure of step planning: how far structures are after each step."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from phyblock.tables.drawing import (
+    COLORS,
+    GRID,
+    INK,
+    MARKERS,
+    PALE,
+    bare_axes,
+    headed,
+    new_figure,
+)
+from phyblock.tables.load import Run
+from phyblock.tracks.step_planning.episodes import progress_frame
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["progress_by_turn", "step_progress"]
+
+_NAMED = 8
+
+
+def step_progress(run: Run) -> pd.DataFrame:
+    """Share of the goal's blocks that stand after each step [%], mean over episodes.
+
+    A row a step from 0, a column a model. An episode that has ended keeps what it built.
+    """
+    frame = progress_frame(run)
+    table = 100 * frame.pivot(index="step", columns="model", values="blocks")
+    table = table.reindex(columns=[name for name in run.design.model_names if name in table])
+    start = pd.DataFrame(0.0, index=[0], columns=table.columns)
+    return pd.concat([start, table]).rename_axis(index="step", columns=None)
+
+
+def progress_by_turn(run: Run) -> Figure | None:
+    """How far the structure is after each step, a line a model; None without an episode."""
+    if "step_planning" not in run.design.suite.tracks:
+        return None
+    table = step_progress(run)
+    if not len(table.columns):
+        return None
+    last = table.iloc[-1].sort_values(ascending=False, kind="stable")
+    figure = new_figure(3.6)
+    ax = figure.subplots()
+    for place, model in reversed(list(enumerate(last.index))):
+        named = place < _NAMED
+        ax.plot(
+            table.index,
+            table[model],
+            color=COLORS[place] if named else PALE,
+            marker=MARKERS[place] if named else None,
+            markersize=3.2,
+            linewidth=1.3 if named else 0.7,
+            label=model if named else "_other",
+            zorder=3 if named else 1,
+        )
+    ax.set(ylim=(0, 102), xlim=(0, None), xlabel="Step", ylabel="Blocks of the goal placed (%)")
+    ax.locator_params(axis="x", integer=True)
+    bare_axes([ax], "y")
+    ax.spines["bottom"].set_color(GRID)
+    ax.tick_params(colors=INK)
+    handles, labels = ax.get_legend_handles_labels()
+    figure.legend(handles[::-1], labels[::-1], loc="outside right center")
+    name = f"Suite {run.design.suite.name}, " if run.design.suite.name else ""
+    headed(figure, "Progress by step", f"{name}mean over episodes; one that ended keeps its blocks")
+    return figure

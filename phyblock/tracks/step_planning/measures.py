@@ -1,0 +1,61 @@
+"""What step planning measures: precision, recall and F1 of moves, and completed goals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+
+from phyblock.scoring.uncertainty import f1_of, precision_of, ratio_of, recall_of
+from phyblock.tables.load import Run
+from phyblock.tables.measures import CELL, VARIANT, Counted, Measure
+from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.tables.track_report import WHOLE
+from phyblock.tracks.step_planning.episodes import NAME, episodes_frame
+
+__all__ = ["COUNTED", "NAME", "STEP_MEASURES", "is_asked"]
+
+COUNTED = ("placed", "attempted")
+"""What precision is over: the blocks in the world, or every move that was attempted."""
+
+
+def is_asked(run: Run) -> bool:
+    """Whether the run has episodes."""
+    return NAME in run.design.suite.tracks
+
+
+def _moves(run: Run) -> pd.DataFrame:
+    scores = run.scores
+    left_out = scores["outcome"].isin(run.design.outcomes_left_out)
+    kept = scores[(scores["track"] == NAME) & ~left_out]
+    return kept.assign(**_about(kept))
+
+
+def _episodes(run: Run) -> pd.DataFrame:
+    episodes = episodes_frame(run)
+    completed = (episodes["ending"] == "completed").astype("int64")
+    return episodes.assign(
+        **dict.fromkeys(VARIANT, ""),
+        **_about(episodes),
+        completed=completed,
+        episodes=1,
+    )
+
+
+def _about(rows: pd.DataFrame) -> dict[str, Any]:
+    replied = ~rows["outcome"].isin(WITHOUT_REPLY)
+    return {CELL: WHOLE.name, "item": rows["scene"], "replied": replied}
+
+
+_MOVES = Counted("moves", ("tp", "fp", "fn"), _moves)
+_ENDS = Counted("episodes", ("completed", "episodes"), _episodes)
+
+STEP_MEASURES = (
+    Measure("f1", "F1", _MOVES, f1_of, "harmonic mean of precision and recall", over="moves"),
+    Measure("precision", "Precision", _MOVES, precision_of, "right moves of those counted"),
+    Measure("recall", "Recall", _MOVES, recall_of, "blocks of the goal that were placed"),
+    Measure(
+        "completion", "Completed", _ENDS, ratio_of, "episodes that placed the whole goal",
+        over="episodes",
+    ),
+)  # fmt: skip

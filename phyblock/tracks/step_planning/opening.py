@@ -1,0 +1,48 @@
+"""Open the step-planning track of a suite."""
+
+from __future__ import annotations
+
+from phyblock.errors import Problem, SpecError
+from phyblock.specs import SuiteSpec
+from phyblock.tracks.kind import Opening
+from phyblock.tracks.opening import assembly_pictures, template_prompt
+from phyblock.tracks.selection import select_tasks
+from phyblock.tracks.step_planning.prompt import StepPrompt
+from phyblock.tracks.step_planning.rules import StepLimits, StepRules
+from phyblock.tracks.step_planning.spec import StepsSpec
+from phyblock.tracks.step_planning.track import StepPlanning
+
+__all__ = ["open_step_planning"]
+
+
+def open_step_planning(opening: Opening) -> StepPlanning:
+    """The track; SpecError, DataError or PromptError with what is wrong."""
+    loaded, suite = opening.loaded, opening.loaded.suite
+    tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit)
+    rules = _rules(suite)
+    if not opening.with_prompts:
+        return StepPlanning(rules, items=tasks)
+    if suite.images.source == "dataset":
+        where = loaded.where("images", "source")
+        message = "step planning draws every state, so the goal must be drawn as well"
+        hint = "render the pictures: --set images.source=render"
+        raise SpecError(Problem(where, message, "images.source", "dataset", hint=hint))
+    steps = suite.section(StepsSpec)
+    shown = (steps.feedback, steps.history, steps.memory, steps.cot)
+    template = template_prompt(loaded, StepPlanning.name)
+    prompt = StepPrompt(template, *shown, gating=rules.gating, accepts=rules.accepts)
+    return StepPlanning(rules, prompt, assembly_pictures(suite), tasks)
+
+
+def _rules(suite: SuiteSpec) -> StepRules:
+    """How a suite plays episodes."""
+    steps = suite.section(StepsSpec)
+    limits = StepLimits(
+        steps.max_steps,
+        steps.max_failures,
+        steps.max_repeats,
+        steps.max_episode_tokens,
+        steps.max_episode_usd,
+    )
+    accepts = steps.setting or suite.settings[0]
+    return StepRules(accepts, suite.settings, steps.gating, steps.physics, steps.samples, limits)

@@ -1,0 +1,84 @@
+"""What step planning brings to the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from phyblock.errors import Problem, SpecError
+from phyblock.tables.load import Run
+from phyblock.tables.track_report import WHOLE, PaperTable, Shown, TableMaker, TrackReport
+from phyblock.tracks.step_planning.episodes import endings_frame, moves_frame, progress_frame
+from phyblock.tracks.step_planning.figure import progress_by_turn
+from phyblock.tracks.step_planning.measures import STEP_MEASURES
+from phyblock.tracks.step_planning.table3 import (
+    endings_view,
+    episodes_in_terminal,
+    moves_view,
+    paper_table3_frame,
+    paper_table3_view,
+    progress_view,
+    published_scores,
+    step_intervals,
+    step_intervals_view,
+    step_scores_frame,
+    table3_frame,
+    table3_view,
+)
+
+__all__ = ["REPORT"]
+
+_COLUMNS = (
+    Shown("precision", WHOLE.name, "Precision", "placed"),
+    Shown("recall", WHOLE.name, "Recall", "placed"),
+    Shown("f1", WHOLE.name, "F1", "placed"),
+    Shown("f1", WHOLE.name, "F1 of attempts", "attempted"),
+    Shown("completion", WHOLE.name, "Completed"),
+)
+
+
+def _references(run: Run) -> Mapping[str, Mapping[str, float]]:
+    printed = {name: published_scores(name) for name in run.design.published.values()}
+    headings = {f"{column.criterion}_{column.measure}": column.heading for column in _COLUMNS}
+    return {
+        f"{name}, published": {headings[cell]: value for cell, value in cells.items()}
+        for name, cells in printed.items()
+        if cells
+    }
+
+
+def _notes(run: Run) -> Sequence[str]:
+    return (
+        f"Percent, setting {run.design.setting}. Precision, recall and F1 are of the blocks that "
+        "were placed, as in the paper's Table 3; F1 of attempts counts every move that placed "
+        "nothing as wrong; completed are episodes that placed the whole goal.",
+    )
+
+
+def _check_alike(run: Run, first: Run, _: Sequence[str]) -> None:
+    settings, wanted = run.design.suite.settings, first.design.setting
+    if wanted not in settings:
+        hint = "phyblock score reads stored replies again under other rules"
+        message = f"was not scored as {first.path} was, by {wanted}"
+        raise SpecError(Problem(str(run.path), message, "settings", ", ".join(settings), hint=hint))
+
+
+REPORT = TrackReport(
+    measures=STEP_MEASURES,
+    headline=lambda _: _COLUMNS,
+    main="F1",
+    short="steps_f1",
+    references=_references,
+    notes=_notes,
+    tables={
+        "table3": TableMaker(table3_frame, table3_view, in_terminal=episodes_in_terminal),
+        "step_intervals": TableMaker(step_intervals, step_intervals_view, "table3"),
+        "step_scores": TableMaker(step_scores_frame, None, "table3"),
+        "endings": TableMaker(endings_frame, endings_view, in_terminal=episodes_in_terminal),
+        "moves": TableMaker(moves_frame, moves_view, "endings"),
+        "progress": TableMaker(progress_frame, progress_view),
+    },
+    figures={"step-progress": progress_by_turn},
+    figure_titles={"step-progress": "Blocks placed, turn by turn"},
+    paper_tables={3: PaperTable(paper_table3_frame, paper_table3_view)},
+    check_alike=_check_alike,
+)

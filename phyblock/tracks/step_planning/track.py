@@ -1,0 +1,181 @@
+"""The step-planning track: one operation at a time, with the assembly in view (paper section 4.1).
+
+The messages of a step hold the goal, the candidates, the current picture and the history, in this
+order.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from phyblock.datasets import AssemblyTask
+from phyblock.domain import Block
+from phyblock.models.base import Image, Message, Request
+from phyblock.scoring import Assembly
+from phyblock.sim.question_pictures import question_key, question_png
+from phyblock.sim.registry import DEFAULT_ENGINE, physics_engine
+from phyblock.sim.site import ONE_SETTING, Settled, settle, state_picture
+from phyblock.sim.stability import DEFAULT_TRIAL
+from phyblock.tracks.pictures import Pictures
+from phyblock.tracks.step_planning.baselines import StepSubject
+from phyblock.tracks.step_planning.episode import Desk, StepEpisode
+from phyblock.tracks.step_planning.prompt import PastStep, StepPrompt
+from phyblock.tracks.step_planning.rules import StepRules
+from phyblock.tracks.studio import Drawing
+
+__all__ = ["StepPlanning"]
+
+_KEPT = 4096
+"""States whose fall or stand is remembered."""
+_LIKELY = PastStep("Move(1)", "placed", "Next plan: Move(1)", None)
+
+
+@dataclass(frozen=True)
+class _Sight:
+    """What a model is shown: a prompt and the pictures in it."""
+
+    prompt: StepPrompt
+    pictures: Pictures
+
+
+class StepPlanning:
+    """Episodes of one operation a step; see `StepEpisode`."""
+
+    name = "step_planning"
+
+    def __init__(
+        self,
+        rules: StepRules,
+        prompt: StepPrompt | None = None,
+        pictures: Pictures | None = None,
+        items: Sequence[AssemblyTask] = (),
+    ) -> None:
+        """`prompt` and `pictures` are None where every model is a recording."""
+        self.rules = rules
+        self.items = items
+        self.template = "" if prompt is None else prompt.template.name
+        self._sight = _Sight(prompt, pictures) if prompt and pictures else None
+        self._settled: OrderedDict[tuple[Block, ...], Settled] = OrderedDict()
+
+    def about(self, item: AssemblyTask) -> dict[str, Any]:
+        """The most steps that an episode of it can take."""
+        return {"max_steps": self.rules.limits.max_steps(len(item.scene))}
+
+    def identity(self) -> dict[str, Any]:
+        """Name and version of the prompt, a digest of all that decides the pictures, and the
+        physics engine where blocks are let go in another one than PyBullet.
+        """
+        engine = self._other_engine()
+        if self._sight is None:
+            return {"prompt": None, "pictures": None, **engine}
+        template = self._sight.prompt.template
+        keys = [self._sight.pictures.keys(task) for task in self.items]
+        return {
+            "prompt": {"name": template.name, "version": template.version},
+            "pictures": hashlib.sha256(json.dumps(keys).encode()).hexdigest(),
+            **engine,
+        }
+
+    def start(
+        self, item: AssemblyTask, seed: int, params: Mapping[str, object], *, with_messages: bool
+    ) -> StepEpisode:
+        """An episode that has not begun."""
+        desk = Desk(self._settle)
+        if with_messages and self._sight is not None:
+            version = self._sight.prompt.template.version
+            desk = Desk(self._settle, partial(self._write, self._sight, item), version)
+        return StepEpisode(item, seed, params, self.rules, desk)
+
+    def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
+        """As many requests as an episode can have, made without rendering.
+
+        Each step is taken to have placed a block. Only the first request can be a real one, and
+        with several samples none, since their seeds are not those of the run.
+        """
+        rules = self.rules
+        assembly = Assembly(item.scene, item.candidates, rules.accepts, rules.gating)
+        subject = StepSubject(item.scene, item.candidates, assembly.right_moves(), ())
+        for step in range(rules.limits.max_steps(len(item.scene))):
+            for sample in range(rules.samples):
+                request = Request(f"{item.key}/{step + 1}", sample, (), {}, "", subject)
+                yield self._outline(item, request, [_LIKELY] * step)
+
+    def close(self) -> None:
+        """Stop the worker processes."""
+        if self._sight is not None:
+            self._sight.pictures.close()
+
+    def _outline(
+        self, item: AssemblyTask, request: Request, past: Sequence[PastStep]
+    ) -> tuple[Request, bool]:
+        is_real = not past and self.rules.samples == 1
+        if self._sight is None:
+            return request, is_real
+        pictures = self._sight.pictures
+        fixed, is_fixed_real = pictures.outline(item)
+        drawing = self._drawing(self._sight, item, ())
+        side = pictures.policy.style.size_px
+        (current,), is_current_real = pictures.outlined((drawing,), (side, side))
+        messages = self._messages(self._sight, item, fixed, current, past)
+        version = self._sight.prompt.template.version
+        request = replace(request, messages=messages, prompt_version=version)
+        return request, is_real and is_fixed_real and is_current_real
+
+    def _other_engine(self) -> dict[str, Any]:
+        # Runs made before there was a choice name none, and are to go on with PyBullet.
+        engine = None if self.rules.physics == "off" else physics_engine()
+        if engine is None or engine.name == DEFAULT_ENGINE:
+            return {}
+        return {"physics": {"engine": engine.name, **engine.versions}}
+
+    async def _write(
+        self,
+        sight: _Sight,
+        item: AssemblyTask,
+        past: Sequence[PastStep],
+        blocks: Sequence[Block],
+    ) -> tuple[tuple[Message, ...], Image]:
+        """The messages of the step after `past`, and the picture of the assembly among them."""
+        fixed = await sight.pictures.of(item)
+        current = await sight.pictures.image(self._drawing(sight, item, blocks))
+        return self._messages(sight, item, fixed, current, past), current
+
+    def _messages(
+        self,
+        sight: _Sight,
+        item: AssemblyTask,
+        fixed: Sequence[Image],
+        current: Image,
+        past: Sequence[PastStep],
+    ) -> tuple[Message, ...]:
+        most = self.rules.limits.max_steps(len(item.scene))
+        return sight.prompt.messages(fixed, current, past, len(item.candidates), most)
+
+    def _drawing(self, sight: _Sight, item: AssemblyTask, blocks: Sequence[Block]) -> Drawing:
+        style = sight.pictures.policy.style
+        recipe = state_picture(item.scene, blocks, style)
+        return Drawing(
+            recipe.label, question_key(recipe, style), partial(question_png, recipe, style)
+        )
+
+    async def _settle(self, blocks: Sequence[Block]) -> Settled:
+        """What becomes of blocks, worked out in another process, or in a thread without one."""
+        state = tuple(blocks)
+        if state not in self._settled:
+            trial = DEFAULT_TRIAL if self.rules.physics == "strict" else ONE_SETTING
+            work = partial(settle, state, trial)
+            self._settled[state] = (
+                await asyncio.to_thread(work)
+                if self._sight is None
+                else await self._sight.pictures.work_out(work)
+            )
+            if len(self._settled) > _KEPT:
+                self._settled.popitem(last=False)
+        return self._settled[state]

@@ -1,0 +1,51 @@
+"""VQA: a question with its pictures in, a letter or an order out (paper section 3.3)."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from phyblock.resources import bundled
+from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.tables.track_report import TrackReport
+from phyblock.tracks.kind import TrackKind
+from phyblock.tracks.vqa.baselines import CHOICE_RULES, ChoiceSubject
+from phyblock.tracks.vqa.opening import open_vqa
+from phyblock.tracks.vqa.record import ChoiceRecord
+from phyblock.tracks.vqa.spec import VqaSpec
+from phyblock.tracks.vqa.track import Vqa
+
+__all__ = ["TRACK"]
+
+
+def _questions(suite: SuiteSpec) -> tuple[str, tuple[str, ...], bool]:
+    spec = suite.section(VqaSpec)
+    return spec.path, ("vqa", "path"), spec.format == "builtin"
+
+
+def _manifest(loaded: LoadedSuite) -> Mapping[str, Any]:
+    spec = loaded.suite.section(VqaSpec)
+    return {"questions": {"format": spec.format, "root": str(loaded.folders[Vqa.name])}}
+
+
+def _report() -> TrackReport:
+    from phyblock.tracks.vqa.report import REPORT
+
+    return REPORT
+
+
+TRACK = TrackKind(
+    name=Vqa.name,
+    title="VQA",
+    item="question",
+    about="multiple-choice questions",
+    open=open_vqa,
+    report=_report,
+    subject=ChoiceSubject,
+    baselines=CHOICE_RULES,
+    section=("vqa", VqaSpec, "The questions of the vqa track, and how they are shown."),
+    record=ChoiceRecord,
+    template=bundled("prompts", "vqa.j2"),
+    prompt_field=("vqa", "prompt"),
+    tables=("table2",),
+    own_data=_questions,
+    manifest=_manifest,
+)

@@ -1,0 +1,139 @@
+"""Answers to questions: which count, which are right, which letters were given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
+from phyblock.scoring import Answered, letter_rates
+from phyblock.tables.load import Run, once_per_run
+from phyblock.tables.outcomes import WITHOUT_REPLY
+
+__all__ = [
+    "CELLS",
+    "OVERALL_CELL",
+    "Showing",
+    "answers_of",
+    "expected_answers",
+    "letters_frame",
+    "questions_counted",
+    "scored_answers",
+    "showing",
+    "subtasks_of",
+]
+
+_TRACK = "vqa"
+OVERALL_CELL = "overall"
+CELLS: tuple[str, ...] = (
+    *(name for category, subtasks in CATEGORIES.items() for name in (*subtasks, category)),
+    OVERALL_CELL,
+)
+"""Cells in the order of Table 2: the subtasks of a category, its average, ..., the overall one."""
+
+
+@dataclass(frozen=True)
+class Showing:
+    """How a run showed its questions."""
+
+    options_as: str = "images"
+    circular: bool = False
+    blind: bool = False
+    wrong_image: bool = False
+
+    @property
+    def rotations(self) -> int:
+        """How often each question was asked with one seed."""
+        return len(LETTERS) if self.circular else 1
+
+
+def showing(run: Run) -> Showing:
+    """What the run's suite says of it."""
+    section = run.manifest.get("suite", {}).get("vqa", {})
+    return Showing(**{name: section[name] for name in Showing.__annotations__ if name in section})
+
+
+@once_per_run
+def questions_counted(run: Run) -> pd.DataFrame:
+    """The questions behind accuracies: model, subtask, scene, question, seed, correct, n.
+
+    One row a model, question and seed, `correct` 0 or 1, `n` 1; with rotations it is right only if
+    each of them is. Subtasks in which a model said nothing are left out.
+    """
+    records = run.records[run.records["track"] == _TRACK]
+    keys = ["model", "subtask", "scene", "question", "seed"]
+    rows = records[keys].assign(
+        correct=records["given"].eq(records["right"]).fillna(False).astype("int64"),
+        left_out=records["outcome"].isin(run.design.outcomes_left_out),
+        replied=~records["outcome"].isin(WITHOUT_REPLY),
+    )
+    asked = rows.groupby(keys, sort=True).agg(
+        {"correct": "sum", "left_out": "any", "replied": "any"}
+    )
+    asked["replied"] = asked.groupby(["model", "subtask"])["replied"].transform("any")
+    kept = asked[asked["replied"].astype(bool) & ~asked["left_out"].astype(bool)]
+    correct = (kept["correct"] == showing(run).rotations).astype("int64")
+    return pd.DataFrame({"correct": correct, "n": 1}, index=kept.index).reset_index()
+
+
+def letters_frame(run: Run) -> pd.DataFrame:
+    """How often each letter was right and was given [%], by model, without ordering.
+
+    `n` answers were scored; `unread` of them (all failures) have no letter. Columns `right_a`,
+    `given_a` to `given_d`.
+    """
+    rows = []
+    for model in run.design.model_names:
+        answers = _answers(scored_answers(run, model))
+        rates = letter_rates(answers)
+        row: dict[str, Any] = {"model": model, "n": rates.n}
+        row["unread"] = rates.n - sum(rates.given.values())
+        for letter in LETTERS:
+            for kind, counts in (("right", rates.right), ("given", rates.given)):
+                share = 100 * counts[letter] / rates.n if rates.n else np.nan
+                row[f"{kind}_{letter.lower()}"] = share
+        rows.append(row)
+    names = [f"{kind}_{letter.lower()}" for letter in LETTERS for kind in ("right", "given")]
+    return pd.DataFrame(rows, columns=["model", "n", "unread", *names])
+
+
+def subtasks_of(cell: str) -> tuple[str, ...]:
+    """The subtasks that one of `CELLS` stands for."""
+    if cell == OVERALL_CELL:
+        return SUBTASKS
+    return next((parts for name, parts in CATEGORIES.items() if name == cell), (cell,))
+
+
+def answers_of(run: Run, model: str) -> pd.DataFrame:
+    """Records of the questions that a model was asked."""
+    records = run.records
+    return records[(records["track"] == _TRACK) & (records["model"] == model)]
+
+
+def scored_answers(run: Run, model: str) -> pd.DataFrame:
+    """Samples that count; under `missing: skip` a question goes with all its rotations."""
+    samples = answers_of(run, model)
+    left_out = samples["outcome"].isin(run.design.outcomes_left_out)
+    if not left_out.any():
+        return samples
+    names = pd.Series(list(zip(samples["question"], samples["seed"], strict=True)), samples.index)
+    return samples[~names.isin(set(names[left_out]))]
+
+
+def _answers(samples: pd.DataFrame) -> list[Answered]:
+    columns = ("question", "seed", "subtask", "right", "given", "rotation")
+    return [
+        Answered(f"{question} s{seed}", subtask, right, given, int(rotation))
+        for question, seed, subtask, right, given, rotation in zip(
+            *(samples[name] for name in columns), strict=True
+        )
+    ]
+
+
+def expected_answers(run: Run) -> dict[str, int]:
+    """Samples of each subtask that a complete run holds of one model."""
+    told = run.manifest.get("tracks", {}).get(_TRACK, {}).get("by_subtask", {})
+    return {name: count * len(run.design.suite.seeds) for name, count in told.items()}

@@ -1,0 +1,75 @@
+"""The figure of questions: a heat map of models and subtasks."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from phyblock.domain import CATEGORIES, SUBTASKS
+from phyblock.scoring import chance
+from phyblock.tables.drawing import (
+    MUTED,
+    headed,
+    new_figure,
+)
+from phyblock.tables.load import Run
+from phyblock.tracks.vqa.accuracy import questions_frame
+from phyblock.tracks.vqa.answers import showing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["accuracy_by_subtask", "vqa_heat_map"]
+
+_DARK = 55.0
+
+
+def accuracy_by_subtask(run: Run) -> pd.DataFrame:
+    """Share of right answers [%], a row a model, a column a subtask; NaN for what was not asked.
+
+    As in `questions_frame`; models that answered nothing have no row.
+    """
+    frame = questions_frame(run)
+    table = 100 * frame.pivot(index="model", columns="cell", values="accuracy")
+    table = table.reindex(index=list(run.design.model_names), columns=list(SUBTASKS))
+    return table.astype("float64").dropna(how="all").rename_axis(index=None, columns=None)
+
+
+def vqa_heat_map(run: Run) -> Figure | None:
+    """A row a model, a column a subtask, categories apart; None without a question."""
+    if "vqa" not in run.design.suite.tracks:
+        return None
+    table = accuracy_by_subtask(run)
+    if table.empty:
+        return None
+    order = table.mean(axis=1).sort_values(ascending=False, kind="stable").index
+    table = table.loc[order]
+    figure = new_figure(1.9 + 0.25 * len(table))
+    ax = figure.subplots()
+    image = ax.imshow(table.to_numpy(), cmap="cividis", vmin=0, vmax=100, aspect="auto")
+    for (row, column), value in np.ndenumerate(table.to_numpy()):
+        if not np.isnan(value):
+            color = "white" if value < _DARK else "black"
+            ax.text(column, row, f"{value:.0f}", ha="center", va="center", color=color, fontsize=7)
+    start = 0.0
+    for category, subtasks in CATEGORIES.items():
+        middle = start + (len(subtasks) - 1) / 2
+        name = category.replace("_", " ").capitalize()
+        ax.text(middle, -0.75, name, ha="center", va="bottom", fontsize=7.5, color=MUTED)
+        start += len(subtasks)
+        ax.axvline(start - 0.5, color="white", linewidth=3)
+    ax.set_xticks(range(len(table.columns)), list(table.columns))
+    ax.set_yticks(range(len(table)), list(table.index))
+    ax.tick_params(length=0)
+    for side in ax.spines.values():
+        side.set_visible(False)
+    bar = figure.colorbar(image, ax=ax, pad=0.015, fraction=0.03)
+    bar.set_label("Right answers (%)")
+    bar.outline.set_visible(False)
+    name = f"Suite {run.design.suite.name}, " if run.design.suite.name else ""
+    guessed = {subtask: 100 * chance(subtask) ** showing(run).rotations for subtask in ("SH", "OR")}
+    guessing = f"guessing gives {guessed['SH']:.2g}, in OR {guessed['OR']:.1g}"
+    headed(figure, "Questions by subtask", f"{name}right answers (%); {guessing}")
+    return figure

@@ -1,0 +1,98 @@
+"""The VQA track of a suite: which questions, asked how."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from phyblock.datasets import (
+    QUESTIONS_FILE,
+    Dataset,
+    QuestionSet,
+    QuestionTask,
+    read_official_questions,
+    read_questions,
+)
+from phyblock.domain import SUBTASKS, Subtask
+from phyblock.errors import DataError, Problem, SpecError
+from phyblock.resources import bundled
+from phyblock.tracks.kind import Opening
+from phyblock.tracks.opening import (
+    picture_folder,
+    picture_style,
+    render_workers,
+    template_prompt,
+)
+from phyblock.tracks.selection import stratified
+from phyblock.tracks.vqa.pictures import QuestionPictures
+from phyblock.tracks.vqa.spec import VqaSpec
+from phyblock.tracks.vqa.track import Vqa, VqaRules
+
+__all__ = ["open_questions", "open_vqa", "select_questions"]
+
+
+def open_vqa(opening: Opening) -> Vqa:
+    """The track; SpecError, DataError or PromptError with what is wrong."""
+    loaded, suite = opening.loaded, opening.loaded.suite
+    spec = suite.section(VqaSpec)
+    questions = open_questions(spec.format, loaded.folders[Vqa.name], opening.dataset)
+    tasks = select_questions(
+        questions.tasks, spec.subtasks, suite.levels, spec.per_subtask, opening.limit
+    )
+    if not tasks:
+        where = loaded.where("vqa", "subtasks")
+        found = ", ".join(sorted({task.question.subtask for task in questions.tasks}))
+        message = "no question is of these subtasks and levels"
+        raise SpecError(Problem(where, message, "vqa.subtasks", found=f"questions of {found}"))
+    rules = VqaRules(spec.options_as, spec.circular, spec.blind, spec.wrong_image)
+    if not opening.with_prompts:
+        return Vqa(rules, questions, tasks)
+    pictures = QuestionPictures(
+        picture_folder(), picture_style(suite), spec.options_as, render_workers()
+    )
+    return Vqa(rules, questions, tasks, template_prompt(loaded, Vqa.name), pictures)
+
+
+def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSet:
+    """Read a question set about the scenes of a data set; DataError when it is not there."""
+    if format_name == "official":
+        return read_official_questions(path, dataset)
+    if (path / QUESTIONS_FILE).is_file():
+        return read_questions(path, dataset)
+    names = sorted(p.parent.name for p in bundled("benchmarks", "data").glob(f"*/{QUESTIONS_FILE}"))
+    allowed = f"a folder with {QUESTIONS_FILE}, or a bundled set of questions: {', '.join(names)}"
+    raise DataError(Problem(str(path), "holds no questions", "vqa.path", allowed=allowed))
+
+
+def select_questions(
+    tasks: Sequence[QuestionTask],
+    subtasks: Sequence[Subtask],
+    levels: Sequence[int],
+    per_subtask: int | None,
+    limit: int | None,
+) -> tuple[QuestionTask, ...]:
+    """The questions of these subtasks about scenes of these levels, in the order of the set.
+
+    Of each subtask at most `per_subtask` are kept, and `limit` in all, shared over the subtasks;
+    those kept are spread evenly over the set.
+    """
+    groups = [
+        [task for task in tasks if task.question.subtask == name and _is_of(task, levels)]
+        for name in SUBTASKS
+        if name in subtasks
+    ]
+    groups = [group for group in groups if group]
+    sizes = [
+        len(group) if per_subtask is None else min(per_subtask, len(group)) for group in groups
+    ]
+    shares = sizes if limit is None else stratified(sizes, limit)
+    kept = {
+        group[place * len(group) // share].key
+        for group, share in zip(groups, shares, strict=True)
+        for place in range(share)
+    }
+    return tuple(task for task in tasks if task.key in kept)
+
+
+def _is_of(task: QuestionTask, levels: Sequence[int]) -> bool:
+    return bool(set(task.scene.levels) & set(levels))

@@ -1,0 +1,72 @@
+"""Questions as the page of a report shows and draws them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from phyblock.datasets import Dataset, QuestionTask
+from phyblock.domain import Question, QuestionPicture
+from phyblock.errors import DataError, Problem
+from phyblock.records import Record
+from phyblock.sim import PictureStyle
+from phyblock.tables.track_report import PageItems
+from phyblock.tracks.drawable import block_entry, rounded
+from phyblock.tracks.vqa.opening import open_questions
+from phyblock.tracks.vqa.pictures import QuestionPictures, Shown
+from phyblock.tracks.vqa.record import ChoiceRecord
+from phyblock.tracks.vqa.track import asked
+
+__all__ = ["question_items"]
+
+_CHANGED = "is not the data set that the run was made on, or it was changed since"
+
+
+def question_items(manifest: Mapping[str, Any], dataset: Dataset) -> PageItems:
+    """The questions of a run; DataError where they are not what it was made on."""
+    recorded, suite = manifest["questions"], manifest["suite"]
+    questions = open_questions(recorded["format"], Path(recorded["root"]), dataset)
+    if questions.sha256 != manifest["tracks"]["vqa"]["questions"]:
+        raise DataError(Problem(str(questions.root), _CHANGED, "sha256", questions.sha256))
+    by_id = {task.question.id: task for task in questions.tasks}
+
+    def pictures(folder: Path, style: PictureStyle) -> QuestionPictures:
+        return QuestionPictures(folder, style, suite["vqa"]["options_as"], 1)
+
+    return PageItems(lambda record: _shown(record, by_id), _entry, pictures)
+
+
+def _shown(record: Record, questions: Mapping[str, QuestionTask]) -> Shown | None:
+    if not isinstance(record, ChoiceRecord) or record.question.id not in questions:
+        return None
+    return asked(questions[record.question.id], record.question.rotation).shown
+
+
+def _entry(shown: Shown) -> dict[str, Any]:
+    return question_entry(shown.question)
+
+
+def question_entry(question: Question) -> dict[str, Any]:
+    """A question with the recipes of its pictures."""
+    return {
+        "id": question.id,
+        "subtask": question.subtask,
+        "text": question.text,
+        "options": list(question.options),
+        "answer": question.answer_letters,
+        "pictures": [_picture(picture) for picture in question.pictures],
+        "evidence": dict(question.evidence),
+    }
+
+
+def _picture(picture: QuestionPicture) -> dict[str, Any]:
+    return {
+        "label": picture.label,
+        "view": list(picture.view_deg),
+        "blocks": [block_entry(block) for block in picture.blocks],
+        "framed": [block_entry(block) for block in picture.framed],
+        "marks": [
+            {"letter": mark.letter, "position": rounded(mark.position_m)} for mark in picture.marks
+        ],
+    }

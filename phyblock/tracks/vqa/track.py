@@ -1,0 +1,273 @@
+"""The VQA track: a question with its pictures in, a letter or an order out (paper section 3.3)."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from phyblock.datasets import QuestionSet, QuestionTask
+from phyblock.domain import LETTERS, Question, Scene, is_picture_option
+from phyblock.domain.rotation import rotated, rotated_label
+from phyblock.errors import Problem, SpecError
+from phyblock.models.base import Image, Request
+from phyblock.models.guesses import Guesses
+from phyblock.parsing import ParsedAnswer, parse_answer
+from phyblock.tracks.prompts import Prompt
+from phyblock.tracks.vqa.baselines import ChoiceSubject
+from phyblock.tracks.vqa.pictures import OptionsAs, QuestionPictures, Shown
+
+__all__ = ["AskedQuestion", "ChoiceJudgement", "Vqa", "VqaRules", "asked"]
+
+
+@dataclass(frozen=True)
+class VqaRules:
+    """How questions are shown.
+
+    `circular`: every rotation of the options is asked; `blind`: no picture is sent;
+    `wrong_image`: the pictures are those of a question about another scene.
+    """
+
+    options_as: OptionsAs = "images"
+    circular: bool = False
+    blind: bool = False
+    wrong_image: bool = False
+
+
+@dataclass(frozen=True)
+class AskedQuestion:
+    """A question with its options in one order; `rotation` 0 is that of the data set."""
+
+    shown: Shown
+    rotation: int = 0
+    is_one_of_many: bool = False
+
+    @property
+    def question(self) -> Question:
+        """The question as it is shown."""
+        return self.shown.question
+
+    @property
+    def key(self) -> str:
+        """The question's id, with the rotation where all are asked."""
+        return f"{self.question.id}-r{self.rotation}" if self.is_one_of_many else self.question.id
+
+    @property
+    def scene(self) -> Scene:
+        """The scene as the question shows it."""
+        return self.question.scene
+
+
+def asked(task: QuestionTask, rotation: int = 0, *, is_one_of_many: bool = False) -> AskedQuestion:
+    """A question with its options rotated."""
+    n = len(task.question.options)
+    files = {rotated_label(label, rotation, n): path for label, path in task.files.items()}
+    shown = Shown(rotated(task.question, rotation), files)
+    return AskedQuestion(shown, rotation, is_one_of_many)
+
+
+@dataclass(frozen=True)
+class ChoiceJudgement:
+    """What a reply was read as, and whether that is right."""
+
+    parsed: ParsedAnswer
+    right: str
+
+    @property
+    def is_read(self) -> bool:
+        """Whether a rule matched."""
+        return self.parsed.rule is not None
+
+    def fields(self) -> dict[str, Any]:
+        """`parse`, `scores` (none: there are no steps) and `answer` of the record."""
+        given = self.parsed.letters
+        return {
+            "parse": {"rule": self.parsed.rule, "letters": given},
+            "scores": [],
+            "answer": {"right": self.right, "given": given, "correct": given == self.right},
+        }
+
+
+class Vqa:
+    """Prompt, parse and score of the track."""
+
+    name = "vqa"
+
+    def __init__(
+        self,
+        rules: VqaRules,
+        questions: QuestionSet,
+        tasks: Sequence[QuestionTask],
+        prompt: Prompt | None = None,
+        pictures: QuestionPictures | None = None,
+    ) -> None:
+        """Ask `tasks` out of `questions`, of which all serve as wrong pictures and for baselines.
+
+        `prompt` and `pictures` are None where every model is a recording. Raises SpecError where
+        wrong pictures are wanted and some question has no other scene to take them from.
+        """
+        rotations = range(len(LETTERS)) if rules.circular else range(1)
+        self.rules = rules
+        self.items: Sequence[AskedQuestion] = tuple(
+            asked(task, rotation, is_one_of_many=rules.circular)
+            for task in tasks
+            for rotation in rotations
+        )
+        self.template = "" if prompt is None else prompt.name
+        self._questions = questions
+        self._prompt = prompt
+        self._pictures = pictures
+        self._guesses = Guesses([task.question for task in questions.tasks])
+        if rules.wrong_image:
+            self._check_elsewhere()
+
+    def about(self, item: AskedQuestion) -> dict[str, Any]:
+        """Which question it is and how it is shown."""
+        return {
+            "question": {
+                "id": item.question.id,
+                "subtask": item.question.subtask,
+                "category": item.question.category,
+                "rotation": item.rotation,
+                "options_as": self.rules.options_as,
+                "blind": self.rules.blind,
+                "wrong_image": self.rules.wrong_image,
+            }
+        }
+
+    def identity(self) -> dict[str, Any]:
+        """Digests of all questions, of those asked, the prompt and the pictures."""
+        counts = Counter(item.question.subtask for item in self.items)
+        keys = [item.key for item in self.items]
+        told: dict[str, Any] = {
+            "questions": self._questions.sha256,
+            "asked": _digest(keys),
+            "by_subtask": dict(counts),
+            "prompt": None,
+            "pictures": None,
+        }
+        if self._prompt is not None and self._pictures is not None:
+            told["prompt"] = {"name": self._prompt.name, "version": self._prompt.version}
+            shown = [] if self.rules.blind else [self._pictures.keys(i.shown) for i in self.items]
+            told["pictures"] = _digest(shown)
+        return told
+
+    async def request(
+        self, item: AskedQuestion, seed: int, params: Mapping[str, object], *, with_messages: bool
+    ) -> Request:
+        """The request of one sample; without messages for models that need none."""
+        if not with_messages or self._prompt is None or self._pictures is None:
+            return Request(item.key, seed, (), params, "", self._about(item))
+        pictures: tuple[Image, ...] = ()
+        if not self.rules.blind:
+            pictures = await self._pictures.of(self._seen(item, seed))
+        return self._request(item, seed, params, self._prompt, pictures)
+
+    def outlines(self, item: AskedQuestion) -> Iterator[tuple[Request, bool]]:
+        """The one request, made without rendering, and whether its pictures are the real ones."""
+        if self._prompt is None or self._pictures is None:
+            yield Request(item.key, 0, (), {}, "", self._about(item)), True
+            return
+        pictures, are_real = (
+            ((), True) if self.rules.blind else self._pictures.outline(self._seen(item, 0))
+        )
+        yield self._request(item, 0, {}, self._prompt, pictures), are_real
+
+    def facts(self, item: AskedQuestion, pictures: Sequence[Image]) -> dict[str, object]:
+        """What templates may use; nothing in it gives the answer away."""
+        question = item.question
+        letters = LETTERS[: len(question.options)]
+        return {
+            "question": question.text,
+            "options": [
+                {"letter": letter, "text": option, "is_picture": is_picture_option(option)}
+                for letter, option in zip(letters, question.options, strict=True)
+            ],
+            "letters": list(letters),
+            "is_ordering": question.subtask == "OR",
+            "pictures": [picture.label for picture in pictures],
+            "is_blind": self.rules.blind,
+        }
+
+    def judge(self, item: AskedQuestion, text: str | None) -> ChoiceJudgement:
+        """Read and score a reply; None, where there is no reply, is no answer."""
+        question = item.question
+        parsed = ParsedAnswer(None, None)
+        if text is not None:
+            parsed = parse_answer(text, question.options, question.subtask == "OR")
+        return ChoiceJudgement(parsed, question.answer_letters)
+
+    def close(self) -> None:
+        """Stop the processes that draw pictures."""
+        if self._pictures is not None:
+            self._pictures.close()
+
+    def _about(self, item: AskedQuestion) -> ChoiceSubject:
+        return ChoiceSubject(item.question, self._guesses.of(item.question))
+
+    def _request(
+        self,
+        item: AskedQuestion,
+        seed: int,
+        params: Mapping[str, object],
+        prompt: Prompt,
+        pictures: tuple[Image, ...],
+    ) -> Request:
+        messages = prompt.messages(pictures, self.facts(item, pictures))
+        return Request(item.key, seed, messages, params, prompt.version, self._about(item))
+
+    def _seen(self, item: AskedQuestion, seed: int) -> Shown:
+        """What a question is shown with: its own pictures, or those of another scene.
+
+        Which other one depends on the question and the seed alone, so it is the same for all
+        models and for all rotations.
+        """
+        if not self.rules.wrong_image:
+            return item.shown
+        others = self._elsewhere[item.question.id]
+        digest = hashlib.sha256(f"wrong image|{seed}|{item.question.id}".encode()).digest()
+        return asked(others[int.from_bytes(digest, "big") % len(others)], item.rotation).shown
+
+    @functools.cached_property
+    def _elsewhere(self) -> dict[str, list[QuestionTask]]:
+        """For each question asked, those with like pictures of a scene that shares no parent."""
+        alike: dict[object, list[QuestionTask]] = {}
+        for task in self._questions.tasks:
+            alike.setdefault(_sort_of(Shown(task.question, task.files)), []).append(task)
+        return {
+            item.question.id: [
+                task
+                for task in alike.get(_sort_of(item.shown), ())
+                if not set(_parents(task.question)) & set(_parents(item.question))
+            ]
+            for item in self.items
+            if not item.rotation
+        }
+
+    def _check_elsewhere(self) -> None:
+        lacking = [name for name, others in self._elsewhere.items() if not others]
+        if lacking:
+            message = "has no question of the same kind about another scene to take pictures from"
+            problem = Problem(f"question {lacking[0]}", message, "vqa.wrong_image")
+            raise SpecError(problem)
+
+
+def _sort_of(shown: Shown) -> tuple[object, ...]:
+    """What pictures must share to stand in for one another: a text may speak of place B."""
+    marks = sorted(
+        (picture.label, *sorted(mark.letter for mark in picture.marks))
+        for picture in shown.question.pictures
+    )
+    return (shown.question.subtask, shown.labels, *marks)
+
+
+def _parents(question: Question) -> tuple[str, ...]:
+    return question.scene.parents or (question.scene.id,)
+
+
+def _digest(content: object) -> str:
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()

@@ -1,0 +1,81 @@
+"""The words that suites, records, rules and the command line share, each spelled once.
+
+Words that one track alone knows stand in its folder, those of blocks and questions in the domain.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+__all__ = [
+    "BACKGROUNDS",
+    "GATINGS",
+    "LEVEL1_CRITERIA",
+    "MATCHERS",
+    "PLAN_PARSERS",
+    "SETTINGS",
+    "Background",
+    "Criterion",
+    "DataFormat",
+    "Finish",
+    "Gating",
+    "Level1Criterion",
+    "Matcher",
+    "MissingPolicy",
+    "Outcome",
+    "Physics",
+    "PictureLayout",
+    "PictureName",
+    "PictureSource",
+    "PlanParser",
+    "Role",
+    "SeedMode",
+    "Setting",
+    "TransportName",
+]
+
+Setting = Literal["A", "B"]
+"""What blocks are compared by: A with orientation, B without."""
+SETTINGS: tuple[Setting, ...] = get_args(Setting)
+
+Matcher = Literal["optimal", "paper"]
+"""How steps and interchangeable goal blocks are matched."""
+MATCHERS: tuple[Matcher, ...] = get_args(Matcher)
+
+Level1Criterion = Literal["selection", "membership"]
+"""How Level 1 is counted where order plays no part."""
+LEVEL1_CRITERIA: tuple[Level1Criterion, ...] = get_args(Level1Criterion)
+Criterion = Literal["selection", "membership", "aov"]
+"""What is counted as a right step."""
+
+MissingPolicy = Literal["count", "skip"]
+"""What becomes of samples without a reply."""
+
+PlanParser = Literal["steps", "official"]
+"""How plans are read out of replies."""
+PLAN_PARSERS: tuple[PlanParser, ...] = get_args(PlanParser)
+
+Gating = Literal["aov", "layer"]
+"""When a block can be placed: when all it rests on is, or when all lower layers are complete."""
+GATINGS: tuple[Gating, ...] = get_args(Gating)
+Physics = Literal["off", "settle", "strict"]
+"""What is simulated of every new state, and whether a collapse ends the episode."""
+
+DataFormat = Literal["builtin", "official"]
+"""Layouts of data sets and question sets."""
+
+Background = Literal["checkerboard", "white", "light-wood", "dark-wood", "concrete", "lawn"]
+"""The six backgrounds of the paper; the checkerboard is dark."""
+BACKGROUNDS: tuple[Background, ...] = get_args(Background)
+PictureName = Literal["goal", "candidates"]
+PictureSource = Literal["render", "dataset"]
+PictureLayout = Literal["composite", "separate"]
+
+Role = Literal["system", "user", "assistant"]
+"""Who speaks in a chat message."""
+Finish = Literal["stop", "length", "refusal", "unknown"]
+"""Why a reply ended: by itself, at the token limit, by a content filter, or not said."""
+Outcome = Literal["ok", "parse_failure", "refusal", "truncated", "api_error", "missing"]
+"""What became of a sample."""
+TransportName = Literal["auto", "litellm", "direct"]
+SeedMode = Literal["auto", "always", "never"]

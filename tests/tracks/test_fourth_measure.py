@@ -1,0 +1,140 @@
+"""A measure is added in one place: how far a plan is from the nearest valid order."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from phyblock import registry
+from phyblock.cli.main import phyblock
+from phyblock.scoring.uncertainty import ratio_of
+from phyblock.tables.measures import Counted, Measure
+from tests.workspace import Workspace
+
+
+def edits_to_a_valid_order(task: Any, judged: Any) -> tuple[float, float]:
+    """The least edits that make the plan a valid order, over the longer of both, and 1."""
+    blocks, graph = task.scene.blocks, task.scene.graph
+    needed = [task.candidates.index_of(block.look) for block in blocks]
+    plan = judged.parsed.plan.steps
+    least = {0: list(range(len(plan) + 1))}
+    # Every set of placed blocks that can be reached, smaller sets first.
+    for _ in blocks:
+        longer: dict[int, list[int]] = {}
+        for placed, before in least.items():
+            for vertex in graph.ready(placed):
+                now = [before[0] + 1]
+                for n, step in enumerate(plan):
+                    other = before[n] + (step != needed[vertex])
+                    now.append(min(other, before[n + 1] + 1, now[n] + 1))
+                known = longer.setdefault(placed | 1 << vertex, now)
+                longer[placed | 1 << vertex] = list(map(min, known, now))
+        least = longer
+    (whole,) = least.values()
+    return whole[-1] / max(len(plan), len(blocks)), 1
+
+
+DISTANCE = Measure(
+    "distance",
+    "Distance",
+    Counted("order_edits", ("edits", "n"), sample=edits_to_a_valid_order),
+    ratio_of,
+    "edits from the plan to the nearest valid order, over the longer of both",
+    better="lower",
+    over="plans",
+)
+
+
+@pytest.fixture
+def added() -> Iterator[None]:
+    registry.add_measure("full_planning", DISTANCE)
+    yield
+    registry.remove_measure("full_planning", DISTANCE.name)
+
+
+def command(*args: object) -> int | None:
+    code: int | None = phyblock.main([*map(str, args)], standalone_mode=False)
+    return code
+
+
+@pytest.fixture
+def here(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Workspace:
+    monkeypatch.chdir(workspace.root)
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+    monkeypatch.setattr(sys, "argv", ["phyblock"])
+    workspace.write_suite(models=["oracle", "all-candidates"])
+    return workspace
+
+
+def check_everywhere(folder: Path) -> None:
+    """The measure is in the tables, with intervals, in comparisons and on the page."""
+    with (folder / "tables" / "estimates.csv").open(newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["measure"] == "distance"]
+    whole = {row["model"]: row for row in rows if row["cell"] == "overall"}
+    assert float(whole["oracle"]["value"]) == float(whole["oracle"]["hi"]) == 0
+    row = whole["all-candidates"]
+    assert 0.5 < float(row["lo"]) <= float(row["value"]) <= float(row["hi"]) < 1
+    assert {row["cell"] for row in rows} == {"1", "2", "3", "4", "overall"}
+    assert "| all-candidates | Distance" in (folder / "tables" / "measures.md").read_text("utf-8")
+    assert "Distance (%)" in (folder / "report.html").read_text("utf-8")
+    command("compare", folder, "--measure", "distance", "--out", folder / "compared")
+    with (folder / "compared" / "comparison.csv").open(newline="") as file:
+        compared = {row["part"]: row for row in csv.DictReader(file)}["overall"]
+    assert float(compared["value_b"]) == pytest.approx(100 * float(row["value"]), abs=1e-3)
+    assert float(compared["lo"]) < float(compared["difference"]) < float(compared["hi"])
+    assert (compared["better"], compared["worse"]) == ("5", "0")
+
+
+@pytest.mark.usefixtures("added")
+def test_a_measure_is_in_tables_intervals_comparisons_and_the_report(
+    here: Workspace,
+) -> None:
+    assert not command("run", "suite.yaml", "--out", here.out)
+    assert all(set(record["counts"]) == {"order_edits"} for record in here.records())
+    check_everywhere(here.out)
+
+
+def test_scoring_again_fills_in_what_older_records_lack(
+    here: Workspace, request: pytest.FixtureRequest
+) -> None:
+    assert not command("run", "suite.yaml", "--out", here.out, "--no-report")
+    assert not any("counts" in record for record in here.records())
+    request.getfixturevalue("added")
+    command("report", here.out)
+    with (here.out / "tables" / "estimates.csv").open(newline="") as file:
+        assert not any(row["measure"] == "distance" for row in csv.DictReader(file))
+    command("score", here.out, "--out", here.root / "scored")
+    command("report", here.root / "scored")
+    check_everywhere(here.root / "scored")
+    old, new = (here.out, here.root / "scored")
+    for line, again in zip(here.records(old), here.records(new), strict=True):
+        assert json.dumps({**line, "counts": again["counts"]}, sort_keys=True) == json.dumps(
+            again, sort_keys=True
+        )
+
+
+def first_is_placed(_: Any, episode: Any) -> tuple[float, float]:
+    return episode.fields()["outcomes"][:1] == ["placed"], 1
+
+
+def test_episodes_are_counted_when_they_have_ended(
+    here: Workspace, request: pytest.FixtureRequest
+) -> None:
+    counted = Counted("first_steps", ("placed", "n"), sample=first_is_placed)
+    measure = Measure("first_step", "First step", counted, ratio_of, "first steps that placed")
+    registry.add_measure("step_planning", measure)
+    request.addfinalizer(lambda: registry.remove_measure("step_planning", "first_step"))
+    here.write_suite(tracks=["step_planning"], steps={"physics": "off"}, levels=[3])
+    assert not command("run", "suite.yaml", "--out", here.out, "--no-report")
+    assert {record["counts"]["first_steps"][1] for record in here.records()} == {1}
+    with (here.out / "tables" / "estimates.csv").open(newline="") as file:
+        values = {
+            row["model"]: row for row in csv.DictReader(file) if row["measure"] == measure.name
+        }
+    assert float(values["oracle"]["value"]) == 1

@@ -1,0 +1,117 @@
+"""Prompts: blocks become messages, pictures stand first and in order, nothing is given away."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from phyblock.datasets import official_prompt, read_builtin, recorded_models
+from phyblock.errors import PromptError
+from phyblock.models.base import Image, Message
+from phyblock.parsing import parse_plan
+from phyblock.resources import bundled
+from phyblock.tracks import OfficialPrompt, TemplatePrompt
+from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
+from tests.workspace import Workspace
+
+GOAL = Image(b"goal", "goal", 8, 8)
+GRID = Image(b"grid", "candidates", 8, 8)
+BOTH = Image(b"both", "composite", 16, 8)
+FACTS = {"pictures": ["goal", "candidates"], "n_candidates": 16}
+
+
+def template(folder: Path, text: str) -> TemplatePrompt:
+    path = folder / "mine.j2"
+    path.write_text(text, encoding="utf-8")
+    return TemplatePrompt(path, "mine.j2")
+
+
+def test_blocks_become_messages_with_the_pictures_before_the_user_text(tmp_path: Path) -> None:
+    system = "{% block system %} Be short. {% endblock %}"
+    prompt = template(tmp_path, system + "{% block user %}\n{{ n_candidates }}\n{% endblock %}")
+    assert prompt.messages((GRID, GOAL), FACTS) == (
+        Message("system", ("Be short.",)),
+        Message("user", (GRID, GOAL, "16")),
+    )
+
+
+@pytest.mark.parametrize("system", ["", "{% block system %} \n {% endblock %}"])
+def test_an_empty_system_part_is_not_sent(tmp_path: Path, system: str) -> None:
+    prompt = template(tmp_path, system + "{% block user %}Build.{% endblock %}")
+    assert prompt.messages((BOTH,), FACTS) == (Message("user", (BOTH, "Build.")),)
+
+
+def test_text_outside_the_blocks_is_not_sent(tmp_path: Path) -> None:
+    prompt = template(tmp_path, "Before {% block user %}in{% endblock %} after")
+    assert prompt.messages((), FACTS) == (Message("user", ("in",)),)
+
+
+def test_the_version_follows_the_text_alone(tmp_path: Path) -> None:
+    one = template(tmp_path, "{% block user %}a{% endblock %}")
+    (tmp_path / "other").mkdir()
+    assert template(tmp_path / "other", "{% block user %}a{% endblock %}").version == one.version
+    assert template(tmp_path, "{% block user %}b{% endblock %}").version != one.version
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "said"),
+    [
+        ("{% block user %}\n\n{% if %}{% endblock %}", ":3", "is not valid Jinja"),
+        ("{% block usr %}{% endblock %}", "", "has no user block"),
+        ("{% block user %}\n{{ goal }}\n{% endblock %}", ":2", "'goal' is undefined"),
+        ("{% block user %}\n\n{{ 1 // 0 }}{% endblock %}", ":3", "division"),
+        ("{% block user %}{{ pictures.__class__ }}{% endblock %}", ":1", "is unsafe"),
+    ],
+)
+def test_what_is_wrong_is_said_with_file_and_line(
+    tmp_path: Path, text: str, where: str, said: str
+) -> None:
+    with pytest.raises(PromptError) as caught:
+        template(tmp_path, text).messages((BOTH,), FACTS)
+    (problem,) = caught.value.problems
+    assert problem.where == f"{tmp_path / 'mine.j2'}{where}"
+    assert said in problem.message
+
+
+@pytest.mark.parametrize("labels", [("composite",), ("goal", "candidates"), ("candidates", "goal")])
+def test_the_default_prompt_speaks_of_the_pictures_that_are_sent(labels: tuple[str, ...]) -> None:
+    prompt = TemplatePrompt(bundled("prompts", "full_planning.j2"), "default")
+    sent = tuple(Image(b"", label, 8, 8) for label in labels)
+    system, user = prompt.messages(sent, {"pictures": list(labels), "n_candidates": 9})
+    assert (system.role, user.role) == ("system", "user")
+    *pictures, text = user.parts
+    assert pictures == list(sent)
+    assert isinstance(text, str)
+    assert "grid of 9 blocks" in text
+    if len(labels) == 2:
+        assert "in this order: " + ", then ".join(labels) in text
+    else:
+        assert "left half shows the goal" in text
+    # The form that is asked for is read, and the example in it is no plan.
+    assert parse_plan(text, 16, "steps").plan.steps == ()
+    assert parse_plan("Step1: Move block with index 4", 16, "steps").plan.steps == (4,)
+
+
+def test_facts_hold_the_labels_and_the_number_of_candidates_alone(workspace: Workspace) -> None:
+    track = FullPlanning(PlanningRules("steps", ("A",), ("optimal",), None))
+    for task in read_builtin(workspace.root / "data").tasks:
+        facts = track.facts(task, (GOAL, GRID))
+        assert facts == {"pictures": ["goal", "candidates"], "n_candidates": len(task.candidates)}
+
+
+def test_the_official_prompt_is_the_recorded_text_to_the_letter(official_checkout: Path) -> None:
+    text = official_prompt(official_checkout)
+    prompt = OfficialPrompt(text)
+    assert prompt.messages((GOAL, GRID), FACTS) == (Message("user", (GOAL, GRID, text)),)
+    recorded = [
+        json.loads(path.read_bytes())
+        for name, folder in recorded_models(official_checkout).items()
+        if name.startswith("InternVL")
+        for path in folder.glob("*.json")
+    ]
+    assert recorded
+    # Marks of the two pictures stand before the text, the goal's first.
+    assert {raw["instruction"] for raw in recorded} == {"<IMG_CONTEXT>" * 2 + text}
+    assert all("cand" not in raw["image"][0] and "cand" in raw["image"][1] for raw in recorded)
