@@ -18,7 +18,7 @@ from tests.workspace import Workspace
 
 AT_ONCE = 4
 FEW = ("--limit", "3")
-VOLATILE = ("time", "latency_s", "attempts", "cached")
+VOLATILE = ("time", "latency_s", "attempts", "cached", "run")
 
 
 def prepare(workspace: Workspace, url: str, **fields: Any) -> None:
