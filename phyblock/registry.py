@@ -104,14 +104,15 @@ def known_track(name: str) -> TrackWords:
 
 def register_track(kind: TrackWords) -> None:
     """Add a track. Raises ValueError for a name, section or table that is taken."""
-    known = known_tracks().values()
-    taken = {other.name for other in known} | {
-        other.section[0] for other in known if other.section is not None
-    }
-    wanted = {kind.name} | ({kind.section[0]} if kind.section is not None else set())
-    if clash := sorted(wanted & taken):
-        raise ValueError(f"a track or section has this name already: {', '.join(clash)}")
+    taken = {name for other in known_tracks().values() for name in _names_of(other)}
+    if clash := sorted(_names_of(kind) & (taken | {PUBLISHED_TABLE})):
+        raise ValueError(f"a track, section or table has this name: {', '.join(clash)}")
     _registered[kind.name] = kind
+
+
+def _names_of(kind: TrackWords) -> set[str]:
+    """Names that a suite says for a track."""
+    return {kind.name, *kind.tables} | ({kind.section[0]} if kind.section is not None else set())
 
 
 def unregister_track(name: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -10,18 +9,15 @@ import click
 from phyblock.cli.console import make_console, print_view, shown_path
 from phyblock.cli.paths import UserPath
 from phyblock.datasets import AssemblyTask
-from phyblock.domain import Block
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.files import write_named
 from phyblock.records import MANIFEST, RECORDS, read_manifest
 from phyblock.records.reading import newest_starts, run_records
 from phyblock.run.data import open_dataset
 from phyblock.sim import PictureStyle
-from phyblock.sim.film import FilmStep, Tone, episode_gif, episode_images, episode_sheet
-from phyblock.sim.site import settle
-from phyblock.tables.text_table import Column, TextTable
-from phyblock.tracks.step_planning.record import EpisodeRecord, EpisodeTurn
-from phyblock.tracks.step_planning.table3 import ENDING_NAMES
+from phyblock.sim.film import episode_gif, episode_images, episode_sheet
+from phyblock.tracks.step_planning.film import episode_film, episode_table
+from phyblock.tracks.step_planning.record import EpisodeRecord
 
 __all__ = ["command"]
 
@@ -57,11 +53,11 @@ def command(
     """
     record = _find(run, sample)
     console = make_console()
-    print_view(console, _as_text(record))
+    print_view(console, episode_table(record))
     if gif is None and sheet is None:
         return
     task = _task(run, record, data)
-    steps = list(_film(record, task))
+    steps = list(episode_film(record, task))
     images = episode_images(task.scene, task.candidates, steps, PictureStyle(size))
     for path, make in ((gif, episode_gif), (sheet, episode_sheet)):
         if path is not None:
@@ -102,56 +98,3 @@ def _task(run: Path, record: EpisodeRecord, data: Path | None) -> AssemblyTask:
         message = "holds no such scene"
         raise DataError(Problem(str(root), message, "scene", record.scene, hint=hint))
     return tasks[record.scene]
-
-
-def _operation(turn: EpisodeTurn) -> str:
-    move = turn.parse.move
-    if move is None:
-        return "(no operation)"
-    return "Done" if move == "Done" else f"Move({move})"
-
-
-def _as_text(record: EpisodeRecord) -> TextTable:
-    columns = ("Step", "Operation", "Outcome", "Rule", "Placed")
-    rows = tuple(
-        (
-            str(turn.step),
-            _operation(turn),
-            _words(turn.outcome),
-            _words(turn.parse.rule),
-            f"{len(turn.world)} of {record.n_blocks}",
-        )
-        for turn in record.steps
-    )
-    return TextTable(
-        f"{record.sample}: {_ending(record)}",
-        tuple(Column(name, is_text=name not in ("Step", "Placed")) for name in columns),
-        rows,
-    )
-
-
-def _words(name: str | None) -> str:
-    return (name or "none").replace("_", " ")
-
-
-def _film(record: EpisodeRecord, task: AssemblyTask) -> Iterator[FilmStep]:
-    """A frame for the empty ground, one a step, and one for how it ended."""
-    yield FilmStep(f"{record.model}, {task.scene.id}", "plain", None, ())
-    blocks: tuple[Block, ...] = ()
-    for turn in record.steps:
-        blocks = tuple(task.scene.blocks[vertex] for vertex in turn.world)
-        tone: Tone = {"placed": "good", "done": "plain"}.get(turn.outcome or "", "bad")  # type: ignore[assignment]
-        told = _words(turn.outcome)
-        move = turn.parse.move
-        caption = f"{turn.step}. {_operation(turn)}" + ("" if told == "done" else f": {told}")
-        yield FilmStep(caption, tone, move if isinstance(move, int) else None, blocks)
-    if record.ending == "collapsed":
-        blocks = settle(blocks).blocks
-    tone = "good" if record.ending == "completed" else "bad"
-    placed = record.progress[-1] if record.progress else 0
-    caption = f"{_ending(record)}: {placed} of {record.n_blocks} blocks"
-    yield FilmStep(caption, tone, None, blocks)
-
-
-def _ending(record: EpisodeRecord) -> str:
-    return ENDING_NAMES[record.ending]

@@ -11,7 +11,7 @@ from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
 from phyblock.tables.text_table import Column, TextTable, between, number
 from phyblock.tables.track_report import Shown
-from phyblock.tracks.estimates import track_estimates, track_measures
+from phyblock.tracks.estimates import samples_lacking, track_estimates, track_measures
 from phyblock.tracks.kind import kind_of
 
 __all__ = [
@@ -110,6 +110,11 @@ def measures_view(table: pd.DataFrame, run: Run) -> TextTable:
         value, interval = number(row["value"], 2), between(row["lo"], row["hi"])
         rows.append((row["model"], f"{measure.heading}{unit}", value, interval, str(row["n"])))
         notes[measure.name] = f"{measure.heading}: {measure.meaning}; {measure.better} is better."
+        if lacking := samples_lacking(run, row["track"], measure.counted):
+            notes[measure.name] += (
+                f" {lacking} samples were judged before it was there and are not in it; "
+                "phyblock score counts them."
+            )
     columns = (
         Column("Model", is_text=True),
         Column("Measure", is_text=True),

@@ -15,8 +15,9 @@ __all__ = ["sample_counts"]
 def sample_counts(track: str, item: Any, judged: Any) -> Mapping[str, tuple[float, ...]]:
     """What the measures of a track count of one sample, by name of the counts.
 
-    `judged` is the judgement of the reply, or the episode once it has ended. A record without
-    these counts, written before the measure was there, gets them by `phyblock score`.
+    `judged` is the judgement of the reply, or the episode once it has ended. Where a measure does
+    not count a sample, its counts are empty: they are absent where a record was written before the
+    measure was there, and `phyblock score` fills them in.
     """
     added: list[Counted] = [measure.counted for measure in added_measures(track)]
     found = {
@@ -25,7 +26,5 @@ def sample_counts(track: str, item: Any, judged: Any) -> Mapping[str, tuple[floa
         if counted.sample is not None
     }
     return {
-        name: tuple(float(number) for number in numbers)
-        for name, numbers in found.items()
-        if numbers is not None
+        name: tuple(float(number) for number in numbers or ()) for name, numbers in found.items()
     }

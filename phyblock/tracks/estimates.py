@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import pandas as pd
 
+from phyblock.errors import Problem, StoreError
+from phyblock.records import RECORDS
 from phyblock.registry import added_measures
 from phyblock.tables.estimates import ESTIMATE_COLUMNS, estimate_frame
 from phyblock.tables.load import Run
@@ -11,12 +15,52 @@ from phyblock.tables.measures import VARIANT, Counted, Measure
 from phyblock.tables.outcomes import WITHOUT_REPLY
 from phyblock.tracks.kind import kind_of
 
-__all__ = ["all_estimates", "counted_samples", "stored_counts", "track_estimates", "track_measures"]
+__all__ = [
+    "all_estimates",
+    "counted_samples",
+    "numbers_of",
+    "samples_lacking",
+    "stored_counts",
+    "track_estimates",
+    "track_measures",
+]
 
 
 def track_measures(track: str) -> tuple[Measure, ...]:
-    """The measures of a track, those that were added behind its own."""
-    return (*kind_of(track).report().measures, *added_measures(track))
+    """The measures of a track, those that were added behind its own.
+
+    Raises ValueError where two measures, or two sorts of counts, have one name.
+    """
+    measures = (*kind_of(track).report().measures, *added_measures(track))
+    counts = {measure.counted for measure in measures}
+    for named in (measures, counts):
+        names = [one.name for one in named]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"two measures or counts of {track} are called {', '.join(twice)}")
+    return measures
+
+
+def numbers_of(
+    counted: Counted, counts: Mapping[str, Sequence[float]] | None, where: str
+) -> Sequence[float] | None:
+    """What a record at `where` holds of these counts; None where they are lacking, () for none.
+
+    Raises StoreError for another number of them than the measure has now.
+    """
+    numbers = (counts or {}).get(counted.name)
+    if numbers and len(numbers) != len(counted.columns):
+        found, allowed = f"{len(numbers)} numbers", ", ".join(counted.columns)
+        message, hint = "was counted in another way", "phyblock score counts anew"
+        raise StoreError(Problem(where, message, f"counts.{counted.name}", found, allowed, hint))
+    return numbers
+
+
+def samples_lacking(run: Run, track: str, counted: Counted) -> int:
+    """Samples that were judged before these counts were there."""
+    if counted.sample is None:
+        return 0
+    rows = run.records[run.records["track"] == track]
+    return sum(counted.name not in (counts or {}) for counts in rows["counts"])
 
 
 def stored_counts(track: str) -> tuple[Counted, ...]:
@@ -53,10 +97,11 @@ def counted_samples(run: Run, track: str, counted: Counted) -> pd.DataFrame:
     records = run.records
     left_out = records["outcome"].isin(run.design.outcomes_left_out)
     rows = records[(records["track"] == track) & ~left_out]
-    found = [(counts or {}).get(counted.name) for counts in rows["counts"]]
-    rows = rows[[numbers is not None for numbers in found]]
+    where = str(run.path / RECORDS)
+    found = [numbers_of(counted, counts, where) for counts in rows["counts"]]
+    rows = rows[[bool(numbers) for numbers in found]]
     numbers = pd.DataFrame(
-        [list(numbers) for numbers in found if numbers is not None],
+        [list(numbers) for numbers in found if numbers],
         columns=list(counted.columns),
         index=rows.index,
         dtype="float64",

@@ -14,7 +14,7 @@ from phyblock.report.export.rows import needs, newest_records, prompt_text
 from phyblock.run.prompts import read_prompts
 from phyblock.scoring import Counts, micro
 from phyblock.tables.load import Run
-from phyblock.tracks.estimates import stored_counts
+from phyblock.tracks.estimates import numbers_of, stored_counts
 
 if TYPE_CHECKING:
     from inspect_ai.log import EvalLog, EvalMetric, EvalSample
@@ -165,8 +165,8 @@ def _scores(record: Record) -> dict[str, Score]:
         value_of = CORRECT if record.is_correct else INCORRECT
         found["answer"] = Score(value=value_of, answer=record.said)
     for counted in stored_counts(record.track):
-        if counted.name in record.counts:
-            counts_of = dict(zip(counted.columns, record.counts[counted.name], strict=True))
+        if numbers := numbers_of(counted, record.counts, record.sample):
+            counts_of = dict(zip(counted.columns, numbers, strict=True))
             found[counted.name] = Score(value=counts_of, answer=record.said)
     return found
 

@@ -13,7 +13,7 @@ from phyblock.records.known import record_types
 from phyblock.records.reading import read_records
 from phyblock.run.prompts import read_prompts
 from phyblock.tables.load import Run
-from phyblock.tracks.estimates import stored_counts
+from phyblock.tracks.estimates import numbers_of, stored_counts
 
 __all__ = ["as_json", "export_rows", "needs", "newest_records", "prompt_text", "track_columns"]
 
@@ -105,18 +105,14 @@ def track_columns() -> dict[str, str]:
 
 def _own_counts(run: Run, record: Record) -> dict[str, float | None]:
     """What measures count beside `scores`: `count_<name>_<column>`."""
-    return {
-        f"count_{counted.name}_{column}": number
-        for track in run.design.suite.tracks
-        for counted in stored_counts(track)
-        for column, number in zip(
-            counted.columns,
-            record.counts.get(counted.name, (None,) * len(counted.columns))
-            if record.track == track
-            else (None,) * len(counted.columns),
-            strict=True,
-        )
-    }
+    found: dict[str, float | None] = {}
+    for track in run.design.suite.tracks:
+        for counted in stored_counts(track):
+            names = [f"count_{counted.name}_{column}" for column in counted.columns]
+            mine = record.counts if record.track == track else {}
+            numbers = numbers_of(counted, mine, record.sample)
+            found |= dict(zip(names, numbers, strict=True)) if numbers else dict.fromkeys(names)
+    return found
 
 
 def as_json(value: object) -> object:

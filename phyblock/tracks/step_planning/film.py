@@ -1,0 +1,69 @@
+"""An episode step by step: as a table of text, and as the frames of a film."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from phyblock.datasets import AssemblyTask
+from phyblock.domain import Block
+from phyblock.sim.film import FilmStep, Tone
+from phyblock.sim.site import settle
+from phyblock.tables.text_table import Column, TextTable
+from phyblock.tracks.step_planning.record import EpisodeRecord, EpisodeTurn
+from phyblock.tracks.step_planning.table3 import ENDING_NAMES
+
+__all__ = ["episode_film", "episode_table"]
+
+
+def _operation(turn: EpisodeTurn) -> str:
+    move = turn.parse.move
+    if move is None:
+        return "(no operation)"
+    return "Done" if move == "Done" else f"Move({move})"
+
+
+def episode_table(record: EpisodeRecord) -> TextTable:
+    """Every step of an episode, wrong ones too."""
+    columns = ("Step", "Operation", "Outcome", "Rule", "Placed")
+    rows = tuple(
+        (
+            str(turn.step),
+            _operation(turn),
+            _words(turn.outcome),
+            _words(turn.parse.rule),
+            f"{len(turn.world)} of {record.n_blocks}",
+        )
+        for turn in record.steps
+    )
+    return TextTable(
+        f"{record.sample}: {_ending(record)}",
+        tuple(Column(name, is_text=name not in ("Step", "Placed")) for name in columns),
+        rows,
+    )
+
+
+def _words(name: str | None) -> str:
+    return (name or "none").replace("_", " ")
+
+
+def episode_film(record: EpisodeRecord, task: AssemblyTask) -> Iterator[FilmStep]:
+    """A frame for the empty ground, one a step, and one for how it ended."""
+    yield FilmStep(f"{record.model}, {task.scene.id}", "plain", None, ())
+    blocks: tuple[Block, ...] = ()
+    for turn in record.steps:
+        blocks = tuple(task.scene.blocks[vertex] for vertex in turn.world)
+        tone: Tone = {"placed": "good", "done": "plain"}.get(turn.outcome or "", "bad")  # type: ignore[assignment]
+        told = _words(turn.outcome)
+        move = turn.parse.move
+        caption = f"{turn.step}. {_operation(turn)}" + ("" if told == "done" else f": {told}")
+        yield FilmStep(caption, tone, move if isinstance(move, int) else None, blocks)
+    if record.ending == "collapsed":
+        blocks = settle(blocks).blocks
+    tone = "good" if record.ending == "completed" else "bad"
+    placed = record.progress[-1] if record.progress else 0
+    caption = f"{_ending(record)}: {placed} of {record.n_blocks} blocks"
+    yield FilmStep(caption, tone, None, blocks)
+
+
+def _ending(record: EpisodeRecord) -> str:
+    return ENDING_NAMES[record.ending]
