@@ -72,5 +72,5 @@ def test_no_client_is_imported_before_a_call_is_sent(tmp_path: Path, code: str) 
 def test_litellm_reads_no_key_file_and_says_nothing(tmp_path: Path) -> None:
     (tmp_path / ".env").write_text("FROM_DOTENV=1\nANTHROPIC_API_KEY=sk-from-a-file-12345\n")
     done = python(SENDING, str(tmp_path))
-    assert done.stdout == "RetryableError\nNone\n"
+    assert done.stdout == "UnreachableError\nNone\n"
     assert done.stderr == ""
