@@ -34,7 +34,7 @@ def measure_bars(run: Run, *, track: str) -> Figure | None:
 
     Models are ranked by the last cell. Cells that are parts of a mean are left out.
     """
-    measure = main_measure(track)
+    measure, report = main_measure(track), kind_of(track).report()
     columns = [c for c in headline_columns(run, track) if c.measure == measure.name]
     columns = columns[-_MOST_PANELS:]
     found = headline_rows(track_estimates(run, track), run.design)
@@ -84,10 +84,11 @@ def measure_bars(run: Run, *, track: str) -> Figure | None:
     axes[0].set_ylim(len(models) - 0.4, -0.6)
     bare_axes(axes)
     clusters = int(found["n_clusters"].max())
-    how = (run.design.suite.name and f"Suite {run.design.suite.name}; ") or ""
+    suite = f"Suite {run.design.suite.name}; " if run.design.suite.name else ""
+    how = "".join(note.partition(".")[0] + "; " for note in report.notes(run)[:1])
     headed(
         figure,
         f"{kind_of(track).title}: {measure.heading}",
-        f"{how}lines: 95 % intervals, {clusters} base scenes resampled",
+        f"{suite}{how}lines: 95 % intervals, {clusters} base scenes resampled",
     )
     return figure
