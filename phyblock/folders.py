@@ -27,7 +27,7 @@ LIST = ".generated"
 
 _HEAD = "# What phyblock wrote here and may write again; all else is never touched."
 _LINK = "cannot be written: it is a link, and links are never followed or replaced"
-_HINT = "move it away, or choose another folder with --out"
+_HINT = "move it away; phyblock writes over nothing that it did not make"
 _CLOSED = "cannot be written in"
 _OUTSIDE = "cannot be written: its name leads out of the folder"
 

@@ -150,13 +150,15 @@ def _conclude(console: Console, folder: Path, result: RunResult, cost: str) -> i
         console.print(f"{one_line(name)} was stopped:", style="red", end=" ")
         console.print(reason, soft_wrap=True)
     done = (
-        f"All {result.samples:,}"
-        if not result.left
-        else f"{result.settled:,} of {result.samples:,}"
+        f"{result.settled:,} of {result.samples:,} samples are done"
+        if result.left
+        else f"All {result.samples:,} samples are done"
+        if result.samples != 1
+        else "The one sample is done"
     )
     reason = f" ({result.reason})" if result.reason else ""
     console.print(
-        f"{done} samples are done{reason}. Cost so far: {cost}. The run is in {where}",
+        f"{done}{reason}. Cost so far: {cost}. The run is in {where}",
         soft_wrap=True,
     )
     if result.failed:
