@@ -44,6 +44,7 @@ ERROR_NAMES: dict[ErrorType, str] = {
     "incorrect_orientation": "Incorrect orientation",
     "dependency_not_met": "Dependency not met",
 }
+_SPREAD_NOTE = "Mean ± standard deviation"
 _LABELS_NOTE = (
     "Prec, Rec, F1 are labeled by what they are. The paper prints its model rows as precision, "
     "recall, F1 under the header “Rec, Prec, F1”; only its Random row is as that header says."
@@ -79,7 +80,7 @@ def _table1_notes(run: Run) -> list[str]:
     overall = cells[cells["level"] == OVERALL]
     seeds = len(run.design.suite.seeds)
     short = overall[overall["n"] < overall["expected"]]
-    notes = [f"Mean ± standard deviation over {seeds} seeds."] if seeds > 1 else []
+    notes = [f"{_SPREAD_NOTE} over {seeds} seeds."] if seeds > 1 else []
     if len(short):
         counts = zip(short["model"], short["n"], strict=True)
         listed = ", ".join(f"{model} {n}" for model, n in counts)
@@ -209,7 +210,8 @@ def table1_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...
     note = "F1 alone, to fit; precision and recall are in tables/table1.md."
     short = replace(view.without(SIDE_METRICS), notes=(note, *view.notes[:-1]))
     bare = tuple(tuple(cell.partition(SPREAD)[0] for cell in row) for row in short.rows)
-    return view, short, replace(short, rows=bare)
+    notes = tuple(note.replace(_SPREAD_NOTE, "Mean") for note in short.notes)
+    return view, short, replace(short, rows=bare, notes=notes)
 
 
 def errors_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
