@@ -137,7 +137,7 @@ def test_a_cut_last_line_is_dropped_and_its_sample_run_again(copy: Workspace) ->
 
 
 def test_a_second_process_is_refused_and_the_first_goes_on(workspace: Workspace) -> None:
-    with Running(OpenAIChat(Faults(latency_s=2.0))) as running:
+    with Running(OpenAIChat(Faults(latency_s=6.0))) as running:
         workspace.write_models(running.url, "alpha")
         workspace.write_suite(models=["alpha"])
         with workspace.start() as first:
