@@ -13,10 +13,9 @@ from phyblock.errors import (
     ModelError,
     RetryableError,
     UnavailableError,
-    UnreachableError,
 )
 from phyblock.models.base import Reply, Request
-from phyblock.models.breaker import Breaker
+from phyblock.models.breaker import Breaker, shows_outage
 from phyblock.models.cache import reply_key
 from phyblock.models.config import ModelConfig, Price
 from phyblock.models.cost import Budget, Estimate, cost_usd, estimate, plausible
@@ -135,9 +134,9 @@ class ChatModel:
                     raise UnavailableError(str(self._unavailable), status=self._unavailable.status)
                 try:
                     reply = await self._send_watched(question, slot, is_probe=is_probe)
-                except RetryableError:
+                except RetryableError as error:
                     # It is the server that fails then, and not this request.
-                    if self._parts.breaker.is_open:
+                    if self._parts.breaker.is_open and shows_outage(error):
                         continue
                     raise
                 slot.succeeded(_total(reply))
@@ -283,8 +282,7 @@ class ChatModel:
 
 def _may_be_billed(error: ModelError) -> bool:
     """Whether the server may have made a reply: it promised one, or was lost on the way."""
-    was_lost = error.status is None and not isinstance(error, UnreachableError)
-    return was_lost or is_success(error.status)
+    return error.sent in ("lost", "maybe") or is_success(error.status)
 
 
 def _counted(reply: Reply, question: _Question) -> Reply:
