@@ -102,7 +102,7 @@ class Breaker:
             self._is_open = True
             self._end = None
             self._probes = 0
-            self._plan_probe(now_s)
+            self._plan_probe(error, now_s)
             self._tell(f"{self._server} cannot be reached, trying now and then: {error}")
 
     def raise_if_ended(self) -> None:
@@ -133,14 +133,16 @@ class Breaker:
 
     def _probe_failed(self, error: RetryableError, now_s: float) -> None:
         self._probes += 1
-        self._plan_probe(now_s)
+        self._plan_probe(error, now_s)
         lasted_s = now_s - self._began_s
         if self._policy.gives_up(error, self._probes, lasted_s):
             self._end = f"{self._server} could not be reached for {lasted_s:.0f} s: {error}"
 
-    def _plan_probe(self, now_s: float) -> None:
+    def _plan_probe(self, error: RetryableError, now_s: float) -> None:
+        """Wait longer with every probe, and as long as the server asks for."""
         most_s = min(_LONGEST_PROBE_WAIT_S, self._policy.max_wait_s)
-        self._probe_at_s = now_s + backoff_s(self._policy.base_s, most_s, self._probes + 1)
+        wait_s = backoff_s(self._policy.base_s, most_s, self._probes + 1)
+        self._probe_at_s = now_s + max(wait_s, self._policy.followed_s(error))
 
 
 def shows_outage(error: ModelError) -> bool:

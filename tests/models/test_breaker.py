@@ -139,6 +139,37 @@ def test_a_dead_name_stops_the_model_after_few_attempts_and_leaves_its_samples(w
     assert 300 <= time.now_s < 330
 
 
+@given(st.none() | st.floats(0, 1000), st.integers(0, 20))
+def test_the_next_probe_waits_as_long_as_the_server_asks(
+    asked_s: float | None, probes: int
+) -> None:
+    async def main() -> None:
+        time = FakeTime()
+        policy = RetryPolicy(clock=time.clock)
+        breaker = Breaker("s", policy)
+        error = RetryableError("overloaded", status=503, retry_after_s=asked_s)
+        for number in range(FAILURES_TO_OPEN):
+            breaker.failed(error, number, is_probe=False)
+
+        async def probe_again_and_again() -> None:
+            for _ in range(probes + 1):
+                failed_s = time.now_s
+                try:
+                    async with breaker.passing() as is_probe:
+                        least_s = min(asked_s or 0.0, policy.max_retry_after_s)
+                        waited_s = time.now_s - failed_s
+                        assert least_s - 1e-6 <= waited_s <= max(15.0, least_s) + 1e-6
+                        breaker.failed(error, "probe", is_probe=is_probe)
+                except UnavailableError:
+                    return
+
+        task = asyncio.create_task(probe_again_and_again())
+        await time.run_until_done(task)
+        await task
+
+    run(main)
+
+
 def test_all_go_on_at_once_when_a_probe_succeeds() -> None:
     time = FakeTime()
     transport = Outage(time, 0.0, 100.0, 1.0)
