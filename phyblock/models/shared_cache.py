@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import queue
 import random
 import time
 from collections.abc import AsyncIterator, Callable
@@ -70,6 +71,7 @@ class SharedCache:
         self._file: ReplyCache | None = None
         self._aside_until_s: float | None = None
         self._is_told = False
+        self._untold: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._is_closing = False
 
     async def __aenter__(self) -> SharedCache:
@@ -151,6 +153,13 @@ class SharedCache:
         except (StoreError, asyncio.TimeoutError) as error:
             self._set_aside(error)
             return otherwise
+        finally:
+            self._pass_on()
+
+    def _pass_on(self) -> None:
+        """Tell, on the loop, what the worker found."""
+        while not self._untold.empty():
+            self._tell(self._untold.get())
 
     @property
     def _is_aside(self) -> bool:
@@ -185,7 +194,8 @@ class SharedCache:
         while True:
             try:
                 if self._file is None:
-                    self._file = ReplyCache(self.path, min(_BUSY_TIMEOUT_S, self._patience_s))
+                    busy_timeout_s = min(_BUSY_TIMEOUT_S, self._patience_s)
+                    self._file = ReplyCache(self.path, busy_timeout_s, self._untold.put)
                 return operation(self._file)
             except CacheBusyError:
                 if self._is_closing or time.monotonic() >= until_s:

@@ -163,9 +163,9 @@ def test_a_file_that_breaks_later_is_set_aside_and_opened_anew(path: Path) -> No
         async with SharedCache(path, said.append, clock=clock) as cache:
             await cache.keep("k", "m", REPLY)
             with contextlib.closing(sqlite3.connect(path)) as db, db:
-                db.execute("UPDATE replies SET reply = '{'")
+                db.execute("DROP TABLE replies")
             assert await cache.find("k") is None
-            assert "broken reply" in said[0]
+            assert "no such table" in said[0]
             path.unlink()
             now_s += 61
             await cache.keep("k", "m", REPLY)
@@ -173,6 +173,26 @@ def test_a_file_that_breaks_later_is_set_aside_and_opened_anew(path: Path) -> No
 
     run(main)
     assert len(said) == 2
+
+
+def test_a_row_that_cannot_be_read_is_told_once_and_the_file_stays_in_use(path: Path) -> None:
+    said: list[str] = []
+
+    async def main() -> None:
+        async with SharedCache(path, said.append) as cache:
+            for key in "abc":
+                await cache.keep(key, "m", REPLY)
+            with contextlib.closing(sqlite3.connect(path)) as db, db:
+                db.execute("UPDATE replies SET reply = '{' WHERE key < 'c'")
+            assert [await cache.find(key) is None for key in "abc"] == [True, True, False]
+            async with cache.asking("a") as turn:
+                assert turn.is_ours
+                await cache.keep("a", "m", REPLY)
+            assert await cache.find("a") is not None
+
+    run(main)
+    (text,) = said
+    assert "holds a broken reply" in text
 
 
 def test_an_older_file_is_taken_as_it_is_and_stays_one(path: Path) -> None:
