@@ -13,7 +13,6 @@ import json
 import re
 import sqlite3
 import time
-import uuid
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -156,7 +155,7 @@ class ReplyCache:
         """What is being asked now, by all who share the file."""
         with self._explained():
             if self._leases is None:
-                self._leases = Leases(self._db, uuid.uuid4().hex)
+                self._leases = Leases(self._db)
             yield self._leases
 
     def stats(self) -> CacheStats:

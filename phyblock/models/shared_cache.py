@@ -21,7 +21,7 @@ from phyblock.errors import StoreError
 from phyblock.models.base import Reply
 from phyblock.models.cache import CacheBusyError, ReplyCache
 from phyblock.models.events import Tell, ignore_text
-from phyblock.models.leases import LEASE_S
+from phyblock.models.leases import LEASE_S, Lease
 from phyblock.models.limits import Clock
 from phyblock.models.worker import Worker
 
@@ -39,10 +39,14 @@ _NOTHING: tuple[Reply | None, bool] = (None, False)
 
 @dataclass(frozen=True)
 class Turn:
-    """Whether it is ours to ask; if not, another asks, or has been answered meanwhile."""
+    """Whether it is ours to ask; if not, another asks, or has been answered meanwhile.
+
+    `lease` keeps others from asking; there is none while the cache is set aside.
+    """
 
     is_ours: bool
     reply: Reply | None = None
+    lease: Lease | None = None
 
 
 class SharedCache:
@@ -110,13 +114,16 @@ class SharedCache:
     async def asking(self, key: str, *, by_force: bool = False) -> AsyncIterator[Turn]:
         """Keep others from asking the same meanwhile, if it is our turn to ask."""
         turn = await self._do(lambda file: _take(file, key, by_force=by_force), Turn(True))
-        renewing = asyncio.create_task(self._renew(key)) if turn.is_ours else None
+        lease = turn.lease
+        if lease is None:
+            yield turn
+            return
+        renewing = asyncio.create_task(self._renew(lease))
         try:
             yield turn
         finally:
-            if renewing is not None:
-                renewing.cancel()
-                await self._do(lambda file: _give_back(file, key), None)
+            renewing.cancel()
+            await self._do(lambda file: _give_back(file, lease), None)
 
     async def keep(self, key: str, model_id: str, reply: Reply) -> None:
         """Keep a reply, if it is whole and the file takes it."""
@@ -134,10 +141,11 @@ class SharedCache:
             await asyncio.wait_for(self._worker.run(self._close_file), 2 * _BUSY_TIMEOUT_S)
         self._worker.stop()
 
-    async def _renew(self, key: str) -> None:
-        while True:
+    async def _renew(self, lease: Lease) -> None:
+        is_held = True
+        while is_held:
             await asyncio.sleep(LEASE_S / 3)
-            await self._do(lambda file: _renew(file, key), None)
+            is_held = await self._do(lambda file: _renew(file, lease), True)
 
     async def _do(self, operation: Callable[[ReplyCache], T], otherwise: T) -> T:
         """What the operation returns; `otherwise` while the cache is set aside."""
@@ -232,19 +240,21 @@ def _look(file: ReplyCache, key: str) -> tuple[Reply | None, bool]:
 def _take(file: ReplyCache, key: str, *, by_force: bool) -> Turn:
     """Look for the reply once more with the lease in hand: then nobody can bring it meanwhile."""
     with file.leases() as leases:
-        if not leases.take(key, by_force=by_force):
+        lease = leases.take(key, by_force=by_force)
+        if lease is None:
             return Turn(False)
         reply = file.get(key)
-        if reply is not None:
-            leases.give_back(key)
-    return Turn(reply is None, reply)
+        if reply is None:
+            return Turn(True, lease=lease)
+        leases.give_back(lease)
+    return Turn(False, reply)
 
 
-def _renew(file: ReplyCache, key: str) -> None:
+def _renew(file: ReplyCache, lease: Lease) -> bool:
     with file.leases() as leases:
-        leases.renew(key)
+        return leases.renew(lease)
 
 
-def _give_back(file: ReplyCache, key: str) -> None:
+def _give_back(file: ReplyCache, lease: Lease) -> None:
     with file.leases() as leases:
-        leases.give_back(key)
+        leases.give_back(lease)
