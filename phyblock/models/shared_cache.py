@@ -76,6 +76,7 @@ class SharedCache:
         self._aside_until_s: float | None = None
         self._is_told = False
         self._untold: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._keeping: set[asyncio.Future[None]] = set()
         self._is_closing = False
 
     async def __aenter__(self) -> SharedCache:
@@ -126,7 +127,13 @@ class SharedCache:
             await self._do(lambda file: _give_back(file, lease), None)
 
     async def keep(self, key: str, model_id: str, reply: Reply) -> None:
-        """Keep a reply, if it is whole and the file takes it."""
+        """Keep a reply, if it is whole and the file takes it, also when the wait is given up."""
+        keeping = asyncio.ensure_future(self._keep(key, model_id, reply))
+        self._keeping.add(keeping)
+        keeping.add_done_callback(self._keeping.discard)
+        await asyncio.shield(keeping)
+
+    async def _keep(self, key: str, model_id: str, reply: Reply) -> None:
         is_kept = await self._do(lambda file: file.put(key, model_id, reply), False)
         # Not before it was written to: a full disk can be read all the same.
         if is_kept and self._is_told:
