@@ -21,6 +21,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Literal
 
 __all__ = [
     "BudgetReachedError",
@@ -33,6 +34,7 @@ __all__ = [
     "RefusedError",
     "RetryableError",
     "SampleError",
+    "Sent",
     "SimulationError",
     "SpecError",
     "StoreError",
@@ -120,15 +122,27 @@ class StoreError(InputError):
     """A run folder or the reply cache cannot be read or written."""
 
 
+Sent = Literal["no", "lost", "maybe", "answered"]
+"""How far a call came that failed: nothing was sent; the connection was lost; it was sent and not
+answered in time, or it is not known; the server answered.
+"""
+
+
 class ModelError(PhyblockError):
     """A call to a model failed; the message is safe to store (it holds no key).
+
+    `status` is the HTTP status that the server answered with, if it did; `sent` is how far the call
+    came: breaker, retries and cost limit go by it.
 
     `billed_usd` is what a run's cost limit counts for it [US dollars], all attempts included; None
     where there is no limit.
     """
 
-    def __init__(self, message: str, *, status: int | None = None) -> None:
+    def __init__(
+        self, message: str, *, status: int | None = None, sent: Sent | None = None
+    ) -> None:
         self.status = status
+        self.sent: Sent = sent or ("maybe" if status is None else "answered")
         self.billed_usd: float | None = None
         # A server's words end up in terminals: no escape codes, no right-to-left marks.
         super().__init__("".join(c if c.isprintable() else " " for c in message))
@@ -138,14 +152,22 @@ class RetryableError(ModelError):
     """The call may succeed when it is sent again; `retry_after_s` is the server's wish."""
 
     def __init__(
-        self, message: str, *, status: int | None = None, retry_after_s: float | None = None
+        self,
+        message: str,
+        *,
+        status: int | None = None,
+        retry_after_s: float | None = None,
+        sent: Sent | None = None,
     ) -> None:
         self.retry_after_s = retry_after_s
-        super().__init__(message, status=status)
+        super().__init__(message, status=status, sent=sent)
 
 
 class UnreachableError(RetryableError):
     """No connection to the server could be made: nothing was sent, and nothing can be billed."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message, sent="no")
 
 
 class SampleError(ModelError):

@@ -1,8 +1,9 @@
 """A breaker for each server: while it cannot be reached, one request at a time finds out whether
 it can again, and all others wait.
 
-What a server says itself, an error 500 or a 429 too, shows that it is there. No answer at all, or
-a gateway that finds nothing behind it (502, 503, 504), does not.
+What a server says itself, an error 500 or a 429 too, shows that it is there. No connection, a lost
+one, or a gateway that finds nothing behind it (502, 503, 504) shows that it is not. An answer that
+does not come in time shows neither: some requests are slow.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from phyblock.models.config import ModelConfig
 from phyblock.models.events import Tell, ignore_text
 from phyblock.models.retry import RetryPolicy, backoff_s
 
-__all__ = ["Breaker", "Breakers", "server_of"]
+__all__ = ["Breaker", "Breakers", "server_of", "shows_outage"]
 
 FAILURES_TO_OPEN = 5
 _REQUESTS_TO_OPEN = 2
@@ -83,11 +84,14 @@ class Breaker:
 
         What becomes of attempts that were sent before the breaker opened says nothing new.
         """
-        if error.status not in (None, *_GATEWAY):
+        is_answer = error.sent == "answered" and error.status not in _GATEWAY
+        # The server took the probe, so it can be reached, however long it thinks.
+        is_slow_probe = is_probe and error.sent == "maybe"
+        if is_answer or is_slow_probe:
             self.heard()
+        if not shows_outage(error):
             return
-        if not isinstance(error, RetryableError):
-            return
+        assert isinstance(error, RetryableError)
         now_s = self._policy.clock.now()
         self._began_s = self._began_s if self._failures else now_s
         self._failures += 1
@@ -98,7 +102,7 @@ class Breaker:
             self._is_open = True
             self._end = None
             self._probes = 0
-            self._plan_probe(now_s)
+            self._plan_probe(error, now_s)
             self._tell(f"{self._server} cannot be reached, trying now and then: {error}")
 
     def raise_if_ended(self) -> None:
@@ -129,14 +133,22 @@ class Breaker:
 
     def _probe_failed(self, error: RetryableError, now_s: float) -> None:
         self._probes += 1
-        self._plan_probe(now_s)
+        self._plan_probe(error, now_s)
         lasted_s = now_s - self._began_s
         if self._policy.gives_up(error, self._probes, lasted_s):
             self._end = f"{self._server} could not be reached for {lasted_s:.0f} s: {error}"
 
-    def _plan_probe(self, now_s: float) -> None:
+    def _plan_probe(self, error: RetryableError, now_s: float) -> None:
+        """Wait longer with every probe, and as long as the server asks for."""
         most_s = min(_LONGEST_PROBE_WAIT_S, self._policy.max_wait_s)
-        self._probe_at_s = now_s + backoff_s(self._policy.base_s, most_s, self._probes + 1)
+        wait_s = backoff_s(self._policy.base_s, most_s, self._probes + 1)
+        self._probe_at_s = now_s + max(wait_s, self._policy.followed_s(error))
+
+
+def shows_outage(error: ModelError) -> bool:
+    """Whether a failure shows that the server cannot be reached."""
+    is_unreached = error.sent in ("no", "lost") or error.status in _GATEWAY
+    return is_unreached and isinstance(error, RetryableError)
 
 
 class Breakers:

@@ -13,17 +13,18 @@ import json
 import re
 import sqlite3
 import time
-import uuid
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from phyblock.errors import Problem, StoreError
-from phyblock.models.base import Image, Message, Reply, Request, Usage
+from phyblock.models.base import Finish, Image, Message, Reply, Request, Usage
 from phyblock.models.config import ModelConfig
+from phyblock.models.events import Tell, ignore_text
 from phyblock.models.leases import Leases
 from phyblock.models.payload import wire_params
+from phyblock.models.raw_replies import token_count
 
 __all__ = ["CacheBusyError", "CacheStats", "ReplyCache", "reply_key"]
 
@@ -38,7 +39,6 @@ _HINT = (
 )
 _WAIT = "wait until the process that holds it has ended, or name another cache folder"
 _ELSEWHERE = "free some space, or name another cache folder with PHYBLOCK_CACHE"
-_MOST_TOKENS = 10**9
 _CREATE = """
 CREATE TABLE IF NOT EXISTS replies (
     key TEXT PRIMARY KEY,
@@ -87,11 +87,16 @@ class ReplyCache:
     """Replies by key, and the questions that are being asked.
 
     Every method raises StoreError when the file is broken or cannot be used, CacheBusyError when
-    another process held it for `busy_timeout_s`. To be used in the thread that made it.
+    another process held it for `busy_timeout_s`. A single row that cannot be read is as good as
+    missing; `tell` hears of the first. To be used in the thread that made it.
     """
 
-    def __init__(self, path: Path, busy_timeout_s: float = _BUSY_TIMEOUT_S) -> None:
+    def __init__(
+        self, path: Path, busy_timeout_s: float = _BUSY_TIMEOUT_S, tell: Tell = ignore_text
+    ) -> None:
         self.path = path
+        self._tell = tell
+        self._is_told = False
         self._leases: Leases | None = None
         with self._explained():
             try:
@@ -113,14 +118,23 @@ class ReplyCache:
 
     def get(self, key: str) -> Reply | None:
         """The reply kept under `key`, marked as cached, or None."""
+        # As bytes: SQLite calls the whole file unusable where a text is no UTF-8.
+        sql = "SELECT CAST(reply AS BLOB) FROM replies WHERE key = ?"
         with self._explained():
-            row = self._db.execute("SELECT reply FROM replies WHERE key = ?", (key,)).fetchone()
-            return None if row is None else _reply(json.loads(row[0]))
+            row = self._db.execute(sql, (key,)).fetchone()
+        if row is None:
+            return None
+        try:
+            return _reply(json.loads(row[0]))
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            if not self._is_told:
+                self._is_told = True
+                why = f"{type(error).__name__}: {error}"
+                self._tell(f"reply cache {self.path}: holds a broken reply, asked anew ({why})")
+            return None
 
     def __contains__(self, key: object) -> bool:
-        with self._explained():
-            row = self._db.execute("SELECT 1 FROM replies WHERE key = ?", (key,)).fetchone()
-        return row is not None
+        return isinstance(key, str) and self.get(key) is not None
 
     def put(self, key: str, model_id: str, reply: Reply) -> bool:
         """Keep a reply, unless it is empty, truncated or refused; whether it was kept."""
@@ -141,7 +155,7 @@ class ReplyCache:
         """What is being asked now, by all who share the file."""
         with self._explained():
             if self._leases is None:
-                self._leases = Leases(self._db, uuid.uuid4().hex)
+                self._leases = Leases(self._db)
             yield self._leases
 
     def stats(self) -> CacheStats:
@@ -207,8 +221,6 @@ class ReplyCache:
             raise self._problem(f"cannot be used: {error}", hint=_ELSEWHERE) from error
         except sqlite3.Error as error:
             raise self._problem(f"cannot be used: {error}") from error
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-            raise self._problem(f"holds a broken reply: {error}") from error
 
     def _problem(
         self, message: str, found: str = "", allowed: str = "", hint: str = _HINT
@@ -221,15 +233,14 @@ class ReplyCache:
 
 
 def _reply(stored: dict[str, Any]) -> Reply:
-    usage = Usage(**{name: _count(number) for name, number in stored["usage"].items()})
+    # Older files may hold counts that a server made up.
+    usage = Usage(**{name: token_count(number) for name, number in stored["usage"].items()})
     reply = Reply(**{**stored, "usage": usage})
-    if not (isinstance(reply.text, str) and isinstance(reply.reasoning, str)):
+    texts = (reply.text, reply.reasoning, reply.provider_model)
+    if not all(isinstance(text, str) for text in texts):
         raise TypeError("its text is no text")
+    if reply.finish not in get_args(Finish):
+        raise ValueError("it ended for no reason that is known")
+    if not isinstance(reply.latency_s, int | float):
+        raise TypeError("its latency is no number")
     return replace(reply, cached=True, attempts=0)
-
-
-def _count(number: object) -> int | None:
-    """A number of tokens; older files may hold what a server made up."""
-    if not isinstance(number, int) or isinstance(number, bool):
-        return None
-    return number if 0 <= number <= _MOST_TOKENS else None

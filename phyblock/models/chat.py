@@ -4,6 +4,7 @@ the breaker, limits, budget, transport.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, nullcontext
 from dataclasses import dataclass, replace
@@ -13,10 +14,9 @@ from phyblock.errors import (
     ModelError,
     RetryableError,
     UnavailableError,
-    UnreachableError,
 )
 from phyblock.models.base import Reply, Request
-from phyblock.models.breaker import Breaker
+from phyblock.models.breaker import Breaker, shows_outage
 from phyblock.models.cache import reply_key
 from phyblock.models.config import ModelConfig, Price
 from phyblock.models.cost import Budget, Estimate, cost_usd, estimate, plausible
@@ -51,7 +51,7 @@ class ChatParts:
 @dataclass
 class _Question:
     """A request with its key in the cache and its expected size, how often it was sent, what that
-    cost, its last failure. `by_force`: another asks the same and takes too long.
+    cost, its last failure, its reply. `by_force`: another asks the same and takes too long.
     """
 
     request: Request
@@ -60,6 +60,7 @@ class _Question:
     sent: int = 0
     billed_usd: float | None = None
     failure: RetryableError | None = None
+    reply: Reply | None = None
     by_force: bool = False
 
 
@@ -97,13 +98,21 @@ class ChatModel:
         await self._parts.transport.aclose()
 
     async def _ask_new(self, question: _Question) -> Reply:
-        """Send until answered; whatever ends it, what was billed is told."""
+        """Send until answered; whatever ends it, what was billed is told.
+
+        A cancellation that comes when the reply is in hand is too late: the reply is returned, so
+        that it is recorded.
+        """
         policy = self._parts.policy
         clock = replace(policy.clock, sleep=self._pause)
         try:
             return await with_retries(
                 lambda: self._attempt(question), replace(policy, clock=clock), self._on_retry
             )
+        except asyncio.CancelledError:
+            if question.reply is None:
+                raise
+            return question.reply
         except (UnavailableError, BudgetReachedError, HaltedError):
             if not question.billed_usd:
                 raise
@@ -135,11 +144,12 @@ class ChatModel:
                     raise UnavailableError(str(self._unavailable), status=self._unavailable.status)
                 try:
                     reply = await self._send_watched(question, slot, is_probe=is_probe)
-                except RetryableError:
+                except RetryableError as error:
                     # It is the server that fails then, and not this request.
-                    if self._parts.breaker.is_open:
+                    if self._parts.breaker.is_open and shows_outage(error):
                         continue
                     raise
+                question.reply = reply
                 slot.succeeded(_total(reply))
                 if self._parts.cache is not None:
                     await self._parts.cache.keep(question.key, self._config.id, reply)
@@ -216,12 +226,14 @@ class ChatModel:
         if budget is None or price is None:
             question.sent += 1
             return _counted(await self._parts.transport.send(call), question)
-        with self._parts.halt.giving_up():
-            held = await budget.reserve(
-                lambda: budget.most_usd(self.name, price, question.expected)
-            )
-        spent_usd: float | None = None
+        held: int | None = None
+        spent_usd: float | None = 0.0
         try:
+            with self._parts.halt.giving_up():
+                held = await budget.reserve(
+                    lambda: budget.most_usd(self.name, price, question.expected)
+                )
+            spent_usd = None
             question.sent += 1
             reply = _counted(await self._parts.transport.send(call), question)
             spent_usd = cost_usd(price, reply.usage)
@@ -234,8 +246,9 @@ class ChatModel:
             spent_usd = None if _may_be_billed(error) else 0.0
             raise
         finally:
-            counted_usd = budget.settle(held, spent_usd)
-            question.billed_usd = (question.billed_usd or 0.0) + counted_usd
+            if held is not None:
+                counted_usd = budget.settle(held, spent_usd)
+                question.billed_usd = (question.billed_usd or 0.0) + counted_usd
 
     async def _pause(self, wait_s: float) -> None:
         with self._parts.halt.giving_up():
@@ -283,8 +296,7 @@ class ChatModel:
 
 def _may_be_billed(error: ModelError) -> bool:
     """Whether the server may have made a reply: it promised one, or was lost on the way."""
-    was_lost = error.status is None and not isinstance(error, UnreachableError)
-    return was_lost or is_success(error.status)
+    return error.sent in ("lost", "maybe") or is_success(error.status)
 
 
 def _counted(reply: Reply, question: _Question) -> Reply:

@@ -36,17 +36,24 @@ class Halt:
 
     @contextlib.contextmanager
     def giving_up(self) -> Iterator[None]:
-        """Raise HaltedError in the place of a wait, or out of one, once the switch is set."""
+        """Raise HaltedError in the place of a wait, out of one, or after it, once the switch is set.
+
+        After it too: a wait that ends at the same moment may swallow the cancellation, as
+        `asyncio.wait_for` did before Python 3.12.
+        """
         task = asyncio.current_task()
         assert task is not None
-        if self._is_set:
-            raise HaltedError("the run was ended before this request was sent")
+        self._raise_if_set()
         self._waiting.add(task)
         try:
             yield
         except asyncio.CancelledError:
-            if self._is_set:
-                raise HaltedError("the run was ended before this request was sent") from None
+            self._raise_if_set()
             raise
         finally:
             self._waiting.discard(task)
+        self._raise_if_set()
+
+    def _raise_if_set(self) -> None:
+        if self._is_set:
+            raise HaltedError("the run was ended before this request was sent") from None

@@ -12,6 +12,7 @@ import urllib.parse
 import urllib.request
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from phyblock.addresses import host_of
@@ -42,6 +43,17 @@ class Answer:
         return 200 <= self.status < 300
 
 
+@dataclass
+class _Progress:
+    """How far an exchange came: whether its request has begun to be sent."""
+
+    has_begun: bool = False
+
+
+async def _note_begun(_: object, context: SimpleNamespace, __: object) -> None:
+    context.trace_request_ctx.has_begun = True
+
+
 class HttpClient:
     """Sends requests for one model, over one session that is opened by the first."""
 
@@ -62,22 +74,26 @@ class HttpClient:
     ) -> Answer:
         """Send once and read the answer.
 
-        Raises UnreachableError where no connection could be made, and RetryableError where it was
-        lost or the answer did not end in time.
+        Raises UnreachableError where no connection could be made in time, and RetryableError where
+        it was lost or the answer did not end in time.
         """
         import aiohttp
 
-        exchange = self._exchange(method, url, body, headers, tls)
+        progress = _Progress()
+        exchange = self._exchange(method, url, body, headers, tls, progress)
         try:
             return await asyncio.wait_for(exchange, self._timeout_s)
         except asyncio.TimeoutError:
-            raise RetryableError(f"no whole answer within {self._timeout_s:g} s") from None
+            within = f"within {self._timeout_s:g} s"
+            if progress.has_begun:
+                raise RetryableError(f"no whole answer {within}", sent="maybe") from None
+            raise UnreachableError(f"no connection to {host_of(url)} {within}") from None
         except aiohttp.ClientConnectorError as error:
             raise _unconnected(error, url) from None
         except (aiohttp.ClientError, OSError) as error:
             text = f"{type(error).__name__}: {error}".strip(": ")
             lost = f"the connection to {host_of(url)} was lost ({text})"
-            raise RetryableError(lost) from None
+            raise RetryableError(lost, sent="lost") from None
 
     async def aclose(self) -> None:
         """Close all connections."""
@@ -92,6 +108,7 @@ class HttpClient:
         body: bytes,
         headers: Mapping[str, str],
         tls: ssl.SSLContext | bool,
+        progress: _Progress,
     ) -> Answer:
         import yarl
 
@@ -103,6 +120,7 @@ class HttpClient:
             proxy=self._proxy(url),
             allow_redirects=False,
             ssl=tls,
+            trace_request_ctx=progress,
         ) as response:
             if 300 <= response.status < 400:
                 response.close()
@@ -139,11 +157,14 @@ class HttpClient:
         import aiohttp
 
         if self._session is None:
+            trace = aiohttp.TraceConfig()
+            trace.on_request_headers_sent.append(_note_begun)
             self._session = aiohttp.ClientSession(
                 connector=aiohttp.TCPConnector(limit=0),
                 timeout=aiohttp.ClientTimeout(total=None),
                 cookie_jar=aiohttp.DummyCookieJar(),
                 auto_decompress=False,
+                trace_configs=[trace],
             )
         return self._session
 

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import sqlite3
 import time
+import uuid
 from collections.abc import Callable
+from typing import NamedTuple
 
-__all__ = ["LEASE_S", "Leases"]
+__all__ = ["LEASE_S", "Lease", "Leases"]
 
 LEASE_S = 30.0
 """How long a lease holds that is not renewed."""
@@ -26,17 +28,21 @@ CREATE TABLE IF NOT EXISTS leases (
 _EXISTS = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'leases'"
 
 
-class Leases:
-    """The leases in one database, as `owner` sees and takes them; sqlite3's errors come out."""
+class Lease(NamedTuple):
+    """One lease that was taken; `owner` differs from that of every other."""
 
-    def __init__(
-        self, db: sqlite3.Connection, owner: str, now: Callable[[], float] = time.time
-    ) -> None:
+    key: str
+    owner: str
+
+
+class Leases:
+    """The leases in one database; sqlite3's errors come out."""
+
+    def __init__(self, db: sqlite3.Connection, now: Callable[[], float] = time.time) -> None:
         """Makes the table where an older file lacks it."""
         self._db = db
-        self._owner = owner
         self._now = now
-        self._held: set[str] = set()
+        self._held: set[Lease] = set()
         if db.execute(_EXISTS).fetchone() is None:
             db.execute(_CREATE)
 
@@ -46,39 +52,40 @@ class Leases:
         row = self._db.execute("SELECT until FROM leases WHERE key = ?", (key,)).fetchone()
         return row is not None and now < row[0] <= now + LEASE_S
 
-    def take(self, key: str, *, by_force: bool = False) -> bool:
-        """Take the lease; whether it was free. `by_force` takes it from whoever holds it."""
+    def take(self, key: str, *, by_force: bool = False) -> Lease | None:
+        """Take the lease, or None where another holds it. `by_force` takes it from the other."""
+        lease = Lease(key, uuid.uuid4().hex)
         self._db.execute("BEGIN IMMEDIATE")
         try:
             is_free = by_force or not self.is_taken(key)
             if is_free:
-                self._put(key)
+                row = (*lease, self._now() + LEASE_S)
+                self._db.execute("INSERT OR REPLACE INTO leases VALUES (?, ?, ?)", row)
             self._db.execute("COMMIT")
         except BaseException:
             self._db.execute("ROLLBACK")
             raise
-        return is_free
+        if not is_free:
+            return None
+        self._held.add(lease)
+        return lease
 
-    def renew(self, key: str) -> None:
-        """Let the lease hold for another while, if it is still held."""
-        if key in self._held:
-            self._put(key)
+    def renew(self, lease: Lease) -> bool:
+        """Let the lease hold for another while; False where it is held no more."""
+        sql = "UPDATE leases SET until = ? WHERE key = ? AND owner = ?"
+        is_held = self._db.execute(sql, (self._now() + LEASE_S, *lease)).rowcount > 0
+        if not is_held:
+            self._held.discard(lease)
+        return is_held
 
-    def give_back(self, key: str) -> None:
-        """The question is no longer being asked."""
-        if key in self._held:
-            self._held.discard(key)
-            sql = "DELETE FROM leases WHERE key = ? AND owner = ?"
-            self._db.execute(sql, (key, self._owner))
+    def give_back(self, lease: Lease) -> None:
+        """The question is no longer being asked, at least not by the one who took the lease."""
+        self._held.discard(lease)
+        self._db.execute("DELETE FROM leases WHERE key = ? AND owner = ?", lease)
 
     def give_all_back(self) -> None:
         """Nothing is being asked any more; what dead processes left behind goes too."""
         if self._held:
-            self._held.clear()
-            sql = "DELETE FROM leases WHERE owner = ? OR until < ?"
-            self._db.execute(sql, (self._owner, self._now()))
-
-    def _put(self, key: str) -> None:
-        row = (key, self._owner, self._now() + LEASE_S)
-        self._db.execute("INSERT OR REPLACE INTO leases VALUES (?, ?, ?)", row)
-        self._held.add(key)
+            for lease in tuple(self._held):
+                self.give_back(lease)
+            self._db.execute("DELETE FROM leases WHERE until < ?", (self._now(),))

@@ -44,8 +44,12 @@ class RetryPolicy:
 
     def wait_s(self, error: RetryableError, failures: int) -> float:
         """The wait before the next attempt [s]."""
-        asked_s = min(error.retry_after_s or 0.0, self.max_retry_after_s)
-        return asked_s + random.uniform(0.0, backoff_s(self.base_s, self.max_wait_s, failures))
+        backoff = backoff_s(self.base_s, self.max_wait_s, failures)
+        return self.followed_s(error) + random.uniform(0.0, backoff)
+
+    def followed_s(self, error: RetryableError) -> float:
+        """How much of the wait that the server asked for is followed [s]."""
+        return min(error.retry_after_s or 0.0, self.max_retry_after_s)
 
 
 def is_success(status: int | None) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import queue
 import random
 import time
 from collections.abc import AsyncIterator, Callable
@@ -20,7 +21,7 @@ from phyblock.errors import StoreError
 from phyblock.models.base import Reply
 from phyblock.models.cache import CacheBusyError, ReplyCache
 from phyblock.models.events import Tell, ignore_text
-from phyblock.models.leases import LEASE_S
+from phyblock.models.leases import LEASE_S, Lease
 from phyblock.models.limits import Clock
 from phyblock.models.worker import Worker
 
@@ -38,10 +39,14 @@ _NOTHING: tuple[Reply | None, bool] = (None, False)
 
 @dataclass(frozen=True)
 class Turn:
-    """Whether it is ours to ask; if not, another asks, or has been answered meanwhile."""
+    """Whether it is ours to ask; if not, another asks, or has been answered meanwhile.
+
+    `lease` keeps others from asking; there is none while the cache is set aside.
+    """
 
     is_ours: bool
     reply: Reply | None = None
+    lease: Lease | None = None
 
 
 class SharedCache:
@@ -70,6 +75,8 @@ class SharedCache:
         self._file: ReplyCache | None = None
         self._aside_until_s: float | None = None
         self._is_told = False
+        self._untold: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._keeping: set[asyncio.Future[None]] = set()
         self._is_closing = False
 
     async def __aenter__(self) -> SharedCache:
@@ -108,16 +115,25 @@ class SharedCache:
     async def asking(self, key: str, *, by_force: bool = False) -> AsyncIterator[Turn]:
         """Keep others from asking the same meanwhile, if it is our turn to ask."""
         turn = await self._do(lambda file: _take(file, key, by_force=by_force), Turn(True))
-        renewing = asyncio.create_task(self._renew(key)) if turn.is_ours else None
+        lease = turn.lease
+        if lease is None:
+            yield turn
+            return
+        renewing = asyncio.create_task(self._renew(lease))
         try:
             yield turn
         finally:
-            if renewing is not None:
-                renewing.cancel()
-                await self._do(lambda file: _give_back(file, key), None)
+            renewing.cancel()
+            await self._do(lambda file: _give_back(file, lease), None)
 
     async def keep(self, key: str, model_id: str, reply: Reply) -> None:
-        """Keep a reply, if it is whole and the file takes it."""
+        """Keep a reply, if it is whole and the file takes it, also when the wait is given up."""
+        keeping = asyncio.ensure_future(self._keep(key, model_id, reply))
+        self._keeping.add(keeping)
+        keeping.add_done_callback(self._keeping.discard)
+        await asyncio.shield(keeping)
+
+    async def _keep(self, key: str, model_id: str, reply: Reply) -> None:
         is_kept = await self._do(lambda file: file.put(key, model_id, reply), False)
         # Not before it was written to: a full disk can be read all the same.
         if is_kept and self._is_told:
@@ -132,10 +148,11 @@ class SharedCache:
             await asyncio.wait_for(self._worker.run(self._close_file), 2 * _BUSY_TIMEOUT_S)
         self._worker.stop()
 
-    async def _renew(self, key: str) -> None:
-        while True:
+    async def _renew(self, lease: Lease) -> None:
+        is_held = True
+        while is_held:
             await asyncio.sleep(LEASE_S / 3)
-            await self._do(lambda file: _renew(file, key), None)
+            is_held = await self._do(lambda file: _renew(file, lease), True)
 
     async def _do(self, operation: Callable[[ReplyCache], T], otherwise: T) -> T:
         """What the operation returns; `otherwise` while the cache is set aside."""
@@ -151,6 +168,13 @@ class SharedCache:
         except (StoreError, asyncio.TimeoutError) as error:
             self._set_aside(error)
             return otherwise
+        finally:
+            self._pass_on()
+
+    def _pass_on(self) -> None:
+        """Tell, on the loop, what the worker found."""
+        while not self._untold.empty():
+            self._tell(self._untold.get())
 
     @property
     def _is_aside(self) -> bool:
@@ -185,7 +209,8 @@ class SharedCache:
         while True:
             try:
                 if self._file is None:
-                    self._file = ReplyCache(self.path, min(_BUSY_TIMEOUT_S, self._patience_s))
+                    busy_timeout_s = min(_BUSY_TIMEOUT_S, self._patience_s)
+                    self._file = ReplyCache(self.path, busy_timeout_s, self._untold.put)
                 return operation(self._file)
             except CacheBusyError:
                 if self._is_closing or time.monotonic() >= until_s:
@@ -222,19 +247,21 @@ def _look(file: ReplyCache, key: str) -> tuple[Reply | None, bool]:
 def _take(file: ReplyCache, key: str, *, by_force: bool) -> Turn:
     """Look for the reply once more with the lease in hand: then nobody can bring it meanwhile."""
     with file.leases() as leases:
-        if not leases.take(key, by_force=by_force):
+        lease = leases.take(key, by_force=by_force)
+        if lease is None:
             return Turn(False)
         reply = file.get(key)
-        if reply is not None:
-            leases.give_back(key)
-    return Turn(reply is None, reply)
+        if reply is None:
+            return Turn(True, lease=lease)
+        leases.give_back(lease)
+    return Turn(False, reply)
 
 
-def _renew(file: ReplyCache, key: str) -> None:
+def _renew(file: ReplyCache, lease: Lease) -> bool:
     with file.leases() as leases:
-        leases.renew(key)
+        return leases.renew(lease)
 
 
-def _give_back(file: ReplyCache, key: str) -> None:
+def _give_back(file: ReplyCache, lease: Lease) -> None:
     with file.leases() as leases:
-        leases.give_back(key)
+        leases.give_back(lease)

@@ -3,23 +3,33 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 
 import pytest
+from aiohttp import web
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.errors import ModelError, RetryableError, SampleError, UnavailableError
+from phyblock.errors import (
+    ModelError,
+    RetryableError,
+    SampleError,
+    Sent,
+    UnavailableError,
+    UnreachableError,
+)
 from phyblock.models import Breakers, Gate, Halt, HaltedError, ModelConfig, Reply, RetryPolicy
 from phyblock.models.breaker import FAILURES_TO_OPEN, Breaker, server_of
 from phyblock.models.chat import ChatModel, ChatParts
 from phyblock.models.limits import ModelLimiter
 from phyblock.models.transport import Call
-from tests.models.factory import make_model, make_request, run
+from tests.models.factory import ask, make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.models.test_limits import FakeTime
-from tests.servers.chassis import Faults, start
+from tests.servers.chassis import Faults, Running, Seen, start
+from tests.servers.openai_chat import OpenAIChat
 
-REFUSED = RetryableError("connection refused")
+REFUSED = UnreachableError("connection refused")
 
 
 class Outage:
@@ -39,7 +49,7 @@ class Outage:
             await self.time.sleep(self.takes_s)
         if was_away or self.is_away():
             self.failed += 1
-            raise RetryableError("connection refused")
+            raise RetryableError("connection refused", sent="lost")
         self.answered += 1
         return Reply("Step1: Move block with index 1")
 
@@ -129,6 +139,37 @@ def test_a_dead_name_stops_the_model_after_few_attempts_and_leaves_its_samples(w
     assert 300 <= time.now_s < 330
 
 
+@given(st.none() | st.floats(0, 1000), st.integers(0, 20))
+def test_the_next_probe_waits_as_long_as_the_server_asks(
+    asked_s: float | None, probes: int
+) -> None:
+    async def main() -> None:
+        time = FakeTime()
+        policy = RetryPolicy(clock=time.clock)
+        breaker = Breaker("s", policy)
+        error = RetryableError("overloaded", status=503, retry_after_s=asked_s)
+        for number in range(FAILURES_TO_OPEN):
+            breaker.failed(error, number, is_probe=False)
+
+        async def probe_again_and_again() -> None:
+            for _ in range(probes + 1):
+                failed_s = time.now_s
+                try:
+                    async with breaker.passing() as is_probe:
+                        least_s = min(asked_s or 0.0, policy.max_retry_after_s)
+                        waited_s = time.now_s - failed_s
+                        assert least_s - 1e-6 <= waited_s <= max(15.0, least_s) + 1e-6
+                        breaker.failed(error, "probe", is_probe=is_probe)
+                except UnavailableError:
+                    return
+
+        task = asyncio.create_task(probe_again_and_again())
+        await time.run_until_done(task)
+        await task
+
+    run(main)
+
+
 def test_all_go_on_at_once_when_a_probe_succeeds() -> None:
     time = FakeTime()
     transport = Outage(time, 0.0, 100.0, 1.0)
@@ -148,10 +189,69 @@ def test_what_a_server_says_itself_never_opens_it() -> None:
     assert not breaker.is_open
 
 
-@pytest.mark.parametrize("status", [None, 502, 503, 504])
-def test_failures_of_one_request_alone_are_no_outage(status: int | None) -> None:
+def test_what_is_not_answered_in_time_never_opens_it() -> None:
     breaker = Breaker("s", RetryPolicy())
-    error = RetryableError("x", status=status)
+    for number in range(50):
+        breaker.failed(RetryableError("too slow", sent="maybe"), number, is_probe=False)
+    assert not breaker.is_open
+
+
+def test_a_probe_that_is_taken_but_not_answered_in_time_closes_it() -> None:
+    breaker = Breaker("s", RetryPolicy())
+    for number in range(FAILURES_TO_OPEN):
+        breaker.failed(REFUSED, number, is_probe=False)
+    breaker.failed(RetryableError("too slow", sent="maybe"), "sent before", is_probe=False)
+    assert breaker.is_open
+    breaker.failed(RetryableError("too slow", sent="maybe"), "probe", is_probe=True)
+    assert not breaker.is_open
+
+
+class SlowAtHead(OpenAIChat):
+    """Never answers about the scenes whose names begin with "slow"."""
+
+    async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
+        is_slow = any(isinstance(part, str) and "Scene slow" in part for part in seen.parts)
+        return await super()._end(seen, "slow" if is_slow else ending, request)
+
+
+@pytest.mark.parametrize("route", ["direct", "openai"])
+def test_slow_requests_at_the_head_end_alone_and_the_rest_goes_on(
+    monkeypatch: pytest.MonkeyPatch, route: str
+) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    names = [f"slow {n}" for n in range(8)] + [f"{n:03}" for n in range(12)]
+    with Running(SlowAtHead()) as running:
+        fields = {"timeout_s": 0.5, "max_concurrency": 8}
+        policy = RetryPolicy(2, 0.0, base_s=0.001, max_wait_s=0.002)
+        config = ROUTES[route].config(running.url, **fields)
+        answers = ask(make_model(config, policy=policy), *map(make_request, names))
+    assert [type(answer) for answer in answers] == [RetryableError] * 8 + [Reply] * 12
+
+
+def test_a_connection_that_is_not_made_in_time_was_not_sent() -> None:
+    with socket.socket() as full:
+        full.bind(("127.0.0.1", 0))
+        full.listen(0)
+        others = [socket.socket() for _ in range(4)]
+        for other in others:
+            other.setblocking(False)
+            other.connect_ex(full.getsockname())
+        url = f"http://127.0.0.1:{full.getsockname()[1]}/v1"
+        config = ModelConfig("m", "litellm", "openai/m", api_base=url, timeout_s=0.3)
+        (answer,) = ask(make_model(config, policy=RetryPolicy(1, 0.0)), make_request())
+        for other in others:
+            other.close()
+    assert isinstance(answer, UnreachableError), answer
+    assert "no connection to 127.0.0.1" in str(answer)
+
+
+@pytest.mark.parametrize(
+    ("status", "sent"),
+    [(None, "no"), (None, "lost"), (502, None), (503, None), (504, None)],
+)
+def test_failures_of_one_request_alone_are_no_outage(status: int | None, sent: Sent | None) -> None:
+    breaker = Breaker("s", RetryPolicy())
+    error = RetryableError("x", status=status, sent=sent)
     for _ in range(50):
         breaker.failed(error, "poison", is_probe=False)
     assert not breaker.is_open

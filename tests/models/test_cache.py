@@ -253,19 +253,36 @@ def test_a_page_overwritten_in_the_middle_is_an_error_not_a_reply(tmp_path: Path
         '{"text": "a", "usage": 5}',
         '{"text": 5, "usage": {}}',
         '{"usage": {"x": 1}}',
+        '{"text": "a", "usage": {}, "finish": "perhaps"}',
+        '{"text": "a", "usage": {}, "latency_s": "long"}',
+        '{"text": "a", "usage": {}, "provider_model": 4}',
         "[" * 10**5,
+        b"\xff\xfe\xfd",
+        7,
     ],
 )
-def test_a_row_that_is_no_reply_is_an_error(tmp_path: Path, content: str) -> None:
+def test_a_row_that_is_no_reply_is_missing_and_is_overwritten(
+    tmp_path: Path, content: str | bytes | int
+) -> None:
+    said: list[str] = []
     path = tmp_path / "c.sqlite"
     with ReplyCache(path) as cache:
         cache.put("k", "openai/m", REPLY)
+        cache.put("whole", "openai/m", REPLY)
     db = sqlite3.connect(path)
     with db:
-        db.execute("UPDATE replies SET reply = ?", (content,))
+        # As a text, whatever bytes it is made of.
+        sql = "UPDATE replies SET reply = CAST(? AS TEXT) WHERE key = 'k'"
+        db.execute(sql, (content,))
     db.close()
-    with ReplyCache(path) as cache, pytest.raises(StoreError, match="broken reply"):
-        cache.get("k")
+    with ReplyCache(path, tell=said.append) as cache:
+        assert cache.get("k") is None
+        assert cache.get("k") is None
+        assert cache.get("whole") is not None
+        cache.put("k", "openai/m", REPLY)
+        assert cache.get("k") is not None
+    (text,) = said
+    assert "holds a broken reply" in text
 
 
 def test_a_folder_in_the_way_is_an_error(tmp_path: Path) -> None:

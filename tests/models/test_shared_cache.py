@@ -27,7 +27,7 @@ from phyblock.models import (
     SharedCache,
     reply_key,
 )
-from phyblock.models.leases import LEASE_S, Leases
+from phyblock.models.leases import LEASE_S, Lease, Leases
 from phyblock.models.limits import Clock
 from tests.models.factory import make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
@@ -163,9 +163,9 @@ def test_a_file_that_breaks_later_is_set_aside_and_opened_anew(path: Path) -> No
         async with SharedCache(path, said.append, clock=clock) as cache:
             await cache.keep("k", "m", REPLY)
             with contextlib.closing(sqlite3.connect(path)) as db, db:
-                db.execute("UPDATE replies SET reply = '{'")
+                db.execute("DROP TABLE replies")
             assert await cache.find("k") is None
-            assert "broken reply" in said[0]
+            assert "no such table" in said[0]
             path.unlink()
             now_s += 61
             await cache.keep("k", "m", REPLY)
@@ -173,6 +173,26 @@ def test_a_file_that_breaks_later_is_set_aside_and_opened_anew(path: Path) -> No
 
     run(main)
     assert len(said) == 2
+
+
+def test_a_row_that_cannot_be_read_is_told_once_and_the_file_stays_in_use(path: Path) -> None:
+    said: list[str] = []
+
+    async def main() -> None:
+        async with SharedCache(path, said.append) as cache:
+            for key in "abc":
+                await cache.keep(key, "m", REPLY)
+            with contextlib.closing(sqlite3.connect(path)) as db, db:
+                db.execute("UPDATE replies SET reply = '{' WHERE key < 'c'")
+            assert [await cache.find(key) is None for key in "abc"] == [True, True, False]
+            async with cache.asking("a") as turn:
+                assert turn.is_ours
+                await cache.keep("a", "m", REPLY)
+            assert await cache.find("a") is not None
+
+    run(main)
+    (text,) = said
+    assert "holds a broken reply" in text
 
 
 def test_an_older_file_is_taken_as_it_is_and_stays_one(path: Path) -> None:
@@ -241,7 +261,7 @@ def lease_of_another(path: Path, key: str, at_s: float) -> None:
     """A lease that a process took at a time and never gave back."""
     ReplyCache(path).close()
     with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as db:
-        assert Leases(db, "another", lambda: at_s).take(key)
+        assert Leases(db, lambda: at_s).take(key)
 
 
 @pytest.mark.parametrize("age_s", [LEASE_S + 1, 10 * LEASE_S, -3600])
@@ -282,17 +302,53 @@ def test_a_lease_is_renewed_while_the_call_is_under_way(path: Path) -> None:
     ReplyCache(path).close()
     now_s = 0.0
     with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as db:
-        ours, theirs = (Leases(db, owner, lambda: now_s) for owner in ("us", "them"))
-        assert ours.take("k")
+        ours, theirs = (Leases(db, lambda: now_s) for _ in range(2))
+        lease = ours.take("k")
+        assert lease is not None
         for _ in range(20):
             now_s += LEASE_S / 3
             assert not theirs.take("k")
-            ours.renew("k")
-        ours.give_back("k")
-        ours.renew("k")
+            assert ours.renew(lease)
+        ours.give_back(lease)
+        assert not ours.renew(lease)
         assert theirs.take("k")
-        ours.give_back("k")
+        ours.give_back(lease)
+        ours.give_all_back()
         assert ours.is_taken("k")
+
+
+def test_a_lease_that_another_took_by_force_does_not_come_back(path: Path) -> None:
+    ReplyCache(path).close()
+    now_s = 0.0
+    with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as db:
+        slow, forceful, third = (Leases(db, lambda: now_s) for _ in range(3))
+        first = slow.take("k")
+        second = forceful.take("k", by_force=True)
+        assert first is not None
+        assert second is not None
+        now_s += LEASE_S / 3
+        assert not slow.renew(first)
+        slow.give_back(first)
+        slow.give_all_back()
+        assert third.take("k") is None
+        forceful.give_back(second)
+        assert third.take("k") is not None
+
+
+def test_one_who_took_by_force_keeps_the_lease_when_the_first_of_its_process_ends(
+    path: Path,
+) -> None:
+    async def main() -> None:
+        async with SharedCache(path) as ours, SharedCache(path) as theirs:
+            async with contextlib.AsyncExitStack() as first:
+                await first.enter_async_context(ours.asking("k"))
+                async with ours.asking("k", by_force=True) as second:
+                    assert second.is_ours
+                    await first.aclose()
+                    async with theirs.asking("k") as third:
+                        assert not third.is_ours
+
+    run(main)
 
 
 @given(st.lists(st.tuples(st.sampled_from("ab"), st.floats(-100, 100), st.booleans()), max_size=20))
@@ -301,13 +357,16 @@ def test_no_two_hold_a_lease_at_once(steps: list[tuple[str, float, bool]]) -> No
     now_s = 1000.0
     held: dict[str, float] = {}
     with contextlib.closing(sqlite3.connect(":memory:", isolation_level=None)) as db:
-        leases = {owner: Leases(db, owner, lambda: now_s) for owner in "ab"}
+        leases = {owner: Leases(db, lambda: now_s) for owner in "ab"}
+        taken: dict[str, Lease] = {}
         for owner, passes_s, gives_back in steps:
             now_s += passes_s
             if gives_back:
-                leases[owner].give_back("k")
+                if owner in taken:
+                    leases[owner].give_back(taken.pop(owner))
                 held.pop(owner, None)
-            elif leases[owner].take("k"):
+            elif (lease := leases[owner].take("k")) is not None:
+                taken[owner] = lease
                 assert all(not now_s < until <= now_s + LEASE_S for until in held.values())
                 held = {owner: now_s + LEASE_S}
 
