@@ -8,7 +8,6 @@ never followed.
 from __future__ import annotations
 
 import contextlib
-import errno
 import fcntl
 import os
 import shutil
@@ -18,7 +17,7 @@ from uuid import uuid4
 
 from phyblock.bounded import read_bytes
 from phyblock.errors import Problem, StoreError
-from phyblock.files import atomic_write, make_folder, writing
+from phyblock.files import append_whole, atomic_write, make_folder, writing
 
 __all__ = ["LIST", "OutFolder"]
 
@@ -168,13 +167,7 @@ def _read(path: Path) -> bytes:
 def _append(path: Path, data: bytes) -> None:
     """Append whole lines in one piece, so that those of two processes never mix; or nothing."""
     with path.open("ab", buffering=0) as file:
-        size = os.fstat(file.fileno()).st_size
-        try:
-            if file.write(data) != len(data):
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        except OSError:
-            os.ftruncate(file.fileno(), size)
-            raise
+        append_whole(file.fileno(), data)
 
 
 def _folders(names: Iterable[str]) -> list[str]:
