@@ -97,6 +97,30 @@ class OutFolder:
                 atomic_write(paths[-1], data)
         return tuple(paths)
 
+    def names(self, below: str) -> list[str]:
+        """The names of ours that begin with `below`, whether the files are still there or not."""
+        return sorted(name for name in self._known() if name.startswith(below))
+
+    def remove(self, names: Iterable[str]) -> None:
+        """Remove those of `names` that are ours, and folders that are empty then.
+
+        Nothing else in an output folder is ever removed. Raises StoreError where the disk refuses.
+        """
+        known = self._known()
+        folders: set[str] = set()
+        for name in names:
+            path, above = self.path / name, _folders([name])
+            if name not in known or any((self.path / folder).is_symlink() for folder in above):
+                continue
+            if path.is_file() and not path.is_symlink():
+                with writing(path):
+                    path.unlink(missing_ok=True)
+                folders |= set(above)
+        for folder in sorted(folders, reverse=True):
+            with writing(self.path / folder):
+                if next((self.path / folder).iterdir(), None) is None:
+                    (self.path / folder).rmdir()
+
     @contextlib.contextmanager
     def making(self, below: str = "") -> Iterator[Path]:
         """A new folder to write any files into; at the end they are moved to `below` in this one.

@@ -11,9 +11,9 @@ from typing import Any
 
 from phyblock.domain import SUBTASK_NAMES
 from phyblock.files import writing
+from phyblock.folders import OutFolder
 from phyblock.records import MANIFEST, PROMPTS, RECORDS
 from phyblock.report.figures import FIGURES, write_figures
-from phyblock.report.html.builds import clear, put_in_place, remove_build, remove_others
 from phyblock.report.html.drawable import kit, question_entry, scene_entry
 from phyblock.report.html.headline import assembly_headline
 from phyblock.report.html.headline_tracks import steps_headline, vqa_headline
@@ -39,6 +39,8 @@ REPORT_FILE = "report.html"
 _FOLDER = "report"
 _PICTURES = "pictures"
 _CHUNK_BYTES = 2**20
+_LAYOUT = 2
+"""Version of the scripts' folder; those of the first were not listed as ours."""
 _FIGURES = {
     "f1-levels": "F1 by level",
     "f1-radar": "F1 by level, as in the paper",
@@ -69,22 +71,18 @@ def write_report(
     sources = open_sources(run.manifest, run.design, data)
     out = run_folder(run.path)
     out.check(page_files())
-    folder = run.path / _FOLDER
     with out.alone(), writing(run.path / REPORT_FILE):
         drawn = write_figures(run, figures)
         build = _build(run, sources)
-        new = folder / f"{build}.new"
-        out.claim([REPORT_FILE, f"{_FOLDER}/{build}/", f"{_FOLDER}/{new.name}/"])
-        clear(new)
-        try:
-            _write_data(run, sources, folder, new, build)
+        own = f"{_FOLDER}/{build}/"
+        out.claim([REPORT_FILE])
+        with out.making(own) as new:
+            _write_data(run, sources, out, new, build)
             page = _page(written, drawn, build)
-            put_in_place(new)
-        except BaseException:
-            remove_build(new)
-            raise
         (path,) = out.write({REPORT_FILE: page})
-        remove_others(folder, build)
+        # A page of an earlier build that is still open says that it was written again.
+        lasting = (own, f"{_FOLDER}/{_PICTURES}/")
+        out.remove(name for name in out.names(f"{_FOLDER}/") if not name.startswith(lasting))
     return path
 
 
@@ -95,7 +93,7 @@ def page_files() -> tuple[str, ...]:
 
 def _build(run: Run, sources: Sources) -> str:
     """A name for what the page shows: the same run, written again, has the same files."""
-    digest = hashlib.sha256(f"{version('phyblock')} {sources.lacking}".encode())
+    digest = hashlib.sha256(f"{_LAYOUT} {version('phyblock')} {sources.lacking}".encode())
     for name in (MANIFEST, RECORDS, PROMPTS):
         with contextlib.suppress(FileNotFoundError), (run.path / name).open("rb") as file:
             while chunk := file.read(_CHUNK_BYTES):
@@ -103,14 +101,14 @@ def _build(run: Run, sources: Sources) -> str:
     return digest.hexdigest()[:12]
 
 
-def _write_data(run: Run, sources: Sources, folder: Path, new: Path, build: str) -> None:
+def _write_data(run: Run, sources: Sources, out: OutFolder, new: Path, build: str) -> None:
     kinds = ("records", "scenes", "questions", "prompts")
     packs = {kind: Pack(new, kind, build) for kind in kinds}
     places = read_places(run.path, run.design)
     asked = questions_asked(run.path, places, sources.questions)
     pictures = {}
     if pictures_sent(run.path, places):
-        pictures = _keep_pictures(run, sources, asked, folder / _PICTURES)
+        pictures = _keep_pictures(run, sources, asked, out)
     prompts = pack_prompts(run.path, packs["prompts"])
     index = SampleIndex(run.design)
     pack_samples(run.path, places, index, packs["records"], prompts, pictures)
@@ -134,16 +132,18 @@ def _write_data(run: Run, sources: Sources, folder: Path, new: Path, build: str)
 
 
 def _keep_pictures(
-    run: Run, sources: Sources, asked: Mapping[Item, Shown], folder: Path
+    run: Run, sources: Sources, asked: Mapping[Item, Shown], out: OutFolder
 ) -> dict[str, str]:
     """Addresses of the pictures at hand as seen from the page, by digest."""
-    shelf = PictureShelf(folder, run.manifest["suite"])
-    if set(run.design.suite.tracks) - {"vqa"}:
-        known = (sources.tasks.get(scene) for scene in _scenes(run))
-        shelf.add_scenes(task for task in known if task is not None)
-    if asked:
-        shelf.add_questions(asked.values())
-    return {digest: f"{_FOLDER}/{_PICTURES}/{name}" for digest, name in shelf.names.items()}
+    place = f"{_FOLDER}/{_PICTURES}/"
+    with out.making(place) as new:
+        shelf = PictureShelf(new, out.path / place, run.manifest["suite"])
+        if set(run.design.suite.tracks) - {"vqa"}:
+            known = (sources.tasks.get(scene) for scene in _scenes(run))
+            shelf.add_scenes(task for task in known if task is not None)
+        if asked:
+            shelf.add_questions(asked.values())
+    return {digest: f"{place}{name}" for digest, name in shelf.names.items()}
 
 
 def _scenes(run: Run) -> list[str]:
