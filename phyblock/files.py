@@ -11,7 +11,7 @@ from uuid import uuid4
 
 from phyblock.errors import Problem, StoreError
 
-__all__ = ["atomic_write", "check_free", "make_folder", "write_named", "writing"]
+__all__ = ["append_whole", "atomic_write", "check_free", "make_folder", "write_named", "writing"]
 
 
 @contextlib.contextmanager
@@ -56,6 +56,26 @@ def atomic_write(path: Path, data: bytes | str) -> None:
         partial.replace(path)
     except BaseException:
         partial.unlink(missing_ok=True)
+        raise
+
+
+def append_whole(number: int, data: bytes, *, sync: bool = False) -> None:
+    """Append to the file that is open for appending as `number`: all of the data, or nothing.
+
+    With `sync` it is on disk at the end. Raises OSError where the disk refuses: see `writing`.
+    """
+    # Asked before anything is written: a size that is not known must never be cut back to.
+    size = os.fstat(number).st_size
+    try:
+        left = memoryview(data)
+        while left:
+            left = left[os.write(number, left) :]
+        if sync:
+            os.fsync(number)
+    except OSError:
+        # Where even this fails, what is left is an unfinished line at the end.
+        with contextlib.suppress(OSError):
+            os.ftruncate(number, size)
         raise
 
 

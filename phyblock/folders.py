@@ -8,7 +8,6 @@ never followed.
 from __future__ import annotations
 
 import contextlib
-import errno
 import fcntl
 import os
 import shutil
@@ -18,7 +17,7 @@ from uuid import uuid4
 
 from phyblock.bounded import read_bytes
 from phyblock.errors import Problem, StoreError
-from phyblock.files import atomic_write, make_folder, writing
+from phyblock.files import append_whole, atomic_write, make_folder, writing
 
 __all__ = ["LIST", "OutFolder"]
 
@@ -98,6 +97,30 @@ class OutFolder:
                 atomic_write(paths[-1], data)
         return tuple(paths)
 
+    def names(self, below: str) -> list[str]:
+        """The names of ours that begin with `below`, whether the files are still there or not."""
+        return sorted(name for name in self._known() if name.startswith(below))
+
+    def remove(self, names: Iterable[str]) -> None:
+        """Remove those of `names` that are ours, and folders that are empty then.
+
+        Nothing else in an output folder is ever removed. Raises StoreError where the disk refuses.
+        """
+        known = self._known()
+        folders: set[str] = set()
+        for name in names:
+            path, above = self.path / name, _folders([name])
+            if name not in known or any((self.path / folder).is_symlink() for folder in above):
+                continue
+            if path.is_file() and not path.is_symlink():
+                with writing(path):
+                    path.unlink(missing_ok=True)
+                folders |= set(above)
+        for folder in sorted(folders, reverse=True):
+            with writing(self.path / folder):
+                if next((self.path / folder).iterdir(), None) is None:
+                    (self.path / folder).rmdir()
+
     @contextlib.contextmanager
     def making(self, below: str = "") -> Iterator[Path]:
         """A new folder to write any files into; at the end they are moved to `below` in this one.
@@ -168,13 +191,7 @@ def _read(path: Path) -> bytes:
 def _append(path: Path, data: bytes) -> None:
     """Append whole lines in one piece, so that those of two processes never mix; or nothing."""
     with path.open("ab", buffering=0) as file:
-        size = os.fstat(file.fileno()).st_size
-        try:
-            if file.write(data) != len(data):
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        except OSError:
-            os.ftruncate(file.fileno(), size)
-            raise
+        append_whole(file.fileno(), data)
 
 
 def _folders(names: Iterable[str]) -> list[str]:

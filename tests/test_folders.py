@@ -112,6 +112,22 @@ def test_a_list_that_was_cut_short_is_no_failure(tmp_path: Path) -> None:
     assert contents(tmp_path) == {"a.csv": "2", "b.md": "1", "c": "3"}
 
 
+def test_only_what_is_ours_is_removed_and_folders_that_are_empty_then(tmp_path: Path) -> None:
+    out = OutFolder(tmp_path / "out")
+    out.write({"a/b/one": "ours", "a/two": "ours", "c/three": "ours", "d/four": "ours"})
+    (out.path / "c" / "theirs").write_text("mine")
+    (out.path / "d" / "four").unlink()
+    (out.path / "d").rmdir()
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "four").write_text("mine")
+    (out.path / "d").symlink_to(tmp_path / "elsewhere")
+    assert out.names("a/") == ["a/b/one", "a/two"]
+    out.remove(["a/b/one", "a/two", "c/three", "c/theirs", "d/four", "gone"])
+    left = {path.relative_to(out.path).as_posix() for path in out.path.rglob("*")}
+    assert left == {LIST, "c", "c/theirs", "d"}
+    assert (tmp_path / "elsewhere" / "four").read_text() == "mine"
+
+
 def make(out: OutFolder, name: str, failure: Exception | None = None) -> None:
     with out.making() as folder:
         (folder / "b").write_text("ours")

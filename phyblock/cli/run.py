@@ -23,7 +23,7 @@ from phyblock.cli.summary import print_summary
 from phyblock.plain_text import one_line
 from phyblock.resources import bundled
 from phyblock.run.estimate import Estimate, estimate
-from phyblock.run.execute import Executor, RunResult
+from phyblock.run.execute import Cause, RunResult
 from phyblock.run.folder import run_folder
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.session import Session, check_ready
@@ -118,7 +118,7 @@ async def _run(opened: Session, view: ProgressView) -> RunResult:
             def interrupted() -> None:
                 if session.executor.stopping:
                     whole.cancel()
-                session.executor.stop(Executor.INTERRUPTED)
+                session.executor.interrupt()
 
             for name in (signal.SIGINT, signal.SIGTERM):
                 loop.add_signal_handler(name, interrupted)
@@ -156,7 +156,8 @@ def _conclude(console: Console, folder: Path, result: RunResult, cost: str) -> i
         if result.samples != 1
         else "The one sample is done"
     )
-    reason = f" ({result.reason})" if result.reason else ""
+    cause = result.stop.cause if result.stop else None
+    reason = f" ({result.stop.reason})" if result.stop else ""
     console.print(
         f"{done}{reason}. Cost so far: {cost}. The run is in {where}",
         soft_wrap=True,
@@ -168,9 +169,8 @@ def _conclude(console: Console, folder: Path, result: RunResult, cost: str) -> i
         console.print(f"{rejected} ask again with --retry-failed", style="red", soft_wrap=True)
     if result.left:
         again = shlex.join(["phyblock", *sys.argv[1:]])
-        how = "raise limits.max_cost_usd" if "max_cost_usd" in reason else "give"
-        how += " and give the same command again" if "raise" in how else " the same command again"
-        console.print(f"To go on, {how}: {again}", soft_wrap=True)
-    if result.reason == Executor.INTERRUPTED and result.left:
+        how = "raise limits.max_cost_usd and give" if cause is Cause.COST else "give"
+        console.print(f"To go on, {how} the same command again: {again}", soft_wrap=True)
+    if cause is Cause.INTERRUPTED and result.left:
         return _INTERRUPTED
     return 1 if result.left or result.failed else 0

@@ -19,12 +19,13 @@ from pathlib import Path
 from typing import Any, get_args
 
 from phyblock.errors import Problem, StoreError
-from phyblock.models.base import Finish, Image, Message, Reply, Request, Usage
+from phyblock.models.base import Image, Message, Reply, Request, Usage
 from phyblock.models.config import ModelConfig
 from phyblock.models.events import Tell, ignore_text
 from phyblock.models.leases import Leases
 from phyblock.models.payload import wire_params
 from phyblock.models.raw_replies import token_count
+from phyblock.words import Finish
 
 __all__ = ["CacheBusyError", "CacheStats", "ReplyCache", "reply_key"]
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
 import threading
 from collections.abc import Iterable, Mapping
 from io import FileIO
 from pathlib import Path
 from typing import Any
 
-from phyblock.files import writing
+from phyblock.files import append_whole, writing
 
 __all__ = ["AppendFile"]
 
@@ -54,24 +52,10 @@ class AppendFile:
 
     def _append(self, data: bytes) -> None:
         with writing(self._path, _HINT):
-            size = 0
-            try:
-                if self._file is None:
-                    # Unbuffered: a write that failed must not be tried again behind our back.
-                    self._file = FileIO(self._path, "a")
-                size = self._file.seek(0, os.SEEK_END)
-                written = 0
-                while written < len(data):
-                    written += self._file.write(data[written:])
-                if self._sync:
-                    os.fsync(self._file.fileno())
-            except OSError:
-                # Where even this fails, what is left is an unfinished line: the next start drops
-                # it.
-                if self._file is not None:
-                    with contextlib.suppress(OSError):
-                        self._file.truncate(size)
-                raise
+            if self._file is None:
+                # Unbuffered: a write that failed must not be tried again behind our back.
+                self._file = FileIO(self._path, "a")
+            append_whole(self._file.fileno(), data, sync=self._sync)
 
 
 def _line(line: Mapping[str, Any]) -> bytes:

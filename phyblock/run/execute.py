@@ -1,17 +1,20 @@
 """Executing a plan: bounded concurrency, every answer on disk before the next is judged.
 
 The executor emits events and prints nothing. It stops cleanly: nothing more is sent, calls that
-are under way are waited for, because they are paid for.
+are under way are waited for, because they are paid for. What was answered is written whatever ends
+it, an error of our own or a cancellation.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Coroutine, Mapping
 from dataclasses import dataclass, field
+from enum import Enum, auto
+from typing import Any
 
-from phyblock.errors import BudgetReachedError, PhyblockError, UnavailableError
+from phyblock.errors import BudgetReachedError, UnavailableError
 from phyblock.models import Halt, HaltedError, Model
 from phyblock.run.events import ModelStopped, SampleDone, Stopping, Watcher
 from phyblock.run.models import PlannedModel
@@ -21,7 +24,24 @@ from phyblock.run.standing import Summary
 from phyblock.run.store import RunStore
 from phyblock.run.writer import RecordWriter
 
-__all__ = ["Executor", "RunResult"]
+__all__ = ["Cause", "Executor", "RunResult", "Stop"]
+
+
+class Cause(Enum):
+    """What ends a run before all is asked."""
+
+    INTERRUPTED = auto()
+    COST = auto()
+    """The cost limit is reached."""
+    ERROR = auto()
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Why a run stopped before all was asked: its kind, and the words for a person."""
+
+    cause: Cause
+    reason: str
 
 
 @dataclass
@@ -34,7 +54,7 @@ class RunResult:
     settled: int = 0
     failed: int = 0
     stopped: dict[str, str] = field(default_factory=dict)
-    reason: str | None = None
+    stop: Stop | None = None
 
     @property
     def left(self) -> int:
@@ -47,8 +67,6 @@ class Executor:
 
     `settled` sums up those that had one from the start, by sample.
     """
-
-    INTERRUPTED = "interrupted"
 
     def __init__(
         self,
@@ -80,25 +98,22 @@ class Executor:
         self.result = RunResult(plan.samples_per_model * len(plan.models))
         self.result.failed = sum(not summary.is_answered for summary in self.settled.values())
         self._in_flight = 0
-        self._failure: PhyblockError | None = None
+        self._failure: Exception | None = None
 
     @property
     def stopping(self) -> bool:
         """Whether no new sample is started."""
-        return self.result.reason is not None
+        return self.result.stop is not None
 
-    def stop(self, reason: str) -> None:
+    def interrupt(self) -> None:
         """Send nothing more; safe to call from a signal handler in the loop's thread."""
-        if self.result.reason is None:
-            self.result.reason = reason
-            self._watch(Stopping(reason, self._in_flight - self._halt.waiting))
-            self._halt.set()
+        self._stop(Stop(Cause.INTERRUPTED, "interrupted"))
 
     async def run(self) -> RunResult:
         """Run what earlier records have not settled.
 
-        Raises the first StoreError, DataError or PromptError that a sample met, once calls under
-        way have ended.
+        Raises the first error that a sample met and that is neither its own nor its model's, once
+        calls under way have ended. Where this is cancelled, they are given up.
         """
         workers: list[asyncio.Task[None]] = []
         for planned in self._plan.models:
@@ -111,19 +126,25 @@ class Executor:
             count = min(planned.config.max_concurrency, len(queue))
             workers += [asyncio.create_task(self._work(planned, queue)) for _ in range(count)]
         try:
-            await asyncio.gather(*workers)
+            # One worker's error must not end the others: they wait for what is paid for.
+            ended = await asyncio.gather(*workers, return_exceptions=True)
         finally:
-            for worker in workers:
-                worker.cancel()
-            await asyncio.gather(*workers, return_exceptions=True)
-            await self._writer.drain()
-            await self._turns.drain()
-        if self._failure is not None:
-            raise self._failure
+            await _to_its_end(self._end(workers))
+        for error in (self._failure, *ended):
+            if error is not None:
+                raise error
         return self.result
 
+    async def _end(self, workers: list[asyncio.Task[None]]) -> None:
+        """Give up what is still under way, and wait until what was answered is on disk."""
+        for worker in workers:
+            worker.cancel()
+        await asyncio.gather(*workers, return_exceptions=True)
+        await self._writer.drain()
+        await self._turns.drain()
+
     async def _work(self, planned: PlannedModel, queue: deque[Sample]) -> None:
-        while queue and self.result.reason is None and planned.name not in self.result.stopped:
+        while queue and not self.stopping and planned.name not in self.result.stopped:
             sample = queue.popleft()
             self._in_flight += 1
             try:
@@ -131,14 +152,22 @@ class Executor:
             except UnavailableError as error:
                 self._stop_model(planned.name, str(error))
             except BudgetReachedError as error:
-                self.stop(str(error))
+                self._stop(Stop(Cause.COST, str(error)))
             except HaltedError:
                 return
-            except PhyblockError as error:
+            except Exception as error:
+                # A mistake of our own is no reason to lose what others have paid for.
                 self._failure = self._failure or error
-                self.stop("an error that the run cannot go on with")
+                self._stop(Stop(Cause.ERROR, "an error that the run cannot go on with"))
             finally:
                 self._in_flight -= 1
+
+    def _stop(self, stop: Stop) -> None:
+        if self.result.stop is None:
+            self.result.stop = stop
+            waiting = self._halt.waiting
+            self._halt.set()
+            self._watch(Stopping(stop.reason, self._in_flight - waiting))
 
     async def _one(self, planned: PlannedModel, sample: Sample) -> None:
         model = self._models[planned.name]
@@ -152,3 +181,17 @@ class Executor:
         if name not in self.result.stopped:
             self.result.stopped[name] = reason
             self._watch(ModelStopped(name, reason))
+
+
+async def _to_its_end(work: Coroutine[Any, Any, None]) -> None:
+    """Wait for work that must be done, even where the waiting task is cancelled meanwhile."""
+    task = asyncio.create_task(work)
+    is_cancelled = False
+    while not task.done():
+        try:
+            await asyncio.wait([task])
+        except asyncio.CancelledError:
+            is_cancelled = True
+    task.result()
+    if is_cancelled:
+        raise asyncio.CancelledError

@@ -20,6 +20,10 @@ _BEGUN = re.compile(rf"{re.escape(LOCK)}|{re.escape(LIST)}|\.[0-9a-f]{{32}}\.par
 """What a run that was killed before it had a manifest leaves behind."""
 _PAGE, _REBUILT = "report.html", ("tables", "figures", "export")
 """Where runs kept what can be made again before `.generated` named it."""
+_BUILDS = "report"
+_BUILD = re.compile(r"[0-9a-f]{12}(\.new)?")
+_SCRIPT = re.compile(r"(index|(records|scenes|questions|prompts)-\d+)\.js")
+"""What the page loads, as it was kept then: a folder of nothing but scripts of these names."""
 _HINT = "choose another folder with --out"
 
 
@@ -61,3 +65,11 @@ def _made_before(folder: Path) -> Iterator[str]:
     for place in _REBUILT:
         for above, _, names in os.walk(folder / place):
             yield from ((Path(above) / name).relative_to(folder).as_posix() for name in names)
+    for build in (folder / _BUILDS).glob("*"):
+        names = [path.name for path in build.iterdir()] if _is_folder(build) else []
+        if _BUILD.fullmatch(build.name) and all(map(_SCRIPT.fullmatch, names)):
+            yield from (f"{_BUILDS}/{build.name}/{name}" for name in names)
+
+
+def _is_folder(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()

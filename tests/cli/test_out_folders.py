@@ -181,10 +181,27 @@ def test_a_run_of_before_the_list_is_reported_and_only_builds_are_removed(finish
     assert page.read_text(encoding="utf-8") != "of before"
     assert (finished / "tables" / "table1.md").read_text() != "of before"
     theirs = {name: data for name, data in files(finished / "report").items() if data == b"mine"}
-    assert set(theirs) == {"ba9876543210/thesis.tex", "ch1/thesis.tex"}
+    kept = ("thesis.tex", "records-0.js", "index.js")
+    assert set(theirs) == {*(f"ba9876543210/{name}" for name in kept), "ch1/thesis.tex"}
     assert not (finished / "report" / "0123456789ab").exists()
     assert len(list((finished / "report").iterdir())) == 3
     write_report(write_tables(finished), figures=())
+
+
+def test_scripts_that_we_did_not_write_stay_whatever_their_names(finished: Path) -> None:
+    theirs = finished / "report" / "0123456789ab" / "index.js"
+    put(theirs)
+    write_report(write_tables(finished), figures=())
+    (first,) = set((finished / "report").iterdir()) - {theirs.parent}
+    put(first / "records-7.js")
+    with (finished / "records.jsonl").open("a") as file:
+        file.write((finished / "records.jsonl").read_text().splitlines()[0] + "\n")
+    write_report(write_tables(finished), figures=())
+    (second,) = set((finished / "report").iterdir()) - {theirs.parent, first}
+    assert theirs.read_text() == "mine"
+    assert [path.name for path in first.iterdir()] == ["records-7.js"]
+    assert (second / "index.js").is_file()
+    assert not list(finished.glob("*.part"))
 
 
 def test_a_link_in_the_place_of_a_build_is_not_followed(finished: Path, tmp_path: Path) -> None:
@@ -195,11 +212,9 @@ def test_a_link_in_the_place_of_a_build_is_not_followed(finished: Path, tmp_path
     assert (finished / "report" / "0123456789ab").is_symlink()
     (build,) = (path for path in (finished / "report").iterdir() if not path.is_symlink())
     build.rename(tmp_path / "build")
-    for name in (build.name, f"{build.name}.new"):
-        (finished / "report" / name).symlink_to(tmp_path / "theirs")
-        with pytest.raises(StoreError, match="it is a link"):
-            write_report(write_tables(finished), figures=())
-        (finished / "report" / name).unlink()
+    (finished / "report" / build.name).symlink_to(tmp_path / "theirs")
+    with pytest.raises(StoreError, match="it is a link"):
+        write_report(write_tables(finished), figures=())
     assert files(tmp_path / "theirs") == {"index.js": b"mine"}
     assert page.is_file()
 

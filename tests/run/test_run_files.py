@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -47,6 +48,27 @@ def test_a_full_disk_is_an_error_that_leaves_whole_lines() -> None:
     with pytest.raises(StoreError, match="No space left on device"):
         file.append([{"a": 1}])
     file.close()
+
+
+@pytest.mark.parametrize("call", ["fstat", "write", "fsync"])
+def test_a_disk_that_fails_at_any_call_leaves_what_was_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str
+) -> None:
+    file = AppendFile(tmp_path / "lines.jsonl")
+    file.append([{"a": 1}])
+
+    def fail(*_: object) -> None:
+        raise OSError(errno.ESTALE, os.strerror(errno.ESTALE))
+
+    with monkeypatch.context() as patch:
+        # No disk here fails so on demand; one over a network does.
+        patch.setattr(os, call, fail)
+        with pytest.raises(StoreError, match="Stale file handle"):
+            file.append([{"a": 2}])
+    assert (tmp_path / "lines.jsonl").read_text() == '{"a":1}\n'
+    file.append([{"a": 3}])
+    file.close()
+    assert (tmp_path / "lines.jsonl").read_text() == '{"a":1}\n{"a":3}\n'
 
 
 def turn_lines(folder: Path, *numbers: int) -> None:

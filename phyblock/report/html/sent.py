@@ -29,10 +29,11 @@ class PictureShelf:
     into the cache; on a file system where that is not possible they are copied, up to 256 MiB.
     """
 
-    def __init__(self, folder: Path, suite: Mapping[str, Any]) -> None:
-        """Keep pictures in `folder`, which may hold some, drawn as `suite` says."""
+    def __init__(self, folder: Path, earlier: Path, suite: Mapping[str, Any]) -> None:
+        """Put pictures, drawn as `suite` says, into `folder` unless `earlier` holds them."""
         self.names: dict[str, str] = {}
         self._folder = folder
+        self._earlier = earlier
         self._cache = cache_dir() / "pictures"
         self._suite = suite
         images = suite["images"]
@@ -60,13 +61,16 @@ class PictureShelf:
                 self._keep(found, pictures.keys(shown))
 
     def _keep(self, images: Sequence[Image], keys: Sequence[str]) -> None:
-        self._folder.mkdir(parents=True, exist_ok=True)
         cached: list[Path | None] = [self._cache / key[:2] / f"{key}.png" for key in keys]
         cached = cached or [None] * len(images)
         for image, source in zip(images, cached, strict=True):
             name = f"{image.sha256[:_DIGITS]}.png"
             path = self._folder / name
-            if path.exists() or self._put(path, image.data, source):
+            if (
+                (self._earlier / name).exists()
+                or path.exists()
+                or self._put(path, image.data, source)
+            ):
                 self.names[image.sha256] = name
 
     def _put(self, path: Path, data: bytes, source: Path | None) -> bool:

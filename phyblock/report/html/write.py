@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from phyblock.files import writing
+from phyblock.folders import OutFolder
 from phyblock.records import MANIFEST, PROMPTS, RECORDS
 from phyblock.report.figures import figure_titles, write_figures
-from phyblock.report.html.builds import clear, put_in_place, remove_build, remove_others
 from phyblock.report.html.headline import headlines
 from phyblock.report.html.index import Item, SampleIndex, read_places
 from phyblock.report.html.pack import Pack, write_script
@@ -32,6 +32,8 @@ REPORT_FILE = "report.html"
 _FOLDER = "report"
 _PICTURES = "pictures"
 _CHUNK_BYTES = 2**20
+_LAYOUT = 2
+"""Version of the scripts' folder; those of the first were not listed as ours."""
 _NOT_SHOWN = ("table1",)
 """Tables that a headline table replaces."""
 
@@ -51,22 +53,18 @@ def write_report(
     sources = open_sources(run.manifest, run.design, data)
     out = run_folder(run.path)
     out.check(page_files())
-    folder = run.path / _FOLDER
     with out.alone(), writing(run.path / REPORT_FILE):
         drawn = write_figures(run, figures)
         build = _build(run, sources)
-        new = folder / f"{build}.new"
-        out.claim([REPORT_FILE, f"{_FOLDER}/{build}/", f"{_FOLDER}/{new.name}/"])
-        clear(new)
-        try:
-            _write_data(run, sources, folder, new, build)
+        own = f"{_FOLDER}/{build}/"
+        out.claim([REPORT_FILE])
+        with out.making(own) as new:
+            _write_data(run, sources, out, new, build)
             page = _page(written, drawn, build)
-            put_in_place(new)
-        except BaseException:
-            remove_build(new)
-            raise
         (path,) = out.write({REPORT_FILE: page})
-        remove_others(folder, build)
+        # A page of an earlier build that is still open says that it was written again.
+        lasting = (own, f"{_FOLDER}/{_PICTURES}/")
+        out.remove(name for name in out.names(f"{_FOLDER}/") if not name.startswith(lasting))
     return path
 
 
@@ -77,7 +75,7 @@ def page_files() -> tuple[str, ...]:
 
 def _build(run: Run, sources: Sources) -> str:
     """A name for what the page shows: the same run, written again, has the same files."""
-    digest = hashlib.sha256(f"{version('phyblock')} {sources.lacking}".encode())
+    digest = hashlib.sha256(f"{_LAYOUT} {version('phyblock')} {sources.lacking}".encode())
     for name in (MANIFEST, RECORDS, PROMPTS):
         with contextlib.suppress(FileNotFoundError), (run.path / name).open("rb") as file:
             while chunk := file.read(_CHUNK_BYTES):
@@ -85,14 +83,14 @@ def _build(run: Run, sources: Sources) -> str:
     return digest.hexdigest()[:12]
 
 
-def _write_data(run: Run, sources: Sources, folder: Path, new: Path, build: str) -> None:
+def _write_data(run: Run, sources: Sources, out: OutFolder, new: Path, build: str) -> None:
     kinds = ("records", "scenes", "questions", "prompts")
     packs = {kind: Pack(new, kind, build) for kind in kinds}
     places = read_places(run.path, run.design)
     asked = items_shown(run.path, places, sources.items)
     pictures = {}
     if pictures_sent(run.path, places):
-        pictures = _keep_pictures(run, sources, asked, folder / _PICTURES)
+        pictures = _keep_pictures(run, sources, asked, out)
     prompts = pack_prompts(run.path, packs["prompts"])
     index = SampleIndex(run.design)
     pack_samples(run.path, places, index, packs["records"], prompts, pictures)
@@ -116,16 +114,18 @@ def _write_data(run: Run, sources: Sources, folder: Path, new: Path, build: str)
 
 
 def _keep_pictures(
-    run: Run, sources: Sources, asked: Mapping[Item, Any], folder: Path
+    run: Run, sources: Sources, asked: Mapping[Item, Any], out: OutFolder
 ) -> dict[str, str]:
     """Addresses of the pictures at hand as seen from the page, by digest."""
-    shelf = PictureShelf(folder, run.manifest["suite"])
-    if scenes := _scenes(run):
-        known = (sources.tasks.get(scene) for scene in scenes)
-        shelf.add_scenes(task for task in known if task is not None)
-    for track, items in sources.items.items():
-        shelf.add_items(items, [shown for item, shown in asked.items() if item.track == track])
-    return {digest: f"{_FOLDER}/{_PICTURES}/{name}" for digest, name in shelf.names.items()}
+    place = f"{_FOLDER}/{_PICTURES}/"
+    with out.making(place) as new:
+        shelf = PictureShelf(new, out.path / place, run.manifest["suite"])
+        if scenes := _scenes(run):
+            known = (sources.tasks.get(scene) for scene in scenes)
+            shelf.add_scenes(task for task in known if task is not None)
+        for track, items in sources.items.items():
+            shelf.add_items(items, [shown for item, shown in asked.items() if item.track == track])
+    return {digest: f"{place}{name}" for digest, name in shelf.names.items()}
 
 
 def _part_names(run: Run) -> dict[str, str]:
