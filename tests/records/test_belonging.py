@@ -12,7 +12,7 @@ import pytest
 
 from phyblock.errors import StoreError
 from phyblock.records import Belonging, Manifest, Turn
-from phyblock.records.known import RECORD_ADAPTER
+from phyblock.records.known import known_records
 from phyblock.report import load_run
 from phyblock.run.rescore import rescore
 from tests.records.damage import Raw, plan_record
@@ -37,7 +37,7 @@ def facts(**changes: Any) -> Manifest:
 
 def differs(belonging: Belonging, record: Raw) -> str | None:
     """The field that shows that a record is of another run."""
-    problem = belonging.problem("records.jsonl:7", RECORD_ADAPTER.validate_python(record))
+    problem = belonging.problem("records.jsonl:7", known_records().validate_python(record))
     if problem is None:
         return None
     assert problem.where == "records.jsonl:7"

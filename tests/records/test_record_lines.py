@@ -17,7 +17,7 @@ from phyblock.errors import StoreError
 from phyblock.models import Reply, Usage
 from phyblock.models.stored import reply_of, stored
 from phyblock.records import StoredReply, lines
-from phyblock.records.known import RECORD_ADAPTER
+from phyblock.records.known import known_records
 from phyblock.records.reading import any_records, newest_starts
 from phyblock.report import load_run
 from tests.records.damage import DAMAGED, lines_before, plan_record, with_value
@@ -36,7 +36,7 @@ def folder_with(path: Path, *held: bytes) -> Path:
 
 
 def whole(line: bytes) -> bytes:
-    record = RECORD_ADAPTER.validate_json(line, strict=True)
+    record = known_records().validate_json(line, strict=True)
     return json.dumps(record.fields(), ensure_ascii=False, separators=(",", ":")).encode()
 
 

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 import yaml
-from phyblock.tracks.step_rules import StepPhysics, StepRules
 
 from phyblock.datasets import read_builtin
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
 from phyblock.sim.question_pictures import question_png
 from phyblock.sim.site import state_picture
-from phyblock.tracks.step_planning import StepPlanning
+from phyblock.tracks.step_planning.rules import StepRules
+from phyblock.tracks.step_planning.track import StepPlanning
+from phyblock.words import Physics
 from tests.sim.box_renderer import BOX_RENDERER
 from tests.sim.still_engine import STILL_ENGINE
 from tests.workspace import Done, Raw, Workspace, candidates
@@ -120,7 +121,7 @@ def test_an_unknown_engine_is_refused_before_anything_is_made(workspace: Workspa
 
 
 @pytest.mark.parametrize("physics", ["off", "settle", "strict"])
-def test_a_step_run_in_pybullet_is_told_as_it_always_was(physics: StepPhysics) -> None:
+def test_a_step_run_in_pybullet_is_told_as_it_always_was(physics: Physics) -> None:
     """So that runs from before there was a choice of engines go on."""
     track = StepPlanning(StepRules(physics=physics))
     assert track.identity() == {"prompt": None, "pictures": None}
