@@ -52,7 +52,8 @@ print(os.environ.get("FROM_DOTENV"))
 
 def python(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-W", "error", "-c", code, *arguments]
-    environment = {"PYTHONPATH": str(ROOT), "PATH": ""}
+    # In its mode "DEV", litellm would read keys from any .env file above.
+    environment = {"PYTHONPATH": str(ROOT), "PATH": "", "LITELLM_MODE": "DEV"}
     return subprocess.run(
         command, capture_output=True, text=True, check=True, cwd=ROOT, env=environment
     )
@@ -72,5 +73,5 @@ def test_no_client_is_imported_before_a_call_is_sent(tmp_path: Path, code: str) 
 def test_litellm_reads_no_key_file_and_says_nothing(tmp_path: Path) -> None:
     (tmp_path / ".env").write_text("FROM_DOTENV=1\nANTHROPIC_API_KEY=sk-from-a-file-12345\n")
     done = python(SENDING, str(tmp_path))
-    assert done.stdout == "RetryableError\nNone\n"
+    assert done.stdout == "UnreachableError\nNone\n"
     assert done.stderr == ""
