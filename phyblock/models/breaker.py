@@ -86,7 +86,7 @@ class Breaker:
         """
         is_answer = error.sent == "answered" and error.status not in _GATEWAY
         # The server took the probe, so it can be reached, however long it thinks.
-        is_slow_probe = is_probe and error.sent == "maybe"
+        is_slow_probe = is_probe and error.sent == "maybe" and isinstance(error, RetryableError)
         if is_answer or is_slow_probe:
             self.heard()
         if not shows_outage(error):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from phyblock.errors import RetryableError
+from phyblock.errors import ModelError, RetryableError
 from phyblock.models.base import Reply, Usage
 from phyblock.models.raw_replies import read_chat_completion
 
@@ -18,8 +18,20 @@ def read_completion(body: object, latency_s: float, status: int = 200) -> Reply:
     """The reply in a decoded body of a success.
 
     Thoughts that a server leaves in the text between think tags become reasoning, as litellm does
-    it. Raises RetryableError when the body is no chat completion, or one without choices.
+    it. Raises RetryableError when the body is no chat completion, or one without choices, or when
+    it cannot be read for another reason.
     """
+    try:
+        return _read(body, latency_s, status)
+    except ModelError:
+        raise
+    except Exception as error:
+        # It was answered, and is billed, whatever keeps us from reading it.
+        why = f"malformed reply: {type(error).__name__}: {error}"
+        raise RetryableError(f"HTTP {status}: {why}", status=status) from None
+
+
+def _read(body: object, latency_s: float, status: int) -> Reply:
     raw = read_chat_completion(body)
     if raw is None:
         why = f"malformed reply: no choices in it (found {_found(body)})"

@@ -26,9 +26,9 @@ class DirectTransport(GuardedTransport):
     """`POST {api_base}/chat/completions`."""
 
     def __init__(self, config: ModelConfig, secrets: Sequence[str]) -> None:
-        """SpecError where no address is given and the provider is not OpenAI.
+        """Raise SpecError where no address is given and the provider is not OpenAI.
 
-        Its key would go to OpenAI else.
+        Without an address the request, with another provider's key, would go to OpenAI.
         """
         if config.api_base is None and config.provider != "openai":
             message = "needs an api_base to be called directly"

@@ -36,7 +36,7 @@ class Halt:
 
     @contextlib.contextmanager
     def giving_up(self) -> Iterator[None]:
-        """Raise HaltedError in the place of a wait, out of one, or after it, once the switch is set.
+        """Raise HaltedError before, out of, or after a wait, once the switch is set.
 
         After it too: a wait that ends at the same moment may swallow the cancellation, as
         `asyncio.wait_for` did before Python 3.12.

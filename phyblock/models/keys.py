@@ -65,6 +65,57 @@ _ADDRESS_VARIABLES: Mapping[str, tuple[str, ...]] = {
 }
 """Where litellm looks for a server's address when it is given none, in its order."""
 
+_AWS = (
+    "AWS_ACCESS_KEY_ID",
+    "AWS_BEARER_TOKEN_BEDROCK",
+    "AWS_SECRET_ACCESS_KEY",
+    "AWS_SESSION_TOKEN",
+)
+_AZURE = (
+    "AZURE_AD_TOKEN",
+    "AZURE_CLIENT_SECRET",
+    "AZURE_OPENAI_API_KEY",
+    "AZURE_PASSWORD",
+)
+_VERTEX = ("VERTEXAI_CREDENTIALS", "VERTEX_CREDENTIALS")
+_WATSONX = (
+    "WATSONX_API_KEY",
+    "WATSONX_APIKEY",
+    "WATSONX_TOKEN",
+    "WATSONX_ZENAPIKEY",
+    "WX_API_KEY",
+)
+_SECRET_VARIABLES: Mapping[str, tuple[str, ...]] = {
+    "anthropic": ("ANTHROPIC_API_KEY", "ANTHROPIC_AUTH_TOKEN"),
+    "azure": _AZURE,
+    "azure_ai": _AZURE,
+    "azure_text": _AZURE,
+    "bedrock": _AWS,
+    "bedrock_converse": _AWS,
+    "bedrock_mantle": (*_AWS, "BEDROCK_MANTLE_API_KEY"),
+    "cohere": ("COHERE_API_KEY", "CO_API_KEY"),
+    "cohere_chat": ("COHERE_API_KEY", "CO_API_KEY"),
+    "databricks": ("DATABRICKS_API_KEY", "DATABRICKS_CLIENT_SECRET", "DATABRICKS_TOKEN"),
+    "datarobot": ("DATAROBOT_API_TOKEN",),
+    "fireworks_ai": ("FIREWORKSAI_API_KEY", "FIREWORKS_AI_TOKEN"),
+    "friendliai": ("FRIENDLIAI_API_KEY", "FRIENDLI_TOKEN"),
+    "gigachat": ("GIGACHAT_ACCESS_TOKEN", "GIGACHAT_CREDENTIALS", "GIGACHAT_PASSWORD"),
+    "huggingface": ("HF_TOKEN", "HUGGINGFACE_API_KEY"),
+    "mistral": ("MISTRAL_AZURE_API_KEY",),
+    "openrouter": ("OR_API_KEY",),
+    "replicate": ("REPLICATE_API_KEY", "REPLICATE_API_TOKEN"),
+    "sagemaker": _AWS,
+    "sagemaker_chat": _AWS,
+    "snowflake": ("SNOWFLAKE_JWT",),
+    "together_ai": ("TOGETHER_AI_TOKEN",),
+    "vertex_ai": _VERTEX,
+    "vertex_ai_beta": _VERTEX,
+    "volcengine": ("ARK_API_KEY",),
+    "watsonx": _WATSONX,
+    "watsonx_text": _WATSONX,
+}
+"""Variables beside those of the key in which litellm looks for what it signs in with."""
+
 _PLACEHOLDER = "no-key"
 _SHORTEST_SECRET = 4
 _PLACEHOLDERS = (_PLACEHOLDER, "empty", "none", "null", "dummy", "test")
@@ -133,12 +184,13 @@ def server_address(model_id: str) -> str | None:
 
 
 def secrets_of(config: ModelConfig) -> tuple[str, ...]:
-    """Values that no stored text may hold: the keys that calls to this model could carry.
+    """Values that no stored text may hold: all secrets that calls to this model could carry.
 
     A value of fewer than 4 characters, or a usual word for "no key", is none: to take it out of all
     text would ruin the text and hide nothing.
     """
-    values = {os.environ.get(name, "").strip() for name in _variables(config)}
+    variables = (*_variables(config), *_SECRET_VARIABLES.get(config.provider, ()))
+    values = {os.environ.get(name, "").strip() for name in variables}
     return tuple(
         sorted(
             value

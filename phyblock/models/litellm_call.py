@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LitellmTransport"]
 
-_DEFAULTS = {
+_SETTINGS = {
     "LITELLM_LOCAL_MODEL_COST_MAP": "True",  # else the import fetches the price map
     "MAX_BASE64_LENGTH_FOR_LOGGING": "0",  # else a regex goes over every picture for its log
     "LITELLM_MODE": "PRODUCTION",  # else the import reads keys from any .env file above
@@ -56,22 +56,24 @@ class LitellmTransport(GuardedTransport):
         from phyblock.models.litellm_wire import CURRENT, Exchange
 
         arguments = self._arguments(call)
-        exchange = Exchange(self._client)
+        exchange = Exchange(self._client, self._config)
         token = CURRENT.set(exchange)
         started = time.perf_counter()
         try:
             response = await asyncio.wait_for(
                 litellm.acompletion(**arguments), self._config.timeout_s + _GRACE_S
             )
+            latency_s = time.perf_counter() - started
+            return read_completion(_plain(response), latency_s, exchange.answered().status)
+        except ModelError:
+            raise
         except asyncio.TimeoutError:
             raise RetryableError("no answer in time") from None
         except Exception as error:
             raise self._failure(call, error, exchange) from None
         finally:
+            exchange.end()
             CURRENT.reset(token)
-        latency_s = time.perf_counter() - started
-        status = 200 if exchange.answer is None else exchange.answer.status
-        return read_completion(_plain(response), latency_s, status)
 
     def _arguments(self, call: Call) -> dict[str, Any]:
         arguments = {
@@ -99,11 +101,11 @@ class LitellmTransport(GuardedTransport):
         if exchange.failure is not None:
             return exchange.failure
         if answer is None:
-            if isinstance(error, litellm.UnsupportedParamsError):
-                if call.seed is not None and refuses_seed(400, str(error)):
-                    return SeedRefusedError(sent=False)
-                return UnavailableError(str(error))
-            return refused_before_sending(getattr(error, "status_code", None), _message(error))
+            is_unsupported = isinstance(error, litellm.UnsupportedParamsError)
+            if is_unsupported and call.seed is not None and refuses_seed(400, str(error)):
+                return SeedRefusedError(sent=False)
+            said = [_message(error), exchange.refused]
+            return refused_before_sending("; ".join(filter(None, said)))
         if answer.is_success:
             return unreadable(answer, _message(error))
         if isinstance(error, litellm.ContentPolicyViolationError):
@@ -122,8 +124,7 @@ def _message(error: Exception) -> str:
 
 def _litellm() -> types.ModuleType:
     """litellm, imported with its network access, key files, chatter and second requests off."""
-    for name, value in _DEFAULTS.items():
-        os.environ.setdefault(name, value)
+    os.environ.update(_SETTINGS)
     import litellm
 
     if not litellm.suppress_debug_info:

@@ -16,7 +16,6 @@ from phyblock.errors import (
     RetryableError,
     SampleError,
     UnavailableError,
-    UnreachableError,
 )
 from phyblock.models.http_client import Answer
 
@@ -95,17 +94,13 @@ def refused_for_policy(answer: Answer) -> RefusedError:
     return RefusedError(f"HTTP {answer.status}: {error_words(answer.body)}", status=answer.status)
 
 
-def refused_before_sending(status: int | None, words: str) -> ModelError:
+def refused_before_sending(words: str) -> UnavailableError:
     """The error of a call that a library gave up before it sent anything.
 
-    `status` is what the library made up for it; without one that settles it, a second try costs
-    nothing.
+    A package, a credential or a setting is missing on this machine: no request would fare better,
+    and none may count as answered.
     """
-    if status in _UNAVAILABLE or _NEVER.search(words):
-        return UnavailableError(words, status=status)
-    if status is not None and 400 <= status < 500 and status not in _RETRYABLE:
-        return SampleError(words, status=status)
-    return UnreachableError(words)
+    return UnavailableError(words, sent="no")
 
 
 def unreadable(answer: Answer, why: str) -> RetryableError:

@@ -154,7 +154,7 @@ def _workers_without_interrupts() -> Iterator[None]:
 
 
 def _take_note(drawn: asyncio.Task[bytes]) -> None:
-    # Of a failure that every waiter was cancelled before: asyncio would print it otherwise.
+    # Where all who waited were cancelled, nobody asks for the failure, and asyncio would print it.
     if not drawn.cancelled():
         drawn.exception()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -149,8 +150,9 @@ def test_nothing_is_sent_outside_of_a_call_and_nothing_twice() -> None:
         client = httpx.AsyncClient(transport=WireTransport(True), trust_env=False)
         with pytest.raises(httpx.ReadError, match="outside of a call"):
             await client.post(url, json=body)
-        ours = HttpClient(CONFIG)
-        CURRENT.set(Exchange(ours))
+        config = replace(CONFIG, api_base=url)
+        ours = HttpClient(config)
+        CURRENT.set(Exchange(ours, config))
         assert (await client.post(url, json=body)).status_code == 200
         with pytest.raises(RuntimeError, match="twice"):
             await client.post(url, json=body)

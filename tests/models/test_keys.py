@@ -152,3 +152,27 @@ def test_a_key_that_cannot_be_sent_is_named_by_its_variable(
         api_key(config("openai/o1"))
     assert "of-mine" not in str(refused.value)
     assert api_key_status(config("openai/o1")).fault
+
+
+@pytest.mark.parametrize(
+    ("model_id", "variable"),
+    [
+        ("bedrock/m", "AWS_BEARER_TOKEN_BEDROCK"),
+        ("bedrock/m", "AWS_SESSION_TOKEN"),
+        ("sagemaker/m", "AWS_SECRET_ACCESS_KEY"),
+        ("azure/m", "AZURE_AD_TOKEN"),
+        ("azure/m", "AZURE_CLIENT_SECRET"),
+        ("watsonx_text/m", "WX_API_KEY"),
+        ("gigachat/m", "GIGACHAT_CREDENTIALS"),
+        ("huggingface/a/m", "HF_TOKEN"),
+        ("vertex_ai/m", "VERTEXAI_CREDENTIALS"),
+    ],
+)
+@pytest.mark.parametrize("api_key_env", [None, "MINE_API_KEY"])
+def test_whatever_a_provider_signs_in_with_is_a_secret_and_no_key(
+    monkeypatch: pytest.MonkeyPatch, model_id: str, variable: str, api_key_env: str | None
+) -> None:
+    monkeypatch.setenv(variable, "a-long-secret-of-mine")
+    config = ModelConfig("m", "litellm", model_id, api_key_env=api_key_env)
+    assert "a-long-secret-of-mine" in secrets_of(config)
+    assert not api_key_status(config).is_set

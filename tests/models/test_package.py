@@ -52,7 +52,8 @@ print(os.environ.get("FROM_DOTENV"))
 
 def python(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-W", "error", "-c", code, *arguments]
-    environment = {"PYTHONPATH": str(ROOT), "PATH": ""}
+    # In its mode "DEV", litellm would read keys from any .env file above.
+    environment = {"PYTHONPATH": str(ROOT), "PATH": "", "LITELLM_MODE": "DEV"}
     return subprocess.run(
         command, capture_output=True, text=True, check=True, cwd=ROOT, env=environment
     )

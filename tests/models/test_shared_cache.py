@@ -339,14 +339,17 @@ def test_one_who_took_by_force_keeps_the_lease_when_the_first_of_its_process_end
     path: Path,
 ) -> None:
     async def main() -> None:
-        async with SharedCache(path) as ours, SharedCache(path) as theirs:
-            async with contextlib.AsyncExitStack() as first:
-                await first.enter_async_context(ours.asking("k"))
-                async with ours.asking("k", by_force=True) as second:
-                    assert second.is_ours
-                    await first.aclose()
-                    async with theirs.asking("k") as third:
-                        assert not third.is_ours
+        async with (
+            SharedCache(path) as ours,
+            SharedCache(path) as theirs,
+            contextlib.AsyncExitStack() as first,
+        ):
+            await first.enter_async_context(ours.asking("k"))
+            async with ours.asking("k", by_force=True) as second:
+                assert second.is_ours
+                await first.aclose()
+                async with theirs.asking("k") as third:
+                    assert not third.is_ours
 
     run(main)
 
