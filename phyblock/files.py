@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import stat
 from collections.abc import Iterable, Iterator
@@ -11,7 +12,18 @@ from uuid import uuid4
 
 from phyblock.errors import Problem, StoreError
 
-__all__ = ["append_whole", "atomic_write", "check_free", "make_folder", "write_named", "writing"]
+__all__ = [
+    "append_whole",
+    "atomic_write",
+    "check_free",
+    "make_folder",
+    "sync_folder",
+    "write_named",
+    "writing",
+]
+
+_CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)
+"""What file systems say that know no sync of a folder."""
 
 
 @contextlib.contextmanager
@@ -41,22 +53,40 @@ def make_folder(path: Path, hint: str = "") -> None:
         path.mkdir(parents=True, exist_ok=True)
 
 
-def atomic_write(path: Path, data: bytes | str) -> None:
+def atomic_write(path: Path, data: bytes | str, *, sync: bool = False) -> None:
     """Write a whole file, or leave what was there and nothing beside it.
 
     Text is written as UTF-8, with question marks for halves of characters. The permissions are
     those of any new file. Where `path` is a link, the link is replaced and its target stays as it
-    is. Raises OSError where the disk refuses: see `writing`.
+    is. With `sync` it survives the death of the machine. Raises OSError where the disk refuses: see
+    `writing`.
     """
     # A name of its own: two processes may write the same file at the same time.
     partial = path.with_name(f".{uuid4().hex}.part")
     try:
         with partial.open("xb") as file:
             file.write(data.encode("utf-8", "replace") if isinstance(data, str) else data)
+            if sync:
+                file.flush()
+                os.fsync(file.fileno())
         partial.replace(path)
+        if sync:
+            sync_folder(path.parent)
     except BaseException:
         partial.unlink(missing_ok=True)
         raise
+
+
+def sync_folder(path: Path) -> None:
+    """Wait until the names in a folder are on disk; raises OSError where the disk refuses."""
+    number = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(number)
+    except OSError as error:
+        if error.errno not in _CANNOT_SYNC:
+            raise
+    finally:
+        os.close(number)
 
 
 def append_whole(number: int, data: bytes, *, sync: bool = False) -> None:

@@ -16,6 +16,7 @@ __all__ = ["decode", "is_cut", "problem_of"]
 
 _LONGEST_SHOWN = 60
 _MISSING = "missing"
+_ENCODER = json.JSONEncoder(ensure_ascii=False, default=lambda value: type(value).__name__)
 
 
 def decode(adapter: TypeAdapter[Any], line: bytes) -> Any:
@@ -62,7 +63,16 @@ def _dotted(place: Sequence[int | str]) -> str:
 
 
 def _shown(value: object) -> str:
-    text = encodable(json.dumps(value, default=str, ensure_ascii=False))
+    """A value as JSON as far as it is shown, whatever it is."""
+    text = ""
+    try:
+        for part in _ENCODER.iterencode(value):
+            text += part
+            if len(text) > _LONGEST_SHOWN:
+                break
+    except (TypeError, ValueError, RecursionError):
+        text += "..." if text else type(value).__name__
+    text = encodable(text)
     return text if len(text) <= _LONGEST_SHOWN else text[: _LONGEST_SHOWN - 3] + "..."
 
 

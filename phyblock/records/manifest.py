@@ -9,6 +9,7 @@ import yaml
 from pydantic import Field, ValidationError
 
 from phyblock.bounded import read_text
+from phyblock.bounded_yaml import TooMuchError, YamlBounds, load_yaml
 from phyblock.errors import Problem, StoreError
 from phyblock.records.decode import problem_of
 from phyblock.records.line import Line
@@ -28,6 +29,9 @@ FORMAT = 1
 MANIFEST = "run.yaml"
 _HINT = "run.yaml is written by `phyblock run` and never edited: restore it from a copy"
 _DIGITS = 16
+_LARGEST_BYTES = 2 * 1024 * 1024
+_BOUNDS = YamlBounds(values=100_000, depth=64)
+"""Far above what a suite of the largest allowed size comes to."""
 
 
 class ManifestModel(Line):
@@ -103,16 +107,20 @@ def read_manifest(folder: Path) -> Manifest:
     """The run's manifest; StoreError when there is none or it cannot be read."""
     path = folder / MANIFEST
     try:
-        found = yaml.safe_load(read_text(path))
+        found = load_yaml(read_text(path, _LARGEST_BYTES), _BOUNDS)
     except (FileNotFoundError, NotADirectoryError) as error:
         allowed = "a folder that phyblock run wrote"
         raise StoreError(Problem(str(folder), f"holds no {MANIFEST}", allowed=allowed)) from error
     except OSError as error:
         raise StoreError(Problem(str(path), f"cannot be read: {error.strerror}")) from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"{path}:{mark.line + 1}:{mark.column + 1}" if mark else str(path)
+    except TooMuchError as error:
+        where, message, allowed = _at(path, error.mark), error.message, error.allowed
+        raise StoreError(Problem(where, message, allowed=allowed, hint=_HINT)) from error
+    except yaml.YAMLError as error:
+        where = _at(path, getattr(error, "problem_mark", None))
         raise StoreError(Problem(where, "is not YAML", hint=_HINT)) from error
+    except ValueError as error:
+        raise StoreError(Problem(str(path), str(error), hint=_HINT)) from error
     if not isinstance(found, dict) or "identity" not in found:
         message, said = "is not a run manifest", "no such key"
         raise StoreError(Problem(str(path), message, "identity", said, hint=_HINT))
@@ -123,3 +131,7 @@ def read_manifest(folder: Path) -> Manifest:
             problem_of(one, str(path), "is not a run manifest", _HINT)
             for one in error.errors(include_url=False)
         ) from error
+
+
+def _at(path: Path, mark: yaml.Mark | None) -> str:
+    return f"{path}:{mark.line + 1}:{mark.column + 1}" if mark else str(path)

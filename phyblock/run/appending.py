@@ -9,7 +9,7 @@ from io import FileIO
 from pathlib import Path
 from typing import Any
 
-from phyblock.files import append_whole, writing
+from phyblock.files import append_whole, sync_folder, writing
 
 __all__ = ["AppendFile"]
 
@@ -55,6 +55,8 @@ class AppendFile:
             if self._file is None:
                 # Unbuffered: a write that failed must not be tried again behind our back.
                 self._file = FileIO(self._path, "a")
+                if self._sync:
+                    sync_folder(self._path.parent)
             append_whole(self._file.fileno(), data, sync=self._sync)
 
 

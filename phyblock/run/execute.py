@@ -89,7 +89,7 @@ class Executor:
         self._plan = plan
         self._writer = RecordWriter(store.records)
         self._turns = RecordWriter(store.turns)
-        begun = store.turns_of_others(self.settled) if plan.has_episodes else {}
+        begun = store.begun_turns(self.settled) if plan.has_episodes else {}
         run = plan.manifest.run
         self._samples = SampleRunner(self._turns, store.prompts, halt, begun, run)
         self._models = models

@@ -98,7 +98,7 @@ class RunStore:
             self._lock.close()
             self._lock = None
 
-    def turns_of_others(self, done: Container[str]) -> dict[str, list[StoredReply]]:
+    def begun_turns(self, done: Container[str]) -> dict[str, list[StoredReply]]:
         """The replies of episodes that have begun and are not `done`, by sample id."""
         return collect_turns(TurnLines(self._folder, self._belonging), done)
 
@@ -134,7 +134,7 @@ class RunStore:
             return
         path = self._folder / MANIFEST
         text = yaml.safe_dump(manifest.fields(), sort_keys=False, allow_unicode=True, width=100)
-        atomic_write(path, text)
+        atomic_write(path, text, sync=True)
 
 
 def holds_run(folder: Path, manifest: Manifest) -> bool:

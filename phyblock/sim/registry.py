@@ -12,7 +12,7 @@ import importlib
 import os
 from collections.abc import Mapping
 
-from phyblock.errors import InputError, Problem
+from phyblock.errors import InputError, PhyblockError, Problem
 from phyblock.sim.engine import PhysicsEngine
 from phyblock.sim.renderer import Renderer
 
@@ -65,10 +65,16 @@ def _make(variable: str, word: str, path: str, names: str) -> object:
     if not all(part.isidentifier() for part in (*module.split("."), factory)):
         allowed = f"{names}, or module:factory"
         raise InputError(Problem(variable, "is not known", found=word, allowed=allowed))
+    doing = "imported"
     try:
         make = getattr(importlib.import_module(module), factory)
-    except (ImportError, AttributeError) as error:
-        raise InputError(Problem(variable, f"cannot be imported: {error}", found=word)) from error
-    if not callable(make):
-        raise InputError(Problem(variable, "names nothing that can be called", found=word))
-    return make()
+        if not callable(make):
+            raise InputError(Problem(variable, "names nothing that can be called", found=word))
+        doing = "made"
+        return make()
+    except PhyblockError:
+        raise
+    except Exception as error:
+        # It may be anybody's code, or no factory at all.
+        said = f"cannot be {doing}: {type(error).__name__}: {error}"
+        raise InputError(Problem(variable, said, found=word)) from error

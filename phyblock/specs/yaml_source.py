@@ -16,8 +16,9 @@ from typing import Any
 import yaml
 
 from phyblock.bounded import LONGEST_INTEGER, read_bytes
+from phyblock.bounded_yaml import TAG, TooMuchError, compose
 from phyblock.errors import Problem, SpecError, said
-from phyblock.specs.yaml_loader import MAX_VALUES, TAG, CoreLoader, TooMuchError, compose
+from phyblock.specs.yaml_loader import BOUNDS, CoreLoader
 
 __all__ = ["CoreLoader", "FieldPath", "YamlSource", "dotted", "parse_yaml", "read_yaml"]
 
@@ -100,7 +101,7 @@ def parse_yaml(text: str, label: str, *, place: str | None = None) -> YamlSource
         problem = Problem(place or label, "is too long", "", f"{len(text):,} characters", _ALLOWED)
         raise SpecError(problem)
     try:
-        node = compose(text)
+        node = compose(CoreLoader(text))
         if node is not None:
             source.data = reader.build(node, (), ())
     except yaml.MarkedYAMLError as error:
@@ -129,8 +130,8 @@ class _Reader:
         if any(node is other for other in above):
             raise TooMuchError("an anchor holds itself", "", node.start_mark)
         self._count += 1
-        if self._count > MAX_VALUES:
-            message = f"holds more than {MAX_VALUES:,} values"
+        if self._count > BOUNDS.values:
+            message = f"holds more than {BOUNDS.values:,} values"
             raise TooMuchError(message, "", node.start_mark)
         self._source.values.setdefault(path, self._where(node))
         above = (*above, node)

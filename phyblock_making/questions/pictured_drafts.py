@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -26,7 +25,6 @@ __all__ = [
     "only_index",
     "option_pictures",
     "picture_of",
-    "relabeled",
     "same_blocks",
     "state",
 ]
@@ -146,8 +144,3 @@ def only_index(right: Sequence[bool]) -> tuple[int]:
     if len(found) != 1:
         raise UnfairError(f"{len(found)} of {len(right)} options are right")
     return (found[0],)
-
-
-def relabeled(picture: QuestionPicture, label: str) -> QuestionPicture:
-    """The same picture under another label."""
-    return replace(picture, label=label)

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from phyblock.cli.progress import ProgressView
 from phyblock.cli.remarks import Remarks
+from phyblock.records.known import known_records
 from phyblock.run.events import (
     ModelNotice,
     ModelStopped,
@@ -19,6 +20,7 @@ from phyblock.run.events import (
     RunStarted,
     SampleDone,
 )
+from tests.report.factory import record
 
 
 def retry(status: int | None = 429, wait_s: float = 1.0, model: str = "alpha") -> ModelNotice:
@@ -103,12 +105,7 @@ def test_a_log_tells_of_retries_slow_downs_servers_and_failures() -> None:
 
 
 def test_a_log_counts_failures_and_ends_with_what_was_not_yet_said() -> None:
-    failed = {
-        "model": "alpha",
-        "outcome": "api_error",
-        "scores": [],
-        "reply": None,
-    }
+    failed = known_records().validate_python(record(outcome="api_error"))
     lines = logged(
         (0.0, retry()),
         (10.0, SampleDone(failed)),

@@ -25,6 +25,7 @@ from tests.fuzz.strategies import (
     TEMPLATES,
     broken,
 )
+from tests.records.damage import YAML_TEXTS
 
 __all__ = ["KINDS", "Cases", "run_cases"]
 
@@ -300,7 +301,15 @@ def run_cases(root: Path) -> Cases:
 
 def _manifests(path: Path) -> st.SearchStrategy[bytes]:
     manifest = yaml.safe_load(path.read_text(encoding="utf-8"))
-    return broken(st.just(manifest), NASTY_TOKENS)
+    whole = path.read_bytes()
+    texts = st.sampled_from([text.encode() for text in YAML_TEXTS.values()])
+    # A field that is not known may hold anything; one that is written already is there twice.
+    added = st.builds(
+        lambda field, text: whole + field + b": " + text + b"\n",
+        st.sampled_from([b"mine", b"created", b"limit", b"scenes", b"scenes_by_level"]),
+        texts,
+    )
+    return broken(st.just(manifest), NASTY_TOKENS) | added
 
 
 def _with_bad_line(path: Path) -> st.SearchStrategy[bytes]:

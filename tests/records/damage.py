@@ -65,3 +65,28 @@ DAMAGED: dict[str, tuple[bytes, str, str]] = {
     "zeros": (b"\0" * 64, "", "not a record"),
 }  # fmt: skip
 """By name: a line, the field that is named, and what else is said."""
+
+YAML_TEXTS: dict[str, str] = {
+    "anchors": "[&a [x, x, x, x, x, x, x, x], &b [*a, *a, *a, *a, *a, *a, *a, *a], "
+    "&c [*b, *b, *b, *b, *b, *b, *b, *b], &d [*c, *c, *c, *c, *c, *c, *c, *c], "
+    "&e [*d, *d, *d, *d, *d, *d, *d, *d], &f [*e, *e, *e, *e, *e, *e, *e, *e], "
+    "&g [*f, *f, *f, *f, *f, *f, *f, *f], [*g, *g, *g, *g, *g, *g, *g, *g]]",
+    "anchor-of-itself": "&a [*a]",
+    "deep": "[" * 9999 + "]" * 9999,
+    "date": "2026-01-01",
+    "date-as-key": "{2026-01-01: 1}",
+    "binary": "!!binary aGVsbG8=",
+    "set": "!!set {a, b}",
+    "pairs": "!!pairs [a: 1]",
+    "python": "!!python/object/apply:os.getcwd []",
+    "hex": "0x" + "f" * 6000,
+    "digits": "9" * 6000,
+    "sexagesimal": "1" + ":59" * 6000,
+    "no-number": "!!int x",
+    "no-truth": "!!bool x",
+    "list-as-key": "{[1]: 2}",
+    "null-as-key": "{null: 2}",
+    "merge": "{<<: {a: 1}}",
+    "half-character": '"\\ud800"',
+}
+"""YAML that `phyblock run` never writes, by what is bad about it."""

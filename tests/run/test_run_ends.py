@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 from aiohttp import web
-from phyblock.tasks.full_planning import FullPlanning
 
 from phyblock.records import Line, Record
 from phyblock.run.appending import AppendFile
@@ -19,6 +18,7 @@ from phyblock.run.plan import make_plan
 from phyblock.run.session import Session
 from phyblock.run.writer import RecordWriter
 from phyblock.specs import load_models, load_suite
+from phyblock.tracks.full_planning.track import FullPlanning
 from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace

@@ -18,7 +18,10 @@ from phyblock.models import Image, Message
 from phyblock.records import PromptLines, TurnLines
 from phyblock.records.reading import collect_turns
 from phyblock.run.appending import AppendFile
+from phyblock.run.plan import make_plan
 from phyblock.run.prompts import PromptFile, read_prompts
+from phyblock.run.store import RunStore
+from phyblock.specs import load_suite
 from tests.workspace import Workspace
 
 REPLY = {
@@ -69,6 +72,30 @@ def test_a_disk_that_fails_at_any_call_leaves_what_was_written(
     file.append([{"a": 3}])
     file.close()
     assert (tmp_path / "lines.jsonl").read_text() == '{"a":1}\n{"a":3}\n'
+
+
+def test_a_run_is_on_disk_with_its_name_before_anything_is_asked(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace.write_suite(models=["oracle"])
+    plan = make_plan(load_suite(workspace.root / "suite.yaml", data_dir=workspace.root), {})
+    synced: list[tuple[str, set[str]]] = []
+    fsync = os.fsync
+
+    def notes(number: int) -> None:
+        names = {path.name for path in workspace.out.iterdir()}
+        synced.append((os.readlink(f"/proc/self/fd/{number}"), names))
+        fsync(number)
+
+    monkeypatch.setattr(os, "fsync", notes)
+    with RunStore(workspace.out, plan.manifest, plan.sample_ids()) as store:
+        (manifest, _), (folder, there) = synced
+        assert manifest.endswith(".part")
+        assert folder == str(workspace.out)
+        assert "run.yaml" in there
+        store.records.append([{"a": 1}])
+        store.records.append([{"a": 2}])
+    assert [path for path, _ in synced[2:]] == [folder] + [f"{folder}/records.jsonl"] * 2
 
 
 def turn_lines(folder: Path, *numbers: int) -> None:

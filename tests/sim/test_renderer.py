@@ -5,12 +5,13 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from phyblock.errors import InputError
+from phyblock.errors import InputError, SimulationError
 from phyblock.sim import PictureStyle, goal_key, goal_png
 from phyblock.sim.bullet.egl import draw_with_egl, succeeds_in_child
 from phyblock.sim.registry import renderer
@@ -62,6 +63,37 @@ def test_tinyrenderer_is_the_default_and_words_are_checked(monkeypatch) -> None:
     assert renderer().name == "tinyrenderer"
     monkeypatch.setenv("PHYBLOCK_RENDERER", "vulkan")
     with pytest.raises(InputError, match="tinyrenderer, egl, auto"):
+        renderer()
+
+
+def refuses() -> None:
+    raise SimulationError("no such device")
+
+
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [
+        ("json:loads", "cannot be made: TypeError: loads"),
+        ("json:nothing", "cannot be imported: AttributeError"),
+        ("nowhere_at_all:make", "cannot be imported: ModuleNotFoundError"),
+        ("fails:make", "cannot be imported: ZeroDivisionError"),
+        ("json:__name__", "names nothing that can be called"),
+        ("json:JSONEncoder", "names no renderer"),
+    ],
+)
+def test_what_makes_no_renderer_is_refused_in_words(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, word: str, said: str
+) -> None:
+    (tmp_path / "fails.py").write_text("1 / 0", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PHYBLOCK_RENDERER", word)
+    with pytest.raises(InputError, match=said):
+        renderer()
+
+
+def test_what_a_renderer_says_of_itself_is_passed_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PHYBLOCK_RENDERER", f"{__name__}:refuses")
+    with pytest.raises(SimulationError, match="no such device"):
         renderer()
 
 

@@ -1,0 +1,62 @@
+"""`run.yaml` is read within bounds, and said to be wrong in words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.bounded_yaml import YamlBounds, load_yaml
+from phyblock.errors import StoreError
+from phyblock.records import MANIFEST, read_manifest
+from phyblock.records.decode import problem_of
+from tests.records.damage import YAML_TEXTS
+
+plain = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
+    lambda below: (
+        st.lists(below, max_size=4) | st.dictionaries(st.text() | st.integers(), below, max_size=4)
+    ),
+    max_leaves=20,
+)
+
+
+@given(plain)
+def test_what_was_written_is_read_as_pyyaml_reads_it(data: object) -> None:
+    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100)
+    assert load_yaml(text, YamlBounds(values=10_000, depth=64)) == yaml.safe_load(text)
+
+
+def test_lists_that_stand_twice_are_read() -> None:
+    shared = [1, 2]
+    text = yaml.safe_dump({"a": shared, "b": shared})
+    assert "&id" in text
+    assert load_yaml(text, YamlBounds(values=10, depth=3)) == {"a": [1, 2], "b": [1, 2]}
+
+
+@pytest.mark.parametrize("name", YAML_TEXTS)
+@pytest.mark.parametrize("field", ["mine", "limit", "scenes", "suite", "scenes_by_level"])
+def test_what_no_run_writes_is_refused_in_words(tmp_path: Path, name: str, field: str) -> None:
+    (tmp_path / MANIFEST).write_text(f"identity: x\n{field}: {YAML_TEXTS[name]}\n")
+    with pytest.raises(StoreError, match=r"run\.yaml"):
+        read_manifest(tmp_path)
+
+
+def test_an_unknown_field_may_hold_any_plain_data(tmp_path: Path) -> None:
+    (tmp_path / MANIFEST).write_text("identity: x\nmine: {a: [1, 2.5, on, ~, 'x: y']}\n")
+    assert read_manifest(tmp_path).fields()["mine"] == {"a": [1, 2.5, True, None, "x: y"]}
+
+
+@pytest.mark.parametrize(
+    "value",
+    [10**6000, {object(): 1}, {(1, 2): 3}, b"x", "\ud800", {"a": {1, 2}}, "x" * 10**6],
+    ids=lambda value: type(value).__name__,
+)
+def test_any_value_can_be_shown(value: object) -> None:
+    error = {"loc": ("a",), "type": "int_type", "msg": "Input should be", "input": value}
+    problem = problem_of(error, "x", "is no line", "")
+    assert len(problem.found) <= 60
+    str(problem).encode()
