@@ -60,6 +60,9 @@ def main() -> None:
     try:
         code = phyblock.main(prog_name="phyblock", standalone_mode=False)
         sys.stdout.flush()
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        sys.exit(0)
     except click.ClickException as error:
         error.show()
         sys.exit(2)

@@ -19,7 +19,7 @@ from phyblock.run.session import Session
 from phyblock.run.writer import RecordWriter
 from phyblock.specs import load_models, load_suite
 from phyblock.tracks.full_planning.track import FullPlanning
-from tests.servers.chassis import Faults, Running, Seen
+from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
 
@@ -27,11 +27,19 @@ AT_ONCE = 4
 
 
 class FirstAtOnce(OpenAIChat):
-    """Answers the first request at once, and the others when that is long done."""
+    """Answers the first request when all are there, and the others when that is long done."""
 
-    def read(self, body: dict[str, Any], request: web.Request) -> Seen:
-        self.faults = Faults(latency_s=1.0 if self.requests else 0.0)
-        return super().read(body, request)
+    async def handle(self, request: web.Request) -> web.StreamResponse:
+        is_first = self.most_at_once == 0
+        self.faults = Faults(latency_s=0.0 if is_first else 1.0)
+        if is_first:
+            self.most_at_once = 1
+            while self.at_once < AT_ONCE - 1:
+                await asyncio.sleep(0.01)
+            # The others have read by then how long they are to wait.
+            await asyncio.sleep(0.2)
+            self.faults = Faults()
+        return await super().handle(request)
 
 
 def session(workspace: Workspace, watch: Callable[[RunEvent], None], model: str) -> Session:
