@@ -108,7 +108,7 @@ class Breaker:
     def raise_if_ended(self) -> None:
         """Raise UnavailableError when the outage has lasted so long that nothing more is sent."""
         if self._is_open and self._end is not None:
-            raise UnavailableError(self._end)
+            raise UnavailableError(self._end, sent="no")
 
     def _is_new_outage(self) -> bool:
         return (

@@ -158,12 +158,14 @@ def api_key(config: ModelConfig) -> str | None:
     """
     status = api_key_status(config)
     if status.fault:
-        raise UnavailableError(f"the API key of {config.name} cannot be sent: {status.fault}")
+        why = f"the API key of {config.name} cannot be sent: {status.fault}"
+        raise UnavailableError(why, sent="no")
     if (found := _found(status.variables)) is not None:
         return found[1]
     if status.is_needed:
         names = " or ".join(status.variables)
-        raise UnavailableError(f"no API key for {config.name}: set {names} in the environment")
+        why = f"no API key for {config.name}: set {names} in the environment"
+        raise UnavailableError(why, sent="no")
     return None if config.provider in _OWN_CREDENTIALS else _PLACEHOLDER
 
 

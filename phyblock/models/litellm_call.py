@@ -51,7 +51,8 @@ class LitellmTransport(GuardedTransport):
 
     async def _ask(self, call: Call) -> Reply:
         if self._config.provider in _OWN_CLIENTS:
-            raise UnavailableError(f"{self._config.provider} is not supported: use openai/...")
+            why = f"{self._config.provider} is not supported: use openai/..."
+            raise UnavailableError(why, sent="no")
         litellm = _litellm()
         from phyblock.models.litellm_wire import CURRENT, Exchange
 
