@@ -145,9 +145,14 @@ def _plain(response: Any) -> Mapping[str, object]:
     """The parts of litellm's response that a reply is made of."""
     return {
         "choices": [
-            {"finish_reason": choice.finish_reason, "message": choice.message.model_dump()}
+            {
+                "finish_reason": choice.finish_reason,
+                "message": choice.message.model_dump(warnings=False),
+            }
             for choice in response.choices
         ],
-        "usage": response.usage.model_dump() if getattr(response, "usage", None) else None,
+        "usage": response.usage.model_dump(warnings=False)
+        if getattr(response, "usage", None)
+        else None,
         "model": response.model,
     }

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from dataclasses import replace
 
 import pytest
 
 from phyblock.errors import DataError, ModelError, Problem, RetryableError, UnavailableError
 from phyblock.models import ModelConfig, Reply, RetryPolicy
+from phyblock.models.http_client import Answer
 from phyblock.models.litellm_call import _litellm
+from phyblock.models.refusals import read_body
 from phyblock.models.transport import Call, GuardedTransport, SeedRefusedError
 from tests.models.factory import ask, make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
@@ -162,3 +165,11 @@ def test_nothing_is_sent_outside_of_a_call_and_nothing_twice() -> None:
     with Running(server) as running:
         run(main)
     assert server.requests == 1
+
+
+@pytest.mark.parametrize("code", [429, "429"])
+def test_a_limit_that_is_told_with_a_success_slows_down_as_any_other(code: object) -> None:
+    body = json.dumps({"error": {"message": "slow down", "code": code}}).encode()
+    with pytest.raises(RetryableError, match="slow down") as told:
+        read_body(Answer(200, {"Retry-After": "7"}, body))
+    assert (told.value.status, told.value.retry_after_s) == (429, 7)
