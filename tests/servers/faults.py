@@ -248,7 +248,7 @@ _ERRORS_IN_200: Mapping[str, tuple[Any, Ending]] = {
     "200-quota": (_error(_QUOTA, "insufficient_quota"), "unavailable"),
     "200-code-401": (_error("No auth credentials found", "401"), "unavailable"),
     "200-code-401-number": (_error("No auth credentials found", 401), "unavailable"),
-    "200-code-429": (_error("Slow down", 429), "retryable"),
+    "200-code-429": (_error("Upstream is down", 429), "retryable"),
     "200-code-500": (_error("Upstream is down", 500), "retryable"),
     "200-code-object": (_error("Upstream is down", {"status": 401}), "retryable"),
     "200-code-huge": (_error("Upstream is down", 10**30), "retryable"),
