@@ -1,6 +1,6 @@
 """One folder a track: what it asks, how replies are read and scored, its baselines and measures.
 
-`phyblock.registry` lists the tracks; nothing outside this package names one.
+`phyblock.registry` lists the tracks. Outside this package only verbs that belong to one name it.
 """
 
 from phyblock.tracks.base import (

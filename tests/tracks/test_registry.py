@@ -55,6 +55,14 @@ def test_two_measures_or_counts_of_one_name_are_refused(
         track_measures("full_planning")
 
 
+@pytest.mark.parametrize("track", sorted(registry.known_tracks()))
+def test_a_track_counts_all_that_its_own_measures_need(track: str) -> None:
+    """A measure in the report whose counts the kind does not name would never be counted."""
+    kind = kind_of(track)
+    needed = {one.counted for one in kind.report().measures if one.counted.sample is not None}
+    assert needed == set(kind.counted)
+
+
 @pytest.mark.usefixtures("half")
 def test_samples_that_lack_counts_are_told_and_those_not_counted_are_not(tmp_path: Path) -> None:
     records = [record(scene="001") | {"counts": {"sampled": [1, 2]}}]
