@@ -131,7 +131,10 @@ class _Builder:
         loader: Any = self._loader
         try:
             if kind == "str":
-                return node.value.encode("utf-16", "surrogatepass").decode("utf-16")
+                # Pairs are JSON's escapes and are joined; lone ones are bytes of a path.
+                return node.value.encode("utf-16", "surrogatepass").decode(
+                    "utf-16", "surrogatepass"
+                )
             if kind in ("int", "float") and len(node.value) > LONGEST_INTEGER:
                 raise ValueError
             if kind == "int":

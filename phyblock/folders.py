@@ -27,6 +27,7 @@ LIST = ".generated"
 _HEAD = "# What phyblock wrote here and may write again; all else is never touched."
 _LINK = "cannot be written: it is a link, and links are never followed or replaced"
 _HINT = "move it away; phyblock writes over nothing that it did not make"
+_ELSEWHERE = "choose another folder with --out"
 _CLOSED = "cannot be written in"
 _OUTSIDE = "cannot be written: its name leads out of the folder"
 
@@ -47,7 +48,7 @@ class OutFolder:
 
     def begin(self) -> None:
         """Make the folder and its list, unless they are there."""
-        make_folder(self.path, _HINT)
+        make_folder(self.path, _ELSEWHERE)
         with writing(self.path / LIST):
             self._append([])
 
@@ -81,7 +82,7 @@ class OutFolder:
         """List `names` as ours and make their folders; raises as `check`."""
         names = list(names)
         self.check(names)
-        make_folder(self.path, _HINT)
+        make_folder(self.path, _ELSEWHERE)
         with writing(self.path / LIST):
             self._append(names)
         for folder in _folders(names):

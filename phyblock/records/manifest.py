@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated, Any
 
 import yaml
-from pydantic import Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 
 from phyblock.bounded import read_text
 from phyblock.bounded_yaml import TooMuchError, YamlBounds, load_yaml
 from phyblock.errors import Problem, StoreError
 from phyblock.records.decode import problem_of
-from phyblock.records.line import Line
+from phyblock.records.line import Line, encodable
 
 __all__ = [
     "FORMAT",
@@ -34,12 +35,25 @@ _BOUNDS = YamlBounds(values=100_000, depth=64)
 """Far above what a suite of the largest allowed size comes to."""
 
 
+def _encodable(suite: dict[str, Any]) -> dict[str, Any]:
+    """A suite, which came from a UTF-8 file; what was edited since could be drawn nowhere."""
+    try:
+        json.dumps(suite, ensure_ascii=False).encode()
+    except UnicodeEncodeError:
+        raise ValueError("no half of a character (a lone surrogate)") from None
+    return suite
+
+
+Text = Annotated[str, AfterValidator(encodable)]
+"""Any text but a path, which may be of bytes that are not UTF-8."""
+
+
 class ManifestModel(Line):
     """A model of the run; what decides its replies stands beside it."""
 
-    name: str
+    name: Text
     """Its name in the run."""
-    published: str | None = None
+    published: Text | None = None
     """What the paper calls it."""
     size_b: float | None = None
     """Its size [billion parameters]."""
@@ -48,7 +62,7 @@ class ManifestModel(Line):
 class ManifestDataset(Line):
     """The data set."""
 
-    name: str
+    name: Text
     """Its name."""
     sha256: str
     """Digest of the scenes that were asked about."""
@@ -76,7 +90,7 @@ class Manifest(Line):
     """When it was begun, UTC."""
     format: Annotated[int, Field(ge=1, le=FORMAT)] = FORMAT
     """Version of the run folder."""
-    suite: dict[str, Any] = Field(default_factory=dict)
+    suite: Annotated[dict[str, Any], AfterValidator(_encodable)] = Field(default_factory=dict)
     """The suite with everything that it left out."""
     models: tuple[ManifestModel, ...] = ()
     """The models as they are called."""

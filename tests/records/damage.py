@@ -87,6 +87,5 @@ YAML_TEXTS: dict[str, str] = {
     "list-as-key": "{[1]: 2}",
     "null-as-key": "{null: 2}",
     "merge": "{<<: {a: 1}}",
-    "half-character": '"\\ud800"',
 }
 """YAML that `phyblock run` never writes, by what is bad about it."""

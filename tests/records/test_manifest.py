@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -15,8 +16,10 @@ from phyblock.records import MANIFEST, read_manifest
 from phyblock.records.decode import problem_of
 from tests.records.damage import YAML_TEXTS
 
+# A path that is not UTF-8 is text with halves of characters.
+texts = st.text() | st.binary().map(os.fsdecode)
 plain = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | texts,
     lambda below: (
         st.lists(below, max_size=4) | st.dictionaries(st.text() | st.integers(), below, max_size=4)
     ),
@@ -43,6 +46,25 @@ def test_what_no_run_writes_is_refused_in_words(tmp_path: Path, name: str, field
     (tmp_path / MANIFEST).write_text(f"identity: x\n{field}: {YAML_TEXTS[name]}\n")
     with pytest.raises(StoreError, match=r"run\.yaml"):
         read_manifest(tmp_path)
+
+
+HALF = '"x\\ud800"'
+
+
+@pytest.mark.parametrize("suite", [f"{{name: {HALF}}}", f"{{levels: [{{{HALF}: 1}}]}}"])
+def test_a_suite_holds_no_half_of_a_character(tmp_path: Path, suite: str) -> None:
+    (tmp_path / MANIFEST).write_text(f"identity: x\nsuite: {suite}\n")
+    with pytest.raises(StoreError, match=r"run\.yaml: suite: (.|\n)*half of a char"):
+        read_manifest(tmp_path)
+
+
+def test_a_folder_of_any_bytes_is_kept_and_names_can_be_shown(tmp_path: Path) -> None:
+    data = f"{{name: {HALF}, sha256: x, root: {HALF}}}"
+    (tmp_path / MANIFEST).write_text(f"identity: x\ndataset: {data}\nmodels: [{{name: {HALF}}}]\n")
+    manifest = read_manifest(tmp_path)
+    assert manifest.dataset is not None
+    assert manifest.dataset.root == "x\ud800"
+    assert [manifest.dataset.name, manifest.models[0].name] == ["x?", "x?"]
 
 
 def test_an_unknown_field_may_hold_any_plain_data(tmp_path: Path) -> None:
