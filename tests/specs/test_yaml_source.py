@@ -47,9 +47,11 @@ SCALARS = {
 
 TEXT = st.text(st.characters(exclude_characters="\x7f", exclude_categories=["Cs"]))
 NUMBERS = st.integers() | st.floats(allow_nan=False, allow_infinity=False)
+# A key that YAML can tell has 1,024 characters at most, and an escape may take 12.
+KEYS = TEXT.filter(lambda text: len(text) <= 80)
 JSON_VALUES = st.recursive(
     st.none() | st.booleans() | NUMBERS | TEXT,
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXT, inner, max_size=3),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=3),
     max_leaves=8,
 )
 
