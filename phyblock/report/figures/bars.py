@@ -15,13 +15,19 @@ from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.kind import kind_of
 
 if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from phyblock.tables.track_report import Shown
 
 __all__ = ["main_measure", "measure_bars"]
 
 _ROW_IN = 0.24
 _MOST_PANELS = 6
 _ROOM = 1.18
+_NONE = (np.nan, np.nan, np.nan)
 
 
 def main_measure(track: str) -> Measure:
@@ -34,61 +40,63 @@ def measure_bars(run: Run, *, track: str) -> Figure | None:
 
     Models are ranked by the last cell. Cells that are parts of a mean are left out.
     """
-    measure, report = main_measure(track), kind_of(track).report()
+    measure = main_measure(track)
     columns = [c for c in headline_columns(run, track) if c.measure == measure.name]
     columns = columns[-_MOST_PANELS:]
     found = headline_rows(track_estimates(run, track), run.design)
     found = found[found["measure"] == measure.name]
-    values = {
-        (row[CELL], row["criterion"] if column.criterion else "", row["model"]): row
-        for column in columns
-        for row in found[found[CELL] == column.cell].to_dict("records")
-        if column.criterion in ("", row["criterion"])
-    }
-
-    def numbers(cell: str, criterion: str, model: str) -> tuple[float, float, float]:
-        row = values.get((cell, criterion, model))
-        if row is None:
-            return (np.nan, np.nan, np.nan)
-        value, lo, hi = (measure.scale * float(row[name]) for name in ("value", "lo", "hi"))
-        return value, lo, hi
-
-    last = columns[-1]
-    ranking = {m: numbers(last.cell, last.criterion, m)[0] for m in run.design.model_names}
+    drawn = [_values(found, column, measure) for column in columns]
     sign = -1 if measure.better == "higher" else 1
-    models = sorted(
-        (m for m in ranking if not np.isnan(ranking[m])), key=lambda m: (sign * ranking[m], m)
-    )
+    last = drawn[-1]
+    measured = (name for name in run.design.model_names if not np.isnan(last.get(name, _NONE)[0]))
+    models = sorted(measured, key=lambda name: (sign * last[name][0], name))
     if not models:
         return None
     figure = new_figure(1.05 + _ROW_IN * len(models))
     axes = figure.subplots(1, len(columns), sharey=True, squeeze=False)[0]
-    places = np.arange(len(models))
-    shown = {c: np.array([numbers(c.cell, c.criterion, m) for m in models]) for c in columns}
-    longest = 100.0 if measure.unit == "%" else np.nanmax([np.nanmax(v) for v in shown.values()])
-    for ax, column in zip(axes, columns, strict=True):
-        value, lo, hi = shown[column].T
-        color = INK if column is last else ACCENT
-        ax.barh(places, np.nan_to_num(value), height=0.62, color=color, alpha=0.85, linewidth=0)
-        sure = ~np.isnan(value) & ~np.isnan(lo)
-        for line, width in (("white", 2.8), (MUTED, 1.1)):
-            ax.hlines(places[sure], lo[sure], hi[sure], color=line, linewidth=width)
-        for place in np.flatnonzero(~np.isnan(value)):
-            end = np.nanmax([value[place], hi[place]]) + 0.02 * longest
-            ax.text(end, place, f"{value[place]:.1f}", va="center", fontsize=6.5, color=INK)
-        unit = f" ({measure.unit})" if measure.unit else ""
-        ax.set(title=column.heading, xlim=(0, _ROOM * longest), xlabel=f"{measure.heading}{unit}")
+    shown = [np.array([values.get(name, _NONE) for name in models]) for values in drawn]
+    longest = 100.0 if measure.unit == "%" else np.nanmax([np.nanmax(v) for v in shown])
+    unit = f" ({measure.unit})" if measure.unit else ""
+    for ax, column, values in zip(axes, columns, shown, strict=True):
+        _bars(ax, values, longest, INK if column is columns[-1] else ACCENT)
+        ax.set(title=column.heading, xlabel=f"{measure.heading}{unit}")
         if measure.unit == "%":
             ax.set_xticks([0, 50, 100])
-    axes[0].set_yticks(places, models)
+    axes[0].set_yticks(np.arange(len(models)), models)
     axes[0].set_ylim(len(models) - 0.4, -0.6)
     bare_axes(axes)
-    clusters = int(found["n_clusters"].max())
-    suite = f"Suite {run.design.suite.name}; " if run.design.suite.name else ""
-    how = "".join(note.partition(".")[0] + "; " for note in report.notes(run)[:1])
-    headed(
-        figure,
-        f"{kind_of(track).title}: {measure.heading}",
-        f"{suite}{how}lines: 95 % intervals, {clusters} base scenes resampled",
-    )
+    title = f"{kind_of(track).title}: {measure.heading}"
+    headed(figure, title, _subtitle(run, track, int(found["n_clusters"].max())))
     return figure
+
+
+def _values(rows: pd.DataFrame, column: Shown, measure: Measure) -> dict[str, tuple[float, ...]]:
+    """By model, the value of a cell and the ends of its interval, in the measure's unit."""
+    rows = rows[rows[CELL] == column.cell]
+    if column.criterion:
+        rows = rows[rows["criterion"] == column.criterion]
+    return {
+        row["model"]: tuple(measure.scale * float(row[name]) for name in ("value", "lo", "hi"))
+        for row in rows.to_dict("records")
+    }
+
+
+def _bars(ax: Axes, values: NDArray[np.float64], longest: float, color: str) -> None:
+    """Draw a bar a row of `values` (value, low, high; NaN: not measured), its number behind it."""
+    value, lo, hi = values.T
+    places = np.arange(len(value))
+    ax.barh(places, np.nan_to_num(value), height=0.62, color=color, alpha=0.85, linewidth=0)
+    sure = ~np.isnan(value) & ~np.isnan(lo)
+    for line, width in (("white", 2.8), (MUTED, 1.1)):
+        ax.hlines(places[sure], lo[sure], hi[sure], color=line, linewidth=width)
+    for place in np.flatnonzero(~np.isnan(value)).tolist():
+        end = np.nanmax([value[place], hi[place]]) + 0.02 * longest
+        ax.text(end, place, f"{value[place]:.1f}", va="center", fontsize=6.5, color=INK)
+    ax.set_xlim(0, _ROOM * longest)
+
+
+def _subtitle(run: Run, track: str, clusters: int) -> str:
+    suite = f"Suite {run.design.suite.name}; " if run.design.suite.name else ""
+    notes = kind_of(track).report().notes(run)[:1]
+    how = "".join(note.partition(".")[0] + "; " for note in notes)
+    return f"{suite}{how}lines: 95 % intervals, {clusters} base scenes resampled"
