@@ -9,7 +9,7 @@ import click
 
 from phyblock.cli.console import shown_path
 from phyblock.cli.paths import UserPath
-from phyblock_making.cli.working import jobs_option, ray_option, tracked
+from phyblock_making.cli.working import jobs_option, ray_option, seed_option, tracked
 from phyblock_making.scenes.scene_card import card
 from phyblock_making.scenes.scene_draft import Palette
 from phyblock_making.scenes.scene_files import open_writer
@@ -40,14 +40,7 @@ def _levels(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int
     metavar="N",
     help="How many scenes.",
 )
-@click.option(
-    "--seed",
-    type=click.IntRange(0),
-    default=0,
-    show_default=True,
-    metavar="S",
-    help="Another seed gives other scenes.",
-)
+@seed_option("Another seed gives other scenes.")
 @click.option(
     "--levels",
     default="1,2,3,4",

@@ -15,7 +15,7 @@ from phyblock.errors import SpecError
 from phyblock_making.cli.question_sets import data_option
 from phyblock_making.cli.scene_sets import read_data_set
 from phyblock_making.cli.subtasks_option import subtasks_option
-from phyblock_making.cli.working import jobs_option, ray_option
+from phyblock_making.cli.working import jobs_option, ray_option, seed_option
 from phyblock_making.questions.question_files import check_place, write_questions
 from phyblock_making.questions.question_production import PER_SUBTASK, make_questions
 from phyblock_making.questions.shortcuts import SubtaskAudit, audit_questions
@@ -33,14 +33,7 @@ __all__ = ["command"]
     metavar="N",
     help="Questions of each subtask; by default 150, of ordering and affordance 50.",
 )
-@click.option(
-    "--seed",
-    type=click.IntRange(0),
-    default=0,
-    show_default=True,
-    metavar="S",
-    help="Another seed gives other questions.",
-)
+@seed_option("Another seed gives other questions.")
 @jobs_option
 @ray_option
 @click.option("--out", type=UserPath(), required=True, metavar="DIR", help="Folder to write.")

@@ -14,7 +14,7 @@ from phyblock.domain import Question
 from phyblock.errors import DataError, Problem
 from phyblock_making.cli.question_sets import data_option, find_questions, questions_option
 from phyblock_making.cli.scene_sets import read_data_set
-from phyblock_making.cli.working import jobs_option, tracked
+from phyblock_making.cli.working import jobs_option, seed_option, tracked
 from phyblock_making.questions.question_files import check_place, write_questions
 from phyblock_making.questions.rederiving import verify_questions
 from phyblock_making.questions.rewording import read_wordings, reword
@@ -28,14 +28,7 @@ __all__ = ["command"]
 @questions_option
 @data_option
 @click.option("--add", is_flag=True, help="Keep the questions of the set beside the new ones.")
-@click.option(
-    "--seed",
-    type=click.IntRange(0),
-    default=0,
-    show_default=True,
-    metavar="S",
-    help="Another seed draws other wordings.",
-)
+@seed_option("Another seed draws other wordings.")
 @jobs_option
 @click.option("--out", type=UserPath(), required=True, metavar="DIR", help="Folder to write.")
 @click.option("--replace", is_flag=True, help="Replace questions that are in the folder.")

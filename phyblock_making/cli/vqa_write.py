@@ -22,6 +22,7 @@ from phyblock.specs import SuiteSpec, did_you_mean, load_models
 from phyblock.tracks import TemplatePrompt
 from phyblock_making.cli.question_sets import data_option, questions_option, read_question_set
 from phyblock_making.cli.subtasks_option import subtasks_option
+from phyblock_making.cli.working import seed_option
 from phyblock_making.questions.paraphrases import Paraphrase, stems_of, write_wordings
 
 __all__ = ["command"]
@@ -50,7 +51,7 @@ _AT_ONCE = 8
     metavar="N",
     help="Questions that each paraphrase is checked with.",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S")
+@seed_option("Another seed asks for other wordings.")
 @click.option(
     "--out",
     type=UserPath(dir_okay=False),

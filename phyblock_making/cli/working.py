@@ -1,19 +1,20 @@
-"""What the verbs that work through many scenes share: processes, progress."""
+"""What the verbs that make sets share: processes, seeds, progress."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, TypeVar
 
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from phyblock.cli.console import make_console
 
-__all__ = ["jobs_option", "ray_option", "tracked"]
+__all__ = ["jobs_option", "ray_option", "seed_option", "tracked"]
 
 T = TypeVar("T")
+Command = TypeVar("Command", bound=Callable[..., Any])
 _LINE_EVERY = 25
 
 jobs_option = click.option(
@@ -29,6 +30,13 @@ ray_option = click.option(
     metavar="ADDRESS",
     help="Work on this Ray cluster; local: on one of N workers here.",
 )
+
+
+def seed_option(about: str) -> Callable[[Command], Command]:
+    """The option of a seed; `about` says what another one gives."""
+    return click.option(
+        "--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S", help=about
+    )
 
 
 def tracked(items: Iterable[T], total: int, doing: str, noun: str = "scenes") -> Iterator[T]:
