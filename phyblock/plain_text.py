@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["csv_cell", "one_line", "plain_lines"]
+__all__ = ["csv_cell", "one_line", "plain_lines", "well_formed"]
 
 _HALF = re.compile("[\ud800-\udfff]")
 _FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+
+def well_formed(text: str) -> str:
+    """The text with U+FFFD in the place of lone surrogates, which cannot be written as UTF-8."""
+    return _HALF.sub("\ufffd", text)
 
 
 def one_line(text: str) -> str:
@@ -19,7 +24,7 @@ def one_line(text: str) -> str:
     """
     if text.isprintable():
         return text
-    text = _HALF.sub("\ufffd", text)
+    text = well_formed(text)
     return "".join(c if c.isprintable() else " " for c in text)
 
 

@@ -6,13 +6,13 @@ six shapes of the official outputs and their near relatives.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from phyblock.errors import DataError, Problem
 from phyblock.models.base import Usage
+from phyblock.plain_text import well_formed
 from phyblock.words import Finish
 
 __all__ = [
@@ -21,10 +21,8 @@ __all__ = [
     "read_chat_completion",
     "read_raw_reply",
     "token_count",
-    "well_formed",
 ]
 
-_LONE_SURROGATE = re.compile("[\ud800-\udfff]")
 _MOST_TOKENS = 10**9
 """Counts above this are believed by nobody: a hundred times the longest context that there is."""
 
@@ -67,11 +65,6 @@ class RawReply:
     def __post_init__(self) -> None:
         for name in ("text", "reasoning", "model"):
             object.__setattr__(self, name, well_formed(getattr(self, name)))
-
-
-def well_formed(text: str) -> str:
-    """The text with U+FFFD in the place of lone surrogates, which cannot be written as UTF-8."""
-    return _LONE_SURROGATE.sub("\ufffd", text)
 
 
 def finish_of(word: object) -> Finish:

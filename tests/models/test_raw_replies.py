@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from phyblock.errors import DataError
 from phyblock.models import RawReply, Usage, read_raw_reply
-from phyblock.models.raw_replies import token_count, well_formed
+from phyblock.models.raw_replies import token_count
+from phyblock.plain_text import well_formed
 
 STEPS = "Step1: Move block with index 3"
 
