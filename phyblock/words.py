@@ -15,6 +15,7 @@ __all__ = [
     "PLAN_PARSERS",
     "SETTINGS",
     "Background",
+    "CandidateOrder",
     "Criterion",
     "DataFormat",
     "Finish",
@@ -70,6 +71,8 @@ BACKGROUNDS: tuple[Background, ...] = get_args(Background)
 PictureName = Literal["goal", "candidates"]
 PictureSource = Literal["render", "dataset"]
 PictureLayout = Literal["composite", "separate"]
+CandidateOrder = Literal["file", "shuffled"]
+"""In which order candidates are numbered and shown."""
 
 Role = Literal["system", "user", "assistant"]
 """Who speaks in a chat message."""

@@ -16,7 +16,7 @@ from phyblock.records.reading import newest_starts, run_records
 from phyblock.run.data import open_dataset
 from phyblock.sim import PictureStyle
 from phyblock.sim.film import episode_gif, episode_images, episode_sheet
-from phyblock.tracks.step_planning.film import episode_film, episode_table
+from phyblock.tracks.step_planning.film import as_recorded, episode_film, episode_table
 from phyblock.tracks.step_planning.record import EpisodeRecord
 
 __all__ = ["command"]
@@ -97,4 +97,4 @@ def _task(run: Path, record: EpisodeRecord, data: Path | None) -> AssemblyTask:
     if record.scene not in tasks:
         message = "holds no such scene"
         raise DataError(Problem(str(root), message, "scene", record.scene, hint=hint))
-    return tasks[record.scene]
+    return as_recorded(tasks[record.scene], record)

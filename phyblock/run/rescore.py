@@ -19,7 +19,7 @@ from phyblock.run.data import open_dataset
 from phyblock.run.folder import check_place, run_folder
 from phyblock.run.records import judged
 from phyblock.specs import SuiteSpec, suite_model
-from phyblock.tracks import kinds
+from phyblock.tracks import kinds, shown_item
 from phyblock.tracks.selection import select_tasks
 from phyblock.words import Matcher, PlanParser
 
@@ -49,9 +49,9 @@ def rescore(
     if out is None:
         run_folder(folder).check([f"{name}/"])
     _check_target(target, identity)
-    tasks = _tasks(folder, manifest, suite, data)
+    tasks, pool = _tasks(folder, manifest, suite, data)
     rescored = {kind.name: kind.rescored for kind in kinds().values() if kind.rescored is not None}
-    tracks = {name: rescored[name](suite, tasks) for name in suite.tracks if name in rescored}
+    tracks = {name: rescored[name](suite, tasks, pool) for name in suite.tracks if name in rescored}
     items = {(name, item.key): item for name, track in tracks.items() for item in track.items}
     records: list[Record] = []
     for record in read_records(folder, manifest):
@@ -66,6 +66,7 @@ def rescore(
                 Problem(where, "names a scene that the run has not", "scene", record.scene,
                         hint=hint)
             )  # fmt: skip
+        item = shown_item(track, item, record.seed)
         judgement = track.judge(item, None if record.reply is None else record.reply.text)
         records.append(judged(record.as_given(), item, judgement))
     told = {"identity": identity, "suite": suite.model_dump(mode="json")}
@@ -101,8 +102,8 @@ def _suite(
 
 def _tasks(
     folder: Path, manifest: Manifest, suite: SuiteSpec, data: Path | None
-) -> tuple[AssemblyTask, ...]:
-    """The tasks of the run, known to be those that it was made on."""
+) -> tuple[Sequence[AssemblyTask], Sequence[AssemblyTask]]:
+    """The tasks of the run, known to be those that it was made on, and all of their data set."""
     recorded = manifest.dataset
     if recorded is None:
         raise _broken(folder, "dataset")
@@ -110,14 +111,14 @@ def _tasks(
     root = data or Path(recorded.root)
     if not root.is_dir():
         raise DataError(Problem(str(root), "the data set of the run is not there", hint=hint))
-    dataset = open_dataset(suite.dataset.format, root)
-    dataset = replace(dataset, tasks=select_tasks(dataset.tasks, suite.levels, manifest.limit))
+    whole = open_dataset(suite.dataset.format, root)
+    dataset = replace(whole, tasks=select_tasks(whole.tasks, suite.levels, manifest.limit))
     if dataset.sha256 != recorded.sha256:
         message = "is not the data set that the run was made on, or it was changed since"
         raise DataError(
             Problem(str(root), message, "sha256", dataset.sha256, recorded.sha256, hint)
         )
-    return dataset.tasks
+    return dataset.tasks, whole.tasks
 
 
 def _broken(folder: Path, field: str) -> StoreError:

@@ -20,6 +20,9 @@ from phyblock.tracks.base import AnyTrack, SingleTrack
 __all__ = ["Opening", "TrackKind", "kind_of", "kinds"]
 
 
+Tasks = Sequence[AssemblyTask]
+
+
 @dataclass(frozen=True)
 class Opening:
     """What a track is opened with; without `with_prompts` nothing is asked of anyone.
@@ -45,10 +48,10 @@ class TrackKind:
     that is its own. `template` is the bundled prompt, None where it has none, and `prompt_field`
     where a suite names another. `own_data` gives the folder of data of its own as a suite says it,
     `manifest` what the manifest says beyond what all tracks have. `rescored` makes the track out of
-    a suite and scenes for reading stored replies again; None where `phyblock score` takes its
-    records over as they are. With `plays`, samples are episodes of several turns. `record` is the
-    model of its records, where it adds something to them. `counted` is what its measures count of
-    every sample as it is judged.
+    a suite, the scenes of a run and all of their data set, for reading stored replies again; None
+    where `phyblock score` takes its records over as they are. With `plays`, samples are episodes of
+    several turns. `record` is the model of its records, where it adds something to them. `counted`
+    is what its measures count of every sample as it is judged.
     """
 
     name: str
@@ -67,7 +70,7 @@ class TrackKind:
     own_data: Callable[[SuiteSpec], tuple[str, tuple[str, ...], bool] | None] | None = None
     manifest: Callable[[LoadedSuite], Mapping[str, Any]] | None = None
     plays: bool = False
-    rescored: Callable[[SuiteSpec, Sequence[AssemblyTask]], SingleTrack[Any]] | None = None
+    rescored: Callable[[SuiteSpec, Tasks, Tasks], SingleTrack[Any]] | None = None
     counted: tuple[Counted, ...] = ()
 
     def data_folder(self, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:

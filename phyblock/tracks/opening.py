@@ -6,13 +6,16 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from phyblock.datasets import AssemblyTask
 from phyblock.resources import cache_dir
 from phyblock.sim import PictureStyle
 from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.specs.fields import PictureControls
 from phyblock.tracks.base import AnyTrack
 from phyblock.tracks.kind import Opening, kind_of
 from phyblock.tracks.pictures import PicturePolicy, Pictures
 from phyblock.tracks.prompts import TemplatePrompt
+from phyblock.tracks.showing import Showing, TaskShowing
 
 __all__ = [
     "assembly_pictures",
@@ -20,6 +23,7 @@ __all__ = [
     "picture_folder",
     "picture_style",
     "render_workers",
+    "task_showing",
     "template_prompt",
 ]
 
@@ -49,6 +53,22 @@ def assembly_pictures(suite: SuiteSpec) -> Pictures:
     images = suite.images
     policy = PicturePolicy(images.source, images.layout, images.order, picture_style(suite))
     return Pictures(picture_folder(), policy, render_workers())
+
+
+def task_showing(
+    suite: SuiteSpec,
+    section: type[PictureControls],
+    name: str,
+    tasks: Sequence[AssemblyTask],
+    pool: Sequence[AssemblyTask],
+) -> TaskShowing:
+    """How a suite shows the scenes of a track, whose section is of this type and name.
+
+    Raises SpecError where another goal is wanted and `pool` has none for one of `tasks`.
+    """
+    controls = suite.section(section)
+    how = Showing(suite.candidates.order, controls.blind, controls.wrong_image, suite.seeds)
+    return TaskShowing(how, tasks, pool, f"{name}.wrong_image")
 
 
 def template_prompt(loaded: LoadedSuite, name: str) -> TemplatePrompt:

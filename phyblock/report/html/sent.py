@@ -41,7 +41,9 @@ class PictureShelf:
         self._room = _MOST_COPIED_BYTES
 
     def add_scenes(self, tasks: Iterable[AssemblyTask]) -> None:
-        """Keep goals and candidates; raises OSError where the disk refuses."""
+        """Keep goals and candidates of tasks as they were shown; raises OSError where the disk
+        refuses.
+        """
         images = self._suite["images"]
         order = tuple(images["order"])
         policy = PicturePolicy(images["source"], images["layout"], order, self._style)

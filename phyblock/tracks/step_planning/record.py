@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from phyblock.records import AskedTurn, Line, Record, StoredReply
 from phyblock.records.line import Whole
-from phyblock.tracks.full_planning.record import PLAN_COLUMNS, PlanParse, plan_row
+from phyblock.tracks.full_planning.record import PLAN_COLUMNS, PlanParse, ShownScene, plan_row
 from phyblock.tracks.step_planning.prompt import StepOutcome
 from phyblock.tracks.step_planning.rules import Ending
 
@@ -55,6 +55,8 @@ class EpisodeRecord(Record):
     """`step_planning`."""
     parse: PlanParse | None = None
     """`plan` holds the moves that were attempted."""
+    shown: ShownScene | None = None
+    """How the scene was shown; null: as the file has it."""
     max_steps: Whole = 0
     """The most steps that the episode can take."""
     setting: str = ""
@@ -79,7 +81,7 @@ class EpisodeRecord(Record):
     def row(self) -> Mapping[str, Any]:
         """The moves that were attempted, as a plan, and how the episode went."""
         went = ("ending", "max_steps", "outcomes", "progress")
-        return {**plan_row(self.parse), **{name: getattr(self, name) for name in went}}
+        return {**plan_row(self.parse, self.shown), **{name: getattr(self, name) for name in went}}
 
     exported: ClassVar[Mapping[str, str]] = {"ending": "string"}
 
