@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from phyblock.datasets import Dataset
+from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.records import Manifest
 from phyblock.run.data import open_dataset
+from phyblock.run.floors import floor_values
 from phyblock.run.manifest import make_manifest
 from phyblock.run.models import PlannedModel, plan_models
 from phyblock.run.samples import Sample
@@ -21,13 +22,21 @@ __all__ = ["RunPlan", "make_plan"]
 
 @dataclass(frozen=True)
 class RunPlan:
-    """Everything a run needs; `manifest` is what `run.yaml` holds."""
+    """Everything a run needs; `manifest` is what `run.yaml` holds, but for what floors reach,
+    which learn from `pool`, all scenes of the data set.
+    """
 
     suite: SuiteSpec
     models: tuple[PlannedModel, ...]
     dataset: Dataset
     tracks: tuple[AnyTrack, ...]
     manifest: Manifest
+    pool: tuple[AssemblyTask, ...] = ()
+
+    def begun(self) -> Manifest:
+        """The manifest of a run that begins, with what floors reach; it takes some seconds."""
+        floors = floor_values(self.manifest, self.suite, self.dataset.tasks, self.pool)
+        return self.manifest.model_copy(update={"floors": floors})
 
     @property
     def samples_per_model(self) -> int:
@@ -80,7 +89,7 @@ def make_plan(
     if not any(track.items for track in tracks):
         raise SpecError(_nothing(loaded, dataset, limit))
     manifest = make_manifest(loaded, models, selected, tracks, limit)
-    return RunPlan(suite, models, selected, tracks, manifest)
+    return RunPlan(suite, models, selected, tracks, manifest, dataset.tasks)
 
 
 def _nothing(loaded: LoadedSuite, dataset: Dataset, limit: int | None) -> Problem:

@@ -16,6 +16,7 @@ from phyblock.files import atomic_write, writing
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
 from phyblock.records.reading import read_records
 from phyblock.run.data import open_dataset
+from phyblock.run.floors import floor_values
 from phyblock.run.folder import check_place, run_folder
 from phyblock.run.records import judged
 from phyblock.specs import SuiteSpec, suite_model
@@ -70,7 +71,9 @@ def rescore(
         judgement = track.judge(item, None if record.reply is None else record.reply.text)
         records.append(judged(record.as_given(), item, judgement))
     told = {"identity": identity, "suite": suite.model_dump(mode="json")}
-    _write(target, manifest.model_copy(update=told), records)
+    scored = manifest.model_copy(update=told)
+    floors = floor_values(scored, suite, tasks, pool)
+    _write(target, scored.model_copy(update={"floors": floors}), records)
     return target
 
 

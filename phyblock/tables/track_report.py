@@ -128,7 +128,8 @@ class TrackReport:
     measure. `check_alike` raises SpecError where the first run cannot be compared with the second
     in these cells. `part_names` say what `Record.part` stands for. `items` opens, for the page and
     out of a manifest, what was asked about where that is more than scenes; it raises DataError
-    where that is not what the run was made on.
+    where that is not what the run was made on. `showing` says, in words that end every caption,
+    what is unusual about how items were shown.
     """
 
     measures: tuple[Measure, ...]
@@ -149,3 +150,4 @@ class TrackReport:
     check_alike: Callable[[Run, Run, Sequence[str]], None] | None = None
     part_names: Mapping[str, str] = field(default_factory=dict)
     items: Callable[[Mapping[str, Any], Dataset], PageItems] | None = None
+    showing: Callable[[Run], tuple[str, ...]] = lambda _: ()

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
 from phyblock.tracks.full_planning.goal_blind import goal_blind_plans
-from phyblock.tracks.showing import TaskShowing
+from phyblock.tracks.showing import ShownTask, TaskShowing
 from phyblock.words import Setting
 
 __all__ = ["BlindGuesses"]
@@ -28,15 +28,15 @@ class BlindGuesses:
         self._setting = setting
         self._plans: dict[int, dict[str, Plan]] = {}
 
-    def plan(self, task: AssemblyTask, seed: int) -> Plan:
-        """The plan for a task of the pool, in the numbers that are shown."""
-        order = self._showing.how.order
-        drawn = seed if order == "shuffled" else 0
-        if drawn not in self._plans:
+    def plan(self, task: AssemblyTask) -> Plan:
+        """The plan for a task of the pool as it is shown, in the numbers that are shown."""
+        is_shuffled = self._showing.how.order == "shuffled"
+        seed = task.seed if is_shuffled and isinstance(task, ShownTask) else 0
+        if seed not in self._plans:
             shown = [self._showing.of(one, seed) for one in self._pool]
-            self._plans[drawn] = goal_blind_plans(
+            self._plans[seed] = goal_blind_plans(
                 [one.scene for one in shown],
                 {one.key: one.candidates for one in shown},
                 self._setting,
             )
-        return self._plans[drawn][task.key]
+        return self._plans[seed][task.key]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from phyblock.datasets import AssemblyTask
@@ -44,11 +44,12 @@ class ShownTask(AssemblyTask):
     """A task in another form than the file's.
 
     `candidates` are in the order shown, and `order` holds the number in the file of each of them;
-    `goal` is the task whose goal is shown, None where none is.
+    `goal` is the task whose goal is shown, None where none is; `seed` drew both.
     """
 
     order: tuple[int, ...] = ()
     goal: AssemblyTask | None = None
+    seed: int = 0
 
 
 class TaskShowing:
@@ -80,7 +81,7 @@ class TaskShowing:
         goal = None if self.how.blind else task
         if self._elsewhere is not None and not self.how.blind:
             goal = self._elsewhere.of(task, seed)
-        return in_order(task, numbers, goal)
+        return replace(in_order(task, numbers, goal), seed=seed)
 
     def each(self, tasks: Sequence[AssemblyTask]) -> list[AssemblyTask]:
         """The tasks in every form in which the suite shows them."""

@@ -9,6 +9,7 @@ from typing import Literal
 from phyblock.report.measure_table import headline_columns, headline_of, main_heading
 from phyblock.tables.headline import Value
 from phyblock.tables.load import Run
+from phyblock.tables.showing import captioned
 from phyblock.tables.text_table import NO_VALUE, number
 from phyblock.tracks.kind import kind_of
 
@@ -85,7 +86,7 @@ def _headline(run: Run, track: str) -> Headline:
     below = (_BELOW,) if any(cell.below for row in rows for cell in row.cells) else ()
     about = (report.reference_note,) if report.reference_note else ()
     return Headline(
-        kind.title,
+        captioned(kind.title, report.showing(run)),
         (*headings, *(["Published"] if published else [])),
         tuple(rows),
         (" ".join((*report.notes(run), *about, *mean, *below)),),

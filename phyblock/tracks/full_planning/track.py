@@ -120,13 +120,13 @@ class FullPlanning:
     ) -> Request:
         """The request of one sample; without messages for models that need none."""
         if not with_messages or self._prompt is None or self._pictures is None:
-            return Request(item.key, seed, (), params, "", self._subject(item, seed))
+            return Request(item.key, seed, (), params, "", self._subject(item))
         return self._request(item, seed, params, self._prompt, await self._pictures.of(item))
 
     def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
         """The one request, made without rendering, and whether its pictures are the real ones."""
         if self._prompt is None or self._pictures is None:
-            yield Request(item.key, 0, (), {}, "", self._subject(item, 0)), True
+            yield Request(item.key, 0, (), {}, "", self._subject(item)), True
             return
         pictures, real = self._pictures.outline(item)
         yield self._request(item, 0, {}, self._prompt, pictures), real
@@ -140,11 +140,11 @@ class FullPlanning:
         pictures: tuple[Image, ...],
     ) -> Request:
         messages = prompt.messages(pictures, self.facts(item, pictures))
-        subject = self._subject(item, seed)
+        subject = self._subject(item)
         return Request(item.key, seed, messages, params, prompt.version, subject)
 
-    def _subject(self, item: AssemblyTask, seed: int) -> PlanSubject:
-        guess = partial(self._guesses.plan, item, seed)
+    def _subject(self, item: AssemblyTask) -> PlanSubject:
+        guess = partial(self._guesses.plan, item)
         return PlanSubject(item.scene, item.candidates, guess)
 
     def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:

@@ -102,7 +102,7 @@ class StepPlanning:
         self, item: AssemblyTask, seed: int, params: Mapping[str, object], *, with_messages: bool
     ) -> StepEpisode:
         """An episode that has not begun."""
-        desk = Desk(self._settle, partial(self._guesses.plan, item, seed))
+        desk = Desk(self._settle, partial(self._guesses.plan, item))
         if with_messages and self._sight is not None:
             version = self._sight.prompt.template.version
             desk = replace(desk, write=partial(self._write, self._sight, item), version=version)
@@ -116,7 +116,7 @@ class StepPlanning:
         """
         rules = self.rules
         assembly = Assembly(item.scene, item.candidates, rules.accepts, rules.gating)
-        guess = partial(self._guesses.plan, item, 0)
+        guess = partial(self._guesses.plan, item)
         right = assembly.right_moves()
         subject = StepSubject(item.scene, item.candidates, right, (), guess=guess)
         for step in range(rules.limits.max_steps(len(item.scene))):

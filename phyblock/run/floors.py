@@ -1,0 +1,97 @@
+"""What answers reach that never see the goal: worked out for the scenes of a run, without a call.
+
+A track whose replies can be read again without a model (`rescored`) is answered here by the rules
+of its own baselines. What they reach stands in `run.yaml`, so that tables need nothing but the
+run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from phyblock.datasets import AssemblyTask
+from phyblock.models.base import Reply
+from phyblock.records import MANIFEST, Manifest, Record
+from phyblock.run.records import begun, judged
+from phyblock.specs import SuiteSpec
+from phyblock.tables.design import read_design
+from phyblock.tables.load import Run, frames_of
+from phyblock.tables.measures import WAY, way_name
+from phyblock.tracks import kind_of, shown_item
+from phyblock.tracks.estimates import track_estimates, track_measures
+
+__all__ = ["COMPUTED_FLOORS", "FloorValues", "floor_values"]
+
+COMPUTED_FLOORS = ("goal-blind", "all-candidates")
+"""Those that leave nothing to chance; `random` stays below them."""
+FloorValues = dict[str, dict[str, dict[str, float]]]
+"""Values by track, floor and way of counting (`way_name`)."""
+
+
+def floor_values(
+    manifest: Manifest,
+    suite: SuiteSpec,
+    tasks: Sequence[AssemblyTask],
+    pool: Sequence[AssemblyTask],
+) -> FloorValues:
+    """What the floors of `COMPUTED_FLOORS` reach on `tasks`, for every measure that names them.
+
+    They learn from `pool`, all scenes of the data set.
+    """
+    found: FloorValues = {}
+    for name in suite.tracks:
+        named = {floor for measure in track_measures(name) for floor in measure.floors}
+        floors = [floor for floor in COMPUTED_FLOORS if floor in named]
+        if kind_of(name).rescored is None or not floors:
+            continue
+        found[name] = {floor: {} for floor in floors}
+        for setting in suite.settings:
+            # What is learned depends on the setting that counts.
+            one = suite.model_copy(update={"settings": (setting,)})
+            records = list(_answered(name, floors, one, tasks, pool))
+            for floor, way, value in _estimates(manifest, name, floors, records):
+                found[name][floor][way] = value
+    return found
+
+
+def _answered(
+    track_name: str,
+    floors: Sequence[str],
+    suite: SuiteSpec,
+    tasks: Sequence[AssemblyTask],
+    pool: Sequence[AssemblyTask],
+) -> Iterator[Record]:
+    """The judged answers of floors; one seed tells all unless each shows another order."""
+    kind = kind_of(track_name)
+    assert kind.rescored is not None
+    track = kind.rescored(suite, tasks, pool)
+    seeds = suite.seeds if suite.candidates.order == "shuffled" else suite.seeds[:1]
+    for item in track.items:
+        for seed in seeds:
+            shown = shown_item(track, item, seed)
+            ((request, _),) = track.outlines(shown)
+            for floor in floors:
+                text = kind.baselines[floor](request.subject, np.random.default_rng(seed))
+                sample = f"{track_name}/{floor}/{item.key}/s{seed}"
+                fields = begun(sample, track_name, floor, shown, seed, Reply(text, cost_usd=0.0))
+                yield judged({**fields, **track.about(shown)}, shown, track.judge(shown, text))
+
+
+def _estimates(
+    manifest: Manifest, track: str, floors: Sequence[str], records: Sequence[Record]
+) -> Iterator[tuple[str, str, float]]:
+    """Floor, way of counting and value, of measures that name floors."""
+    facts = {**manifest.fields(), "models": [{"name": floor} for floor in floors]}
+    design = read_design(facts)
+    run = Run(Path(MANIFEST), facts, design, *frames_of(records, design, texts=False))
+    measures = [measure.name for measure in track_measures(track) if measure.floors]
+    rows = track_estimates(run, track)
+    columns = ["model", *WAY, "value"]
+    for row in rows.loc[rows["measure"].isin(measures), columns].to_dict("records"):
+        if not math.isnan(row["value"]):
+            way = way_name({str(name): part for name, part in row.items()})
+            yield str(row["model"]), way, float(row["value"])
