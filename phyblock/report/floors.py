@@ -7,9 +7,8 @@ guessing; the strongest is the one to hold models against.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import pandas as pd
 
@@ -21,7 +20,14 @@ from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
 from phyblock.tracks.estimates import track_estimates, track_measures
 from phyblock.tracks.kind import kind_of
 
-__all__ = ["Floor", "floor_lines", "floors_frame", "floors_view", "strongest_floors"]
+__all__ = [
+    "Floor",
+    "floor_lines",
+    "floors_frame",
+    "floors_view",
+    "headline_floors",
+    "strongest_floors",
+]
 
 CHANCE = "chance"
 """Name of the floor that is uniform guessing."""
@@ -39,11 +45,11 @@ class Floor:
     name: str
     value: float
 
-    def is_below(self, lo: float, hi: float, measure: Measure) -> bool | None:
+    def is_below(self, lo: float, hi: float, better: str = "higher") -> bool | None:
         """Whether an interval lies wholly on the better side; None where there is none."""
         if math.isnan(lo) or math.isnan(hi):
             return None
-        return lo > self.value if measure.better == "higher" else hi < self.value
+        return lo > self.value if better == "higher" else hi < self.value
 
 
 def floors_frame(run: Run) -> pd.DataFrame:
@@ -64,9 +70,10 @@ def floors_frame(run: Run) -> pd.DataFrame:
                 floor = floors.get(way_name(row))
                 if floor is None or row["model"] in named:
                     continue
-                verdict = _VERDICTS[floor.is_below(row["lo"], row["hi"], measure)]
+                verdict = _VERDICTS[floor.is_below(row["lo"], row["hi"], measure.better)]
                 about = {"track": track, "floor": floor.name, "floor_value": floor.value}
-                rows.append({**row, **about, "verdict": verdict})
+                numbers = {str(name): value for name, value in row.items()}
+                rows.append({**numbers, **about, "verdict": verdict})
     return pd.DataFrame(rows, columns=list(_COLUMNS))
 
 
@@ -79,6 +86,24 @@ def strongest_floors(run: Run, track: str, measure: Measure) -> dict[str, Floor]
         if other is None or is_higher == (measure.better == "higher"):
             best[way] = floor
     return best
+
+
+def headline_floors(run: Run, track: str) -> dict[str, Floor]:
+    """The strongest floor of the columns of a track's headline that have one, by heading.
+
+    Values are as shown, in percent.
+    """
+    rows = headline_rows(track_estimates(run, track), run.design)
+    found: dict[str, Floor] = {}
+    for column in headline_columns(run, track):
+        mine = rows[(rows["measure"] == column.measure) & (rows[CELL] == column.cell)]
+        mine = mine[(mine["criterion"] == column.criterion) | (not column.criterion)]
+        if len(mine):
+            (measure,) = (m for m in track_measures(track) if m.name == column.measure)
+            floor = strongest_floors(run, track, measure).get(way_name(mine.iloc[0].to_dict()))
+            if floor is not None:
+                found[column.heading] = Floor(floor.name, measure.scale * floor.value)
+    return found
 
 
 def _known_floors(run: Run, track: str, measure: Measure) -> Iterator[tuple[str, Floor]]:
@@ -148,7 +173,7 @@ def _row(
 
 
 def floor_lines(table: pd.DataFrame, run: Run) -> Sequence[str]:
-    """For the terminal: the strongest floor of each track's main number, and who is not above it."""
+    """For the terminal: the strongest floor of each track's main number, and who is not above."""
     lines = ["Floors: what is reached without seeing the goal"]
     for track in run.design.suite.tracks:
         heading = main_heading(run, track)
@@ -163,7 +188,7 @@ def floor_lines(table: pd.DataFrame, run: Run) -> Sequence[str]:
 
 
 def _told(rows: pd.DataFrame, measure: Measure) -> str:
-    first: Mapping[Any, Any] = rows.iloc[0]
+    first = rows.iloc[0]
     floor = f"{first['floor']} {number(measure.scale * first['floor_value'])}"
     below = rows.loc[rows["verdict"] == "not above", "model"].tolist()
     return f"{floor}; " + (f"not above it: {', '.join(below)}" if below else "all are above it")

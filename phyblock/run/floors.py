@@ -93,5 +93,4 @@ def _estimates(
     columns = ["model", *WAY, "value"]
     for row in rows.loc[rows["measure"].isin(measures), columns].to_dict("records"):
         if not math.isnan(row["value"]):
-            way = way_name({str(name): part for name, part in row.items()})
-            yield str(row["model"]), way, float(row["value"])
+            yield str(row["model"]), way_name(row), float(row["value"])

@@ -92,6 +92,6 @@ class Measure:
         return 100.0 if self.unit == "%" else 1.0
 
 
-def way_name(row: Mapping[str, Any]) -> str:
+def way_name(row: Mapping[Any, Any]) -> str:
     """What a value is of, as a key: `f1/overall/A/optimal/aov`."""
     return "/".join(str(row[name]) for name in WAY)

@@ -15,7 +15,7 @@ from phyblock.models.base import Image, Request
 from phyblock.parsing import ParsedPlan, parse_plan
 from phyblock.scoring import AssemblyScorer, Score
 from phyblock.tracks.full_planning.baselines import PlanSubject
-from phyblock.tracks.guessing import BlindGuesses
+from phyblock.tracks.full_planning.guessing import BlindGuesses
 from phyblock.tracks.pictures import Pictures
 from phyblock.tracks.prompts import Prompt
 from phyblock.tracks.showing import Showing, TaskShowing, file_plan, told_of

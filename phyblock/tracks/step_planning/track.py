@@ -23,7 +23,7 @@ from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.sim.registry import DEFAULT_ENGINE, physics_engine
 from phyblock.sim.site import ONE_SETTING, Settled, settle, state_picture
 from phyblock.sim.stability import DEFAULT_TRIAL
-from phyblock.tracks.guessing import BlindGuesses
+from phyblock.tracks.full_planning.guessing import BlindGuesses
 from phyblock.tracks.pictures import Pictures
 from phyblock.tracks.showing import Showing, TaskShowing, told_of
 from phyblock.tracks.step_planning.baselines import StepSubject
