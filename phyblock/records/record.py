@@ -23,6 +23,7 @@ __all__ = [
     "Score",
     "SentImage",
     "SentPrompt",
+    "ShownScene",
     "StoredError",
     "StoredReply",
     "StoredUsage",
@@ -297,6 +298,15 @@ class Record(Line):
         return 0.0 if self.error is None else self.error.billed_usd or 0.0
 
 
+class ShownScene(Line):
+    """How a scene was shown, where that was not as the file has it."""
+
+    order: tuple[Whole, ...]
+    """The number in the file of each candidate, in the order shown."""
+    goal: str | None
+    """The scene whose goal was shown; null: none was."""
+
+
 class Recorded(Line):
     """What a recording needs of a record: whose reply it is, and to what."""
 
@@ -310,3 +320,5 @@ class Recorded(Line):
     """The reply."""
     error: StoredError | None = None
     """The error."""
+    shown: ShownScene | None = None
+    """How the item was shown."""

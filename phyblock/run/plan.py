@@ -11,11 +11,12 @@ from phyblock.records import Manifest
 from phyblock.run.data import open_dataset
 from phyblock.run.floors import floor_values
 from phyblock.run.manifest import make_manifest
-from phyblock.run.models import PlannedModel, plan_models
+from phyblock.run.models import PlannedModel, plan_models, recorded_order
 from phyblock.run.samples import Sample
 from phyblock.specs import LoadedSuite, ModelSpec, SuiteSpec
 from phyblock.tracks import AnyTrack, EpisodeTrack, Opening, kind_of, open_tracks
 from phyblock.tracks.selection import select_tasks
+from phyblock.words import CandidateOrder
 
 __all__ = ["RunPlan", "make_plan"]
 
@@ -83,7 +84,7 @@ def make_plan(
     models = plan_models(loaded, known, only)
     asks = any(model.config.kind != "replay" for model in models)
     tracks = open_tracks(Opening(loaded, dataset, limit, asks), suite.tracks)
-    _check_models(models, tracks)
+    _check_models(models, tracks, suite.candidates.order)
     tasks = select_tasks(dataset.tasks, suite.levels, limit)
     selected = replace(dataset, tasks=tasks)
     if not any(track.items for track in tracks):
@@ -99,8 +100,10 @@ def _nothing(loaded: LoadedSuite, dataset: Dataset, limit: int | None) -> Proble
     return Problem(str(loaded.path), "the suite has no samples", "", found, allowed)
 
 
-def _check_models(models: Sequence[PlannedModel], tracks: Sequence[AnyTrack]) -> None:
-    """Every model can answer what every track asks."""
+def _check_models(
+    models: Sequence[PlannedModel], tracks: Sequence[AnyTrack], order: CandidateOrder
+) -> None:
+    """Every model can answer what every track asks, and means the numbers that are shown."""
     problems = []
     for model in models:
         for track in tracks:
@@ -108,6 +111,10 @@ def _check_models(models: Sequence[PlannedModel], tracks: Sequence[AnyTrack]) ->
             if model.config.kind == "replay" and isinstance(track, EpisodeTrack):
                 message = f"is a recording, which cannot answer in {track.name}"
                 problems.append(Problem(where, message, "tracks", track.name))
+            recorded = model.config.recording
+            if recorded is not None and (found := recorded_order(recorded)) != order:
+                message = f"is a recording of candidates in the order {found}"
+                problems.append(Problem(where, message, "candidates.order", order, found))
             able = kind_of(track.name).baselines
             if model.config.kind != "baseline" or model.config.id in able:
                 continue

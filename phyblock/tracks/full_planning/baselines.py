@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -22,7 +22,7 @@ class PlanSubject:
 
     scene: Scene
     candidates: CandidateSet
-    guess: Callable[[], Plan] = Plan
+    guess: Callable[[], Plan] = field(default=Plan, compare=False)
 
 
 def _plan(steps: Iterable[int]) -> str:

@@ -5,19 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
-from phyblock.records import Line, Record
-from phyblock.records.line import Whole
+from phyblock.records import Line, Record, ShownScene
 
-__all__ = ["PLAN_COLUMNS", "PlanParse", "PlanRecord", "ShownScene", "plan_row"]
-
-
-class ShownScene(Line):
-    """How a scene was shown, where that was not as the file has it."""
-
-    order: tuple[Whole, ...]
-    """The number in the file of each candidate, in the order shown."""
-    goal: str | None
-    """The scene whose goal was shown; null: none was."""
+__all__ = ["PLAN_COLUMNS", "PlanParse", "PlanRecord", "plan_row"]
 
 
 class PlanParse(Line):

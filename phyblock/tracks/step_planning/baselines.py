@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class StepSubject:
     exact: tuple[int, ...]
     last_failed: int | None = None
     step: int = 0
-    guess: Callable[[], Plan] = Plan
+    guess: Callable[[], Plan] = field(default=Plan, compare=False)
 
 
 def _random_step(subject: StepSubject, rng: np.random.Generator) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
-from phyblock.records import AskedTurn, Line, Record, StoredReply
+from phyblock.records import AskedTurn, Line, Record, ShownScene, StoredReply
 from phyblock.records.line import Whole
-from phyblock.tracks.full_planning.record import PLAN_COLUMNS, PlanParse, ShownScene, plan_row
+from phyblock.tracks.full_planning.record import PLAN_COLUMNS, PlanParse, plan_row
 from phyblock.tracks.step_planning.prompt import StepOutcome
 from phyblock.tracks.step_planning.rules import Ending
 
