@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
 from phyblock.tracks.full_planning.goal_blind import goal_blind_plans
-from phyblock.tracks.showing import ShownTask, TaskShowing
+from phyblock.tracks.showing import Showing, ShownTask, TaskShowing
 from phyblock.words import Setting
 
 __all__ = ["BlindGuesses"]
@@ -23,7 +23,8 @@ class BlindGuesses:
     def __init__(
         self, showing: TaskShowing, pool: Sequence[AssemblyTask], setting: Setting
     ) -> None:
-        self._showing = showing
+        # A goal is not learned from, whichever is shown.
+        self._showing = TaskShowing(Showing(showing.how.order))
         self._pool = pool
         self._setting = setting
         self._plans: dict[int, dict[str, Plan]] = {}
