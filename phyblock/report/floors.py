@@ -61,8 +61,10 @@ def floors_frame(run: Run) -> pd.DataFrame:
     interval. Floors themselves have no row.
     """
     rows = []
+    place = {name: number for number, name in enumerate(run.design.model_names)}
     for track in run.design.suite.tracks:
         found = track_estimates(run, track)
+        found = found.sort_values("model", key=lambda names: names.map(place), kind="stable")
         for measure in track_measures(track):
             floors = strongest_floors(run, track, measure)
             named = {*measure.floors} & _baselines(run)
