@@ -24,6 +24,7 @@ __all__ = [
     "Floor",
     "floor_lines",
     "floors_frame",
+    "floors_run",
     "floors_view",
     "headline_floors",
     "strongest_floors",
@@ -67,7 +68,7 @@ def floors_frame(run: Run) -> pd.DataFrame:
         found = found.sort_values("model", key=lambda names: names.map(place), kind="stable")
         for measure in track_measures(track):
             floors = strongest_floors(run, track, measure)
-            named = {*measure.floors} & _baselines(run)
+            named = floors_run(run, track)
             for row in found[found["measure"] == measure.name].to_dict("records"):
                 floor = floors.get(way_name(row))
                 if floor is None or row["model"] in named:
@@ -88,6 +89,12 @@ def strongest_floors(run: Run, track: str, measure: Measure) -> dict[str, Floor]
         if other is None or is_higher == (measure.better == "higher"):
             best[way] = floor
     return best
+
+
+def floors_run(run: Run, track: str) -> set[str]:
+    """The models of a run that are floors of a track."""
+    named = {floor for measure in track_measures(track) for floor in measure.floors}
+    return named & {str(m["name"]) for m in run.manifest["models"] if m.get("kind") == "baseline"}
 
 
 def headline_floors(run: Run, track: str) -> dict[str, Floor]:
@@ -112,7 +119,7 @@ def _known_floors(run: Run, track: str, measure: Measure) -> Iterator[tuple[str,
     """Floors that were run, then those that the manifest knows, then chance."""
     found = track_estimates(run, track)
     found = found[found["measure"] == measure.name]
-    asked = [name for name in measure.floors if name in _baselines(run)]
+    asked = [name for name in measure.floors if name in floors_run(run, track)]
     for row in found[found["model"].isin(asked)].to_dict("records"):
         if not math.isnan(row["value"]):
             yield way_name(row), Floor(str(row["model"]), float(row["value"]))
@@ -123,10 +130,6 @@ def _known_floors(run: Run, track: str, measure: Measure) -> Iterator[tuple[str,
     if measure.chance is not None:
         for row in found.drop_duplicates([CELL, *VARIANT]).to_dict("records"):
             yield way_name(row), Floor(CHANCE, measure.chance(run, str(row[CELL])))
-
-
-def _baselines(run: Run) -> set[str]:
-    return {str(m["name"]) for m in run.manifest["models"] if m.get("kind") == "baseline"}
 
 
 def floors_view(table: pd.DataFrame, run: Run) -> TextTable:

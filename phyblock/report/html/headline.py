@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from phyblock.report.floors import Floor, headline_floors
+from phyblock.report.floors import Floor, floors_run, headline_floors
 from phyblock.report.measure_table import headline_columns, headline_of, main_heading
 from phyblock.tables.headline import Value
 from phyblock.tables.load import Run
@@ -71,12 +71,14 @@ def _headline(run: Run, track: str) -> Headline:
     headings = [column.heading for column in columns]
     published = report.published(run)
     floors = headline_floors(run, track)
+    own_floors = floors_run(run, track)
     main = headings.index(main_heading(run, track))
     rows = []
     for name, sort in kinds_of(run).items():
         found = [values.get((name, heading)) for heading in headings]
+        held = {} if name in own_floors else floors
         cells = [
-            *(_cell(value, floors.get(head)) for value, head in zip(found, headings, strict=True)),
+            *(_cell(value, held.get(head)) for value, head in zip(found, headings, strict=True)),
             *([_plain(published.get(name), NO_VALUE)] if published else []),
         ]
         rows.append(Row(name, sort, tuple(cells), _strip(found[main])))
