@@ -13,7 +13,7 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic import TypeAdapter
 
-from phyblock.records.line import Line
+from phyblock.records.line import Line, parts
 
 __all__ = ["field_tables", "json_schema", "put_between"]
 
@@ -52,7 +52,7 @@ def field_tables(title: str, kinds: Sequence[type[Line]], known: set[type[Line]]
         hints = typing.get_type_hints(kind, include_extras=False)
         for name in names:
             lines.append(f"| `{name}` | {_type(hints[name])} | {told.get(name, '')} |")
-            waiting += _parts(hints[name])
+            waiting += parts(hints[name])
     return "\n".join(lines) + "\n"
 
 
@@ -92,7 +92,7 @@ def _with_parts(kinds: Sequence[type[Line]]) -> list[type[Line]]:
             found.append(kind)
             hints = typing.get_type_hints(kind)
             for name in kind.model_fields:
-                waiting += _parts(hints[name])
+                waiting += parts(hints[name])
     return found
 
 
@@ -111,13 +111,6 @@ def _docs(kind: type[Line]) -> dict[str, str]:
         ):
             found[field.target.id] = " ".join(str(below.value.value).split())
     return found
-
-
-def _parts(hint: Any) -> list[type[Line]]:
-    """Models that a type is made of."""
-    if isinstance(hint, type) and issubclass(hint, Line):
-        return [hint]
-    return [part for argument in get_args(hint) for part in _parts(argument)]
 
 
 def _type(hint: Any) -> str:
