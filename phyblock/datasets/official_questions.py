@@ -43,7 +43,8 @@ from phyblock.records.data_values import Name, Text
 from phyblock.records.decode import shown
 from phyblock.records.faults import Fault, fault, validated
 from phyblock.records.line import Line
-from phyblock.records.question import About, Options, SceneId
+from phyblock.records.picture import About
+from phyblock.records.question import Options, SceneId
 
 __all__ = ["read_official_questions"]
 

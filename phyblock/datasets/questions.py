@@ -11,7 +11,8 @@ from typing import Any
 from phyblock.datasets.base import Dataset, QuestionSet, QuestionTask
 from phyblock.datasets.raw import read_lines
 from phyblock.records.faults import validated
-from phyblock.records.question import About, StoredQuestion
+from phyblock.records.picture import About
+from phyblock.records.question import StoredQuestion
 
 __all__ = ["QUESTIONS_FILE", "read_questions"]
 

@@ -135,7 +135,7 @@ View = Annotated[
 
 def is_name(text: str) -> bool:
     """Whether a text is a `Name`."""
-    return re.search(_NAME, text) is not None and not text.endswith("\n")
+    return re.fullmatch(_NAME, text) is not None
 
 
 def triple(numbers: Triple) -> Triple:

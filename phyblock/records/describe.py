@@ -118,10 +118,12 @@ def _type(hint: Any) -> str:
         return _PLAIN[hint]
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is Literal:
-        return ", ".join(f"`{word}`" for word in arguments)
+        return ", ".join("true" if word is True else f"`{word}`" for word in arguments)
     if origin in (types.UnionType, typing.Union):
         return " or ".join(_type(argument) for argument in arguments)
     if origin is tuple:
+        if ... not in arguments:
+            return f"list of {_inside(arguments[0])}, {len(arguments)} of them"
         return f"list of {_inside(arguments[0])}"
     if origin is dict:
         return f"object of {_inside(arguments[1])}"
@@ -130,7 +132,8 @@ def _type(hint: Any) -> str:
 
 def _inside(hint: Any) -> str:
     text = _type(hint)
-    return f"({text})" if " or " in text and hint is not bool else text
+    is_choice = hint is not bool and (" or " in text or ", " in text)
+    return f"({text})" if is_choice else text
 
 
 def _name(kind: type) -> str:

@@ -57,7 +57,7 @@ class StoredBlock(Line, extra="ignore"):
     """A block of a goal structure at its goal pose."""
 
     order: Order
-    """Its number, 1 to 9999, unique in the scene."""
+    """Its number, from 1, unique in the scene."""
     type: BlockType
     """Its shape."""
     color: Color
@@ -67,9 +67,9 @@ class StoredBlock(Line, extra="ignore"):
     depend: Annotated[tuple[OrderOrGround, ...], Filled(MAX_BLOCKS)]
     """Orders of the blocks that must stand before it; 0 is the ground; never empty, no cycles."""
     position: Position
-    """Origin of the body frame in the world [m], z up, the ground at z = 0: three numbers."""
+    """Origin of the body frame in the world [m], z up, the ground at z = 0."""
     euler: Annotated[Angles, _EITHER_NAME]
-    """Extrinsic x-y-z angles [degrees], three numbers: R = Rz·Ry·Rx (scipy's `'xyz'`)."""
+    """Extrinsic x-y-z angles [degrees]: R = Rz·Ry·Rx (scipy's `'xyz'`)."""
 
     @classmethod
     def of(cls, block: Block, position: Sequence[float] | None = None) -> Self:

@@ -102,8 +102,12 @@ def _tolerate(read: Callable[[], _T], name: str, findings: list[Finding]) -> _T 
     try:
         return read()
     except DataError as error:
-        findings += [unreadable(name, problem) for problem in error.problems]
+        findings += _unreadable(name, error)
         return None
+
+
+def _unreadable(name: str, error: DataError) -> list[Finding]:
+    return [unreadable(name, problem) for problem in error.problems]
 
 
 def _builtin(folder: Path, tasks: list[SalvagedTask], findings: list[Finding]) -> None:
@@ -112,11 +116,11 @@ def _builtin(folder: Path, tasks: list[SalvagedTask], findings: list[Finding]) -
     for number, text in enumerate(lines_of(path, ""), 1):
         _check_number(findings, folder)
         where = f"{path}:{number}"
-        raw = _tolerate(partial(parse_json, text, path, number), f"line {number}", findings)
-        if raw is None:
-            continue
-        line = _tolerate(partial(validated, _Scene, raw, where), f"line {number}", findings)
-        if line is None:
+        try:
+            raw = parse_json(text, path, number)
+            line = validated(_Scene, raw, where)
+        except DataError as error:
+            findings += _unreadable(f"line {number}", error)
             continue
         first = first_line.setdefault(line.id, number)
         if first != number:
