@@ -6,7 +6,6 @@ Numbers stay integers or floats as they were given, so that a line is written as
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -29,6 +28,7 @@ __all__ = [
     "View",
     "is_name",
     "plain",
+    "rounded",
     "triple",
 ]
 
@@ -144,6 +144,12 @@ def triple(numbers: Triple) -> Triple:
     return float(x) + 0.0, float(y) + 0.0, float(z) + 0.0
 
 
-def plain(numbers: Iterable[float]) -> tuple[float, ...]:
+def rounded(numbers: Triple) -> Triple:
+    """Lengths [m] to a micrometer."""
+    x, y, z = (round(number, 6) + 0.0 for number in numbers)
+    return x, y, z
+
+
+def plain(numbers: tuple[float, ...]) -> Any:
     """Whole numbers as integers, which read better in a file."""
     return tuple(int(n) if float(n).is_integer() else n for n in numbers)

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any, TypeVar
 
-from pydantic import AfterValidator, ValidationError, WrapValidator
+from pydantic import AfterValidator, ValidationError, ValidationInfo, WrapValidator
 from pydantic_core import PydanticCustomError
 
 from phyblock.errors import DataError, Problem
 from phyblock.records.decode import dotted, shown
 from phyblock.records.line import Line, parts
 
-__all__ = ["Fault", "fault", "free_of", "refuse", "validated", "worded"]
+__all__ = ["Fault", "fault", "fits", "free_of", "refuse", "validated", "worded"]
 
 _MOST_FAULTS = 100
 """Faults of one line that are told."""
@@ -72,6 +72,17 @@ def free_of(*finders: Callable[[Any], Iterable[Fault]]) -> AfterValidator:
 
     def check(value: _T) -> _T:
         if found := [each for find in finders for each in find(value)]:
+            raise fault(*found)
+        return value
+
+    return AfterValidator(check)
+
+
+def fits(find: Callable[[Any, ValidationInfo], Iterable[Fault]]) -> AfterValidator:
+    """A check that `find` finds nothing, given the fields before this one and the context."""
+
+    def check(value: _T, info: ValidationInfo) -> _T:
+        if found := tuple(find(value, info)):
             raise fault(*found)
         return value
 

@@ -22,7 +22,7 @@ from phyblock.domain.question import Mark, QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock.records.data_values import Angles, Filled, Position, View, plain, triple
 from phyblock.records.decode import shown
-from phyblock.records.faults import Fault, fault
+from phyblock.records.faults import Fault, fits
 from phyblock.records.line import Line
 from phyblock.records.scene import MAX_BLOCKS, StoredBlock
 
@@ -43,16 +43,14 @@ class About:
         return cls(scenes.get(name) if isinstance(name, str) else None, len(scenes))
 
 
-def _against_scene(find: Callable[[Any, Scene], Iterable[Fault]]) -> Callable[..., Any]:
+def _in_scene(find: Callable[[Any, Scene], Iterable[Fault]]) -> AfterValidator:
     """A check that `find` finds nothing, where the scene is known."""
 
-    def check(value: Any, info: ValidationInfo) -> Any:
+    def found(value: Any, info: ValidationInfo) -> Iterable[Fault]:
         scene = info.context.scene if isinstance(info.context, About) else None
-        if scene is not None and (found := tuple(find(value, scene))):
-            raise fault(*found)
-        return value
+        return () if scene is None else find(value, scene)
 
-    return check
+    return fits(found)
 
 
 def _unknown_orders(orders: object, scene: Scene) -> Iterator[Fault]:
@@ -70,7 +68,7 @@ def _known_orders(added: Sequence[StoredBlock], scene: Scene) -> Iterator[Fault]
             yield Fault("has the order of a block of the scene", found=str(order))
 
 
-OF_BLOCKS = BeforeValidator(_against_scene(_unknown_orders))
+OF_BLOCKS = BeforeValidator(_in_scene(_unknown_orders).func)
 """An object whose names are orders of blocks of the scene."""
 
 
@@ -115,14 +113,14 @@ class StoredPicture(Line, extra="forbid"):
     without: Annotated[
         tuple[StrictInt, ...],
         Filled(MAX_BLOCKS),
-        AfterValidator(_against_scene(_unknown_orders)),
+        _in_scene(_unknown_orders),
     ] = ()
     """Orders of blocks that are not drawn."""
     poses: Annotated[dict[str, StoredPose], OF_BLOCKS] = Field(default_factory=dict)
     """By order, where blocks stand that are not at their place."""
     swap: Annotated[dict[str, StoredKind], OF_BLOCKS] = Field(default_factory=dict)
     """By order, what blocks are that differ."""
-    add: Annotated[_Blocks, AfterValidator(_against_scene(_known_orders))] = ()
+    add: Annotated[_Blocks, _in_scene(_known_orders)] = ()
     """Whole blocks that the scene does not have."""
     marks: Annotated[tuple[StoredMark, ...], Filled(MAX_BLOCKS)] = ()
     """Places."""
@@ -192,5 +190,5 @@ def _nothing_drawn(picture: StoredPicture, scene: Scene) -> Iterator[Fault]:
         yield Fault("draws no blocks", found="")
 
 
-Picture = Annotated[StoredPicture, AfterValidator(_against_scene(_nothing_drawn))]
+Picture = Annotated[StoredPicture, _in_scene(_nothing_drawn)]
 """A picture that shows something of its scene."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, ValidationInfo
+from pydantic import Field, ValidationInfo
 from typing_extensions import Self
 
 from phyblock.domain.blocks import Color
@@ -21,7 +21,7 @@ from phyblock.domain.question import (
 from phyblock.domain.scene import Scene
 from phyblock.records.data_values import Filled, Format, Name, Text
 from phyblock.records.decode import shown
-from phyblock.records.faults import Fault, fault, free_of
+from phyblock.records.faults import Fault, fits, free_of
 from phyblock.records.line import Line
 from phyblock.records.picture import OF_BLOCKS, About, Picture, StoredPicture
 
@@ -31,11 +31,10 @@ _MOST_OPTIONS = 26
 _MOST_PICTURES = 2 + len(LETTERS)
 
 
-def _is_there(name: str, info: ValidationInfo) -> str:
+def _scene_faults(_: str, info: ValidationInfo) -> Iterator[Fault]:
     if isinstance(info.context, About) and info.context.scene is None:
         allowed = f"one of the {info.context.n_scenes} scenes of the data set"
-        raise fault(Fault("names no scene of the data set", allowed))
-    return name
+        yield Fault("names no scene of the data set", allowed)
 
 
 def _plain_words(option: str) -> str:
@@ -57,30 +56,23 @@ def _option_faults(options: Sequence[str]) -> Iterator[Fault]:
         yield Fault("are not the four pictures", " ".join(wanted))
 
 
-def _is_answer(answer: str, info: ValidationInfo) -> str:
+def _answer_faults(answer: str, info: ValidationInfo) -> Iterator[Fault]:
     is_order = info.data.get("subtask") == "OR"
     if is_order and sorted(answer) != list(LETTERS):
-        raise fault(Fault("is none of the options", "all of A, B, C, D in the right order"))
+        yield Fault("is none of the options", "all of A, B, C, D in the right order")
     if not is_order and answer not in tuple(LETTERS):
-        raise fault(Fault("is none of the options", "A, B, C or D"))
-    return answer
+        yield Fault("is none of the options", "A, B, C or D")
 
 
-def _is_of_subtask(category: Category, info: ValidationInfo) -> Category:
+def _category_faults(category: Category, info: ValidationInfo) -> Iterator[Fault]:
     subtask = info.data.get("subtask")
     if subtask is not None and category != category_of(subtask):
-        raise fault(Fault("is not known", category_of(subtask)))
-    return category
+        yield Fault("is not known", category_of(subtask))
 
 
-def _fit(pictures: tuple[StoredPicture, ...], info: ValidationInfo) -> tuple[StoredPicture, ...]:
-    """Pictures and marks of all options, no label twice."""
-    if faults := tuple(_picture_faults(pictures, info.data.get("options", ()))):
-        raise fault(*faults)
-    return pictures
-
-
-def _picture_faults(pictures: Sequence[StoredPicture], options: Sequence[str]) -> Iterator[Fault]:
+def _picture_faults(pictures: Sequence[StoredPicture], info: ValidationInfo) -> Iterator[Fault]:
+    """A label twice; pictures or marks of options that are missing, and pictures of none."""
+    options = info.data.get("options", ())
     labels = [picture.label for picture in pictures]
     for i, label in enumerate(labels):
         if label in labels[:i]:
@@ -98,7 +90,7 @@ def _picture_faults(pictures: Sequence[StoredPicture], options: Sequence[str]) -
             yield Fault("no picture marks the places", allowed, shown(unmarked))
 
 
-SceneId = Annotated[str, AfterValidator(_is_there)]
+SceneId = Annotated[str, fits(_scene_faults)]
 """The id of the scene that a question is held against."""
 Options = Annotated[tuple[Text, ...], Filled(_MOST_OPTIONS), free_of(_option_faults)]
 """Four different texts, or the four pictures in order."""
@@ -111,7 +103,7 @@ class StoredQuestion(Line, extra="forbid"):
     """Unique in the file."""
     subtask: Subtask
     """The letters of its subtask, as above."""
-    category: Annotated[Category, AfterValidator(_is_of_subtask)] | None = None
+    category: Annotated[Category, fits(_category_faults)] | None = None
     """The category of the paper that the subtask belongs to."""
     scene_id: SceneId
     """The scene in the data set that the questions are about."""
@@ -121,11 +113,11 @@ class StoredQuestion(Line, extra="forbid"):
     """The text."""
     options: Options
     """Four texts, or `<img1>` to `<img4>` for pictures A to D."""
-    answer: Annotated[str, AfterValidator(_is_answer)]
+    answer: Annotated[str, fits(_answer_faults)]
     """`A` to `D`; for ordering all four letters in the right order, like `BADC`."""
     colors: Annotated[dict[str, Color], OF_BLOCKS] = Field(default_factory=dict)
     """By order, the colors of blocks that are recolored; left out where none is."""
-    pictures: Annotated[tuple[Picture, ...], Filled(_MOST_PICTURES), AfterValidator(_fit)]
+    pictures: Annotated[tuple[Picture, ...], Filled(_MOST_PICTURES), fits(_picture_faults)]
     """Its pictures."""
     evidence: dict[str, Any] = Field(default_factory=dict)
     """What the answer was derived from; `slots` are the words in the template."""
@@ -140,20 +132,19 @@ class StoredQuestion(Line, extra="forbid"):
             for block, before in zip(question.scene.blocks, original.blocks, strict=True)
             if block.color != before.color
         }
-        return cls.model_validate(
-            {
-                "id": question.id,
-                "subtask": question.subtask,
-                "category": question.category,
-                "scene_id": question.scene.id,
-                "wording": question.wording,
-                "question": question.text,
-                "options": question.options,
-                "answer": question.answer_letters,
-                **({"colors": colors} if colors else {}),
-                "pictures": [StoredPicture.of(p, question.scene) for p in question.pictures],
-                "evidence": question.evidence,
-            }
+        changed: dict[str, Any] = {"colors": colors} if colors else {}
+        return cls(
+            id=question.id,
+            subtask=question.subtask,
+            category=question.category,
+            scene_id=question.scene.id,
+            wording=question.wording,
+            question=question.text,
+            options=question.options,
+            answer=question.answer_letters,
+            **changed,
+            pictures=tuple(StoredPicture.of(p, question.scene) for p in question.pictures),
+            evidence=dict(question.evidence),
         )
 
     def about(self, original: Scene) -> Question:

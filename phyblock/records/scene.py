@@ -24,7 +24,9 @@ from phyblock.records.data_values import (
     Order,
     OrderOrGround,
     Position,
+    Triple,
     plain,
+    rounded,
     triple,
 )
 from phyblock.records.decode import shown
@@ -72,18 +74,16 @@ class StoredBlock(Line, extra="ignore"):
     """Extrinsic x-y-z angles [degrees]: R = Rz·Ry·Rx (scipy's `'xyz'`)."""
 
     @classmethod
-    def of(cls, block: Block, position: Sequence[float] | None = None) -> Self:
+    def of(cls, block: Block, position: Triple | None = None) -> Self:
         """A block as it is written; `position` where that is to be written in another way."""
-        return cls.model_validate(
-            {
-                "order": block.order,
-                "type": block.type,
-                "color": block.color,
-                "layer": block.layer,
-                "depend": block.depend or (0,),
-                "position": plain(block.position_m) if position is None else position,
-                "euler": plain(block.euler_deg),
-            }
+        return cls(
+            order=block.order,
+            type=block.type,
+            color=block.color,
+            layer=block.layer,
+            depend=block.depend or (0,),
+            position=plain(block.position_m) if position is None else position,
+            euler=plain(block.euler_deg),
         )
 
     def block(self) -> Block:
@@ -105,6 +105,12 @@ class StoredCandidate(Line, extra="ignore"):
     required: Any = None
     """Whether the scene needs it; not read."""
 
+    @classmethod
+    def of(cls, candidate: Candidate, *, required: bool) -> Self:
+        """A candidate as it is written."""
+        euler = plain(candidate.euler_deg)
+        return cls(type=candidate.type, color=candidate.color, euler=euler, required=required)
+
     @functools.cached_property
     def candidate(self) -> Candidate:
         """The candidate that it says."""
@@ -118,24 +124,25 @@ def _order_faults(blocks: Sequence[StoredBlock]) -> Iterator[Fault]:
             yield Fault("is used twice", "unique orders", str(order), (i, "order"))
 
 
-def _dependency_faults(blocks: Sequence[StoredBlock]) -> Iterator[Fault]:
+def _dependency_faults(blocks: Sequence[StoredBlock]) -> list[Fault]:
     """Dependencies that name no block or run in a circle, in a list whose orders are unique."""
     orders = [block.order for block in blocks]
     known = "0 (the ground) or an order of the scene: " + ", ".join(map(str, sorted(orders)))
-    is_sound = True
-    for i, block in enumerate(blocks):
-        for order in block.depend:
-            if order and order not in orders:
-                is_sound = False
-                yield Fault("names no block", known, str(order), (i, "depend"))
-    if not is_sound:
-        return
+    unknown = [
+        Fault("names no block", known, str(order), (i, "depend"))
+        for i, block in enumerate(blocks)
+        for order in block.depend
+        if order and order not in orders
+    ]
+    if unknown:
+        return unknown
     try:
         _graph(blocks)
     except CycleError as error:
         cycle = " -> ".join(str(orders[v]) for v in (*error.vertices, error.vertices[0]))
         at = (error.vertices[0], "depend")
-        yield Fault("is part of a cycle", "dependencies without a cycle", cycle, at)
+        return [Fault("is part of a cycle", "dependencies without a cycle", cycle, at)]
+    return []
 
 
 def _layer_faults(blocks: Sequence[StoredBlock]) -> Iterator[Fault]:
@@ -219,27 +226,15 @@ class StoredScene(Line, extra="ignore"):
     def of(cls, scene: Scene, candidates: CandidateSet) -> Self:
         """A scene as it is written: lengths to a micrometer."""
         looks = {block.look for block in scene.blocks}
-        return cls.model_validate(
-            {
-                "id": scene.id,
-                "levels": scene.levels,
-                "parents": scene.parents,
-                "blocks": [
-                    StoredBlock.of(block, [round(c, 6) + 0.0 for c in block.position_m])
-                    for block in scene.blocks
-                ],
-                "candidates": [
-                    StoredCandidate.model_validate(
-                        {
-                            "type": candidate.type,
-                            "color": candidate.color,
-                            "euler": plain(candidate.euler_deg),
-                            "required": candidate.look in looks,
-                        }
-                    )
-                    for candidate in candidates.candidates
-                ],
-            }
+        return cls(
+            id=scene.id,
+            levels=scene.levels,
+            parents=scene.parents,
+            blocks=tuple(StoredBlock.of(b, rounded(b.position_m)) for b in scene.blocks),
+            candidates=tuple(
+                StoredCandidate.of(candidate, required=candidate.look in looks)
+                for candidate in candidates.candidates
+            ),
         )
 
     def scene(self) -> Scene:

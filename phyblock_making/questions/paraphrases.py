@@ -18,44 +18,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pydantic import StrictBool
 
 from phyblock.bounded import load_json
 from phyblock.domain import LETTERS, Question, Subtask, is_picture_option
 from phyblock.models import Message, Model, Request
 from phyblock.parsing import parse_answer
-from phyblock.records import Line
-from phyblock.records.data_values import Name
 from phyblock.tracks import TemplatePrompt
 from phyblock_making.questions.rederiving import problem_of
 from phyblock_making.questions.wording import WORDINGS, fill_template, stem_of, wording_ids
 
-__all__ = [
-    "Paraphrase",
-    "StoredWording",
-    "fault_of_form",
-    "stems_of",
-    "texts_in",
-    "write_wordings",
-]
+__all__ = ["Paraphrase", "fault_of_form", "stems_of", "texts_in", "write_wordings"]
 
 _LENGTHS = (15, 400)
 _SHOWN_CHARS = 200
 _LETTERS = "ABCDE"
 _ELSE = "something else is asked, or it cannot be told"
 _LETTER = re.compile(r"\boptions?\b|\b[A-D]\)|\([A-D]\)|answer:", re.IGNORECASE)
-
-
-class StoredWording(Line, extra="ignore"):
-    """A line of the file that paraphrases are written to, for a person to read and change."""
-
-    wording: Name
-    subtask: str = ""
-    template: str
-    accepted: StrictBool
-    fault: str | None = None
-    checked_with: tuple[str, ...] = ()
-    model: str = ""
 
 
 @dataclass(frozen=True)
@@ -70,16 +48,16 @@ class Paraphrase:
 
     def line(self, model: str, number: int) -> str:
         """As one line of JSON, without its end."""
-        stored = StoredWording(
-            wording=f"{self.stem}-m{number}",
-            subtask=self.subtask,
-            template=self.template,
-            accepted=self.fault is None,
-            fault=self.fault,
-            checked_with=self.checked_with,
-            model=model,
-        )
-        return json.dumps(stored.fields(), ensure_ascii=False)
+        fields = {
+            "wording": f"{self.stem}-m{number}",
+            "subtask": self.subtask,
+            "template": self.template,
+            "accepted": self.fault is None,
+            "fault": self.fault,
+            "checked_with": list(self.checked_with),
+            "model": model,
+        }
+        return json.dumps(fields, ensure_ascii=False)
 
 
 def stems_of(questions: Sequence[Question]) -> dict[str, list[Question]]:

@@ -12,19 +12,28 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from pydantic import StrictBool
 
 from phyblock.datasets.raw import lines_of, parse_json
 from phyblock.domain import Question
 from phyblock.errors import DataError, Problem
+from phyblock.records.data_values import Name
 from phyblock.records.decode import shown
 from phyblock.records.faults import Fault, refuse, validated
+from phyblock.records.line import Line
 from phyblock_making.questions.choices import pick
-from phyblock_making.questions.paraphrases import StoredWording, fault_of_form
+from phyblock_making.questions.paraphrases import fault_of_form
 from phyblock_making.questions.wording import WORDINGS, fill_template, stem_of, wording_ids
 
 __all__ = ["Wording", "read_wordings", "reword"]
 
 _ALLOWED = "a file that phyblock vqa write wrote"
+
+
+class _StoredWording(Line, extra="ignore"):
+    wording: Name
+    accepted: StrictBool
+    template: str
 
 
 @dataclass(frozen=True)
@@ -55,7 +64,7 @@ def read_wordings(path: Path) -> tuple[Wording, ...]:
     for number, text in enumerate(lines_of(path, _ALLOWED), 1):
         where = f"{path}:{number}"
         try:
-            line = validated(StoredWording, parse_json(text, path, number), where)
+            line = validated(_StoredWording, parse_json(text, path, number), where)
             if line.accepted:
                 refuse(_faults(line, wordings), where)
                 wordings.append(Wording(line.wording, line.template))
@@ -85,7 +94,7 @@ def reword(
     return reworded
 
 
-def _faults(line: StoredWording, earlier: Sequence[Wording]) -> Iterator[Fault]:
+def _faults(line: _StoredWording, earlier: Sequence[Wording]) -> Iterator[Fault]:
     """Why an accepted line cannot be used beside those before it."""
     stem = stem_of(line.wording)
     originals = [WORDINGS[known] for known in wording_ids(stem)]
