@@ -132,7 +132,7 @@ class StoredQuestion(Line, extra="forbid"):
             for block, before in zip(question.scene.blocks, original.blocks, strict=True)
             if block.color != before.color
         }
-        changed: dict[str, Any] = {"colors": colors} if colors else {}
+        optional: dict[str, Any] = {"colors": colors}
         return cls(
             id=question.id,
             subtask=question.subtask,
@@ -142,7 +142,7 @@ class StoredQuestion(Line, extra="forbid"):
             question=question.text,
             options=question.options,
             answer=question.answer_letters,
-            **changed,
+            **{name: value for name, value in optional.items() if value},
             pictures=tuple(StoredPicture.of(p, question.scene) for p in question.pictures),
             evidence=dict(question.evidence),
         )
