@@ -75,17 +75,26 @@ def test_what_is_wrong_is_said_with_file_and_line(
     assert said in problem.message
 
 
-@pytest.mark.parametrize("labels", [("composite",), ("goal", "candidates"), ("candidates", "goal")])
+@pytest.mark.parametrize(
+    "labels",
+    [("composite",), ("goal", "candidates"), ("candidates", "goal"), ("candidates",)],
+)
 def test_the_default_prompt_speaks_of_the_pictures_that_are_sent(labels: tuple[str, ...]) -> None:
     prompt = TemplatePrompt(bundled("prompts", "full_planning.j2"), "default")
     sent = tuple(Image(b"", label, 8, 8) for label in labels)
-    system, user = prompt.messages(sent, {"pictures": list(labels), "n_candidates": 9})
+    is_blind = labels == ("candidates",)
+    facts = {"pictures": list(labels), "n_candidates": 9, "is_blind": is_blind}
+    system, user = prompt.messages(sent, facts)
     assert (system.role, user.role) == ("system", "user")
     *pictures, text = user.parts
     assert pictures == list(sent)
     assert isinstance(text, str)
     assert "grid of 9 blocks" in text
-    if len(labels) == 2:
+    assert ("goal, a finished structure of blocks, is not available" in text) == is_blind
+    assert ("study the goal" in text) != is_blind
+    if is_blind:
+        assert "one picture: the candidates" in text
+    elif len(labels) == 2:
         assert "in this order: " + ", then ".join(labels) in text
     else:
         assert "left half shows the goal" in text
@@ -94,11 +103,13 @@ def test_the_default_prompt_speaks_of_the_pictures_that_are_sent(labels: tuple[s
     assert parse_plan("Step1: Move block with index 4", 16, "steps").plan.steps == (4,)
 
 
-def test_facts_hold_the_labels_and_the_number_of_candidates_alone(workspace: Workspace) -> None:
+def test_facts_hold_what_is_shown_alone(workspace: Workspace) -> None:
     track = FullPlanning(PlanningRules("steps", ("A",), ("optimal",), None))
     for task in read_builtin(workspace.root / "data").tasks:
         facts = track.facts(task, (GOAL, GRID))
-        assert facts == {"pictures": ["goal", "candidates"], "n_candidates": len(task.candidates)}
+        n_candidates = len(task.candidates)
+        labels = ["goal", "candidates"]
+        assert facts == {"pictures": labels, "n_candidates": n_candidates, "is_blind": False}
 
 
 def test_the_official_prompt_is_the_recorded_text_to_the_letter(official_checkout: Path) -> None:
