@@ -97,7 +97,7 @@ def test_only_the_registry_and_its_own_folder_name_a_track() -> None:
     found = {
         f"{place}: {name}"
         for path in root.rglob("*.py")
-        if path.name != "registry.py" and not {*path.parents} & {*folders}
+        if path != root / "registry.py" and not {*path.parents} & {*folders}
         for place in [path.relative_to(root.parent).as_posix()]
         for name in tracks_named(path, names) - MADE_ELSEWHERE.get(place, set())
     }
