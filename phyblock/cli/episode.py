@@ -14,9 +14,10 @@ from phyblock.errors import DataError, Problem, StoreError
 from phyblock.files import write_named
 from phyblock.records import MANIFEST, RECORDS, Record, read_manifest
 from phyblock.records.reading import newest_starts, run_records
-from phyblock.run.data import open_dataset
+from phyblock.run.data import recorded_dataset
 from phyblock.sim import PictureStyle
 from phyblock.sim.film import episode_gif, episode_images, episode_sheet
+from phyblock.tables.design import read_design
 from phyblock.tables.track_report import EpisodeView
 from phyblock.tracks import kind_of, kinds
 
@@ -96,15 +97,10 @@ def _find(run: Path, sample: str, tracks: Collection[str]) -> Record:
 
 
 def _task(run: Path, record: Record, data: Path | None) -> AssemblyTask:
-    about = read_manifest(run).dataset
-    hint = "name the folder where it is now with --data"
-    if about is None:
-        raise StoreError(Problem(str(run / MANIFEST), "names no data set", "dataset"))
-    root = data or Path(about.root)
-    if not root.is_dir():
-        raise DataError(Problem(str(root), "the data set of the run is not there", hint=hint))
-    tasks = {task.scene.id: task for task in open_dataset(about.format, root).tasks}
+    manifest = read_manifest(run)
+    levels = read_design(manifest.fields(), str(run / MANIFEST)).suite.levels
+    dataset = recorded_dataset(run, manifest, levels, data)
+    tasks = {task.scene.id: task for task in dataset.tasks}
     if record.scene not in tasks:
-        message = "holds no such scene"
-        raise DataError(Problem(str(root), message, "scene", record.scene, hint=hint))
+        raise DataError(Problem(str(dataset.root), "holds no such scene", "scene", record.scene))
     return tasks[record.scene]

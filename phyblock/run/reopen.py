@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
 from pathlib import Path
 
 from phyblock.datasets import Dataset
-from phyblock.errors import DataError, Problem, StoreError
+from phyblock.errors import DataError, Problem
 from phyblock.records import MANIFEST, Manifest
-from phyblock.run.data import open_dataset
+from phyblock.run.data import CHANGED
 from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.specs.yaml_source import YamlSource
 from phyblock.tracks import AnyTrack, kind_of
 from phyblock.tracks.kind import Opening
 from phyblock.tracks.opening import open_tracks
-from phyblock.tracks.selection import select_tasks
 
-__all__ = ["broken_manifest", "reopen_tracks"]
-
-_HINT = "name the folder where it is now with --data"
-_CHANGED = "is not the data set that the run was made on, or it was changed since"
+__all__ = ["reopen_tracks"]
 
 
 def reopen_tracks(
@@ -28,14 +23,13 @@ def reopen_tracks(
     manifest: Manifest,
     suite: SuiteSpec,
     names: Collection[str],
-    data: Path | None,
+    dataset: Dataset,
 ) -> dict[str, AnyTrack]:
     """The tracks of these names, known to ask what the run in `folder` asked.
 
-    `data` is where the data set is now, if it has moved. Raises StoreError for a manifest that
-    names no data, DataError for data that are not what the run was made on.
+    `dataset` is the run's. Raises DataError for other data of a track than those that the run was
+    made on, or another simulator.
     """
-    dataset = _dataset(folder, manifest, suite, data)
     path = folder / MANIFEST
     folders = {
         name: Path(root) for name in names if (root := kind_of(name).own_root(manifest)) is not None
@@ -49,22 +43,6 @@ def reopen_tracks(
     return tracks
 
 
-def _dataset(folder: Path, manifest: Manifest, suite: SuiteSpec, data: Path | None) -> Dataset:
-    """The data set of the run, whose chosen tasks are known to be those that it was made on."""
-    recorded = manifest.dataset
-    if recorded is None:
-        raise broken_manifest(folder, "dataset")
-    root = data or Path(recorded.root)
-    if not root.is_dir():
-        raise DataError(Problem(str(root), "the data set of the run is not there", hint=_HINT))
-    dataset = open_dataset(suite.dataset.format, root)
-    chosen = replace(dataset, tasks=select_tasks(dataset.tasks, suite.levels, manifest.limit))
-    if chosen.sha256 != recorded.sha256:
-        problem = Problem(str(root), _CHANGED, "sha256", chosen.sha256, recorded.sha256, _HINT)
-        raise DataError(problem)
-    return dataset
-
-
 def _check_alike(name: str, track: AnyTrack, manifest: Manifest, root: Path) -> None:
     """Raise DataError where a track asks something else, or in another simulator."""
     told = manifest.tracks.get(name, {})
@@ -72,10 +50,4 @@ def _check_alike(name: str, track: AnyTrack, manifest: Manifest, root: Path) -> 
         # Prompts and pictures are left out by a track that asks nobody.
         if value is not None and value != told.get(key):
             field, was = f"tracks.{name}.{key}", str(told.get(key))
-            raise DataError(Problem(str(root), _CHANGED, field, str(value), was))
-
-
-def broken_manifest(folder: Path, field: str) -> StoreError:
-    """The error for a manifest in which a field is missing or wrong."""
-    hint = "run.yaml is written by `phyblock run` and is never edited"
-    return StoreError(Problem(str(folder / MANIFEST), "is missing or wrong", field, hint=hint))
+            raise DataError(Problem(str(root), CHANGED, field, str(value), was))

@@ -14,9 +14,10 @@ from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, writing
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
 from phyblock.records.reading import read_records
+from phyblock.run.data import recorded_dataset
 from phyblock.run.folder import check_place, run_folder
 from phyblock.run.records import judged
-from phyblock.run.reopen import broken_manifest, reopen_tracks
+from phyblock.run.reopen import reopen_tracks
 from phyblock.run.replayed import counted_again
 from phyblock.specs import SuiteSpec, suite_model
 from phyblock.tracks import AnyTrack, EpisodeTrack, kind_of
@@ -51,7 +52,8 @@ def rescore(
         run_folder(folder).check([f"{name}/"])
     _check_target(target, identity)
     names = [name for name in suite.tracks if kind_of(name).rescored or counts_samples(name)]
-    tracks = reopen_tracks(folder, manifest, suite, names, data)
+    dataset = recorded_dataset(folder, manifest, suite.levels, data)
+    tracks = reopen_tracks(folder, manifest, suite, names, dataset)
     records = asyncio.run(_judged_again(folder, manifest, tracks))
     told = {"identity": identity, "suite": suite.model_dump(mode="json")}
     _write(target, manifest.model_copy(update=told), records)
@@ -105,7 +107,9 @@ def _suite(
         scoring = suite.scoring.model_copy(update={"matchers": matchers})
         return suite.model_copy(update={"scoring": scoring, "parser": parser or suite.parser})
     except ValidationError as error:
-        raise broken_manifest(folder, "suite") from error
+        hint = "run.yaml is written by `phyblock run` and is never edited"
+        problem = Problem(str(folder / MANIFEST), "is missing or wrong", "suite", hint=hint)
+        raise StoreError(problem) from error
 
 
 def _write(folder: Path, manifest: Manifest, records: Sequence[Record]) -> None:

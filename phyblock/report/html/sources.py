@@ -6,21 +6,17 @@ Without them the page still shows every reply, plan and score; it cannot draw.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from phyblock.datasets import AssemblyTask, Dataset
-from phyblock.errors import DataError, Problem
-from phyblock.run.data import open_dataset
+from phyblock.errors import DataError
+from phyblock.run.data import recorded_dataset
 from phyblock.tables.load import Run
 from phyblock.tables.track_report import PageItems
 from phyblock.tracks.kind import kind_of
-from phyblock.tracks.selection import select_tasks
 
 __all__ = ["Sources", "open_sources"]
-
-_HINT = "name the folder where it is now with --data"
-_CHANGED = "is not the data set that the run was made on, or it was changed since"
 
 
 @dataclass(frozen=True)
@@ -41,7 +37,7 @@ def open_sources(run: Run, data: Path | None) -> Sources:
     Raises DataError when `data` is given and is not what the run was made on.
     """
     try:
-        dataset = _dataset(run, data)
+        dataset = recorded_dataset(run.path, run.manifest, run.design.suite.levels, data)
         tasks = {task.scene.id: task for task in dataset.tasks}
         return Sources(tasks, _items(run, dataset))
     except DataError as error:
@@ -50,20 +46,6 @@ def open_sources(run: Run, data: Path | None) -> Sources:
         said = f"{error.problems[0].where}: {error.problems[0].message}"
         how = "phyblock report RUN --data FOLDER draws it from where it is now"
         return Sources(lacking=f"Nothing can be drawn without the data set ({said}); {how}.")
-
-
-def _dataset(run: Run, data: Path | None) -> Dataset:
-    """All tasks of the data set, of which those of the run are known to be the run's."""
-    recorded = run.manifest.dataset
-    root = data or Path(recorded.root if recorded else "")
-    if recorded is None or not root.is_dir():
-        raise DataError(Problem(str(root), "the data set of the run is not there", hint=_HINT))
-    dataset = open_dataset(recorded.format, root)
-    tasks = select_tasks(dataset.tasks, run.design.suite.levels, run.manifest.limit)
-    chosen = replace(dataset, tasks=tasks).sha256
-    if chosen != recorded.sha256:
-        raise DataError(Problem(str(root), _CHANGED, "sha256", chosen, recorded.sha256, _HINT))
-    return dataset
 
 
 def _items(run: Run, dataset: Dataset) -> dict[str, PageItems]:
