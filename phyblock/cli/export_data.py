@@ -8,9 +8,7 @@ import click
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
-from phyblock.datasets import SCENES_FILE
-from phyblock.resources import named_set
-from phyblock.run.data import open_dataset
+from phyblock.datasets.named import read_data_set
 from phyblock.tables.track_report import ItemExport
 from phyblock.tracks import kinds
 
@@ -56,7 +54,7 @@ def command(
 ) -> None:
     """Write questions with their pictures: a VLMEvalKit TSV, or a Hugging Face dataset."""
     export = _EXPORTS[form]
-    scenes = open_dataset("builtin", named_set(data, SCENES_FILE))
+    scenes = read_data_set(data)
     files = export.write(form, out, questions or export.items, scenes, limit, size_px)
     console = make_console()
     for file in files:

@@ -11,13 +11,13 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from phyblock.datasets import QUESTIONS_FILE, Dataset, QuestionTask
+from phyblock.datasets import Dataset, QuestionTask
+from phyblock.datasets.named import find_questions
 from phyblock.domain import LETTERS, SUBTASKS, is_picture_option
 from phyblock.extras import needs
 from phyblock.files import writing
 from phyblock.folders import OutFolder
 from phyblock.models.base import Image
-from phyblock.resources import named_set
 from phyblock.sim import PictureStyle
 from phyblock.tables.track_report import ItemExport
 from phyblock.tracks.opening import picture_folder, render_workers
@@ -193,7 +193,7 @@ def _write(
     form: str, out: Path, questions: str, scenes: Dataset, limit: int | None, size_px: int
 ) -> tuple[Path, ...]:
     """As `ItemExport` says; a `limit` is shared over subtasks."""
-    asked = open_questions("builtin", named_set(questions, QUESTIONS_FILE), scenes)
+    asked = open_questions("builtin", find_questions(questions), scenes)
     tasks = select_questions(asked.tasks, SUBTASKS, _LEVELS, None, limit)
     style = PictureStyle(size_px=size_px)
     pictures = QuestionPictures(picture_folder(), style, "images", render_workers())
