@@ -15,11 +15,9 @@ from phyblock.records.record import (
     Score,
     SentImage,
     SentPrompt,
-    StoredError,
-    StoredReply,
-    StoredUsage,
 )
 from phyblock.records.record_lines import RecordedLines, RecordLines, record_adapter
+from phyblock.records.reply import StoredError, StoredReply, StoredUsage
 
 __all__ = [
     "FORMAT",

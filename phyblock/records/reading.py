@@ -11,8 +11,9 @@ from phyblock.records.known import known_records
 from phyblock.records.lines import TurnLines
 from phyblock.records.manifest import Manifest, read_manifest
 from phyblock.records.others import Turn
-from phyblock.records.record import Record, StoredReply
+from phyblock.records.record import Record
 from phyblock.records.record_lines import RecordLines
+from phyblock.records.reply import StoredReply
 
 __all__ = ["any_records", "collect_turns", "newest_starts", "read_records", "run_records"]
 
