@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,8 +12,17 @@ from phyblock.tables.cells import METRIC_NAMES, METRICS, SIDE_METRICS
 from phyblock.tables.headline import interval_frame, interval_view
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
-from phyblock.tables.paper_numbers import NOTHING, beside_view, interleaved, published_table
-from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number, spread
+from phyblock.tables.paper_numbers import (
+    NOTHING,
+    OURS,
+    PUBLISHED,
+    beside_view,
+    cell_text,
+    interleaved,
+    published_table,
+    row_name,
+)
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.step_planning.episodes import STEP_OUTCOMES, endings_frame
 from phyblock.tracks.step_planning.measures import COUNTED, NAME, is_asked
@@ -37,7 +45,6 @@ __all__ = [
     "table3_view",
 ]
 
-_OURS, _PUBLISHED = "run", "published"
 _MODEL = Column("Model", is_text=True)
 _GROUPS = {"placed": "Placed blocks", "attempted": "All attempted moves"}
 ENDING_NAMES = {
@@ -137,7 +144,7 @@ def table3_frame(run: Run) -> pd.DataFrame:
     kinds = {"": "_mean", "_sd": "_sd"} if several else {"": ""}
     rows: list[dict[str, Any]] = []
     for model in design.model_names:
-        row: dict[str, Any] = {"model": model, "source": _OURS, "published_name": ""}
+        row: dict[str, Any] = {"model": model, "source": OURS, "published_name": ""}
         for criterion in COUNTED:
             cells = scores[(model, criterion)]
             row |= {
@@ -149,7 +156,7 @@ def table3_frame(run: Run) -> pd.DataFrame:
         row |= {"completion": 100 * ended["completion"], "detour": ended["detour"], "n": ended["n"]}
         rows.append(row)
         if printed := published_scores(design.published.get(model, "")):
-            about = {"model": model, "source": _PUBLISHED}
+            about = {"model": model, "source": PUBLISHED}
             rows.append({**about, "published_name": design.published[model], **printed})
     return pd.DataFrame(rows)
 
@@ -169,8 +176,8 @@ def table3_view(table: pd.DataFrame, run: Run) -> TextTable:
     cells = [f"{criterion}_{metric}" for criterion in COUNTED for metric in METRICS]
     rows = tuple(
         (
-            _row_name(row),
-            *(_cell(row, cell) for cell in cells),
+            row_name(row),
+            *(cell_text(row, cell) for cell in cells),
             number(row["completion"]),
             number(row["detour"], 2),
         )
@@ -182,15 +189,6 @@ def table3_view(table: pd.DataFrame, run: Run) -> TextTable:
         rows,
         tuple(_notes(table, run)),
     )
-
-
-def _row_name(row: Mapping[Hashable, Any]) -> str:
-    published = f"  as published ({row['published_name']})"
-    return str(row["model"]) if row["source"] == _OURS else published
-
-
-def _cell(row: Mapping[Hashable, Any], cell: str) -> str:
-    return spread(row[cell], row.get(f"{cell}_sd", np.nan))
 
 
 def _notes(table: pd.DataFrame, run: Run) -> list[str]:
@@ -209,7 +207,7 @@ def _notes(table: pd.DataFrame, run: Run) -> list[str]:
     ]
     if seeds > 1:
         notes.append(f"Mean ± standard deviation over {seeds} seeds.")
-    ours = table[table["source"] == _OURS]
+    ours = table[table["source"] == OURS]
     expected = run.design.samples(NAME)
     short = [
         f"{row['model']} {row['n']:.0f}" for row in ours.to_dict("records") if row["n"] < expected
