@@ -22,6 +22,7 @@ def _exports() -> dict[str, ItemExport]:
 
 
 _EXPORTS = _exports()
+_SETS = dict.fromkeys(export.items for export in _EXPORTS.values())
 
 
 @click.command("export-data")
@@ -30,8 +31,7 @@ _EXPORTS = _exports()
 @click.option(
     "--questions",
     type=NAME_OR_PATH,
-    show_default=", ".join(dict.fromkeys(export.items for export in _EXPORTS.values())),
-    help="A set of questions, or folder.",
+    help=f"A set of questions, or folder. [default: {', '.join(_SETS)}]",
 )
 @click.option(
     "--data",
