@@ -109,6 +109,6 @@ def tracks_named(path: Path, tracks: set[str]) -> set[str]:
     texts: list[str] = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            texts.append(re.sub(r"docs/\w+\.md", "", node.value))
+            texts.append(re.sub(r"\w+\.md", "", node.value))
         texts += [str(getattr(node, part, "")) for part in ("module", "name", "id", "attr", "arg")]
     return {word for text in texts for word in re.findall(r"\w+", text)} & tracks
