@@ -10,19 +10,27 @@ import click
 from rich.console import Console
 
 from phyblock.cli.console import counted, make_console, plain_table, shown_path
-from phyblock.cli.paths import UserPath
+from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.domain import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
 from phyblock.files import make_folder, write_named
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from phyblock.tracks.vqa.opening import select_questions
+from phyblock_making.attacks.attacks import all_attacks, attack
+from phyblock_making.attacks.observed import Observed, observe_all
 from phyblock_making.cli.question_sets import (
     data_option,
     questions_argument,
     read_question_set,
     size_option,
 )
-from phyblock_making.cli.working import tracked
+from phyblock_making.cli.vqa_attacks_view import (
+    attack_findings,
+    audit_json,
+    cut_findings,
+    print_attacks,
+)
+from phyblock_making.cli.working import jobs_option, tracked
 from phyblock_making.questions.sheet import sheet_html
 from phyblock_making.questions.shortcuts import (
     BALANCE,
@@ -56,8 +64,25 @@ _PER_SUBTASK = 5
 )
 @size_option
 @click.option(
-    "--no-text-probe", is_flag=True, help="Leave out the classifier, which needs scikit-learn."
+    "--no-text-probe", is_flag=True, help="Leave out what needs scikit-learn: classifiers."
 )
+@click.option("--no-pictures", is_flag=True, help="Leave out the attacks that look at pictures.")
+@click.option(
+    "--unseen",
+    type=NAME_OR_PATH,
+    metavar="PATH",
+    help="Another set of questions, of another seed: a text probe learns from it alone.",
+)
+@click.option(
+    "--unseen-data",
+    type=NAME_OR_PATH,
+    metavar="PATH",
+    help="The scenes that those are about, unless they are those of --data.",
+)
+@click.option(
+    "--json", "table", type=UserPath(dir_okay=False), metavar="FILE", help="All figures as JSON."
+)
+@jobs_option
 def command(
     questions: str,
     data: str,
@@ -65,6 +90,11 @@ def command(
     per_subtask: int,
     size: int,
     no_text_probe: bool,
+    no_pictures: bool,
+    unseen: str | None,
+    unseen_data: str | None,
+    table: Path | None,
+    jobs: int,
 ) -> None:
     """Audit the questions of PATH: what could be answered without looking, and what cannot be seen.
 
@@ -72,11 +102,15 @@ def command(
     By subtask: how often each letter is right; what the most frequent answer and a classifier of
     the texts alone reach on questions they were not trained on; options that read alike and
     repeated questions; the least visible block that is named; how questions cluster by scene.
-    The exit code is 0 whatever is found.
+    Then what attacks reach that look at pictures and know nothing of blocks, or only that what
+    rests on a block goes with it, beside the aims of the built-in sets; and which pictures are cut
+    open. The exit code is 0 whatever is found.
     """
-    if sheet is not None:
-        make_folder(sheet.parent)
+    for out in (sheet, table):
+        if out is not None:
+            make_folder(out.parent)
     tasks = read_question_set(questions, data).tasks
+    other = read_question_set(unseen, unseen_data or data).tasks if unseen else ()
     asked = [task.question for task in tasks]
     console = make_console()
     audits = list(
@@ -89,7 +123,16 @@ def command(
     )
     _print_guessing(console, audits)
     _print_contents(console, audits)
-    _print_findings(console, audits, asked)
+    looked = [Observed(one) for one in asked] if no_pictures else _looked_at(asked, jobs)
+    attacks = all_attacks([task.question for task in other], with_texts=not no_text_probe)
+    attacked = [row for one in attacks for row in attack(one, looked)]
+    if attacked:
+        print_attacks(console, attacked)
+    further = [*attack_findings(attacked), *cut_findings(looked)]
+    _print_findings(console, audits, asked, further)
+    if table is not None:
+        write_named(table, audit_json(audits, looked, attacked))
+        console.print(f"all figures in {shown_path(table)}", markup=False)
     if sheet is not None:
         some = select_questions(tasks, SUBTASKS, range(1, 5), per_subtask, None)
         chosen = [task.question for task in some]
@@ -97,6 +140,11 @@ def command(
         pieces = sheet_html(f"Questions of {questions}", chosen, draw)
         write_named(sheet, "".join(pieces))
         console.print(f"{counted(len(chosen), 'question')} in {shown_path(sheet)}", markup=False)
+
+
+def _looked_at(asked: Sequence[Question], jobs: int) -> list[Observed]:
+    observed = observe_all(asked, min(jobs, len(asked)))
+    return list(tracked(observed, len(asked), "Looking", "questions"))
 
 
 def _print_guessing(console: Console, audits: Sequence[SubtaskAudit]) -> None:
@@ -166,7 +214,10 @@ def _print_contents(console: Console, audits: Sequence[SubtaskAudit]) -> None:
 
 
 def _print_findings(
-    console: Console, audits: Sequence[SubtaskAudit], asked: Sequence[Question]
+    console: Console,
+    audits: Sequence[SubtaskAudit],
+    asked: Sequence[Question],
+    further: Sequence[str],
 ) -> None:
     low, high = (round(100 * bound) for bound in BALANCE)
     findings = []
@@ -183,6 +234,7 @@ def _print_findings(
             )
         findings += [f"{name}: options read alike" for name in one.ambiguous]
     findings += [f"{name}: repeats {first}" for name, first in duplicates_of(asked).items()]
+    findings += further
     for finding in findings:
         console.print(finding, style="red", markup=False, soft_wrap=True)
     verdict = counted(len(findings), "finding") if findings else "nothing to find fault with"
