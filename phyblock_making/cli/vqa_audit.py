@@ -7,12 +7,12 @@ from functools import partial
 from pathlib import Path
 
 import click
-from rich.console import Console
 
-from phyblock.cli.console import counted, make_console, plain_table, shown_path
+from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
-from phyblock.domain import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
+from phyblock.domain import SUBTASKS, Question
 from phyblock.files import make_folder, write_named
+from phyblock.folders import OutFolder
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from phyblock.tracks.vqa.opening import select_questions
@@ -30,19 +30,16 @@ from phyblock_making.cli.vqa_attacks_view import (
     cut_findings,
     print_attacks,
 )
+from phyblock_making.cli.vqa_audit_view import print_contents, print_findings, print_guessing
 from phyblock_making.cli.working import jobs_option, tracked
-from phyblock_making.questions.sheet import sheet_html
-from phyblock_making.questions.shortcuts import (
-    BALANCE,
-    GUESSABLE,
-    SubtaskAudit,
-    audit_questions,
-    duplicates_of,
-)
+from phyblock_making.questions.blind_picture import blind_png
+from phyblock_making.questions.sheet import Draw, sheet_html
+from phyblock_making.questions.shortcuts import audit_questions
 
 __all__ = ["command"]
 
 _PER_SUBTASK = 5
+_ANSWERS = "answers.csv"
 
 
 @click.command("audit")
@@ -53,6 +50,12 @@ _PER_SUBTASK = 5
     type=UserPath(dir_okay=False),
     metavar="FILE",
     help="Write an HTML page for a human check: pictures, questions, answers behind a fold.",
+)
+@click.option(
+    "--blind",
+    type=UserPath(file_okay=False),
+    metavar="DIR",
+    help="Write each question of the sheet as a PNG without its answer; answers.csv has those.",
 )
 @click.option(
     "--per-subtask",
@@ -87,6 +90,7 @@ def command(
     questions: str,
     data: str,
     sheet: Path | None,
+    blind: Path | None,
     per_subtask: int,
     size: int,
     no_text_probe: bool,
@@ -121,125 +125,38 @@ def command(
             "subtasks",
         )
     )
-    _print_guessing(console, audits)
-    _print_contents(console, audits)
+    print_guessing(console, audits)
+    print_contents(console, audits)
     looked = [Observed(one) for one in asked] if no_pictures else _looked_at(asked, jobs)
     attacks = all_attacks([task.question for task in other], with_texts=not no_text_probe)
     attacked = [row for one in attacks for row in attack(one, looked)]
     if attacked:
         print_attacks(console, attacked)
     further = [*attack_findings(attacked), *cut_findings(looked)]
-    _print_findings(console, audits, asked, further)
+    print_findings(console, audits, asked, further)
     if table is not None:
         write_named(table, audit_json(audits, looked, attacked))
         console.print(f"all figures in {shown_path(table)}", markup=False)
+    some = select_questions(tasks, SUBTASKS, range(1, 5), per_subtask, None)
+    chosen, draw = [task.question for task in some], partial(question_png, style=PictureStyle(size))
     if sheet is not None:
-        some = select_questions(tasks, SUBTASKS, range(1, 5), per_subtask, None)
-        chosen = [task.question for task in some]
-        draw = partial(question_png, style=PictureStyle(size))
         pieces = sheet_html(f"Questions of {questions}", chosen, draw)
         write_named(sheet, "".join(pieces))
         console.print(f"{counted(len(chosen), 'question')} in {shown_path(sheet)}", markup=False)
+    if blind is not None:
+        _write_blind(OutFolder(blind), chosen, draw)
+        console.print(f"{counted(len(chosen), 'question')} in {shown_path(blind)}", markup=False)
+
+
+def _write_blind(folder: OutFolder, chosen: Sequence[Question], draw: Draw) -> None:
+    names = [f"{question.id}.png" for question in chosen]
+    folder.check([*names, _ANSWERS])
+    for name, question in zip(names, chosen, strict=True):
+        folder.write({name: blind_png(question, draw)})
+    rows = [f"{question.id},{question.answer_letters}" for question in chosen]
+    folder.write({_ANSWERS: "\n".join(("id,answer", *rows)) + "\n"})
 
 
 def _looked_at(asked: Sequence[Question], jobs: int) -> list[Observed]:
     observed = observe_all(asked, min(jobs, len(asked)))
     return list(tracked(observed, len(asked), "Looking", "questions"))
-
-
-def _print_guessing(console: Console, audits: Sequence[SubtaskAudit]) -> None:
-    rows = [
-        (
-            one.subtask,
-            SUBTASK_NAMES[one.subtask],
-            str(one.n),
-            *(_letters(one)),
-            *(_percent(value) for value in (one.chance, one.majority, one.text_only)),
-        )
-        for one in audits
-    ]
-    headings = ("", "subtask", "n", *LETTERS, "chance", "majority", "text only")
-    console.print(plain_table(headings, rows, numbers=8))
-    console.print(
-        "Letters: share of questions where it is right [%]; of ordering, where its picture comes "
-        "first. Guesses: accuracy [%] on questions about other base scenes than those learned "
-        "from.",
-        style="dim",
-    )
-    console.print()
-
-
-def _letters(one: SubtaskAudit) -> list[str]:
-    counts = {
-        letter: sum(n for answer, n in one.letters.items() if answer[0] == letter)
-        for letter in LETTERS
-    }
-    return [_percent(counts[letter] / one.n) for letter in LETTERS]
-
-
-def _print_contents(console: Console, audits: Sequence[SubtaskAudit]) -> None:
-    rows = [
-        (
-            one.subtask,
-            str(one.values),
-            str(len(one.ambiguous)),
-            str(len(one.duplicates)),
-            str(one.named),
-            "" if one.least_seen is None else _percent(one.least_seen[0]),
-            str(one.scenes),
-            str(one.bases),
-            str(one.most_of_a_scene),
-        )
-        for one in audits
-    ]
-    headings = (
-        "",
-        "answers",
-        "alike",
-        "repeats",
-        "named",
-        "least seen",
-        "scenes",
-        "base scenes",
-        "most of one",
-    )
-    console.print(plain_table(headings, rows, numbers=8))
-    console.print(
-        "answers: different right answers; alike: options that read alike; named: blocks that "
-        "words name, and the least that one of them shows of itself [%]; most of one: questions "
-        "about the scene with most.",
-        style="dim",
-    )
-    console.print()
-
-
-def _print_findings(
-    console: Console,
-    audits: Sequence[SubtaskAudit],
-    asked: Sequence[Question],
-    further: Sequence[str],
-) -> None:
-    low, high = (round(100 * bound) for bound in BALANCE)
-    findings = []
-    for one in audits:
-        if not one.is_balanced:
-            findings.append(f"{one.subtask}: a letter is right outside of {low} to {high} %")
-        for name, reached in (("majority", one.majority), ("text only", one.text_only)):
-            if reached is not None and reached > GUESSABLE:
-                findings.append(f"{one.subtask}: {name} reaches {_percent(reached)} %")
-        if one.hidden and one.least_seen is not None:
-            findings.append(
-                f"{one.subtask}: {counted(one.hidden, 'named block')} hardly to be seen, the least "
-                f"in {one.least_seen[1]}"
-            )
-        findings += [f"{name}: options read alike" for name in one.ambiguous]
-    findings += [f"{name}: repeats {first}" for name, first in duplicates_of(asked).items()]
-    findings += further
-    for finding in findings:
-        console.print(finding, style="red", markup=False, soft_wrap=True)
-    verdict = counted(len(findings), "finding") if findings else "nothing to find fault with"
-    console.print(f"{counted(len(asked), 'question')}, {verdict}", markup=False)
-
-
-def _percent(share: float | None) -> str:
-    return "" if share is None else f"{100 * share:.1f}"

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from PIL import Image
 
 from phyblock.cli.main import phyblock
 from phyblock.domain import LETTERS
@@ -63,3 +64,29 @@ def test_pictures_and_classifiers_can_be_left_out(scenes: Path, tmp_path: Path) 
     told = audit(folder, "--data", scenes, "--no-pictures", "--no-text-probe", "-j", 1)
     assert "attack" not in told.stdout
     assert "4 questions" in told.stdout
+
+
+def test_blind_pictures_hold_whole_questions_and_the_answers_stand_apart(
+    scenes: Path, tmp_path: Path
+) -> None:
+    asked = questions(per_subtask=4, subtasks=("SH", "VP", "OR", "AD"))
+    folder = write_questions(tmp_path / "few", asked)
+    out = tmp_path / "blind"
+    quick = ("--no-pictures", "--no-text-probe", "--size", 128, "-j", 1)
+    audit(folder, "--data", scenes, *quick, "--blind", out, "--per-subtask", 2)
+    rows = (out / "answers.csv").read_text(encoding="utf-8").splitlines()
+    answers = dict(row.split(",") for row in rows[1:])
+    right = {one["id"]: one["answer"] for one in asked}
+    assert len(answers) == 8
+    assert answers == {name: right[name] for name in answers}
+    sizes = {}
+    for name in answers:
+        with Image.open(out / f"{name}.png") as picture:
+            sizes[name[:2]] = picture.size
+    # A viewpoint's options stand below its scene, an ordering has no scene.
+    assert sizes["vp"][1] >= sizes["or"][1] + 128
+    changed = [{**one, "answer": "ABCD" if one["subtask"] == "OR" else "A"} for one in asked]
+    write_questions(folder, changed)
+    before = {name: (out / f"{name}.png").read_bytes() for name in answers}
+    audit(folder, "--data", scenes, *quick, "--blind", out, "--per-subtask", 2)
+    assert {name: (out / f"{name}.png").read_bytes() for name in answers} == before
