@@ -26,7 +26,7 @@ __all__ = [
     "SEEN_PX",
     "Top",
     "block_mark",
-    "differing",
+    "changed_pixels",
     "differing_pixels",
     "is_apart",
     "is_inside",
@@ -70,16 +70,16 @@ def _seen(recipe: QuestionPicture, drawn_by: Renderer) -> Shot:
     return shoot(drawn_blocks(recipe), question_camera(recipe, _STYLE), SEEN_PX, drawn_by)
 
 
-def differing(one: Shot, other: Shot) -> NDArray[np.bool_]:
-    """Pixels, shape (size, size), that differ by more than a tenth of the scale in some channel."""
-    step = np.abs(_colors(one) - _colors(other)).max(axis=2)
-    differs: NDArray[np.bool_] = step > _VISIBLE_STEP
-    return differs
-
-
 def differing_pixels(one: Shot, other: Shot) -> int:
-    """How many pixels of the two differ as `differing` has it."""
-    return int(differing(one, other).sum())
+    """How many pixels of the two differ by more than a tenth of the scale in some channel."""
+    return int(changed_pixels(one, other).sum())
+
+
+def changed_pixels(one: Shot, other: Shot) -> NDArray[np.bool_]:
+    """Where the two differ by more than a tenth of the scale in some channel, shape of both."""
+    step = np.abs(_colors(one) - _colors(other)).max(axis=2)
+    changed: NDArray[np.bool_] = step > _VISIBLE_STEP
+    return changed
 
 
 def least_difference(shots: Sequence[Shot]) -> int:

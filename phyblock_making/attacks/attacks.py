@@ -83,12 +83,21 @@ class Attacked:
     aim_inverted: float | None
 
     @property
+    def sides(self) -> tuple[tuple[Rate, float], ...]:
+        """Both ways to read the attack, or the one that there is, with their aims."""
+        if self.aim_inverted is None:
+            return ((self.most, self.aim),)
+        return ((self.most, self.aim), (self.least, self.aim_inverted))
+
+    @property
+    def best(self) -> tuple[Rate, float]:
+        """The way that is right more often, with its aim."""
+        return max(self.sides, key=lambda side: side[0].value)
+
+    @property
     def verdict(self) -> Verdict:
-        """The worse one of both sides."""
-        sides = [_verdict(self.most, self.aim)]
-        if self.aim_inverted is not None:
-            sides.append(_verdict(self.least, self.aim_inverted))
-        return max(sides, key=_VERDICTS.index)
+        """The worse one of both ways."""
+        return max((_verdict(rate, aim) for rate, aim in self.sides), key=_VERDICTS.index)
 
 
 _VERDICTS: tuple[Verdict, ...] = ("met", "over, in noise", "missed")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.sim.render import COLOR_RGB, Shot
-from phyblock.sim.seeing import SEEN_PX, differing
+from phyblock.sim.seeing import SEEN_PX, changed_pixels
 from phyblock_making.attacks.looks import Look, Spot
 
 __all__ = ["MARK_CUES", "PICTURE_CUES", "SCENE_CUES", "Cue", "Floats", "cues_of"]
@@ -80,7 +80,7 @@ def _edges(look: Look) -> list[float]:
 def _oddness(look: Look) -> list[float]:
     """Pixels that differ from the other options, summed over them."""
     return [
-        float(sum(differing(one, other).sum() for other in look.options if other is not one))
+        float(sum(changed_pixels(one, other).sum() for other in look.options if other is not one))
         for one in look.options
     ]
 
@@ -207,7 +207,7 @@ def _center(mask: NDArray[np.bool_]) -> tuple[float, float]:
 
 def _changes(look: Look, shot: Shot) -> NDArray[np.bool_]:
     assert look.scene is not None
-    return differing(look.scene, shot)
+    return changed_pixels(look.scene, shot)
 
 
 def _colors(shot: Shot) -> Floats:

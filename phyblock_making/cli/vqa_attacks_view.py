@@ -51,7 +51,7 @@ def attack_findings(attacked: Sequence[Attacked]) -> list[str]:
     """Aims that are missed beyond doubt, in words."""
     return [
         f"{one.subtask or 'all'}: {' '.join((one.attack.name, one.kind)).strip()} reaches "
-        f"{100 * max(one.most.value, one.least.value):.1f} %"
+        f"{100 * one.best[0].value:.1f} %"
         for one in attacked
         if one.verdict == "missed"
     ]
