@@ -13,18 +13,27 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 
-from phyblock.datasets import AssemblyTask
+from phyblock.datasets import SCENES_FILE, AssemblyTask, read_builtin, read_official
 from phyblock.domain import Plan
 from phyblock.domain.scene import Kind
+from phyblock.resources import bundled
 from phyblock.scoring import Goal, match_plan, micro
 from phyblock.words import SETTINGS
-from phyblock_making.cli.scene_sets import read_data_set
 
 Pick = Callable[[Sequence[int]], int]
 """One of the places at which a kind is listed."""
+
+
+def read(name: str) -> tuple[AssemblyTask, ...]:
+    """The scenes of a folder or of a bundled set."""
+    folder = Path(name)
+    folder = folder if folder.is_dir() else bundled("benchmarks", "data", name)
+    reader = read_builtin if (folder / SCENES_FILE).is_file() else read_official
+    return reader(folder).tasks
 
 
 def listed(task: AssemblyTask) -> dict[Kind, list[int]]:
@@ -116,7 +125,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     for name in options.data:
-        tasks = read_data_set(name).tasks
+        tasks = read(name)
         print(f"{name}: {len(tasks)} scenes")
         print_places(tasks)
         print_poses(tasks)

@@ -49,9 +49,10 @@ def write_questions(
     those.
     """
     lines = "".join(f"{question_line(q, originals[q.scene.id])}\n" for q in questions)
-    card = question_card(folder.name, scenes_name, questions, made_by, audits, attacks)
     files = {
-        _CARD_FILE: card.encode(),
+        _CARD_FILE: question_card(
+            folder.name, scenes_name, questions, made_by, audits, attacks
+        ).encode(),
         QUESTIONS_FILE: lines.encode(),
     }
     sums = "".join(f"{hashlib.sha256(d).hexdigest()}  {name}\n" for name, d in files.items())
