@@ -34,7 +34,7 @@ from phyblock_making.cli.vqa_audit_view import print_contents, print_findings, p
 from phyblock_making.cli.working import jobs_option, tracked
 from phyblock_making.questions.blind_picture import blind_png
 from phyblock_making.questions.sheet import Draw, sheet_html
-from phyblock_making.questions.shortcuts import audit_questions
+from phyblock_making.questions.shortcuts import SubtaskAudit, audit_questions
 
 __all__ = ["command"]
 
@@ -113,50 +113,63 @@ def command(
     for out in (sheet, table):
         if out is not None:
             make_folder(out.parent)
-    tasks = read_question_set(questions, data).tasks
-    other = read_question_set(unseen, unseen_data or data).tasks if unseen else ()
-    asked = [task.question for task in tasks]
-    console = make_console()
-    audits = list(
-        tracked(
-            audit_questions(asked, with_text_probe=not no_text_probe),
-            len({question.subtask for question in asked}),
-            "Auditing",
-            "subtasks",
-        )
-    )
+    read = read_question_set(questions, data)
+    other = _other_set(unseen, unseen_data or data, read.root)
+    some = select_questions(read.tasks, SUBTASKS, range(1, 5), per_subtask, None)
+    chosen = [task.question for task in some]
+    if blind is not None:
+        OutFolder(blind).check([*map(_picture_name, chosen), _ANSWERS])
+    console, asked = make_console(), [task.question for task in read.tasks]
+    audits = _audits(asked, not no_text_probe)
     print_guessing(console, audits)
     print_contents(console, audits)
     looked = [Observed(one) for one in asked] if no_pictures else _looked_at(asked, jobs)
-    attacks = all_attacks([task.question for task in other], with_texts=not no_text_probe)
+    attacks = all_attacks(other, with_texts=not no_text_probe)
     attacked = [row for one in attacks for row in attack(one, looked)]
     if attacked:
         print_attacks(console, attacked)
-    further = [*attack_findings(attacked), *cut_findings(looked)]
-    print_findings(console, audits, asked, further)
+    print_findings(console, audits, asked, [*attack_findings(attacked), *cut_findings(looked)])
     if table is not None:
         write_named(table, audit_json(audits, looked, attacked))
         console.print(f"all figures in {shown_path(table)}", markup=False)
-    some = select_questions(tasks, SUBTASKS, range(1, 5), per_subtask, None)
-    chosen, draw = [task.question for task in some], partial(question_png, style=PictureStyle(size))
+    draw = partial(question_png, style=PictureStyle(size))
     if sheet is not None:
-        pieces = sheet_html(f"Questions of {questions}", chosen, draw)
-        write_named(sheet, "".join(pieces))
-        console.print(f"{counted(len(chosen), 'question')} in {shown_path(sheet)}", markup=False)
+        write_named(sheet, "".join(sheet_html(f"Questions of {questions}", chosen, draw)))
     if blind is not None:
         _write_blind(OutFolder(blind), chosen, draw)
-        console.print(f"{counted(len(chosen), 'question')} in {shown_path(blind)}", markup=False)
+    for place in (sheet, blind):
+        if place is not None:
+            told = f"{counted(len(chosen), 'question')} in {shown_path(place)}"
+            console.print(told, markup=False)
 
 
-def _write_blind(folder: OutFolder, chosen: Sequence[Question], draw: Draw) -> None:
-    names = [f"{question.id}.png" for question in chosen]
-    folder.check([*names, _ANSWERS])
-    for name, question in zip(names, chosen, strict=True):
-        folder.write({name: blind_png(question, draw)})
-    rows = [f"{question.id},{question.answer_letters}" for question in chosen]
-    folder.write({_ANSWERS: "\n".join(("id,answer", *rows)) + "\n"})
+def _other_set(unseen: str | None, data: str, mine: Path) -> list[Question]:
+    """The questions of another set; BadParameter where it is the one that is audited."""
+    if unseen is None:
+        return []
+    other = read_question_set(unseen, data)
+    if other.root.resolve() == mine.resolve():
+        raise click.BadParameter(f"{unseen} is the set that is audited", param_hint="--unseen")
+    return [task.question for task in other.tasks]
+
+
+def _audits(asked: Sequence[Question], with_texts: bool) -> list[SubtaskAudit]:
+    subtasks = len({question.subtask for question in asked})
+    audits = audit_questions(asked, with_text_probe=with_texts)
+    return list(tracked(audits, subtasks, "Auditing", "subtasks"))
 
 
 def _looked_at(asked: Sequence[Question], jobs: int) -> list[Observed]:
     observed = observe_all(asked, min(jobs, len(asked)))
     return list(tracked(observed, len(asked), "Looking", "questions"))
+
+
+def _picture_name(question: Question) -> str:
+    return f"{question.id}.png"
+
+
+def _write_blind(folder: OutFolder, chosen: Sequence[Question], draw: Draw) -> None:
+    for question in chosen:
+        folder.write({_picture_name(question): blind_png(question, draw)})
+    rows = [f"{question.id},{question.answer_letters}" for question in chosen]
+    folder.write({_ANSWERS: "\n".join(("id,answer", *rows)) + "\n"})

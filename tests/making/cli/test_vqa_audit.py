@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 from click.testing import CliRunner
 from PIL import Image
@@ -90,3 +91,9 @@ def test_blind_pictures_hold_whole_questions_and_the_answers_stand_apart(
     before = {name: (out / f"{name}.png").read_bytes() for name in answers}
     audit(folder, "--data", scenes, *quick, "--blind", out, "--per-subtask", 2)
     assert {name: (out / f"{name}.png").read_bytes() for name in answers} == before
+
+
+def test_a_set_is_no_other_set_than_itself(scenes: Path, tmp_path: Path) -> None:
+    folder = write_questions(tmp_path / "few", questions(per_subtask=1, subtasks=("SH",)))
+    with pytest.raises(click.BadParameter, match="is the set that is audited"):
+        audit(folder, "--data", scenes, "--unseen", folder)
