@@ -10,8 +10,8 @@ from phyblock.domain.question import Question
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, check_free, writing
+from phyblock.records.question import StoredQuestion
 from phyblock_making.questions.question_card import question_card
-from phyblock_making.questions.question_lines import question_line
 from phyblock_making.questions.shortcuts import SubtaskAudit
 
 __all__ = ["QUESTIONS_FILE", "check_place", "write_questions"]
@@ -48,7 +48,7 @@ def write_questions(
     that makes the same files; `audits` are told of in the card, and `attacks` is its section about
     those.
     """
-    lines = "".join(f"{question_line(q, originals[q.scene.id])}\n" for q in questions)
+    lines = "".join(f"{StoredQuestion.of(q, originals[q.scene.id]).as_json()}\n" for q in questions)
     files = {
         _CARD_FILE: question_card(
             folder.name, scenes_name, questions, made_by, audits, attacks
