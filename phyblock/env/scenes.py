@@ -6,7 +6,7 @@ from pathlib import Path
 
 from phyblock.datasets import SCENES_FILE, AssemblyTask, read_builtin, read_official
 from phyblock.errors import DataError, Problem
-from phyblock.resources import bundled
+from phyblock.resources import bundled, bundled_sets
 
 __all__ = ["read_tasks"]
 
@@ -23,6 +23,6 @@ def read_tasks(data: str | Path) -> tuple[AssemblyTask, ...]:
         return read_builtin(path).tasks
     if path.is_dir():
         return read_official(path).tasks
-    names = sorted(p.parent.name for p in bundled("benchmarks", "data").glob(f"*/{SCENES_FILE}"))
-    allowed = f"a folder with {SCENES_FILE}, an official checkout, or: {', '.join(names)}"
+    names = ", ".join(bundled_sets(SCENES_FILE))
+    allowed = f"a folder with {SCENES_FILE}, an official checkout, or: {names}"
     raise DataError(Problem(str(data), "there is no such data set", allowed=allowed))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import DataError, Problem
-from phyblock.resources import bundled
+from phyblock.resources import bundled_sets
 
 __all__ = ["open_dataset"]
 
@@ -17,6 +17,6 @@ def open_dataset(format_name: str, path: Path) -> Dataset:
         return read_official(path)
     if path.is_dir():
         return read_builtin(path)
-    names = sorted(p.parent.name for p in bundled("benchmarks", "data").glob(f"*/{SCENES_FILE}"))
-    allowed = f"a folder with {SCENES_FILE}, or a bundled data set: {', '.join(names)}"
+    names = ", ".join(bundled_sets(SCENES_FILE))
+    allowed = f"a folder with {SCENES_FILE}, or a bundled data set: {names}"
     raise DataError(Problem(str(path), "is no data set", "dataset.path", allowed=allowed))

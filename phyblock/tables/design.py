@@ -80,6 +80,11 @@ class Design(_Part):
         """What the paper calls each model that it knows; Table 1 need not have a row of it."""
         return {model.name: model.published for model in self.models if model.published}
 
+    @property
+    def of_suite(self) -> str:
+        """The suite as captions of tables end in it, `, suite NAME`; "" where it has no name."""
+        return f", suite {self.suite.name}" if self.suite.name else ""
+
     def samples(self, track: str) -> int:
         """Samples that a complete run holds of one model in a track."""
         return self.items.get(track, 0) * len(self.suite.seeds)

@@ -94,9 +94,8 @@ def beside_view(
             values = (number(by_cell[kind][cell], signed=signed) for cell in cells)
             rows.append((head, _KINDS[kind], *values))
     columns = [Column(names.get(cell, cell)) for cell in cells]
-    suite = f", suite {run.design.suite.name}" if run.design.suite.name else ""
     return TextTable(
-        f"Our numbers beside the paper's Table {number_in_paper}{suite} (%)",
+        f"Our numbers beside the paper's Table {number_in_paper}{run.design.of_suite} (%)",
         (Column("Model", is_text=True), Column("", is_text=True), *columns),
         tuple(rows),
         (note,),

@@ -9,7 +9,7 @@ import click
 from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.datasets import QUESTIONS_FILE, QuestionSet, read_questions
 from phyblock.errors import DataError, Problem
-from phyblock.resources import bundled
+from phyblock.resources import bundled, bundled_sets
 from phyblock_making.cli.scene_sets import read_data_set
 
 __all__ = [
@@ -65,8 +65,7 @@ def find_questions(name: str) -> Path:
         return path.parent
     if len(path.parts) == 1 and bundled("benchmarks", "data", name, QUESTIONS_FILE).is_file():
         return bundled("benchmarks", "data", name)
-    bundled_sets = bundled("benchmarks", "data").glob(f"*/{QUESTIONS_FILE}")
-    names = ", ".join(sorted(path.parent.name for path in bundled_sets))
+    names = ", ".join(bundled_sets(QUESTIONS_FILE))
     allowed = f"a folder with {QUESTIONS_FILE}, or a bundled set: {names}"
     raise DataError(Problem(name, "there are no such questions", allowed=allowed))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from phyblock.datasets import SCENES_FILE, AssemblyTask, Dataset, read_builtin, read_official
 from phyblock.errors import DataError, Problem
-from phyblock.resources import bundled
+from phyblock.resources import bundled, bundled_sets
 
 __all__ = ["find_data_set", "find_scenes", "read_data_set"]
 
@@ -28,10 +28,8 @@ def find_data_set(name: str) -> Path:
         return path.parent
     if len(path.parts) == 1 and bundled("benchmarks", "data", name, SCENES_FILE).is_file():
         return bundled("benchmarks", "data", name)
-    names = sorted(p.parent.name for p in bundled("benchmarks", "data").glob(f"*/{SCENES_FILE}"))
-    allowed = (
-        f"a folder with {SCENES_FILE}, an official checkout, or a bundled set: {', '.join(names)}"
-    )
+    names = ", ".join(bundled_sets(SCENES_FILE))
+    allowed = f"a folder with {SCENES_FILE}, an official checkout, or a bundled set: {names}"
     message = "holds no data set" if path.is_dir() else "there is no such data set"
     raise DataError(Problem(name, message, allowed=allowed))
 

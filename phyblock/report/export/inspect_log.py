@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from phyblock.extras import needs
 from phyblock.records import PromptMessage, Record, StoredReply
 from phyblock.records import Score as StoredScore
-from phyblock.report.export.rows import needs, newest_records, prompt_text
+from phyblock.report.export.rows import newest_records, prompt_text
 from phyblock.run.prompts import read_prompts
 from phyblock.scoring import Counts, micro
 from phyblock.tables.load import Run

@@ -102,7 +102,7 @@ def intervals_view(table: pd.DataFrame, run: Run) -> TextTable:
         for model in design.model_names
     ]
     return TextTable(
-        f"F1 with 95 % intervals (%){f', suite {design.suite.name}' if design.suite.name else ''}",
+        f"F1 with 95 % intervals (%){design.of_suite}",
         (
             Column("Model", is_text=True),
             *(

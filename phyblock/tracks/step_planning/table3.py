@@ -176,7 +176,7 @@ def table3_view(table: pd.DataFrame, run: Run) -> TextTable:
         for row in table.to_dict("records")
     )
     return TextTable(
-        f"Step-by-step planning (%){_of_suite(run)}",
+        f"Step-by-step planning (%){run.design.of_suite}",
         (_MODEL, *columns, Column("Completed"), Column("Steps / fewest")),
         rows,
         tuple(_notes(table, run)),
@@ -190,10 +190,6 @@ def _row_name(row: Mapping[Hashable, Any]) -> str:
 
 def _cell(row: Mapping[Hashable, Any], cell: str) -> str:
     return spread(row[cell], row.get(f"{cell}_sd", np.nan))
-
-
-def _of_suite(run: Run) -> str:
-    return f", suite {run.design.suite.name}" if run.design.suite.name else ""
 
 
 def _notes(table: pd.DataFrame, run: Run) -> list[str]:
@@ -237,7 +233,7 @@ def endings_view(table: pd.DataFrame, run: Run) -> TextTable:
         for row in table.to_dict("records")
     )
     return TextTable(
-        f"How episodes ended (%){_of_suite(run)}",
+        f"How episodes ended (%){run.design.of_suite}",
         (_MODEL, Column("Episodes"), *columns, Column("Steps"), Column("Steps / fewest")),
         rows,
         ("Steps is the mean over all episodes; Steps / fewest is over those completed.",),
@@ -256,7 +252,7 @@ def moves_view(table: pd.DataFrame, run: Run) -> TextTable:
     )
     columns = [Column(_OUTCOMES[name]) for name in STEP_OUTCOMES]
     return TextTable(
-        f"What became of steps (%){_of_suite(run)}",
+        f"What became of steps (%){run.design.of_suite}",
         (_MODEL, Column("Steps"), *columns),
         rows,
         ("Shares of all steps. Unread: no single operation could be read in the reply.",),
@@ -273,7 +269,7 @@ def progress_view(table: pd.DataFrame, run: Run) -> TextTable:
         for model in run.design.model_names
     )
     return TextTable(
-        f"Blocks of the goal that are placed after so many steps (%){_of_suite(run)}",
+        f"Blocks of the goal that are placed after so many steps (%){run.design.of_suite}",
         (_MODEL, *(Column(str(step)) for step in shown)),
         rows,
         ("Mean over episodes; one that has ended keeps what it had. Every step: progress.csv.",),

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
-from phyblock.scoring import Answered, letter_rates
+from phyblock.scoring import letter_rates
 from phyblock.tables.load import Run, once_per_run
 from phyblock.tables.outcomes import WITHOUT_REPLY
 
@@ -87,8 +87,8 @@ def letters_frame(run: Run) -> pd.DataFrame:
     """
     rows = []
     for model in run.design.model_names:
-        answers = _answers(scored_answers(run, model))
-        rates = letter_rates(answers)
+        answers = scored_answers(run, model)
+        rates = letter_rates(zip(answers["right"], answers["given"], strict=True))
         row: dict[str, Any] = {"model": model, "n": rates.n}
         row["unread"] = rates.n - sum(rates.given.values())
         for letter in LETTERS:
@@ -121,16 +121,6 @@ def scored_answers(run: Run, model: str) -> pd.DataFrame:
         return samples
     names = pd.Series(list(zip(samples["question"], samples["seed"], strict=True)), samples.index)
     return samples[~names.isin(set(names[left_out]))]
-
-
-def _answers(samples: pd.DataFrame) -> list[Answered]:
-    columns = ("question", "seed", "subtask", "right", "given", "rotation")
-    return [
-        Answered(f"{question} s{seed}", subtask, right, given, int(rotation))
-        for question, seed, subtask, right, given, rotation in zip(
-            *(samples[name] for name in columns), strict=True
-        )
-    ]
 
 
 def expected_answers(run: Run) -> dict[str, int]:

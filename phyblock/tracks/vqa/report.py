@@ -11,6 +11,7 @@ from phyblock.tables.paper_numbers import HUMAN_ACCURACY, HUMAN_NOTE
 from phyblock.tables.track_report import PaperTable, Shown, TableMaker, TrackReport
 from phyblock.tracks.vqa.accuracy import questions_frame
 from phyblock.tracks.vqa.answers import OVERALL_CELL, letters_frame, showing
+from phyblock.tracks.vqa.export import QUESTION_EXPORT
 from phyblock.tracks.vqa.figure import vqa_heat_map
 from phyblock.tracks.vqa.measures import (
     ACCURACY,
@@ -87,4 +88,5 @@ REPORT = TrackReport(
     check_alike=_check_alike,
     part_names={str(short): name for short, name in SUBTASK_NAMES.items()},
     items=question_items,
+    export=QUESTION_EXPORT,
 )

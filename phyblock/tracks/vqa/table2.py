@@ -92,9 +92,8 @@ def table2_view(table: pd.DataFrame, run: Run) -> TextTable:
     rows = tuple(
         (_row_name(row), *(_cell(row, cell) for cell in CELLS)) for row in table.to_dict("records")
     )
-    suite = f", suite {run.design.suite.name}" if run.design.suite.name else ""
     return TextTable(
-        f"Physical-understanding VQA (%){suite}{_how_shown(run)}",
+        f"Physical-understanding VQA (%){run.design.of_suite}{_how_shown(run)}",
         (_MODEL, *columns, Column("Avg", "Overall")),
         rows,
         tuple(_notes(table, run)),
