@@ -154,8 +154,8 @@ class TrackReport:
     `tables`, `figures` and `paper_tables` (by their number in the paper) are its own; a figure is
     None for a run that has no numbers for it. `bars` is the name of the figure of its first
     measure. `check_alike` raises SpecError where the first run cannot be compared with the second
-    in these cells. `part_names` say what `Record.part` stands for. `items` opens, for the page and
-    out of a manifest, what was asked about where that is more than scenes; it raises DataError
+    in these cells. `part_names` say what `Record.part` stands for. `items` opens, for the page of a
+    run, what was asked about where that is more than scenes; it raises DataError
     where that is not what the run was made on. `episodes` shows records that are episodes, `export`
     writes what is asked about.
     """
@@ -177,6 +177,6 @@ class TrackReport:
     paper_tables: Mapping[int, PaperTable] = field(default_factory=dict)
     check_alike: Callable[[Run, Run, Sequence[str]], None] | None = None
     part_names: Mapping[str, str] = field(default_factory=dict)
-    items: Callable[[Mapping[str, Any], Dataset], PageItems] | None = None
+    items: Callable[[Run, Dataset], PageItems] | None = None
     episodes: EpisodeView | None = None
     export: ItemExport | None = None

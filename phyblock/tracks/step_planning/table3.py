@@ -19,6 +19,7 @@ from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.step_planning.episodes import STEP_OUTCOMES, endings_frame
 from phyblock.tracks.step_planning.measures import COUNTED, NAME, is_asked
 from phyblock.tracks.step_planning.rules import ENDINGS
+from phyblock.tracks.step_planning.spec import StepsSpec
 
 __all__ = [
     "ENDING_NAMES",
@@ -193,13 +194,13 @@ def _cell(row: Mapping[Hashable, Any], cell: str) -> str:
 
 
 def _notes(table: pd.DataFrame, run: Run) -> list[str]:
-    steps = run.manifest["suite"].get("steps", {})
+    steps = run.section("steps", StepsSpec)
     seeds = len(run.design.suite.seeds)
-    accepts = steps.get("setting") or run.design.setting
+    accepts = steps.setting or run.design.setting
     notes = [
         f"Scored in setting {run.design.setting}. The simulator goes by setting {accepts}, gating "
-        f"{steps.get('gating')}, physics {steps.get('physics')}; feedback {steps.get('feedback')}, "
-        f"history as {steps.get('history')}. Micro averages.",
+        f"{steps.gating}, physics {steps.physics}; feedback {steps.feedback}, "
+        f"history as {steps.history}. Micro averages.",
         "Placed blocks: those in the world; one is wrong when the goal has no such block left in "
         "this setting, or when it fell. A simulator that goes by the same setting places no wrong "
         "one, so precision is then below 100 by collapses alone. The paper does not say how its "

@@ -48,7 +48,7 @@ def open_vqa(opening: Opening) -> Vqa:
     if not opening.with_prompts:
         return Vqa(rules, questions, tasks)
     pictures = QuestionPictures(
-        picture_folder(), picture_style(suite), spec.options_as, render_workers()
+        picture_folder(), picture_style(suite.images), spec.options_as, render_workers()
     )
     return Vqa(rules, questions, tasks, template_prompt(loaded, Vqa.name), pictures)
 
