@@ -263,11 +263,13 @@ def f1_of(sums: Floats) -> Floats:
 
 
 def ratio_of(sums: Floats) -> Floats:
-    """Part / whole of counts (..., [part, whole]), as right answers of answers; NaN for no whole.
+    """Part / whole of counts (..., [part, whole]), as right answers of answers.
 
-    The mean of such ratios over the axis before the last is a macro average.
+    NaN for no whole, and for a part that is more than the whole, which is no share of it: the
+    paper's criterion `membership` counts repeated steps again. The mean of such ratios over the
+    axis before the last is a macro average.
     """
     part, whole = sums[..., 0], sums[..., 1]
     out = np.full(part.shape, np.nan)
-    np.divide(part, whole, out=out, where=whole != 0)
+    np.divide(part, whole, out=out, where=(whole > 0) & (part <= whole))
     return out
