@@ -102,5 +102,5 @@ def interval_view(
         f"{caption} with 95 % intervals{run.design.of_suite}",
         (Column("Model", is_text=True), *columns),
         tuple(rows),
-        (f"Intervals: base scenes resampled{most}.",),
+        (f"Intervals: base scenes left out in turn{most}.",),
     )

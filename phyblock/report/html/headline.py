@@ -52,7 +52,7 @@ class Headline:
     references: dict[str, float] = field(default_factory=dict)
 
 
-_BELOW = "Below each value stands its 95 % interval, from resampling the base scenes."
+_BELOW = "Below each value stands its 95 % interval, from leaving out each base scene in turn."
 
 
 def headlines(run: Run) -> list[Headline]:
