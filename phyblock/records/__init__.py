@@ -17,11 +17,9 @@ from phyblock.records.record import (
     SentImage,
     SentPrompt,
     ShownScene,
-    StoredError,
-    StoredReply,
-    StoredUsage,
 )
 from phyblock.records.record_lines import RecordedLines, RecordLines, record_adapter
+from phyblock.records.reply import StoredError, StoredReply, StoredUsage
 from phyblock.records.scene import StoredScene
 
 __all__ = [

@@ -94,7 +94,7 @@ def strongest_floors(run: Run, track: str, measure: Measure) -> dict[str, Floor]
 def floors_run(run: Run, track: str) -> set[str]:
     """The models of a run that are floors of a track."""
     named = {floor for measure in track_measures(track) for floor in measure.floors}
-    return named & {str(m["name"]) for m in run.manifest["models"] if m.get("kind") == "baseline"}
+    return named & {model.name for model in run.manifest.models if model.kind == "baseline"}
 
 
 def headline_floors(run: Run, track: str) -> dict[str, Floor]:
@@ -123,7 +123,7 @@ def _known_floors(run: Run, track: str, measure: Measure) -> Iterator[tuple[str,
     for row in found[found["model"].isin(asked)].to_dict("records"):
         if not math.isnan(row["value"]):
             yield way_name(row), Floor(str(row["model"]), float(row["value"]))
-    computed = run.manifest.get("floors", {}).get(track, {})
+    computed = run.manifest.floors.get(track, {})
     for name in measure.floors:
         for way, value in computed.get(name, {}).items() if name not in asked else ():
             yield way, Floor(name, float(value))

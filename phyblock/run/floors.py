@@ -8,20 +8,20 @@ run.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from phyblock.datasets import AssemblyTask
 from phyblock.models.base import Reply
 from phyblock.records import MANIFEST, Manifest, Record
+from phyblock.records.manifest import ManifestModel
 from phyblock.run.records import begun, judged
 from phyblock.specs import SuiteSpec
 from phyblock.tables.design import read_design
 from phyblock.tables.load import Run, frames_of
 from phyblock.tables.measures import WAY, way_name
-from phyblock.tracks import kind_of, shown_item
+from phyblock.tracks import AnyTrack, SingleTrack, kind_of, shown_item
 from phyblock.tracks.estimates import track_estimates, track_measures
 
 __all__ = ["COMPUTED_FLOORS", "FloorValues", "floor_values"]
@@ -35,51 +35,43 @@ FloorValues = dict[str, dict[str, dict[str, float]]]
 def floor_values(
     manifest: Manifest,
     suite: SuiteSpec,
-    tasks: Sequence[AssemblyTask],
-    pool: Sequence[AssemblyTask],
+    reopened: Callable[[str, SuiteSpec], AnyTrack],
 ) -> FloorValues:
-    """What the floors of `COMPUTED_FLOORS` reach on `tasks`, for every measure that names them.
+    """What the floors of `COMPUTED_FLOORS` reach on a run, for every measure that names them.
 
-    They learn from `pool`, all scenes of the data set, under each setting of the suite; the best
-    value counts.
+    `reopened` opens a track under a suite, without prompts. Floors learn under each setting of
+    the suite; the best value counts.
     """
     found: FloorValues = {}
     for name in suite.tracks:
         named = {floor for measure in track_measures(name) for floor in measure.floors}
         floors = [floor for floor in COMPUTED_FLOORS if floor in named]
-        if kind_of(name).rescored is None or not floors:
+        if not kind_of(name).rescored or not floors:
             continue
         found[name] = {floor: {} for floor in floors}
         for setting in suite.settings:
             # What is learned goes by the first setting; what scores best in B may be either.
             others = (other for other in suite.settings if other != setting)
             one = suite.model_copy(update={"settings": (setting, *others)})
-            records = list(_answered(name, floors, one, tasks, pool))
+            records = list(_answered(reopened(name, one), floors, one))
             for floor, way, value in _estimates(manifest, name, floors, records):
                 found[name][floor][way] = max(value, found[name][floor].get(way, value))
     return found
 
 
-def _answered(
-    track_name: str,
-    floors: Sequence[str],
-    suite: SuiteSpec,
-    tasks: Sequence[AssemblyTask],
-    pool: Sequence[AssemblyTask],
-) -> Iterator[Record]:
+def _answered(track: AnyTrack, floors: Sequence[str], suite: SuiteSpec) -> Iterator[Record]:
     """The judged answers of floors; one seed tells all unless each shows another order."""
-    kind = kind_of(track_name)
-    assert kind.rescored is not None
-    track = kind.rescored(suite, tasks, pool)
+    assert isinstance(track, SingleTrack)
+    rules = kind_of(track.name).baselines
     seeds = suite.seeds if suite.candidates.order == "shuffled" else suite.seeds[:1]
     for item in track.items:
         for seed in seeds:
             shown = shown_item(track, item, seed)
             ((request, _),) = track.outlines(shown)
             for floor in floors:
-                text = kind.baselines[floor](request.subject, np.random.default_rng(seed))
-                sample = f"{track_name}/{floor}/{item.key}/s{seed}"
-                fields = begun(sample, track_name, floor, shown, seed, Reply(text, cost_usd=0.0))
+                text = rules[floor](request.subject, np.random.default_rng(seed))
+                sample = f"{track.name}/{floor}/{item.key}/s{seed}"
+                fields = begun(sample, track.name, floor, shown, seed, Reply(text, cost_usd=0.0))
                 yield judged({**fields, **track.about(shown)}, shown, track.judge(shown, text))
 
 
@@ -87,8 +79,9 @@ def _estimates(
     manifest: Manifest, track: str, floors: Sequence[str], records: Sequence[Record]
 ) -> Iterator[tuple[str, str, float]]:
     """Floor, way of counting and value, of measures that name floors."""
-    facts = {**manifest.fields(), "models": [{"name": floor} for floor in floors]}
-    design = read_design(facts)
+    models = tuple(ManifestModel(name=floor) for floor in floors)
+    facts = manifest.model_copy(update={"models": models})
+    design = read_design(facts.fields())
     run = Run(Path(MANIFEST), facts, design, *frames_of(records, design, texts=False))
     measures = [measure.name for measure in track_measures(track) if measure.floors]
     rows = track_estimates(run, track)

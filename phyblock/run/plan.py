@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from phyblock.datasets import AssemblyTask, Dataset
+from phyblock.datasets import Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.records import Manifest
 from phyblock.run.data import open_dataset
@@ -23,8 +23,8 @@ __all__ = ["RunPlan", "make_plan"]
 
 @dataclass(frozen=True)
 class RunPlan:
-    """Everything a run needs; `manifest` is what `run.yaml` holds, but for what floors reach,
-    which learn from `pool`, all scenes of the data set.
+    """Everything a run needs; `manifest` is what `run.yaml` holds, but for what floors reach;
+    `reopened` opens a track under a suite, without prompts.
     """
 
     suite: SuiteSpec
@@ -32,11 +32,11 @@ class RunPlan:
     dataset: Dataset
     tracks: tuple[AnyTrack, ...]
     manifest: Manifest
-    pool: tuple[AssemblyTask, ...] = ()
+    reopened: Callable[[str, SuiteSpec], AnyTrack]
 
     def begun(self) -> Manifest:
         """The manifest of a run that begins, with what floors reach; it takes some seconds."""
-        floors = floor_values(self.manifest, self.suite, self.dataset.tasks, self.pool)
+        floors = floor_values(self.manifest, self.suite, self.reopened)
         return self.manifest.model_copy(update={"floors": floors})
 
     @property
@@ -90,7 +90,12 @@ def make_plan(
     if not any(track.items for track in tracks):
         raise SpecError(_nothing(loaded, dataset, limit))
     manifest = make_manifest(loaded, models, selected, tracks, limit)
-    return RunPlan(suite, models, selected, tracks, manifest, dataset.tasks)
+
+    def reopened(name: str, one: SuiteSpec) -> AnyTrack:
+        opening = Opening(replace(loaded, suite=one), dataset, limit, with_prompts=False)
+        return kind_of(name).open(opening)
+
+    return RunPlan(suite, models, selected, tracks, manifest, reopened)
 
 
 def _nothing(loaded: LoadedSuite, dataset: Dataset, limit: int | None) -> Problem:

@@ -16,7 +16,7 @@ _ORDERS = {"shuffled": "candidates shuffled"}
 
 def control_words(run: Run, section: str) -> tuple[str, ...]:
     """The controls that a track's section of the suite sets; older runs have no such section."""
-    held = run.manifest.get("suite", {}).get(section) or {}
+    held = run.manifest.suite.get(section) or {}
     return tuple(words for name, words in _CONTROLS.items() if held.get(name))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.tables.cells import micro_averages
+from phyblock.scoring.uncertainty import f1_of
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
 from phyblock.tables.text_table import Column, TextTable, between, number
@@ -64,7 +64,9 @@ def _over_seeds(run: Run, track: str, criterion: str, matcher: str) -> dict[str,
     kept = (scores["track"] == track) & (scores["criterion"] == criterion)
     kept &= (scores["setting"] == run.design.setting) & (scores["matcher"] == matcher)
     kept &= ~scores["outcome"].isin(run.design.outcomes_left_out)
-    each = micro_averages(scores[kept], ["model", "seed"])["f1"].groupby(level="model")
+    sums = scores[kept].groupby(["model", "seed"])[["tp", "fp", "fn"]].sum()
+    values = pd.Series(f1_of(sums.to_numpy(np.float64)), index=sums.index)
+    each = values.groupby(level="model")
     table = each.agg(["mean", "std", "min", "max"])
     return {str(model): [float(value) for value in row] for model, *row in table.itertuples()}
 

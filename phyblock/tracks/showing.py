@@ -15,10 +15,20 @@ from typing import Any
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import CandidateSet
 from phyblock.errors import DataError, Problem
+from phyblock.records import Record
 from phyblock.tracks.elsewhere import Elsewhere
 from phyblock.words import CandidateOrder
 
-__all__ = ["Showing", "ShownTask", "TaskShowing", "file_plan", "in_order", "shown_order", "told_of"]
+__all__ = [
+    "Showing",
+    "ShownTask",
+    "TaskShowing",
+    "as_recorded",
+    "file_plan",
+    "in_order",
+    "shown_order",
+    "told_of",
+]
 
 
 @dataclass(frozen=True)
@@ -104,6 +114,11 @@ def in_order(task: AssemblyTask, numbers: Sequence[int], goal: AssemblyTask | No
         )
     shown = CandidateSet(tuple(task.candidates[number] for number in numbers))
     return ShownTask(task.scene, shown, task.composite, tuple(numbers), goal)
+
+
+def as_recorded(task: AssemblyTask, record: Record) -> AssemblyTask:
+    """The task with its candidates in the order in which a record says that they were shown."""
+    return task if record.shown is None else in_order(task, record.shown.order, task)
 
 
 def shown_order(task: AssemblyTask, seed: int) -> tuple[int, ...]:

@@ -14,7 +14,7 @@ from phyblock.tracks.opening import assembly_pictures, task_showing, template_pr
 from phyblock.tracks.prompts import OfficialPrompt, Prompt
 from phyblock.tracks.selection import select_tasks
 
-__all__ = ["open_full_planning", "rescored_planning"]
+__all__ = ["open_full_planning"]
 
 
 def open_full_planning(opening: Opening) -> FullPlanning:
@@ -29,14 +29,6 @@ def open_full_planning(opening: Opening) -> FullPlanning:
         _check_composites(opening.dataset, tasks)
     pictures = assembly_pictures(suite)
     return FullPlanning(_rules(suite), _prompt(opening.loaded), pictures, tasks, showing, pool)
-
-
-def rescored_planning(
-    suite: SuiteSpec, tasks: Sequence[AssemblyTask], pool: Sequence[AssemblyTask]
-) -> FullPlanning:
-    """The track for reading stored replies again; nothing is asked."""
-    showing = task_showing(suite, PlanningSpec, FullPlanning.name, tasks, pool)
-    return FullPlanning(_rules(suite), items=tasks, showing=showing, pool=pool)
 
 
 def _rules(suite: SuiteSpec) -> PlanningRules:

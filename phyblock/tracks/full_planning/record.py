@@ -50,8 +50,6 @@ class PlanRecord(Record):
     """`full_planning`."""
     parse: PlanParse | None = None
     """The plan that was read."""
-    shown: ShownScene | None = None
-    """How the scene was shown; null: as the file has it."""
 
     columns: ClassVar[Mapping[str, str]] = PLAN_COLUMNS
 

@@ -9,11 +9,10 @@ from phyblock.domain import Block
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.site import settle
 from phyblock.tables.text_table import Column, TextTable
-from phyblock.tracks.showing import in_order
 from phyblock.tracks.step_planning.record import EpisodeRecord, EpisodeTurn
 from phyblock.tracks.step_planning.table3 import ENDING_NAMES
 
-__all__ = ["as_recorded", "episode_film", "episode_table"]
+__all__ = ["episode_film", "episode_table"]
 
 
 def _operation(turn: EpisodeTurn) -> str:
@@ -45,11 +44,6 @@ def episode_table(record: EpisodeRecord) -> TextTable:
 
 def _words(name: str | None) -> str:
     return (name or "none").replace("_", " ")
-
-
-def as_recorded(task: AssemblyTask, record: EpisodeRecord) -> AssemblyTask:
-    """The task with its candidates in the order in which the episode showed them."""
-    return task if record.shown is None else in_order(task, record.shown.order, task)
 
 
 def episode_film(record: EpisodeRecord, task: AssemblyTask) -> Iterator[FilmStep]:

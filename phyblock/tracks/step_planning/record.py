@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
-from phyblock.records import AskedTurn, Line, Record, ShownScene, StoredReply
+from phyblock.records import AskedTurn, Line, Record, StoredReply
 from phyblock.records.line import Whole
 from phyblock.tracks.full_planning.record import PLAN_COLUMNS, PlanParse, plan_row
 from phyblock.tracks.step_planning.prompt import StepOutcome
@@ -55,8 +55,6 @@ class EpisodeRecord(Record):
     """`step_planning`."""
     parse: PlanParse | None = None
     """`plan` holds the moves that were attempted."""
-    shown: ShownScene | None = None
-    """How the scene was shown; null: as the file has it."""
     max_steps: Whole = 0
     """The most steps that the episode can take."""
     setting: str = ""

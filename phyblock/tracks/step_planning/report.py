@@ -8,7 +8,14 @@ from functools import partial
 from phyblock.errors import Problem, SpecError
 from phyblock.tables.load import Run
 from phyblock.tables.showing import planning_words
-from phyblock.tables.track_report import WHOLE, PaperTable, Shown, TableMaker, TrackReport
+from phyblock.tables.track_report import (
+    WHOLE,
+    EpisodeView,
+    PaperTable,
+    Shown,
+    TableMaker,
+    TrackReport,
+)
 from phyblock.tracks.orders import order_frame, order_in_terminal, order_view
 from phyblock.tracks.step_planning.episodes import (
     NAME,
@@ -17,6 +24,7 @@ from phyblock.tracks.step_planning.episodes import (
     progress_frame,
 )
 from phyblock.tracks.step_planning.figure import progress_by_turn
+from phyblock.tracks.step_planning.film import episode_film, episode_table
 from phyblock.tracks.step_planning.measures import STEP_MEASURES
 from phyblock.tracks.step_planning.table3 import (
     endings_view,
@@ -96,4 +104,5 @@ REPORT = TrackReport(
     paper_tables={3: PaperTable(paper_table3_frame, paper_table3_view)},
     check_alike=_check_alike,
     showing=lambda run: planning_words(run, "steps"),
+    episodes=EpisodeView(episode_table, episode_film),
 )
