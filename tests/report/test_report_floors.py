@@ -44,7 +44,7 @@ def verdicts(run: Run) -> dict[str, tuple[str, str]]:
 
 def test_the_strongest_floor_is_named_and_whose_interval_is_above_it() -> None:
     counts = {"good": (4, 4, 3), "middling": (1, 3, 2), "bad": (0, 1, 0), "random": (1, 1, 1)}
-    run = run_with({"goal-blind": 0.5, "all-candidates": 0.3}, **counts)
+    run = run_with({"goal-blind": 0.3, "all-candidates": 0.2}, **counts)
     assert verdicts(run) == {
         "good": ("goal-blind", "above"),
         "middling": ("goal-blind", "not above"),
@@ -53,9 +53,9 @@ def test_the_strongest_floor_is_named_and_whose_interval_is_above_it() -> None:
     weaker = run_with({"all-candidates": 0.2}, **counts)
     assert {floor for floor, _ in verdicts(weaker).values()} == {"random"}
     (title, line) = floor_lines(floors_frame(run), run)
-    assert line == "Full planning, Overall F1: goal-blind 50.0; not above it: middling, bad"
+    assert line == "Full planning, Overall F1: goal-blind 30.0; not above it: middling, bad"
     view = floors_view(floors_frame(run), run)
-    assert ("F1, Overall", "A", "aov", "goal-blind", "50.0", "good", "middling, bad") in view.rows
+    assert ("F1, Overall", "A", "aov", "goal-blind", "30.0", "good", "middling, bad") in view.rows
     assert title.startswith("Floors")
 
 
@@ -87,11 +87,11 @@ def test_above_is_an_interval_that_lies_wholly_above(
 
 
 def test_the_headline_has_the_floor_and_marks_what_is_not_above_it() -> None:
-    run = run_with({"goal-blind": 0.5}, good=(4, 4, 3), bad=(0, 1, 0))
-    assert headline_floors(run, "full_planning")["Overall F1"].value == 50.0
+    run = run_with({"goal-blind": 0.3}, good=(4, 4, 3), bad=(0, 1, 0))
+    assert headline_floors(run, "full_planning")["Overall F1"].value == 30.0
     (headline,) = headlines(run)
     rows = {row.name: row.cells[headline.main] for row in headline.rows}
-    assert rows["Floor: goal-blind"].value == 50.0
+    assert rows["Floor: goal-blind"].value == 30.0
     assert rows["bad"].below.endswith(", not above the floor")
     assert "floor" not in rows["good"].below
 
