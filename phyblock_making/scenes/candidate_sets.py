@@ -63,8 +63,8 @@ def make_candidates(
 ) -> CandidateSet:
     """Up to `size` candidates that look different, all that the scene needs among them.
 
-    Distractors come from `palette`. Types that goals have low stand first, candidates
-    of one type in an order that is drawn. The same scene id and seed give the same set everywhere. Raises
+    Distractors come from `palette`. Types that goals have low stand first, candidates of one type
+    in an order that is drawn. The same scene id and seed give the same set everywhere. Raises
     DataError when the scene needs more than `size` looks.
     """
     needed = _by_look([Candidate(b.type, b.color, b.euler_deg) for b in scene.blocks])

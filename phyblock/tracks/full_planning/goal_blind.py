@@ -36,7 +36,7 @@ _PRIOR = 4.0
 _ORDERS: tuple[Callable[[float, int, int], tuple[float, ...]], ...] = (
     lambda height, copy, number: (height, copy, number),
     lambda height, copy, number: (copy, height, number),
-    lambda height, copy, number: (copy, number),
+    lambda _, copy, number: (copy, number),
 )
 """By height; all once by height, then all a second time; the same as they are listed."""
 
@@ -60,7 +60,10 @@ def goal_blind_plans(
 
 
 def _ways(
-    known: Sequence[Lesson], kin: Sequence[Sequence[int]], learners: Sequence[Learner], repeats: bool
+    known: Sequence[Lesson],
+    kin: Sequence[Sequence[int]],
+    learners: Sequence[Learner],
+    repeats: bool,
 ) -> Iterator[list[Plan]]:
     """Plans for all lessons, made in one way after another."""
     heights = _heights(known, kin)

@@ -1,4 +1,4 @@
-"""Scenes as what learns from them without seeing the goal takes them, and sums over other scenes."""
+"""Scenes as learners take them, and sums over the scenes that one may learn from."""
 
 from __future__ import annotations
 
