@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from phyblock.datasets.version import VERSION_FILE
 from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
@@ -21,6 +22,7 @@ from phyblock_making.scenes.scene_draft import PALETTES, Palette
 __all__ = [
     "CARD_FILE",
     "SCENES_FILE",
+    "SET_VERSION",
     "SUMS_FILE",
     "LevelStatistics",
     "SetWriter",
@@ -32,6 +34,10 @@ __all__ = [
 SCENES_FILE = "scenes.jsonl"
 CARD_FILE = "README.md"
 SUMS_FILE = "SHA256SUMS"
+SET_VERSION = 2
+"""Counts what makes other scenes or candidate sets out of the same seed: 2 offers distractors as
+often as goals need them, and shows at least 3 % of every block's outline.
+"""
 QUANTITIES = ("blocks", "types", "colors", "layers")
 
 
@@ -89,6 +95,7 @@ class SetWriter:
                     shutil.copyfileobj(file, out)
         whole.replace(self._folder / SCENES_FILE)
         atomic_write(self._folder / CARD_FILE, card)
+        atomic_write(self._folder / VERSION_FILE, f"{SET_VERSION}\n")
         atomic_write(self._folder / SUMS_FILE, sums_text(self._folder))
 
 
@@ -102,7 +109,7 @@ def open_writer(folder: Path, palette: Palette, replace: bool = False) -> Iterat
         hint = "give another --out, or --replace"
         raise StoreError(Problem(str(folder), "holds a data set already", hint=hint))
     if not (folder / SCENES_FILE).exists():
-        others = [folder / name for name in (SCENES_FILE, CARD_FILE, SUMS_FILE)]
+        others = [folder / name for name in (SCENES_FILE, CARD_FILE, VERSION_FILE, SUMS_FILE)]
         check_free(others, "give another --out")
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -143,8 +150,8 @@ def scene_line(scene: Scene, candidates: CandidateSet) -> str:
 
 
 def sums_text(folder: Path) -> str:
-    """Checksums of the scenes and the card, as `sha256sum -c` reads them."""
-    names = (CARD_FILE, SCENES_FILE)
+    """Checksums of the scenes, the card and the version, as `sha256sum -c` reads them."""
+    names = (CARD_FILE, SCENES_FILE, VERSION_FILE)
     sums = [hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in names]
     return "".join(f"{one}  {name}\n" for one, name in zip(sums, names, strict=True))
 
