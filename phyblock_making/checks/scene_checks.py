@@ -157,9 +157,9 @@ def _hidden(facts: SceneFacts) -> Iterator[Finding]:
     least = facts.tolerances.shown
     for order, share in facts.shown.items():
         if share < least and order not in facts.hidden:
-            message = f"{share:.1%} of the outline of block {order} shows in the goal picture"
-            about, limit = (order,), 100 * least
-            yield Finding(facts.scene.id, "hidden", message, about, 100 * share, limit, "%")
+            message = f"only {share:.1%} of the outline of block {order} shows in the goal picture"
+            covered, limit = 100 * (1 - share), 100 * (1 - least)
+            yield Finding(facts.scene.id, "hidden", message, (order,), covered, limit, "%")
 
 
 def _lacking_candidates(facts: SceneFacts) -> Iterator[Finding]:

@@ -74,8 +74,8 @@ class SetWriter:
         self.shared = self.base = self.count = 0
         self.sizes: set[int] = set()
 
-    def add(self, scene: Scene) -> None:
-        """Append a scene with a candidate set of its own."""
+    def add(self, scene: Scene) -> CandidateSet:
+        """Append a scene with a candidate set of its own, which is returned."""
         candidates = make_candidates(scene, palette=PALETTES[self._palette])
         with (self._parts / f"{scene.levels[0]}").open("a", encoding="utf-8", newline="\n") as file:
             file.write(scene_line(scene, candidates) + "\n")
@@ -85,6 +85,7 @@ class SetWriter:
         self.shared += len(scene.levels) > 1
         self.base += scene.parents == (scene.id,)
         self.sizes.add(len(candidates))
+        return candidates
 
     def finish(self, card: str) -> None:
         """Put the scenes together, sorted by id, and write the card and the checksums."""

@@ -31,6 +31,8 @@ lesson the chances that the goal has at least 1, 2, ... of each unit, shape (uni
 MOST_COPIES = 6
 """More of one unit are never named."""
 _THRESHOLDS = (0.0, 0.1, 0.14, 0.18, 0.23, 0.3, 0.4)
+_DIGITS = 9
+"""Sums of which a part was taken away again are known so well."""
 _PRIOR = 4.0
 """So many units of the overall frequency are mixed into every row of a table."""
 _ORDERS: tuple[Callable[[float, int, int], tuple[float, ...]], ...] = (
@@ -50,8 +52,9 @@ def goal_blind_plans(
 ) -> dict[str, Plan]:
     """For each scene's id the plan that is expected to score best, by the other scenes.
 
-    No scene that shares a base scene has a part in it. `learners` are the frequency tables unless
-    given. Without `repeats` no candidate is named twice. A scene that shares a base scene with all
+    No scene that shares a base scene is learned from, nor is its score: it has a part only in the
+    plans of unrelated scenes, by whose scores one of the ways is chosen. `learners` are the
+    frequency tables unless given. Without `repeats` no candidate is named twice. A scene that shares a base scene with all
     others gets every candidate once.
     """
     known, kin = lessons(scenes, candidates, setting), related(scenes)
@@ -138,7 +141,7 @@ def _heights(known: Sequence[Lesson], kin: Sequence[Sequence[int]]) -> list[Floa
         seen = ~np.isnan(height)
         values.append(np.column_stack([seen, np.where(seen, height, 0.0)]).astype(np.float64))
     return [
-        (part[:, 2] + whole[2] / max(whole[1], 1.0)) / (part[:, 1] + 1.0)
+        ((part[:, 2] + whole[2] / max(whole[1], 1.0)) / (part[:, 1] + 1.0)).round(_DIGITS)
         for part, whole in left_out(keys, values, kin)
     ]
 
