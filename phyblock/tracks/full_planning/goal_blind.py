@@ -54,8 +54,8 @@ def goal_blind_plans(
 
     No scene that shares a base scene is learned from, nor is its score: it has a part only in the
     plans of unrelated scenes, by whose scores one of the ways is chosen. `learners` are the
-    frequency tables unless given. Without `repeats` no candidate is named twice. A scene that shares a base scene with all
-    others gets every candidate once.
+    frequency tables unless given. Without `repeats` no candidate is named twice. A scene that
+    shares a base scene with all others gets every candidate once.
     """
     known, kin = lessons(scenes, candidates, setting), related(scenes)
     ways = list(_ways(known, kin, FREQUENCIES if learners is None else learners, repeats))
@@ -87,17 +87,16 @@ def _plan(
     order: Callable[[float, int, int], tuple[float, ...]],
     again: bool,
 ) -> Plan:
-    """What is at least so likely; every candidate once where `least` is 0, and the likeliest
-    alone where nothing is likely enough.
+    """What is at least so likely; every candidate once where `least` is 0, what is likeliest
+    where nothing is likely enough.
     """
+    least = min(least, float(chances[:, 0].max()))
     named: list[tuple[tuple[float, ...], int]] = []
     for at, copy in zip(*np.nonzero(chances >= least), strict=True):
         numbers = lesson.units[at].numbers
         if copy < len(numbers) or (again and least > 0):
             number = numbers[copy % len(numbers)]
             named.append((order(float(heights[at]), int(copy), number), number))
-    if not named:
-        return Plan((lesson.units[int(chances[:, 0].argmax())].place,))
     return Plan(tuple(number for _, number in sorted(named)))
 
 
