@@ -12,6 +12,7 @@ from rich.console import Console
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.datasets import SCENES_FILE
+from phyblock.datasets.named import find_data_set
 from phyblock.files import check_free, make_folder, write_named
 from phyblock.folders import OutFolder
 from phyblock.sim import PictureStyle
@@ -25,7 +26,6 @@ from phyblock_making.auditing.tells import blind_scores, find_tells, learners
 from phyblock_making.checks.scene_facts import SceneFacts
 from phyblock_making.checks.set_checks import find_duplicates
 from phyblock_making.checks.tolerances import FOREIGN, Tolerances
-from phyblock_making.cli.scene_sets import find_data_set
 from phyblock_making.cli.scenes_audit_view import print_audit, print_changes, worst_scenes
 from phyblock_making.cli.scenes_tells_view import print_blind, print_tells
 from phyblock_making.cli.working import jobs_option, tracked
