@@ -19,10 +19,22 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str) -> None:
     The track says what must agree in how the two were asked and scored; scenes of a name must be
     the same.
     """
+    _check_version(run, first)
     check = kind_of(track).report().check_alike
     if check is not None:
         check(run, first, cells)
     _check_scenes(run, first)
+
+
+def _check_version(run: Run, first: Run) -> None:
+    """Scenes of two versions of a data set may share a name and nothing else."""
+    found, wanted = (one.manifest.get("dataset") or {} for one in (run, first))
+    versions = found.get("version", 1), wanted.get("version", 1)
+    if found.get("name") == wanted.get("name") and versions[0] != versions[1]:
+        message = f"is of another version of {found.get('name')} than {first.path}"
+        hint = "run the suite again on the newer version"
+        where, field = str(run.path), "dataset.version"
+        raise SpecError(Problem(where, message, field, str(versions[0]), str(versions[1]), hint))
 
 
 def _check_scenes(run: Run, first: Run) -> None:

@@ -8,13 +8,15 @@ from phyblock.domain.scene import Scene
 from phyblock.sim.pictures import PictureStyle, drawn, goal_camera
 from phyblock.sim.render import shoot
 
-__all__ = ["LEAST_SHARE", "hidden_blocks", "visible_shares"]
+__all__ = ["LEAST_SHARE", "LEAST_SHOWN", "hidden_blocks", "visible_shares"]
 
 LEAST_SHARE = 12 / 256**2
 """The least share of a goal picture that must show of a block: 48 pixels of 512 by 512.
 
 What cannot be seen cannot be planned.
 """
+LEAST_SHOWN = 0.03
+"""The least share of a block's own outline that must show in the goal picture of a scene."""
 _SIZE_PX = 256
 
 
