@@ -14,11 +14,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from phyblock.sim.exact import rounded, turned
+
 __all__ = ["FIELD_OF_VIEW_DEG", "FULL_WINDOW", "VIEWS", "Camera", "Window", "frame", "view_axes"]
+
+
+def _half_tangent(angle_deg: float) -> float:
+    return round(math.tan(math.radians(angle_deg / 2)), 12)
+
 
 FIELD_OF_VIEW_DEG = 30.0
 """Vertical and horizontal field of view; pictures are square."""
-_HALF_TANGENT = math.tan(math.radians(FIELD_OF_VIEW_DEG / 2))
+_HALF_TANGENT = _half_tangent(FIELD_OF_VIEW_DEG)
 _DEPTH_MARGIN_M = 0.02
 
 VIEWS: dict[str, tuple[float, float]] = {
@@ -66,11 +73,11 @@ class Camera:
     @property
     def half_tangent(self) -> float:
         """Half the width of what is seen at a depth, as a share of that depth."""
-        return math.tan(math.radians(self.field_of_view_deg / 2))
+        return _half_tangent(self.field_of_view_deg)
 
     def project(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """Normalized picture coordinates of world points (n, 3), shape (n, 2)."""
-        right, up, depth = self.axes @ (points_m - self.eye_m).T
+        right, up, depth = turned(points_m - self.eye_m, self.axes).T
         seen: NDArray[np.float64] = np.stack([right, up], axis=1) / depth[:, None]
         seen /= self.half_tangent
         return seen
@@ -107,7 +114,7 @@ def view_axes(azimuth_deg: float, elevation_deg: float) -> NDArray[np.float64]:
         ]
     )
     right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
-    return np.stack([right, np.cross(towards, right), -towards])
+    return rounded(np.stack([right, np.cross(towards, right), -towards]))
 
 
 def frame(
@@ -121,7 +128,7 @@ def frame(
     It stays at least `min_distance_m` [m] from the nearest point, and centers the points in the
     window. `points_m` must hold a point.
     """
-    right, up, forward = axes @ points_m.T
+    right, up, forward = turned(points_m, axes).T
     spans = []
     for across, low, high in ((right, window.left, window.right), (up, window.bottom, window.top)):
         low_slope, high_slope = low * _HALF_TANGENT, high * _HALF_TANGENT
@@ -133,5 +140,5 @@ def frame(
     center = [(most + least + (high + low) * depth) / 2 for most, least, low, high in spans]
     depths = forward - depth
     near = max(float(depths.min()) - _DEPTH_MARGIN_M, 0.01)
-    eye = np.array([*center, depth]) @ axes
+    eye = rounded(turned(np.array([*center, depth]), axes.T))
     return Camera(eye, axes, near, float(depths.max()) + _DEPTH_MARGIN_M)

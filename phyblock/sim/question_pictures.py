@@ -36,7 +36,7 @@ __all__ = [
     "question_png",
 ]
 
-QUESTION_RENDER_VERSION = 1
+QUESTION_RENDER_VERSION = 2
 """Raised whenever the same recipe gives other pixels, so that stored pictures are made again."""
 BLOCK_LABEL = "block"
 """The label of a picture that shows one block by itself."""
