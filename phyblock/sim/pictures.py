@@ -128,13 +128,22 @@ def goal_camera(scene: Scene, style: PictureStyle) -> Camera:
     return camera_for(drawn(scene), style, scene.id)
 
 
-def camera_for(blocks: Sequence[DrawnBlock], style: PictureStyle, where: str) -> Camera:
-    """The camera that frames blocks as a goal; DataError, at `where`, when there are none."""
+def camera_for(
+    blocks: Sequence[DrawnBlock],
+    style: PictureStyle,
+    where: str,
+    shown: Sequence[DrawnBlock] = (),
+) -> Camera:
+    """The camera that frames blocks as a goal; DataError, at `where`, when there are none.
+
+    `shown` are all blocks of the picture, where those are not the ones that it frames.
+    """
     if not blocks:
         raise DataError(Problem(where=where, field="blocks", message="there is none to draw"))
     points = np.vstack([block.vertices_m for block in blocks])
     axes = view_axes(style.azimuth_deg, style.elevation_deg)
-    return frame(points, axes, _GOAL_WINDOW, _GOAL_MIN_DISTANCE_M)
+    drawn_m = np.vstack([block.vertices_m for block in shown]) if shown else None
+    return frame(points, axes, _GOAL_WINDOW, _GOAL_MIN_DISTANCE_M, drawn_m)
 
 
 def candidate_camera(block: DrawnBlock, style: PictureStyle) -> Camera:
