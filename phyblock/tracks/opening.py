@@ -41,7 +41,8 @@ def picture_folder() -> Path:
 
 def picture_style(suite: SuiteSpec) -> PictureStyle:
     """How a suite wants pictures drawn."""
-    return PictureStyle(size_px=suite.images.size_px, background=suite.images.background)
+    images = suite.images
+    return PictureStyle(images.size_px, images.background, candidate_scale=images.candidate_scale)
 
 
 def assembly_pictures(suite: SuiteSpec) -> Pictures:

@@ -22,7 +22,7 @@ from phyblock.sim import (
 )
 from phyblock.sim.compose import to_png
 from phyblock.tracks.studio import Drawing, Studio, to_image
-from phyblock.words import PictureLayout, PictureName, PictureSource
+from phyblock.words import CandidateScale, PictureLayout, PictureName, PictureSource
 
 __all__ = ["PicturePolicy", "Pictures"]
 
@@ -47,6 +47,11 @@ class Pictures(Studio):
     def __init__(self, folder: Path, policy: PicturePolicy, workers: int) -> None:
         super().__init__(folder, workers)
         self.policy = policy
+
+    @property
+    def candidate_scale(self) -> CandidateScale | None:
+        """How candidates are scaled, for the prompt; None where pictures are the data set's."""
+        return None if self.policy.source == "dataset" else self.policy.style.candidate_scale
 
     async def of(self, task: AssemblyTask) -> tuple[Image, ...]:
         """The pictures of one task as they are sent.

@@ -37,7 +37,9 @@ class PictureShelf:
         self._cache = cache_dir() / "pictures"
         self._suite = suite
         images = suite["images"]
-        self._style = PictureStyle(size_px=images["size_px"], background=images["background"])
+        # Runs made before there was a choice drew each candidate to fill its cell.
+        scale = images.get("candidate_scale", "fit")
+        self._style = PictureStyle(images["size_px"], images["background"], candidate_scale=scale)
         self._room = _MOST_COPIED_BYTES
 
     def add_scenes(self, tasks: Iterable[AssemblyTask]) -> None:

@@ -156,7 +156,8 @@ class StepPlanning:
         past: Sequence[PastStep],
     ) -> tuple[Message, ...]:
         most = self.rules.limits.max_steps(len(item.scene))
-        return sight.prompt.messages(fixed, current, past, len(item.candidates), most)
+        scale = sight.pictures.candidate_scale
+        return sight.prompt.messages(fixed, current, past, len(item.candidates), most, scale)
 
     def _drawing(self, sight: _Sight, item: AssemblyTask, blocks: Sequence[Block]) -> Drawing:
         style = sight.pictures.policy.style
