@@ -13,6 +13,7 @@ from phyblock.sim.pictures import (
     composite_png,
     goal_key,
     goal_png,
+    goal_style,
 )
 from phyblock.sim.stability import Stability, Trial, check, check_prefixes, check_removal
 from phyblock.sim.support import Gap, Overlap, find_gaps, find_overlaps, support_graph
@@ -38,5 +39,6 @@ __all__ = [
     "find_overlaps",
     "goal_key",
     "goal_png",
+    "goal_style",
     "support_graph",
 ]

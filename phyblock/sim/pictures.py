@@ -12,7 +12,7 @@ import io
 import json
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from typing import get_args
 
 import numpy as np
@@ -33,7 +33,9 @@ from phyblock.sim.renderer import Renderer
 from phyblock.words import BACKGROUNDS, Background, CandidateScale
 
 __all__ = [
+    "LARGEST_PX",
     "RENDER_VERSION",
+    "SMALLEST_PX",
     "PictureStyle",
     "camera_for",
     "candidate_camera",
@@ -45,6 +47,7 @@ __all__ = [
     "goal_camera",
     "goal_key",
     "goal_png",
+    "goal_style",
     "on_the_floor",
     "pixel_versions",
 ]
@@ -52,11 +55,16 @@ __all__ = [
 RENDER_VERSION = 2
 """Raised whenever the same input gives other pixels, so that stored pictures are made again."""
 
+SMALLEST_PX, LARGEST_PX = 128, 2048
+"""Sides that pictures may have."""
 _GOAL_WINDOW = Window(-0.84, 0.84, -0.84, 0.84)
 _GOAL_MIN_DISTANCE_M = 0.48
 _CELL_WINDOW = Window(-0.86, 0.86, 2 * LABEL_STRIP - 1.0, 0.86)
 _LARGEST_DIAGONAL_M = 0.16
 _SIZE_CUE = 0.25
+_CUBE_M = 0.05
+_LEAST_CUBE = 0.08
+"""The least share of a goal picture's side that the edge of its farthest cube takes."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +84,9 @@ class PictureStyle:
     candidate_scale: CandidateScale = "common"
 
     def __post_init__(self) -> None:
-        if not 128 <= self.size_px <= 2048:
-            raise ValueError(f"size_px is {self.size_px}, allowed 128..2048")
+        if not SMALLEST_PX <= self.size_px <= LARGEST_PX:
+            allowed = f"allowed {SMALLEST_PX}..{LARGEST_PX}"
+            raise ValueError(f"size_px is {self.size_px}, {allowed}")
         if self.background not in BACKGROUNDS:
             raise ValueError(f"background is {self.background!r}, allowed {', '.join(BACKGROUNDS)}")
         if self.candidate_scale not in (scales := get_args(CandidateScale)):
@@ -136,6 +145,20 @@ def candidates_key(candidates: CandidateSet, style: PictureStyle) -> str:
 def goal_camera(scene: Scene, style: PictureStyle) -> Camera:
     """The camera of the goal picture; raises DataError for a scene without blocks."""
     return camera_for(drawn(scene), style, scene.id)
+
+
+def goal_style(scene: Scene, style: PictureStyle) -> PictureStyle:
+    """The style, of a larger size where blocks of the goal would come out small.
+
+    A length of 50 mm at the farthest block spans 8 % of the asked side or more, in pixels. Raises
+    DataError for a scene without blocks.
+    """
+    camera = goal_camera(scene, style)
+    places = np.array([block.position_m for block in scene.blocks])
+    farthest_m = float(dot(places - camera.eye_m, camera.axes[2]).max())
+    growth = _LEAST_CUBE * camera.width_m(farthest_m) / _CUBE_M
+    size_px = min(math.ceil(style.size_px * max(growth, 1.0)), LARGEST_PX)
+    return replace(style, size_px=size_px)
 
 
 def camera_for(

@@ -32,7 +32,16 @@ from phyblock.sim.renderer import Light, Prop, Raster, Renderer, Rgb
 from phyblock.sim.textures import floor, shadow
 from phyblock.words import Background
 
-__all__ = ["COLOR_RGB", "SUPERSAMPLE", "DrawnBlock", "Shot", "empty_ground", "picture", "shoot"]
+__all__ = [
+    "COLOR_RGB",
+    "SUPERSAMPLE",
+    "DrawnBlock",
+    "Shot",
+    "empty_ground",
+    "picture",
+    "segments",
+    "shoot",
+]
 
 SUPERSAMPLE = 2
 
@@ -101,6 +110,12 @@ def shoot(
     return Shot(rgb, raster.prop)
 
 
+def segments(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> NDArray[np.int64]:
+    """The 0-based number of the block seen in each pixel, shape (size, size), -1 for none."""
+    light = Light(np.array([0.0, 0.0, 1.0]), 1.0, 0.0)
+    return renderer().draw(_props(blocks), camera, light, size_px).prop
+
+
 def picture(
     blocks: Sequence[DrawnBlock],
     camera: Camera,
@@ -128,7 +143,12 @@ def picture(
 def _raster(
     blocks: Sequence[DrawnBlock], camera: Camera, size_px: int, drawn_by: Renderer | None
 ) -> Raster:
-    props = [
+    light = Light(light_direction(camera), _AMBIENT, _DIFFUSE)
+    return (drawn_by or renderer()).draw(_props(blocks), camera, light, size_px)
+
+
+def _props(blocks: Sequence[DrawnBlock]) -> list[Prop]:
+    return [
         Prop(
             drawn_mesh(block.type),
             COLOR_RGB[block.color],
@@ -136,8 +156,6 @@ def _raster(
         )
         for block in blocks
     ]
-    light = Light(light_direction(camera), _AMBIENT, _DIFFUSE)
-    return (drawn_by or renderer()).draw(props, camera, light, size_px)
 
 
 def empty_ground(background: Background, camera: Camera, size_px: int) -> NDArray[np.float32]:
