@@ -20,9 +20,9 @@ RIM_RGB: dict[Background, Rgb] = {
     "white": INK_RGB,
     "checkerboard": (206, 212, 222),
     "light-wood": INK_RGB,
-    "dark-wood": (226, 218, 208),
+    "dark-wood": (240, 234, 226),
     "concrete": INK_RGB,
-    "lawn": (232, 240, 220),
+    "lawn": (250, 253, 244),
 }
 """Lines where blocks end at the floor: all contrast with it by 3:1 or more."""
 
@@ -32,13 +32,14 @@ def draw_outlines(
 ) -> NDArray[Pixel]:
     """A picture (size, size, 3) of a raster with its outlines; without background, no rim.
 
-    A line takes a pixel on either side of where a face ends.
+    A line takes a pixel on either side of where a face ends, a rim one more on the floor: scaled
+    down to half the size, it fills a pixel's width wherever it lies.
     """
-    inner, outer = _ends(raster.face, raster.prop), _ends(raster.prop < 0)
     lined: NDArray[Pixel] = image.copy()
-    lined[inner & (raster.prop >= 0)] = INK_RGB
+    lined[_ends(raster.face, raster.prop) & (raster.prop >= 0)] = INK_RGB
     if background is not None:
-        lined[outer] = RIM_RGB[background]
+        rim = _ends(raster.prop >= 0)
+        lined[rim | _ends(rim) & (raster.prop < 0)] = RIM_RGB[background]
     return lined
 
 
