@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from phyblock.sim.camera import Camera
 from phyblock.sim.exact import cross, dot
-from phyblock.sim.raster.scan import NOTHING, nearest, spans
+from phyblock.sim.raster.scan import AT_ONCE, NOTHING, nearest, spans
 from phyblock.sim.raster.shadows import LightMap, ground_shadow
 from phyblock.sim.raster.solids import Solids, solids
 from phyblock.sim.raster.views import CameraScreen
@@ -22,7 +22,6 @@ RASTER_VERSION = "1"
 """Raised whenever the same props give other pixels."""
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _LIGHT_SCREEN = 0.75
 """Side of the light's picture, as a share of the camera's: props fill the former wholly."""
@@ -60,37 +59,28 @@ class NumpyRenderer:
         found = spans(corners_px, size_px)
         found = found._replace(triangle=owner[found.triangle])
         seen = nearest(found, screen.planes(front), size_px, screen.least, screen.most)
-        row, column = np.nonzero(seen.triangle != NOTHING)
-        shown, depth_m = seen.triangle[row, column], 1 / seen.nearness[row, column]
-        pixels = _Pixels(column.astype(np.float64), row.astype(np.float64), depth_m)
-        bright = _facing(front, light.direction, screen, shown, pixels)
-        if light.diffuse:
-            _take_shadow(
-                bright,
-                LightMap(solid, light.direction, round(size_px * _LIGHT_SCREEN)),
-                screen,
-                pixels,
-            )
-        bright = light.ambient + light.diffuse * bright
-        colors = np.array([prop.rgb for prop in props], dtype=np.float64)[front.prop[shown]]
-        rgb[row, column] = np.rint(np.clip(colors * bright[:, None], 0, 255))
-        return Raster(
-            rgb,
-            np.append(front.prop, NOTHING)[seen.triangle],
-            np.append(front.face, NOTHING)[seen.triangle],
-            ground_shadow(solid, light.direction, screen),
-        )
+        look = _Look(props, solid, front, screen, light)
+        prop, face = (np.full((size_px, size_px), NOTHING) for _ in range(2))
+        pixels = np.flatnonzero(seen.triangle != NOTHING)
+        for start in range(0, len(pixels), AT_ONCE):
+            part = pixels[start : start + AT_ONCE]
+            shown = seen.triangle.ravel()[part]
+            row, column = np.divmod(part, size_px)
+            points = _Points(column * 1.0, row * 1.0, 1 / seen.nearness.ravel()[part])
+            rgb.reshape(-1, 3)[part] = look.colors(shown, points)
+            prop.ravel()[part], face.ravel()[part] = front.prop[shown], front.face[shown]
+        return Raster(rgb, prop, face, ground_shadow(solid, light.direction, screen))
 
 
-class _Pixels(NamedTuple):
-    """Pixels that show something, each (n,): column, row, and the depth of what they show [m]."""
+class _Points(NamedTuple):
+    """What pixels show, each (n,): their column and row, and its depth [m]."""
 
     column: Floats
     row: Floats
     depth_m: Floats
 
-    def some(self, chosen: Ints) -> _Pixels:
-        return _Pixels(self.column[chosen], self.row[chosen], self.depth_m[chosen])
+    def some(self, chosen: NDArray[np.int64]) -> _Points:
+        return _Points(self.column[chosen], self.row[chosen], self.depth_m[chosen])
 
     def linear(self, start: Floats, slope: Floats) -> Floats:
         """The sum start + depth * (a * column + b * row + c) for `slope` (3,) or (3, n)."""
@@ -100,35 +90,58 @@ class _Pixels(NamedTuple):
         return total
 
 
-def _take_shadow(bright: Floats, light: LightMap, screen: CameraScreen, pixels: _Pixels) -> None:
-    """Take away from `bright` (n,) what does not reach the pixels for what stands in the way."""
-    to_light = np.flatnonzero(bright > 0)
-    if len(to_light):
-        lit = pixels.some(to_light)
-        starts = light.screen.places(screen.camera.eye_m)
-        slopes = screen.linear(light.screen.steps)
-        places = [lit.linear(start, slope) for start, slope in zip(starts, slopes, strict=True)]
-        bright[to_light] *= light.lit(*places)
+class _Look:
+    """How the triangles in `front` of a camera look in a light that all of `solid` shades."""
+
+    def __init__(
+        self,
+        props: Sequence[Prop],
+        solid: Solids,
+        front: Solids,
+        screen: CameraScreen,
+        light: Light,
+    ) -> None:
+        self._rgb = np.array([prop.rgb for prop in props], dtype=np.float64)[front.prop]
+        self._light, self._map = light, None
+        # The cosine to the light is known at corners, and linear between them.
+        cosines = dot(front.bends, light.direction)
+        gradient = _gradient(front.corners_m, cosines)
+        self._is_bent = np.ptp(cosines, axis=1) > 0
+        self._cosine = cosines[:, 0]
+        self._start = cosines[:, 0]
+        self._start = self._start + dot(gradient, screen.camera.eye_m - front.corners_m[:, 0])
+        self._slope = screen.linear(gradient).T
+        if light.diffuse:
+            self._map = LightMap(solid, light.direction, round(screen.size_px * _LIGHT_SCREEN))
+            steps = screen.linear(self._map.screen.steps)
+            eye = self._map.screen.places(screen.camera.eye_m)
+            self._map_places = list(zip(eye, steps, strict=True))
+
+    def colors(self, shown: NDArray[np.int32], points: _Points) -> Floats:
+        """Color of each point by the triangle that it is of, shape (n, 3), 0..255, whole."""
+        bright = self._cosine[shown]
+        bent = np.flatnonzero(self._is_bent[shown])
+        which = shown[bent]
+        bright[bent] = points.some(bent).linear(self._start[which], self._slope[:, which])
+        to_light = np.flatnonzero(bright > 0)
+        if self._map is not None:
+            lit = points.some(to_light)
+            places = [lit.linear(start, slope) for start, slope in self._map_places]
+            bright[to_light] *= self._map.lit(*places)
+        np.maximum(bright, 0.0, out=bright)
+        bright *= self._light.diffuse
+        bright += self._light.ambient
+        colors: Floats = self._rgb[shown]
+        colors *= bright[:, None]
+        np.minimum(colors, 255.0, out=colors)
+        return np.rint(colors, out=colors)
 
 
-def _facing(
-    front: Solids, direction: Floats, screen: CameraScreen, shown: Ints, pixels: _Pixels
-) -> Floats:
-    """How much what pixels show is turned to the light, 0..1, by the triangles shown (n,).
-
-    The cosine at the corners, and linear between them: its gradient follows from its corners.
-    """
-    values = dot(front.bends, direction)
-    facing: Floats = values[shown, 0]
-    curved = np.flatnonzero(np.ptp(values, axis=1)[shown])
-    one, two = (front.corners_m[:, i] - front.corners_m[:, 0] for i in (1, 2))
+def _gradient(corners_m: Floats, values: Floats) -> Floats:
+    """Gradient (n, 3) in its plane of what has these values (n, 3) at a triangle's corners."""
+    one, two = (corners_m[:, i] - corners_m[:, 0] for i in (1, 2))
     normal = cross(one, two)
     rise_one, rise_two = (values[:, i, None] - values[:, :1] for i in (1, 2))
     gradient = rise_one * cross(two, normal) + rise_two * cross(normal, one)
     gradient /= dot(normal, normal)[:, None]
-    start = values[:, 0] + dot(gradient, screen.camera.eye_m - front.corners_m[:, 0])
-    bent = shown[curved]
-    slope = screen.linear(gradient).T[:, bent]
-    facing[curved] = pixels.some(curved).linear(start[bent], slope)
-    np.maximum(facing, 0.0, out=facing)
-    return facing
+    return gradient

@@ -15,12 +15,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["NOTHING", "Nearest", "Spans", "covered", "nearest", "spans"]
+__all__ = ["AT_ONCE", "NOTHING", "Nearest", "Spans", "covered", "nearest", "spans"]
 
 NOTHING = -1
 """What is nearest where there is no triangle."""
-_AT_ONCE = 1 << 20
-"""Pixels that are worked on together; more would take more memory and not be faster."""
+AT_ONCE = 1 << 16
+"""Pixels that are worked on together: what they take of memory is used again and again."""
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -62,7 +62,7 @@ class Nearest(NamedTuple):
     nearness there.
     """
 
-    triangle: Ints
+    triangle: NDArray[np.int32]
     nearness: Floats
 
 
@@ -73,7 +73,7 @@ def nearest(found: Spans, planes: Floats, size_px: int, least: float, most: floa
     outside `least`..`most` is left out. Of two that are equally near the later counts.
     """
     best = np.full(size_px * size_px, least)
-    shown = np.full(size_px * size_px, NOTHING)
+    shown = np.full(size_px * size_px, NOTHING, dtype=np.int32)
     for part in _parts(found):
         lengths = part.right - part.left
         a, b, c = planes.T[:, part.triangle]
@@ -92,11 +92,16 @@ def nearest(found: Spans, planes: Floats, size_px: int, least: float, most: floa
 
 def covered(found: Spans, size_px: int) -> NDArray[np.bool_]:
     """Which pixels any span covers, shape (size, size)."""
-    edges = np.zeros((size_px, size_px + 1), dtype=np.int64)
-    np.add.at(edges, (found.row, found.left), 1)
-    np.add.at(edges, (found.row, found.right), -1)
-    depth: NDArray[np.bool_] = np.cumsum(edges, axis=1)[:, :-1] > 0
-    return depth
+    inside = np.zeros((size_px, size_px), dtype=np.bool_)
+    if len(found.row):
+        first, end = int(found.row.min()), int(found.row.max()) + 1
+        n, start = (end - first) * (size_px + 1), (found.row - first) * (size_px + 1)
+        depth = np.bincount(start + found.left, minlength=n)
+        depth -= np.bincount(start + found.right, minlength=n)
+        # A row's spans end within it, so that one sum runs through all rows.
+        np.cumsum(depth, out=depth)
+        inside[first:end] = depth.reshape(-1, size_px + 1)[:, :-1] > 0
+    return inside
 
 
 def _crossing(x: Floats, y: Floats, center: Floats, start: int, end: int) -> Floats:
@@ -113,8 +118,8 @@ def _from_center(place: Floats, size_px: int) -> Ints:
 
 
 def _parts(found: Spans) -> Iterator[Spans]:
-    """The spans in groups of about a million pixels."""
+    """The spans in groups of about so many pixels as are worked on together."""
     ends = np.cumsum(found.right - found.left)
-    cuts = np.flatnonzero(np.diff(ends // _AT_ONCE)) + 1
+    cuts = np.flatnonzero(np.diff(ends // AT_ONCE)) + 1
     for group in np.split(np.arange(len(ends)), cuts):
         yield Spans(*(column[group] for column in found))
