@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+import phyblock.sim
 from phyblock.domain import BLOCK_TYPES, Block, euler_deg_to_quat_xyzw, quat_xyzw_to_matrix
 from phyblock.sim.camera import FULL_WINDOW, Camera, frame, view_axes
 from phyblock.sim.geometry import drawn_mesh
@@ -23,6 +26,7 @@ SIZE_PX = 160
 RAYS = 40
 COLORS = tuple(COLOR_RGB)
 DIGEST = "077f19edea00090368f8a9efc8a70dd88b668db1ee19f511f0d31b1d2652a7d5"
+PRODUCTS = ("dot", "einsum", "inner", "linalg", "matmul", "tensordot", "vdot")
 RENDERER = NumpyRenderer()
 views = st.tuples(st.floats(-180, 180), st.floats(3, 90))
 
@@ -253,3 +257,15 @@ def test_the_bytes_of_a_picture_are_the_same_on_every_machine() -> None:
     for part in (raster.rgb, raster.prop.astype("<i8"), raster.face.astype("<i8"), raster.shaded):
         digest.update(part.tobytes())
     assert digest.hexdigest() == DIGEST
+
+
+def test_no_matrix_product_decides_a_pixel() -> None:
+    """A BLAS adds up in another order on another machine."""
+    sim = Path(phyblock.sim.__file__).parent
+    named = ("exact", "camera", "outlines", "render", "surfaces", "textures")
+    for path in [*sim.glob("raster/*.py"), *(sim / f"{name}.py" for name in named)]:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            assert not isinstance(node, ast.MatMult), path
+            if isinstance(node, ast.Attribute):
+                is_numpy = isinstance(node.value, ast.Name) and node.value.id == "np"
+                assert not (is_numpy and node.attr in PRODUCTS), path
