@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import json
 import shutil
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, check_free, writing
+from phyblock.records.scene import StoredScene
 from phyblock_making.scenes.candidate_sets import make_candidates
 from phyblock_making.scenes.scene_draft import PALETTES, Palette
 
@@ -25,7 +24,6 @@ __all__ = [
     "LevelStatistics",
     "SetWriter",
     "open_writer",
-    "scene_line",
     "sums_text",
 ]
 
@@ -72,7 +70,7 @@ class SetWriter:
         """Append a scene with a candidate set of its own."""
         candidates = make_candidates(scene, palette=PALETTES[self._palette])
         with (self._parts / f"{scene.levels[0]}").open("a", encoding="utf-8", newline="\n") as file:
-            file.write(scene_line(scene, candidates) + "\n")
+            file.write(StoredScene.of(scene, candidates).as_json() + "\n")
         for level in scene.levels:
             self.levels.setdefault(level, LevelStatistics()).add(scene)
         self.count += 1
@@ -110,45 +108,8 @@ def open_writer(folder: Path, palette: Palette, replace: bool = False) -> Iterat
             yield SetWriter(folder, Path(parts), palette)
 
 
-def scene_line(scene: Scene, candidates: CandidateSet) -> str:
-    """A scene and its candidates as one line of JSON, no newline at its end."""
-    looks = {block.look for block in scene.blocks}
-    record = {
-        "id": scene.id,
-        "levels": list(scene.levels),
-        "parents": list(scene.parents),
-        "blocks": [
-            {
-                "order": block.order,
-                "type": block.type,
-                "color": block.color,
-                "layer": block.layer,
-                "depend": list(block.depend) or [0],
-                "position": [round(c, 6) + 0.0 for c in block.position_m],
-                "euler": [_plain(angle) for angle in block.euler_deg],
-            }
-            for block in scene.blocks
-        ],
-        "candidates": [
-            {
-                "type": candidate.type,
-                "color": candidate.color,
-                "euler": [_plain(angle) for angle in candidate.euler_deg],
-                "required": candidate.look in looks,
-            }
-            for candidate in candidates.candidates
-        ],
-    }
-    return json.dumps(record, allow_nan=False)
-
-
 def sums_text(folder: Path) -> str:
     """Checksums of the scenes and the card, as `sha256sum -c` reads them."""
     names = (CARD_FILE, SCENES_FILE)
     sums = [hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in names]
     return "".join(f"{one}  {name}\n" for one, name in zip(sums, names, strict=True))
-
-
-def _plain(angle_deg: float) -> float | int:
-    """Whole degrees as an integer, which reads better in a file."""
-    return int(angle_deg) if float(angle_deg).is_integer() else angle_deg
