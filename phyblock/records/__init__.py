@@ -16,11 +16,9 @@ from phyblock.records.record import (
     Score,
     SentImage,
     SentPrompt,
-    StoredError,
-    StoredReply,
-    StoredUsage,
 )
 from phyblock.records.record_lines import RecordedLines, RecordLines, record_adapter
+from phyblock.records.reply import StoredError, StoredReply, StoredUsage
 from phyblock.records.scene import StoredScene
 
 __all__ = [

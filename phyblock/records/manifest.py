@@ -57,6 +57,8 @@ class ManifestModel(Line):
     """What the paper calls it."""
     size_b: float | None = None
     """Its size [billion parameters]."""
+    kind: str = ""
+    """`litellm`: asked over the network; `replay`: a recording; `baseline`: a rule."""
 
 
 class ManifestDataset(Line):

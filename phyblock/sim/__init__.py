@@ -15,7 +15,7 @@ from phyblock.sim.pictures import (
     goal_png,
     goal_style,
 )
-from phyblock.sim.stability import Stability, Trial, check, check_prefixes, check_removal
+from phyblock.sim.stability import Stability, Trial, check
 from phyblock.sim.support import Gap, Overlap, find_gaps, find_overlaps, support_graph
 from phyblock.sim.world import Physics, Pose, World
 
@@ -32,8 +32,6 @@ __all__ = [
     "candidates_key",
     "candidates_png",
     "check",
-    "check_prefixes",
-    "check_removal",
     "composite_png",
     "find_gaps",
     "find_overlaps",

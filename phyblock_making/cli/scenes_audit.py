@@ -11,6 +11,7 @@ import click
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.datasets import SCENES_FILE
+from phyblock.datasets.named import find_data_set
 from phyblock.files import check_free, make_folder, write_named
 from phyblock.folders import OutFolder
 from phyblock.sim import PictureStyle
@@ -21,7 +22,6 @@ from phyblock_making.auditing.scene_audit import SceneAudit
 from phyblock_making.auditing.set_audit import Audit, audit_scenes, findings_csv
 from phyblock_making.checks.set_checks import find_duplicates
 from phyblock_making.checks.tolerances import FOREIGN, Tolerances
-from phyblock_making.cli.scene_sets import find_data_set
 from phyblock_making.cli.scenes_audit_view import print_audit, print_changes, worst_scenes
 from phyblock_making.cli.working import jobs_option, tracked
 

@@ -10,13 +10,13 @@ from rich.progress import Progress, TaskID
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
+from phyblock.datasets.named import read_data_set
 from phyblock.domain import SUBTASKS, Question, Subtask
 from phyblock.errors import SpecError
 from phyblock_making.attacks.attack_card import attack_card
 from phyblock_making.attacks.attacks import Attacked, all_attacks, attack
 from phyblock_making.attacks.observed import Observed, observe
 from phyblock_making.cli.question_sets import data_option
-from phyblock_making.cli.scene_sets import read_data_set
 from phyblock_making.cli.subtasks_option import subtasks_option
 from phyblock_making.cli.working import jobs_option, ray_option, seed_option
 from phyblock_making.questions.question_files import check_place, write_questions

@@ -5,7 +5,7 @@ from __future__ import annotations
 from phyblock.sim.stability import DEFAULT_TRIAL
 from phyblock.sim.steps import DEFAULT_REST
 from phyblock.sim.support import FIT_TOLERANCE_M
-from phyblock.sim.visibility import LEAST_OUTLINE_SHARE, LEAST_SHARE
+from phyblock.sim.visibility import LEAST_SHARE
 from phyblock_making.checks.tolerances import FINISHED_REST, LEVEL_LIMITS
 from phyblock_making.scenes.scene_files import QUANTITIES, LevelStatistics, SetWriter
 
@@ -54,8 +54,7 @@ A scene is in the set only when
   the whole {duration:g} s);
 * so does every intermediate structure when blocks are placed in the stored order, at the first
   setting; a step ends early once no corner was faster than {speed:g} mm/s for {quiet:g} s;
-* every block shows in the goal picture, on {pixels:g} of 512 by 512 pixels and {outline:.0%} of its
-  outline's area at least;
+* every block shows in the goal picture, on {pixels:g} of 512 by 512 pixels at least;
 * no other scene in the set is the same but for turning, mirroring or shifting;
 * it keeps the limits of its levels:
 
@@ -115,7 +114,6 @@ def card(name: str, written: SetWriter, command: str, palette_text: str) -> str:
         finished_quiet=FINISHED_REST.quiet_s,
         quiet=DEFAULT_REST.quiet_s,
         pixels=LEAST_SHARE * 512**2,
-        outline=LEAST_OUTLINE_SHARE,
         limits="\n".join(_limit(level) for level in levels),
         heads=" | ".join(f"{quantity}, mean | most" for quantity in QUANTITIES),
         rules="|".join("---|---" for _ in QUANTITIES),
