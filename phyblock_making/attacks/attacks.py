@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from phyblock.domain.question import SUBTASKS, Question, Subtask
-from phyblock.scoring.uncertainty import Clusters, bootstrap, ratio_of
+from phyblock.scoring.uncertainty import Clusters, in_unit_range, jackknife, ratio_of
 from phyblock_making.attacks.cues import Floats
 from phyblock_making.attacks.observed import Observed, credit, kind_of
 from phyblock_making.attacks.probes import (
@@ -35,7 +35,6 @@ _ORDERS = 0.12
 """Aims: the largest share of right answers that an attack may reach; `_ORDERS` of orderings."""
 _FEWEST = 25
 """Questions of a kind that are judged apart."""
-_SEED = 0
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ class Attack:
 
 
 class Rate(NamedTuple):
-    """A share of right answers, with its 95 % interval from resampling base scenes."""
+    """A share of right answers, with its 95 % interval over base scenes."""
 
     value: float
     low: float
@@ -207,7 +206,7 @@ def _attacked(
         [question.scene.parents or (question.scene.id,) for question in questions]
     )
     counts = np.stack([sides, np.ones_like(sides)], axis=-1)
-    found = bootstrap(counts, clusters, ratio_of, np.random.default_rng(_SEED))
+    found = in_unit_range(jackknife(counts, clusters, ratio_of))
     most, least = (
         Rate(float(found.value[side]), float(found.lo[side]), float(found.hi[side]))
         for side in (0, 1)

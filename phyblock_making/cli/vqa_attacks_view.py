@@ -40,7 +40,7 @@ def print_attacks(console: Console, attacked: Sequence[Attacked]) -> None:
     legend = "; ".join(f"{name}: {what}" for name, what in told.items())
     console.print(
         "Accuracy [%] of picking the option that an attack likes most, and the one that it likes "
-        "least, ties at random, with the interval from resampling base scenes; of orderings whole "
+        "least, ties at random, with the interval over base scenes; of orderings whole "
         f"orders, the way round that fits their kind better. Attacks go by: {legend}.",
         style="dim",
     )
