@@ -28,13 +28,16 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str) -> None:
 
 def _check_version(run: Run, first: Run) -> None:
     """Scenes of two versions of a data set may share a name and nothing else."""
-    found, wanted = (one.manifest.get("dataset") or {} for one in (run, first))
-    versions = found.get("version", 1), wanted.get("version", 1)
-    if found.get("name") == wanted.get("name") and versions[0] != versions[1]:
-        message = f"is of another version of {found.get('name')} than {first.path}"
+    found, wanted = run.manifest.dataset, first.manifest.dataset
+    if found is None or wanted is None or found.name != wanted.name:
+        return
+    if found.version != wanted.version:
+        message = f"is of another version of {found.name} than {first.path}"
         hint = "run the suite again on the newer version"
         where, field = str(run.path), "dataset.version"
-        raise SpecError(Problem(where, message, field, str(versions[0]), str(versions[1]), hint))
+        raise SpecError(
+            Problem(where, message, field, str(found.version), str(wanted.version), hint)
+        )
 
 
 def _check_scenes(run: Run, first: Run) -> None:
