@@ -16,6 +16,7 @@ __all__ = [
     "SETTINGS",
     "Background",
     "CandidateOrder",
+    "CandidateScale",
     "Criterion",
     "DataFormat",
     "Finish",
@@ -73,6 +74,7 @@ PictureSource = Literal["render", "dataset"]
 PictureLayout = Literal["composite", "separate"]
 CandidateOrder = Literal["file", "shuffled"]
 """In which order candidates are numbered and shown."""
+CandidateScale = Literal["common", "fit"]
 
 Role = Literal["system", "user", "assistant"]
 """Who speaks in a chat message."""

@@ -68,6 +68,8 @@ class ManifestDataset(Line):
     """Its name."""
     sha256: str
     """Digest of the scenes that were asked about."""
+    version: Annotated[int, Field(ge=1)] = 1
+    """Its version; results on different versions are never mixed."""
     format: str = "builtin"
     """Its layout."""
     root: str = ""

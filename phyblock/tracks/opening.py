@@ -47,7 +47,7 @@ def picture_folder() -> Path:
 
 def picture_style(images: ImagesSpec) -> PictureStyle:
     """How a suite wants pictures drawn."""
-    return PictureStyle(size_px=images.size_px, background=images.background)
+    return PictureStyle(images.size_px, images.background, candidate_scale=images.candidate_scale)
 
 
 def picture_policy(images: ImagesSpec) -> PicturePolicy:

@@ -19,11 +19,12 @@ from phyblock.sim import (
     composite_png,
     goal_key,
     goal_png,
+    goal_style,
 )
 from phyblock.sim.compose import to_png
 from phyblock.tracks.showing import ShownTask
 from phyblock.tracks.studio import Drawing, Studio, to_image
-from phyblock.words import PictureLayout, PictureName, PictureSource
+from phyblock.words import CandidateScale, PictureLayout, PictureName, PictureSource
 
 __all__ = ["PicturePolicy", "Pictures"]
 
@@ -49,6 +50,15 @@ class Pictures(Studio):
         super().__init__(folder, workers)
         self.policy = policy
 
+    @property
+    def candidate_scale(self) -> CandidateScale | None:
+        """How candidates are scaled, for the prompt; None where pictures are the data set's."""
+        return None if self.policy.source == "dataset" else self.policy.style.candidate_scale
+
+    def style_of(self, task: AssemblyTask) -> PictureStyle:
+        """How the pictures of a task are drawn: larger than usual where its goal is wide."""
+        return goal_style(task.scene, self.policy.style)
+
     async def of(self, task: AssemblyTask) -> tuple[Image, ...]:
         """The pictures of one task as they are sent.
 
@@ -70,7 +80,7 @@ class Pictures(Studio):
         if self.policy.source == "dataset":
             return self._from_dataset(task), True
         drawings = self._drawings(task)
-        side = self.policy.style.size_px
+        side = self._shown_style(task).size_px
         wide = 2 * side if drawings[0].label == "composite" else side
         return self.outlined(drawings, (wide, side))
 
@@ -82,8 +92,13 @@ class Pictures(Studio):
             return tuple(hashlib.sha256(data).hexdigest() for data in parts)
         return tuple(drawing.key for drawing in self._drawings(task))
 
+    def _shown_style(self, task: AssemblyTask) -> PictureStyle:
+        """The style of what is shown: a goal that is not shown has no part in its size."""
+        goal = _goal_of(task)
+        return self.policy.style if goal is None else self.style_of(goal)
+
     def _drawings(self, task: AssemblyTask) -> tuple[Drawing, ...]:
-        candidates, style = task.candidates, self.policy.style
+        candidates, style = task.candidates, self._shown_style(task)
         grid = Drawing(
             "candidates",
             candidates_key(candidates, style),

@@ -19,7 +19,7 @@ from tests.workspace import Workspace
 GOAL = Image(b"goal", "goal", 8, 8)
 GRID = Image(b"grid", "candidates", 8, 8)
 BOTH = Image(b"both", "composite", 16, 8)
-FACTS = {"pictures": ["goal", "candidates"], "n_candidates": 16}
+FACTS = {"pictures": ["goal", "candidates"], "n_candidates": 16, "candidate_scale": "common"}
 
 
 def template(folder: Path, text: str) -> TemplatePrompt:
@@ -79,17 +79,23 @@ def test_what_is_wrong_is_said_with_file_and_line(
     "labels",
     [("composite",), ("goal", "candidates"), ("candidates", "goal"), ("candidates",)],
 )
-def test_the_default_prompt_speaks_of_the_pictures_that_are_sent(labels: tuple[str, ...]) -> None:
+@pytest.mark.parametrize("scale", ["common", "fit", None])
+def test_the_default_prompt_speaks_of_the_pictures_that_are_sent(
+    labels: tuple[str, ...], scale: str | None
+) -> None:
     prompt = TemplatePrompt(bundled("prompts", "full_planning.j2"), "default")
     sent = tuple(Image(b"", label, 8, 8) for label in labels)
     is_blind = labels == ("candidates",)
-    facts = {"pictures": list(labels), "n_candidates": 9, "is_blind": is_blind}
+    facts = {"pictures": list(labels), "n_candidates": 9, "candidate_scale": scale}
+    facts["is_blind"] = is_blind
     system, user = prompt.messages(sent, facts)
     assert (system.role, user.role) == ("system", "user")
     *pictures, text = user.parts
     assert pictures == list(sent)
     assert isinstance(text, str)
     assert "grid of 9 blocks" in text
+    assert ("drawn at one scale" in text) == (scale == "common")
+    assert ("drawn to fill its cell" in text) == (scale == "fit")
     assert ("goal, a finished structure of blocks, is not available" in text) == is_blind
     assert ("study the goal" in text) != is_blind
     if is_blind:
@@ -107,9 +113,12 @@ def test_facts_hold_what_is_shown_alone(workspace: Workspace) -> None:
     track = FullPlanning(PlanningRules("steps", ("A",), ("optimal",), None))
     for task in read_builtin(workspace.root / "data").tasks:
         facts = track.facts(task, (GOAL, GRID))
-        n_candidates = len(task.candidates)
-        labels = ["goal", "candidates"]
-        assert facts == {"pictures": labels, "n_candidates": n_candidates, "is_blind": False}
+        assert facts == {
+            "pictures": ["goal", "candidates"],
+            "n_candidates": len(task.candidates),
+            "candidate_scale": None,
+            "is_blind": False,
+        }
 
 
 def test_the_official_prompt_is_the_recorded_text_to_the_letter(official_checkout: Path) -> None:

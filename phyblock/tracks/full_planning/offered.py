@@ -15,12 +15,12 @@ __all__ = ["Unit", "units"]
 class Unit:
     """What a setting takes for one thing: a candidate in A, all candidates of a kind in B.
 
-    `number` is that of the candidate, in B of the first of its kind. `poses` is how many
+    `numbers` are those of its candidates, `candidate` the first of them. `poses` is how many
     candidates its kind has, `rank` its place among them from 0, `kinds` and `offered` how many
     kinds and candidates the whole set has, `alike` how many kinds of its type.
     """
 
-    number: int
+    numbers: tuple[int, ...]
     candidate: Candidate
     poses: int
     rank: int
@@ -29,24 +29,31 @@ class Unit:
     alike: int
 
     @property
-    def numbers(self) -> tuple[float, ...]:
-        """All of it as numbers, shape (16,), for learners that take no words."""
+    def place(self) -> int:
+        """The number of its first candidate, from 1."""
+        return self.numbers[0]
+
+    @property
+    def features(self) -> tuple[float, ...]:
+        """All of it as numbers, 17 of them, for learners that take no words."""
         one = self.candidate
-        known = (self.number, self.poses, self.rank, self.kinds, self.offered, self.alike)
+        known = (self.place, self.poses, self.rank, self.kinds, self.offered, self.alike)
         words = (BLOCK_TYPES.index(one.type), COLORS.index(one.color))
         return (*map(float, (*known, *words)), *one.look[2])
 
 
 def units(candidates: CandidateSet, setting: Setting) -> tuple[Unit, ...]:
     """The units of a candidate set under a setting, by their numbers."""
-    poses = Counter(candidate.kind for candidate in candidates.candidates)
-    alike = Counter(block_type for block_type, _ in poses)
-    ranks: Counter[Kind] = Counter()
+    numbers: dict[Kind, list[int]] = {}
+    for number, one in enumerate(candidates.candidates, 1):
+        numbers.setdefault(one.kind, []).append(number)
+    alike = Counter(block_type for block_type, _ in numbers)
     found = []
     for number, one in enumerate(candidates.candidates, 1):
-        rank = ranks[one.kind]
-        ranks[one.kind] += 1
+        same = numbers[one.kind]
+        rank = same.index(number)
         if setting == "A" or rank == 0:
-            about = (poses[one.kind], rank, len(poses), len(candidates), alike[one.type])
-            found.append(Unit(number, one, *about))
+            named = (number,) if setting == "A" else tuple(same)
+            shown = (len(same), rank, len(numbers), len(candidates), alike[one.type])
+            found.append(Unit(named, one, *shown))
     return tuple(found)

@@ -153,6 +153,7 @@ class FullPlanning:
             "pictures": [picture.label for picture in pictures],
             "n_candidates": len(item.candidates),
             "is_blind": self._showing.how.blind,
+            "candidate_scale": None if self._pictures is None else self._pictures.candidate_scale,
         }
 
     def judge(self, item: AssemblyTask, text: str | None) -> PlanJudgement:
