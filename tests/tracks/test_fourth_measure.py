@@ -80,7 +80,7 @@ def check_everywhere(folder: Path) -> None:
     with (folder / "tables" / "estimates.csv").open(newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["measure"] == "distance"]
     whole = {row["model"]: row for row in rows if row["cell"] == "overall"}
-    assert float(whole["oracle"]["value"]) == float(whole["oracle"]["hi"]) == 0
+    assert float(whole["oracle"]["value"]) == float(whole["oracle"]["lo"]) == 0
     row = whole["all-candidates"]
     assert 0.5 < float(row["lo"]) <= float(row["value"]) <= float(row["hi"]) < 1
     assert {row["cell"] for row in rows} == {"1", "2", "3", "4", "overall"}
