@@ -2,7 +2,8 @@
 
 Each line is an object with `id`, `subtask`, `category`, `scene_id`, `wording`, `question`,
 `options` (four texts, or `<img1>` to `<img4>`), `answer` (a letter; for ordering four), `colors`
-where blocks are recolored, `pictures` (recipes) and `evidence`. docs/vqa.md holds the schema.
+where blocks are recolored, `background`, `pictures` (recipes) and `evidence`. docs/vqa.md holds
+the schema.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from phyblock.domain import (
     is_picture_option,
 )
 from phyblock.errors import DataError, Problem
+from phyblock.words import BACKGROUNDS, Background
 
 __all__ = ["QUESTIONS_FILE", "QuestionReader", "read_question_line", "read_questions"]
 
@@ -33,7 +35,7 @@ QUESTIONS_FILE = "questions.jsonl"
 _MOST_OPTIONS = 26
 _FIELDS = (
     *("id", "subtask", "category", "scene_id", "wording", "question", "options", "answer"),
-    *("colors", "pictures", "evidence"),
+    *("colors", "background", "pictures", "evidence"),
 )
 
 
@@ -79,7 +81,8 @@ def read_question_line(path: Path, number: int, line: str, scenes: Mapping[str, 
     pictures: tuple[QuestionPicture, ...] = ()
     if scene is not None:
         scene = reader.recolored(raw.get("colors", {}), scene, "colors")
-        pictures = reader.pictures(entries, scene)
+        background = reader.background(raw.get("background"))
+        pictures = reader.pictures(entries, scene, background)
         reader.check_pictures(options, pictures)
     if subtask is not None:
         category = category_of(cast(Subtask, subtask))
@@ -113,6 +116,12 @@ class QuestionReader(RecipeReader):
             allowed = f"one of the {len(scenes)} scenes of the data set"
             self.complain("scene_id", "names no scene of the data set", raw, allowed)
         return found
+
+    def background(self, raw: object) -> Background | None:
+        """The ground of all pictures of a question; None where it says none."""
+        if raw is None:
+            return None
+        return cast(Background | None, self.choice(raw, "background", BACKGROUNDS))
 
     def text(self, raw: object, field: str) -> str:
         """A text that is not blank."""

@@ -19,6 +19,7 @@ from phyblock.domain import (
     QuestionPicture,
     Scene,
 )
+from phyblock.words import Background
 
 __all__ = ["LABELS", "RecipeReader"]
 
@@ -43,9 +44,12 @@ class RecipeReader(SceneReader):
         )
         return replace(scene, blocks=blocks)
 
-    def pictures(self, raw: Any, scene: Scene) -> tuple[QuestionPicture, ...]:
-        """All pictures of a question, whose labels differ."""
-        found = [self._picture(one, scene, f"pictures[{i}]") for i, one in enumerate(raw)]
+    def pictures(
+        self, raw: Any, scene: Scene, background: Background | None
+    ) -> tuple[QuestionPicture, ...]:
+        """All pictures of a question, whose labels differ, on one background."""
+        read = [self._picture(one, scene, f"pictures[{i}]") for i, one in enumerate(raw)]
+        found = [replace(picture, background=background) for picture in read]
         labels = [picture.label for picture in found]
         for i, label in enumerate(labels):
             if label and label in labels[:i]:

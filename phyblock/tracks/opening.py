@@ -13,6 +13,7 @@ from phyblock.tracks.base import AnyTrack
 from phyblock.tracks.kind import Opening, kind_of
 from phyblock.tracks.pictures import PicturePolicy, Pictures
 from phyblock.tracks.prompts import TemplatePrompt
+from phyblock.words import BACKGROUNDS
 
 __all__ = [
     "assembly_pictures",
@@ -41,7 +42,8 @@ def picture_folder() -> Path:
 
 def picture_style(suite: SuiteSpec) -> PictureStyle:
     """How a suite wants pictures drawn."""
-    return PictureStyle(size_px=suite.images.size_px, background=suite.images.background)
+    images = suite.images
+    return PictureStyle(size_px=images.size_px, background=images.background or BACKGROUNDS[0])
 
 
 def assembly_pictures(suite: SuiteSpec) -> Pictures:

@@ -7,16 +7,18 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 import numpy as np
 
 from phyblock.domain.blocks import COLORS
-from phyblock.domain.question import Question, Subtask
+from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.support import GROUND, bounds_m, support_graph
 from phyblock_making.questions.choices import shuffled
 from phyblock_making.questions.goal_view import (
     COUNTED,
+    View,
     are_seen,
+    goal_picture,
     require_seen,
     require_shapes_seen,
-    shown_blocks,
+    shown_picture,
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import SHAPE_WORDS
@@ -40,15 +42,16 @@ class NumberMaker(StaticMaker):
 
     subtask: Subtask = "NU"
 
-    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Of all that can be counted in a scene whose blocks all show enough."""
-        if not are_seen(scene.blocks, _orders(scene.blocks), COUNTED):
+        picture = goal_picture(scene, view)
+        if not are_seen(picture, _orders(scene.blocks), COUNTED):
             return
         colors = [color for color in COLORS if any(b.color == color for b in scene.blocks)]
         kinds = [(f"{color} blocks", "color") for color in colors]
         kinds += [(word, "shape") for word in _TYPES_OF]
         kinds += [(f"{color} {word}", "both") for color in colors for word in _TYPES_OF]
-        if not _shapes_are_seen(scene.blocks):
+        if not _shapes_are_seen(picture):
             kinds = [(what, kind) for what, kind in kinds if kind == "color"]
         for what, kind in shuffled(rng, kinds):
             counted = _fitting(what, scene.blocks)
@@ -56,36 +59,39 @@ class NumberMaker(StaticMaker):
             if values is not None:
                 options = [str(value) for value in values]
                 evidence = {"counted": _orders(counted)}
-                yield draft(scene, rng, "nu", {"what": what}, options, options[0], kind, **evidence)
+                slots = {"what": what}
+                yield draft(scene, picture, rng, "nu", slots, options, options[0], kind, **evidence)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Counts the blocks that fit the words."""
-        blocks = shown_blocks(question)
-        require_seen(blocks, _orders(blocks), COUNTED)
+        picture = shown_picture(question)
+        require_seen(picture, _orders(picture.blocks), COUNTED)
         what = slots_of(question)["what"]
         if not what.endswith(" blocks"):
-            require_shapes_seen(blocks)
-        return index_of(question, str(len(_fitting(what, blocks))))
+            require_shapes_seen(picture)
+        return index_of(question, str(len(_fitting(what, picture.blocks))))
 
 
 class _WholeMaker(StaticMaker):
     """One number that a whole scene has."""
 
     subtask: Subtask
-    drafts_a_scene = _TRIES
+    views_a_scene = 2
+    drafts_a_view = _TRIES
 
     def __init__(
         self,
         values: Sequence[int],
         count: Callable[[Sequence[Block]], int],
-        require: Callable[[Sequence[Block]], None],
+        require: Callable[[QuestionPicture], None],
     ) -> None:
         self._values, self._count, self._require = values, count, require
 
-    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """The same question with windows of options that differ."""
+        picture = goal_picture(scene, view)
         try:
-            self._require(scene.blocks)
+            self._require(picture)
             right = self._count(scene.blocks)
         except UnfairError:
             return
@@ -93,14 +99,16 @@ class _WholeMaker(StaticMaker):
             values = window(rng, self._values, right)
             if values is not None:
                 options = [str(value) for value in values]
-                yield draft(scene, rng, self.subtask.lower(), {}, options, options[0], count=right)
+                yield draft(
+                    scene, picture, rng, self.subtask.lower(), {}, options, options[0], count=right
+                )
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Counts anew."""
-        blocks = shown_blocks(question)
+        picture = shown_picture(question)
         slots_of(question)
-        self._require(blocks)
-        return index_of(question, str(self._count(blocks)))
+        self._require(picture)
+        return index_of(question, str(self._count(picture.blocks)))
 
 
 class CountMaker(_WholeMaker):
@@ -130,13 +138,13 @@ class TypeMaker(_WholeMaker):
         super().__init__(range(2, 9), _types, require_shapes_seen)
 
 
-def _require_counted(blocks: Sequence[Block]) -> None:
-    require_seen(blocks, _orders(blocks), COUNTED)
+def _require_counted(picture: QuestionPicture) -> None:
+    require_seen(picture, _orders(picture.blocks), COUNTED)
 
 
-def _shapes_are_seen(blocks: Sequence[Block]) -> bool:
+def _shapes_are_seen(picture: QuestionPicture) -> bool:
     try:
-        require_shapes_seen(blocks)
+        require_shapes_seen(picture)
     except UnfairError:
         return False
     return True

@@ -7,13 +7,20 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from phyblock.domain.question import Question, Subtask
+from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.support import bounds_m
 from phyblock_making.questions.block_measures import top_m
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import recolored
-from phyblock_making.questions.goal_view import NAMED, center_m, require_seen, shown_blocks
+from phyblock_making.questions.goal_view import (
+    NAMED,
+    View,
+    center_m,
+    goal_picture,
+    require_seen,
+    shown_picture,
+)
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import Feature, names, resolve_one
 from phyblock_making.questions.static_drafts import (
@@ -82,32 +89,33 @@ class DistanceMaker(StaticMaker):
 
     subtask: Subtask = "AP"
 
-    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Heights of blocks and distances of pairs, as far as they are on the grid."""
         for _ in range(_TRIES):
             shown = recolored(scene, rng)
-            seen = seen_blocks(shown, NAMED)
+            picture = goal_picture(shown, view)
+            seen = seen_blocks(picture, NAMED)
             scales = [kind for kind in _SCALES if any(block.type == kind for block in seen)]
             named = {
                 block.order: expressions[0]
                 for block in seen
-                if (expressions := names(block, shown.blocks, _PLAIN))
+                if (expressions := names(block, picture, _PLAIN))
             }
             blocks = [block for block in seen if block.order in named]
             if scales:
                 scale = _SCALES[pick(rng, scales)]
-                yield from _of_blocks(shown, blocks, named, scale, rng)
+                yield from _of_blocks(shown, picture, blocks, named, scale, rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """From the places of the blocks that the text names."""
-        blocks, slots = shown_blocks(question), slots_of(question)
-        named = [resolve_one(slots[name], blocks) for name in ("block", "other") if name in slots]
-        require_seen(blocks, [block.order for block in named], NAMED)
-        _require_scale(slots["scale"], blocks)
+        picture, slots = shown_picture(question), slots_of(question)
+        named = [resolve_one(slots[name], picture) for name in ("block", "other") if name in slots]
+        require_seen(picture, [block.order for block in named], NAMED)
+        _require_scale(slots["scale"], picture)
         rule = question.wording.split("-")[1] if question.wording else ""
         if rule not in _RULES:
             raise UnfairError(f"the wording {question.wording!r} asks for no length")
-        if rule == "apart" and not _are_joined(named[0], named[-1], blocks):
+        if rule == "apart" and not _are_joined(named[0], named[-1], picture.blocks):
             raise UnfairError("the blocks are parts of structures that stand apart")
         right_cm = _grid_cm(_RULES[rule](named[0], named[-1]))
         try:
@@ -121,6 +129,7 @@ class DistanceMaker(StaticMaker):
 
 def _of_blocks(
     scene: Scene,
+    picture: QuestionPicture,
     blocks: Sequence[Block],
     named: Mapping[int, str],
     scale: str,
@@ -143,9 +152,8 @@ def _of_blocks(
                 ladder = pick(rng, ladders)
                 values = [right, *(value for value in ladder if value != right)]
                 options = [_shown(value) for value in values]
-                yield draft(
-                    scene, rng, f"ap-{rule}", slots, options, options[0], rule, length_cm=right
-                )
+                stem, evidence = f"ap-{rule}", {"length_cm": right}
+                yield draft(scene, picture, rng, stem, slots, options, options[0], rule, **evidence)
 
 
 def _are_joined(one: Block, other: Block, blocks: Sequence[Block]) -> bool:
@@ -172,12 +180,12 @@ def _shown(length_cm: float) -> str:
     return f"{length_cm:g} cm"
 
 
-def _require_scale(scale: str, blocks: Sequence[Block]) -> None:
+def _require_scale(scale: str, picture: QuestionPicture) -> None:
     kinds = [kind for kind, text in _SCALES.items() if text == scale]
-    orders = [block.order for block in blocks if block.type in kinds]
+    orders = [block.order for block in picture.blocks if block.type in kinds]
     for order in orders:
         try:
-            require_seen(blocks, [order], NAMED)
+            require_seen(picture, [order], NAMED)
         except UnfairError:
             continue
         return

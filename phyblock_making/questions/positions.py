@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from phyblock.domain.question import Question, Subtask
+from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.support import bounds_m
 from phyblock_making.questions.block_measures import offset_m, top_m
@@ -15,10 +15,12 @@ from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import recolored
 from phyblock_making.questions.goal_view import (
     NAMED,
+    View,
     center_m,
+    goal_picture,
     outermost,
     require_seen,
-    shown_blocks,
+    shown_picture,
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import Feature, names, resolve_one
@@ -60,40 +62,41 @@ class PositionMaker(StaticMaker):
 
     subtask: Subtask = "RP"
 
-    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Pairs of blocks, and choices of one of four."""
         for _ in range(_TRIES):
             shown = recolored(scene, rng)
+            picture = goal_picture(shown, view)
             named = {
                 block.order: expressions[0]
-                for block in seen_blocks(shown, NAMED)
-                if (expressions := names(block, shown.blocks, _PLAIN))
+                for block in seen_blocks(picture, NAMED)
+                if (expressions := names(block, picture, _PLAIN))
             }
-            blocks = [block for block in shown.blocks if block.order in named]
-            yield from _of_pairs(shown, blocks, named, rng)
-            yield from _of_four(shown, blocks, named, rng)
+            yield from _of_pairs(shown, picture, named, rng)
+            yield from _of_four(shown, picture, named, rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """From the places of the blocks that the text or the options name."""
-        blocks, slots = shown_blocks(question), slots_of(question)
+        picture, slots = shown_picture(question), slots_of(question)
         if "extreme" in slots or "block" not in slots:
-            named = [resolve_one(option, blocks) for option in question.options]
-            anchor = resolve_one(slots["other"], blocks) if "other" in slots else None
+            named = [resolve_one(option, picture) for option in question.options]
+            anchor = resolve_one(slots["other"], picture) if "other" in slots else None
             seen = [*named, anchor] if anchor else named
-            require_seen(blocks, [block.order for block in seen], NAMED)
+            require_seen(picture, [block.order for block in seen], NAMED)
             if anchor:
                 return (named.index(_nearest(anchor, named)),)
-            return (named.index(_extreme(slots["extreme"], named, blocks)),)
-        one, other = (resolve_one(slots[name], blocks) for name in ("block", "other"))
-        require_seen(blocks, [one.order, other.order], NAMED)
+            return (named.index(_extreme(slots["extreme"], named, picture)),)
+        one, other = (resolve_one(slots[name], picture) for name in ("block", "other"))
+        require_seen(picture, [one.order, other.order], NAMED)
         corners = set(question.options) == set(_CORNERS)
-        right = _corner(one, other) if corners else _upright(one, other)
+        right = (_corner if corners else _upright)(one, other, picture.view_deg)
         return index_of(question, right)
 
 
 def _of_pairs(
-    scene: Scene, blocks: Sequence[Block], named: dict[int, str], rng: np.random.Generator
+    scene: Scene, picture: QuestionPicture, named: dict[int, str], rng: np.random.Generator
 ) -> Iterator[Draft]:
+    blocks = [block for block in scene.blocks if block.order in named]
     pairs = shuffled(rng, list(itertools.permutations(blocks, 2)))[:4]
     for one, other in pairs:
         slots = {"block": named[one.order], "other": named[other.order]}
@@ -102,17 +105,20 @@ def _of_pairs(
             ("upright", _UPRIGHT, _upright),
         ):
             try:
-                right = rule(one, other)
+                right = rule(one, other, picture.view_deg)
             except UnfairError:
                 continue
             options = [right, *(word for word in words if word != right)]
-            offset = [round(float(x), 6) for x in offset_m(one, other)]
-            yield draft(scene, rng, f"rp-{stem}", slots, options, right, stem, offset_m=offset)
+            offset = [round(float(x), 6) for x in offset_m(one, other, picture.view_deg)]
+            yield draft(
+                scene, picture, rng, f"rp-{stem}", slots, options, right, stem, offset_m=offset
+            )
 
 
 def _of_four(
-    scene: Scene, blocks: Sequence[Block], named: dict[int, str], rng: np.random.Generator
+    scene: Scene, picture: QuestionPicture, named: dict[int, str], rng: np.random.Generator
 ) -> Iterator[Draft]:
+    blocks = [block for block in scene.blocks if block.order in named]
     chosen = shuffled(rng, blocks)[:5]
     if len(chosen) < 5:
         return
@@ -120,7 +126,7 @@ def _of_four(
     kind = pick(rng, (*_EXTREMES, "nearest"))
     try:
         is_near = kind == "nearest"
-        right = _nearest(anchor, four) if is_near else _extreme(kind, four, scene.blocks)
+        right = _nearest(anchor, four) if is_near else _extreme(kind, four, picture)
     except UnfairError:
         return
     ranked = [right, *(block for block in four if block is not right)]
@@ -128,21 +134,21 @@ def _of_four(
     slots = {"other": named[anchor.order]} if kind == "nearest" else {"extreme": kind}
     stem = "nearest" if kind == "nearest" else "extreme"
     orders = {"ranked": [block.order for block in ranked]}
-    yield draft(scene, rng, f"rp-{stem}", slots, options, right.type, kind, **orders)
+    yield draft(scene, picture, rng, f"rp-{stem}", slots, options, right.type, kind, **orders)
 
 
-def _corner(one: Block, other: Block) -> str:
+def _corner(one: Block, other: Block, view: View) -> str:
     """Which quarter of the floor round `other` holds `one`, as the viewer sees it."""
-    across, away, _ = offset_m(one, other)
+    across, away, _ = offset_m(one, other, view)
     if min(abs(across), abs(away)) < _CLEAR_M:
         raise UnfairError("is neither clearly to a side nor clearly in front or behind")
     depth = "behind" if away > 0 else "in front"
     return f"{depth} and to the {'right' if across > 0 else 'left'}"
 
 
-def _upright(one: Block, other: Block) -> str:
+def _upright(one: Block, other: Block, view: View) -> str:
     """Over or under it, or beside it at its height; UnfairError for all that lies between."""
-    across, away, _ = offset_m(one, other)
+    across, away, _ = offset_m(one, other, view)
     low, high = bounds_m(one)[:, 2] - bounds_m(other)[::-1, 2]
     if max(abs(across), abs(away)) < _ABOVE_M and (low > -_LEVEL_M or high < _LEVEL_M):
         return "above it" if low > -_LEVEL_M else "below it"
@@ -161,7 +167,7 @@ def _nearest(anchor: Block, blocks: Sequence[Block]) -> Block:
     return ranked[0]
 
 
-def _extreme(extreme: str, blocks: Sequence[Block], scene: Sequence[Block]) -> Block:
+def _extreme(extreme: str, blocks: Sequence[Block], picture: QuestionPicture) -> Block:
     """The one of `blocks` that is clearly farthest to a side, or reaches highest."""
     if extreme == "highest":
         ranked = sorted(blocks, key=lambda block: -top_m(block))
@@ -171,7 +177,7 @@ def _extreme(extreme: str, blocks: Sequence[Block], scene: Sequence[Block]) -> B
     if extreme not in _EXTREMES:
         raise UnfairError(f"{extreme!r} is no place")
     orders = [block.order for block in blocks]
-    order = outermost(orders, scene, to_left=extreme == "farthest left")
+    order = outermost(orders, picture, to_left=extreme == "farthest left")
     if order is None:
         raise UnfairError(f"two blocks are about the {extreme}")
     return blocks[orders.index(order)]

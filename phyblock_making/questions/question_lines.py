@@ -31,6 +31,8 @@ def question_line(question: Question, original: Scene) -> str:
     }
     if colors:
         record["colors"] = colors
+    if question.pictures and question.pictures[0].background is not None:
+        record["background"] = question.pictures[0].background
     record["pictures"] = [_picture(one, question.scene) for one in question.pictures]
     record["evidence"] = question.evidence
     return json.dumps(record, allow_nan=False)

@@ -1,4 +1,4 @@
-"""Questions from one seed: drafts of all scenes, an even choice of them, letters dealt evenly."""
+"""Questions from one seed: drafts of all scenes, a choice of them, letters and backgrounds."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ from phyblock.domain.question import (
 )
 from phyblock.domain.scene import Block, Scene
 from phyblock.errors import DataError, Problem
+from phyblock.words import BACKGROUNDS, Background
+from phyblock_making.questions.choices import pick
 from phyblock_making.questions.makers import MAKERS
 from phyblock_making.questions.question_draft import Draft, Option
 from phyblock_making.questions.selection import Pooled, select
@@ -112,7 +114,8 @@ def _dealt(
     dealt = list(zip(in_order, places, strict=True))
     for number, i in enumerate(rng.permutation(len(dealt)).tolist(), 1):
         one, order = dealt[i]
-        yield _question(f"{subtask.lower()}-{number:0{width}d}", subtask, one.draft, order)
+        name = f"{subtask.lower()}-{number:0{width}d}"
+        yield _question(name, subtask, one.draft, order, pick(rng, BACKGROUNDS))
 
 
 def _places(subtask: Subtask, number: int, rng: np.random.Generator) -> list[int]:
@@ -128,7 +131,9 @@ def _places(subtask: Subtask, number: int, rng: np.random.Generator) -> list[int
     return [right, *(rest[int(i)] for i in rng.permutation(len(rest)))]
 
 
-def _question(name: str, subtask: Subtask, draft: Draft, places: Sequence[int]) -> Question:
+def _question(
+    name: str, subtask: Subtask, draft: Draft, places: Sequence[int], background: Background
+) -> Question:
     options: list[str] = [""] * len(places)
     pictures = list(draft.pictures)
     marks: list[Mark] = []
@@ -148,7 +153,7 @@ def _question(name: str, subtask: Subtask, draft: Draft, places: Sequence[int]) 
         pictures[0] = replace(pictures[0], marks=(*pictures[0].marks, *lettered))
     pictures += sorted(shown, key=lambda picture: picture.label)
     answer = tuple(places) if subtask == "OR" else (places[0],)
-    tidy = tuple(map(tidy_picture, pictures))
+    tidy = tuple(replace(tidy_picture(one), background=background) for one in pictures)
     evidence = dict(draft.evidence)
     text, wording = draft.text, draft.wording
     return Question(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,12 +21,13 @@ from phyblock_making.questions.block_measures import turned_about_vertical, vert
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import with_own_colors
 from phyblock_making.questions.goal_view import (
-    GOAL_VIEW,
     NAMED,
     STUDIED,
+    View,
     are_seen,
+    goal_picture,
     require_seen,
-    shown_blocks,
+    shown_picture,
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import resolve_one, shape_word
@@ -76,10 +77,10 @@ class RotationMaker(StaticMaker):
 
     subtask: Subtask = "RR"
 
-    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Pairs of a type, one of them turned so that an angle drawn comes out."""
         carrying = {order for block in scene.blocks for order in block.depend}
-        seen = {block.order for block in seen_blocks(scene, NAMED)}
+        seen = {block.order for block in seen_blocks(goal_picture(scene, view), NAMED)}
         pairs = [
             (one, other)
             for one, other in itertools.permutations(scene.blocks, 2)
@@ -90,15 +91,15 @@ class RotationMaker(StaticMaker):
         ]
         for one, other in shuffled(rng, pairs)[:_PAIRS]:
             rule = _rule(one)
-            made = _turned(scene, one, other, rule, rng) if rule else None
+            made = _turned(view, scene, one, other, rule, rng) if rule else None
             if made is not None:
                 yield made
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """From the orientations in the picture, up to the symmetry of the type."""
-        blocks, slots = shown_blocks(question), slots_of(question)
-        one, other = (resolve_one(slots[name], blocks) for name in ("block", "other"))
-        require_seen(blocks, [one.order, other.order], STUDIED)
+        picture, slots = shown_picture(question), slots_of(question)
+        one, other = (resolve_one(slots[name], picture) for name in ("block", "other"))
+        require_seen(picture, [one.order, other.order], STUDIED)
         rule = _rule(one)
         turns = [rule.phrase_of(turn) for turn in vertical_turns_deg(one, other)] if rule else []
         if not turns or not rule:
@@ -112,7 +113,7 @@ class RotationMaker(StaticMaker):
 
 
 def _turned(
-    scene: Scene, one: Block, other: Block, rule: _Rule, rng: np.random.Generator
+    view: View, scene: Scene, one: Block, other: Block, rule: _Rule, rng: np.random.Generator
 ) -> Draft | None:
     """A draft in which `one` stands at an angle drawn to `other`; None when it does not fit."""
     phrase = pick(rng, rule.options)
@@ -122,14 +123,15 @@ def _turned(
         moved = turned_about_vertical(mine, turn) if turn else mine
         if phrase in [rule.phrase_of(t) for t in vertical_turns_deg(moved, its)[:1]]:
             blocks = tuple(moved if b.order == one.order else b for b in colored.blocks)
-            if _is_sound(blocks, moved, mine, its):
-                return _draft(colored, blocks, (mine, its), rule, phrase, rng)
+            picture = goal_picture(replace(colored, blocks=blocks), view)
+            if _is_sound(picture, moved, mine, its):
+                return _draft(colored, picture, (mine, its), rule, phrase, rng)
     return None
 
 
 def _draft(
     scene: Scene,
-    blocks: tuple[Block, ...],
+    picture: QuestionPicture,
     pair: tuple[Block, Block],
     rule: _Rule,
     phrase: str,
@@ -138,8 +140,8 @@ def _draft(
     options = [phrase, *(option for option in rule.options if option != phrase)]
     noun = shape_word(pair[0].type)
     slots = {"block": f"{pair[0].color} {noun}", "other": f"{pair[1].color} {noun}"}
-    made = draft(scene, rng, f"rr-{rule.kind}", slots, options, phrase, rule.kind, turned=phrase)
-    return replace(made, pictures=(QuestionPicture("scene", blocks, GOAL_VIEW, (), scene.blocks),))
+    stem = f"rr-{rule.kind}"
+    return draft(scene, picture, rng, stem, slots, options, phrase, rule.kind, turned=phrase)
 
 
 def _rule(block: Block) -> _Rule | None:
@@ -147,9 +149,9 @@ def _rule(block: Block) -> _Rule | None:
     return {(0,): _TURN, (0, 180): _ANGLE}.get(vertical_turns_deg(block, block))
 
 
-def _is_sound(blocks: Sequence[Block], moved: Block, before: Block, other: Block) -> bool:
+def _is_sound(picture: QuestionPicture, moved: Block, before: Block, other: Block) -> bool:
     """Whether the moved block fits, rests on what it rested on, and both show enough."""
-    near = [block for block in blocks if block is not moved and _is_near(block, moved, before)]
+    near = [b for b in picture.blocks if b is not moved and _is_near(b, moved, before)]
     if drop_height_m(moved, near) > FIT_TOLERANCE_M:
         return False
     if any(moved.order in (o.first, o.second) for o in find_overlaps([*near, moved])):
@@ -157,7 +159,7 @@ def _is_sound(blocks: Sequence[Block], moved: Block, before: Block, other: Block
     rests_on = [support_graph([*near, block])[moved.order] for block in (moved, before)]
     if rests_on[0] != rests_on[1]:
         return False
-    return are_seen(blocks, (moved.order, other.order), STUDIED)
+    return are_seen(picture, (moved.order, other.order), STUDIED)
 
 
 def _is_near(block: Block, *others: Block) -> bool:

@@ -15,6 +15,7 @@ from phyblock.resources import cache_dir
 from phyblock.sim import PictureStyle
 from phyblock.tables.track_report import PageItems
 from phyblock.tracks import PicturePolicy, Pictures
+from phyblock.words import BACKGROUNDS
 
 __all__ = ["PictureShelf"]
 
@@ -37,7 +38,8 @@ class PictureShelf:
         self._cache = cache_dir() / "pictures"
         self._suite = suite
         images = suite["images"]
-        self._style = PictureStyle(size_px=images["size_px"], background=images["background"])
+        ground = images["background"] or BACKGROUNDS[0]
+        self._style = PictureStyle(size_px=images["size_px"], background=ground)
         self._room = _MOST_COPIED_BYTES
 
     def add_scenes(self, tasks: Iterable[AssemblyTask]) -> None:

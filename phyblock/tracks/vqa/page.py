@@ -32,7 +32,8 @@ def question_items(manifest: Mapping[str, Any], dataset: Dataset) -> PageItems:
     by_id = {task.question.id: task for task in questions.tasks}
 
     def pictures(folder: Path, style: PictureStyle) -> QuestionPictures:
-        return QuestionPictures(folder, style, suite["vqa"]["options_as"], 1)
+        ground = suite["images"]["background"]
+        return QuestionPictures(folder, style, suite["vqa"]["options_as"], 1, ground)
 
     return PageItems(lambda record: _shown(record, by_id), _entry, pictures)
 
