@@ -32,6 +32,7 @@ __all__ = [
     "find_twins",
     "fingerprint",
     "transformed",
+    "turned_form",
 ]
 
 Matrix = NDArray[np.float64]
@@ -80,6 +81,11 @@ def canonical_form(blocks: Sequence[Block]) -> tuple[tuple[object, ...], ...]:
     blocks, places counted in millimeters from the low corner of the block origins.
     """
     return min(_form(transformed(blocks, symmetry)) for symmetry in SYMMETRIES)
+
+
+def turned_form(blocks: Sequence[Block]) -> tuple[tuple[object, ...], ...]:
+    """A name of the structure that turning and shifting it keeps, and mirroring does not."""
+    return min(_form(transformed(blocks, Symmetry(turns))) for turns in range(4))
 
 
 def fingerprint(blocks: Sequence[Block]) -> bytes:

@@ -12,7 +12,7 @@ in one question tells nothing of the next.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,10 +35,11 @@ Floats = NDArray[np.float64]
 class Texts:
     """What a reader without pictures sees of a draft; the right option stands first.
 
-    `group` is equal for drafts about scenes that share parts.
+    `group` is equal for drafts about scenes that share parts, `kind` for those that ask the same.
     """
 
     group: str
+    kind: str
     question: str
     options: tuple[str, ...]
 
@@ -93,14 +94,23 @@ def _table(texts: Sequence[Texts], names: dict[str, int], grows: bool) -> _Table
     row = 0
     for one in texts:
         starts.append(row)
-        for features in text_features(one.question, one.options):
-            known = {"": 0.0} | {n: v for n, v in features.items() if grows or n in names}
-            for name, value in known.items():
+        for features in _features(one):
+            for name, value in features.items():
+                if not (grows or name in names):
+                    continue
                 rows.append(row)
                 columns.append(names.setdefault(name, len(names)))
                 values.append(value)
             row += 1
     return _Table(np.array(rows), np.array(columns), np.array(values), np.array(starts))
+
+
+def _features(one: Texts) -> Iterator[Mapping[str, float]]:
+    """Of each option, as they are and for its kind, with the others it stands beside."""
+    together = " / ".join(sorted(one.options))
+    for option, features in zip(one.options, text_features(one.question, one.options), strict=True):
+        own = {f"{one.kind}: {name}": value for name, value in features.items()}
+        yield {"": 1.0, **features, **own, f"{one.kind}: {option} of {together}": 1.0}
 
 
 def _fit(table: _Table, size: int) -> Floats:

@@ -40,6 +40,7 @@ class NumberMaker(StaticMaker):
     """NU: how many blocks there are of a color, a shape, or both."""
 
     subtask: Subtask = "NU"
+    views_a_scene = 2
 
     def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Of all that can be counted in a scene whose blocks all show enough."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -44,17 +45,23 @@ _SCALES: Mapping[str, str] = {
     "cylinder": "a cylinder is 10 cm long and 5 cm thick",
     "arch": "an arch is 10 cm long, 5 cm wide and 5 cm high",
 }
-_LADDERS: tuple[tuple[float, ...], ...] = (
-    (2.5, 5, 7.5, 10),
-    (5, 7.5, 10, 15),
-    (7.5, 10, 12.5, 17.5),
-    (10, 12.5, 17.5, 22.5),
-    (12.5, 15, 20, 25),
-    (15, 20, 25, 32.5),
-    (20, 25, 32.5, 40),
-    (25, 32.5, 40, 50),
-)
-"""Values in centimeters that stand together as options: each at least 20 % from the next."""
+_STEP_CM, _LONGEST_CM = 2.5, 50.0
+_APART = (1.2, 2.0)
+"""Values that stand together as options: each so many times the one before, at least and at most."""
+
+
+@functools.cache
+def _ladders() -> Mapping[float, Sequence[tuple[float, ...]]]:
+    """All sets of four values on the grid that may stand together, by each value in them."""
+    grid = [_STEP_CM * n for n in range(1, round(_LONGEST_CM / _STEP_CM) + 1)]
+    found: dict[float, list[tuple[float, ...]]] = {value: [] for value in grid}
+    for four in itertools.combinations(grid, 4):
+        if all(_APART[0] * a <= b <= _APART[1] * a for a, b in itertools.pairwise(four)):
+            for value in four:
+                found[value].append(four)
+    return found
+
+
 _KINDS: Mapping[str, str] = {
     "top": "height",
     "bottom": "height",
@@ -111,7 +118,7 @@ class DistanceMaker(StaticMaker):
             values = sorted(float(option.removesuffix(" cm")) for option in question.options)
         except ValueError as error:
             raise UnfairError("some option is no length in centimeters") from error
-        if any(high < 1.2 * low for low, high in itertools.pairwise(values)):
+        if any(high < _APART[0] * low for low, high in itertools.pairwise(values)):
             raise UnfairError("two values are less than 20 % apart")
         return index_of(question, _shown(right_cm))
 
@@ -154,7 +161,7 @@ def _options(
     if rule == "span":
         require_seen(picture, [block.order for block in picture.blocks], COUNTED)
     right = grid_cm(LENGTHS[rule](one, other, picture.blocks))
-    ladders = [ladder for ladder in _LADDERS if right in ladder]
+    ladders = _ladders().get(right)
     if not ladders:
         return []
     ladder = pick(rng, ladders)

@@ -1,10 +1,12 @@
 """Choosing among drafts: answers are drawn, what a reader sees beside them is evened out.
 
-First drafts are left out by chance until the texts of those kept tell nothing of what is right
-(`answer_odds`). Of these the greedy choice takes, out of a hundred or so at a time, the one that
-evens out best what was taken so far: sorts of questions, wordings, sets of options, scenes and
-levels. It does not look at answers that are texts: evening those out would make what is right
-often in some questions rare in the others.
+Drafts of each sort are taken in turns from all scenes, so that none counts for more than another.
+Of these, chance leaves out some until the texts of those kept tell nothing of what is right
+(`answer_odds`). Of those the greedy choice takes, out of a hundred or so at a time, the one that
+evens out best what was taken so far. Where options are texts it goes by what the text itself says
+alone, sort, wording and set of options: to choose by the scene as well would choose answers, for
+large scenes have larger numbers, and to even out answers would make what is right often in some
+questions rare in the others.
 """
 
 from __future__ import annotations
@@ -21,9 +23,11 @@ from phyblock_making.questions.question_draft import Draft
 __all__ = ["Pooled", "select"]
 
 _LOOKED_AT = 100
-_SPARE = 3
-"""So many times the drafts that are wanted are kept at the least, where the pool has them."""
-_WEIGHTS = {"kind": 6.0, "value": 4.0, "options": 2.0, "wording": 2.0, "scene": 3.0, "level": 0.3}
+_SPREAD = 20
+"""So many times the drafts that are wanted of a sort are looked at, where the pool has them,"""
+_SPARE = 2
+"""and so many times the drafts that are wanted are kept at the least."""
+_WEIGHTS = {"kind": 6.0, "wording": 2.0, "options": 0.2, "value": 4.0, "scene": 3.0, "level": 0.3}
 
 
 @dataclass(frozen=True)
@@ -46,12 +50,13 @@ class Pooled:
     def texts(self) -> Texts:
         """What a reader without pictures sees."""
         scene = self.draft.scene
-        return Texts((scene.parents or (scene.id,))[0], self.draft.text, self.option_texts)
+        group = (scene.parents or (scene.id,))[0]
+        return Texts(group, self.draft.kind, self.draft.text, self.option_texts)
 
 
 def select(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list[Pooled]:
     """At most `count` drafts of the pool, no two the same question about the same scene."""
-    left = _kept(pool, count, rng)
+    left = _kept(_spread(pool, count, rng), count, rng)
     tally = _Tally(left)
     taken: list[Pooled] = []
     keys: set[Hashable] = set()
@@ -67,6 +72,19 @@ def select(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list
             taken.append(chosen)
             tally.add(chosen)
     return taken
+
+
+def _spread(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list[Pooled]:
+    """Drafts of each sort, one of each scene in turns, several times as many as are wanted."""
+    turns: dict[str, list[tuple[int, int, Pooled]]] = defaultdict(list)
+    of_scene: Counter[tuple[str, str]] = Counter()
+    for place, i in enumerate(rng.permutation(len(pool)).tolist()):
+        draft = pool[i].draft
+        turns[draft.kind].append((of_scene[draft.kind, draft.scene.id], place, pool[i]))
+        of_scene[draft.kind, draft.scene.id] += 1
+    most = -(-_SPREAD * count // max(len(turns), 1))
+    ranked = (sorted(group, key=lambda entry: entry[:2])[:most] for group in turns.values())
+    return [one for group in ranked for _, _, one in group]
 
 
 def _kept(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list[Pooled]:
@@ -105,10 +123,11 @@ def _even(one: Pooled) -> Iterator[tuple[Hashable, Hashable, float]]:
     """Groups, the draft's member of each, and weights: members should be equally frequent."""
     draft = one.draft
     yield "kind", draft.kind, _WEIGHTS["kind"]
-    if not one.option_texts:
-        yield ("value", draft.kind), draft.value, _WEIGHTS["value"]
-    yield ("options", draft.kind), frozenset(one.option_texts), _WEIGHTS["options"]
     yield ("wording", draft.kind), draft.wording, _WEIGHTS["wording"]
+    if one.option_texts:
+        yield ("options", draft.kind), frozenset(one.option_texts), _WEIGHTS["options"]
+        return
+    yield ("value", draft.kind), draft.value, _WEIGHTS["value"]
     yield "scene", draft.scene.id, _WEIGHTS["scene"]
     yield "level", draft.scene.level, _WEIGHTS["level"]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from phyblock_making.questions.counting_templates import COUNTING_TEMPLATES
+from phyblock_making.questions.viewpoint_templates import VIEWPOINT_TEMPLATES
 
 __all__ = ["TEMPLATES"]
 
@@ -146,5 +147,6 @@ TEMPLATES: Mapping[str, str] = {
         "its longest side."
     ),
     **COUNTING_TEMPLATES,
+    **VIEWPOINT_TEMPLATES,
 }
 """An id is the subtask, a kind where there are several, and a number: `rp-corner-2`."""
