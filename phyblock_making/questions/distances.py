@@ -47,7 +47,7 @@ _SCALES: Mapping[str, str] = {
 }
 _STEP_CM, _LONGEST_CM = 2.5, 50.0
 _APART = (1.2, 2.0)
-"""Values that stand together as options: each so many times the one before, at least and at most."""
+"""Values that are options together: each at least and at most so many times the one before."""
 
 
 @functools.cache

@@ -134,16 +134,25 @@ def _family(
 ) -> tuple[tuple[_Structure, ...], str]:
     """A structure with each of two changes made or not; none where two of them are the same."""
     base = _Structure(scene.blocks)
-    changed = [base]
     names = shuffled(rng, ("mirror", "swap", "swap", "shift"))[:2]
+    changed = [base]
+    touched: list[int] = []
     for name in names:
         made = _changed(base, name, rng, views)
         if made is None:
             return (), ""
+        touched += [] if made.is_mirrored else _differing(base, made)
         changed += [_like(base, made, one) for one in changed]
-    if len({turned_form(one.blocks) for one in changed}) < len(changed):
+    forms = {turned_form(one.blocks) for one in changed}
+    if len(forms) < len(changed) or len(set(touched)) < len(touched):
         return (), ""
     return tuple(changed), "+".join(sorted(names))
+
+
+def _differing(base: _Structure, changed: _Structure) -> list[int]:
+    """Orders of the blocks that a change alters."""
+    pairs = zip(base.blocks, changed.blocks, strict=True)
+    return [before.order for before, after in pairs if before != after]
 
 
 def _changed(
@@ -168,18 +177,11 @@ def _like(base: _Structure, changed: _Structure, other: _Structure) -> _Structur
     """What was changed from `base` changed in another structure as well."""
     if changed.is_mirrored:
         return other.mirrored()
-    new = {b.order: a for b, a in zip(base.blocks, changed.blocks, strict=True) if a != b}
     if other.is_mirrored:
-        plain = _like(base, changed, other.mirrored())
-        return plain.mirrored()
-    return _Structure(tuple(_merged(block, new.get(block.order)) for block in other.blocks))
-
-
-def _merged(block: Block, change: Block | None) -> Block:
-    """The block with the color and the pose of its change, which alters one of the two."""
-    if change is None:
-        return block
-    return change if change.color == block.color else replace(block, color=change.color)
+        return _like(base, changed, other.mirrored()).mirrored()
+    altered = _differing(base, changed)
+    new = {block.order: block for block in changed.blocks if block.order in altered}
+    return _Structure(tuple(new.get(block.order, block) for block in other.blocks))
 
 
 def _side(scene: Scene, rng: np.random.Generator, front: View, side: str) -> Iterator[Draft]:
