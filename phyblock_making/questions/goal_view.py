@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from phyblock.domain.blocks import BlockType, euler_deg_to_matrix
 from phyblock.domain.question import Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.camera import VIEWS, view_axes
@@ -37,6 +38,7 @@ __all__ = [
     "require_shapes_seen",
     "shares",
     "shown_picture",
+    "shows_profile",
 ]
 
 View = tuple[float, float]
@@ -55,6 +57,15 @@ SHAPED = 0.28
 """The least visible share of every block where shapes are counted,"""
 SHAPED_AREA = 0.004
 """and the least share of the picture that it covers."""
+_PROFILE_AXES: Mapping[BlockType, int] = {
+    "arch": 0,
+    "triangle": 0,
+    "semi_cylinder": 0,
+    "cylinder": 2,
+}
+"""Body axes along which these types look like what they are; from elsewhere they look like boxes."""
+_LEAST_PROFILE = 0.26
+"""The sine of 15 degrees: so far the face across that axis is turned to the viewer."""
 _SIZE_PX = 256
 _MIDDLE_GAP = 0.1
 """So much further out, of half the picture's width, is the middle of a block called leftmost,"""
@@ -165,9 +176,20 @@ def _areas(blocks: tuple[Block, ...], view: View) -> Mapping[int, float]:
     }
 
 
+def shows_profile(block: Block, view: View) -> bool:
+    """Whether a view shows the face that tells an arch, a prism or a half cylinder from a box."""
+    axis = _PROFILE_AXES.get(block.type)
+    if axis is None:
+        return True
+    along = euler_deg_to_matrix(block.euler_deg)[:, axis]
+    return bool(abs(along @ view_axes(*view)[2]) >= _LEAST_PROFILE)
+
+
 def require_shapes_seen(picture: QuestionPicture) -> None:
     """Raise UnfairError unless every block shows enough of itself to tell its shape."""
     require_seen(picture, [block.order for block in picture.blocks], SHAPED)
+    if not all(shows_profile(block, picture.view_deg) for block in picture.blocks):
+        raise UnfairError("some block is seen from a side that does not tell its shape")
     areas = _areas(tuple(map(_plain, picture.blocks)), picture.view_deg)
     small = [order for order, area in sorted(areas.items()) if area < SHAPED_AREA]
     if small:

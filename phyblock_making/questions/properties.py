@@ -19,6 +19,7 @@ from phyblock_making.questions.goal_view import (
     goal_picture,
     require_seen,
     shown_picture,
+    shows_profile,
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import SHAPE_WORDS, Feature, resolve_one, shape_word
@@ -48,7 +49,7 @@ class ShapeMaker(StaticMaker):
     def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """One a block that shows enough of itself."""
         for block in shuffled(rng, seen_blocks(goal_picture(scene, view), STUDIED)):
-            if _hides_its_shape(block, scene.blocks):
+            if _hides_its_shape(block, scene.blocks) or not shows_profile(block, view):
                 continue
             shown = recolored(scene, rng)
             picture = goal_picture(shown, view)
@@ -65,6 +66,8 @@ class ShapeMaker(StaticMaker):
         picture = shown_picture(question)
         block = resolve_one(slots_of(question)["block"], picture)
         require_seen(picture, [block.order], STUDIED)
+        if not shows_profile(block, picture.view_deg):
+            raise UnfairError("is seen from a side that does not tell its shape")
         if _hides_its_shape(block, picture.blocks):
             raise UnfairError("a half cylinder that stands and carries looks like a cylinder")
         return index_of(question, shape_word(block.type))

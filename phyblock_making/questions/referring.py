@@ -16,7 +16,7 @@ from phyblock.domain.blocks import COLORS, BlockType, Color
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block
 from phyblock.sim.support import bounds_m
-from phyblock_making.questions.goal_view import outermost
+from phyblock_making.questions.goal_view import outermost, shows_profile
 from phyblock_making.questions.question_draft import UnfairError
 
 __all__ = ["SHAPE_WORDS", "Feature", "names", "resolve", "resolve_one", "shape_word"]
@@ -93,7 +93,7 @@ def resolve(text: str, picture: QuestionPicture, loosely: bool = False) -> tuple
     if match is None:
         raise UnfairError(f"{text!r} names no block")
     words = match.groupdict()
-    fitting = [block for block in picture.blocks if _fits(block, words, loosely)]
+    fitting = [block for block in picture.blocks if _fits(block, words, loosely, picture)]
     if words["layer"] is not None:
         layers = [block.layer for block in fitting]
         if len(set(layers)) < len(layers):
@@ -171,8 +171,13 @@ def _is_part(shorter: _Expression, longer: _Expression) -> bool:
     return fits and all(short is None or short == long for short, long in pairs)
 
 
-def _fits(block: Block, words: Mapping[str, str | None], loosely: bool) -> bool:
+def _fits(
+    block: Block, words: Mapping[str, str | None], loosely: bool, picture: QuestionPicture
+) -> bool:
     types = set(_NOUNS[words["noun"] or "block"])
+    if loosely and words["noun"] != "block" and not shows_profile(block, picture.view_deg):
+        # Seen from this side, it may be taken for anything but what it is.
+        return block.type not in types and words["color"] in (None, block.color)
     if loosely:
         types = types.union(*(alike for alike in _ALIKE if alike & types))
     return block.type in types and words["color"] in (None, block.color)
