@@ -63,7 +63,7 @@ _PROFILE_AXES: Mapping[BlockType, int] = {
     "semi_cylinder": 0,
     "cylinder": 2,
 }
-"""Body axes along which these types look like what they are; from elsewhere they look like boxes."""
+"""Body axes along which these types look like what they are, and from elsewhere like boxes."""
 _LEAST_PROFILE = 0.26
 """The sine of 15 degrees: so far the face across that axis is turned to the viewer."""
 _SIZE_PX = 256

@@ -92,8 +92,9 @@ What was unfair became a rule for all:
 * of next steps at most one obviously floats; the others are blocks of the goal at wrong places;
 * of the pictures of removals at least one wrong one lacks the right block, so that to look for
   what is gone is not enough; the removed block shows 40% of itself, the others 12%;
-* an arch, a triangular prism, a half cylinder or a cylinder is called that, and its shape asked for,
-  only where its profile is turned to the viewer by 15 degrees: from behind an arch looks like a box;
+* an arch, a triangular prism, a half cylinder or a cylinder is called that, and its shape asked
+  for, only where its profile is turned to the viewer by 15 degrees: from behind an arch looks like
+  a box;
 * what is hidden is counted only where a block that shows rests on it alone, one at the most;
 * heights are asked for "above the ground", left and right "in the picture";
 * other viewpoints to a side are asked for from straight in front alone: a slanted view has a
