@@ -15,6 +15,7 @@ __all__ = [
     "PLAN_PARSERS",
     "SETTINGS",
     "Background",
+    "CandidateScale",
     "Criterion",
     "DataFormat",
     "Finish",
@@ -70,6 +71,7 @@ BACKGROUNDS: tuple[Background, ...] = get_args(Background)
 PictureName = Literal["goal", "candidates"]
 PictureSource = Literal["render", "dataset"]
 PictureLayout = Literal["composite", "separate"]
+CandidateScale = Literal["common", "fit"]
 
 Role = Literal["system", "user", "assistant"]
 """Who speaks in a chat message."""

@@ -12,23 +12,37 @@ order, so a level-2 scene is read as a scene of levels 1 and 2.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Annotated, Any, TypeVar
+
+from pydantic import Field
 
 from phyblock.datasets.base import AssemblyTask, Dataset
-from phyblock.datasets.checks import SceneReader
-from phyblock.datasets.raw import gather, is_name, read_json
-from phyblock.domain import CandidateSet, Scene
+from phyblock.datasets.raw import gather, read_json
+from phyblock.domain import MAX_CANDIDATES, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
+from phyblock.records.data_values import NAME_ALLOWED, Filled, Position, is_name, triple
+from phyblock.records.decode import shown
+from phyblock.records.faults import Fault, free_of, refuse, validated, worded
+from phyblock.records.line import Line
+from phyblock.records.scene import (
+    SceneBlocks,
+    StoredCandidate,
+    candidate_set,
+    look_faults,
+    missing_faults,
+)
 
 __all__ = [
+    "OfficialGoal",
     "candidates_file",
     "goal_files",
     "official_prompt",
     "read_candidates",
+    "read_goal",
     "read_official",
-    "read_scene",
     "recorded_models",
 ]
 
@@ -38,7 +52,47 @@ _PICTURES = Path("data", "SCENEs_400_Goal_and_Cand_Imgs_resized")
 _OUTPUTS = Path("outputs")
 # <IMG_CONTEXT> of InternVL, <|image_pad|> of Qwen, <image> of LLaVA
 _PICTURE_MARKS = re.compile(r"\A(?:\s*<\|?[A-Za-z_]{1,30}\|?>)+")
+_NO_LEVEL = ("is not an allowed number", "an integer 1 to 4")
+_PARENTS = r"^[A-Za-z0-9][A-Za-z0-9.-]{0,99}(_[A-Za-z0-9][A-Za-z0-9.-]{0,99})*$"
+_NO_PARENTS = ("is not allowed", "base scenes joined by '_'")
 _T = TypeVar("_T")
+_GoalT = TypeVar("_GoalT", bound=Line)
+
+
+class OfficialGoal(Line, extra="ignore"):
+    """A goal file; other fields are not read."""
+
+    level: Annotated[int, Field(strict=True, ge=1, le=4), worded(*_NO_LEVEL)]
+    # Declared layers differ from the longest path in 70 of the 400 released scenes.
+    blocks: SceneBlocks
+    lookat_pos: Position | None = None
+    combined: Annotated[str, Field(pattern=_PARENTS), worded(*_NO_PARENTS)] | None = None
+
+    def scene(self, name: str) -> Scene:
+        """The goal structure; a base scene is its own parent."""
+        levels = (1, 2) if self.level == 2 else (self.level,)
+        parents = self.combined.split("_") if self.combined is not None else [name]
+        look_at_m = None if self.lookat_pos is None else triple(self.lookat_pos)
+        blocks = tuple(stored.block() for stored in self.blocks)
+        return Scene(name, levels, blocks, tuple(parents), look_at_m)
+
+
+class _Numbered(StoredCandidate, extra="ignore"):
+    position: Any = None
+
+
+def _number_faults(candidates: Sequence[_Numbered]) -> Iterator[Fault]:
+    for i, candidate in enumerate(candidates):
+        if candidate.position != i + 1:
+            allowed = f"{i + 1}: candidates are numbered from 1 in file order"
+            yield Fault("is wrong", allowed, shown(candidate.position), (i, "position"))
+
+
+class _CandidateFile(Line):
+    candidates: Annotated[
+        tuple[_Numbered, ...], Filled(MAX_CANDIDATES), free_of(_number_faults, look_faults)
+    ]
+    """In candidate files `position` is the number, from 1, that the picture shows."""
 
 
 def read_official(root: Path) -> Dataset:
@@ -108,13 +162,12 @@ def official_prompt(root: Path) -> str:
 
 def _read_task(root: Path, path: Path) -> AssemblyTask:
     candidates_path = candidates_file(root, path)
-    scene, problems = _try(read_scene, path)
+    goal, problems = _try(partial(read_goal, kind=OfficialGoal), path)
     candidates, more_problems = _try(read_candidates, candidates_path)
-    if scene is None or candidates is None:
+    if goal is None or candidates is None:
         raise DataError([*problems, *more_problems])
-    reader = SceneReader(str(candidates_path))
-    reader.check_solvable(scene, candidates)
-    reader.raise_if_broken()
+    scene = goal.scene(path.stem)
+    refuse(missing_faults(scene, candidates), str(candidates_path))
     picture = root / _PICTURES / f"{path.stem}.png"
     return AssemblyTask(scene, candidates, picture if picture.is_file() else None)
 
@@ -126,36 +179,15 @@ def _try(read: Callable[[Path], _T], path: Path) -> tuple[_T | None, tuple[Probl
         return None, error.problems
 
 
-def read_scene(path: Path, reader: SceneReader | None = None) -> Scene:
-    """The scene in a goal file; raises DataError with everything that `reader` finds wrong."""
-    reader = reader or SceneReader(str(path))
-    raw = reader.mapping(read_json(path))
-    level = reader.integer(reader.get(raw, "level"), "level", 1, 4)
-    # Declared layers differ from the longest path in 70 of the 400 released scenes.
-    blocks = reader.blocks(reader.get(raw, "blocks"), strict_layers=False)
-    optional = raw if isinstance(raw, dict) else {}
-    look_at = optional.get("lookat_pos")
-    look_at_m = None if look_at is None else reader.position(look_at, "lookat_pos")
-    parents = [reader.name(path.stem, "the file's name")]
-    if (combined := optional.get("combined")) is not None:
-        parents = combined.split("_") if isinstance(combined, str) else []
-        if not parents or not all(map(is_name, parents)):
-            reader.complain("combined", "is not allowed", combined, "base scenes joined by '_'")
-    reader.raise_if_broken()
-    levels = (1, 2) if level == 2 else (cast(int, level),)
-    return Scene(path.stem, levels, blocks, tuple(parents), look_at_m)
+def read_goal(path: Path, kind: type[_GoalT]) -> _GoalT:
+    """A goal file as a `kind`; raises DataError with everything that is wrong in it."""
+    if not is_name(path.stem):
+        problem = Problem(str(path), "is not a name", "the file's name", path.stem, NAME_ALLOWED)
+        raise DataError(problem)
+    return validated(kind, read_json(path), str(path))
 
 
 def read_candidates(path: Path) -> CandidateSet:
     """The candidate set in a file; raises DataError with everything that is wrong in it."""
-    raw = read_json(path)
-    reader = SceneReader(str(path))
-    candidates = reader.candidates(raw)
-    for i, entry in enumerate(raw if isinstance(raw, list) else []):
-        # In candidate files `position` is the 1-based number that the picture shows.
-        number = entry.get("position") if isinstance(entry, dict) else i + 1
-        if number != i + 1:
-            allowed = f"{i + 1}: candidates are numbered from 1 in file order"
-            reader.complain(f"candidates[{i}].position", "is wrong", number, allowed)
-    reader.raise_if_broken()
-    return candidates
+    found = validated(_CandidateFile, {"candidates": read_json(path)}, str(path))
+    return candidate_set(found.candidates)

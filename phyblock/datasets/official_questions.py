@@ -19,14 +19,15 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Annotated, Any, NamedTuple, cast
+
+from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, ValidationInfo
 
 from phyblock.datasets.base import Dataset, QuestionSet, QuestionTask
-from phyblock.datasets.builtin import scene_lines
-from phyblock.datasets.questions import QuestionReader
-from phyblock.datasets.raw import MISSING, gather, parse_json, read_text
+from phyblock.datasets.raw import gather, lines_of, parse_json, read_text, used_already
 from phyblock.domain import (
     LETTERS,
     SUBTASK_NAMES,
@@ -38,12 +39,20 @@ from phyblock.domain import (
     is_picture_option,
 )
 from phyblock.errors import DataError, Problem
+from phyblock.records.data_values import Name, Text
+from phyblock.records.decode import shown
+from phyblock.records.faults import Fault, fault, validated
+from phyblock.records.line import Line
+from phyblock.records.picture import About
+from phyblock.records.question import Options, SceneId
 
 __all__ = ["read_official_questions"]
 
 _MOST_QUESTIONS = 100_000
 _GOAL_VIEW = (45.0, 22.0)
 _SUFFIXES = (".json", ".jsonl")
+_QUESTIONS = "a file of questions"
+_ALLOWED = "a PNG or JPEG file inside the folder"
 _PICTURES = (".png", ".jpg", ".jpeg")
 _NAME = re.compile(r"[^a-z]+")
 _NAMES: Mapping[str, Subtask] = {
@@ -78,26 +87,37 @@ def read_official_questions(folder: Path, scenes: Dataset) -> QuestionSet:
         base = _index_base([entry.raw for entry in entries])
         for entry in entries:
             try:
-                task = _Reader(entry.where, folder, base).task(entry, path.stem, known)
+                task = _read_task(entry, path, known, base)
             except DataError as error:
                 gather(problems, error.problems, folder)
                 continue
             if first.setdefault(task.key, entry.where) != entry.where:
-                message = f"is used at {first[task.key]} already"
-                gather(problems, [Problem(entry.where, message, "id", repr(task.key))], folder)
+                gather(
+                    problems, [used_already(entry.where, f"at {first[task.key]}", task.key)], folder
+                )
             tasks.append(task)
     if problems:
         raise DataError(problems)
     return QuestionSet(folder.name, folder, tuple(tasks))
 
 
+def _read_task(
+    entry: _Entry, path: Path, scenes: Mapping[str, Scene], base: int | None
+) -> QuestionTask:
+    raw = _completed(entry.raw, path.stem, entry.number)
+    scene = About.named_in(raw, scenes).scene
+    around = _Around(scene, len(scenes), path.parent, base)
+    line = validated(_StoredEntry, raw, entry.where, around)
+    return line.task(scenes[line.scene_id])
+
+
 def _entries(path: Path) -> Iterator[_Entry]:
     """The objects of a file with the line on which each begins."""
     if path.suffix == ".jsonl":
-        for number, line in enumerate(scene_lines(path), 1):
+        for number, line in enumerate(lines_of(path, _QUESTIONS), 1):
             yield _Entry(f"{path}:{number}", parse_json(line, path, number), number)
         return
-    text = read_text(path, "a file of questions")
+    text = read_text(path, _QUESTIONS)
     whole = parse_json(text, path)
     if not isinstance(whole, list):
         raise DataError(Problem(str(path), "is not an array", allowed="an array of questions"))
@@ -134,111 +154,119 @@ def _index_base(entries: list[Any]) -> int | None:
     return 1 if len(LETTERS) in found else None
 
 
-class _Reader(QuestionReader):
-    """Reads one entry, and collects what is wrong with it."""
+@dataclass(frozen=True)
+class _Around(About):
+    """What an entry is held against: its scene, its folder, and where indices of its file begin."""
 
-    def __init__(self, where: str, folder: Path, base: int | None) -> None:
-        super().__init__(where)
-        self._folder = folder
-        self._base = base
-
-    def task(self, entry: _Entry, stem: str, scenes: Mapping[str, Scene]) -> QuestionTask:
-        """The question with its pictures; raises DataError with everything that is wrong."""
-        raw = self.mapping(entry.raw)
-        optional = {} if raw is MISSING else raw
-        subtask = self._subtask(optional.get("subtask", stem))
-        name = self.name(optional.get("id", f"{_code(stem)}-{entry.number:03d}"), "id")
-        scene = self.scene(self._scene_id(self.get(raw, "scene_id")), scenes)
-        text = self.text(self.get(raw, "question"), "question")
-        options = self.options(self.get(raw, "options"))
-        answer = self._answer(self.get(raw, "answer"), options, subtask == "OR")
-        files = self._files(optional.get("images", {}), name, scene, options)
-        self.raise_if_broken()
-        assert scene is not None
-        assert subtask is not None
-        drawn = () if "scene" in files or subtask == "OR" else (_goal(scene),)
-        question = Question(name, subtask, scene, text, options, answer, drawn)
-        return QuestionTask(question, files)
-
-    def _subtask(self, raw: object) -> Subtask | None:
-        found = _NAMES.get(_NAME.sub("", raw.lower())) if isinstance(raw, str) else None
-        if found is None:
-            allowed = f"in the entry or as the file's name: {', '.join(SUBTASKS)}"
-            self.complain("subtask", "is not known", raw, allowed)
-        return found
-
-    def _scene_id(self, raw: object) -> object:
-        """Scene ids are texts of three digits in the official files; numbers are taken as such."""
-        return f"{raw:03d}" if type(raw) is int else raw
-
-    def _answer(self, raw: object, options: tuple[str, ...], is_order: bool) -> tuple[int, ...]:
-        if raw is MISSING or not options:
-            return ()
-        parts = raw if isinstance(raw, list) else [raw]
-        if is_order and isinstance(raw, str):
-            parts = [letter for letter in raw.upper() if letter.isalnum()]
-        found = [self._index(part, options) for part in parts]
-        wanted = len(options) if is_order else 1
-        if None in found or len(set(found)) < wanted or len(found) != wanted:
-            allowed = "a permutation of the options" if is_order else "a letter, option or index"
-            if self._base is None and any(type(part) is int for part in parts):
-                allowed = "letters: the indices of this file do not tell whether they begin at 0"
-            self.complain("answer", "is none of the options", raw, allowed)
-            return ()
-        return tuple(cast(list[int], found))
-
-    def _index(self, raw: object, options: tuple[str, ...]) -> int | None:
-        if type(raw) is int:
-            index = None if self._base is None else raw - self._base
-            return index if index is not None and 0 <= index < len(options) else None
-        text = raw.strip() if isinstance(raw, str) else ""
-        letter = text.strip("().").upper()
-        if letter and letter in LETTERS[: len(options)]:
-            return LETTERS.index(letter)
-        return options.index(text) if text in options else None
-
-    def _files(
-        self, raw: object, name: str, scene: Scene | None, options: tuple[str, ...]
-    ) -> dict[str, Path]:
-        """The picture files by label; complains about those that are missing."""
-        named = self.mapping(raw, "images")
-        named = {} if named is MISSING else named
-        files: dict[str, Path] = {}
-        pictures = self._folder / "images"
-        if scene is not None and (path := self._file(named, "scene", pictures / scene.id)):
-            files["scene"] = path
-        for letter, option in zip(LETTERS, options, strict=False):
-            label = option.strip("<>")
-            if not is_picture_option(option):
-                continue
-            path = self._file(named, label, pictures / name / label)
-            if path is not None:
-                files[letter] = path
-            elif label not in named:
-                shown = f"images/{name}/{label}.png"
-                self.complain("images", f"the picture {option} is missing", shown, _ALLOWED)
-        return files
-
-    def _file(self, named: Mapping[str, Any], label: str, default: Path) -> Path | None:
-        """The file that is named, or the one at its usual place."""
-        if label in named:
-            path = self._folder / str(named[label])
-            inside = os.path.join(os.path.abspath(self._folder), "")
-            if not os.path.abspath(path).startswith(inside) or not os.path.isfile(path):
-                self.complain(
-                    f"images.{label}", "no such file in the folder", str(named[label]), _ALLOWED
-                )
-                return None
-            return path
-        found = (default.with_name(default.name + suffix) for suffix in _PICTURES)
-        return next((path for path in found if os.path.isfile(path)), None)
+    folder: Path
+    base: int | None
 
 
-_ALLOWED = "a PNG or JPEG file inside the folder"
+def _subtask_of(named: object) -> Subtask:
+    found = _NAMES.get(_NAME.sub("", named.lower())) if isinstance(named, str) else None
+    if found is None:
+        allowed = f"in the entry or as the file's name: {', '.join(SUBTASKS)}"
+        raise fault(Fault("is not known", allowed))
+    return found
 
 
-def _goal(scene: Scene) -> QuestionPicture:
-    return QuestionPicture("scene", scene.blocks, _GOAL_VIEW)
+def _around(info: ValidationInfo) -> _Around:
+    return cast(_Around, info.context)
+
+
+def _indices(answer: object, info: ValidationInfo) -> tuple[int, ...]:
+    """The indices from 0 of the right options."""
+    options: tuple[str, ...] = info.data.get("options", ())
+    if not options:
+        return ()
+    base, is_order = _around(info).base, info.data.get("subtask") == "OR"
+    parts: Sequence[object] = answer if isinstance(answer, list) else [answer]
+    if is_order and isinstance(answer, str):
+        parts = [letter for letter in answer.upper() if letter.isalnum()]
+    found = [_index(part, options, base) for part in parts]
+    wanted = len(options) if is_order else 1
+    if None in found or len(set(found)) < wanted or len(found) != wanted:
+        allowed = "a permutation of the options" if is_order else "a letter, option or index"
+        if base is None and any(type(part) is int for part in parts):
+            allowed = "letters: the indices of this file do not tell whether they begin at 0"
+        raise fault(Fault("is none of the options", allowed))
+    return tuple(cast(list[int], found))
+
+
+def _index(part: object, options: tuple[str, ...], base: int | None) -> int | None:
+    if type(part) is int:
+        index = None if base is None else part - base
+        return index if index is not None and 0 <= index < len(options) else None
+    text = part.strip() if isinstance(part, str) else ""
+    letter = text.strip("().").upper()
+    if letter and letter in LETTERS[: len(options)]:
+        return LETTERS.index(letter)
+    return options.index(text) if text in options else None
+
+
+def _files(named: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+    """The picture files by label; that of the scene may be missing, those of options may not."""
+    scene, folder, name = _around(info).scene, _around(info).folder, info.data.get("id", "")
+    wanted = [] if scene is None else [("scene", "scene", scene.id)]
+    for letter, option in zip(LETTERS, info.data.get("options", ()), strict=False):
+        if is_picture_option(option):
+            wanted.append((letter, option.strip("<>"), f"{name}/{option.strip('<>')}"))
+    files: dict[str, Path] = {}
+    faults: list[Fault] = []
+    for label, key, usual in wanted:
+        path = _named(folder, named[key]) if key in named else _usual(folder / "images" / usual)
+        if path is not None:
+            files[label] = path
+        elif key in named:
+            found = shown(str(named[key]))
+            faults.append(Fault("no such file in the folder", _ALLOWED, found, (key,)))
+        elif label != "scene":
+            found = shown(f"images/{usual}.png")
+            faults.append(Fault(f"the picture <{key}> is missing", _ALLOWED, found))
+    if faults:
+        raise fault(*faults)
+    return files
+
+
+def _named(folder: Path, name: object) -> Path | None:
+    path = folder / str(name)
+    inside = os.path.join(os.path.abspath(folder), "")
+    is_inside = os.path.abspath(path).startswith(inside)
+    return path if is_inside and os.path.isfile(path) else None
+
+
+def _usual(place: Path) -> Path | None:
+    found = (place.with_name(place.name + suffix) for suffix in _PICTURES)
+    return next((path for path in found if os.path.isfile(path)), None)
+
+
+class _StoredEntry(Line, extra="ignore"):
+    id: Name
+    subtask: Annotated[Subtask, BeforeValidator(_subtask_of)]
+    scene_id: SceneId
+    question: Text
+    options: Options
+    answer: Annotated[tuple[int, ...], PlainValidator(_indices)]
+    images: Annotated[dict[str, Any], AfterValidator(_files)] = Field({}, validate_default=True)
+
+    def task(self, scene: Scene) -> QuestionTask:
+        is_drawn = "scene" not in self.images and self.subtask != "OR"
+        drawn = (QuestionPicture("scene", scene.blocks, _GOAL_VIEW),) if is_drawn else ()
+        question = Question(
+            self.id, self.subtask, scene, self.question, self.options, self.answer, drawn
+        )
+        return QuestionTask(question, self.images)
+
+
+def _completed(raw: Any, stem: str, number: int) -> Any:
+    """An entry with what the file's name says where it does not."""
+    if not isinstance(raw, dict):
+        return raw
+    whole = {"id": f"{_code(stem)}-{number:03d}", "subtask": stem, **raw}
+    if type(raw.get("scene_id")) is int:
+        # Scene ids are texts of three digits in the official files.
+        whole["scene_id"] = f"{raw['scene_id']:03d}"
+    return whole
 
 
 def _code(stem: str) -> str:

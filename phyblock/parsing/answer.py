@@ -11,7 +11,6 @@ failure, and no later rule is tried. Nothing raises on any text.
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -37,7 +36,7 @@ from phyblock.parsing.answer_patterns import (
     UNSURE,
 )
 from phyblock.parsing.answer_value import CONTRADICTION, ChoiceReader
-from phyblock.parsing.reasoning import after_reasoning
+from phyblock.parsing.text_forms import after_reasoning, plain_forms
 
 __all__ = ["ParsedAnswer", "parse_answer"]
 
@@ -57,7 +56,7 @@ class ParsedAnswer:
 
 def parse_answer(text: str, options: Sequence[str], is_ordering: bool) -> ParsedAnswer:
     """Read the answer out of a reply to a question that shows `options`, the first one as A."""
-    answer = unicodedata.normalize("NFKC", after_reasoning(text)).strip()
+    answer = plain_forms(after_reasoning(text)).strip()
     reader = OrderReader(len(options)) if is_ordering else ChoiceReader(options)
     for rule, find in _ORDER_RULES if is_ordering else _CHOICE_RULES:
         found = find(answer, reader)

@@ -7,8 +7,9 @@ is no answer (two options, or none of those shown), and None for a text that nam
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Sequence
+
+from phyblock.parsing.text_forms import plain_forms
 
 __all__ = ["CONTRADICTION", "EDGES", "LETTERS", "ChoiceReader", "plain", "unmarked"]
 
@@ -214,7 +215,7 @@ class ChoiceReader:
 
 def plain(text: str) -> str:
     """A text as options are compared: no case, no markup, no article, digits for numbers."""
-    value = _SPACE.sub(" ", unicodedata.normalize("NFKC", text).casefold())
+    value = _SPACE.sub(" ", plain_forms(text).casefold())
     for spelled, as_usual in _SPELLED:
         value = spelled.sub(as_usual, value)
     value = _ARTICLES.sub("", _MARKUP.sub("", value).strip(EDGES))

@@ -11,12 +11,11 @@ from __future__ import annotations
 
 import json
 import re
-import unicodedata
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from phyblock.parsing.reasoning import after_reasoning
+from phyblock.parsing.text_forms import after_reasoning, plain_forms
 
 __all__ = ["MOVE_PROBLEMS", "MOVE_RULES", "MoveProblem", "ParsedMove", "parse_move"]
 
@@ -101,7 +100,7 @@ _ACTION_KEYS = ("action", "operation", "next_plan", "next plan", "plan", "answer
 
 def parse_move(text: str) -> ParsedMove:
     """Read the one operation that a reply names."""
-    answer = unicodedata.normalize("NFKC", _answer(text))
+    answer = plain_forms(_answer(text))
     lines = [line for line in map(_plain, answer.splitlines()) if line]
     if not lines:
         return ParsedMove(problem="no_move" if text.strip() else "empty")

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from phyblock.domain import Plan
-from phyblock.parsing.reasoning import after_reasoning
+from phyblock.parsing.text_forms import after_reasoning
 from phyblock.words import PlanParser
 
 __all__ = ["ParsedPlan", "parse_plan"]

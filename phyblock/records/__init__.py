@@ -1,4 +1,4 @@
-"""Every line and file that a run writes and reads again, each declared once.
+"""Every line and file of runs and data that is written and read again, each declared once.
 
 A model of a line reads it, says what is wrong with it, writes it and documents itself.
 """
@@ -8,6 +8,7 @@ from phyblock.records.line import Line
 from phyblock.records.lines import PROMPTS, RECORDS, TURNS, Lines, PromptLines, TurnLines
 from phyblock.records.manifest import FORMAT, MANIFEST, Manifest, read_manifest
 from phyblock.records.others import PictureMark, Prompt, PromptMessage, Turn
+from phyblock.records.question import StoredQuestion
 from phyblock.records.record import (
     AskedTurn,
     Record,
@@ -15,11 +16,10 @@ from phyblock.records.record import (
     Score,
     SentImage,
     SentPrompt,
-    StoredError,
-    StoredReply,
-    StoredUsage,
 )
 from phyblock.records.record_lines import RecordedLines, RecordLines, record_adapter
+from phyblock.records.reply import StoredError, StoredReply, StoredUsage
+from phyblock.records.scene import StoredScene
 
 __all__ = [
     "FORMAT",
@@ -44,7 +44,9 @@ __all__ = [
     "SentImage",
     "SentPrompt",
     "StoredError",
+    "StoredQuestion",
     "StoredReply",
+    "StoredScene",
     "StoredUsage",
     "Turn",
     "TurnLines",

@@ -12,7 +12,7 @@ from phyblock.bounded import load_json
 from phyblock.errors import Problem
 from phyblock.records.line import encodable
 
-__all__ = ["decode", "is_cut", "problem_of"]
+__all__ = ["decode", "dotted", "is_cut", "problem_of", "shown"]
 
 _LONGEST_SHOWN = 60
 _MISSING = "missing"
@@ -46,23 +46,24 @@ def is_cut(line: bytes) -> bool:
 
 def problem_of(error: Any, where: str, is_not: str, hint: str) -> Problem:
     """What pydantic found, in our words."""
-    field = _dotted(error["loc"])
+    field = dotted(error["loc"])
     if error["type"] == _MISSING:
         return Problem(where, f"{is_not}: missing", field, hint=hint)
     allowed = _ALLOWED.get(error["type"], _expected)(error.get("ctx") or {}, error["msg"])
-    found = _shown(error["input"])
+    found = shown(error["input"])
     message = f"{is_not}: of the wrong type or out of range"
     return Problem(where, message, field, found, allowed, hint)
 
 
-def _dotted(place: Sequence[int | str]) -> str:
+def dotted(place: Sequence[int | str]) -> str:
+    """A place as people write it: `blocks[1].depend`; its empty parts are choices of a model."""
     text = ""
     for part in place:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}"
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if part else ""
     return text.lstrip(".")
 
 
-def _shown(value: object) -> str:
+def shown(value: object) -> str:
     """A value as JSON as far as it is shown, whatever it is."""
     text = ""
     try:

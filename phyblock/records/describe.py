@@ -13,7 +13,7 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic import TypeAdapter
 
-from phyblock.records.line import Line
+from phyblock.records.line import Line, parts
 
 __all__ = ["field_tables", "json_schema", "put_between"]
 
@@ -52,7 +52,7 @@ def field_tables(title: str, kinds: Sequence[type[Line]], known: set[type[Line]]
         hints = typing.get_type_hints(kind, include_extras=False)
         for name in names:
             lines.append(f"| `{name}` | {_type(hints[name])} | {told.get(name, '')} |")
-            waiting += _parts(hints[name])
+            waiting += parts(hints[name])
     return "\n".join(lines) + "\n"
 
 
@@ -92,7 +92,7 @@ def _with_parts(kinds: Sequence[type[Line]]) -> list[type[Line]]:
             found.append(kind)
             hints = typing.get_type_hints(kind)
             for name in kind.model_fields:
-                waiting += _parts(hints[name])
+                waiting += parts(hints[name])
     return found
 
 
@@ -113,22 +113,17 @@ def _docs(kind: type[Line]) -> dict[str, str]:
     return found
 
 
-def _parts(hint: Any) -> list[type[Line]]:
-    """Models that a type is made of."""
-    if isinstance(hint, type) and issubclass(hint, Line):
-        return [hint]
-    return [part for argument in get_args(hint) for part in _parts(argument)]
-
-
 def _type(hint: Any) -> str:
     if hint in _PLAIN:
         return _PLAIN[hint]
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is Literal:
-        return ", ".join(f"`{word}`" for word in arguments)
+        return ", ".join("true" if word is True else f"`{word}`" for word in arguments)
     if origin in (types.UnionType, typing.Union):
         return " or ".join(_type(argument) for argument in arguments)
     if origin is tuple:
+        if ... not in arguments:
+            return f"list of {_inside(arguments[0])}, {len(arguments)} of them"
         return f"list of {_inside(arguments[0])}"
     if origin is dict:
         return f"object of {_inside(arguments[1])}"
@@ -137,7 +132,8 @@ def _type(hint: Any) -> str:
 
 def _inside(hint: Any) -> str:
     text = _type(hint)
-    return f"({text})" if " or " in text and hint is not bool else text
+    is_choice = hint is not bool and (" or " in text or ", " in text)
+    return f"({text})" if is_choice else text
 
 
 def _name(kind: type) -> str:

@@ -7,11 +7,11 @@ that a line that was read is written again byte for byte, whichever version wrot
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-__all__ = ["LARGEST_WHOLE", "Amount", "Line", "Usd", "Whole", "encodable"]
+__all__ = ["LARGEST_WHOLE", "Amount", "Line", "Usd", "Whole", "encodable", "parts"]
 
 LARGEST_WHOLE = 2**53
 
@@ -37,6 +37,10 @@ class Line(BaseModel):
         """The line as it is written: plain values, nothing that was not given."""
         return self.model_dump(exclude_unset=True)
 
+    def as_json(self) -> str:
+        """The line as JSON, no newline at its end."""
+        return json.dumps(self.fields(), allow_nan=False)
+
 
 Whole = Annotated[int, Field(ge=-LARGEST_WHOLE, le=LARGEST_WHOLE)]
 """An integer that tables can hold and add up."""
@@ -51,3 +55,10 @@ Usd = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 def encodable(text: str) -> str:
     """Text that UTF-8 can hold: lone surrogates, which a broken reply may have, become "?"."""
     return text.encode("utf-8", "replace").decode("utf-8")
+
+
+def parts(hint: Any) -> list[type[Line]]:
+    """The models that a type is made of."""
+    if isinstance(hint, type) and issubclass(hint, Line):
+        return [hint]
+    return [part for argument in get_args(hint) for part in parts(argument)]

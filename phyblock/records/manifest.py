@@ -57,6 +57,8 @@ class ManifestModel(Line):
     """What the paper calls it."""
     size_b: float | None = None
     """Its size [billion parameters]."""
+    kind: str = ""
+    """`litellm`: asked over the network; `replay`: a recording; `baseline`: a rule."""
 
 
 class ManifestDataset(Line):
@@ -66,6 +68,8 @@ class ManifestDataset(Line):
     """Its name."""
     sha256: str
     """Digest of the scenes that were asked about."""
+    version: Annotated[int, Field(ge=1)] = 1
+    """Its version; results on different versions are never mixed."""
     format: str = "builtin"
     """Its layout."""
     root: str = ""

@@ -1,4 +1,4 @@
-"""`python -m phyblock.run`: rewrite what the documentation says of the files of a run."""
+"""`python -m phyblock.run`: rewrite what the documentation says of lines of runs and data."""
 
 import sys
 from pathlib import Path

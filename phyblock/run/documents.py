@@ -1,35 +1,43 @@
-"""What the documentation says of the files of a run: made from the models that read them."""
+"""What the documentation says of lines of runs and data: made from the models that read them."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from pydantic import TypeAdapter
 
-from phyblock.records import Line, Manifest, Prompt, Record, Turn
+from phyblock.records import Line, Manifest, Prompt, Record, StoredQuestion, StoredScene, Turn
 from phyblock.records.describe import field_tables, json_schema, put_between
 from phyblock.records.known import known_records, record_types
 
 __all__ = ["make_documents", "write_documents"]
 
-_PAGE = Path("docs") / "results.md"
+_SECTIONS: Mapping[str, Mapping[str, Callable[[], Sequence[type[Line]]]]] = {
+    "results.md": {
+        "A record": lambda: (Record,),
+        "What the tracks add": record_types,
+        "A turn": lambda: (Turn,),
+        "A prompt": lambda: (Prompt,),
+        "The manifest": lambda: (Manifest,),
+    },
+    "data-format.md": {"A line of `scenes.jsonl`": lambda: (StoredScene,)},
+    "vqa.md": {"A line of `questions.jsonl`": lambda: (StoredQuestion,)},
+}
+"""By page of docs/ and title, the models whose fields it lists."""
 _SCHEMAS = Path("benchmarks") / "schemas"
 
 
 def make_documents(root: Path) -> dict[Path, str]:
-    """Every file with its content as it should be; the page is read from the checkout `root`."""
-    known: set[type[Line]] = set()
-    tables = [
-        field_tables("A record", (Record,), known),
-        field_tables("What the tracks add", record_types(), known),
-        field_tables("A turn", (Turn,), known),
-        field_tables("A prompt", (Prompt,), known),
-        field_tables("The manifest", (Manifest,), known),
-    ]
-    page = (root / _PAGE).read_text(encoding="utf-8")
-    made = {_PAGE: put_between(page, "\n".join(tables))}
+    """Every file with its content as it should be; pages are read from the checkout `root`."""
+    made: dict[Path, str] = {}
+    for name, sections in _SECTIONS.items():
+        path = Path("docs", name)
+        known: set[type[Line]] = set()
+        tables = [field_tables(title, kinds(), known) for title, kinds in sections.items()]
+        made[path] = put_between((root / path).read_text(encoding="utf-8"), "\n".join(tables))
     for name, schema in _schemas().items():
         text = json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
         made[_SCHEMAS / f"{name}.schema.json"] = text
@@ -50,4 +58,8 @@ def _schemas() -> dict[str, Any]:
         "turn": json_schema("phyblock turn", TypeAdapter(Turn), (Turn,)),
         "prompt": json_schema("phyblock prompt", TypeAdapter(Prompt), (Prompt,)),
         "manifest": json_schema("phyblock run.yaml", TypeAdapter(Manifest), (Manifest,)),
+        "scene": json_schema("phyblock scene", TypeAdapter(StoredScene), (StoredScene,)),
+        "question": json_schema(
+            "phyblock question", TypeAdapter(StoredQuestion), (StoredQuestion,)
+        ),
     }

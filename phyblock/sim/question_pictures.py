@@ -36,7 +36,7 @@ __all__ = [
     "question_png",
 ]
 
-QUESTION_RENDER_VERSION = 1
+QUESTION_RENDER_VERSION = 2
 """Raised whenever the same recipe gives other pixels, so that stored pictures are made again."""
 BLOCK_LABEL = "block"
 """The label of a picture that shows one block by itself."""
@@ -66,14 +66,15 @@ def question_camera(picture_recipe: QuestionPicture, style: PictureStyle) -> Cam
     """
     azimuth_deg, elevation_deg = picture_recipe.view_deg
     seen = replace(style, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
-    framed = _drawn(picture_recipe.framed) or drawn_blocks(picture_recipe)
+    shown = drawn_blocks(picture_recipe)
+    framed = _drawn(picture_recipe.framed) or shown
     if _is_alone(picture_recipe):
-        framed = drawn_blocks(picture_recipe)
+        framed = shown
         shape = SHAPES[framed[0].type]
         share = math.dist(shape.low_m, shape.high_m) / _LARGEST_DIAGONAL_M
         window = _BLOCK_WINDOW.scaled(share**_SIZE_CUE)
         return frame(framed[0].vertices_m, view_axes(azimuth_deg, elevation_deg), window)
-    return camera_for(framed, seen, picture_recipe.label)
+    return camera_for(framed, seen, picture_recipe.label, shown)
 
 
 def drawn_blocks(picture_recipe: QuestionPicture) -> list[DrawnBlock]:

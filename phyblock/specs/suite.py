@@ -37,6 +37,7 @@ from phyblock.specs.fields import (
 from phyblock.specs.rules import broken_rules, read_dotted
 from phyblock.words import (
     Background,
+    CandidateScale,
     Criterion,
     DataFormat,
     Matcher,
@@ -160,6 +161,11 @@ class ImagesSpec(Section):
         AfterValidator(check_unique),
     ] = Field(
         default=("goal", "candidates"), description="Order in which separate pictures are sent."
+    )
+    candidate_scale: CandidateScale = Field(
+        default="common",
+        description="common: all rendered candidates of a grid are drawn at one scale. fit: each "
+        "fills its cell. The prompt says which.",
     )
     size_px: Annotated[int, Field(strict=True, ge=128, le=2048)] = Field(
         default=512, description="Edge of a rendered picture [pixels]."

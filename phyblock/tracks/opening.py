@@ -9,6 +9,7 @@ from pathlib import Path
 from phyblock.resources import cache_dir
 from phyblock.sim import PictureStyle
 from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.specs.suite import ImagesSpec
 from phyblock.tracks.base import AnyTrack
 from phyblock.tracks.kind import Opening, kind_of
 from phyblock.tracks.pictures import PicturePolicy, Pictures
@@ -19,6 +20,7 @@ __all__ = [
     "assembly_pictures",
     "open_tracks",
     "picture_folder",
+    "picture_policy",
     "picture_style",
     "render_workers",
     "template_prompt",
@@ -40,17 +42,20 @@ def picture_folder() -> Path:
     return cache_dir() / "pictures"
 
 
-def picture_style(suite: SuiteSpec) -> PictureStyle:
+def picture_style(images: ImagesSpec) -> PictureStyle:
     """How a suite wants pictures drawn."""
-    images = suite.images
-    return PictureStyle(size_px=images.size_px, background=images.background or BACKGROUNDS[0])
+    ground = images.background or BACKGROUNDS[0]
+    return PictureStyle(images.size_px, ground, candidate_scale=images.candidate_scale)
+
+
+def picture_policy(images: ImagesSpec) -> PicturePolicy:
+    """Which pictures of goals and candidates a suite wants, and how they are drawn."""
+    return PicturePolicy(images.source, images.layout, images.order, picture_style(images))
 
 
 def assembly_pictures(suite: SuiteSpec) -> Pictures:
     """Pictures of goals and candidates as a suite wants them."""
-    images = suite.images
-    policy = PicturePolicy(images.source, images.layout, images.order, picture_style(suite))
-    return Pictures(picture_folder(), policy, render_workers())
+    return Pictures(picture_folder(), picture_policy(suite.images), render_workers())
 
 
 def template_prompt(loaded: LoadedSuite, name: str) -> TemplatePrompt:

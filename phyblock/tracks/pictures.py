@@ -19,10 +19,11 @@ from phyblock.sim import (
     composite_png,
     goal_key,
     goal_png,
+    goal_style,
 )
 from phyblock.sim.compose import to_png
 from phyblock.tracks.studio import Drawing, Studio, to_image
-from phyblock.words import PictureLayout, PictureName, PictureSource
+from phyblock.words import CandidateScale, PictureLayout, PictureName, PictureSource
 
 __all__ = ["PicturePolicy", "Pictures"]
 
@@ -48,6 +49,15 @@ class Pictures(Studio):
         super().__init__(folder, workers)
         self.policy = policy
 
+    @property
+    def candidate_scale(self) -> CandidateScale | None:
+        """How candidates are scaled, for the prompt; None where pictures are the data set's."""
+        return None if self.policy.source == "dataset" else self.policy.style.candidate_scale
+
+    def style_of(self, task: AssemblyTask) -> PictureStyle:
+        """How the pictures of a task are drawn: larger than usual where its goal is wide."""
+        return goal_style(task.scene, self.policy.style)
+
     async def of(self, task: AssemblyTask) -> tuple[Image, ...]:
         """The pictures of one task as they are sent.
 
@@ -68,7 +78,7 @@ class Pictures(Studio):
         if self.policy.source == "dataset":
             return self._from_dataset(task), True
         drawings = self._drawings(task)
-        side = self.policy.style.size_px
+        side = self.style_of(task).size_px
         wide = 2 * side if self.policy.layout == "composite" else side
         return self.outlined(drawings, (wide, side))
 
@@ -80,7 +90,7 @@ class Pictures(Studio):
         return tuple(drawing.key for drawing in self._drawings(task))
 
     def _drawings(self, task: AssemblyTask) -> tuple[Drawing, ...]:
-        scene, candidates, style = task.scene, task.candidates, self.policy.style
+        scene, candidates, style = task.scene, task.candidates, self.style_of(task)
         goal = Drawing("goal", goal_key(scene, style), partial(goal_png, scene, style))
         grid = Drawing(
             "candidates",

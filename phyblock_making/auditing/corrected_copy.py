@@ -8,10 +8,11 @@ from pathlib import Path
 
 from phyblock.domain.candidates import CandidateSet
 from phyblock.files import atomic_write, check_free, writing
+from phyblock.records.scene import StoredScene
 from phyblock_making.auditing.scene_audit import SceneAudit
 from phyblock_making.auditing.set_audit import csv_text, shown_orders
 from phyblock_making.checks.scene_facts import declared_orders
-from phyblock_making.scenes.scene_files import SCENES_FILE, scene_line
+from phyblock_making.scenes.scene_files import SCENES_FILE
 
 __all__ = ["CHANGES_FILE", "Change", "Copied", "changes_of", "write_fixed"]
 
@@ -74,7 +75,7 @@ def write_fixed(
         if offered is None or reason:
             left_out[audit.scene.id] = reason
             continue
-        lines.append(scene_line(audit.fixed, offered))
+        lines.append(StoredScene.of(audit.fixed, offered).as_json())
         changes += changes_of(audit)
     rows = [(c.scene, str(c.block), c.field, c.before, c.after) for c in changes]
     texts = {

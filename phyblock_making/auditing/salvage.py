@@ -8,18 +8,36 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any, TypeVar
 
-from phyblock.datasets.builtin import SCENES_FILE, read_line, scene_lines
-from phyblock.datasets.checks import SceneReader
-from phyblock.datasets.official import candidates_file, goal_files, read_candidates, read_scene
-from phyblock.domain import Block, CandidateSet, Scene
+from phyblock.datasets.builtin import SCENES_FILE
+from phyblock.datasets.official import (
+    OfficialGoal,
+    candidates_file,
+    goal_files,
+    read_candidates,
+    read_goal,
+)
+from phyblock.datasets.raw import lines_of, parse_json, used_already
+from phyblock.domain import CandidateSet, Scene
 from phyblock.errors import DataError, Problem
+from phyblock.records.faults import validated
+from phyblock.records.line import Line
+from phyblock.records.scene import (
+    BlockList,
+    CandidateList,
+    SceneBlocks,
+    StoredScene,
+    candidate_set,
+)
 from phyblock_making.checks.finding import Finding, unreadable
 
 __all__ = ["Salvage", "SalvagedTask", "salvage"]
 
 _MOST_FINDINGS = 10_000
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -54,34 +72,23 @@ def salvage(root: Path) -> Salvage:
     return Salvage(root, tuple(sorted(tasks, key=lambda task: task.scene.id)), tuple(findings))
 
 
-class _TolerantReader(SceneReader):
-    """Keeps apart what does not stop an audit: its complaints go to `tolerated`.
+class _Scene(StoredScene):
+    """Layers and unanswerable blocks are passed over in silence: the audit finds them itself."""
 
-    Layers and unanswerable blocks are passed over in silence: the audit finds them itself.
-    """
+    blocks: BlockList
+    candidates: Any = None
 
-    def __init__(self, where: str) -> None:
-        super().__init__(where)
-        self.tolerated: list[Problem] = []
 
-    def check_dependencies(self, blocks: tuple[Block, ...]) -> None:
-        self._tolerate(lambda: super(_TolerantReader, self).check_dependencies(blocks))
+class _Goal(OfficialGoal):
+    blocks: BlockList
 
-    def check_layers(self, blocks: tuple[Block, ...]) -> None:
-        del blocks
 
-    def check_solvable(self, scene: Scene, candidates: CandidateSet) -> None:
-        del scene, candidates
+class _Graph(Line, extra="ignore"):
+    blocks: SceneBlocks
 
-    def candidates(self, raw: object) -> CandidateSet:
-        return self._tolerate(lambda: super(_TolerantReader, self).candidates(raw))
 
-    def _tolerate(self, read: Callable[[], CandidateSet | None]) -> CandidateSet:
-        before = len(self.problems)
-        candidates = read()
-        self.tolerated += self.problems[before:]
-        del self.problems[before:]
-        return candidates or CandidateSet(())
+class _Candidates(Line, extra="ignore"):
+    candidates: CandidateList
 
 
 def _check_number(findings: list[Finding], root: Path) -> None:
@@ -90,42 +97,48 @@ def _check_number(findings: list[Finding], root: Path) -> None:
         raise DataError(Problem(str(root), message))
 
 
+def _tolerate(read: Callable[[], _T], name: str, findings: list[Finding]) -> _T | None:
+    """What `read` gives; None after findings that name the scene or line."""
+    try:
+        return read()
+    except DataError as error:
+        findings += _unreadable(name, error)
+        return None
+
+
+def _unreadable(name: str, error: DataError) -> list[Finding]:
+    return [unreadable(name, problem) for problem in error.problems]
+
+
 def _builtin(folder: Path, tasks: list[SalvagedTask], findings: list[Finding]) -> None:
     path = folder / SCENES_FILE
     first_line: dict[str, int] = {}
-    for number, line in enumerate(scene_lines(path), 1):
+    for number, text in enumerate(lines_of(path, ""), 1):
         _check_number(findings, folder)
-        reader = _TolerantReader(f"{path}:{number}")
+        where = f"{path}:{number}"
         try:
-            task = read_line(path, number, line, reader)
+            raw = parse_json(text, path, number)
+            line = validated(_Scene, raw, where)
         except DataError as error:
-            findings += [unreadable(f"line {number}", problem) for problem in error.problems]
+            findings += _unreadable(f"line {number}", error)
             continue
-        name = task.scene.id
-        first = first_line.setdefault(name, number)
+        first = first_line.setdefault(line.id, number)
         if first != number:
-            message = f"is used by line {first} already"
-            problem = Problem(reader.where, message, "id", repr(name))
-            findings.append(unreadable(name, problem))
+            findings.append(unreadable(line.id, used_already(where, f"by line {first}", line.id)))
             continue
-        findings += [unreadable(name, problem) for problem in reader.tolerated]
-        tasks.append(SalvagedTask(task.scene, task.candidates if len(task.candidates) else None))
+        _tolerate(partial(validated, _Graph, raw, where), line.id, findings)
+        found = _tolerate(partial(validated, _Candidates, raw, where), line.id, findings)
+        candidates = None if found is None else candidate_set(found.candidates)
+        tasks.append(SalvagedTask(line.scene(), candidates))
 
 
 def _official(root: Path, tasks: list[SalvagedTask], findings: list[Finding]) -> None:
     for path in goal_files(root):
         _check_number(findings, root)
-        reader = _TolerantReader(str(path))
-        try:
-            scene = read_scene(path, reader)
-        except DataError as error:
-            findings += [unreadable(path.stem, problem) for problem in error.problems]
+        name = path.stem
+        goal = _tolerate(partial(read_goal, path, _Goal), name, findings)
+        if goal is None:
             continue
-        findings += [unreadable(path.stem, problem) for problem in reader.tolerated]
-        try:
-            candidates = read_candidates(candidates_file(root, path))
-        except DataError as error:
-            findings += [unreadable(path.stem, problem) for problem in error.problems]
-            tasks.append(SalvagedTask(scene, None))
-        else:
-            tasks.append(SalvagedTask(scene, candidates))
+        _tolerate(partial(read_goal, path, _Graph), name, findings)
+        read = partial(read_candidates, candidates_file(root, path))
+        tasks.append(SalvagedTask(goal.scene(name), _tolerate(read, name, findings)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from phyblock.domain.question import LETTERS, Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
-from phyblock.sim.outcomes import DEFAULT_LIMITS, Limits
+from phyblock.sim.outcomes import DEFAULT_LIMITS
 from phyblock.sim.seeing import is_inside, least_difference, seen
 from phyblock.sim.world import Pose
 from phyblock_making.questions.choices import pick
@@ -31,7 +31,8 @@ __all__ = [
 
 LEAST_PIXELS = 220
 """In so many pixels of 256 by 256 any two pictures that are compared differ, at the least."""
-_SAME = Limits(still_m=0.002, still_deg=2.0, moved_m=0.002, moved_deg=2.0)
+_ALIKE_M = 0.002
+_ALIKE_DEG = 2.0
 
 
 def state(
@@ -53,9 +54,9 @@ def are_alike(one: Block, other: Block) -> bool:
     if one.kind != other.kind:
         return False
     start, end = Pose.goal(one), Pose.goal(other)
-    if end.distance_m(start) > _SAME.still_m:
+    if end.distance_m(start) > _ALIKE_M:
         return False
-    return one.look == other.look or end.angle_deg(start) <= _SAME.still_deg
+    return one.look == other.look or end.angle_deg(start) <= _ALIKE_DEG
 
 
 def same_blocks(one: Sequence[Block], other: Sequence[Block]) -> bool:

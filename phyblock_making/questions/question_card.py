@@ -114,7 +114,7 @@ What was unfair became a rule for all:
 
 A to D: share of questions whose right option has that letter (ordering: that comes first). The
 last column is the share of the most frequent right option text.
-{audit}
+{audit}{attacks}
 ## The file
 
 `questions.jsonl` holds one question a line; docs/vqa.md describes the fields.
@@ -145,8 +145,12 @@ def question_card(
     questions: Sequence[Question],
     made_by: str,
     audits: Sequence[SubtaskAudit] = (),
+    attacks: str = "",
 ) -> str:
-    """Markdown text of the card of a set of questions called `name` about those scenes."""
+    """Markdown text of the card of a set of questions called `name` about those scenes.
+
+    `attacks` is the section about what attacks reach, empty for none.
+    """
     by_subtask = {s: [q for q in questions if q.subtask == s] for s in SUBTASKS}
     return _TEXT.format(
         name=name,
@@ -162,6 +166,7 @@ def question_card(
         area=SHAPED_AREA,
         rows="\n".join(_row(asked) for asked in by_subtask.values() if asked),
         audit=_audit_text(audits) if audits else "",
+        attacks=attacks,
     )
 
 

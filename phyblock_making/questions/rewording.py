@@ -7,17 +7,20 @@ have its answer derived again before it is used.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from pydantic import StrictBool
 
-from phyblock.datasets.builtin import scene_lines
-from phyblock.datasets.raw import MISSING, RawReader, parse_json
+from phyblock.datasets.raw import lines_of, parse_json
 from phyblock.domain import Question
 from phyblock.errors import DataError, Problem
+from phyblock.records.data_values import Name
+from phyblock.records.decode import shown
+from phyblock.records.faults import Fault, refuse, validated
+from phyblock.records.line import Line
 from phyblock_making.questions.choices import pick
 from phyblock_making.questions.paraphrases import fault_of_form
 from phyblock_making.questions.wording import WORDINGS, fill_template, stem_of, wording_ids
@@ -25,6 +28,12 @@ from phyblock_making.questions.wording import WORDINGS, fill_template, stem_of, 
 __all__ = ["Wording", "read_wordings", "reword"]
 
 _ALLOWED = "a file that phyblock vqa write wrote"
+
+
+class _StoredWording(Line, extra="ignore"):
+    wording: Name
+    accepted: StrictBool
+    template: str
 
 
 @dataclass(frozen=True)
@@ -52,15 +61,15 @@ def read_wordings(path: Path) -> tuple[Wording, ...]:
     """The accepted wordings of a file; raises DataError with everything that is wrong in it."""
     wordings: list[Wording] = []
     problems: list[Problem] = []
-    for number, line in enumerate(scene_lines(path, _ALLOWED), 1):
-        reader = RawReader(f"{path}:{number}")
+    for number, text in enumerate(lines_of(path, _ALLOWED), 1):
+        where = f"{path}:{number}"
         try:
-            wording = _read_line(reader, parse_json(line, path, number), wordings)
-            reader.raise_if_broken()
+            line = validated(_StoredWording, parse_json(text, path, number), where)
+            if line.accepted:
+                refuse(_faults(line, wordings), where)
+                wordings.append(Wording(line.wording, line.template))
         except DataError as error:
             problems += error.problems
-            continue
-        wordings += [] if wording is None else [wording]
     if problems:
         raise DataError(problems)
     if not wordings:
@@ -85,33 +94,19 @@ def reword(
     return reworded
 
 
-def _read_line(reader: RawReader, content: object, earlier: Sequence[Wording]) -> Wording | None:
-    """The wording of a line; None where it is not accepted, or after a complaint."""
-    raw = reader.mapping(content)
-    name = reader.name(reader.get(raw, "wording"), "wording")
-    is_accepted = _flag(reader, raw, "accepted")
-    template = reader.get(raw, "template")
-    if template is not MISSING and not isinstance(template, str):
-        reader.complain("template", "is no text", template, "a question with its slots")
-    if reader.problems or not is_accepted:
-        return None
-    wording = Wording(name, template)
-    originals = [WORDINGS[known] for known in wording_ids(wording.stem)]
+def _faults(line: _StoredWording, earlier: Sequence[Wording]) -> Iterator[Fault]:
+    """Why an accepted line cannot be used beside those before it."""
+    stem = stem_of(line.wording)
+    originals = [WORDINGS[known] for known in wording_ids(stem)]
     if not originals:
         allowed = "a wording of a known kind of question, such as sh-m1"
-        reader.complain("wording", "is of no known kind", name, allowed)
-    elif name in WORDINGS or any(other.name == name for other in earlier):
-        reader.complain("wording", "is used already", name, "a name of its own, such as sh-m1")
+        yield Fault("is of no known kind", allowed, shown(line.wording), ("wording",))
+    elif line.wording in WORDINGS or any(other.name == line.wording for other in earlier):
+        allowed = "a name of its own, such as sh-m1"
+        yield Fault("is used already", allowed, shown(line.wording), ("wording",))
     else:
-        alike = [other.template for other in earlier if other.stem == wording.stem]
-        fault = fault_of_form(template, [*originals, *alike])
+        alike = [other.template for other in earlier if other.stem == stem]
+        fault = fault_of_form(line.template, [*originals, *alike])
         if fault is not None:
-            reader.complain("template", f"cannot be used: {fault}", template)
-    return wording
-
-
-def _flag(reader: RawReader, raw: Any, field: str) -> bool:
-    value = reader.get(raw, field)
-    if value is not MISSING and not isinstance(value, bool):
-        reader.complain(field, "is neither true nor false", value, "true or false")
-    return value is True
+            message = f"cannot be used: {fault}"
+            yield Fault(message, found=shown(line.template), at=("template",))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
@@ -68,29 +68,22 @@ class SubtaskAudit:
         low, high = self.letter_shares
         return BALANCE[0] <= low and high <= BALANCE[1]
 
-    @property
-    def noise(self) -> float:
-        """Standard error of a guesser's accuracy."""
-        return math.sqrt(self.chance * (1 - self.chance) / self.n)
-
 
 def audit_questions(
     questions: Sequence[Question],
     *,
     with_text_probe: bool = True,
-    report: Callable[[Subtask], None] = lambda _: None,
 ) -> Iterator[SubtaskAudit]:
     """An audit of each subtask that has questions, in the paper's order.
 
-    `report` hears of each question whose picture was looked at. Raises SpecError where the
-    text-only probe is wanted and scikit-learn is not installed.
+    Raises SpecError where the text-only probe is wanted and scikit-learn is not installed.
     """
     guesses = Guesses(questions)
     repeated = duplicates_of(questions)
     for subtask in SUBTASKS:
         mine = [question for question in questions if question.subtask == subtask]
         if mine:
-            yield _audit(subtask, mine, guesses, repeated, with_text_probe, report)
+            yield _audit(subtask, mine, guesses, repeated, with_text_probe)
 
 
 def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
@@ -126,12 +119,10 @@ def _audit(
     guesses: Guesses,
     repeated: dict[str, str],
     with_text_probe: bool,
-    report: Callable[[Subtask], None],
 ) -> SubtaskAudit:
     seen: list[tuple[float, str]] = []
     for question in questions:
         seen += [(share, question.id) for share in referents(question).values()]
-        report(subtask)
     scenes = Counter(question.scene.id for question in questions)
     chances = [1 / math.factorial(4) if subtask == "OR" else 1 / len(q.options) for q in questions]
     return SubtaskAudit(

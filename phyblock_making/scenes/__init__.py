@@ -2,12 +2,10 @@
 
 from phyblock_making.checks.acceptance import accept, form_problems, physics_problems
 from phyblock_making.scenes.candidate_sets import make_candidates
-from phyblock_making.scenes.scene_files import scene_line
 
 __all__ = [
     "accept",
     "form_problems",
     "make_candidates",
     "physics_problems",
-    "scene_line",
 ]

@@ -4,34 +4,39 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import json
 import shutil
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from phyblock.datasets.version import VERSION_FILE
 from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, check_free, writing
+from phyblock.records.scene import StoredScene
 from phyblock_making.scenes.candidate_sets import make_candidates
 from phyblock_making.scenes.scene_draft import PALETTES, Palette
 
 __all__ = [
     "CARD_FILE",
     "SCENES_FILE",
+    "SET_VERSION",
     "SUMS_FILE",
     "LevelStatistics",
     "SetWriter",
     "open_writer",
-    "scene_line",
     "sums_text",
 ]
 
 SCENES_FILE = "scenes.jsonl"
 CARD_FILE = "README.md"
 SUMS_FILE = "SHA256SUMS"
+SET_VERSION = 2
+"""Counts what makes other scenes or candidate sets out of the same seed: 2 offers distractors as
+often as goals need them, and shows at least 3 % of every block's outline.
+"""
 QUANTITIES = ("blocks", "types", "colors", "layers")
 
 
@@ -68,17 +73,18 @@ class SetWriter:
         self.shared = self.base = self.count = 0
         self.sizes: set[int] = set()
 
-    def add(self, scene: Scene) -> None:
-        """Append a scene with a candidate set of its own."""
+    def add(self, scene: Scene) -> CandidateSet:
+        """Append a scene with a candidate set of its own, which is returned."""
         candidates = make_candidates(scene, palette=PALETTES[self._palette])
         with (self._parts / f"{scene.levels[0]}").open("a", encoding="utf-8", newline="\n") as file:
-            file.write(scene_line(scene, candidates) + "\n")
+            file.write(StoredScene.of(scene, candidates).as_json() + "\n")
         for level in scene.levels:
             self.levels.setdefault(level, LevelStatistics()).add(scene)
         self.count += 1
         self.shared += len(scene.levels) > 1
         self.base += scene.parents == (scene.id,)
         self.sizes.add(len(candidates))
+        return candidates
 
     def finish(self, card: str) -> None:
         """Put the scenes together, sorted by id, and write the card and the checksums."""
@@ -89,6 +95,7 @@ class SetWriter:
                     shutil.copyfileobj(file, out)
         whole.replace(self._folder / SCENES_FILE)
         atomic_write(self._folder / CARD_FILE, card)
+        atomic_write(self._folder / VERSION_FILE, f"{SET_VERSION}\n")
         atomic_write(self._folder / SUMS_FILE, sums_text(self._folder))
 
 
@@ -102,7 +109,7 @@ def open_writer(folder: Path, palette: Palette, replace: bool = False) -> Iterat
         hint = "give another --out, or --replace"
         raise StoreError(Problem(str(folder), "holds a data set already", hint=hint))
     if not (folder / SCENES_FILE).exists():
-        others = [folder / name for name in (SCENES_FILE, CARD_FILE, SUMS_FILE)]
+        others = [folder / name for name in (SCENES_FILE, CARD_FILE, VERSION_FILE, SUMS_FILE)]
         check_free(others, "give another --out")
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -110,45 +117,8 @@ def open_writer(folder: Path, palette: Palette, replace: bool = False) -> Iterat
             yield SetWriter(folder, Path(parts), palette)
 
 
-def scene_line(scene: Scene, candidates: CandidateSet) -> str:
-    """A scene and its candidates as one line of JSON, no newline at its end."""
-    looks = {block.look for block in scene.blocks}
-    record = {
-        "id": scene.id,
-        "levels": list(scene.levels),
-        "parents": list(scene.parents),
-        "blocks": [
-            {
-                "order": block.order,
-                "type": block.type,
-                "color": block.color,
-                "layer": block.layer,
-                "depend": list(block.depend) or [0],
-                "position": [round(c, 6) + 0.0 for c in block.position_m],
-                "euler": [_plain(angle) for angle in block.euler_deg],
-            }
-            for block in scene.blocks
-        ],
-        "candidates": [
-            {
-                "type": candidate.type,
-                "color": candidate.color,
-                "euler": [_plain(angle) for angle in candidate.euler_deg],
-                "required": candidate.look in looks,
-            }
-            for candidate in candidates.candidates
-        ],
-    }
-    return json.dumps(record, allow_nan=False)
-
-
 def sums_text(folder: Path) -> str:
-    """Checksums of the scenes and the card, as `sha256sum -c` reads them."""
-    names = (CARD_FILE, SCENES_FILE)
+    """Checksums of the scenes, the card and the version, as `sha256sum -c` reads them."""
+    names = (CARD_FILE, SCENES_FILE, VERSION_FILE)
     sums = [hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in names]
     return "".join(f"{one}  {name}\n" for one, name in zip(sums, names, strict=True))
-
-
-def _plain(angle_deg: float) -> float | int:
-    """Whole degrees as an integer, which reads better in a file."""
-    return int(angle_deg) if float(angle_deg).is_integer() else angle_deg

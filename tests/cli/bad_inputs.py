@@ -126,7 +126,7 @@ DATA: tuple[Bad, ...] = (
     Bad("dangling", second_scene("blocks.1.depend", [7]), ("scenes.jsonl:2: ", "found: 7")),
     Bad("nan-m", second_scene("blocks.1.position", [0, 0, float("nan")]), ("jsonl:2:", "position")),
     Bad("far", second_scene("blocks.1.position", [0, 0, -1e308]),
-        ("jsonl:2: blocks[1].position", "is out of range", "-100 to 100 m")),
+        ("jsonl:2: blocks[1].position", "is not a vector in range", "-100 to 100 m")),
     Bad("kind", second_scene("blocks.0.type", "cub"), ("jsonl:2: blocks[0].type", "cube, cuboid1")),
     Bad("layer", second_scene("blocks.1.layer", 1), ("jsonl:2: blocks[1].layer", "found: 1")),
     Bad("lost", second_scene("candidates", [tower("t", [1], ("red",))["candidates"][0]]),

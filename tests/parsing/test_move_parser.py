@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import string
+import unicodedata
 
 import pytest
 from hypothesis import given, settings
@@ -14,6 +16,7 @@ Outcome = int | str
 """A candidate's number, "done", or the name of a problem."""
 
 TOO_LARGE = 10**6
+_EXPONENTS = re.compile("[²³¹\u2070-\u209f\u2150-\u2189¼-¾]")
 
 REPLIES: tuple[tuple[str, Outcome], ...] = (
     # The forms that are asked for, and how models write them.
@@ -31,6 +34,9 @@ REPLIES: tuple[tuple[str, Outcome], ...] = (
     ("Move(index=3)", 3),
     ('Move("3")', 3),
     ("Move(#3)", 3),
+    ("Move(\uff13)", 3),
+    ("²", "no_move"),
+    ("Move(²)", "no_move"),
     ("**Move(3)**", 3),
     ("- `Move(3)`", 3),
     ("> Move(3);", 3),
@@ -211,8 +217,7 @@ def test_any_text_has_one_named_outcome(text: str) -> None:
 def test_a_number_that_was_read_stands_in_the_text(text: str) -> None:
     move = parse_move(text).move
     if move is not None and abs(move) < TOO_LARGE:
-        digits = text.replace("\uff13", "3")
-        assert str(abs(move)) in digits
+        assert str(abs(move)) in unicodedata.normalize("NFKC", _EXPONENTS.sub("", text))
 
 
 quiet = st.text(

@@ -211,7 +211,7 @@ def test_the_chosen_engine_decides_what_stands(monkeypatch: pytest.MonkeyPatch) 
         ("phyblock.nowhere:Engine", "cannot be imported"),
         ("phyblock.sim.engine:FLOOR", "can be called"),
         ("phyblock.sim.engine:Engine", "cannot be imported"),
-        ("phyblock.sim.bullet.renderer:tiny_renderer", "names no physics engine"),
+        ("phyblock.sim.raster.renderer:NumpyRenderer", "names no physics engine"),
     ],
 )
 def test_a_word_that_names_no_engine_is_refused(word: str, message: str) -> None:

@@ -52,7 +52,7 @@ class Headline:
     references: dict[str, float] = field(default_factory=dict)
 
 
-_BELOW = "Below each value stands its 95 % interval, from resampling the base scenes."
+_BELOW = "Below each value stands its 95 % interval, from leaving out each base scene in turn."
 
 
 def headlines(run: Run) -> list[Headline]:
@@ -120,7 +120,7 @@ def _plain(value: float | None, blank: str = "") -> Cell:
 
 def kinds_of(run: Run) -> dict[str, Kind]:
     """Which models are baselines; these come last."""
-    kinds = {model["name"]: model.get("kind") for model in run.manifest["models"]}
+    kinds = {model.name: model.kind for model in run.manifest.models}
     baselines = [name for name in run.design.model_names if kinds.get(name) == "baseline"]
     models = [name for name in run.design.model_names if name not in baselines]
     return {**dict.fromkeys(models, "model"), **dict.fromkeys(baselines, "baseline")}

@@ -22,9 +22,11 @@ from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.sources import Sources, open_sources
 from phyblock.report.write import TablesWritten
 from phyblock.run.folder import run_folder
+from phyblock.specs.suite import ImagesSpec
 from phyblock.tables.load import Run
 from phyblock.tracks.drawable import kit, scene_entry
 from phyblock.tracks.kind import kind_of
+from phyblock.tracks.opening import picture_policy
 
 __all__ = ["REPORT_FILE", "page_files", "write_report"]
 
@@ -50,7 +52,7 @@ def write_report(
     StoreError where the folder cannot be written or something is in the way that we never wrote.
     """
     run = written.run
-    sources = open_sources(run.manifest, run.design, data)
+    sources = open_sources(run, data)
     out = run_folder(run.path)
     out.check(page_files())
     with out.alone(), writing(run.path / REPORT_FILE):
@@ -119,7 +121,8 @@ def _keep_pictures(
     """Addresses of the pictures at hand as seen from the page, by digest."""
     place = f"{_FOLDER}/{_PICTURES}/"
     with out.making(place) as new:
-        shelf = PictureShelf(new, out.path / place, run.manifest["suite"])
+        policy = picture_policy(run.section("images", ImagesSpec))
+        shelf = PictureShelf(new, out.path / place, policy)
         if scenes := _scenes(run):
             known = (sources.tasks.get(scene) for scene in scenes)
             shelf.add_scenes(task for task in known if task is not None)
@@ -155,21 +158,19 @@ def _page(written: TablesWritten, figures: Sequence[Path], build: str) -> str:
 
 def _about(run: Run) -> dict[str, Any]:
     manifest, design = run.manifest, run.design
-    suite = manifest["suite"]
-    versions = manifest.get("versions") or {}
     facts = {
-        "Data": (manifest.get("dataset") or {}).get("name"),
+        "Data": manifest.dataset.name if manifest.dataset else "",
         "Scenes": f"{design.scenes:,}",
         "Models": f"{len(design.model_names)}",
         "Seeds": f"{len(design.suite.seeds)}",
         "Samples": f"{len(run.records):,}",
-        "Made": str(manifest.get("created", ""))[:10],
-        "phyblock": versions.get("phyblock"),
-        "Run": str(manifest["identity"])[:12],
+        "Made": manifest.created[:10],
+        "phyblock": manifest.versions.get("phyblock"),
+        "Run": manifest.identity[:12],
     }
     return {
         "title": design.suite.name or run.path.name,
-        "description": suite.get("description") or "",
+        "description": design.suite.description,
         "facts": [(name, text) for name, text in facts.items() if text],
     }
 

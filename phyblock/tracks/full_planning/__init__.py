@@ -3,7 +3,7 @@
 from phyblock.resources import bundled
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.full_planning.baselines import PLAN_RULES, PlanSubject
-from phyblock.tracks.full_planning.opening import open_full_planning, rescored_planning
+from phyblock.tracks.full_planning.opening import open_full_planning
 from phyblock.tracks.full_planning.record import PlanRecord
 from phyblock.tracks.full_planning.track import FullPlanning
 from phyblock.tracks.kind import TrackKind
@@ -29,5 +29,5 @@ TRACK = TrackKind(
     record=PlanRecord,
     template=bundled("prompts", "full_planning.j2"),
     tables=("assembly", "table1", "errors"),
-    rescored=rescored_planning,
+    rescored=True,
 )

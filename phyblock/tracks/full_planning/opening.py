@@ -13,7 +13,7 @@ from phyblock.tracks.opening import assembly_pictures, template_prompt
 from phyblock.tracks.prompts import OfficialPrompt, Prompt
 from phyblock.tracks.selection import select_tasks
 
-__all__ = ["open_full_planning", "rescored_planning"]
+__all__ = ["open_full_planning"]
 
 
 def open_full_planning(opening: Opening) -> FullPlanning:
@@ -26,11 +26,6 @@ def open_full_planning(opening: Opening) -> FullPlanning:
         _check_composites(opening.dataset, tasks)
     pictures = assembly_pictures(suite)
     return FullPlanning(_rules(suite), _prompt(opening.loaded), pictures, tasks)
-
-
-def rescored_planning(suite: SuiteSpec, tasks: Sequence[AssemblyTask]) -> FullPlanning:
-    """The track for reading stored replies again; nothing is asked."""
-    return FullPlanning(_rules(suite), items=tasks)
 
 
 def _rules(suite: SuiteSpec) -> PlanningRules:

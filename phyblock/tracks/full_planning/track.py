@@ -125,6 +125,7 @@ class FullPlanning:
         return {
             "pictures": [picture.label for picture in pictures],
             "n_candidates": len(item.candidates),
+            "candidate_scale": None if self._pictures is None else self._pictures.candidate_scale,
         }
 
     def judge(self, item: AssemblyTask, text: str | None) -> PlanJudgement:

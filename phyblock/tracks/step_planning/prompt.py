@@ -14,7 +14,7 @@ from phyblock.models.base import Image, Message
 from phyblock.parsing.move import MoveProblem
 from phyblock.scoring import MoveOutcome
 from phyblock.tracks.prompts import TemplatePrompt
-from phyblock.words import Gating, Setting
+from phyblock.words import CandidateScale, Gating, Setting
 
 __all__ = ["FEEDBACKS", "Feedback", "History", "PastStep", "StepOutcome", "StepPrompt"]
 
@@ -90,11 +90,16 @@ class StepPrompt:
         past: Sequence[PastStep],
         n_candidates: int,
         max_steps: int,
+        candidate_scale: CandidateScale | None = None,
     ) -> tuple[Message, ...]:
-        """The messages of the step after `past`; `fixed` are the goal and the candidates."""
+        """The messages of the step after `past`; `fixed` are the goal and the candidates.
+
+        `candidate_scale` is None where the pictures are not drawn here.
+        """
         hidden = 0 if self.memory is None else max(0, len(past) - self.memory)
         facts: dict[str, object] = {
             "n_candidates": n_candidates,
+            "candidate_scale": candidate_scale,
             "max_steps": max_steps,
             "cot": self.cot,
             "gating": self.gating,

@@ -6,9 +6,17 @@ from collections.abc import Mapping, Sequence
 
 from phyblock.errors import Problem, SpecError
 from phyblock.tables.load import Run
-from phyblock.tables.track_report import WHOLE, PaperTable, Shown, TableMaker, TrackReport
+from phyblock.tables.track_report import (
+    WHOLE,
+    EpisodeView,
+    PaperTable,
+    Shown,
+    TableMaker,
+    TrackReport,
+)
 from phyblock.tracks.step_planning.episodes import endings_frame, moves_frame, progress_frame
 from phyblock.tracks.step_planning.figure import progress_by_turn
+from phyblock.tracks.step_planning.film import episode_film, episode_table
 from phyblock.tracks.step_planning.measures import STEP_MEASURES
 from phyblock.tracks.step_planning.table3 import (
     endings_view,
@@ -81,4 +89,5 @@ REPORT = TrackReport(
     figure_titles={"step-progress": "Blocks placed, turn by turn"},
     paper_tables={3: PaperTable(paper_table3_frame, paper_table3_view)},
     check_alike=_check_alike,
+    episodes=EpisodeView(episode_table, episode_film),
 )

@@ -121,7 +121,7 @@ class StepPlanning:
         pictures = self._sight.pictures
         fixed, is_fixed_real = pictures.outline(item)
         drawing = self._drawing(self._sight, item, ())
-        side = pictures.policy.style.size_px
+        side = pictures.style_of(item).size_px
         (current,), is_current_real = pictures.outlined((drawing,), (side, side))
         messages = self._messages(self._sight, item, fixed, current, past)
         version = self._sight.prompt.template.version
@@ -156,10 +156,11 @@ class StepPlanning:
         past: Sequence[PastStep],
     ) -> tuple[Message, ...]:
         most = self.rules.limits.max_steps(len(item.scene))
-        return sight.prompt.messages(fixed, current, past, len(item.candidates), most)
+        scale = sight.pictures.candidate_scale
+        return sight.prompt.messages(fixed, current, past, len(item.candidates), most, scale)
 
     def _drawing(self, sight: _Sight, item: AssemblyTask, blocks: Sequence[Block]) -> Drawing:
-        style = sight.pictures.policy.style
+        style = sight.pictures.style_of(item)
         recipe = state_picture(item.scene, blocks, style)
         return Drawing(
             recipe.label, question_key(recipe, style), partial(question_png, recipe, style)

@@ -10,12 +10,12 @@ from phyblock.tables.load import Run
 from phyblock.tables.paper_numbers import HUMAN_ACCURACY, HUMAN_NOTE
 from phyblock.tables.track_report import PaperTable, Shown, TableMaker, TrackReport
 from phyblock.tracks.vqa.accuracy import questions_frame
-from phyblock.tracks.vqa.answers import OVERALL_CELL, letters_frame, showing
+from phyblock.tracks.vqa.answers import OVERALL_CELL, letters_frame, question_digest, showing
+from phyblock.tracks.vqa.export import QUESTION_EXPORT
 from phyblock.tracks.vqa.figure import vqa_heat_map
 from phyblock.tracks.vqa.measures import (
     ACCURACY,
     CATEGORY_NAMES,
-    NAME,
     VQA_MEASURES,
     in_subtasks,
     subtask_cells,
@@ -61,7 +61,7 @@ def _check_alike(run: Run, first: Run, _: Sequence[str]) -> None:
         message = f"counts right answers in another way than {first.path}"
         raise SpecError(Problem(str(run.path), message, "vqa.circular", found, allowed))
     # Digests of the sets that questions were chosen from.
-    sets = [one.manifest.get("tracks", {}).get(NAME, {}).get("questions") for one in (run, first)]
+    sets = [question_digest(one) for one in (run, first)]
     if sets[0] != sets[1]:
         message = f"asked questions of another set than {first.path}"
         raise SpecError(Problem(str(run.path), message, "questions", str(sets[0]), str(sets[1])))
@@ -87,4 +87,5 @@ REPORT = TrackReport(
     check_alike=_check_alike,
     part_names={str(short): name for short, name in SUBTASK_NAMES.items()},
     items=question_items,
+    export=QUESTION_EXPORT,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from phyblock.domain import SUBTASKS, Subtask
+from phyblock.domain import LETTERS, SUBTASKS, Subtask
 from phyblock.specs.fields import Count, Flag, Section, TemplateName, UniqueSome
 from phyblock.tracks.vqa.pictures import OptionsAs
 from phyblock.words import DataFormat
@@ -47,3 +47,8 @@ class VqaSpec(Section):
     prompt: TemplateName = Field(
         default="default", description="default, or the path of a .j2 template."
     )
+
+    @property
+    def rotations(self) -> int:
+        """How often each question is asked with one seed."""
+        return len(LETTERS) if self.circular else 1

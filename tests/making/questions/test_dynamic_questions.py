@@ -9,11 +9,11 @@ import pytest
 
 from phyblock.datasets import read_builtin
 from phyblock.domain import LETTERS, Question, Subtask
+from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled
 from phyblock.sim.seeing import is_inside, least_difference, seen
 from phyblock_making.questions.counterfactual import OUTCOME_TEXTS
 from phyblock_making.questions.pictured_drafts import LEAST_PIXELS
-from phyblock_making.questions.question_lines import question_line
 from phyblock_making.questions.question_production import make_questions
 from phyblock_making.questions.rederiving import problem_of
 from phyblock_making.workers import open_workers
@@ -76,8 +76,8 @@ def test_a_changed_picture_is_found_out(questions: list[Question]) -> None:
 @pytest.mark.slow
 def test_two_processes_give_the_same_bytes(questions: list[Question]) -> None:
     originals = {scene.id: scene for scene in SCENES}
-    lines = [question_line(q, originals[q.scene.id]) for q in questions]
-    assert [question_line(q, originals[q.scene.id]) for q in made(jobs=2)] == lines
+    lines = [StoredQuestion.of(q, originals[q.scene.id]).as_json() for q in questions]
+    assert [StoredQuestion.of(q, originals[q.scene.id]).as_json() for q in made(jobs=2)] == lines
 
 
 @pytest.mark.slow

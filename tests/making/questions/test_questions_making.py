@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -17,13 +16,13 @@ from hypothesis import strategies as st
 from phyblock.datasets import read_builtin, read_questions
 from phyblock.domain import LETTERS, Question, Scene, Subtask
 from phyblock.errors import DataError, StoreError
+from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled
 from phyblock.words import BACKGROUNDS
 from phyblock_making.questions.goal_view import ELEVATIONS_DEG, NAMED
 from phyblock_making.questions.letters import BALANCE, even_letters
 from phyblock_making.questions.makers import MAKERS
 from phyblock_making.questions.question_files import check_place, write_questions
-from phyblock_making.questions.question_lines import question_line
 from phyblock_making.questions.question_production import PER_SUBTASK, make_questions
 from phyblock_making.questions.rederiving import problem_of
 from phyblock_making.questions.shortcuts import referents
@@ -158,7 +157,10 @@ def test_the_processes_change_nothing_and_the_seed_does() -> None:
 
     def lines(seed: int, jobs: int) -> list[str]:
         found = made(SCENES[:12], ("CO", "RP"), seed, jobs)
-        return [question_line(question, originals[question.scene.id]) for question in found]
+        return [
+            StoredQuestion.of(question, originals[question.scene.id]).as_json()
+            for question in found
+        ]
 
     assert lines(1, 1) == lines(1, 2) != lines(2, 1)
 
@@ -173,7 +175,7 @@ def test_colors_are_drawn_where_the_kit_would_tell(questions: list[Question]) ->
     recolored = Counter(
         q.subtask
         for q in questions
-        if "colors" in json.loads(question_line(q, originals[q.scene.id]))
+        if "colors" in StoredQuestion.of(q, originals[q.scene.id]).fields()
     )
     for subtask in ("SH", "CO", "SI"):
         assert recolored[subtask] == COUNT

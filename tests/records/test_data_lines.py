@@ -1,0 +1,125 @@
+"""Lines of data: the shipped ones are written again as they are, and schemas say the same."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+from hypothesis import given
+
+from phyblock.datasets import Dataset, QuestionSet, read_builtin, read_questions
+from phyblock.errors import DataError
+from phyblock.records import Line, StoredQuestion, StoredScene
+from phyblock.records.faults import validated
+from phyblock.resources import bundled
+from tests.datasets.broken import Raw, sound_scene, with_value, without
+from tests.datasets.test_builtin_laws import as_json, tasks
+from tests.fuzz.strategies import sound_question
+from tests.records.test_documents import ROOT
+
+SCENES = Path("phyblock-400", "scenes.jsonl")
+QUESTIONS = Path("phyblock-vqa", "questions.jsonl")
+
+
+def lines_of(path: Path) -> list[str]:
+    return (bundled("benchmarks", "data") / path).read_text(encoding="utf-8").splitlines()
+
+
+@pytest.fixture(scope="module")
+def scenes() -> Dataset:
+    return read_builtin(bundled("benchmarks", "data") / SCENES.parent)
+
+
+@pytest.fixture(scope="module")
+def questions(scenes: Dataset) -> QuestionSet:
+    return read_questions(bundled("benchmarks", "data") / QUESTIONS.parent, scenes)
+
+
+def test_the_shipped_scenes_are_written_byte_for_byte(scenes: Dataset) -> None:
+    written = [StoredScene.of(task.scene, task.candidates).as_json() for task in scenes.tasks]
+    assert written == lines_of(SCENES)
+
+
+def test_the_shipped_questions_are_written_byte_for_byte(
+    scenes: Dataset, questions: QuestionSet
+) -> None:
+    originals = {task.key: task.scene for task in scenes.tasks}
+    written = [
+        StoredQuestion.of(task.question, originals[task.scene.id]).as_json()
+        for task in questions.tasks
+    ]
+    assert written == lines_of(QUESTIONS)
+
+
+@given(tasks().map(as_json))
+def test_a_line_is_written_as_it_was_read(raw: Raw) -> None:
+    assert validated(StoredScene, raw, "here").as_json() == json.dumps(raw)
+
+
+@pytest.mark.parametrize(
+    ("kind", "raw"), [(StoredScene, sound_scene()), (StoredQuestion, sound_question())]
+)
+def test_a_line_may_say_its_version_and_none_is_from_the_future(kind: type[Line], raw: Raw) -> None:
+    for line in (raw, {**raw, "format": 1}):
+        assert json.loads(validated(kind, line, "here").as_json()) == line
+    with pytest.raises(DataError) as caught:
+        validated(kind, {**raw, "format": 2}, "here")
+    (problem,) = caught.value.problems
+    assert (problem.field, problem.found, problem.allowed) == ("format", "2", "1")
+
+
+def test_everything_that_is_wrong_with_a_question_is_said_at_once() -> None:
+    broken = without(sound_question(), "question") | {"answer": "E", "colour": 1}
+    broken = with_value(broken, "pictures.0.marks.0.position", [0, 0])
+    with pytest.raises(DataError) as caught:
+        validated(StoredQuestion, broken, "here")
+    assert {(p.field, p.message) for p in caught.value.problems} == {
+        ("question", "is missing"),
+        ("answer", "is none of the options"),
+        ("colour", "is not known"),
+        ("pictures[0].marks[0].position", "is not a vector in range"),
+    }
+    (unknown,) = (p for p in caught.value.problems if p.field == "colour")
+    assert unknown.allowed.startswith("id, subtask, category, scene_id")
+
+
+def schema(name: str) -> jsonschema.Draft202012Validator:
+    text = (ROOT / "benchmarks" / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
+    jsonschema.Draft202012Validator.check_schema(json.loads(text))
+    return jsonschema.Draft202012Validator(json.loads(text))
+
+
+@pytest.mark.parametrize(("name", "path"), [("scene", SCENES), ("question", QUESTIONS)])
+def test_the_schemas_take_what_is_shipped(name: str, path: Path) -> None:
+    found = schema(name)
+    for line in lines_of(path)[::25]:
+        found.validate(json.loads(line))
+
+
+BROKEN: dict[str, tuple[str, Raw, str, Any]] = {
+    "shape": ("scene", sound_scene(), "blocks.0.type", "ball"),
+    "order": ("scene", sound_scene(), "blocks.0.order", 0),
+    "position": ("scene", sound_scene(), "blocks.0.position", [0, 0]),
+    "levels": ("scene", sound_scene(), "levels", [1, 3]),
+    "no candidates": ("scene", sound_scene(), "candidates", []),
+    "name": ("scene", sound_scene(), "id", "../x"),
+    "view": ("question", sound_question(), "pictures.0.view", [45, 0]),
+    "label": ("question", sound_question(), "pictures.0.label", "E"),
+    "framed": ("question", sound_question(), "pictures.0.framed", False),
+    "color": ("question", sound_question(), "colors.1", "pink"),
+    "field": ("question", sound_question(), "pictures.0.widthout", [1]),
+}
+
+
+@pytest.mark.parametrize(("name", "raw", "at", "value"), BROKEN.values(), ids=BROKEN)
+def test_the_schemas_refuse_what_the_models_refuse(
+    name: str, raw: Raw, at: str, value: object
+) -> None:
+    broken = with_value(raw, at, value)
+    assert schema(name).is_valid(raw)
+    assert not schema(name).is_valid(broken)
+    with pytest.raises(DataError):
+        validated(StoredScene if name == "scene" else StoredQuestion, broken, "here")
