@@ -152,7 +152,7 @@ def _about_some_axis(
     if holds(every.blocks, loose.order) and are_seen(picture, (loose.order, other.order), STUDIED):
         colored = replace(every, blocks=every.blocks[:-1])
         its = next(block for block in colored.blocks if block.order == other.order)
-        yield _draft(colored, picture, (every.blocks[-1], its), rule, phrase, rng)
+        yield from _drafted(colored, picture, (every.blocks[-1], its), rule, phrase, rng)
 
 
 def _on_the_spot(
@@ -168,23 +168,29 @@ def _on_the_spot(
             blocks = tuple(moved if b.order == mine.order else b for b in colored.blocks)
             picture = goal_picture(replace(colored, blocks=blocks), view)
             if _is_sound(picture, moved, mine, its):
-                yield _draft(colored, picture, (mine, its), rule, phrase, rng)
+                yield from _drafted(colored, picture, (mine, its), rule, phrase, rng)
                 return
 
 
-def _draft(
+def _drafted(
     scene: Scene,
     picture: QuestionPicture,
     pair: tuple[Block, Block],
     rule: _Rule,
     phrase: str,
     rng: np.random.Generator,
-) -> Draft:
+) -> Iterator[Draft]:
+    """The draft, where color and shape are names that fit both blocks as they are seen."""
     options = [phrase, *(option for option in rule.options if option != phrase)]
     noun = shape_word(pair[0].type)
     slots = {"block": f"{pair[0].color} {noun}", "other": f"{pair[1].color} {noun}"}
+    try:
+        for name in slots.values():
+            resolve_one(name, picture)
+    except UnfairError:
+        return
     stem = f"rr-{rule.stem}"
-    return draft(scene, picture, rng, stem, slots, options, phrase, rule.kind, turned=phrase)
+    yield draft(scene, picture, rng, stem, slots, options, phrase, rule.kind, turned=phrase)
 
 
 def _is_sound(picture: QuestionPicture, moved: Block, before: Block, other: Block) -> bool:
