@@ -15,6 +15,7 @@ __all__ = [
     "PLAN_PARSERS",
     "SETTINGS",
     "Background",
+    "CandidateOrder",
     "CandidateScale",
     "Criterion",
     "DataFormat",
@@ -71,6 +72,8 @@ BACKGROUNDS: tuple[Background, ...] = get_args(Background)
 PictureName = Literal["goal", "candidates"]
 PictureSource = Literal["render", "dataset"]
 PictureLayout = Literal["composite", "separate"]
+CandidateOrder = Literal["file", "shuffled"]
+"""In which order candidates are numbered and shown."""
 CandidateScale = Literal["common", "fit"]
 
 Role = Literal["system", "user", "assistant"]

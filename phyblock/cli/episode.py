@@ -20,6 +20,7 @@ from phyblock.sim.film import episode_gif, episode_images, episode_sheet
 from phyblock.tables.design import read_design
 from phyblock.tables.track_report import EpisodeView
 from phyblock.tracks import kind_of, kinds
+from phyblock.tracks.showing import as_recorded
 
 __all__ = ["command"]
 
@@ -103,4 +104,4 @@ def _task(run: Path, record: Record, data: Path | None) -> AssemblyTask:
     tasks = {task.scene.id: task for task in dataset.tasks}
     if record.scene not in tasks:
         raise DataError(Problem(str(dataset.root), "holds no such scene", "scene", record.scene))
-    return tasks[record.scene]
+    return as_recorded(tasks[record.scene], record)

@@ -16,6 +16,7 @@ from phyblock.records.record import (
     Score,
     SentImage,
     SentPrompt,
+    ShownScene,
 )
 from phyblock.records.record_lines import RecordedLines, RecordLines, record_adapter
 from phyblock.records.reply import StoredError, StoredReply, StoredUsage
@@ -43,6 +44,7 @@ __all__ = [
     "Score",
     "SentImage",
     "SentPrompt",
+    "ShownScene",
     "StoredError",
     "StoredQuestion",
     "StoredReply",

@@ -112,6 +112,9 @@ class Manifest(Line):
     """Distinct scenes."""
     scenes_by_level: dict[int, int] = Field(default_factory=dict)
     """Scenes of each level; one scene may be of several."""
+    floors: dict[str, dict[str, dict[str, float]]] = Field(default_factory=dict)
+    """By track and baseline that never sees the goal, what it reaches on these scenes, in [0, 1]:
+    by measure, cell, setting, matcher and criterion."""
     versions: dict[str, str] = Field(default_factory=dict)
     """Of Python and of libraries."""
 

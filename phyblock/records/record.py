@@ -22,6 +22,7 @@ __all__ = [
     "Score",
     "SentImage",
     "SentPrompt",
+    "ShownScene",
 ]
 
 
@@ -85,6 +86,15 @@ class AskedTurn(Line):
     """What was sent."""
 
 
+class ShownScene(Line):
+    """How a scene was shown, where that was not as the file has it."""
+
+    order: tuple[Whole, ...]
+    """The number in the file of each candidate, in the order shown."""
+    goal: str | None
+    """The scene whose goal was shown; null: none was."""
+
+
 class Record(Line):
     """A sample's stored outcome."""
 
@@ -122,6 +132,8 @@ class Record(Line):
     """When it was written, UTC."""
     run: str = ""
     """Digest of the run that it belongs to; older records have none."""
+    shown: ShownScene | None = None
+    """How the scene was shown; null: as the file has it."""
     counts: dict[str, tuple[Amount, ...]] = Field(default_factory=dict)
     """By name, what was counted for measures beside `scores`."""
 
@@ -221,3 +233,5 @@ class Recorded(Line):
     """The reply."""
     error: StoredError | None = None
     """The error."""
+    shown: ShownScene | None = None
+    """How the item was shown."""

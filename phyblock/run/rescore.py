@@ -15,12 +15,13 @@ from phyblock.files import atomic_write, writing
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
 from phyblock.records.reading import read_records
 from phyblock.run.data import recorded_dataset
+from phyblock.run.floors import floor_values
 from phyblock.run.folder import check_place, run_folder
 from phyblock.run.records import judged
 from phyblock.run.reopen import reopen_tracks
 from phyblock.run.replayed import counted_again
 from phyblock.specs import SuiteSpec, suite_model
-from phyblock.tracks import AnyTrack, EpisodeTrack, kind_of
+from phyblock.tracks import AnyTrack, EpisodeTrack, kind_of, shown_item
 from phyblock.tracks.counting import counts_samples
 from phyblock.words import Matcher, PlanParser
 
@@ -53,10 +54,16 @@ def rescore(
     _check_target(target, identity)
     names = [name for name in suite.tracks if kind_of(name).rescored or counts_samples(name)]
     dataset = recorded_dataset(folder, manifest, suite.levels, data)
+
+    def reopened(name: str, one: SuiteSpec) -> AnyTrack:
+        return reopen_tracks(folder, manifest, one, [name], dataset)[name]
+
     tracks = reopen_tracks(folder, manifest, suite, names, dataset)
     records = asyncio.run(_judged_again(folder, manifest, tracks))
     told = {"identity": identity, "suite": suite.model_dump(mode="json")}
-    _write(target, manifest.model_copy(update=told), records)
+    scored = manifest.model_copy(update=told)
+    floors = floor_values(scored, suite, reopened)
+    _write(target, scored.model_copy(update={"floors": floors}), records)
     return target
 
 
@@ -76,6 +83,7 @@ async def _judged_again(
         if item is None:
             message, hint = "names an item that the run has not", "restore the file from a copy"
             raise StoreError(Problem(where, message, "key", record.item, hint=hint))
+        item = shown_item(track, item, record.seed)
         if isinstance(track, EpisodeTrack):
             records.append(await counted_again(track, item, record, where))
             continue

@@ -37,6 +37,7 @@ from phyblock.specs.fields import (
 from phyblock.specs.rules import broken_rules, read_dotted
 from phyblock.words import (
     Background,
+    CandidateOrder,
     CandidateScale,
     Criterion,
     DataFormat,
@@ -53,6 +54,7 @@ __all__ = [
     "BUILTIN_DATASET",
     "PROMPT_WORDS",
     "RECORDED",
+    "CandidatesSpec",
     "DatasetSpec",
     "ImagesSpec",
     "LimitsSpec",
@@ -177,6 +179,16 @@ class ImagesSpec(Section):
     )
 
 
+class CandidatesSpec(Section):
+    """How candidates are offered."""
+
+    order: CandidateOrder = Field(
+        default="file",
+        description="file: numbered as in the data. shuffled: each seed draws another order for "
+        "every scene, the same for all models; numbers in pictures, prompts and replies go along.",
+    )
+
+
 class ScoringSpec(Section):
     """How replies are scored."""
 
@@ -263,6 +275,9 @@ class SuiteSpec(Section):
     )
     images: ImagesSpec = Field(
         default_factory=ImagesSpec, description="Which pictures a model is shown."
+    )
+    candidates: CandidatesSpec = Field(
+        default_factory=CandidatesSpec, description="How candidates are offered."
     )
     parser: PlanParser = Field(
         default="steps",

@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 from phyblock.errors import Problem, StoreError
 from phyblock.registry import known_tracks, table_names
 from phyblock.tables.outcomes import WITHOUT_REPLY
-from phyblock.words import Criterion, MissingPolicy
+from phyblock.words import CandidateOrder, Criterion, MissingPolicy
 
 __all__ = ["OVERALL", "Design", "SectionT", "read_design", "read_section"]
 
@@ -34,6 +34,10 @@ class _Scoring(_Part):
     missing: MissingPolicy
 
 
+class _Candidates(_Part):
+    order: CandidateOrder = "file"
+
+
 class _Suite(_Part):
     name: str = ""
     description: str = ""
@@ -41,6 +45,7 @@ class _Suite(_Part):
     levels: tuple[int, ...] = Field(min_length=1)
     settings: tuple[str, ...] = Field(min_length=1)
     seeds: tuple[int, ...] = Field(min_length=1)
+    candidates: _Candidates = _Candidates()
     scoring: _Scoring
     tables: tuple[str, ...] = Field(default_factory=table_names)
 

@@ -157,7 +157,8 @@ class TrackReport:
     in these cells. `part_names` say what `Record.part` stands for. `items` opens, for the page of a
     run, what was asked about where that is more than scenes; it raises DataError
     where that is not what the run was made on. `episodes` shows records that are episodes, `export`
-    writes what is asked about.
+    writes what is asked about. `showing` says, in words that end every caption, what is unusual
+    about how items were shown.
     """
 
     measures: tuple[Measure, ...]
@@ -180,3 +181,4 @@ class TrackReport:
     items: Callable[[Run, Dataset], PageItems] | None = None
     episodes: EpisodeView | None = None
     export: ItemExport | None = None
+    showing: Callable[[Run], tuple[str, ...]] = lambda _: ()

@@ -6,14 +6,17 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from phyblock.datasets import AssemblyTask
 from phyblock.resources import cache_dir
 from phyblock.sim import PictureStyle
 from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.specs.fields import PictureControls
 from phyblock.specs.suite import ImagesSpec
 from phyblock.tracks.base import AnyTrack
 from phyblock.tracks.kind import Opening, kind_of
 from phyblock.tracks.pictures import PicturePolicy, Pictures
 from phyblock.tracks.prompts import TemplatePrompt
+from phyblock.tracks.showing import Showing, TaskShowing
 from phyblock.words import BACKGROUNDS
 
 __all__ = [
@@ -23,6 +26,7 @@ __all__ = [
     "picture_policy",
     "picture_style",
     "render_workers",
+    "task_showing",
     "template_prompt",
 ]
 
@@ -56,6 +60,22 @@ def picture_policy(images: ImagesSpec) -> PicturePolicy:
 def assembly_pictures(suite: SuiteSpec) -> Pictures:
     """Pictures of goals and candidates as a suite wants them."""
     return Pictures(picture_folder(), picture_policy(suite.images), render_workers())
+
+
+def task_showing(
+    suite: SuiteSpec,
+    section: type[PictureControls],
+    name: str,
+    tasks: Sequence[AssemblyTask],
+    pool: Sequence[AssemblyTask],
+) -> TaskShowing:
+    """How a suite shows the scenes of a track, whose section is of this type and name.
+
+    Raises SpecError where another goal is wanted and `pool` has none for one of `tasks`.
+    """
+    controls = suite.section(section)
+    how = Showing(suite.candidates.order, controls.blind, controls.wrong_image, suite.seeds)
+    return TaskShowing(how, tasks, pool, f"{name}.wrong_image")
 
 
 def template_prompt(loaded: LoadedSuite, name: str) -> TemplatePrompt:

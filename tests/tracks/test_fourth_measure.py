@@ -99,7 +99,7 @@ def test_a_measure_is_in_tables_intervals_comparisons_and_the_report(
     here: Workspace,
 ) -> None:
     assert not command("run", "suite.yaml", "--out", here.out)
-    assert all(set(record["counts"]) == {"order_edits"} for record in here.records())
+    assert all(set(record["counts"]) == {"poses", "order_edits"} for record in here.records())
     check_everywhere(here.out)
 
 
@@ -107,7 +107,7 @@ def test_scoring_again_fills_in_what_older_records_lack(
     here: Workspace, request: pytest.FixtureRequest
 ) -> None:
     assert not command("run", "suite.yaml", "--out", here.out, "--no-report")
-    assert not any("counts" in record for record in here.records())
+    assert not any("order_edits" in record["counts"] for record in here.records())
     request.getfixturevalue("added")
     command("report", here.out)
     with (here.out / "tables" / "estimates.csv").open(newline="") as file:

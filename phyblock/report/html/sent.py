@@ -38,7 +38,9 @@ class PictureShelf:
         self._room = _MOST_COPIED_BYTES
 
     def add_scenes(self, tasks: Iterable[AssemblyTask]) -> None:
-        """Keep goals and candidates; raises OSError where the disk refuses."""
+        """Keep goals and candidates of tasks as they were shown; raises OSError where the disk
+        refuses.
+        """
         pictures = Pictures(self._cache, self._policy, 1)
         is_drawn = self._policy.source == "render"
         for task in tasks:

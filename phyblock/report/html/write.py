@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from phyblock.datasets import AssemblyTask
 from phyblock.files import writing
 from phyblock.folders import OutFolder
 from phyblock.records import MANIFEST, PROMPTS, RECORDS
@@ -27,6 +29,7 @@ from phyblock.tables.load import Run
 from phyblock.tracks.drawable import kit, scene_entry
 from phyblock.tracks.kind import kind_of
 from phyblock.tracks.opening import picture_policy
+from phyblock.tracks.showing import in_order
 
 __all__ = ["REPORT_FILE", "page_files", "write_report"]
 
@@ -123,9 +126,8 @@ def _keep_pictures(
     with out.making(place) as new:
         policy = picture_policy(run.section("images", ImagesSpec))
         shelf = PictureShelf(new, out.path / place, policy)
-        if scenes := _scenes(run):
-            known = (sources.tasks.get(scene) for scene in scenes)
-            shelf.add_scenes(task for task in known if task is not None)
+        if sources.tasks:
+            shelf.add_scenes(_scenes(run, sources.tasks))
         for track, items in sources.items.items():
             shelf.add_items(items, [shown for item, shown in asked.items() if item.track == track])
     return {digest: f"{place}{name}" for digest, name in shelf.names.items()}
@@ -139,9 +141,18 @@ def _part_names(run: Run) -> dict[str, str]:
     return names
 
 
-def _scenes(run: Run) -> list[str]:
-    """Scenes that were asked about as such: their names are those of the items."""
-    return list(run.records.loc[run.records["item"] == run.records["scene"], "scene"].unique())
+def _scenes(run: Run, tasks: Mapping[str, AssemblyTask]) -> Iterator[AssemblyTask]:
+    """Scenes that were asked about as such, in every form in which they were shown: their names
+    are those of the items.
+    """
+    asked = run.records[run.records["item"] == run.records["scene"]]
+    forms = asked["shown"].map(json.dumps)
+    for scene, form in dict.fromkeys(zip(asked["scene"], forms, strict=True)):
+        task, shown = tasks.get(scene), json.loads(form)
+        if task is not None and shown:
+            yield in_order(task, shown["order"], tasks.get(shown["goal"]))
+        elif task is not None:
+            yield task
 
 
 def _page(written: TablesWritten, figures: Sequence[Path], build: str) -> str:

@@ -67,7 +67,8 @@ class PastStep:
 class StepPrompt:
     """A template with its rules; `memory` is how many earlier steps are shown, None for all.
 
-    By `gating` and the setting `accepts` a move succeeds, of which the model is told.
+    By `gating` and the setting `accepts` a move succeeds, of which the model is told; with
+    `is_blind` it is not shown the goal.
     """
 
     template: TemplatePrompt
@@ -77,6 +78,7 @@ class StepPrompt:
     cot: bool
     gating: Gating = "aov"
     accepts: Setting = "A"
+    is_blind: bool = False
 
     def __post_init__(self) -> None:
         """Raise PromptError where the template has no text for the turns of a conversation."""
@@ -104,6 +106,7 @@ class StepPrompt:
             "cot": self.cot,
             "gating": self.gating,
             "setting": self.accepts,
+            "is_blind": self.is_blind,
             "n_hidden": hidden,
         }
         facts["answer"] = self.template.text("answer", facts)

@@ -101,14 +101,14 @@ def table2_view(table: pd.DataFrame, run: Run) -> TextTable:
         for row in table.to_dict("records")
     )
     return TextTable(
-        f"Physical-understanding VQA (%){run.design.of_suite}{_how_shown(run)}",
+        f"Physical-understanding VQA (%){run.design.of_suite}",
         (_MODEL, *columns, Column("Avg", "Overall")),
         rows,
         tuple(_notes(table, run)),
     )
 
 
-def letters_view(table: pd.DataFrame, run: Run) -> TextTable:
+def letters_view(table: pd.DataFrame, _: Run) -> TextTable:
     """Rates of letters out of `letters_frame`."""
     columns = [Column(kind, letter) for letter in LETTERS for kind in ("right", "given")]
     names = [f"{kind}_{letter.lower()}" for letter in LETTERS for kind in ("right", "given")]
@@ -117,24 +117,11 @@ def letters_view(table: pd.DataFrame, run: Run) -> TextTable:
         for row in table.to_dict("records")
     )
     return TextTable(
-        f"Letters that are right and letters given (%){_how_shown(run)}",
+        "Letters that are right and letters given (%)",
         (_MODEL, Column("n"), Column("No letter"), *columns),
         rows,
         ("Shares of all scored answers; questions of ordering have no one letter.",),
     )
-
-
-def _how_shown(run: Run) -> str:
-    """What is unusual about how questions were shown, as the end of a caption."""
-    shown = showing(run)
-    parts = {
-        "circular": shown.circular,
-        "blind": shown.blind,
-        "pictures of another scene": shown.wrong_image,
-        "options on one sheet": shown.options_as == "letters",
-    }
-    told = [name for name, holds in parts.items() if holds]
-    return f" [{', '.join(told)}]" if told else ""
 
 
 def _notes(table: pd.DataFrame, run: Run) -> list[str]:
