@@ -67,7 +67,7 @@ DataFormat = Literal["builtin", "official"]
 """Layouts of data sets and question sets."""
 
 Background = Literal["checkerboard", "white", "light-wood", "dark-wood", "concrete", "lawn"]
-"""The six backgrounds of the paper; the checkerboard is dark."""
+"""The six backgrounds of the paper; the checkerboard is dark, and where nothing else is said."""
 BACKGROUNDS: tuple[Background, ...] = get_args(Background)
 PictureName = Literal["goal", "candidates"]
 PictureSource = Literal["render", "dataset"]

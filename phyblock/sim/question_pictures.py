@@ -47,13 +47,14 @@ _SIZE_CUE = 0.25
 
 
 def question_png(picture_recipe: QuestionPicture, style: PictureStyle) -> bytes:
-    """PNG of a question's picture, square; the recipe's view takes the place of the style's.
+    """PNG of a question's picture, square; its view, and background if any, replace the style's.
 
     Raises DataError for a recipe with nothing to frame, ValueError for a view that a
     `PictureStyle` does not allow.
     """
     camera = question_camera(picture_recipe, style)
-    image = picture(drawn_blocks(picture_recipe), camera, style.background, style.size_px)
+    ground = picture_recipe.background or style.background
+    image = picture(drawn_blocks(picture_recipe), camera, ground, style.size_px)
     return to_png(draw_marks(image, picture_recipe.marks, camera))
 
 
@@ -93,7 +94,7 @@ def question_key(picture_recipe: QuestionPicture, style: PictureStyle) -> str:
         "kind": "question",
         "render_version": [RENDER_VERSION, QUESTION_RENDER_VERSION],
         **pixel_versions(),
-        "style": [style.size_px, style.background],
+        "style": [style.size_px, picture_recipe.background or style.background],
         "view": list(picture_recipe.view_deg),
         "alone": _is_alone(picture_recipe),
         "blocks": _field_values(drawn_blocks(picture_recipe)),

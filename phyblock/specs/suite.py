@@ -172,10 +172,10 @@ class ImagesSpec(Section):
     size_px: Annotated[int, Field(strict=True, ge=128, le=2048)] = Field(
         default=512, description="Edge of a rendered picture [pixels]."
     )
-    background: Background = Field(
-        default="checkerboard",
-        description="Ground of rendered pictures, one of the paper's six; the checkerboard is "
-        "dark.",
+    background: Background | None = Field(
+        default=None,
+        description="Ground of all rendered pictures, one of the paper's six; the checkerboard is "
+        "dark. null: each question's own, and the checkerboard for all else.",
     )
 
 

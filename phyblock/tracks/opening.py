@@ -17,6 +17,7 @@ from phyblock.tracks.kind import Opening, kind_of
 from phyblock.tracks.pictures import PicturePolicy, Pictures
 from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.tracks.showing import Showing, TaskShowing
+from phyblock.words import BACKGROUNDS
 
 __all__ = [
     "assembly_pictures",
@@ -47,7 +48,8 @@ def picture_folder() -> Path:
 
 def picture_style(images: ImagesSpec) -> PictureStyle:
     """How a suite wants pictures drawn."""
-    return PictureStyle(images.size_px, images.background, candidate_scale=images.candidate_scale)
+    ground = images.background or BACKGROUNDS[0]
+    return PictureStyle(images.size_px, ground, candidate_scale=images.candidate_scale)
 
 
 def picture_policy(images: ImagesSpec) -> PicturePolicy:

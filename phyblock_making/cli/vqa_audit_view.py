@@ -8,7 +8,8 @@ from rich.console import Console
 
 from phyblock.cli.console import counted, plain_table
 from phyblock.domain import LETTERS, SUBTASK_NAMES, Question
-from phyblock_making.questions.shortcuts import BALANCE, GUESSABLE, SubtaskAudit, duplicates_of
+from phyblock_making.questions.letters import BALANCE
+from phyblock_making.questions.shortcuts import GUESSABLE, SubtaskAudit, duplicates_of
 
 __all__ = ["print_contents", "print_findings", "print_guessing"]
 

@@ -59,9 +59,10 @@ class CounterfactualMaker:
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Drafts of all kinds about removals in a scene of which every block can be seen."""
         orders = [block.order for block in scene.blocks]
-        if len(scene) < 4 or not are_seen(scene.blocks, orders, _ALL_SEEN):
+        plain = state(scene, scene.blocks, GOAL_VIEW)
+        if len(scene) < 4 or not are_seen(plain, orders, _ALL_SEEN):
             return
-        taken = shuffled(rng, [o for o in orders if are_seen(scene.blocks, (o,), NAMED)])
+        taken = shuffled(rng, [o for o in orders if are_seen(plain, (o,), NAMED)])
         makers = shuffled(rng, (_count, _which, _pictured))
         for number, order in enumerate(taken[:_REMOVALS_TRIED]):
             outcome = after_removal(scene.blocks, order)
@@ -78,7 +79,7 @@ class CounterfactualMaker:
         outcome = after_removal(scene.blocks, order)
         if not outcome.is_clear:
             raise UnfairError(f"the settings disagree on what follows without block {order}")
-        require_seen(scene.blocks, (order,), NAMED)
+        require_seen(shown, (order,), NAMED)
         if kind == "cf-count":
             right = OUTCOME_TEXTS[min(len(outcome.moved), 3)]
             return only_index([option == right for option in question.options])
@@ -102,7 +103,7 @@ def marked_order(picture: QuestionPicture, letter: str) -> int:
 
 def _taken(question: Question, slots: Mapping[str, str]) -> int:
     if of_kind(question) == "cf-picture":
-        return resolve_one(slots["block"], question.scene.blocks).order
+        return resolve_one(slots["block"], picture_of(question, "scene")).order
     return marked_order(picture_of(question, "scene"), TAKEN)
 
 
@@ -111,7 +112,7 @@ def _count(scene: Scene, order: int, outcome: Outcome, rng: np.random.Generator)
     moved = outcome.moved
     plain = state(scene, scene.blocks, GOAL_VIEW)
     mark = block_mark(plain, seen(plain), order, TAKEN)
-    if mark is None or not are_seen(scene.blocks, moved, COUNTED):
+    if mark is None or not are_seen(plain, moved, COUNTED):
         return
     number = min(len(moved), 3)
     others = [text for text in OUTCOME_TEXTS if text != OUTCOME_TEXTS[number]]
@@ -138,7 +139,7 @@ def _which(scene: Scene, order: int, outcome: Outcome, rng: np.random.Generator)
                 chosen.append(mark)
         if not chosen:
             return
-    if len(chosen) == 4 and are_seen(scene.blocks, moved[:1], COUNTED):
+    if len(chosen) == 4 and are_seen(plain, moved[:1], COUNTED):
         facts = {"removed": order, "moved": list(moved)}
         shown = replace(plain, marks=(taken,))
         yield draft(scene, rng, "cf-which", chosen, [shown], "place", facts=facts)
@@ -149,10 +150,10 @@ def _pictured(
 ) -> Iterator[Draft]:
     """The settled scene among others of which some also lack the block."""
     block = next(b for b in scene.blocks if b.order == order)
-    expressions = names(block, scene.blocks, ("color", "type", "layer", "side"))
+    plain = state(scene, scene.blocks, GOAL_VIEW)
+    expressions = names(block, plain, ("color", "type", "layer", "side"))
     if not expressions:
         return
-    plain = state(scene, scene.blocks, GOAL_VIEW)
     right = state(scene, outcome.settled, GOAL_VIEW)
     chosen = [right]
     for wrong in chain(_same_gone(scene, order, outcome, rng), _other_gone(scene, order, rng)):

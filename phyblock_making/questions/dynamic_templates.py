@@ -6,22 +6,6 @@ from collections.abc import Mapping
 
 __all__ = ["DYNAMIC_TEMPLATES"]
 
-_MATCH = (
-    "The first picture shows a structure. Which of the four pictures shows exactly the same"
-    " structure from another viewpoint?",
-    "Three of the four pictures differ from the structure in the first picture in one block."
-    " Which one shows the very same structure, seen from elsewhere?",
-    "The camera has moved around the structure in the first picture. Which of the four pictures"
-    " did it take of that structure, with every block unchanged?",
-)
-_SIDE = (
-    "The first picture shows a structure from the front. Which of the four pictures shows it"
-    " from {side_words}?",
-    "Looking at the structure in the first picture from the front, imagine walking around it until"
-    " you face it from {side_words}. Which of the four pictures do you see then?",
-    "If the first picture is the front view of the structure, which of the four pictures is the"
-    " view from {side_words}?",
-)
 _BUILD = (
     "The four pictures show stages of building one structure, block by block, with no block ever"
     " taken away. Put them in the order of building, earliest stage first.",
@@ -89,9 +73,6 @@ _STAYS = (
 _TARGET = " The small target of a mark lies on the block that is meant."
 _MARKED_STEMS = ("cf-count", "cf-which", "pd-push")
 _STEMS: Mapping[str, tuple[str, ...]] = {
-    "vp-color": _MATCH,
-    "vp-form": _MATCH,
-    "vp-side": _SIDE,
     "or-build": _BUILD,
     "or-apart": _APART,
     "cf-count": _COUNT,

@@ -25,12 +25,14 @@ which gives the same bytes with any number of processes. No picture is stored: e
 ## How they were made
 
 Every scene gives drafts: fair questions with their right option, distractors and evidence. From
-the drafts of all scenes a greedy choice takes the questions of a subtask so that sorts of
-questions, answer values, values under each set of options and under each word of the question,
-wordings, levels and scenes are as even as the scenes allow, and so that each option text, and each
-word in one, is right in one of four cases in which it is offered. The same block, color or number
-is not asked about twice in a scene. Letters go round within sets of options, so that each is right
-equally often; in ordering, all orders are drawn.
+the drafts of all scenes chance leaves out some, until the texts of those kept tell nothing of what
+is right (rejection sampling by a conditional logit over the texts, learned on other scenes). Of
+these a greedy choice evens out sorts, wordings and sets of options, never answers: what is evened
+out in a whole set is rare in one part where it was frequent in the other. The same block, color or
+number is not asked about twice in a scene. Letters are drawn until each is right about as often.
+
+Static questions and viewpoints are seen from all round, 18 to 38 degrees above the floor. Each
+question has one of the six backgrounds. Both are drawn.
 
 Texts come from templates with slots (`wording`). Blocks are named by color, type, layer, place in
 the picture or what they rest on, so that exactly one block fits.
@@ -90,9 +92,16 @@ What was unfair became a rule for all:
 * of next steps at most one obviously floats; the others are blocks of the goal at wrong places;
 * of the pictures of removals at least one wrong one lacks the right block, so that to look for
   what is gone is not enough; the removed block shows 40% of itself, the others 12%;
+* an arch, a triangular prism, a half cylinder or a cylinder is called that, and its shape asked
+  for, only where its profile is turned to the viewer by 15 degrees: from behind an arch looks like
+  a box;
+* what is hidden is counted only where a block that shows rests on it alone, one at the most;
+* heights are asked for "above the ground", left and right "in the picture";
 * other viewpoints to a side are asked for from straight in front alone: a slanted view has a
   mirror image that could be one of the same side;
-* options of viewpoints are four versions of one block, and the true one is drawn evenly;
+* options of viewpoints are one structure with two changes (mirrored, two colors exchanged, a block
+  shifted) each made or not, with equal blocks and colors; the true one is drawn evenly, and the
+  nearest histogram of visible colors is right for one of the four;
 * places for a block hold, or do not, also 7 mm off in four directions, and blocks without a clear
   middle are not put down;
 * pictures that are options differ in 220 of 256 x 256 pixels at least, and cut nothing off.

@@ -8,17 +8,16 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from phyblock.domain.question import LETTERS, SUBTASKS, Question, Subtask
+from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block
 from phyblock.models.guesses import Guesses
-from phyblock_making.questions.goal_view import GOAL_VIEW, shares
+from phyblock_making.questions.goal_view import shares
+from phyblock_making.questions.letters import BALANCE
 from phyblock_making.questions.question_draft import UnfairError
 from phyblock_making.questions.referring import resolve
 
-__all__ = ["BALANCE", "GUESSABLE", "SubtaskAudit", "audit_questions", "duplicates_of", "referents"]
+__all__ = ["GUESSABLE", "SubtaskAudit", "audit_questions", "duplicates_of", "referents"]
 
-BALANCE = (0.22, 0.28)
-"""Shares of right answers that every letter is to stay within."""
 GUESSABLE = 0.32
 """What guessing without a picture may reach: chance plus noise."""
 _DIGITS = 6
@@ -104,13 +103,13 @@ def referents(question: Question) -> dict[int, float]:
     Of static questions alone: where marks or pictures say what is meant, nothing is named.
     """
     picture = question.pictures[0] if question.pictures else None
-    if picture is None or picture.view_deg != GOAL_VIEW or picture.label != "scene":
+    if picture is None or picture.label != "scene":
         return {}
     slots = question.evidence.get("slots", {})
     named: set[int] = set()
     for text in (*(str(slot) for slot in slots.values()), *question.options):
-        named.update(_named(text, picture.blocks))
-    seen = shares(picture.blocks) if named else {}
+        named.update(_named(text, picture))
+    seen = shares(picture) if named else {}
     return {order: seen[order] for order in sorted(named)}
 
 
@@ -153,10 +152,10 @@ def _accuracy(probe: str, questions: Sequence[Question], guesses: Guesses) -> fl
     return right / len(questions)
 
 
-def _named(text: str, blocks: Sequence[Block]) -> tuple[int, ...]:
+def _named(text: str, picture: QuestionPicture) -> tuple[int, ...]:
     """The block that a text names; none where it is no expression, or fits several."""
     try:
-        orders = resolve(text.lower(), blocks)
+        orders = resolve(text.lower(), picture)
     except UnfairError:
         return ()
     return orders if len(orders) == 1 else ()

@@ -48,7 +48,11 @@ def open_vqa(opening: Opening) -> Vqa:
     if not opening.with_prompts:
         return Vqa(rules, questions, tasks)
     pictures = QuestionPictures(
-        picture_folder(), picture_style(suite.images), spec.options_as, render_workers()
+        picture_folder(),
+        picture_style(suite.images),
+        spec.options_as,
+        render_workers(),
+        suite.images.background,
     )
     return Vqa(rules, questions, tasks, template_prompt(loaded, Vqa.name), pictures)
 

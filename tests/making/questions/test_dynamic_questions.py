@@ -63,7 +63,7 @@ def test_texts_of_outcomes_are_always_all_offered(questions: list[Question]) -> 
 
 def test_a_changed_picture_is_found_out(questions: list[Question]) -> None:
     """The right picture put in a wrong one's place: two options are right, or none."""
-    matching = next(q for q in questions if q.evidence["kind"] in ("vp-color", "vp-form"))
+    matching = next(q for q in questions if q.evidence["kind"] == "vp-match")
     right = matching.pictures[1 + matching.answer[0]]
     copied = [
         replace(right, label=picture.label) if picture.label in LETTERS else picture
