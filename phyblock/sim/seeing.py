@@ -26,6 +26,7 @@ __all__ = [
     "SEEN_PX",
     "Top",
     "block_mark",
+    "changed_pixels",
     "differing_pixels",
     "is_apart",
     "is_inside",
@@ -69,8 +70,14 @@ def _seen(recipe: QuestionPicture, drawn_by: Renderer) -> Shot:
 
 def differing_pixels(one: Shot, other: Shot) -> int:
     """How many pixels of the two differ by more than a tenth of the scale in some channel."""
+    return int(changed_pixels(one, other).sum())
+
+
+def changed_pixels(one: Shot, other: Shot) -> NDArray[np.bool_]:
+    """Where the two differ by more than a tenth of the scale in some channel, shape of both."""
     step = np.abs(_colors(one) - _colors(other)).max(axis=2)
-    return int((step > _VISIBLE_STEP).sum())
+    changed: NDArray[np.bool_] = step > _VISIBLE_STEP
+    return changed
 
 
 def least_difference(shots: Sequence[Shot]) -> int:

@@ -156,7 +156,7 @@ def what_happened(
     Who is gone, who moved, whether the pushed block went with the push, and who came down.
     UnfairError where it is hard to tell whether a block came down.
     """
-    gone, moved = moved_between(scene, picture)
+    gone, moved = moved_between(scene.blocks, picture)
     goal = {block.order: block for block in scene.blocks}
     now = {block.order: block for block in picture.blocks}
     start, end = goal[push.order].position_m, now[push.order].position_m
