@@ -10,7 +10,8 @@ is then right in one case of four.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +21,14 @@ from phyblock.sim.render import Shot
 from phyblock.sim.seeing import changed_pixels, differing_pixels, is_inside, seen
 from phyblock_making.questions.pictured_drafts import LEAST_PIXELS
 
-__all__ = ["alike_wrong", "looks"]
+__all__ = ["alike_wrong", "looks", "ranked_as_drawn"]
 
 _WRONG = 3
 _MOST_POOL = 11
 _MOST_OFF = 1.0
 """How many ranks the right option may be off, on average over the measures."""
 _EQUAL = 0.02
-_CHANGE, _MOST_CHANGE_OFF = 5, 0.5
+_CHANGE, _HELD_OFF = 5, 0.5
 
 
 def alike_wrong(
@@ -42,25 +43,41 @@ def alike_wrong(
     `change` is how many of them are to have changed less than the right one, which holds exactly;
     it is drawn as the other ranks are where it is None.
     """
-    start = seen(first)
     whole = [one for one in (right, *pool) if is_inside(one)][: 1 + _MOST_POOL]
     if not whole or whole[0] is not right:
         return []
-    shots = [seen(one) for one in whole]
-    apart = np.array([[differing_pixels(a, b) >= LEAST_PIXELS for b in shots] for a in shots])
-    is_new = [differing_pixels(start, shot) >= LEAST_PIXELS for shot in shots]
+    start, shots = seen(first), [seen(one) for one in whole]
+    together = [start, *shots]
+    apart = np.array([[differing_pixels(a, b) >= LEAST_PIXELS for b in together] for a in shots])
+    if not apart[0, 0]:
+        return []
+    apart[:, 1:] &= apart[:, :1] & apart[:, 0]
     measures = np.array([looks(start, shot) for shot in shots])
+    chosen = ranked_as_drawn(measures, apart[:, 1:], rng, {} if change is None else {_CHANGE: change})
+    return [whole[i] for i in chosen]
+
+
+def ranked_as_drawn(
+    measures: NDArray[np.float64],
+    apart: NDArray[np.bool_],
+    rng: np.random.Generator,
+    held: Mapping[int, int] = MappingProxyType({}),
+) -> tuple[int, ...]:
+    """Three rows after the first, all apart, among which the first has about the ranks drawn.
+
+    `measures` has shape (n, k), `apart` (n, n). `held` gives ranks that hold exactly for some of
+    the k measures. Empty where no three come near enough.
+    """
     wanted = rng.integers(_WRONG + 1, size=measures.shape[1])
-    wanted[_CHANGE] = wanted[_CHANGE] if change is None else change
-    found: tuple[float, tuple[int, ...]] | None = None
-    for chosen in itertools.combinations(range(1, len(whole)), _WRONG):
+    fixed = sorted(held)
+    wanted[fixed] = [held[one] for one in fixed]
+    best: tuple[float, tuple[int, ...]] = (_MOST_OFF, ())
+    for chosen in itertools.combinations(range(1, len(measures)), _WRONG):
         if all(apart[a, b] for a, b in itertools.combinations((0, *chosen), 2)):
             off = np.abs(_rank(measures, chosen) - wanted)
-            if off[_CHANGE] <= _MOST_CHANGE_OFF:
-                found = min(found or (np.inf, ()), (float(off.mean()), chosen))
-    if found is None or found[0] > _MOST_OFF or not all(is_new[i] for i in (0, *found[1])):
-        return []
-    return [whole[i] for i in found[1]]
+            if (off[fixed] <= _HELD_OFF).all():
+                best = min(best, (float(off.mean()), chosen))
+    return best[1]
 
 
 def _rank(measures: NDArray[np.float64], chosen: Sequence[int]) -> NDArray[np.float64]:

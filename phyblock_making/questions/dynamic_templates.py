@@ -99,11 +99,17 @@ _GONE = (
 )
 _NEXT = (
     "The first picture shows an unfinished structure. Which of the four pictures can be the next"
-    " step, with one more block in place that stays where it is put?",
+    " step, with one more block put down so that everything stays where it is?",
     "An assembly has come as far as the first picture shows. In which of the four pictures was the"
-    " next block added so that it stays put?",
-    "Which picture can come next in this assembly? The added block must stay where it is once it"
-    " is let go.",
+    " next block added so that nothing moves once it is let go?",
+    "Which picture can come next in this assembly? The added block, and all others, must stay where"
+    " they are once it is let go.",
+    "One more block is about to be let go on the structure in the first picture, in four different"
+    " places. In which picture will it stay put, and all else with it?",
+    "Three of the four pictures show the moment before something falls. Which one shows a next step"
+    " that holds?",
+    "The assembly in the first picture goes on with one block. Which of the four ways of adding it"
+    " does not end in a fall?",
 )
 _PUSHED = (
     "A finger slowly pushes the block marked X {direction} by 4.4 cm, a little less than the"
@@ -113,15 +119,29 @@ _PUSHED = (
     " cube, as seen in the picture. Which of the four pictures shows the result?",
     "What does the scene look like after the block marked X was pushed slowly {direction}, as seen"
     " in the picture, by 4.4 cm, a little less than the side of a cube?",
+    "Each of the four pictures shows what a slow push of one block by 4.4 cm, a little less than"
+    " the side of a cube, led to. Which one follows when the block marked X is pushed {direction},"
+    " as seen in the first picture?",
+    "Seen from here, the block marked X is moved {direction} by 4.4 cm, slowly, nearly the side of"
+    " a cube. Which picture was taken after that?",
 )
 _STAYS = (
-    "The block in the second picture is put down on the structure in the first, turned as it is"
-    " shown, with its middle straight above one of the marked places. At which place does it stay,"
-    " with nothing moving or falling?",
+    "The block in the second picture is lowered onto the structure in the first, turned as it is"
+    " shown, with its middle straight above one of the marked places, and let go where it first"
+    " touches something. At which place does it stay, with nothing moving or falling?",
     "At which of the places A to D can the block in the second picture be set down so that"
-    " everything stays as it is? Its middle goes straight above the place, and it is not turned.",
+    " everything stays as it is? Its middle goes straight above the place, it is not turned, and it"
+    " comes down until it touches something.",
     "Four places are marked. The block in the second picture is lowered, as it is turned there,"
-    " with its middle over one of them, and let go. At which place does it come to rest safely?",
+    " with its middle over one of them until it touches something, and let go. At which place does"
+    " it come to rest safely?",
+    "Three of the places A to D are wrong for the block in the second picture: lowered there, turned"
+    " as shown and with its middle over the mark, it would fall or tip something over as soon as it"
+    " is let go. Which place is right?",
+    "You hold the block in the second picture as it is turned there and let it down with its middle"
+    " over A, B, C or D until it meets the structure. Where can you let go without anything falling?",
+    "Which of the places A to D bears the block in the second picture? It is let down straight,"
+    " turned as shown, its middle over the mark, and released at the first touch.",
 )
 _TARGET = " The small target of a mark lies on the block that is meant."
 _MARKED_STEMS = ("cf-count", "cf-which", "cf-picture", "pd-push")
