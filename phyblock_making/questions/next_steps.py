@@ -17,8 +17,8 @@ from phyblock.sim.seeing import seen, shown_pixels
 from phyblock.sim.support import bounds_m
 from phyblock_making.questions.alike import alike_wrong
 from phyblock_making.questions.choices import pick, shuffled
-from phyblock_making.questions.goal_view import drawn_view
-from phyblock_making.questions.pictured_drafts import draft, same_blocks
+from phyblock_making.questions.goal_view import COUNTED, are_seen, drawn_view
+from phyblock_making.questions.pictured_drafts import draft, same_blocks, with_room
 from phyblock_making.questions.placing import lowered, surely_stays, verdict
 from phyblock_making.questions.question_draft import Draft, UnfairError
 
@@ -29,7 +29,8 @@ _MOST_LEFT = 6
 _PLACES_TRIED = 44
 _STEP_M, _MOST_STEPS = 0.0125, 6
 _LEAST_HEIGHT_M = 0.02
-_LEAST_SHOWN = 60
+_LEAST_SHOWN = 250
+_ABOVE_M = 0.03
 _ENOUGH, _MOST_OF_A_SORT = 4, 8
 _RIGHTS_TRIED = 3
 
@@ -40,13 +41,15 @@ def next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         stage, block = _stage(scene, rng)
         if not stage:
             return
-        framed = (*stage, block)
+        framed = with_room(stage, _ABOVE_M)
         shown = QuestionPicture("scene", stage, drawn_view(rng), framed=framed)
         staying, falling = _places(shown, block, rng)
         if len(falling) < _ENOUGH:
             continue
         for right in staying[:_RIGHTS_TRIED]:
             wrong = alike_wrong(shown, right, falling, rng)
+            if not all(are_seen(one, (block.order,), COUNTED) for one in (right, *wrong)):
+                continue
             if wrong and _are_sure([right, *wrong], block.order):
                 facts = {"placed": [one.order for one in stage], "next": block.order}
                 options = [right, *wrong]

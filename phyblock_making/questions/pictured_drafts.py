@@ -46,12 +46,13 @@ def state(
     return QuestionPicture(label, tuple(blocks), view_deg, framed=scene.blocks)
 
 
-def with_room(blocks: Sequence[Block]) -> tuple[Block, ...]:
-    """What to frame a picture on so that there is floor all round the blocks for what falls."""
+def with_room(blocks: Sequence[Block], above_m: float = 0.0) -> tuple[Block, ...]:
+    """What to frame a picture on for floor all round the blocks, and some air above them [m]."""
     low, high = whole_bounds_m(blocks)
     first = max(block.order for block in blocks) + 1
+    height_m = round(float(high[2]) + above_m, 4) if above_m else 0.0125
     corners = [
-        Block(first + i, "cuboid1", "red", (x, y, 0.0125), (0.0, 0.0, 0.0), (), 1)
+        Block(first + i, "cuboid1", "red", (x, y, height_m), (0.0, 0.0, 0.0), (), 1)
         for i, (x, y) in enumerate(
             (round(float(x), 4), round(float(y), 4))
             for x in (low[0] - _ROOM_M, high[0] + _ROOM_M)
