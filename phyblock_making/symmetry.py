@@ -27,6 +27,7 @@ from phyblock_making.poses import POSES
 __all__ = [
     "SYMMETRIES",
     "Symmetry",
+    "angles_deg",
     "canonical_form",
     "find_twins",
     "fingerprint",
@@ -115,7 +116,7 @@ def _turned(block_type: BlockType, euler_deg: Euler, symmetry: Symmetry) -> Eule
     """Angles of the image of a pose, as `POSES` names them where it does."""
     body = _MIRROR if symmetry.mirrored else np.eye(3)
     image = symmetry.matrix @ euler_deg_to_matrix(euler_deg) @ body
-    angles = _angles_deg(image)
+    angles = angles_deg(image)
     wanted = _pose_class(block_type, angles)
     for known in POSES[block_type].values():
         if _pose_class(block_type, known) == wanted:
@@ -132,7 +133,7 @@ def _pose_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, ...]:
     return orientation_class(block_type, euler_deg)
 
 
-def _angles_deg(rotation: Matrix) -> Euler:
+def angles_deg(rotation: Matrix) -> Euler:
     """Extrinsic x-y-z angles [degrees] of a rotation matrix: R = Rz Ry Rx."""
     sine = -float(rotation[2, 0])
     if abs(sine) > 1 - 1e-9:

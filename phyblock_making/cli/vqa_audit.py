@@ -23,9 +23,9 @@ from phyblock_making.cli.question_sets import (
     size_option,
 )
 from phyblock_making.cli.working import tracked
+from phyblock_making.questions.letters import BALANCE
 from phyblock_making.questions.sheet import sheet_html
 from phyblock_making.questions.shortcuts import (
-    BALANCE,
     GUESSABLE,
     SubtaskAudit,
     audit_questions,

@@ -19,6 +19,7 @@ from phyblock_making.questions.goal_view import (
     center_m,
     goal_picture,
     outermost,
+    picture_axes,
     require_seen,
     shown_picture,
 )
@@ -30,7 +31,7 @@ from phyblock_making.questions.static_drafts import (
     index_of,
     seen_blocks,
 )
-from phyblock_making.questions.wording import slots_of
+from phyblock_making.questions.wording import slots_of, stem_of
 
 __all__ = ["PositionMaker"]
 
@@ -51,8 +52,11 @@ _CLEAR_M = 0.03
 _ABOVE_M = 0.015
 _LEVEL_M = 0.005
 _TRIES = 5
-_EXTREMES = ("farthest left", "farthest right", "highest")
-_HEIGHT_GAP_M = 0.024
+_FOURS = 6
+_SIDES = ("farthest left", "farthest right")
+_RANKED = ("highest", "lowest", "front", "back")
+"""Told by wordings of their own, because they are not about the picture but about the ground."""
+_GAP_M = 0.024
 _NEARER = 0.75
 """The nearest block is at most this share of the next one's distance away."""
 
@@ -61,6 +65,7 @@ class PositionMaker(StaticMaker):
     """RP: as seen in the picture; scenes are recolored so that most blocks have a name."""
 
     subtask: Subtask = "RP"
+    drafts_a_view = 16
 
     def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Pairs of blocks, and choices of one of four."""
@@ -72,20 +77,22 @@ class PositionMaker(StaticMaker):
                 for block in seen_blocks(picture, NAMED)
                 if (expressions := names(block, picture, _PLAIN))
             }
+            for _ in range(_FOURS):
+                yield from _of_four(shown, picture, named, rng)
             yield from _of_pairs(shown, picture, named, rng)
-            yield from _of_four(shown, picture, named, rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """From the places of the blocks that the text or the options name."""
         picture, slots = shown_picture(question), slots_of(question)
-        if "extreme" in slots or "block" not in slots:
+        if "block" not in slots:
             named = [resolve_one(option, picture) for option in question.options]
             anchor = resolve_one(slots["other"], picture) if "other" in slots else None
             seen = [*named, anchor] if anchor else named
             require_seen(picture, [block.order for block in seen], NAMED)
             if anchor:
                 return (named.index(_nearest(anchor, named)),)
-            return (named.index(_extreme(slots["extreme"], named, picture)),)
+            kind = slots.get("extreme") or stem_of(question.wording).removeprefix("rp-")
+            return (named.index(_extreme(kind, named, picture)),)
         one, other = (resolve_one(slots[name], picture) for name in ("block", "other"))
         require_seen(picture, [one.order, other.order], NAMED)
         corners = set(question.options) == set(_CORNERS)
@@ -97,7 +104,7 @@ def _of_pairs(
     scene: Scene, picture: QuestionPicture, named: dict[int, str], rng: np.random.Generator
 ) -> Iterator[Draft]:
     blocks = [block for block in scene.blocks if block.order in named]
-    pairs = shuffled(rng, list(itertools.permutations(blocks, 2)))[:4]
+    pairs = shuffled(rng, list(itertools.permutations(blocks, 2)))[:2]
     for one, other in pairs:
         slots = {"block": named[one.order], "other": named[other.order]}
         for stem, words, rule in (
@@ -123,7 +130,7 @@ def _of_four(
     if len(chosen) < 5:
         return
     anchor, four = chosen[0], chosen[1:]
-    kind = pick(rng, (*_EXTREMES, "nearest"))
+    kind = pick(rng, (*_SIDES, *_RANKED, "nearest"))
     try:
         is_near = kind == "nearest"
         right = _nearest(anchor, four) if is_near else _extreme(kind, four, picture)
@@ -131,8 +138,10 @@ def _of_four(
         return
     ranked = [right, *(block for block in four if block is not right)]
     options = [f"the {named[block.order]}" for block in ranked]
-    slots = {"other": named[anchor.order]} if kind == "nearest" else {"extreme": kind}
-    stem = "nearest" if kind == "nearest" else "extreme"
+    slots = {"other": named[anchor.order]} if is_near else {}
+    if kind in _SIDES:
+        slots = {"extreme": kind}
+    stem = "extreme" if kind in _SIDES else kind
     orders = {"ranked": [block.order for block in ranked]}
     yield draft(scene, picture, rng, f"rp-{stem}", slots, options, right.type, kind, **orders)
 
@@ -168,13 +177,19 @@ def _nearest(anchor: Block, blocks: Sequence[Block]) -> Block:
 
 
 def _extreme(extreme: str, blocks: Sequence[Block], picture: QuestionPicture) -> Block:
-    """The one of `blocks` that is clearly farthest to a side, or reaches highest."""
-    if extreme == "highest":
-        ranked = sorted(blocks, key=lambda block: -top_m(block))
-        if top_m(ranked[0]) - top_m(ranked[1]) < _HEIGHT_GAP_M:
-            raise UnfairError("two blocks are about as high")
+    """The one of `blocks` that is clearly farthest to a side, to the front, or reaches highest."""
+    if extreme in _RANKED:
+        away = picture_axes(picture.view_deg)[1]
+        upright = extreme in ("highest", "lowest")
+        sign = -1.0 if extreme in ("highest", "back") else 1.0
+        reach = {
+            b.order: sign * (top_m(b) if upright else float(center_m(b) @ away)) for b in blocks
+        }
+        ranked = sorted(blocks, key=lambda block: reach[block.order])
+        if reach[ranked[1].order] - reach[ranked[0].order] < _GAP_M:
+            raise UnfairError(f"two blocks are about as {extreme}")
         return ranked[0]
-    if extreme not in _EXTREMES:
+    if extreme not in _SIDES:
         raise UnfairError(f"{extreme!r} is no place")
     orders = [block.order for block in blocks]
     order = outermost(orders, picture, to_left=extreme == "farthest left")

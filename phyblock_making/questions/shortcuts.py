@@ -12,13 +12,12 @@ from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPictur
 from phyblock.domain.scene import Block
 from phyblock.models.guesses import Guesses
 from phyblock_making.questions.goal_view import shares
+from phyblock_making.questions.letters import BALANCE
 from phyblock_making.questions.question_draft import UnfairError
 from phyblock_making.questions.referring import resolve
 
-__all__ = ["BALANCE", "GUESSABLE", "SubtaskAudit", "audit_questions", "duplicates_of", "referents"]
+__all__ = ["GUESSABLE", "SubtaskAudit", "audit_questions", "duplicates_of", "referents"]
 
-BALANCE = (0.22, 0.28)
-"""Shares of right answers that every letter is to stay within."""
 GUESSABLE = 0.32
 """What guessing without a picture may reach: chance plus noise."""
 _DIGITS = 6
