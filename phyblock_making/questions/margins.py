@@ -12,15 +12,18 @@ from phyblock.sim.support import support_graph
 __all__ = ["group_of", "is_sure", "resting_on"]
 
 
-def resting_on(blocks: Sequence[Block], order: int) -> frozenset[int]:
+def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> frozenset[int]:
     """Orders of the blocks that rest on one, directly or not; not its own.
 
-    The naive rule says that these fall when it is taken away, and nothing else.
+    With `only` they rest on nothing but it and others that do. The naive rule says that these, or
+    those, fall when it is taken away, and nothing else.
     """
     below = support_graph(blocks)
     found: frozenset[int] = frozenset({order})
     for _ in blocks:
-        found |= {one for one, under in below.items() if under & found}
+        found |= {
+            one for one, under in below.items() if under & found and (not only or under <= found)
+        }
     return found - {order}
 
 

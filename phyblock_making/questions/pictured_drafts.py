@@ -91,18 +91,18 @@ def same_blocks(one: Sequence[Block], other: Sequence[Block]) -> bool:
 
 
 def moved_between(
-    blocks: Sequence[Block], picture: QuestionPicture
+    scene: Scene, picture: QuestionPicture
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Orders of the blocks that a picture lacks, and of those that it shows elsewhere.
+    """Orders of the scene's blocks that a picture lacks, and of those that it shows elsewhere.
 
     UnfairError when it shows others, or a block neither at its place nor clearly elsewhere.
     """
-    goal = {block.order: block for block in blocks}
+    goal = {block.order: block for block in scene.blocks}
     moved = []
     for block in picture.blocks:
         before = goal.get(block.order)
         if before is None or before.kind != block.kind:
-            raise UnfairError(f"picture {picture.label} shows a block that was not there")
+            raise UnfairError(f"picture {picture.label} shows a block that the scene has not")
         start, end = Pose.goal(before), Pose.goal(block)
         distance_m, angle_deg = end.distance_m(start), end.angle_deg(start)
         if distance_m > DEFAULT_LIMITS.moved_m or angle_deg > DEFAULT_LIMITS.moved_deg:
@@ -120,7 +120,7 @@ def story_of(
 
     UnfairError as `moved_between`, and where it is hard to tell whether a block came down.
     """
-    gone, moved = moved_between(blocks, picture)
+    gone, moved = moved_between(Scene("", (1,), tuple(blocks), ()), picture)
     before = {block.order: block.position_m[2] for block in blocks}
     after = {block.order: block.position_m[2] for block in picture.blocks}
     down_m = {order: before[order] - after[order] for order in moved}
