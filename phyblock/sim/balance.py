@@ -10,6 +10,7 @@ one side after another, so that no verdict hangs on an edge that a weight is nea
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -44,6 +45,8 @@ _LEAST_VERTICAL = 0.15
 _TOLERANCE = 1e-5
 _UP = np.array([0.0, 0.0, 1.0])
 _STEEP = 0.9
+_SAME_GAP_M = 1e-4
+_KEPT = 2048
 
 
 class _Contact(NamedTuple):
@@ -133,34 +136,42 @@ def _wrenches(at_m: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[
 
 
 def _contacts(blocks: Sequence[Block]) -> list[_Contact]:
-    pieces = [_pieces(block) for block in blocks]
-    boxes = [bounds_m(block) for block in blocks]
-    found = []
-    for number, own in enumerate(pieces):
-        if boxes[number][0, 2] < CONTACT_TOLERANCE_M:
-            points = np.vstack([piece.vertices_m for piece in own])
-            low = points[points[:, 2] < points[:, 2].min() + CONTACT_TOLERANCE_M]
-            found.append(_Contact(None, number, _outline(low), _UP))
-    for one, other in combinations(range(len(blocks)), 2):
-        if not boxes_near(boxes[one], boxes[other], CONTACT_TOLERANCE_M):
-            continue
-        for first in pieces[one]:
-            for second in pieces[other]:
-                found += _touching(one, other, first, second)
+    found = [_Contact(None, i, place, _UP) for i, b in enumerate(blocks) for place in _on_floor(b)]
+    for (below, one), (above, other) in combinations(enumerate(blocks), 2):
+        found += [_Contact(below, above, *place) for place in _between(one, other)]
     return found
 
 
-def _touching(one: int, other: int, first: ConvexPiece, second: ConvexPiece) -> list[_Contact]:
-    """The contact of two pieces where they touch, seen from the lower block."""
+@functools.lru_cache(maxsize=_KEPT)
+def _on_floor(block: Block) -> tuple[NDArray[np.float64], ...]:
+    """Where a block stands on the ground; empty where it does not."""
+    points = np.vstack([piece.vertices_m for piece in _pieces(block)])
+    if points[:, 2].min() >= CONTACT_TOLERANCE_M:
+        return ()
+    return (_outline(points[points[:, 2] < points[:, 2].min() + CONTACT_TOLERANCE_M]),)
+
+
+@functools.lru_cache(maxsize=_KEPT)
+def _between(
+    one: Block, other: Block
+) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64]], ...]:
+    """Corners and normal of each contact of two blocks, the normal from the first on."""
+    if not boxes_near(bounds_m(one), bounds_m(other), CONTACT_TOLERANCE_M):
+        return ()
+    met = [_touching(a, b) for a in _pieces(one) for b in _pieces(other)]
+    return tuple(contact for contact in met if contact is not None)
+
+
+def _touching(
+    first: ConvexPiece, second: ConvexPiece
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     axes = separating_axes(first, second)
     if not -2 * CONTACT_TOLERANCE_M <= axes.gap_m <= CONTACT_TOLERANCE_M:
-        return []
-    best = axes.directions[axes.gaps_m > axes.gap_m - 1e-4]
+        return None
+    best = axes.directions[axes.gaps_m > axes.gap_m - _SAME_GAP_M]
     direction = best[int(np.argmax(np.abs(best[:, 2])))]
-    if abs(direction[2]) < _LEAST_VERTICAL:
-        return []
     corners = contact_corners_m(first, second, direction)
-    return [_Contact(one, other, corners, direction)] if len(corners) else []
+    return (corners, direction) if abs(direction[2]) >= _LEAST_VERTICAL and len(corners) else None
 
 
 def _outline(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -170,6 +181,7 @@ def _outline(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return points[sorted(set(reach.argmax(axis=0).tolist()))]
 
 
+@functools.lru_cache(maxsize=_KEPT)
 def _pieces(block: Block) -> list[ConvexPiece]:
     rotation, position = euler_deg_to_matrix(block.euler_deg), np.array(block.position_m)
     return [moved(piece, rotation, position) for piece in collision_pieces(block.type)]

@@ -45,10 +45,10 @@ _PLACES_TRIED = 90
 _ENOUGH, _MOST_OF_A_SORT = 4, 12
 _STEP_PX = 5
 _FLAT_RISE = 0.99
-_SHIFTS_M = ((0.007, 0.0), (-0.007, 0.0), (0.0, 0.007), (0.0, -0.007))
+_SHIFTS_M = ((0.005, 0.0), (-0.005, 0.0), (0.0, 0.005), (0.0, -0.005))
 _OFF_CENTER_M = 0.001
-_APART_PX = 18.0
-_RIGHTS_TRIED = 4
+_APART_PX = 15.0
+_RIGHTS_TRIED = 12
 
 
 def _balanced() -> list[tuple[BlockType, Euler]]:
@@ -141,12 +141,13 @@ def _places(
             found[stays].append(top)
     if len(found[False]) < _ENOUGH:
         return []
+    central = int(rng.integers(len(LETTERS)))
     for right in found[True][:_RIGHTS_TRIED]:
         together = [right, *found[False]]
         marks = [Mark("A", top.position_m) for top in together]
         apart = np.array([[is_apart(plain, a, [b], _APART_PX) for b in marks] for a in marks])
         measures = np.array([_looks(plain, top) for top in together])
-        chosen = [marks[i] for i in (0, *ranked_as_drawn(measures, apart, rng))]
+        chosen = [marks[i] for i in (0, *ranked_as_drawn(measures, apart, rng, {0: central}))]
         if len(chosen) == len(LETTERS) and _are_sure(plain, block, chosen):
             return chosen
     return []
@@ -157,7 +158,6 @@ def _looks(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
     middle = np.mean([bounds_m(block).mean(axis=0) for block in plain.blocks], axis=0)
     x, y, z = top.position_m
     return (
-        20 * top.off_center_m,
         20 * top.off_center_m,
         10 * z,
         3 * float(np.hypot(x - middle[0], y - middle[1])),
@@ -171,7 +171,7 @@ def _by_statics(blocks: Sequence[Block], block: Block, top: Top) -> bool | None:
 
 
 def _are_sure(plain: QuestionPicture, block: Block, marks: Sequence[Mark]) -> bool:
-    """Whether the first place holds and the others do not, and likewise 7 mm off to any side."""
+    """Whether the first place holds and the others do not, and likewise 5 mm off to any side."""
     if not is_inside(replace(plain, marks=tuple(marks))):
         return False
     for number, mark in enumerate(marks):

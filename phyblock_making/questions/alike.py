@@ -53,7 +53,9 @@ def alike_wrong(
         return []
     apart[:, 1:] &= apart[:, :1] & apart[:, 0]
     measures = np.array([looks(start, shot) for shot in shots])
-    chosen = ranked_as_drawn(measures, apart[:, 1:], rng, {} if change is None else {_CHANGE: change})
+    chosen = ranked_as_drawn(
+        measures, apart[:, 1:], rng, {} if change is None else {_CHANGE: change}
+    )
     return [whole[i] for i in chosen]
 
 
@@ -70,7 +72,8 @@ def ranked_as_drawn(
     """
     wanted = rng.integers(_WRONG + 1, size=measures.shape[1])
     fixed = sorted(held)
-    wanted[fixed] = [held[one] for one in fixed]
+    for one in fixed:
+        wanted[one] = held[one]
     best: tuple[float, tuple[int, ...]] = (_MOST_OFF, ())
     for chosen in itertools.combinations(range(1, len(measures)), _WRONG):
         if all(apart[a, b] for a, b in itertools.combinations((0, *chosen), 2)):
@@ -81,7 +84,7 @@ def ranked_as_drawn(
 
 
 def _rank(measures: NDArray[np.float64], chosen: Sequence[int]) -> NDArray[np.float64]:
-    """How many of those chosen are below the first in each measure; nearly equal ones count half."""
+    """How many of those chosen are below the first in each measure; equal ones count half."""
     step = measures[list(chosen)] - measures[0]
     is_equal = np.abs(step) <= _EQUAL
     below: NDArray[np.float64] = (step < -_EQUAL).sum(axis=0) + is_equal.sum(axis=0) / 2

@@ -32,7 +32,11 @@ _FLAT_M = 0.0005
 _LEAST_TOP_M = 0.045
 _HIGHEST_M = 0.2
 _PROPPED = 0.4
-_PLANKS: tuple[tuple[BlockType, float], ...] = (("cuboid3", 0.15), ("cuboid3", 0.15), ("cuboid2", 0.1))
+_PLANKS: tuple[tuple[BlockType, float], ...] = (
+    ("cuboid3", 0.15),
+    ("cuboid3", 0.15),
+    ("cuboid2", 0.1),
+)
 """Types of planks and their lengths [m]."""
 
 
@@ -53,7 +57,11 @@ _WEIGHTS = (
     _Weight("cuboid2", (0.0, 0.0, 90.0), 0.025, 0.0125),
     _Weight("cylinder", (0.0, 0.0, 0.0), 0.025, 0.05),
 )
-_COLUMN: tuple[tuple[BlockType, float], ...] = (("cube", 0.05), ("cuboid1", 0.025), ("cylinder", 0.1))
+_COLUMN: tuple[tuple[BlockType, float], ...] = (
+    ("cube", 0.05),
+    ("cuboid1", 0.025),
+    ("cylinder", 0.1),
+)
 """What columns are made of, and heights [m]."""
 
 
@@ -98,7 +106,7 @@ class _Plan(NamedTuple):
 
 
 def _drawn(scene: Scene, top: Block, rng: np.random.Generator) -> list[Block]:
-    """A plank along x or y on a top, with weights, and sometimes a column; none that is too high."""
+    """A plank along x or y on a top, with weights or a column; none on one that is too high."""
     low, high = bounds_m(top)
     height_m, along = float(high[2]), int(rng.integers(2))
     plan = _planned(float(high[along] - low[along]) / 2, rng)

@@ -21,7 +21,7 @@ from phyblock.sim.outcomes import Outcome, after_removal
 from phyblock.sim.seeing import block_mark, is_apart, is_inside, seen, seen_order
 from phyblock_making.questions.alike import alike_wrong
 from phyblock_making.questions.annexes import with_annex
-from phyblock_making.questions.choices import pick, shuffled
+from phyblock_making.questions.choices import shuffled
 from phyblock_making.questions.goal_view import (
     COUNTED,
     NAMED,
@@ -168,8 +168,7 @@ def _drafts_of(
 ) -> Iterator[Draft]:
     """At most one draft about a removal, of the first kind that fits."""
     for _ in range(_VIEWS_TRIED):
-        framed = with_room(case.blocks)
-        plain = QuestionPicture("scene", case.blocks, drawn_view(rng), framed=framed)
+        plain = QuestionPicture("scene", case.blocks, drawn_view(rng))
         mark = block_mark(plain, seen(plain), case.order, TAKEN)
         orders = [block.order for block in case.blocks]
         if mark and are_seen(plain, (case.order,), NAMED) and are_seen(plain, orders, _ALL_SEEN):
@@ -187,13 +186,16 @@ def _drafts_of(
     for kind in kinds:
         asked = kind(plain, mark, outcome, rng)
         if asked:
-            shown = replace(plain, marks=(mark,))
+            shown = replace(asked.about, marks=(mark,))
             yield draft(scene, rng, asked.kind, asked.options, [shown], asked.value, {}, facts)
             return
 
 
 class _Asked(NamedTuple):
+    """A kind of question, the picture that it is about, before any mark, options and value."""
+
     kind: str
+    about: QuestionPicture
     options: Sequence[Option]
     value: str
 
@@ -209,7 +211,7 @@ def _count(
         return None
     number = min(len(outcome.moved), 3)
     others = [text for text in OUTCOME_TEXTS if text != OUTCOME_TEXTS[number]]
-    return _Asked("cf-count", [OUTCOME_TEXTS[number], *shuffled(rng, others)], str(number))
+    return _Asked("cf-count", plain, [OUTCOME_TEXTS[number], *shuffled(rng, others)], str(number))
 
 
 def _which(
@@ -232,7 +234,7 @@ def _which(
                 chosen.append(mark)
         if not chosen:
             return None
-    return _Asked("cf-which", chosen, "place") if len(chosen) == 4 else None
+    return _Asked("cf-which", plain, chosen, "place") if len(chosen) == 4 else None
 
 
 def _pictured(
@@ -243,7 +245,8 @@ def _pictured(
     As nothing changed less than a scene in which nothing moved, that is right in one of four.
     """
     order = marked_order(replace(plain, marks=(taken,)), TAKEN)
-    right = replace(plain, blocks=outcome.settled)
+    roomy = replace(plain, framed=with_room(plain.blocks))
+    right = replace(roomy, blocks=outcome.settled)
     change = int(rng.integers(1, _WRONG + 1)) if outcome.moved else 0
     pool: list[QuestionPicture] = []
     try:
@@ -259,5 +262,5 @@ def _pictured(
         if story not in known and is_inside(picture):
             known.add(story)
             pool.append(picture)
-    wrong = alike_wrong(plain, right, pool, rng, change) if len(pool) >= _WRONG else []
-    return _Asked("cf-picture", [right, *wrong], f"change {change}") if wrong else None
+    wrong = alike_wrong(roomy, right, pool, rng, change) if len(pool) >= _WRONG else []
+    return _Asked("cf-picture", roomy, [right, *wrong], f"change {change}") if wrong else None

@@ -21,6 +21,7 @@ from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Scene
 from phyblock.sim.seeing import seen
 from phyblock_making.questions.choices import pick
+from phyblock_making.questions.goal_view import COUNTED, are_seen, drawn_view, require_seen
 from phyblock_making.questions.pictured_drafts import (
     are_told_apart,
     draft,
@@ -30,7 +31,6 @@ from phyblock_making.questions.pictured_drafts import (
     state,
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError
-from phyblock_making.questions.goal_view import COUNTED, are_seen, drawn_view, require_seen
 from phyblock_making.questions.wording import slots_of
 
 __all__ = ["OrderingMaker"]
@@ -84,9 +84,7 @@ class OrderingMaker:
         return order if of_kind(question) == "or-build" else order[::-1]
 
 
-def _draft_from(
-    scene: Scene, plain: QuestionPicture, rng: np.random.Generator
-) -> Iterator[Draft]:
+def _draft_from(scene: Scene, plain: QuestionPicture, rng: np.random.Generator) -> Iterator[Draft]:
     for _ in range(_CUTS_TRIED):
         stages = _cut(scene, rng)
         if _only_order(scene, stages) is None or _is_sorted_by_eye(plain, stages):
@@ -95,7 +93,7 @@ def _draft_from(
         in_order = stages if kind == "or-build" else stages[::-1]
         options = [_highlighted(plain, stage, pair) for stage in in_order]
         if are_told_apart(options):
-            slots = {"color": pair[0], "other": pair[1]}
+            slots: dict[str, str] = {"color": pair[0], "other": pair[1]}
             facts = {"stages": [sorted(stage) for stage in stages]}
             yield draft(scene, rng, kind, options, [], kind, slots, facts)
             return
@@ -139,9 +137,7 @@ def _highlighted(
     return replace(plain, blocks=blocks)
 
 
-def _stage_in(
-    scene: Scene, option: QuestionPicture, slots: Mapping[str, str]
-) -> frozenset[int]:
+def _stage_in(scene: Scene, option: QuestionPicture, slots: Mapping[str, str]) -> frozenset[int]:
     """Orders of the blocks that a picture highlights; UnfairError when it shows another scene."""
     goal = {block.order: block for block in scene.blocks}
     if any(block.color not in (slots["color"], slots["other"]) for block in option.blocks):
@@ -160,7 +156,7 @@ def _is_sorted_by_eye(plain: QuestionPicture, stages: Stages) -> bool:
 
 
 def _looks(
-    plain: QuestionPicture, shown: NDArray[np.int32], stage: frozenset[int]
+    plain: QuestionPicture, shown: NDArray[np.int64], stage: frozenset[int]
 ) -> tuple[float, ...]:
     """Numbers of blocks and pixels, and heights in the world and in the picture, of a stage."""
     blocks = [(i, b.position_m[2]) for i, b in enumerate(plain.blocks) if b.order in stage]

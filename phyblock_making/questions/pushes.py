@@ -52,9 +52,7 @@ def push_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
     if min(shown_pixels(plain, shot).values()) < _LEAST_SHOWN:
         return
     for one, other in shuffled(rng, _touching(scene.blocks))[:_PAIRS_TRIED]:
-        pushes = [
-            (order, direction) for order, direction in product((one, other), _DIRECTIONS)
-        ]
+        pushes = [(order, direction) for order, direction in product((one, other), _DIRECTIONS)]
         (order, direction), *others = shuffled(rng, pushes)
         mark = block_mark(plain, shot, order, TAKEN)
         push = meant_push(plain, order, direction)
@@ -81,7 +79,7 @@ def meant_push(picture: QuestionPicture, order: int, direction: str) -> Push:
 
 
 def sure_push(blocks: Sequence[Block], push: Push) -> Outcome | None:
-    """What surely follows a push; None where settings or, if nothing came down, statics doubt it."""
+    """What surely follows a push; None where settings, or statics if none came down, doubt it."""
     outcome = after(blocks, push)
     if not outcome.is_clear or push.order not in outcome.moved:
         return None
