@@ -3,8 +3,8 @@
 Blocks stand when forces in their contacts can bear every weight: each force inside the cone of
 friction, all forces and moments of a block in balance. That is a set of linear equations in
 forces that only push, solved by non-negative least squares (Lawson and Hanson, 1974), with each
-cone as a pyramid of four edges. Where such forces exist, rigid bodies may stand; where none exist, they
-cannot. `surely_stands` and `surely_falls` ask so with every weight moved by `MARGIN_M` to
+cone as a pyramid of four edges. Where such forces exist, rigid bodies may stand; where none exist,
+they cannot. `surely_stands` and `surely_falls` ask so with every weight moved by `MARGIN_M` to
 one side after another, so that no verdict hangs on an edge that a weight is nearly over.
 """
 
@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
+from scipy.optimize import nnls  # type: ignore[import-untyped]
 
 from phyblock.domain.blocks import FRICTION, SHAPES, BlockType, euler_deg_to_matrix
 from phyblock.domain.scene import Block

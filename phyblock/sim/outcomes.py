@@ -2,9 +2,9 @@
 
 An outcome counts only where every setting names the same blocks, and names them clearly: each
 either stayed where it was or moved far. Time step, solver, friction and masses all vary, because
-which blocks fall changes with the time step alone in one removal of twenty. The floor leans a little,
-each time to another side, because a block whose weight is exactly over an edge falls in every
-simulation and stays on many a table.
+which blocks fall changes with the time step alone in one removal of twenty. The floor leans a
+little, each time to another side, because a block whose weight is exactly over an edge falls in
+every simulation and stays on many a table.
 """
 
 from __future__ import annotations

@@ -21,14 +21,16 @@ from phyblock.sim.render import Shot
 from phyblock.sim.seeing import changed_pixels, differing_pixels, is_inside, seen
 from phyblock_making.questions.pictured_drafts import LEAST_PIXELS
 
-__all__ = ["alike_wrong", "looks", "ranked_as_drawn"]
+__all__ = ["AREA", "CHANGE", "alike_wrong", "looks", "ranked_as_drawn"]
 
 _WRONG = 3
 _MOST_POOL = 11
 _MOST_OFF = 1.0
 """How many ranks the right option may be off, on average over the measures."""
 _EQUAL = 0.02
-_CHANGE, _HELD_OFF = 5, 0.5
+AREA, CHANGE = 0, 5
+"""Places of two of the measures: how much is colored, how much changed."""
+_HELD_OFF = 0.5
 
 
 def alike_wrong(
@@ -36,12 +38,11 @@ def alike_wrong(
     right: QuestionPicture,
     pool: Sequence[QuestionPicture],
     rng: np.random.Generator,
-    change: int | None = None,
+    held: Mapping[int, int] = MappingProxyType({}),
 ) -> list[QuestionPicture]:
     """Three of the pool, told apart from one another and the rest, or none.
 
-    `change` is how many of them are to have changed less than the right one, which holds exactly;
-    it is drawn as the other ranks are where it is None.
+    `held` gives ranks that hold exactly, by measure: `AREA` or `CHANGE`.
     """
     whole = [one for one in (right, *pool) if is_inside(one)][: 1 + _MOST_POOL]
     if not whole or whole[0] is not right:

@@ -19,7 +19,7 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.outcomes import Outcome, after_removal
 from phyblock.sim.seeing import block_mark, is_apart, is_inside, seen, seen_order
-from phyblock_making.questions.alike import alike_wrong
+from phyblock_making.questions.alike import CHANGE, alike_wrong
 from phyblock_making.questions.annexes import with_annex
 from phyblock_making.questions.choices import shuffled
 from phyblock_making.questions.goal_view import (
@@ -262,5 +262,5 @@ def _pictured(
         if story not in known and is_inside(picture):
             known.add(story)
             pool.append(picture)
-    wrong = alike_wrong(roomy, right, pool, rng, change) if len(pool) >= _WRONG else []
+    wrong = alike_wrong(roomy, right, pool, rng, {CHANGE: change}) if len(pool) >= _WRONG else []
     return _Asked("cf-picture", roomy, [right, *wrong], f"change {change}") if wrong else None

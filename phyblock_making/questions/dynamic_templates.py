@@ -52,13 +52,13 @@ _APART = (
     " team takes away in {color}, and the others in {other}. No block is pulled out from under"
     " another. Order the pictures from the first team to the last.",
     "This structure is cleared in four steps. What one step clears is {color} in one of the"
-    " pictures, and everything else, cleared earlier or later, is {other}. Blocks that carry others"
-    " have to wait. Put the pictures in the order of the steps.",
-    "Each picture marks in {color} the blocks that are taken down on one of four days; blocks of the"
-    " other days are {other}. Only blocks that carry nothing are ever taken. Sort the pictures from"
+    " pictures, and everything else, cleared earlier or later, is {other}. Blocks that carry"
+    " others have to wait. Put the pictures in the order of the steps.",
+    "Each picture marks in {color} the blocks that are taken down on one of four days; blocks of"
+    " the other days are {other}. Only blocks that carry nothing are ever taken. Sort the pictures from"
     " the first day to the last.",
-    "In what sequence can the {color} parts of these four pictures be removed from the structure, if"
-    " a block has to stay as long as anything rests on it? All that is not of the stage shown is"
+    "In what sequence can the {color} parts of these four pictures be removed from the structure,"
+    " if a block has to stay as long as anything rests on it? All that is not of the stage shown is"
     " {other}. Give the part that goes first, first.",
     "A structure is divided into four subassemblies that are taken away one after the other. In"
     " every picture one of them is {color} and the rest {other}. Which order of the pictures is"
@@ -135,8 +135,8 @@ _STAYS = (
     "Four places are marked. The block in the second picture is lowered, as it is turned there,"
     " with its middle over one of them until it touches something, and let go. At which place does"
     " it come to rest safely?",
-    "Three of the places A to D are wrong for the block in the second picture: lowered there, turned"
-    " as shown and with its middle over the mark, it would fall or tip something over as soon as it"
+    "Three of the places A to D are wrong for the block in the second picture: lowered there,"
+    " turned as shown and with its middle over the mark, it would fall or tip something over as soon as it"
     " is let go. Which place is right?",
     "You hold the block in the second picture as it is turned there and let it down with its middle"
     " over A, B, C or D until it meets the structure. Where can you let go without anything falling?",

@@ -13,9 +13,12 @@ import numpy as np
 
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block, Scene
+from phyblock.sim.balance import surely_stands
 from phyblock.sim.seeing import seen, shown_pixels
+from phyblock.sim.steps import groups
 from phyblock.sim.support import bounds_m
-from phyblock_making.questions.alike import alike_wrong
+from phyblock_making.questions.alike import AREA, alike_wrong
+from phyblock_making.questions.annexes import with_annex
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.goal_view import COUNTED, are_seen, drawn_view
 from phyblock_making.questions.pictured_drafts import draft, same_blocks, with_room
@@ -25,6 +28,7 @@ from phyblock_making.questions.question_draft import Draft, UnfairError
 __all__ = ["can_follow", "next_drafts"]
 
 _STAGES_TRIED = 3
+_ANNEXED = 0.5
 _MOST_LEFT = 6
 _PLACES_TRIED = 44
 _STEP_M, _MOST_STEPS = 0.0125, 6
@@ -32,7 +36,7 @@ _LEAST_HEIGHT_M = 0.02
 _LEAST_SHOWN = 250
 _ABOVE_M = 0.03
 _ENOUGH, _MOST_OF_A_SORT = 4, 8
-_RIGHTS_TRIED = 3
+_RIGHTS_TRIED = 6
 
 
 def next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -46,8 +50,9 @@ def next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         staying, falling = _places(shown, block, rng)
         if len(falling) < _ENOUGH:
             continue
+        rank = int(rng.integers(4))
         for right in staying[:_RIGHTS_TRIED]:
-            wrong = alike_wrong(shown, right, falling, rng)
+            wrong = alike_wrong(shown, right, falling, rng, {AREA: rank})
             if not all(are_seen(one, (block.order,), COUNTED) for one in (right, *wrong)):
                 continue
             if wrong and _are_sure([right, *wrong], block.order):
@@ -71,8 +76,15 @@ def can_follow(shown: QuestionPicture, option: QuestionPicture) -> bool:
 
 
 def _stage(scene: Scene, rng: np.random.Generator) -> tuple[tuple[Block, ...], Block]:
-    """The blocks placed so far, none where there are too few, and one of those to come."""
+    """The blocks placed so far, none where there are too few, and one more of the scene's.
+
+    Half of the stages have an annex, whose planks tip where a block is put on them wrongly.
+    """
     order = scene.graph.random_order(rng)
+    annexed = with_annex(scene, rng) if rng.random() < _ANNEXED else None
+    if annexed and all(map(surely_stands, groups(annexed))):
+        number = max(block.order for block in annexed) + 1
+        return annexed, replace(pick(rng, scene.blocks), order=number)
     least, most = max(1, len(scene) - _MOST_LEFT), len(scene) - 1
     if most < least:
         return (), scene.blocks[0]

@@ -35,7 +35,7 @@ __all__ = [
 LEAST_PIXELS = 220
 """In so many pixels of 256 by 256 any two pictures that are compared differ, at the least."""
 _LEVEL_M, _DOWN_M = 0.004, 0.008
-_ROOM_M = 0.045
+_ROOM_M = 0.06
 _SAME = Limits(still_m=0.002, still_deg=2.0, moved_m=0.002, moved_deg=2.0)
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from phyblock.domain.question import Question, Subtask
 from phyblock.domain.scene import Scene
-from phyblock_making.questions.choices import shuffled
 from phyblock_making.questions.counterfactual import TAKEN, marked_order
 from phyblock_making.questions.next_steps import can_follow, next_drafts
 from phyblock_making.questions.pictured_drafts import (
@@ -33,8 +32,8 @@ class PredictiveMaker:
     drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """One draft of each kind at most, in an order drawn."""
-        for make in shuffled(rng, (next_drafts, push_drafts)):
+        """A push, which fewer scenes allow, where one is fair; else a next step."""
+        for make in (push_drafts, next_drafts):
             yield from make(scene, rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:

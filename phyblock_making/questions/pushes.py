@@ -1,8 +1,8 @@
 """PD, pushes: the settled scene after a block was pushed, among what other pushes lead to.
 
-Every option is what really follows one of four pushes: of the block itself or of one that it
-touches, to the right or to the left. Which of the four is asked about is drawn, so that the
-pictures alone say nothing.
+Every option is what really follows one of four pushes: of the block itself or of one close by, to
+the right or to the left. Which of the four is asked about is drawn, so that the pictures alone say
+nothing.
 """
 
 from __future__ import annotations
@@ -34,13 +34,15 @@ from phyblock_making.questions.question_draft import Draft, UnfairError
 
 __all__ = ["meant_push", "push_drafts", "sure_push", "what_happened"]
 
-_PAIRS_TRIED = 3
+_BLOCKS_TRIED = 3
+_PUSHES_TRIED = 9
 _OPTIONS = 4
 _FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
 _ELEVATIONS_DEG = (20, 32)
 _DIRECTIONS = {"to the right": 1, "to the left": -1}
 _LEAST_SHOWN = 60
 _TOUCH_M = 0.002
+_ALONG_M = 0.01
 _REACH_M = 0.12
 
 
@@ -51,23 +53,23 @@ def push_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
     shot = seen(plain)
     if min(shown_pixels(plain, shot).values()) < _LEAST_SHOWN:
         return
-    for one, other in shuffled(rng, _touching(scene.blocks))[:_PAIRS_TRIED]:
-        pushes = [(order, direction) for order, direction in product((one, other), _DIRECTIONS)]
-        (order, direction), *others = shuffled(rng, pushes)
-        mark = block_mark(plain, shot, order, TAKEN)
-        push = meant_push(plain, order, direction)
-        options = _options(plain, push, [meant_push(plain, *another) for another in others])
-        if mark is None or len(options) < _OPTIONS:
+    for block in shuffled(rng, scene.blocks)[:_BLOCKS_TRIED]:
+        told = _told_apart(plain, _pushes(plain, block.order, rng))
+        if len(told) < _OPTIONS:
             continue
-        outcome = sure_push(scene.blocks, push)
-        if outcome is not None:
+        (order, direction), right = told.pop(int(rng.integers(_OPTIONS)))
+        mark = block_mark(plain, shot, order, TAKEN)
+        outcome = sure_push(scene.blocks, meant_push(plain, order, direction)) if mark else None
+        if mark is None or outcome is None:
+            continue
+        right = replace(right, blocks=outcome.settled)
+        if are_told_apart([right, *(picture for _, picture in told)]):
             facts = {"pushed": order, "moved": list(outcome.moved)}
-            right = replace(plain, blocks=outcome.settled)
-            told = [right, *options[1:]]
+            options = [right, *(picture for _, picture in told)]
             shown = [replace(plain, marks=(mark,))]
             value = "falls" if len(outcome.moved) > 1 else "slides"
             slots = {"direction": direction}
-            yield draft(scene, rng, "pd-push", told, shown, value, slots, facts)
+            yield draft(scene, rng, "pd-push", options, shown, value, slots, facts)
             return
 
 
@@ -91,50 +93,62 @@ def sure_push(blocks: Sequence[Block], push: Push) -> Outcome | None:
 
 def what_happened(
     blocks: Sequence[Block], picture: QuestionPicture, push: Push
-) -> tuple[tuple[int, ...], tuple[int, ...], frozenset[int], bool]:
+) -> tuple[tuple[int, ...], tuple[int, ...], frozenset[int], frozenset[int]]:
     """What a picture says happened, in words that two settled scenes can be compared by.
 
-    Who is gone, who moved, who came down, and whether the pushed block went with the push.
-    UnfairError as `story_of`.
+    Who is gone, who moved, who came down, and who went the way of the push. UnfairError as
+    `story_of`.
     """
     story = story_of(blocks, picture)
-    start = next(b.position_m for b in blocks if b.order == push.order)
-    end = next((b.position_m for b in picture.blocks if b.order == push.order), start)
-    along = sum((e - s) * d for s, e, d in zip(start, end, push.direction, strict=False))
-    return (*story, along > _TOUCH_M)
+    start = {block.order: block.position_m for block in blocks}
+    along = {
+        b.order: sum(
+            (end - begin) * way
+            for begin, end, way in zip(start[b.order], b.position_m, push.direction, strict=False)
+        )
+        for b in picture.blocks
+    }
+    return (*story, frozenset(order for order, way_m in along.items() if way_m > _ALONG_M))
 
 
-def _touching(blocks: Sequence[Block]) -> list[tuple[int, int]]:
-    """Orders of blocks that touch one another, in pairs."""
-    boxes = [(block.order, bounds_m(block)) for block in blocks]
-    return [
-        (one, other)
-        for i, (one, box) in enumerate(boxes)
-        for other, box_of_other in boxes[i + 1 :]
-        if boxes_near(box, box_of_other, _TOUCH_M)
-    ]
+def _pushes(plain: QuestionPicture, order: int, rng: np.random.Generator) -> list[tuple[int, str]]:
+    """Pushes of a block and of those that it touches, to either side, in an order drawn."""
+    boxes = {block.order: bounds_m(block) for block in plain.blocks}
+    touching = [one for one, box in boxes.items() if boxes_near(box, boxes[order], _TOUCH_M)]
+    return shuffled(rng, list(product(touching, _DIRECTIONS)))[:_PUSHES_TRIED]
 
 
-def _options(plain: QuestionPicture, push: Push, others: Sequence[Push]) -> list[QuestionPicture]:
-    """Pictures of what follows the pushes, the first one's first, as far as all tell their own.
+def _told_apart(
+    plain: QuestionPicture, pushes: Sequence[tuple[int, str]]
+) -> list[tuple[tuple[int, str], QuestionPicture]]:
+    """The first four pushes of which each leads to a picture that tells a story of its own.
 
-    No answer hangs on the others, so one setting will do for now, and what stands far away is left
-    alone.
+    Settings are compared for the one that is asked about alone; one will do to look for others.
+    Blocks that stand far away are left alone.
     """
-    chosen: list[QuestionPicture] = []
+    found: list[tuple[tuple[int, str], QuestionPicture]] = []
     stories: set[object] = set()
-    near = next(g for g in groups(plain.blocks, _REACH_M) if any(b.order == push.order for b in g))
-    for one in (push, *others):
-        outcome = after(near, one, OUTCOME_SETTINGS[:1])
+    near = next(
+        group
+        for group in groups(plain.blocks, _REACH_M)
+        if any(block.order == pushes[0][0] for block in group)
+    )
+    axis = meant_push(plain, pushes[0][0], next(iter(_DIRECTIONS)))
+    for order, direction in pushes:
+        outcome = after(near, meant_push(plain, order, direction), OUTCOME_SETTINGS[:1])
+        if not outcome.is_clear or order not in outcome.moved:
+            continue
         settled = {block.order: block for block in outcome.settled}
         blocks = tuple(settled.get(block.order, block) for block in plain.blocks)
         picture = replace(plain, blocks=blocks)
         try:
-            story = what_happened(plain.blocks, picture, push)
+            story = what_happened(plain.blocks, picture, axis)
         except UnfairError:
-            return []
-        if not outcome.is_clear or story in stories or one.order not in outcome.moved:
-            return []
-        stories.add(story)
-        chosen.append(picture)
-    return chosen if are_told_apart([plain, *chosen]) else []
+            continue
+        pictures = [plain, *(one for _, one in found), picture]
+        if story not in stories and are_told_apart(pictures):
+            stories.add(story)
+            found.append(((order, direction), picture))
+        if len(found) == _OPTIONS:
+            break
+    return found
