@@ -54,9 +54,7 @@ def alike_wrong(
         return []
     apart[:, 1:] &= apart[:, :1] & apart[:, 0]
     measures = np.array([looks(start, shot) for shot in shots])
-    chosen = ranked_as_drawn(
-        measures, apart[:, 1:], rng, {} if change is None else {_CHANGE: change}
-    )
+    chosen = ranked_as_drawn(measures, apart[:, 1:], rng, held)
     return [whole[i] for i in chosen]
 
 
