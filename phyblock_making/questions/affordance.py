@@ -22,7 +22,7 @@ from phyblock.domain.blocks import (
 )
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.sim.balance import surely_stands
+from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.question_pictures import BLOCK_LABEL
 from phyblock.sim.seeing import Top, is_apart, is_inside, seen, seen_order, visible_tops
 from phyblock.sim.steps import groups
@@ -32,6 +32,7 @@ from phyblock_making.questions.alike import ranked_as_drawn
 from phyblock_making.questions.annexes import with_annex
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.goal_view import drawn_view
+from phyblock_making.questions.margins import group_of
 from phyblock_making.questions.pictured_drafts import draft, only_index, picture_of
 from phyblock_making.questions.placing import lowered, surely_stays, verdict
 from phyblock_making.questions.question_draft import Draft, UnfairError
@@ -165,22 +166,24 @@ def _looks(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
 
 
 def _by_statics(blocks: Sequence[Block], block: Block, top: Top) -> bool | None:
+    """Whether the block stays at a place, and likewise 5 mm off to any side; None where unsure."""
     x, y, _ = top.position_m
     put = lowered(block, blocks, x, y)
-    return surely_stays((*blocks, put), put.order)
+    stays = surely_stays((*blocks, put), put.order)
+    if stays is None:
+        return None
+    for dx, dy in _SHIFTS_M:
+        put = lowered(block, blocks, x + dx, y + dy)
+        if is_balanced(group_of((*blocks, put), put.order)) is not stays:
+            return None
+    return stays
 
 
 def _are_sure(plain: QuestionPicture, block: Block, marks: Sequence[Mark]) -> bool:
-    """Whether the first place holds and the others do not, and likewise 5 mm off to any side."""
+    """Whether, by simulation too, the first place holds and the others do not."""
     if not is_inside(replace(plain, marks=tuple(marks))):
         return False
-    for number, mark in enumerate(marks):
-        x, y, _ = mark.position_m
-        for dx, dy in _SHIFTS_M:
-            put = lowered(block, plain.blocks, x + dx, y + dy)
-            if surely_stays((*plain.blocks, put), put.order) is not (number == 0):
-                return False
-        put = lowered(block, plain.blocks, x, y)
-        if verdict((*plain.blocks, put), put.order) is not (number == 0):
-            return False
-    return True
+    puts = [lowered(block, plain.blocks, *mark.position_m[:2]) for mark in marks]
+    return all(
+        verdict((*plain.blocks, put), put.order) is (number == 0) for number, put in enumerate(puts)
+    )

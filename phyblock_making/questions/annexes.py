@@ -1,9 +1,9 @@
 """Small additions to a structure that make its balance worth a question.
 
-The structures of the data set are built so that they stand at every step; few of their blocks rest
-on more than they need, and none is held by a weight. An annex is a plank laid on a flat top, off its
-middle as likely as not, with weights on it and perhaps a column under its free end: drawn at
-random, it may be a balance, a cantilever with a counterweight, or a bridge with a support too many.
+The structures of the data set are built so that they stand at every step; few of their blocks
+rest on more than they need, and none is held by a weight. An annex is a plank laid on a flat top,
+off its middle as likely as not, with weights on it and perhaps a column under its free end: drawn
+at random, it is a balance, a cantilever with a counterweight, or a bridge with a support too many.
 """
 
 from __future__ import annotations

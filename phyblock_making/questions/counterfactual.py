@@ -64,6 +64,7 @@ _SORTS: tuple[_Sort, ...] = ((False, False), (False, True), (True, False), (True
 _SHARES = (0.35, 0.25, 0.25, 0.15)
 """How often removals of each sort are looked for: each rule is right in four cases of ten."""
 _WRONG = 3
+_STAYS_ASKED = 0.25
 
 
 class _Case(NamedTuple):
@@ -184,7 +185,7 @@ def _drafts_of(
         "resting": sorted(case.resting),
     }
     for kind in kinds:
-        asked = kind(plain, mark, outcome, rng)
+        asked = kind(plain, case.order, outcome, rng)
         if asked:
             shown = replace(asked.about, marks=(mark,))
             yield draft(scene, rng, asked.kind, asked.options, [shown], asked.value, {}, facts)
@@ -200,14 +201,15 @@ class _Asked(NamedTuple):
     value: str
 
 
-_Kind = Callable[[QuestionPicture, Mark, Outcome, np.random.Generator], _Asked | None]
+_Kind = Callable[[QuestionPicture, int, Outcome, np.random.Generator], _Asked | None]
 
 
 def _count(
-    plain: QuestionPicture, taken: Mark, outcome: Outcome, rng: np.random.Generator
+    plain: QuestionPicture, _: int, outcome: Outcome, rng: np.random.Generator
 ) -> _Asked | None:
-    """How many others do not stay."""
-    if not are_seen(plain, outcome.moved, COUNTED):
+    """How many others do not stay; that none moves is asked less often than it is found."""
+    is_rare = not outcome.moved and rng.random() > _STAYS_ASKED
+    if is_rare or not are_seen(plain, outcome.moved, COUNTED):
         return None
     number = min(len(outcome.moved), 3)
     others = [text for text in OUTCOME_TEXTS if text != OUTCOME_TEXTS[number]]
@@ -215,13 +217,15 @@ def _count(
 
 
 def _which(
-    plain: QuestionPicture, taken: Mark, outcome: Outcome, rng: np.random.Generator
+    plain: QuestionPicture, order: int, outcome: Outcome, rng: np.random.Generator
 ) -> _Asked | None:
     """One of four marked blocks that does not stay; those that rest on the block come first."""
     if not outcome.moved:
         return None
     shot, moved = seen(plain), outcome.moved
-    order = marked_order(replace(plain, marks=(taken,)), TAKEN)
+    taken = block_mark(plain, shot, order, TAKEN)
+    if taken is None:
+        return None
     resting = resting_on(plain.blocks, order)
     others = [b.order for b in plain.blocks if b.order != order and b.order not in moved]
     near = [one for one in shuffled(rng, others) if one in resting]
@@ -238,13 +242,14 @@ def _which(
 
 
 def _pictured(
-    plain: QuestionPicture, taken: Mark, outcome: Outcome, rng: np.random.Generator
+    plain: QuestionPicture, order: int, outcome: Outcome, rng: np.random.Generator
 ) -> _Asked | None:
     """The settled scene among others at rest, all of which lack the block.
 
     As nothing changed less than a scene in which nothing moved, that is right in one of four.
     """
-    order = marked_order(replace(plain, marks=(taken,)), TAKEN)
+    if not outcome.moved and rng.random() > _STAYS_ASKED:
+        return None
     roomy = replace(plain, framed=with_room(plain.blocks))
     right = replace(roomy, blocks=outcome.settled)
     change = int(rng.integers(1, _WRONG + 1)) if outcome.moved else 0

@@ -55,8 +55,8 @@ _APART = (
     " pictures, and everything else, cleared earlier or later, is {other}. Blocks that carry"
     " others have to wait. Put the pictures in the order of the steps.",
     "Each picture marks in {color} the blocks that are taken down on one of four days; blocks of"
-    " the other days are {other}. Only blocks that carry nothing are ever taken. Sort the pictures from"
-    " the first day to the last.",
+    " the other days are {other}. Only blocks that carry nothing are ever taken. Sort the pictures"
+    " from the first day to the last.",
     "In what sequence can the {color} parts of these four pictures be removed from the structure,"
     " if a block has to stay as long as anything rests on it? All that is not of the stage shown is"
     " {other}. Give the part that goes first, first.",
