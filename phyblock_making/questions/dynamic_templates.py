@@ -136,10 +136,11 @@ _STAYS = (
     " with its middle over one of them until it touches something, and let go. At which place does"
     " it come to rest safely?",
     "Three of the places A to D are wrong for the block in the second picture: lowered there,"
-    " turned as shown and with its middle over the mark, it would fall or tip something over as soon as it"
-    " is let go. Which place is right?",
+    " turned as shown and with its middle over the mark, it would fall or tip something over as"
+    " soon as it is let go. Which place is right?",
     "You hold the block in the second picture as it is turned there and let it down with its middle"
-    " over A, B, C or D until it meets the structure. Where can you let go without anything falling?",
+    " over A, B, C or D until it meets the structure. Where can you let go without anything"
+    " falling?",
     "Which of the places A to D bears the block in the second picture? It is let down straight,"
     " turned as shown, its middle over the mark, and released at the first touch.",
 )
