@@ -22,7 +22,7 @@ from phyblock_making.workers import open_workers
 DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
 SMALL = [task.scene for task in DATA.tasks if len(task.scene) in (4, 5)]
 TOWERS = [task.scene for task in DATA.tasks if len(task.scene) in (8, 9)]
-SCENES = (*SMALL[::24], *TOWERS[::9])
+SCENES = (*SMALL[::30], *TOWERS[::20])
 HANGS_M = 0.004
 WANTED: dict[Subtask, int] = {"VP": 3, "CF": 3, "PD": 1, "OR": 2}
 
