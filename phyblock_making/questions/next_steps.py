@@ -13,14 +13,15 @@ import numpy as np
 
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block, Scene
-from phyblock.sim.balance import surely_stands
+from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.seeing import seen, shown_pixels
 from phyblock.sim.steps import groups
 from phyblock.sim.support import bounds_m
 from phyblock_making.questions.alike import AREA, alike_wrong
 from phyblock_making.questions.annexes import with_annex
 from phyblock_making.questions.choices import pick, shuffled
-from phyblock_making.questions.goal_view import COUNTED, are_seen, drawn_view
+from phyblock_making.questions.goal_view import COUNTED, View, are_seen, drawn_view
+from phyblock_making.questions.margins import group_of
 from phyblock_making.questions.pictured_drafts import draft, same_blocks, with_room
 from phyblock_making.questions.placing import lowered, surely_stays, verdict
 from phyblock_making.questions.question_draft import Draft, UnfairError
@@ -30,10 +31,12 @@ __all__ = ["can_follow", "next_drafts"]
 _STAGES_TRIED = 3
 _ANNEXED = 0.5
 _MOST_LEFT = 6
-_PLACES_TRIED = 44
+_PLACES_TRIED = 60
 _STEP_M, _MOST_STEPS = 0.0125, 6
 _LEAST_HEIGHT_M = 0.02
 _LEAST_SHOWN = 250
+_ELEVATIONS_DEG = (34, 48)
+_SHIFTS_M = ((0.01, 0.0), (-0.01, 0.0), (0.0, 0.01), (0.0, -0.01))
 _ABOVE_M = 0.03
 _ENOUGH, _MOST_OF_A_SORT = 4, 8
 _RIGHTS_TRIED = 6
@@ -46,7 +49,7 @@ def next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         if not stage:
             return
         framed = with_room(stage, _ABOVE_M)
-        shown = QuestionPicture("scene", stage, drawn_view(rng), framed=framed)
+        shown = QuestionPicture("scene", stage, _view(rng), framed=framed)
         staying, falling = _places(shown, block, rng)
         if len(falling) < _ENOUGH:
             continue
@@ -108,7 +111,7 @@ def _places(
         if bounds_m(put)[0, 2] < _LEAST_HEIGHT_M:
             continue
         picture = replace(shown, blocks=(*shown.blocks, put))
-        stays = surely_stays(picture.blocks, put.order)
+        stays = _clearly_stays(shown.blocks, put)
         if stays is None or len(found[stays]) == _MOST_OF_A_SORT:
             continue
         if shown_pixels(picture, seen(picture))[put.order] >= _LEAST_SHOWN:
@@ -116,6 +119,25 @@ def _places(
         if all(len(sort) >= _MOST_OF_A_SORT // 2 for sort in found.values()):
             break
     return shuffled(rng, found[True]), found[False]
+
+
+def _view(rng: np.random.Generator) -> View:
+    """A view from high enough to tell what lies behind from what lies above."""
+    low, high = _ELEVATIONS_DEG
+    return (drawn_view(rng)[0], float(rng.integers(low, high + 1)))
+
+
+def _clearly_stays(stage: Sequence[Block], put: Block) -> bool | None:
+    """Whether the block stays, and likewise 1 cm off to any side; None where unsure."""
+    stays = surely_stays((*stage, put), put.order)
+    if stays is None:
+        return None
+    x, y, _ = bounds_m(put).mean(axis=0)
+    for dx, dy in _SHIFTS_M:
+        moved = lowered(put, stage, float(x) + dx, float(y) + dy)
+        if is_balanced(group_of((*stage, moved), moved.order)) is not stays:
+            return None
+    return stays
 
 
 def _are_sure(options: Sequence[QuestionPicture], order: int) -> bool:
