@@ -69,7 +69,7 @@ def ranked_as_drawn(
     `measures` has shape (n, k), `apart` (n, n). `held` gives ranks that hold exactly for some of
     the k measures. Empty where no three come near enough.
     """
-    wanted: NDArray[np.int64] = rng.integers(_WRONG + 1, size=measures.shape[1])
+    wanted = np.array(rng.integers(_WRONG + 1, size=measures.shape[1]), dtype=np.int64)
     fixed = sorted(held)
     for one in fixed:
         wanted[one] = held[one]
