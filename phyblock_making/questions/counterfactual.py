@@ -8,6 +8,7 @@ on nothing else: a plank may need each of two supports.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -18,8 +19,8 @@ from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, S
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.outcomes import Outcome, after_removal
-from phyblock.sim.seeing import block_mark, is_apart, is_inside, seen, seen_order
-from phyblock_making.questions.alike import CHANGE, alike_wrong
+from phyblock.sim.seeing import block_mark, is_apart, is_inside, seen, seen_order, surface_at
+from phyblock_making.questions.alike import AREA, CHANGE, alike_wrong, ranked_as_drawn
 from phyblock_making.questions.annexes import with_annex
 from phyblock_making.questions.choices import shuffled
 from phyblock_making.questions.goal_view import (
@@ -65,6 +66,8 @@ _SHARES = (0.35, 0.25, 0.25, 0.15)
 """How often removals of each sort are looked for: each rule is right in four cases of ten."""
 _WRONG = 3
 _STAYS_ASKED = 0.25
+_MOVED_TRIED = 3
+_LEVEL_RISE = 0.99
 
 
 class _Case(NamedTuple):
@@ -100,7 +103,8 @@ class CounterfactualMaker:
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Drafts about removals from the scene, or from a part of it with an annex."""
         sort = _SORTS[int(rng.choice(len(_SORTS), p=_SHARES))]
-        kinds = shuffled(rng, (_count, _which, _pictured))
+        # Nearly every removal can be counted, few can be pictured or marked: those come first.
+        kinds = [*shuffled(rng, (_which, _pictured)), _count]
         for number in range(_STRUCTURES_TRIED):
             blocks = scene.blocks if number == 0 else with_annex(scene, rng)
             for case in _cases(scene, blocks, sort, rng) if blocks else ():
@@ -219,26 +223,44 @@ def _count(
 def _which(
     plain: QuestionPicture, order: int, outcome: Outcome, rng: np.random.Generator
 ) -> _Asked | None:
-    """One of four marked blocks that does not stay; those that rest on the block come first."""
-    if not outcome.moved:
-        return None
-    shot, moved = seen(plain), outcome.moved
+    """One of four marked blocks that does not stay, its mark no more central than the others."""
+    shot, resting = seen(plain), resting_on(plain.blocks, order)
     taken = block_mark(plain, shot, order, TAKEN)
-    if taken is None:
+    if not outcome.moved or taken is None:
         return None
-    resting = resting_on(plain.blocks, order)
-    others = [b.order for b in plain.blocks if b.order != order and b.order not in moved]
-    near = [one for one in shuffled(rng, others) if one in resting]
-    near += [one for one in shuffled(rng, others) if one not in resting]
-    chosen: list[Mark] = []
-    for group, most in ((shuffled(rng, moved), 1), (near, 4)):
-        for one in group:
-            mark = block_mark(plain, shot, one, "A")
-            if mark is not None and len(chosen) < most and is_apart(plain, mark, [taken, *chosen]):
-                chosen.append(mark)
-        if not chosen:
-            return None
-    return _Asked("cf-which", plain, chosen, "place") if len(chosen) == 4 else None
+    others = [b.order for b in plain.blocks if b.order != order and b.order not in outcome.moved]
+    marked = _marked(plain, [*shuffled(rng, outcome.moved)[:_MOVED_TRIED], *shuffled(rng, others)])
+    marked = {one: m for one, m in marked.items() if is_apart(plain, m, [taken])}
+    staying = [one for one in others if one in marked]
+    central = int(rng.integers(_WRONG + 1))
+    for right in [one for one in outcome.moved if one in marked]:
+        together = [right, *staying]
+        marks = [marked[one] for one in together]
+        apart = np.array([[is_apart(plain, a, [b]) for b in marks] for a in marks])
+        measures = [[*_mark_looks(plain, marked[one], taken), one in resting] for one in together]
+        wrong = ranked_as_drawn(np.array(measures, dtype=float), apart, rng, {0: central})
+        if wrong:
+            return _Asked("cf-which", plain, [marks[i] for i in (0, *wrong)], "place")
+    return None
+
+
+def _marked(plain: QuestionPicture, orders: Sequence[int]) -> dict[int, Mark]:
+    """Marks of those blocks that show enough for one, by order."""
+    marks = {order: block_mark(plain, seen(plain), order, "A") for order in orders}
+    return {order: mark for order, mark in marks.items() if mark is not None}
+
+
+def _mark_looks(plain: QuestionPicture, mark: Mark, taken: Mark) -> tuple[float, ...]:
+    """How central a mark is, those on level faces first; how high; how far from the mark X."""
+    place = surface_at(plain, seen(plain), mark.position_m)
+    off_center_m = place.off_center_m if place is not None else 0.0
+    is_level = place is not None and place.rise >= _LEVEL_RISE
+    return (
+        20 * (off_center_m + (not is_level)),
+        20 * off_center_m,
+        10 * mark.position_m[2],
+        3 * math.dist(mark.position_m, taken.position_m),
+    )
 
 
 def _pictured(
@@ -253,6 +275,7 @@ def _pictured(
     roomy = replace(plain, framed=with_room(plain.blocks))
     right = replace(roomy, blocks=outcome.settled)
     change = int(rng.integers(1, _WRONG + 1)) if outcome.moved else 0
+    ranks = {CHANGE: change, AREA: int(rng.integers(_WRONG + 1))}
     pool: list[QuestionPicture] = []
     try:
         known = {story_of(plain.blocks, right)}
@@ -267,5 +290,5 @@ def _pictured(
         if story not in known and is_inside(picture):
             known.add(story)
             pool.append(picture)
-    wrong = alike_wrong(roomy, right, pool, rng, {CHANGE: change}) if len(pool) >= _WRONG else []
+    wrong = alike_wrong(roomy, right, pool, rng, ranks) if len(pool) >= _WRONG else []
     return _Asked("cf-picture", roomy, [right, *wrong], f"change {change}") if wrong else None
