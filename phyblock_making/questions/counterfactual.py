@@ -251,14 +251,12 @@ def _marked(plain: QuestionPicture, orders: Sequence[int]) -> dict[int, Mark]:
 
 
 def _mark_looks(plain: QuestionPicture, mark: Mark, taken: Mark) -> tuple[float, ...]:
-    """How central a mark is, those on level faces first; how high; how far from the mark X."""
+    """How central a mark is, those on level faces first; and how far it is from the mark X."""
     place = surface_at(plain, seen(plain), mark.position_m)
     off_center_m = place.off_center_m if place is not None else 0.0
     is_level = place is not None and place.rise >= _LEVEL_RISE
     return (
         20 * (off_center_m + (not is_level)),
-        20 * off_center_m,
-        10 * mark.position_m[2],
         3 * math.dist(mark.position_m, taken.position_m),
     )
 

@@ -144,7 +144,9 @@ def _told_apart(
         if any(block.order == pushes[0][0] for block in group)
     )
     axis = meant_push(plain, pushes[0][0], next(iter(_DIRECTIONS)))
-    for order, direction in pushes:
+    for number, (order, direction) in enumerate(pushes):
+        if len(found) + len(pushes) - number < _OPTIONS:
+            break
         outcome = after(near, meant_push(plain, order, direction), OUTCOME_SETTINGS[:1])
         if not outcome.is_clear or order not in outcome.moved:
             continue
