@@ -177,6 +177,7 @@ def is_apart(
     return bool(apart.min(initial=np.inf) >= least_px)
 
 
+@functools.lru_cache(maxsize=48)
 def _colors(shot: Shot) -> NDArray[np.int16]:
     """Colors with every pixel of the floor white."""
     colors = shot.rgb.astype(np.int16)
