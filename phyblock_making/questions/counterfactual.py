@@ -9,6 +9,7 @@ on nothing else: a plank may need each of two supports.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -19,7 +20,7 @@ from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, S
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.outcomes import Outcome, after_removal
-from phyblock.sim.seeing import block_mark, is_apart, is_inside, seen, seen_order, surface_at
+from phyblock.sim.seeing import Top, block_mark, is_apart, is_inside, seen, seen_order, visible_tops
 from phyblock_making.questions.alike import AREA, CHANGE, alike_wrong, ranked_as_drawn
 from phyblock_making.questions.annexes import with_annex
 from phyblock_making.questions.choices import shuffled
@@ -56,7 +57,7 @@ OUTCOME_TEXTS = (
 TAKEN = "X"
 """The letter of the block that is taken away or pushed."""
 _ALL_SEEN = 0.12
-_STRUCTURES_TRIED = 4
+_STRUCTURES_TRIED = 6
 _VIEWS_TRIED = 3
 _REMOVALS_TRIED = 6
 _Sort = tuple[bool, bool]
@@ -66,7 +67,8 @@ _SHARES = (0.35, 0.25, 0.25, 0.15)
 """How often removals of each sort are looked for: each rule is right in four cases of ten."""
 _WRONG = 3
 _STAYS_ASKED = 0.25
-_MOVED_TRIED = 3
+_STEP_PX = 6
+_SPOTS_OF_A_BLOCK, _MOST_STAYING, _RIGHTS_TRIED = 2, 12, 4
 _LEVEL_RISE = 0.99
 
 
@@ -224,41 +226,45 @@ def _which(
     plain: QuestionPicture, order: int, outcome: Outcome, rng: np.random.Generator
 ) -> _Asked | None:
     """One of four marked blocks that does not stay, its mark no more central than the others."""
-    shot, resting = seen(plain), resting_on(plain.blocks, order)
-    taken = block_mark(plain, shot, order, TAKEN)
+    taken = block_mark(plain, seen(plain), order, TAKEN)
     if not outcome.moved or taken is None:
         return None
-    others = [b.order for b in plain.blocks if b.order != order and b.order not in outcome.moved]
-    marked = _marked(plain, [*shuffled(rng, outcome.moved)[:_MOVED_TRIED], *shuffled(rng, others)])
-    marked = {one: m for one, m in marked.items() if is_apart(plain, m, [taken])}
-    staying = [one for one in others if one in marked]
+    spots = _spots(plain, taken, rng)
+    staying = [spot for spot in spots if spot[0] != order and spot[0] not in outcome.moved]
+    resting = resting_on(plain.blocks, order)
     central = int(rng.integers(_WRONG + 1))
-    for right in [one for one in outcome.moved if one in marked]:
-        together = [right, *staying]
-        marks = [marked[one] for one in together]
+    for right in [spot for spot in spots if spot[0] in outcome.moved][:_RIGHTS_TRIED]:
+        together = [right, *staying[:_MOST_STAYING]]
+        marks = [Mark("A", top.position_m) for _, top in together]
         apart = np.array([[is_apart(plain, a, [b]) for b in marks] for a in marks])
-        measures = [[*_mark_looks(plain, marked[one], taken), one in resting] for one in together]
+        orders = np.array([one for one, _ in together])
+        apart &= orders[:, None] != orders
+        measures = [[*_mark_looks(top, taken), one in resting] for one, top in together]
         wrong = ranked_as_drawn(np.array(measures, dtype=float), apart, rng, {0: central})
         if wrong:
             return _Asked("cf-which", plain, [marks[i] for i in (0, *wrong)], "place")
     return None
 
 
-def _marked(plain: QuestionPicture, orders: Sequence[int]) -> dict[int, Mark]:
-    """Marks of those blocks that show enough for one, by order."""
-    marks = {order: block_mark(plain, seen(plain), order, "A") for order in orders}
-    return {order: mark for order, mark in marks.items() if mark is not None}
+def _spots(plain: QuestionPicture, taken: Mark, rng: np.random.Generator) -> list[tuple[int, Top]]:
+    """Places for marks in an order drawn, a few on each block, none near the mark X."""
+    shot = seen(plain)
+    found: list[tuple[int, Top]] = []
+    number: Counter[int] = Counter()
+    for top in shuffled(rng, visible_tops(plain, shot, _STEP_PX, -1.0)):
+        order = seen_order(plain, shot, top.position_m)
+        is_free = order is not None and number[order] < _SPOTS_OF_A_BLOCK
+        if order is not None and is_free and is_apart(plain, Mark("A", top.position_m), [taken]):
+            number[order] += 1
+            found.append((order, top))
+    return found
 
 
-def _mark_looks(plain: QuestionPicture, mark: Mark, taken: Mark) -> tuple[float, ...]:
+def _mark_looks(top: Top, taken: Mark) -> tuple[float, ...]:
     """How central a mark is, those on level faces first; and how far it is from the mark X."""
-    place = surface_at(plain, seen(plain), mark.position_m)
-    off_center_m = place.off_center_m if place is not None else 0.0
-    is_level = place is not None and place.rise >= _LEVEL_RISE
-    return (
-        20 * (off_center_m + (not is_level)),
-        3 * math.dist(mark.position_m, taken.position_m),
-    )
+    is_level = top.rise >= _LEVEL_RISE
+    far_m = math.dist(top.position_m, taken.position_m)
+    return 20 * (top.off_center_m + (not is_level)), 20 * top.off_center_m, 3 * far_m
 
 
 def _pictured(

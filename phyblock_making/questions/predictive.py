@@ -32,7 +32,7 @@ class PredictiveMaker:
     """Kinds: `pd-next` (the next step) and `pd-push` (the settled scene after a push)."""
 
     subtask: Subtask = "PD"
-    scenes_tried = 400
+    scenes_tried = 340
     drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
