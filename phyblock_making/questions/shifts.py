@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from phyblock.domain.scene import Block
+from phyblock.sim.balance import is_balanced
 from phyblock.sim.outcomes import OUTCOME_SETTINGS, holds
 from phyblock.sim.support import drop_height_m, find_overlaps
 from phyblock_making.questions.choices import shuffled
+from phyblock_making.questions.margins import group_of
 
 __all__ = ["shifted"]
 
@@ -35,9 +37,14 @@ def shifted(blocks: Sequence[Block], rng: np.random.Generator) -> tuple[Block, .
             if drop_height_m(moved, rest) > _FLOATS_M or find_overlaps((*rest, moved)):
                 continue
             every = tuple(moved if other.order == block.order else other for other in blocks)
-            if holds(every, moved.order, OUTCOME_SETTINGS[:1]):
+            if _stays(every, moved.order):
                 return every
     return None
+
+
+def _stays(blocks: Sequence[Block], order: int) -> bool:
+    """Whether a block and all that it touches stay; statics, which cost less, refuse most."""
+    return is_balanced(group_of(blocks, order)) and bool(holds(blocks, order, OUTCOME_SETTINGS[:1]))
 
 
 def _moved(
