@@ -51,6 +51,11 @@ _RISING: tuple[tuple[BlockType, ...], ...] = (
 they are listed names them in a good order to build in, and wins nothing by finding a better one.
 """
 _TIERS = {block_type: tier for tier, types in enumerate(_RISING) for block_type in types}
+_RARER: dict[BlockType, float] = {"triangle": 0.7}
+"""Factors on how often a type is drawn as a distractor. Triangles are of one color in six poses: to
+setting B, where a pose does not count, all of them are one block offered again and again, and
+leaving some out would pay.
+"""
 _MOST_DRAWN = 0.98
 """What more than `_EVEN_SHARE` of all goals need is offered nearly always."""
 
@@ -90,7 +95,7 @@ def _rates(palette: tuple[Kind, ...]) -> dict[Candidate, float]:
             share = needed / colors[block_type]
             drawn = min(share * (1 / _EVEN_SHARE - 1) / (1 - share), _MOST_DRAWN)
             one = Candidate(block_type, color, POSES[block_type][pose])
-            rates[one] = -math.log1p(-drawn)
+            rates[one] = -math.log1p(-drawn) * _RARER.get(block_type, 1.0)
     return rates
 
 
