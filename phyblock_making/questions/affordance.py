@@ -24,7 +24,7 @@ from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, S
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.question_pictures import BLOCK_LABEL
-from phyblock.sim.seeing import Top, is_apart, is_inside, seen, seen_order, visible_tops
+from phyblock.sim.seeing import Top, is_apart, is_inside, mark_pixel, seen, seen_order, visible_tops
 from phyblock.sim.steps import groups
 from phyblock.sim.support import bounds_m
 from phyblock_making.poses import POSES
@@ -159,11 +159,16 @@ def _places(
 
 
 def _looks(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
-    """How central a place is on its block, how high it is, and how far out in the structure."""
+    """How central a place is on its block, how much room is round it, how high, how far out."""
+    shot = seen(plain)
+    row, column = mark_pixel(plain, top.position_m)
+    others = np.argwhere(shot.block != shot.block[row, column])
+    room_px = np.linalg.norm(others - (row, column), axis=1).min()
     middle = np.mean([bounds_m(block).mean(axis=0) for block in plain.blocks], axis=0)
     x, y, z = top.position_m
     return (
         20 * top.off_center_m,
+        float(room_px) / 10,
         10 * z,
         3 * float(np.hypot(x - middle[0], y - middle[1])),
     )

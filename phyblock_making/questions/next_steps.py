@@ -40,6 +40,12 @@ _SHIFTS_M = ((0.01, 0.0), (-0.01, 0.0), (0.0, 0.01), (0.0, -0.01))
 _ABOVE_M = 0.03
 _ENOUGH, _MOST_OF_A_SORT = 4, 8
 _RIGHTS_TRIED = 6
+_AREA_RANKS = (0.1, 0.2, 0.3, 0.4)
+"""How often each rank of the right picture by colored area is looked for.
+
+A block that stays hides more of what it stands on, so that the last rank is the hardest to find;
+what is found is evened out when questions are chosen.
+"""
 
 
 def next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -53,7 +59,7 @@ def next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         staying, falling = _places(shown, block, rng)
         if len(falling) < _ENOUGH:
             continue
-        rank = int(rng.integers(4))
+        rank = int(rng.choice(len(_AREA_RANKS), p=_AREA_RANKS))
         for right in staying[:_RIGHTS_TRIED]:
             wrong = alike_wrong(shown, right, falling, rng, {AREA: rank})
             if not all(are_seen(one, (block.order,), COUNTED) for one in (right, *wrong)):
@@ -61,7 +67,7 @@ def next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
             if wrong and _are_sure([right, *wrong], block.order):
                 facts = {"placed": [one.order for one in stage], "next": block.order}
                 options = [right, *wrong]
-                yield draft(scene, rng, "pd-next", options, [shown], block.type, facts=facts)
+                yield draft(scene, rng, "pd-next", options, [shown], f"area {rank}", facts=facts)
                 return
 
 

@@ -21,7 +21,7 @@ _PUSHES = 2
 _FALLS = 12
 _SIDES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 _PUSHED_M = (0.031, 0.044, 0.069)
-_REACH_M = 0.1
+_REACH_M = 0.02
 _PLACES_TRIED = 12
 _BESIDE_M = (0.03, 0.11)
 """How far from what stands a fallen block lies [m]."""
