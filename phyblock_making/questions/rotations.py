@@ -94,7 +94,7 @@ _RULES: tuple[_Rule, ...] = (
 _PAIRS = 6
 _LOOSE = 4
 _PLACES = 6
-"""So many are tried for a loose block: seldom would leave out the turns that are hard to see."""
+"""So many are tried for a loose block; with one, turns that are hard to see would be rare."""
 _NEAR_M = 0.002
 
 
