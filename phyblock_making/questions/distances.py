@@ -13,7 +13,6 @@ from phyblock.domain.scene import Block, Scene
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import recolored
 from phyblock_making.questions.goal_view import (
-    COUNTED,
     NAMED,
     View,
     goal_picture,
@@ -67,11 +66,10 @@ _KINDS: Mapping[str, str] = {
     "rise": "rise",
     "apart": "apart",
     "gap": "gap",
-    "span": "span",
     "place": "place",
 }
-"""Wordings, and the sorts of questions whose shares are even: heights are one of six."""
-_FEW_A_SCENE = ("gap", "span", "place")
+"""Wordings, and the sorts of questions whose shares are even: heights are one of five."""
+_FEW_A_SCENE = ("gap", "place")
 """Kinds of which hardly any scene has four values that could be offered together."""
 _TRIES = 3
 _PAIRS = 90
@@ -116,8 +114,6 @@ class DistanceMaker(StaticMaker):
             raise UnfairError(f"the wording {question.wording!r} asks for no length")
         if rule == "place":
             return index_of(question, _place_text(_place_cm(named[0], named[1], picture)))
-        if rule == "span":
-            require_seen(picture, [block.order for block in picture.blocks], COUNTED)
         right_cm = grid_cm(LENGTHS[rule](named[0], named[-1], picture.blocks))
         try:
             values = sorted(float(option.removesuffix(" cm")) for option in question.options)
@@ -168,8 +164,6 @@ def _by_value(
 def _values_cm(rule: str, one: Block, other: Block, picture: QuestionPicture) -> Values:
     if rule == "place":
         return _place_cm(one, other, picture)
-    if rule == "span":
-        require_seen(picture, [block.order for block in picture.blocks], COUNTED)
     return (grid_cm(LENGTHS[rule](one, other, picture.blocks)),)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from phyblock.domain.scene import Block
-from phyblock.sim.support import bounds_m, whole_bounds_m
+from phyblock.sim.support import bounds_m
 from phyblock_making.questions.block_measures import top_m
 from phyblock_making.questions.goal_view import center_m
 from phyblock_making.questions.question_draft import UnfairError
@@ -92,23 +92,12 @@ def _gap(one: Block, other: Block, blocks: Sequence[Block]) -> float:
     return float(high[open_axes[0]] - low[open_axes[0]])
 
 
-def _span(one: Block, other: Block, blocks: Sequence[Block]) -> float:
-    """Of everything in the picture, along the length of the block."""
-    del other
-    axis = length_axis(one)
-    for block in blocks:
-        require_joined(one, block, blocks)
-    low, high = whole_bounds_m(blocks)
-    return float(high[axis] - low[axis])
-
-
 LENGTHS: Mapping[str, Callable[[Block, Block, Sequence[Block]], float]] = {
     "top": _top,
     "bottom": _bottom,
     "apart": _apart,
     "rise": _rise,
     "gap": _gap,
-    "span": _span,
 }
 """By kind, of a block, another, and all blocks; UnfairError for what cannot be told."""
 PAIRED = ("apart", "rise", "gap", "place")

@@ -93,6 +93,8 @@ _RULES: tuple[_Rule, ...] = (
 )
 _PAIRS = 6
 _LOOSE = 4
+_PLACES = 6
+"""So many are tried for a loose block; with one, turns that are hard to see would be rare."""
 _NEAR_M = 0.002
 
 
@@ -136,23 +138,29 @@ class RotationMaker(StaticMaker):
 def _about_some_axis(
     view: View, scene: Scene, other: Block, rng: np.random.Generator
 ) -> Iterator[Draft]:
-    """A loose block beside the structure that lies as `other` would after a turn drawn."""
+    """A loose block beside the structure that lies as `other` would after a turn drawn.
+
+    None where some turn cannot be told from another, which would tell what is asked.
+    """
     rule = _RULES[2]
-    phrase = pick(rng, rule.options)
     try:
-        turned = [one for one in tipped_over(other) if rule.phrases(one, other) == (phrase,)]
+        images = [(one, rule.phrases(one, other)) for one in tipped_over(other)]
     except UnfairError:
         return
-    if not turned:
+    if any(all(true != (phrase,) for _, true in images) for phrase in rule.options):
         return
-    loose = put_beside(pick(rng, turned), scene.blocks, rng)
-    every = replace(scene, blocks=(*scene.blocks, loose))
-    every = with_own_colors(every, [other.order, loose.order], rng)
-    picture = goal_picture(every, view)
-    if are_seen(picture, (loose.order, other.order), STUDIED) and holds(every.blocks, loose.order):
-        colored = replace(every, blocks=every.blocks[:-1])
-        its = next(block for block in colored.blocks if block.order == other.order)
-        yield from _drafted(colored, picture, (every.blocks[-1], its), rule, phrase, rng)
+    phrase = pick(rng, rule.options)
+    turned = [one for one, true in images if true == (phrase,)]
+    for _ in range(_PLACES):
+        loose = put_beside(pick(rng, turned), scene.blocks, rng)
+        every = replace(scene, blocks=(*scene.blocks, loose))
+        every = with_own_colors(every, [other.order, loose.order], rng)
+        picture, both = goal_picture(every, view), (loose.order, other.order)
+        if are_seen(picture, both, STUDIED) and holds(every.blocks, loose.order):
+            colored = replace(every, blocks=every.blocks[:-1])
+            its = next(block for block in colored.blocks if block.order == other.order)
+            yield from _drafted(colored, picture, (every.blocks[-1], its), rule, phrase, rng)
+            return
 
 
 def _on_the_spot(

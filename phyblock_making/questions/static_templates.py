@@ -88,14 +88,6 @@ TEMPLATES: Mapping[str, str] = {
         "Take as scale that {scale}. How much room is there between the {block} and the {other},"
         " from side to side?"
     ),
-    "ap-span-1": (
-        "If {scale}, how far does all that stands in the picture reach from end to end, measured "
-        "along the ground in the direction of the length of the {block}?"
-    ),
-    "ap-span-2": (
-        "Take as scale that {scale}. A box is to hold everything in the picture as it stands. How "
-        "long must it be in the direction of the length of the {block}?"
-    ),
     "ap-place-1": (
         "If {scale}, how far along the length of the {other}, and how far across it, is the middle "
         "of the {block} from its middle, seen straight from above?"

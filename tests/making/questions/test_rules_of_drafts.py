@@ -100,7 +100,6 @@ def test_a_gap_is_measured_between_sides_and_with_nothing_in_it() -> None:
     with pytest.raises(UnfairError, match="stands in the gap"):
         LENGTHS["gap"](left, right, (slab, left, right, between))
     assert along_and_across_m(left, slab) == pytest.approx((0.05, 0.0))
-    assert grid_cm(LENGTHS["span"](slab, slab, (slab, left, right))) == 15
 
 
 def test_a_hidden_block_is_sure_where_one_that_shows_rests_on_it_alone() -> None:
