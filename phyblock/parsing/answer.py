@@ -36,7 +36,7 @@ from phyblock.parsing.answer_patterns import (
     UNSURE,
 )
 from phyblock.parsing.answer_value import CONTRADICTION, ChoiceReader
-from phyblock.parsing.text_forms import after_reasoning, plain_forms
+from phyblock.parsing.text_forms import answer_of
 
 __all__ = ["ParsedAnswer", "parse_answer"]
 
@@ -56,7 +56,7 @@ class ParsedAnswer:
 
 def parse_answer(text: str, options: Sequence[str], is_ordering: bool) -> ParsedAnswer:
     """Read the answer out of a reply to a question that shows `options`, the first one as A."""
-    answer = plain_forms(after_reasoning(text)).strip()
+    answer = (answer_of(text) or "").strip()
     reader = OrderReader(len(options)) if is_ordering else ChoiceReader(options)
     for rule, find in _ORDER_RULES if is_ordering else _CHOICE_RULES:
         found = find(answer, reader)

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from phyblock.parsing.text_forms import after_reasoning, plain_forms
+from phyblock.parsing.text_forms import answer_of
 
 __all__ = ["MOVE_PROBLEMS", "MOVE_RULES", "MoveProblem", "ParsedMove", "parse_move"]
 
@@ -91,7 +91,6 @@ _OBJECT = re.compile(r"\{[^{}]{0,600}\}")
 _FENCE = re.compile(r"(?:`{3,}|~{3,})\s{0,3}[\w+-]{0,16}")
 _MARKUP = re.compile(r"[*`_~]{1,3}|\\boxed\{|[{}]")
 _EDGES = " \t\r\f\v>#-*+\u2022|\"'"
-_THINKING_OPENS = re.compile(r"<think(?:ing)?>", re.IGNORECASE)
 _INDEX_KEYS = ("index", "block_index", "id", "block_id", "block", "candidate", "number")
 _INDEX_ALONE = _INDEX_KEYS[:4]
 """Keys that are enough without an action."""
@@ -100,7 +99,7 @@ _ACTION_KEYS = ("action", "operation", "next_plan", "next plan", "plan", "answer
 
 def parse_move(text: str) -> ParsedMove:
     """Read the one operation that a reply names."""
-    answer = plain_forms(_answer(text))
+    answer = answer_of(text) or ""
     lines = [line for line in map(_plain, answer.splitlines()) if line]
     if not lines:
         return ParsedMove(problem="no_move" if text.strip() else "empty")
@@ -108,13 +107,6 @@ def parse_move(text: str) -> ParsedMove:
         if found := find(answer, lines):
             return _verdict(found, rule)
     return ParsedMove(problem="no_move")
-
-
-def _answer(text: str) -> str:
-    """The reply without what is thought aloud; thoughts that never end hold no answer."""
-    answer = after_reasoning(text)
-    opened = _THINKING_OPENS.search(answer)
-    return answer[: opened.start()] if opened else answer
 
 
 def _plain(line: str) -> str:

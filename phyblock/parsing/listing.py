@@ -1,0 +1,242 @@
+"""The lists of a reply: runs of steps, numbered or marked items, sentences, labelled numbers, JSON, tables.
+
+A list knows what stands above it, so that it can be told what it is to the one before it.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_left
+from dataclasses import dataclass, field
+
+from phyblock.parsing.statement import MOST_AT_ONCE, VERB, chain, read_statement
+from phyblock.parsing.structured import Found, find_json, find_tables
+from phyblock.parsing.text_forms import plain_line
+
+__all__ = ["Listing", "listings"]
+
+
+@dataclass
+class Listing:
+    """One list: its form, the blocks that it names in order, and where it stands.
+
+    `above` are the lines between it and the list before it that name nothing; `own` are the
+    numbers that its items bear; `n_moves` of its `n_named` items say by a verb that they move.
+    """
+
+    form: str
+    above: list[str]
+    first_line: int
+    last_line: int
+    numbers: list[int] = field(default_factory=list)
+    own: list[int] = field(default_factory=list)
+    n_named: int = 0
+    n_moves: int = 0
+    label: str = ""
+    ends_named: bool = True
+
+    @property
+    def is_firm(self) -> bool:
+        """Whether its form says that it is a plan: steps, moves, JSON, a table with steps."""
+        return self.form in ("steps", "json", "table") or 2 * self.n_moves >= self.n_named
+
+
+_STEP_WORD = r"(?:step|schritt|paso|étape|etape|passo|шаг|stap|krok|adım|步骤|步驟|ステップ|단계|第(?=\s?\d))"
+_INLINE_STEP = re.compile(
+    rf"(?<=[{{,;.])[ \t]{{0,4}}(?=[\"'*]{{0,3}}{_STEP_WORD}[\s_#]{{0,3}}\d{{1,3}}[\"'*]{{0,3}}\s?[:.)=\-\u2013\u2014])"
+    rf"|(?<=[{{,;])[ \t]{{0,4}}(?=[\"'][^\"'\n:]{{1,40}}:?[ _-]step[\s_#]{{0,3}}\d{{1,3}}[\"'])"
+    rf"|(?<=\S)[ \t](?=\d{{1,2}}[.)] (?:\*\*)?(?:{VERB}))",
+    re.IGNORECASE,
+)
+_STEP = re.compile(
+    rf"[\s>+\-#({{|\[\d.)•·]{{0,16}}(?:[^\n:.]{{0,40}}?[ :_-]{{1,2}})??{_STEP_WORD}[\s_#]{{0,3}}(?P<number>\d{{1,3}})(?!\d)\s?步?"
+    r"(?: ?(?:&|and|to|-|\u2013) ?(?P<last>\d{1,3})(?![\w.]))?"
+    r"\s{0,3}(?:\([^()\n]{0,60}\)\s?)?(?P<sign>[:.)=\-\u2013\u2014、,\]}>]|(?=\s)|\Z)",
+    re.IGNORECASE,
+)
+_NUMBERED = re.compile(r"[\s>+\-#({|•·]{0,8}(?P<number>\d{1,3})\s?(?:[.):、](?!\d)|\)\.?)\s{0,4}(?=\D|\d)")
+_MARKED = re.compile(r"\s{0,40}(?:[-+•·▪–]|>)\s{1,4}(?=\S)|\s{0,40}[a-h][.)]\s")
+_STARTS_MOVING = re.compile(rf"[\s>\[{{(]{{0,12}}(?:(?:first|then|next|finally|now|please|und|dann|zuerst),?\s)?(?:robot\.)?(?:{VERB})", re.I)
+_NAMES_FIRST = re.compile(r"\s{0,20}(?:(?:the )?block |with |the )?(?:index|block|candidate|积木|#)\W{0,4}\d", re.I)
+_LABELED = re.compile(
+    r"\s{0,20}[-#>]{0,4}\s{0,3}(?:\d{1,2}[.)]\s)?(?P<label>[^:=：\[\n]{1,80}?)\s{0,3}(?:[:=：]|\b(?:is|are|would be|ist|lautet|est|es)\b:?|是|为)\s{0,3}"
+    r"(?P<value>[\s(\[{<#]{0,4}(?:(?:blocks?|index|indices|积木)\s)?\d[^\n]{0,400})",
+    re.IGNORECASE,
+)
+_ARRAY = re.compile(r"\[\s{0,9}(?:[\"']?\d{1,6}[\"']?\s{0,9},\s{0,9}){1,63}[\"']?\d{1,6}[\"']?\s{0,9}\]")
+_FENCE = re.compile(r"\s{0,20}(?:[>*+-]\s{1,4})?(?:`{3,}|~{3,})|\s{0,20}(?:json|plaintext|text)\s*\Z")
+_LAYER = re.compile(r"layer|level|step|stage|phase|part|ebene|schicht|层|structure|base|bottom|middle|top|then|next", re.I)
+_ABOVE = 12
+
+
+def listings(text: str) -> tuple[list[Listing], list[str]]:
+    """The lists of a text in order, and the lines that stand below the last one."""
+    text = _INLINE_STEP.sub("\n", text)
+    reader = _Reader()
+    forms = sorted(_apart(text), key=lambda found: found.start)
+    starts = [found.start for found in forms]
+    at = 0
+    for number, line in enumerate(text.splitlines(keepends=True)):
+        here = bisect_left(starts, at + len(line))
+        inside = next((f for f in forms[max(0, here - 1) : here] if f.end > at), None)
+        if inside is None:
+            reader.read(number, line)
+        else:
+            if at <= inside.start:
+                reader.read(number, line[: inside.start - at])
+                reader.take(number, inside)
+            if inside.end < at + len(line):
+                reader.read(number, line[inside.end - at :])
+        at += len(line)
+    return reader.done, reader.above
+
+
+def _apart(text: str) -> list[Found]:
+    """JSON and tables of a text; JSON of a few words within a line is left to the line."""
+    tables = find_tables(text)
+    values = [f for f in find_json(text) if not any(t.start < f.end and f.start < t.end for t in tables)]
+    return tables + values
+
+
+class _Reader:
+    """Reads lines one by one into lists."""
+
+    def __init__(self) -> None:
+        self.done: list[Listing] = []
+        self.above: list[str] = []
+        self._steps: Listing | None = None
+        self._numbered: Listing | None = None
+        self._open: Listing | None = None
+        self._times = 1
+
+    def take(self, number: int, found: Found) -> None:
+        """Add a list of a form of its own."""
+        listing = self._new(found.form, number)
+        listing.numbers, listing.n_named = list(found.numbers), len(found.numbers)
+        listing.n_moves = listing.n_named
+        self._steps = self._numbered = self._open = None
+
+    def read(self, number: int, raw: str) -> None:
+        """Add a line: an item of a list, what belongs to an item, or what stands between lists."""
+        line = plain_line(raw).rstrip()
+        if _FENCE.match(raw) or not line.strip(" \t[]{}()|,.:;#-=~"):
+            return
+        for pattern, name in ((_STEP, "_steps"), (_NUMBERED, "_numbered")):
+            head = pattern.match(line)
+            if head is not None and self._item(number, line, head, name):
+                return
+        if not self._other(number, line):
+            self.above = [*self.above[-_ABOVE:], line.strip()]
+            if not _MARKED.match(line):
+                self._open = None
+
+    def _item(self, at: int, line: str, head: re.Match[str], name: str) -> bool:
+        """Take a numbered item; False for a line whose number means something else."""
+        n = int(head["number"])
+        last = int(head.groupdict().get("last") or n)
+        body = line[head.end() :].replace("{", " ").replace("}", " ")
+        if name == "_steps" and not head["sign"] and body.strip() and not _is_move(body):
+            return False
+        current: Listing | None = getattr(self, name)
+        if current is None or not 0 < n - (current.own[-1] if current.own else 0) <= 3:
+            if n > 1 and not (name == "_steps" and _is_move(body)):
+                return False
+            current = self._new("steps" if name == "_steps" else "numbered", at)
+            setattr(self, name, current)
+            if name == "_steps":
+                self._numbered = None
+        current.own += range(n, last + 1) if 0 <= last - n < MOST_AT_ONCE else [n]
+        self._open, self._times = current, max(1, last - n + 1)
+        named = self._add(current, at, body, is_item=True)
+        if not named:
+            self.above = [*self.above[-_ABOVE:], line.strip()]
+        return True
+
+    def _other(self, at: int, line: str) -> bool:
+        """Take a line without a number of its own; False where it names nothing that counts."""
+        marked = _MARKED.match(line)
+        body = line[marked.end() :] if marked else line
+        if self._open is not None and not self._open.ends_named or self._is_nested(at, marked):
+            statement = read_statement(body.replace("{", " ").replace("}", " "), is_item=False)
+            assert self._open is not None
+            if statement.has_verb or (self._open.form == "steps" and _NAMES_FIRST.match(body) and statement.numbers):
+                return self._add(self._open, at, body, is_item=False, is_nested=True)
+        if self._take_labeled(at, line):
+            return True
+        statement = read_statement(body, is_item=marked is not None)
+        listed, by_arrows = chain(body)
+        if listed and (len(listed) > 1 or not marked):
+            listing = self._new("chain" if by_arrows or len(listed) > 1 else "numbers", at)
+            listing.numbers, listing.n_named, listing.n_moves = list(listed), 2, 1 if by_arrows else 0
+            self._open = None
+            return True
+        if not statement.numbers:
+            return False
+        if marked is None and not statement.has_verb:
+            return False
+        form = "marked" if marked or _STARTS_MOVING.match(line) else "sentences"
+        return self._extend(form, at, body, is_item=marked is not None)
+
+    def _is_nested(self, at: int, marked: re.Match[str] | None) -> bool:
+        """Whether a marked line goes on with those that an item without a block of its own has."""
+        return marked is not None and self._open is not None and self._nested_at == (id(self._open), at - 1)
+
+    _nested_at: tuple[int, int] = (0, 0)
+
+    def _extend(self, form: str, at: int, body: str, *, is_item: bool) -> bool:
+        """Go on with the list above, where it has this form and nothing stands between."""
+        last = self.done[-1] if self.done else None
+        if last is None or last.form != form or (self.above and form == "marked"):
+            last = self._new(form, at)
+        if form == "marked":
+            self._open = None
+        return self._add(last, at, body, is_item=is_item)
+
+    def _take_labeled(self, at: int, line: str) -> bool:
+        """Numbers with a label before them ("Order: 3, 5, 12"), or an array somewhere in a line."""
+        labeled = _LABELED.match(line)
+        value = labeled["value"].rstrip(" .}") if labeled else ""
+        listed, _ = chain(value)
+        if not listed and labeled and not read_statement(line, is_item=False).has_verb:
+            listed = read_statement(value, is_item=True).numbers if len(labeled["label"]) < 30 else ()
+        if not listed:
+            arrays = list(_ARRAY.finditer(line))
+            if not arrays:
+                return False
+            listed, label = chain(arrays[-1][0])[0], line[: arrays[-1].start()]
+        else:
+            label = labeled["label"] if labeled else ""
+        last = self.done[-1] if self.done else None
+        self._open = None
+        if last is not None and last.form == "labeled" and not self.above and _LAYER.search(label):
+            last.numbers += listed
+            last.last_line = at
+            return True
+        listing = self._new("labeled", at)
+        listing.numbers, listing.label, listing.n_named = list(listed), label, 2
+        return True
+
+    def _add(self, to: Listing, at: int, body: str, *, is_item: bool, is_nested: bool = False) -> bool:
+        statement = read_statement(body, is_item=is_item)
+        listed = statement.numbers or (chain(body)[0] if is_item else ())
+        to.last_line = at
+        to.ends_named = bool(listed)
+        if not listed:
+            return False
+        to.numbers += list(listed) * (self._times if len(listed) == 1 and is_item else 1)
+        to.n_named += 1
+        to.n_moves += statement.has_verb
+        if is_nested:
+            self._nested_at = (id(to), at)
+        self.above = []
+        return True
+
+    def _new(self, form: str, at: int) -> Listing:
+        listing = Listing(form, self.above, at, at)
+        self.above = []
+        self.done.append(listing)
+        return listing
+
+
+def _is_move(body: str) -> bool:
+    return bool(read_statement(body, is_item=False).numbers)
