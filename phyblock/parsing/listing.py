@@ -20,7 +20,8 @@ __all__ = ["Listing", "listings"]
 class Listing:
     """One list: its form, the blocks that it names in order, and where it stands.
 
-    `above` are the lines between it and the list before it that name nothing; `own` are the
+    `above` are the lines between it and the list before it that name nothing, `heading` the last of
+    them or, where nothing stands between, that of the list before; `own` are the
     numbers that its items bear; `n_moves` of its `n_named` items say by a verb that they move.
     """
 
@@ -33,6 +34,7 @@ class Listing:
     n_named: int = 0
     n_moves: int = 0
     label: str = ""
+    heading: str = ""
     ends_named: bool = True
 
     @property
@@ -43,7 +45,7 @@ class Listing:
 
 _STEP_WORD = r"(?:step|schritt|paso|étape|etape|passo|шаг|stap|krok|adım|步骤|步驟|ステップ|단계|第(?=\s?\d))"
 _INLINE_STEP = re.compile(
-    rf"(?<=[{{,;.])[ \t]{{0,4}}(?=[\"'*]{{0,3}}{_STEP_WORD}[\s_#]{{0,3}}\d{{1,3}}[\"'*]{{0,3}}\s?[:.)=\-\u2013\u2014])"
+    rf"(?:(?<=[{{,;])|(?<=[^\d\s]\.)|(?<=[\w)\]] \d\.)|(?<=[\w)\]] \d\d\.))[ \t]{{0,4}}(?=[\"'*]{{0,3}}{_STEP_WORD}[\s_#]{{0,3}}\d{{1,3}}[\"'*]{{0,3}}\s?[:.)=\-\u2013\u2014])"
     rf"|(?<=[{{,;])[ \t]{{0,4}}(?=[\"'][^\"'\n:]{{1,40}}:?[ _-]step[\s_#]{{0,3}}\d{{1,3}}[\"'])"
     rf"|(?<=\S)[ \t](?=\d{{1,2}}[.)] (?:\*\*)?(?:{VERB}))",
     re.IGNORECASE,
@@ -66,6 +68,7 @@ _LABELED = re.compile(
 _ARRAY = re.compile(r"\[\s{0,9}(?:[\"']?\d{1,6}[\"']?\s{0,9},\s{0,9}){1,63}[\"']?\d{1,6}[\"']?\s{0,9}\]")
 _FENCE = re.compile(r"\s{0,20}(?:[>*+-]\s{1,4})?(?:`{3,}|~{3,})|\s{0,20}(?:json|plaintext|text)\s*\Z")
 _LAYER = re.compile(r"layer|level|step|stage|phase|part|ebene|schicht|层|structure|base|bottom|middle|top|then|next", re.I)
+_SENTENCE_END = re.compile(r"(?<=[\d)\]])[.;]\s{1,4}(?=\S)")
 _ABOVE = 12
 
 
@@ -195,7 +198,10 @@ class _Reader:
     def _take_labeled(self, at: int, line: str) -> bool:
         """Numbers with a label before them ("Order: 3, 5, 12"), or an array somewhere in a line."""
         labeled = _LABELED.match(line)
-        value = labeled["value"].rstrip(" .}") if labeled else ""
+        if labeled and labeled["label"].count("(") > labeled["label"].count(")"):
+            labeled = None
+        value, _, rest = _SENTENCE_END.sub("\n", labeled["value"], count=1).partition("\n") if labeled else ("", "", "")
+        value = value.rstrip(" .}")
         listed, _ = chain(value)
         if not listed and labeled and not read_statement(line, is_item=False).has_verb:
             listed = read_statement(value, is_item=True).numbers if len(labeled["label"]) < 30 else ()
@@ -211,9 +217,10 @@ class _Reader:
         if last is not None and last.form == "labeled" and not self.above and _LAYER.search(label):
             last.numbers += listed
             last.last_line = at
-            return True
-        listing = self._new("labeled", at)
-        listing.numbers, listing.label, listing.n_named = list(listed), label, 2
+        else:
+            last = self._new("labeled", at)
+            last.numbers, last.label, last.n_named = list(listed), label, 2
+        self.above = [rest] if rest else []
         return True
 
     def _add(self, to: Listing, at: int, body: str, *, is_item: bool, is_nested: bool = False) -> bool:
@@ -233,6 +240,11 @@ class _Reader:
 
     def _new(self, form: str, at: int) -> Listing:
         listing = Listing(form, self.above, at, at)
+        last = self.done[-1] if self.done else None
+        if self.above:
+            listing.heading = self.above[-1]
+        elif last is not None and at - last.last_line <= 1:
+            listing.heading = last.heading
         self.above = []
         self.done.append(listing)
         return listing

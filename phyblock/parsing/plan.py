@@ -169,12 +169,13 @@ def _choose(answer: str) -> _Read:
     if _REFUSAL.search(answer) and (best == _LAST or _is_declined(answer, named)):
         return "refusal"
     plans = _plans(named, ranks, best, found)
-    if not plans:
-        return "no_plan"
     plans[-1].below = below
-    plan = _chosen(plans, answer, _is_cut_off(answer, found, below))
+    plan = _chosen(plans, answer)
     if plan is None:
         return "two_plans"
+    if plan is plans[-1] and _is_cut_off(answer, found, below):
+        firm = plans if len(plans) > 1 else [*_plans(named, ranks, _MOVES, found), plan]
+        plan = firm[-2] if len(firm) > 1 else plan
     numbers = plan.numbers
     form = plan.lists[-1].form
     return form, numbers[::-1] if _is_reversed(plan, form) else numbers
@@ -182,7 +183,7 @@ def _choose(answer: str) -> _Read:
 
 def _rank(listing: Listing) -> int:
     """How surely a list is a plan, by its form, its label and the heading above it; 0 is not at all."""
-    heading = listing.above[-1] if listing.above else ""
+    heading = listing.heading
     if _EXAMPLE.search(" ".join(listing.above[-2:])[-200:]) or listing.form == "numbers":
         return _NO
     is_catalogue = _names_catalogue(heading)
@@ -212,7 +213,7 @@ def _rank_of_label(listing: Listing, heading: str, *, is_catalogue: bool) -> int
         return _NO
     if _FINAL_LABEL.search(label):
         return _ASKED if many or re.search("answer|final|plan", label, re.IGNORECASE) else _NO
-    if _PLAN_WORD.search(label) or (_PLAN_WORD.search(heading) and not is_catalogue):
+    if _PLAN_WORD.search(label) or _DOWNWARD.search(label) or (_PLAN_WORD.search(heading) and not is_catalogue):
         return _MARKED if many else _NO
     return _LAST if many and not is_catalogue and not re.search("block|index|indices", label, re.IGNORECASE) and len(label) < 20 else _NO
 
@@ -264,8 +265,8 @@ def _relation(passed: list[str], plans: list[_Plan], listing: Listing) -> str:
     return "skip" if plans[-1].explained else "part"
 
 
-def _chosen(plans: list[_Plan], answer: str, is_cut: bool) -> _Plan | None:
-    """The last plan, the last complete one where it is cut off, or the one that is said to be meant."""
+def _chosen(plans: list[_Plan], answer: str) -> _Plan | None:
+    """The last plan, or of several options the one that is said to be meant."""
     last = plans[-1]
     options = [plan for plan in plans if plan.option]
     if options and last.option:
@@ -274,8 +275,6 @@ def _chosen(plans: list[_Plan], answer: str, is_cut: bool) -> _Plan | None:
         chosen = [match["a"] or match["b"] for match in _CHOICE.finditer(answer)]
         named = [plan for plan in plans if chosen and plan.option == chosen[-1].lower()]
         return named[-1] if named else (last if len(plans) == 1 else None)
-    if is_cut and len(plans) > 1:
-        return plans[-2]
     return last
 
 

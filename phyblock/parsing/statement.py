@@ -173,7 +173,7 @@ def _moved(piece: str) -> list[int]:
         before = piece[max(0, start - 120) : start]
         if _NEGATED.search(before) or (not is_call and _SUPPORT.search(before)):
             continue
-        if last is not None:
+        if last is not None and not (mention["call"] and last["call"]):
             between = piece[last.end() : start]
             times = _TIMES.match(piece, last.end())
             between = piece[times.end() : start] if times and times.end() <= start else between
