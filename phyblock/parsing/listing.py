@@ -43,7 +43,7 @@ class Listing:
         return self.form in ("steps", "json", "table") or 2 * self.n_moves >= self.n_named
 
 
-_STEP_WORD = r"(?:step|schritt|paso|étape|etape|passo|шаг|stap|krok|adım|步骤|步驟|ステップ|단계|第(?=\s?\d))"
+_STEP_WORD = r"(?:steps?|schritte?|pasos?|étapes?|etape|passo|шаг|stap|krok|adım|步骤|步驟|ステップ|단계|第(?=\s?\d))"
 _INLINE_STEP = re.compile(
     rf"(?:(?<=[{{,;])|(?<=[^\d\s]\.)|(?<=[\w)\]] \d\.)|(?<=[\w)\]] \d\d\.))[ \t]{{0,4}}(?=[\"'*]{{0,3}}{_STEP_WORD}[\s_#]{{0,3}}\d{{1,3}}[\"'*]{{0,3}}\s?[:.)=\-\u2013\u2014])"
     rf"|(?<=[{{,;])[ \t]{{0,4}}(?=[\"'][^\"'\n:]{{1,40}}:?[ _-]step[\s_#]{{0,3}}\d{{1,3}}[\"'])"
@@ -66,6 +66,8 @@ _LABELED = re.compile(
     re.IGNORECASE,
 )
 _ARRAY = re.compile(r"\[\s{0,9}(?:[\"']?\d{1,6}[\"']?\s{0,9},\s{0,9}){1,63}[\"']?\d{1,6}[\"']?\s{0,9}\]")
+_TAG = re.compile(r"</?[a-z_]{1,20}(?:\s[^<>\n]{0,80})?>", re.IGNORECASE)
+_NOUN_LABEL = re.compile(r"[-\s]{0,4}(?:block|index|id|candidate|piece|number)(?: (?:index|id|number))?\s*", re.I)
 _FENCE = re.compile(r"\s{0,20}(?:[>*+-]\s{1,4})?(?:`{3,}|~{3,})|\s{0,20}(?:json|plaintext|text)\s*\Z")
 _LAYER = re.compile(r"layer|level|step|stage|phase|part|ebene|schicht|层|structure|base|bottom|middle|top|then|next", re.I)
 _SENTENCE_END = re.compile(r"(?<=[\d)\]])[.;]\s{1,4}(?=\S)")
@@ -74,7 +76,7 @@ _ABOVE = 12
 
 def listings(text: str) -> tuple[list[Listing], list[str]]:
     """The lists of a text in order, and the lines that stand below the last one."""
-    text = _INLINE_STEP.sub("\n", text)
+    text = _INLINE_STEP.sub("\n", _TAG.sub("\n", text))
     reader = _Reader()
     forms = sorted(_apart(text), key=lambda found: found.start)
     starts = [found.start for found in forms]
@@ -164,11 +166,17 @@ class _Reader:
             assert self._open is not None
             if statement.has_verb or (self._open.form == "steps" and _NAMES_FIRST.match(body) and statement.numbers):
                 return self._add(self._open, at, body, is_item=False, is_nested=True)
+        if self._is_detail(at, line, body, is_marked=marked is not None):
+            return True
         if self._take_labeled(at, line):
             return True
         statement = read_statement(body, is_item=marked is not None)
         listed, by_arrows = chain(body)
         if listed and (len(listed) > 1 or not marked):
+            if self.done and self.done[-1].form == "numbers" and len(listed) == 1 and not self.above:
+                self.done[-1].numbers += listed
+                self.done[-1].last_line = at
+                return True
             listing = self._new("chain" if by_arrows or len(listed) > 1 else "numbers", at)
             listing.numbers, listing.n_named, listing.n_moves = list(listed), 2, 1 if by_arrows else 0
             self._open = None
@@ -184,6 +192,17 @@ class _Reader:
         """Whether a marked line goes on with those that an item without a block of its own has."""
         return marked is not None and self._open is not None and self._nested_at == (id(self._open), at - 1)
 
+    def _is_detail(self, at: int, line: str, body: str, *, is_marked: bool) -> bool:
+        """Whether a marked line says more of the item above it, which names its block."""
+        item = self._open
+        if not is_marked or item is None or not item.ends_named or at - 1 not in (item.last_line, self._detail_at):
+            return False
+        if not line[:1].isspace() and read_statement(body, is_item=False).has_verb:
+            return False
+        self._detail_at = at
+        return True
+
+    _detail_at = -1
     _nested_at: tuple[int, int] = (0, 0)
 
     def _extend(self, form: str, at: int, body: str, *, is_item: bool) -> bool:
@@ -198,7 +217,9 @@ class _Reader:
     def _take_labeled(self, at: int, line: str) -> bool:
         """Numbers with a label before them ("Order: 3, 5, 12"), or an array somewhere in a line."""
         labeled = _LABELED.match(line)
-        if labeled and labeled["label"].count("(") > labeled["label"].count(")"):
+        if labeled and (
+            labeled["label"].count("(") > labeled["label"].count(")") or _NOUN_LABEL.fullmatch(labeled["label"])
+        ):
             labeled = None
         value, _, rest = _SENTENCE_END.sub("\n", labeled["value"], count=1).partition("\n") if labeled else ("", "", "")
         value = value.rstrip(" .}")
@@ -217,10 +238,12 @@ class _Reader:
         if last is not None and last.form == "labeled" and not self.above and _LAYER.search(label):
             last.numbers += listed
             last.last_line = at
+            last.label = f"{last.label}, {label}"
         else:
             last = self._new("labeled", at)
             last.numbers, last.label, last.n_named = list(listed), label, 2
-        self.above = [rest] if rest else []
+        if rest:
+            self.read(at, rest)
         return True
 
     def _add(self, to: Listing, at: int, body: str, *, is_item: bool, is_nested: bool = False) -> bool:

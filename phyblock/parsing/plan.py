@@ -102,7 +102,7 @@ class _Plan:
 _PLAN_WORD = re.compile(
     r"order|sequence|plan\b|assembl|build|\bsteps?\b|instruction|answer|solution|\bmoves?\b|placement|construct|result"
     r"|reihenfolge|anleitung|antwort|schritt|aufbau|ordre|étapes|réponse|orden|pasos|respuesta|secuencia|ordine"
-    r"|порядок|план|ответ|顺序|步骤|答案|计划|方案|顺|序列|手順|順序|순서",
+    r"|bottom[- ](?:to|up)|from the (?:bottom|ground)|von unten|从下到上|порядок|план|ответ|顺序|步骤|答案|计划|方案|顺|序列|手順|順序|순서",
     re.IGNORECASE,
 )
 _CATALOGUE_WORD = re.compile(
@@ -114,8 +114,11 @@ _CATALOGUE_WORD = re.compile(
 _FINAL_LABEL = re.compile(
     r"(?:final|answer|plan|order|sequence|antwort|reihenfolge|respuesta|réponse|ответ|答案|顺序|步骤)\W*\Z", re.IGNORECASE
 )
-_EXAMPLE = re.compile(r"\bexample\b|\be\.g\.|for instance|\bsample (?:output|answer|plan)|beispiel|\bejemplo|\bexemple|例如|示例|例:", re.IGNORECASE)
-_EXPLANATION = re.compile(r"expla(?:in|nation)|rationale|reasoning|justif|erklärung|begründung|解释|说明", re.IGNORECASE)
+_EXAMPLE = re.compile(
+    r"(?:\bexample\b|\be\.g\.|for instance|\bsample (?:output|answer|plan)|beispiel|\bejemplo|\bexemple|例如|示例|例)[^.!?。]{0,40}\Z",
+    re.IGNORECASE,
+)
+_EXPLANATION = re.compile(r"expla(?:in|nation)|rationale|reasoning|justif|verif|\bcheck|validat|\bwhy\b|\bnotes?\b|remark|stability|überprüf|验证|检查|erklärung|begründung|解释|说明", re.IGNORECASE)
 _OPTION = re.compile(
     r"\b(?P<kind>plan|option|alternative|variant|variante|solution|approach|version|possibility|candidate plan|lösung|方案)"
     r"\s{0,2}#?(?P<name>[A-D]|[1-4]|one|two|three|I{1,3})\b",
@@ -152,7 +155,7 @@ _REVERSED = re.compile(
     r"|umgekehrte?r? reihenfolge|rückwärts|von hinten|倒序|逆序|反过来|相反的?顺序|ordre inverse|orden inverso",
     re.IGNORECASE,
 )
-_NOT_REVERSED = re.compile(r"\b(?:not|never|don't|do not|isn't|no need)\b[^.\n]{0,30}revers", re.IGNORECASE)
+_NOT_REVERSED = re.compile(r"\b(?:not|never|don't|do not|isn't|no need|take (?:it|them) apart|dis\w+|undo|remov\w+)\b[^.\n]{0,40}revers", re.IGNORECASE)
 _DOWNWARD = re.compile(r"top[- ](?:to|down)[- ]?(?:bottom)?\b|von oben nach unten|从上到下|de haut en bas|de arriba (?:a|hacia) abajo", re.IGNORECASE)
 
 
@@ -183,9 +186,12 @@ def _choose(answer: str) -> _Read:
 
 def _rank(listing: Listing) -> int:
     """How surely a list is a plan, by its form, its label and the heading above it; 0 is not at all."""
-    heading = listing.heading
-    if _EXAMPLE.search(" ".join(listing.above[-2:])[-200:]) or listing.form == "numbers":
+    heading = "" if listing.heading.endswith((".", "。")) else listing.heading
+    if listing.above and _EXAMPLE.search(listing.above[-1]):
         return _NO
+    if listing.form == "numbers":
+        is_list = len(listing.numbers) > 1 and (not heading or _PLAN_WORD.search(heading))
+        return _LAST if is_list else _NO
     is_catalogue = _names_catalogue(heading)
     if listing.form == "labeled":
         return _rank_of_label(listing, heading, is_catalogue=is_catalogue)
@@ -209,8 +215,8 @@ _NO, _LAST, _MARKED, _MOVES, _ASKED = range(5)
 def _rank_of_label(listing: Listing, heading: str, *, is_catalogue: bool) -> int:
     """The rank of numbers that stand behind a label."""
     label, many = listing.label, len(listing.numbers) > 1
-    if _names_catalogue(label):
-        return _NO
+    if _names_catalogue(label) or re.match(r"\W*(?:the )?(?:top|upper|roof)\b.*(?:bottom|base|ground|lower)\b(?! to)", label, re.I):
+        return _DOWNWARD.search(label) is not None and _MARKED or _NO
     if _FINAL_LABEL.search(label):
         return _ASKED if many or re.search("answer|final|plan", label, re.IGNORECASE) else _NO
     if _PLAN_WORD.search(label) or _DOWNWARD.search(label) or (_PLAN_WORD.search(heading) and not is_catalogue):
@@ -234,7 +240,7 @@ def _plans(named: list[Listing], ranks: list[int], best: int, found: list[Listin
             continue
         relation = _relation(passed, plans, listing)
         title = " ".join(passed[-2:])
-        option = _OPTION.search(title)
+        option = _OPTION.search(f"{title} {listing.label}")
         if relation == "part":
             plans[-1].lists.append(listing)
         elif relation == "explanation":
@@ -248,13 +254,15 @@ def _plans(named: list[Listing], ranks: list[int], best: int, found: list[Listin
 
 def _relation(passed: list[str], plans: list[_Plan], listing: Listing) -> str:
     """What a list is to the plan before it, by the lines between them."""
-    lines = [line for line in passed if line]
+    lines = [line for line in passed if line] or ([listing.label] if listing.form == "labeled" else [])
     title = lines[0].strip() if len(lines) == 1 else ""
     if not plans:
         return "other"
     if any(_OPTION.search(line) or _OR_ELSE.match(line) for line in lines[-2:]):
         return "option"
     before = plans[-1].lists[-1]
+    if listing.form == "labeled" and not any(passed):
+        return "other"
     if len(lines) > 1 or len(title) > _HEADING_CHARS or _REVISION.search(title) or "" in passed:
         return "explanation" if any(_EXPLANATION.search(line) for line in lines[:1]) else "other"
     if _EXPLANATION.search(title):
@@ -298,7 +306,6 @@ def _is_declined(answer: str, named: list[Listing]) -> bool:
 def _is_reversed(plan: _Plan, form: str) -> bool:
     """Whether the reply says that its list is to be built from its end."""
     said = [plan.title, *plan.lists[-1].above[-3:], plan.lists[-1].label, *plan.below[:4]]
-    near = " \n ".join(said)
-    if _REVERSED.search(near) and not _NOT_REVERSED.search(near):
+    if any(_REVERSED.search(line) and not _NOT_REVERSED.search(line) for line in said):
         return True
     return form in ("labeled", "chain", "marked") and bool(_DOWNWARD.search(" ".join(said[:-4] or said)))

@@ -44,7 +44,7 @@ _WORD_NUMBER = (
     r"|cinq|sept|huit|neuf|dix|uno|dos|tres|cuatro|cinco|seis|siete|ocho|nueve|diez|десять|один|два"
     r"|три|четыре|пять|шесть|семь|восемь|девять)(?!\w)|[一二三四五六七八九十]{1,2}(?![号號番\w])"
 )
-_UNIT = r"(?!\s?(?:x\b|×|times?\b|mal\b|fois|veces|cm|mm|m\b|°|degrees?\b|%|次|个|more\b))"
+_UNIT = r"(?!\s?(?:[x×]\s|times?\b|mal\b|fois|veces|cm|mm|m\b|°|degrees?\b|%|次|个|more\b))"
 _DIGITS = rf"\d{{1,6}}(?!\d|\.\d){_UNIT}"
 _TO = r"\s{0,2}(?:-|\u2013|\u2014|~|\bto\b|\bthrough\b|\bthru\b|\bbis\b|至|到)\s{0,2}"
 _OR = r"\s{0,3},?\s{0,3}(?:\bor\b|\boder\b|\bou\b|/|或者?)\s{0,3}"
@@ -62,7 +62,7 @@ _MENTION = re.compile(
     rf"(?P<called>\d{{1,6}})(?=\s{{0,3}}[,)\]])"
     rf"|(?P<verb>{VERB}\s(?:the\s)?#?)(?P<moved>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})"
     rf"(?=\s{{0,3}}(?:\Z|[.,;:()\u2014\u2013]|(?:on|onto|to|at|next|and|then|in|beside|over|above|auf)\b))"
-    r"|(?:(?<=\()#?|(?<!\w)#)(?P<bare>\d{1,6}(?:(?:, ?|\s?&\s?|/| or )\d{1,6}){0,8})(?=\)|(?!\d|\.\d))(?<!\w\d)"
+    r"|(?:(?<=\()#?|(?<!\w)#)(?P<bare>\d{1,6}(?:(?:, ?|\s?&\s?|/| or )\d{1,6}){0,8})(?=\)|(?!\d|\.\d))"
     r"|(?P<cjk>\d{1,6}(?:(?:、|,|和|-|至|到)\d{1,6}){0,20})(?=\s?(?:号|號|番))",
     re.IGNORECASE,
 )
@@ -98,15 +98,17 @@ _SUPPORT = re.compile(
 )
 _NEGATED = re.compile(
     rf"(?:\b(?:not|never|avoid|without|cannot|nicht|no|ne|не)\b|n't\b|不要?|别)\s{{0,2}}(?:\w{{1,12}}\s){{0,2}}{VERB}"
-    r"[^,;]{0,60}\Z",
+    r"[^,;]{0,60}\Z|\b(?:remov\w{1,3}|discard|ignor\w{1,3}|skip|exclud\w{1,3}|reject|leave out|avoid|omit|entfern\w{1,3}"
+    r"|unused|spare)\b[^,;]{0,60}\Z",
     re.IGNORECASE,
 )
 _PIECES = re.compile(r"(?<=[^\d\s])(?<!\b[Nn][or])[.](?=\s|\Z)|(?<=\d)[.](?=\s\D|\Z)|[;!?。；]|,(?=\s{0,2}[^\W\d]{0,12}\s?\bit\b)")
-_PIECE_VERB = re.compile(VERB, re.IGNORECASE)
+_PIECE_VERB = re.compile(rf"{VERB}|\b(?:then|dann|puis|ensuite|luego)\b|然后", re.IGNORECASE)
 _JOINS = re.compile(
-    rf"(?:[\s,)\]\-→>&+、，。]|\([^()\n]{{0,80}}\)|\b(?:and|then|und|dann|et|puis|y|luego|followed by|finally|also|next"
-    rf"|another|again|more|the|a|one|an|(?:red|blue|green|yellow|orange|purple|long|small|large|vertical|horizontal))\b"
-    rf"|然后|接着|和|再|{VERB}){{1,12}}\Z",
+    rf"(?:[\s,()\]\-→>&+、，。]|\([^()\n]{{0,80}}\)|\b(?:and|then|und|dann|et|puis|y|luego|followed by|finally|also|next"
+    rf"|another|again|more|the|a|one|an|(?:red|blue|green|yellow|orange|purple|long|small|large|vertical|horizontal"
+    r"|cube|arch|cylinder|cuboid|prism|triangle|roof|base|pillar|column|beam|bar|bridge|block|index|le|la|der|die|das))\b"
+    rf"|\b(?:by|first|last|finish(?:ing)?)\b|然后|接着|最后|和|再|{VERB}){{1,16}}\Z",
     re.IGNORECASE,
 )
 _AND_THEN = re.compile(rf"[,&+→>、，]|\b(?:and|then|und|dann|et|puis|y|luego|by|finally|also|next)\b|然后|和|{VERB}", re.I)

@@ -13,6 +13,8 @@ _THINKING = re.compile(
     r"|(?P<opens><(?:think(?:ing)?|thought|reasoning)>|\[THINK\]|◁think▷)",
     re.IGNORECASE,
 )
+_NEXT_TURN = re.compile(r"</s>|<\|(?:im_end|endoftext|eot_id|end|user)\|>|<end_of_turn>|<｜end▁of▁sentence｜>")
+"""What a server should have stopped at: behind it a model plays the next turn."""
 _STRUCK_OUT = re.compile(r"~~[^~\n]{1,400}~~|<(?:del|s)>[^<>\n]{1,400}</(?:del|s)>|<!--.{0,4000}?-->")
 _QUOTES = re.compile(r"[*`\"\u201c\u201d\u00ab\u00bb\u201e]|(?<!\w)['\u2018\u2019]|['\u2018\u2019](?!\w)")
 _LATEX = re.compile(r"\\(?:text|textbf|mathrm|mathbf)\s{0,2}\{([^{}\n]{0,80})\}|\\(?:,|;|quad|[()\[\]])")
@@ -49,6 +51,9 @@ def answer_of(text: str) -> str | None:
         elif not is_thinking:
             opened, is_thinking = mark.start(), True
     answer = text[start:opened] if is_thinking else text[start:]
+    ends = _NEXT_TURN.search(answer)
+    if ends and answer[: ends.start()].strip():
+        answer = answer[: ends.start()]
     if not answer.strip():
         return None if start or is_thinking else ""
     return plain_forms(_STRUCK_OUT.sub(" ", answer))
