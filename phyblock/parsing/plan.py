@@ -155,6 +155,11 @@ _REVERSED = re.compile(
     r"|umgekehrte?r? reihenfolge|rückwärts|von hinten|倒序|逆序|反过来|相反的?顺序|ordre inverse|orden inverso",
     re.IGNORECASE,
 )
+_AGAIN = re.compile(
+    r"\brepeat (?:the |this |these )?(?:above |same |whole )?(?:assembly |building )?(?:order|steps|sequence|plan|instructions)\b"
+    r"[^.\n]{0,30}\b(?:for|to build) (?:the )?(?:second|other)\b",
+    re.IGNORECASE,
+)
 _NOT_REVERSED = re.compile(r"\b(?:not|never|don't|do not|isn't|no need|take (?:it|them) apart|dis\w+|undo|remov\w+)\b[^.\n]{0,40}revers", re.IGNORECASE)
 _DOWNWARD = re.compile(r"top[- ](?:to|down)[- ]?(?:bottom)?\b|von oben nach unten|从上到下|de haut en bas|de arriba (?:a|hacia) abajo", re.IGNORECASE)
 
@@ -179,8 +184,8 @@ def _choose(answer: str) -> _Read:
     if plan is plans[-1] and _is_cut_off(answer, found, below):
         firm = plans if len(plans) > 1 else [*_plans(named, ranks, _MOVES, found), plan]
         plan = firm[-2] if len(firm) > 1 else plan
-    numbers = plan.numbers
     form = plan.lists[-1].form
+    numbers = plan.numbers * (2 if any(map(_AGAIN.search, below)) else 1)
     return form, numbers[::-1] if _is_reversed(plan, form) else numbers
 
 

@@ -37,7 +37,11 @@ _NOUN = (
     r"|nummern?|no\.?|nr\.?|n°|ids?|блоки?|блока|кубик|индекс(?:ом)?|номер)(?![a-zа-я])"
     r"|积木|方块|木块|块|编号|索引|序号|ブロック|番号|블록|번호)"
 )
-_PLURAL = re.compile(r"(?:ices|[cdekx]s|es|blöcken?|steinen?|en|积木|方块|木块|块|blocchi|ы|и)\W*\Z", re.I)
+_PLURAL = re.compile(
+    r"\b(?:ind(?:ices|exes|izes)|blocks|cubes|arches|cylinders|pieces|bricks|candidates|numbers|ids|blöcken?|bausteinen?|steinen?"
+    r"|klötze|bloques|blocs|blocos|blocchi|piezas|peças|pièces|блоки)\b|积木|方块|木块|块",
+    re.IGNORECASE,
+)
 _WORD_NUMBER = (
     r"(?:one|two|three|four|five|six|seven|eight|nine|ten|eleven|twelve|thirteen|fourteen|fifteen"
     r"|sixteen|eins|zwei|drei|vier|fünf|sechs|sieben|acht|neun|zehn|elf|zwölf|un|deux|trois|quatre"
@@ -204,16 +208,15 @@ _SIGNED = re.compile(r"(?P<sign>[^\d]*)(?P<number>\d{1,6})")
 
 
 def _group(given: str, *, is_plural: bool) -> list[int]:
+    """The numbers of "1, 2 and 5", "1-4" or "5 or 6"; of one block "5/6" are alternatives, too."""
     numbers: list[int] = []
     parts = list(_SIGNED.finditer(given))
-    for i, part in enumerate(parts):
+    signs = [part["sign"].strip(" #,").lower() for part in parts]
+    if any(sign in _OR_SIGNS or (sign == "/" and not is_plural) for sign in signs[1:]):
+        return [int(parts[0]["number"])]
+    for part, sign in zip(parts, signs, strict=True):
         number = int(part["number"])
-        sign = part["sign"]
-        if i and re.fullmatch(rf"{_OR}#?", sign, re.IGNORECASE):
-            return numbers[:1] if i == 1 else numbers
-        if _alternative(parts, i):
-            return [*numbers, number][:1]
-        if i and re.fullmatch(rf"{_TO}#?", sign, re.IGNORECASE):
+        if numbers and sign in _TO_SIGNS:
             if not is_plural or not 0 < number - numbers[-1] < MOST_AT_ONCE:
                 return numbers
             numbers += range(numbers[-1] + 1, number + 1)
@@ -222,9 +225,8 @@ def _group(given: str, *, is_plural: bool) -> list[int]:
     return numbers
 
 
-def _alternative(parts: list[re.Match[str]], i: int) -> bool:
-    """Whether "or" stands before a later number: "1, 2, or 3" are alternatives from the first on."""
-    return i == 0 and any(re.fullmatch(rf"{_OR}#?", p["sign"], re.IGNORECASE) for p in parts[1:])
+_OR_SIGNS = {"or", "oder", "ou", "或", "或者"}
+_TO_SIGNS = {"-", "\u2013", "\u2014", "~", "to", "through", "thru", "bis", "至", "到"}
 
 
 def _times(text: str, mention: re.Match[str]) -> int:
