@@ -13,7 +13,7 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from phyblock.parsing.answer_order import OrderReader
 from phyblock.parsing.answer_patterns import (
@@ -21,6 +21,7 @@ from phyblock.parsing.answer_patterns import (
     BRANDED,
     CHOSEN,
     CONCLUDED,
+    CONDITIONAL,
     DANGLES,
     IS_REJECTED,
     IS_RIGHT,
@@ -29,14 +30,17 @@ from phyblock.parsing.answer_patterns import (
     LEADING,
     LINE,
     ORDER,
+    QUOTED,
     REJECTS,
     REVISED,
     SENTENCE,
     TAG,
+    TURNED,
     UNSURE,
+    VERDICT,
 )
 from phyblock.parsing.answer_value import CONTRADICTION, ChoiceReader
-from phyblock.parsing.text_forms import answer_of
+from phyblock.parsing.text_forms import BACKWARD, answer_of
 
 __all__ = ["ParsedAnswer", "parse_answer"]
 
@@ -56,7 +60,7 @@ class ParsedAnswer:
 
 def parse_answer(text: str, options: Sequence[str], is_ordering: bool) -> ParsedAnswer:
     """Read the answer out of a reply to a question that shows `options`, the first one as A."""
-    answer = (answer_of(text) or "").strip()
+    answer = QUOTED.sub(" ", answer_of(text) or "").strip()
     reader = OrderReader(len(options)) if is_ordering else ChoiceReader(options)
     for rule, find in _ORDER_RULES if is_ordering else _CHOICE_RULES:
         found = find(answer, reader)
@@ -109,7 +113,48 @@ def _stated(text: str, reader: Reader) -> str | None:
         stated += _statements(text, IS_RIGHT, reader.exact, 0)
     else:
         stated += _statements(text, ORDER, reader.read, 0)
-    return _settle(text, sorted(stated, key=lambda statement: statement.start))
+        stated = [_forward(text, statement) for statement in stated]
+    firm = [statement for statement in stated if not _is_conditional(text, statement)]
+    if stated and not firm:
+        return CONTRADICTION
+    return _turned(text, sorted(firm, key=lambda statement: statement.start), reader)
+
+
+def _is_conditional(text: str, stated: _Statement) -> bool:
+    """Whether a statement holds only under a condition, said before it or right behind it."""
+    start = max(0, stated.start - _SENTENCE_CHARS)
+    before = re.split(r"[.!?\n](?=\s|\Z)", text[start : stated.start])[-1]
+    after = re.split(r"[.!?\n]", text[stated.end : stated.end + _SENTENCE_CHARS], maxsplit=1)[0]
+    return bool(CONDITIONAL.search(before) or CONDITIONAL.search(after))
+
+
+def _forward(text: str, stated: _Statement) -> _Statement:
+    """An order from first to last, where its line says that it goes from last to first."""
+    line = text[max(text.rfind("\n", 0, stated.start) + 1, stated.end - _SENTENCE_CHARS) : stated.end]
+    return replace(stated, letters=stated.letters[::-1]) if BACKWARD.search(line) else stated
+
+
+def _turned(text: str, stated: Sequence[_Statement], reader: Reader) -> str | None:
+    """What statements come to, unless the text turns to another option behind the last of them."""
+    settled = _settle(text, stated)
+    turn = TURNED.search(text, stated[-1].end) if stated else None
+    if not settled or turn is None or turn["value"].upper() in ("", settled):
+        return settled
+    letter = turn["value"].upper()
+    is_firm = stated[-1].weight or not isinstance(reader, ChoiceReader) or letter not in reader.letters
+    return CONTRADICTION if is_firm else letter
+
+
+def _verdicts(text: str, reader: Reader) -> str | None:
+    """The one option that is called right where every option is called right or wrong."""
+    found = {match["letter"].upper(): bool(match["yes"]) for match in VERDICT.finditer(text)}
+    if not isinstance(reader, ChoiceReader) or len(found) < len(reader.letters) or len(found) < _MANY:
+        return None
+    right = [letter for letter, is_right in found.items() if is_right]
+    return right[0] if len(right) == 1 and right[0] in reader.letters else CONTRADICTION
+
+
+_MANY = 3
 
 
 def _statements(
@@ -151,6 +196,9 @@ def _leading(text: str, reader: Reader) -> str | None:
         return None
     if IS_REJECTED.match(text, head.end("letter")):
         return None
+    first = _first_line(text)
+    if CONDITIONAL.search(first) or first.count("%") > 1:
+        return CONTRADICTION
     found = reader.letter(_first_line(text))
     labels = {match["letter"] for match in LABEL.finditer(text)} & set(reader.letters)
     return found if found is None or labels <= {found} else None
@@ -158,7 +206,12 @@ def _leading(text: str, reader: Reader) -> str | None:
 
 def _concluded(text: str, reader: Reader) -> str | None:
     found = [reader.exact(match["value"]) for match in CONCLUDED.finditer(text)]
-    return found[-1] if found and not UNSURE.search(text) else None
+    return found[-1] if found and not _is_open(text) else None
+
+
+def _is_open(text: str) -> bool:
+    """Whether a reply says that it cannot tell, or only under conditions."""
+    return bool(UNSURE.search(text) or CONDITIONAL.search(text))
 
 
 def _only_one_named(text: str, reader: Reader) -> str | None:
@@ -166,7 +219,7 @@ def _only_one_named(text: str, reader: Reader) -> str | None:
 
     Unless that is to turn it down, or the reply was cut off before it came to the others.
     """
-    if UNSURE.search(text):
+    if _is_open(text):
         return None
     found = [(match, match["a"] or match["b"] or match["c"]) for match in BRANDED.finditer(text)]
     named = {letter for _, letter in found} & set(reader.letters)
@@ -192,7 +245,7 @@ def _sentence_of(text: str, match: re.Match[str]) -> str:
 
 def _only_text(text: str, reader: Reader) -> str | None:
     """The one option whose words a short reply, or the last line of a long one, holds."""
-    if not isinstance(reader, ChoiceReader) or UNSURE.search(text):
+    if not isinstance(reader, ChoiceReader) or _is_open(text):
         return None
     last = _last_line(text)
     if DANGLES.search(last):
@@ -207,7 +260,7 @@ def _only_text(text: str, reader: Reader) -> str | None:
 
 def _only_order(text: str, reader: Reader) -> str | None:
     """The one order in the text; listing the pictures as they were shown is none."""
-    if not isinstance(reader, OrderReader) or UNSURE.search(text):
+    if not isinstance(reader, OrderReader) or _is_open(text):
         return None
     for piece in (_last_line(text), text):
         named = set(reader.orders(piece)) - {reader.letters}
@@ -225,7 +278,9 @@ def _last_line(text: str) -> str:
 
 
 def _list(text: str, reader: Reader) -> str | None:
-    return reader.listed(text) if isinstance(reader, OrderReader) else None
+    if not isinstance(reader, OrderReader):
+        return None
+    return reader.listed(text) or reader.ranked(text)
 
 
 _Rule = tuple[str, Callable[[str, Reader], str | None]]
@@ -235,6 +290,7 @@ _STRICT: tuple[_Rule, ...] = (
     ("boxed", _marked(BOX)),
     ("json", _marked(JSON)),
     ("stated", _stated),
+    ("verdicts", _verdicts),
     ("outer_line", _outer_line),
 )
 _CHOICE_RULES: tuple[_Rule, ...] = (

@@ -9,6 +9,7 @@ __all__ = [
     "BRANDED",
     "CHOSEN",
     "CONCLUDED",
+    "CONDITIONAL",
     "DANGLES",
     "IS_REJECTED",
     "IS_RIGHT",
@@ -17,11 +18,14 @@ __all__ = [
     "LEADING",
     "LINE",
     "ORDER",
+    "QUOTED",
     "REJECTS",
     "REVISED",
     "SENTENCE",
     "TAG",
+    "TURNED",
     "UNSURE",
+    "VERDICT",
 ]
 
 _WORDS = (
@@ -48,7 +52,7 @@ SENTENCE = re.compile(
 )
 CHOSEN = re.compile(
     r"(?:\bI(?:['\u2019]ll|['\u2019]d| will| would| am going to)?"
-    r" (?:choose|pick|select|go with|answer)"
+    r" (?:choose|pick|select|prefer|go with|answer)"
     r"|\bmy (?:choice|pick|guess|selection) (?:is|would be)"
     r"|\b(?:correct|right|best) (?:option|choice|one|picture|image|letter|place|match)"
     r" (?:is|would be|must be|should be)"
@@ -71,6 +75,28 @@ CONCLUDED = re.compile(
     r"(?: must be| has to be| should be| is|['\u2019]s| leaves| matches| corresponds to)"
     r"(?: (?:the |with )?(?:option|picture|image|choice|place))?)[ *_`]{0,4}"
     r"(?P<value>\(?[A-Z]\)?)[*_`]{0,3}(?=[\s.!,;]{0,3}(?:\Z|\n|[.!;]))",
+)
+CONDITIONAL = re.compile(
+    r"\b(?:if|unless|provided|assuming|(?<=, )falls|wenn|otherwise|sonst|or else|depend(?:s|ing))\b(?! (?:I|we) (?:had|have|must)\b)"
+    r"|如果|否则|取决于",
+    re.IGNORECASE,
+)
+"""That an answer holds only under a condition."""
+QUOTED = re.compile(
+    rf"(?<=\w )[\"\u201c\u00ab](?:[^\"\u201d\u00bb\n]{{0,40}}?(?:{_WORDS})\s?[:：][^\"\u201d\u00bb\n]{{0,40}})[\"\u201d\u00bb]",
+    re.IGNORECASE,
+)
+"""An answer in quotation marks within a sentence: somebody else's words."""
+TURNED = re.compile(
+    r"(?:\b(?:but|however|actually|yet|aber|doch)\b|但是?|不过)[^\n]{0,100}?(?:\b(?:is|be|ist)\s|是)(?:option )?"
+    r"\(?(?P<value>[A-Z])\)?\s{0,2}(?=[.!;。]|\Z)",
+    re.IGNORECASE,
+)
+"""A turn away from the answer that was stated: "I would answer A, but the picture shows that it is D"."""
+VERDICT = re.compile(
+    r"(?:^|[.;,]\s|\n)[\s*\-_(\[]{0,6}(?:option )?(?P<letter>[A-Z])[*_)\]]{0,3}\s?[:.\-\u2013\u2014]?\s{0,3}"
+    r"(?:(?P<yes>✓|✔|✅|☑|(?:yes|correct|matches|fits|right|true)\b)|(?:✗|✘|❌|×|☒|(?:no|wrong|incorrect|false|does not|doesn't|not)\b))",
+    re.IGNORECASE,
 )
 TAG = re.compile(r"<(?:final_)?answer>\s{0,20}(?P<value>[^<>]{1,400})", re.IGNORECASE)
 BOX = re.compile(r"\\boxed\s{0,2}\{(?P<value>[^\n]{1,80}?)\}{1,3}(?=[^}]|\Z)")

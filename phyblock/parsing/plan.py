@@ -17,7 +17,7 @@ from typing import Literal, get_args
 
 from phyblock.domain import Plan
 from phyblock.parsing.listing import Listing, listings
-from phyblock.parsing.text_forms import answer_of
+from phyblock.parsing.text_forms import BACKWARD, answer_of
 from phyblock.words import PlanParser
 
 __all__ = ["PLAN_PROBLEMS", "ParsedPlan", "PlanProblem", "parse_plan"]
@@ -147,12 +147,6 @@ _REFUSAL = re.compile(
     r"\bI(?:['\u2019]m| am) (?:sorry|unable|not able|afraid)|\bI (?:cannot|can['\u2019]?t|could not|won['\u2019]t|am not able)"
     r"|\b(?:cannot|can['\u2019]t|not possible to|impossible to|unable to) (?:determine|give|provide|build|produce|see|view|make|create|identify|plan|be built)"
     r"|as an ai|no (?:valid )?plan\b|ich kann (?:das |die |den |leider )?(?:\w+ )?(?:nicht|kein)|leider|无法|抱歉|不能确定|lo siento|désolé|не могу",
-    re.IGNORECASE,
-)
-_REVERSED = re.compile(
-    r"\b(?:in |the )?revers(?:e|ed)(?: order)?\b|\bbackwards?\b|from (?:the )?last to (?:the )?first|bottom[- ]most last"
-    r"|last (?:step|block|one|item) first|read (?:it )?from (?:the )?(?:bottom|end|right)"
-    r"|umgekehrte?r? reihenfolge|rückwärts|von hinten|倒序|逆序|反过来|相反的?顺序|ordre inverse|orden inverso",
     re.IGNORECASE,
 )
 _AGAIN = re.compile(
@@ -311,6 +305,6 @@ def _is_declined(answer: str, named: list[Listing]) -> bool:
 def _is_reversed(plan: _Plan, form: str) -> bool:
     """Whether the reply says that its list is to be built from its end."""
     said = [plan.title, *plan.lists[-1].above[-3:], plan.lists[-1].label, *plan.below[:4]]
-    if any(_REVERSED.search(line) and not _NOT_REVERSED.search(line) for line in said):
+    if any(BACKWARD.search(line) and not _NOTBACKWARD.search(line) for line in said):
         return True
     return form in ("labeled", "chain", "marked") and bool(_DOWNWARD.search(" ".join(said[:-4] or said)))

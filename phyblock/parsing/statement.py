@@ -49,7 +49,7 @@ _WORD_NUMBER = (
     r"|три|четыре|пять|шесть|семь|восемь|девять)(?!\w)|[一二三四五六七八九十]{1,2}(?![号號番\w])"
 )
 _UNIT = r"(?!\s?(?:[x×]\s|times?\b|mal\b|fois|veces|cm|mm|m\b|°|degrees?\b|%|次|个|more\b))"
-_DIGITS = rf"\d{{1,6}}(?!\d|\.\d){_UNIT}"
+_DIGITS = rf"[0-9]{{1,6}}(?![0-9]|\.[0-9]|[a-wyz]){_UNIT}"
 _TO = r"\s{0,2}(?:-|\u2013|\u2014|~|\bto\b|\bthrough\b|\bthru\b|\bbis\b|至|到)\s{0,2}"
 _OR = r"\s{0,3},?\s{0,3}(?:\bor\b|\boder\b|\bou\b|/|或者?)\s{0,3}"
 _AND = (
@@ -63,11 +63,11 @@ _MENTION = re.compile(
     rf"(?<![a-zа-я])(?P<noun>{_NOUN}(?:{_BETWEEN}(?:with|mit|the|of|is|con|avec|com|dem|der|{_NOUN}))"
     rf"{{0,4}}{_BETWEEN}){_GROUP}"
     rf"|(?P<call>{VERB}(?:[ ]?block)?\s?[(\[]\s{{0,3}}(?:(?:block|id|index|n)\s?[=:]\s?)?#?)"
-    rf"(?P<called>\d{{1,6}})(?=\s{{0,3}}[,)\]])"
+    rf"(?P<called>[0-9]{{1,6}})(?=\s{{0,3}}[,)\]])"
     rf"|(?P<verb>{VERB}\s(?:the\s)?#?)(?P<moved>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})"
     rf"(?=\s{{0,3}}(?:\Z|[.,;:()\u2014\u2013]|(?:on|onto|to|at|next|and|then|in|beside|over|above|auf)\b))"
-    r"|(?:(?<=\()#?|(?<!\w)#)(?P<bare>\d{1,6}(?:(?:, ?|\s?&\s?|/| or )\d{1,6}){0,8})(?=\)|(?!\d|\.\d))"
-    r"|(?P<cjk>\d{1,6}(?:(?:、|,|和|-|至|到)\d{1,6}){0,20})(?=\s?(?:号|號|番))",
+    r"|(?:(?<=\()#?(?=[0-9][^()]{0,40}\))|(?<!\w)#)(?P<bare>[0-9]{1,6}(?:(?:, ?|\s?&\s?|/| or )[0-9]{1,6}){0,8})(?![\w]|\.[0-9])"
+    r"|(?P<cjk>[0-9]{1,6}(?:(?:、|,|和|-|至|到)[0-9]{1,6}){0,20})(?=\s?(?:号|號|番))",
     re.IGNORECASE,
 )
 _TIMES = re.compile(
