@@ -305,6 +305,6 @@ def _is_declined(answer: str, named: list[Listing]) -> bool:
 def _is_reversed(plan: _Plan, form: str) -> bool:
     """Whether the reply says that its list is to be built from its end."""
     said = [plan.title, *plan.lists[-1].above[-3:], plan.lists[-1].label, *plan.below[:4]]
-    if any(BACKWARD.search(line) and not _NOTBACKWARD.search(line) for line in said):
+    if any(BACKWARD.search(line) and not _NOT_REVERSED.search(line) for line in said):
         return True
     return form in ("labeled", "chain", "marked") and bool(_DOWNWARD.search(" ".join(said[:-4] or said)))
