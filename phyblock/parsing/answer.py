@@ -130,7 +130,9 @@ def _is_conditional(text: str, stated: _Statement) -> bool:
 
 def _forward(text: str, stated: _Statement) -> _Statement:
     """An order from first to last, where its line says that it goes from last to first."""
-    line = text[max(text.rfind("\n", 0, stated.start) + 1, stated.end - _SENTENCE_CHARS) : stated.end]
+    line = text[
+        max(text.rfind("\n", 0, stated.start) + 1, stated.end - _SENTENCE_CHARS) : stated.end
+    ]
     return replace(stated, letters=stated.letters[::-1]) if BACKWARD.search(line) else stated
 
 
@@ -141,14 +143,20 @@ def _turned(text: str, stated: Sequence[_Statement], reader: Reader) -> str | No
     if not settled or turn is None or turn["value"].upper() in ("", settled):
         return settled
     letter = turn["value"].upper()
-    is_firm = stated[-1].weight or not isinstance(reader, ChoiceReader) or letter not in reader.letters
+    is_firm = (
+        stated[-1].weight or not isinstance(reader, ChoiceReader) or letter not in reader.letters
+    )
     return CONTRADICTION if is_firm else letter
 
 
 def _verdicts(text: str, reader: Reader) -> str | None:
     """The one option that is called right where every option is called right or wrong."""
     found = {match["letter"].upper(): bool(match["yes"]) for match in VERDICT.finditer(text)}
-    if not isinstance(reader, ChoiceReader) or len(found) < len(reader.letters) or len(found) < _MANY:
+    if (
+        not isinstance(reader, ChoiceReader)
+        or len(found) < len(reader.letters)
+        or len(found) < _MANY
+    ):
         return None
     right = [letter for letter, is_right in found.items() if is_right]
     return right[0] if len(right) == 1 and right[0] in reader.letters else CONTRADICTION

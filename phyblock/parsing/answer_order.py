@@ -75,7 +75,10 @@ class OrderReader:
             "last": len(self.letters),
             **dict(zip(("first", "second", "third", "fourth"), range(1, 5), strict=True)),
         }
-        named = [(int(m[3]) if m[3] else places[m[2]], m[1]) for m in self._ranked.finditer(unmarked(text))]
+        named = [
+            (int(m[3]) if m[3] else places[m[2]], m[1])
+            for m in self._ranked.finditer(unmarked(text))
+        ]
         order = "".join(letter for _, letter in sorted(named))
         is_whole = [place for place, _ in sorted(named)] == list(range(1, len(self.letters) + 1))
         return order if is_whole and set(order) == set(self.letters) else None

@@ -36,6 +36,7 @@ class Listing:
     label: str = ""
     heading: str = ""
     ends_named: bool = True
+    leaves: bool = False
 
     @property
     def is_firm(self) -> bool:
@@ -56,20 +57,36 @@ _STEP = re.compile(
     r"\s{0,3}(?:\([^()\n]{0,60}\)\s?)?(?P<sign>[:.)=\-\u2013\u2014、,\]}>]|(?=\s)|\Z)",
     re.IGNORECASE,
 )
-_NUMBERED = re.compile(r"[\s>+\-#({|•·]{0,8}(?P<number>\d{1,3})\s?(?:[.):、](?!\d)|\)\.?)\s{0,4}(?=\D|\d)")
+_NUMBERED = re.compile(
+    r"[\s>+\-#({|•·]{0,8}(?P<number>\d{1,3})(?:st|nd|rd|th)?\s?(?:[.):、](?!\d)|\)\.?)\s{0,4}(?=\D|\d)"
+)
 _MARKED = re.compile(r"\s{0,40}(?:[-+•·▪–]|>)\s{1,4}(?=\S)|\s{0,40}[a-h][.)]\s")
-_STARTS_MOVING = re.compile(rf"[\s>\[{{(]{{0,12}}(?:(?:first|then|next|finally|now|please|und|dann|zuerst),?\s)?(?:robot\.)?(?:{VERB})", re.I)
-_NAMES_FIRST = re.compile(r"\s{0,20}(?:(?:the )?block |with |the )?(?:index|block|candidate|积木|#)\W{0,4}\d", re.I)
+_STARTS_MOVING = re.compile(
+    rf"[\s>\[{{(]{{0,12}}(?:(?:first|then|next|finally|now|please|und|dann|zuerst),?\s)?(?:robot\.)?(?:{VERB})",
+    re.I,
+)
+_NAMES_FIRST = re.compile(
+    r"\s{0,20}(?:(?:the )?block |with |the )?(?:index|block|candidate|积木|#)\W{0,4}\d", re.I
+)
 _LABELED = re.compile(
     r"\s{0,20}[-#>]{0,4}\s{0,3}(?:\d{1,2}[.)]\s)?(?P<label>[^:=：\[\n]{1,80}?)\s{0,3}(?:[:=：]|\b(?:is|are|would be|ist|lautet|est|es)\b:?|是|为)\s{0,3}"
     r"(?P<value>[\s(\[{<#]{0,4}(?:(?:blocks?|index|indices|积木)\s)?\d[^\n]{0,400})",
     re.IGNORECASE,
 )
-_ARRAY = re.compile(r"\[\s{0,9}(?:[\"']?\d{1,6}[\"']?\s{0,9},\s{0,9}){1,63}[\"']?\d{1,6}[\"']?\s{0,9}\]")
+_ARRAY = re.compile(
+    r"\[\s{0,9}(?:[\"']?\d{1,6}[\"']?\s{0,9},\s{0,9}){1,63}[\"']?\d{1,6}[\"']?\s{0,9}\]"
+)
 _TAG = re.compile(r"</?[a-z_]{1,20}(?:\s[^<>\n]{0,80})?>", re.IGNORECASE)
-_NOUN_LABEL = re.compile(r"[-\s]{0,4}(?:block|index|id|candidate|piece|number)(?: (?:index|id|number))?\s*", re.I)
-_FENCE = re.compile(r"\s{0,20}(?:[>*+-]\s{1,4})?(?:`{3,}|~{3,})|\s{0,20}(?:json|plaintext|text)\s*\Z")
-_LAYER = re.compile(r"layer|level|step|stage|phase|part|ebene|schicht|层|structure|base|bottom|middle|top|then|next", re.I)
+_NOUN_LABEL = re.compile(
+    r"[-\s]{0,4}(?:block|index|id|candidate|piece|number)(?: (?:index|id|number))?\s*", re.I
+)
+_FENCE = re.compile(
+    r"\s{0,20}(?:[>*+-]\s{1,4})?(?:`{3,}|~{3,})|\s{0,20}(?:json|plaintext|text)\s*\Z"
+)
+_LAYER = re.compile(
+    r"layer|level|step|stage|phase|part|ebene|schicht|层|structure|base|bottom|middle|top|then|next",
+    re.I,
+)
 _SENTENCE_END = re.compile(r"(?<=[\d)\]])[.;]\s{1,4}(?=\S)")
 _ABOVE = 12
 
@@ -99,7 +116,9 @@ def listings(text: str) -> tuple[list[Listing], list[str]]:
 def _apart(text: str) -> list[Found]:
     """JSON and tables of a text; JSON of a few words within a line is left to the line."""
     tables = find_tables(text)
-    values = [f for f in find_json(text) if not any(t.start < f.end and f.start < t.end for t in tables)]
+    values = [
+        f for f in find_json(text) if not any(t.start < f.end and f.start < t.end for t in tables)
+    ]
     return tables + values
 
 
@@ -164,7 +183,9 @@ class _Reader:
         if self._open is not None and not self._open.ends_named or self._is_nested(at, marked):
             statement = read_statement(body.replace("{", " ").replace("}", " "), is_item=False)
             assert self._open is not None
-            if statement.has_verb or (self._open.form == "steps" and _NAMES_FIRST.match(body) and statement.numbers):
+            if statement.has_verb or (
+                self._open.form == "steps" and _NAMES_FIRST.match(body) and statement.numbers
+            ):
                 return self._add(self._open, at, body, is_item=False, is_nested=True)
         if self._is_detail(at, line, body, is_marked=marked is not None):
             return True
@@ -173,12 +194,21 @@ class _Reader:
         statement = read_statement(body, is_item=marked is not None)
         listed, by_arrows = chain(body)
         if listed and (len(listed) > 1 or not marked):
-            if self.done and self.done[-1].form == "numbers" and len(listed) == 1 and not self.above:
+            if (
+                self.done
+                and self.done[-1].form == "numbers"
+                and len(listed) == 1
+                and not self.above
+            ):
                 self.done[-1].numbers += listed
                 self.done[-1].last_line = at
                 return True
             listing = self._new("chain" if by_arrows or len(listed) > 1 else "numbers", at)
-            listing.numbers, listing.n_named, listing.n_moves = list(listed), 2, 1 if by_arrows else 0
+            listing.numbers, listing.n_named, listing.n_moves = (
+                list(listed),
+                2,
+                1 if by_arrows else 0,
+            )
             self._open = None
             return True
         if not statement.numbers:
@@ -190,12 +220,21 @@ class _Reader:
 
     def _is_nested(self, at: int, marked: re.Match[str] | None) -> bool:
         """Whether a marked line goes on with those that an item without a block of its own has."""
-        return marked is not None and self._open is not None and self._nested_at == (id(self._open), at - 1)
+        return (
+            marked is not None
+            and self._open is not None
+            and self._nested_at == (id(self._open), at - 1)
+        )
 
     def _is_detail(self, at: int, line: str, body: str, *, is_marked: bool) -> bool:
         """Whether a marked line says more of the item above it, which names its block."""
         item = self._open
-        if not is_marked or item is None or not item.ends_named or at - 1 not in (item.last_line, self._detail_at):
+        if (
+            not is_marked
+            or item is None
+            or not item.ends_named
+            or at - 1 not in (item.last_line, self._detail_at)
+        ):
             return False
         if not line[:1].isspace() and read_statement(body, is_item=False).has_verb:
             return False
@@ -218,14 +257,21 @@ class _Reader:
         """Numbers with a label before them ("Order: 3, 5, 12"), or an array somewhere in a line."""
         labeled = _LABELED.match(line)
         if labeled and (
-            labeled["label"].count("(") > labeled["label"].count(")") or _NOUN_LABEL.fullmatch(labeled["label"])
+            labeled["label"].count("(") > labeled["label"].count(")")
+            or _NOUN_LABEL.fullmatch(labeled["label"])
         ):
             labeled = None
-        value, _, rest = _SENTENCE_END.sub("\n", labeled["value"], count=1).partition("\n") if labeled else ("", "", "")
+        value, _, rest = (
+            _SENTENCE_END.sub("\n", labeled["value"], count=1).partition("\n")
+            if labeled
+            else ("", "", "")
+        )
         value = value.rstrip(" .}")
         listed, _ = chain(value)
         if not listed and labeled and not read_statement(line, is_item=False).has_verb:
-            listed = read_statement(value, is_item=True).numbers if len(labeled["label"]) < 30 else ()
+            listed = (
+                read_statement(value, is_item=True).numbers if len(labeled["label"]) < 30 else ()
+            )
         if not listed:
             arrays = list(_ARRAY.finditer(line))
             if not arrays:
@@ -246,7 +292,9 @@ class _Reader:
             self.read(at, rest)
         return True
 
-    def _add(self, to: Listing, at: int, body: str, *, is_item: bool, is_nested: bool = False) -> bool:
+    def _add(
+        self, to: Listing, at: int, body: str, *, is_item: bool, is_nested: bool = False
+    ) -> bool:
         statement = read_statement(body, is_item=is_item)
         listed = statement.numbers or (chain(body)[0] if is_item else ())
         to.last_line = at
@@ -256,6 +304,7 @@ class _Reader:
         to.numbers += list(listed) * (self._times if len(listed) == 1 and is_item else 1)
         to.n_named += 1
         to.n_moves += statement.has_verb
+        to.leaves = to.leaves or statement.leaves
         if is_nested:
             self._nested_at = (id(to), at)
         self.above = []

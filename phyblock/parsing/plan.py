@@ -75,7 +75,9 @@ def _steps(text: str) -> _Read:
         return "thoughts_only"
     for frame in reversed(list(_FRAME.finditer(answer))[-_MOST_FRAMES:]):
         name = frame.lastgroup or "tag"
-        read = _choose(f"Answer: {frame[name].strip()}" if "\n" not in frame[name].strip() else frame[name])
+        read = _choose(
+            f"Answer: {frame[name].strip()}" if "\n" not in frame[name].strip() else frame[name]
+        )
         if not isinstance(read, str):
             return name, read[1]
     return _choose(answer) if answer else "empty"
@@ -112,19 +114,30 @@ _CATALOGUE_WORD = re.compile(
     re.IGNORECASE,
 )
 _FINAL_LABEL = re.compile(
-    r"(?:final|answer|plan|order|sequence|antwort|reihenfolge|respuesta|réponse|ответ|答案|顺序|步骤)\W*\Z", re.IGNORECASE
+    r"(?:final|answer|plan|order|sequence|antwort|reihenfolge|respuesta|réponse|ответ|答案|顺序|步骤)\W*\Z",
+    re.IGNORECASE,
 )
 _EXAMPLE = re.compile(
     r"(?:\bexample\b|\be\.g\.|for instance|\bsample (?:output|answer|plan)|beispiel|\bejemplo|\bexemple|例如|示例|例)[^.!?。]{0,40}\Z",
     re.IGNORECASE,
 )
-_EXPLANATION = re.compile(r"expla(?:in|nation)|rationale|reasoning|justif|verif|\bcheck|validat|\bwhy\b|\bnotes?\b|remark|stability|überprüf|验证|检查|erklärung|begründung|解释|说明", re.IGNORECASE)
+_NOT_MEANT = re.compile(
+    r"(?:\b(?:wrong|incorrect|invalid|bad|mistaken|rejected|falsch\w{0,2})\b[^.!?]{0,40}|^\W*(?:if|unless|falls|wenn)\b[^.!?]{0,80})[:：]\W*\Z",
+    re.IGNORECASE,
+)
+_EXPLANATION = re.compile(
+    r"expla(?:in|nation)|rationale|reasoning|justif|verif|\bcheck|validat|\bwhy\b|\bnotes?\b|remark|stability|überprüf|验证|检查|erklärung|begründung|解释|说明",
+    re.IGNORECASE,
+)
 _OPTION = re.compile(
     r"\b(?P<kind>plan|option|alternative|variant|variante|solution|approach|version|possibility|candidate plan|lösung|方案)"
     r"\s{0,2}#?(?P<name>[A-D]|[1-4]|one|two|three|I{1,3})\b",
     re.IGNORECASE,
 )
-_OR_ELSE = re.compile(r"^\W*(?:or|oder|ou|或者?|alternativ\w*|another (?:valid |possible )?\w+|or (?:else|alternatively).{0,40})\b\W*", re.IGNORECASE)
+_OR_ELSE = re.compile(
+    r"^\W*(?:or|oder|ou|或者?|alternativ\w*|another (?:valid |possible )?\w+|or (?:else|alternatively).{0,40})\b\W*",
+    re.IGNORECASE,
+)
 _CHOICE = re.compile(
     r"\b(?:choose|chose|pick|select|prefer|recommend|go(?:ing)? with|went with|use|best|better|final|submit|take|answer is"
     r"|wähle|nehme|entscheide|选择?|采用)[^.\n]{0,40}?(?:plan|option|alternative|variant|solution|approach|version|lösung|方案)\s{0,2}#?(?P<a>[A-D]|[1-4]|one|two|three|I{1,3})\b"
@@ -146,7 +159,7 @@ _HEADING_CHARS = 80
 _REFUSAL = re.compile(
     r"\bI(?:['\u2019]m| am) (?:sorry|unable|not able|afraid)|\bI (?:cannot|can['\u2019]?t|could not|won['\u2019]t|am not able)"
     r"|\b(?:cannot|can['\u2019]t|not possible to|impossible to|unable to) (?:determine|give|provide|build|produce|see|view|make|create|identify|plan|be built)"
-    r"|as an ai|no (?:valid )?plan\b|ich kann (?:das |die |den |leider )?(?:\w+ )?(?:nicht|kein)|leider|无法|抱歉|不能确定|lo siento|désolé|не могу",
+    r"|as an ai|please (?:provide|send|upload|share)|(?:is|are) not visible|need to see|no (?:valid )?plan\b|ich kann (?:das |die |den |leider )?(?:\w+ )?(?:nicht|kein)|leider|无法|抱歉|不能确定|lo siento|désolé|не могу",
     re.IGNORECASE,
 )
 _AGAIN = re.compile(
@@ -154,8 +167,14 @@ _AGAIN = re.compile(
     r"[^.\n]{0,30}\b(?:for|to build) (?:the )?(?:second|other)\b",
     re.IGNORECASE,
 )
-_NOT_REVERSED = re.compile(r"\b(?:not|never|don't|do not|isn't|no need|take (?:it|them) apart|dis\w+|undo|remov\w+)\b[^.\n]{0,40}revers", re.IGNORECASE)
-_DOWNWARD = re.compile(r"top[- ](?:to|down)[- ]?(?:bottom)?\b|von oben nach unten|从上到下|de haut en bas|de arriba (?:a|hacia) abajo", re.IGNORECASE)
+_NOT_REVERSED = re.compile(
+    r"\b(?:not|never|don't|do not|isn't|no need|take (?:it|them) apart|dis\w+|undo|remov\w+)\b[^.\n]{0,40}revers",
+    re.IGNORECASE,
+)
+_DOWNWARD = re.compile(
+    r"top[- ](?:to|down)[- ]?(?:bottom)?\b|von oben nach unten|从上到下|de haut en bas|de arriba (?:a|hacia) abajo",
+    re.IGNORECASE,
+)
 
 
 def _choose(answer: str) -> _Read:
@@ -167,7 +186,9 @@ def _choose(answer: str) -> _Read:
     if not best:
         if _REFUSAL.search(answer):
             return "refusal"
-        return "catalogue" if named or any(f.form in ("json", "table") for f in found) else "no_plan"
+        return (
+            "catalogue" if named or any(f.form in ("json", "table") for f in found) else "no_plan"
+        )
     if _REFUSAL.search(answer) and (best == _LAST or _is_declined(answer, named)):
         return "refusal"
     plans = _plans(named, ranks, best, found)
@@ -186,7 +207,7 @@ def _choose(answer: str) -> _Read:
 def _rank(listing: Listing) -> int:
     """How surely a list is a plan, by its form, its label and the heading above it; 0 is not at all."""
     heading = "" if listing.heading.endswith((".", "。")) else listing.heading
-    if listing.above and _EXAMPLE.search(listing.above[-1]):
+    if listing.above and (_EXAMPLE.search(listing.above[-1]) or _NOT_MEANT.search(listing.above[-1])):
         return _NO
     if listing.form == "numbers":
         is_list = len(listing.numbers) > 1 and (not heading or _PLAN_WORD.search(heading))
@@ -199,13 +220,17 @@ def _rank(listing: Listing) -> int:
     if listing.form == "steps":
         return _MOVES
     if is_catalogue or listing.form == "sentences":
-        return _LAST if listing.n_moves else _NO
+        return _LAST if listing.n_moves and not listing.leaves else _NO
     if listing.is_firm:
         is_final = bool(_REVISION.search(heading))
         return _ASKED if is_final else _MOVES if listing.form == "numbered" else _MARKED
     if listing.own == listing.numbers and len(listing.own) > 2:
         return _NO
-    return _LAST if _PLAN_WORD.search(heading) or listing.form in ("numbered", "chain") or not heading else _NO
+    return (
+        _LAST
+        if _PLAN_WORD.search(heading) or listing.form in ("numbered", "chain") or not heading
+        else _NO
+    )
 
 
 _NO, _LAST, _MARKED, _MOVES, _ASKED = range(5)
@@ -214,13 +239,25 @@ _NO, _LAST, _MARKED, _MOVES, _ASKED = range(5)
 def _rank_of_label(listing: Listing, heading: str, *, is_catalogue: bool) -> int:
     """The rank of numbers that stand behind a label."""
     label, many = listing.label, len(listing.numbers) > 1
-    if _names_catalogue(label) or re.match(r"\W*(?:the )?(?:top|upper|roof)\b.*(?:bottom|base|ground|lower)\b(?! to)", label, re.I):
+    if _NOT_MEANT.search(f"{label}:") or _names_catalogue(label) or re.match(
+        r"\W*(?:the )?(?:top|upper|roof)\b.*(?:bottom|base|ground|lower)\b(?! to)", label, re.I
+    ):
         return _DOWNWARD.search(label) is not None and _MARKED or _NO
     if _FINAL_LABEL.search(label):
         return _ASKED if many or re.search("answer|final|plan", label, re.IGNORECASE) else _NO
-    if _PLAN_WORD.search(label) or _DOWNWARD.search(label) or (_PLAN_WORD.search(heading) and not is_catalogue):
+    if (
+        _PLAN_WORD.search(label)
+        or _DOWNWARD.search(label)
+        or (_PLAN_WORD.search(heading) and not is_catalogue)
+    ):
         return _MARKED if many else _NO
-    return _LAST if many and not is_catalogue and not re.search("block|index|indices", label, re.IGNORECASE) and len(label) < 20 else _NO
+    is_short = len(label) < _LABEL_CHARS and not _BLOCK_WORD.search(label)
+    return _LAST if many and not is_catalogue and (is_short or _LAYERS.match(label)) else _NO
+
+
+_LABEL_CHARS = 20
+_BLOCK_WORD = re.compile("block|index|indices", re.IGNORECASE)
+_LAYERS = re.compile(r"\W*(?:(?:the )?(?:bottom|ground|base|first)\b|(?:layer|level|ebene|schicht|层) ?1)", re.IGNORECASE)
 
 
 def _names_catalogue(title: str) -> bool:
@@ -253,7 +290,9 @@ def _plans(named: list[Listing], ranks: list[int], best: int, found: list[Listin
 
 def _relation(passed: list[str], plans: list[_Plan], listing: Listing) -> str:
     """What a list is to the plan before it, by the lines between them."""
-    lines = [line for line in passed if line] or ([listing.label] if listing.form == "labeled" else [])
+    lines = [line for line in passed if line] or (
+        [listing.label] if listing.form == "labeled" else []
+    )
     title = lines[0].strip() if len(lines) == 1 else ""
     if not plans:
         return "other"
@@ -296,7 +335,11 @@ def _is_cut_off(answer: str, found: list[Listing], below: list[str]) -> bool:
 def _is_declined(answer: str, named: list[Listing]) -> bool:
     """Whether a refusal says of its list that it is only how one might look."""
     return any(
-        re.search(r"would|could|generic|hypothetical|in general|typical|illustrat|placeholder|candidates", line, re.IGNORECASE)
+        re.search(
+            r"would|could|generic|hypothetical|in general|typical|illustrat|placeholder|candidates",
+            line,
+            re.IGNORECASE,
+        )
         for listing in named
         for line in listing.above[-2:]
     )
@@ -307,4 +350,6 @@ def _is_reversed(plan: _Plan, form: str) -> bool:
     said = [plan.title, *plan.lists[-1].above[-3:], plan.lists[-1].label, *plan.below[:4]]
     if any(BACKWARD.search(line) and not _NOT_REVERSED.search(line) for line in said):
         return True
-    return form in ("labeled", "chain", "marked") and bool(_DOWNWARD.search(" ".join(said[:-4] or said)))
+    return form in ("labeled", "chain", "marked") and bool(
+        _DOWNWARD.search(" ".join(said[:-4] or said))
+    )

@@ -66,7 +66,7 @@ _MENTION = re.compile(
     rf"(?P<called>[0-9]{{1,6}})(?=\s{{0,3}}[,)\]])"
     rf"|(?P<verb>{VERB}\s(?:the\s)?#?)(?P<moved>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})"
     rf"(?=\s{{0,3}}(?:\Z|[.,;:()\u2014\u2013]|(?:on|onto|to|at|next|and|then|in|beside|over|above|auf)\b))"
-    r"|(?:(?<=\()#?(?=[0-9][^()]{0,40}\))|(?<!\w)#)(?P<bare>[0-9]{1,6}(?:(?:, ?|\s?&\s?|/| or )[0-9]{1,6}){0,8})(?![\w]|\.[0-9])"
+    r"|(?:(?<=\()#?(?=[0-9][^()]{0,40}\))|(?<!\w)#)(?P<bare>[0-9]{1,6}(?:(?:, ?|\s?&\s?|/| or |,? and | und |、)[0-9]{1,6}){0,8})(?![\w]|\.[0-9])"
     r"|(?P<cjk>[0-9]{1,6}(?:(?:、|,|和|-|至|到)[0-9]{1,6}){0,20})(?=\s?(?:号|號|番))",
     re.IGNORECASE,
 )
@@ -97,7 +97,7 @@ _SUPPORT = re.compile(
     r"|since|because|while|so that|auf|über|unter|neben|zwischen|hinter|vor|statt|nicht|ohne|kein\w{0,2}|sobre"
     r"|encima de|sur|dessus d\w|à côté d\w|entre|debajo de|sopra|accanto|su|на|над|рядом с|не)\b"
     r"|在|到|于|不要?|上的|の上)"
-    rf"(?:[\s(,]{{0,3}}(?!{VERB})[^\W\d]{{1,16}}){{0,7}}[\s(#]{{0,3}}\Z",
+    rf"(?:[\s(,]{{0,3}}(?!{VERB}|(?:it|them|each)\b)[^\W\d]{{1,16}}){{0,7}}[\s(#]{{0,3}}\Z",
     re.IGNORECASE,
 )
 _NEGATED = re.compile(
@@ -106,8 +106,10 @@ _NEGATED = re.compile(
     r"|unused|spare)\b[^,;]{0,60}\Z",
     re.IGNORECASE,
 )
-_PIECES = re.compile(r"(?<=[^\d\s])(?<!\b[Nn][or])[.](?=\s|\Z)|(?<=\d)[.](?=\s\D|\Z)|[;!?。；]|,(?=\s{0,2}[^\W\d]{0,12}\s?\bit\b)")
-_PIECE_VERB = re.compile(rf"{VERB}|\b(?:then|dann|puis|ensuite|luego)\b|然后", re.IGNORECASE)
+_PIECES = re.compile(
+    r"(?<=[^\d\s])(?<!\b[Nn][or])[.](?=\s|\Z)|(?<=\d)[.](?=\s\D|\Z)|[;!?。；]|,(?=\s{0,2}[^\W\d]{0,12}\s?\bit\b)"
+)
+_PIECE_VERB = re.compile(rf"{VERB}|\b(?:then|next(?! to)|finally|lastly|afterwards|dann|danach|zuletzt|puis|ensuite|enfin|luego)\b|然后|最后", re.IGNORECASE)
 _JOINS = re.compile(
     rf"(?:[\s,()\]\-→>&+、，。]|\([^()\n]{{0,80}}\)|\b(?:and|then|und|dann|et|puis|y|luego|followed by|finally|also|next"
     rf"|another|again|more|the|a|one|an|(?:red|blue|green|yellow|orange|purple|long|small|large|vertical|horizontal"
@@ -115,13 +117,16 @@ _JOINS = re.compile(
     rf"|\b(?:by|first|last|finish(?:ing)?)\b|然后|接着|最后|和|再|{VERB}){{1,16}}\Z",
     re.IGNORECASE,
 )
-_AND_THEN = re.compile(rf"[,&+→>、，]|\b(?:and|then|und|dann|et|puis|y|luego|by|finally|also|next)\b|然后|和|{VERB}", re.I)
+_AND_THEN = re.compile(
+    rf"[,&+→>、，]|\b(?:and|then|und|dann|et|puis|y|luego|by|finally|also|next)\b|然后|和|{VERB}",
+    re.I,
+)
 _IS_WHOLE = re.compile(
     rf"[\s#(\[]{{0,4}}{_GROUP}[\s)\]]{{0,3}}(?=\Z|[(:,;.\-\u2013\u2014|x×])", re.IGNORECASE
 )
 _CHAIN = re.compile(
     r"[\s(\[{<]{0,4}(?:(?:blocks?|index|indices|candidates?|积木|#)[\s:#]{0,3})?(?P<list>\d{1,6}(?:\s{0,3}"
-    r"(?P<sign>,|、|;|->|→|>|=>|-|\u2013|/|then|and|\s)(?:\s?(?:and|then|block|index|#)){0,2}[\s#]{0,3}\d{1,6}){0,63})"
+    r"(?P<sign>,|、|;|\||->|→|>|=>|-|\u2013|/|then|and|\s)(?:\s?(?:and|then|block|index|#)){0,2}[\s#]{0,3}\d{1,6}){0,63})"
     r"[\s)\]}>.]{0,4}\Z",
     re.IGNORECASE,
 )
@@ -130,10 +135,14 @@ _NUMBER = re.compile(r"\d{1,6}")
 
 @dataclass(frozen=True)
 class Statement:
-    """The blocks that a statement moves, in order; whether it says so by a verb."""
+    """The blocks that a statement moves, in order; whether it says so by a verb.
+
+    `leaves` tells that it names others, too, of which it does not say so.
+    """
 
     numbers: tuple[int, ...]
     has_verb: bool = False
+    leaves: bool = False
 
 
 def read_statement(text: str, *, is_item: bool) -> Statement:
@@ -145,10 +154,10 @@ def read_statement(text: str, *, is_item: bool) -> Statement:
         found = _moved(piece)
         if found and _PIECE_VERB.search(piece):
             moved += found
-        elif not bare:
-            bare = tuple(found)
+        else:
+            bare = bare or tuple(found)
     if moved:
-        return Statement(tuple(moved), has_verb=True)
+        return Statement(tuple(moved), True, not {*bare} <= {*moved})
     whole = _IS_WHOLE.match(text) if is_item else None
     return Statement(tuple(_counted(whole, text, "s")) if whole else bare)
 
@@ -158,7 +167,13 @@ def chain(text: str) -> tuple[tuple[int, ...], bool]:
     found = _CHAIN.match(text)
     if found is None:
         return (), False
-    return tuple(map(int, _NUMBER.findall(found["list"]))), (found["sign"] or "") in ("->", "→", ">", "=>", "then")
+    return tuple(map(int, _NUMBER.findall(found["list"]))), (found["sign"] or "") in (
+        "->",
+        "→",
+        ">",
+        "=>",
+        "then",
+    )
 
 
 def _pieces(text: str) -> list[str]:
@@ -201,7 +216,7 @@ def _counted(mention: re.Match[str], text: str, noun: str) -> list[int]:
     given = plain or (first if word is None else str(word)) + (groups.get("more") or "")
     numbers = _group(given, is_plural=bool(_PLURAL.search(noun)) or bool(groups.get("cjk")))
     times = _times(text, mention)
-    return numbers[:-1] + numbers[-1:] * times if numbers else []
+    return numbers * times if len(numbers) == 1 else numbers
 
 
 _SIGNED = re.compile(r"(?P<sign>[^\d]*)(?P<number>\d{1,6})")

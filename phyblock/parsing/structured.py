@@ -46,12 +46,20 @@ _INDEX_KEY = re.compile(
     r"(?:(?:block|candidate|piece)[ _-]?)?(?:index|idx|id|number|no)|block|candidate|piece|move|place|baustein|积木|编号",
     re.IGNORECASE,
 )
-_ACTION_KEY = re.compile(r"action|instruction|operation|description|move|text|do|command", re.IGNORECASE)
+_ACTION_KEY = re.compile(
+    r"action|instruction|operation|description|move|text|do|command", re.IGNORECASE
+)
 _TIMES_KEY = re.compile(r"count|times|quantity|qty|repeat|copies|anzahl|数量", re.IGNORECASE)
-_PLACE_KEY = re.compile(r"step|order|sequence|layer|level|position_in_order|schritt|步骤", re.IGNORECASE)
-_MANY_KEY = re.compile(r"blocks|indices|indexes|ids|candidates|pieces|block_ids|block_indices|积木", re.IGNORECASE)
+_PLACE_KEY = re.compile(
+    r"step|order|sequence|layer|level|position_in_order|schritt|步骤", re.IGNORECASE
+)
+_MANY_KEY = re.compile(
+    r"blocks|indices|indexes|ids|candidates|pieces|block_ids|block_indices|积木", re.IGNORECASE
+)
 _LOOKS_KEY = re.compile(r"shape|color|colour|orientation|type|形状|颜色", re.IGNORECASE)
-_CHOICE_KEY = re.compile(r"(?:plan|option|alternative|variant)[ _-]?(?P<which>[a-d1-4])", re.IGNORECASE)
+_CHOICE_KEY = re.compile(
+    r"(?:plan|option|alternative|variant)[ _-]?(?P<which>[a-d1-4])", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True)
@@ -150,10 +158,16 @@ def _object(fields: _Fields, *, is_plan: bool) -> list[int]:
     plans = [value for key, value in fields if _PLAN_KEY.fullmatch(key.strip())]
     choices = [(m["which"], v) for k, v in fields if (m := _CHOICE_KEY.fullmatch(k.strip()))]
     if len(choices) > 1:
-        chosen = [str(v)[-1:].lower() for k, v in fields if re.search("chosen|choice|selected|best|final", k, re.I)]
+        chosen = [
+            str(v)[-1:].lower()
+            for k, v in fields
+            if re.search("chosen|choice|selected|best|final", k, re.I)
+        ]
         return next((_read(v, is_plan=True) for n, v in choices if n.lower() in chosen), [])
     if plans and not steps:
-        return next((found for value in reversed(plans) if (found := _read(value, is_plan=True))), [])
+        return next(
+            (found for value in reversed(plans) if (found := _read(value, is_plan=True))), []
+        )
     if steps:
         if len({int(m["n"] or m["bare"]) for m, _ in steps}) == len(steps):
             steps.sort(key=lambda step: int(step[0]["n"] or step[0]["bare"]))
@@ -196,7 +210,9 @@ def _is_step(fields: _Fields) -> bool:
 
 
 def _one(fields: _Fields) -> bool:
-    return any(_INDEX_KEY.fullmatch(k.strip()) and not isinstance(v, (list, _Fields)) for k, v in fields)
+    return any(
+        _INDEX_KEY.fullmatch(k.strip()) and not isinstance(v, (list, _Fields)) for k, v in fields
+    )
 
 
 def _place(fields: _Fields) -> int | None:
@@ -214,10 +230,17 @@ def _step(fields: _Fields) -> list[int]:
     return found * min(times or 1, MOST_AT_ONCE) if len(found) == 1 else found
 
 
-_TABLE = re.compile(r"^[ \t]*\|?[^|\n]*\|[^\n]*\n[ \t]*\|?[ \t:|-]*-[ \t:|-]*\n(?:[^\n]*\|[^\n]*(?:\n|\Z))+", re.MULTILINE)
-_STEP_COLUMN = re.compile(r"step|order|seq|^#$|^no\.?$|^nr\.?$|schritt|reihenfolge|paso|étape|步骤|顺序|序号|手順", re.IGNORECASE)
+_TABLE = re.compile(
+    r"^[ \t]*\|?[^|\n]*\|[^\n]*\n[ \t]*\|?[ \t:|-]*-[ \t:|-]*\n(?:[^\n]*\|[^\n]*(?:\n|\Z))+",
+    re.MULTILINE,
+)
+_STEP_COLUMN = re.compile(
+    r"step|order|seq|^#$|^no\.?$|^nr\.?$|schritt|reihenfolge|paso|étape|步骤|顺序|序号|手順",
+    re.IGNORECASE,
+)
 _BLOCK_COLUMN = re.compile(
-    r"block|ind(?:ex|ice)|idx|candidate|piece|move|action|^id$|baustein|bloc|bloque|aktion|积木|编号|块|ブロック", re.IGNORECASE
+    r"block|ind(?:ex|ice)|idx|candidate|piece|move|action|^id$|baustein|bloc|bloque|aktion|积木|编号|块|ブロック",
+    re.IGNORECASE,
 )
 _TABLE_CHARS = 20_000
 
@@ -245,10 +268,16 @@ def _of_rows(head: list[str], rows: list[list[str]]) -> list[int]:
     rows = [row for row in rows if len(row) == len(head)]
     order = [whole_number(re.sub(r"\D", "", row[steps])) for row in rows]
     if None not in order and len(set(order)) == len(order):
-        rows = [row for _, row in sorted(zip(order, rows, strict=True), key=lambda pair: pair[0] or 0)]
+        rows = [
+            row for _, row in sorted(zip(order, rows, strict=True), key=lambda pair: pair[0] or 0)
+        ]
     for column in columns:
         named = [list(_line(row[column])) for row in rows]
         if rows and all(named):
             many = [(whole_number(row[times]) if times is not None else None) or 1 for row in rows]
-            return [n for numbers, k in zip(named, many, strict=True) for n in numbers * min(k, MOST_AT_ONCE)]
+            return [
+                n
+                for numbers, k in zip(named, many, strict=True)
+                for n in numbers * min(k, MOST_AT_ONCE)
+            ]
     return []

@@ -13,11 +13,19 @@ _THINKING = re.compile(
     r"|(?P<opens><(?:think(?:ing)?|thought|reasoning)>|\[THINK\]|◁think▷)",
     re.IGNORECASE,
 )
-_NEXT_TURN = re.compile(r"</s>|<\|(?:im_end|endoftext|eot_id|end|user)\|>|<end_of_turn>|<｜end▁of▁sentence｜>")
+_NEXT_TURN = re.compile(
+    r"</s>|<\|(?:im_end|endoftext|eot_id|end|user)\|>|<end_of_turn>|<｜end▁of▁sentence｜>"
+)
 """What a server should have stopped at: behind it a model plays the next turn."""
-_STRUCK_OUT = re.compile(r"~~[^~\n]{1,400}~~|<(?:del|s)>[^<>\n]{1,400}</(?:del|s)>|<!--.{0,4000}?-->")
-_QUOTES = re.compile(r"[*`\"\u201c\u201d\u00ab\u00bb\u201e]|(?<!\w)['\u2018\u2019]|['\u2018\u2019](?!\w)")
-_LATEX = re.compile(r"\\(?:text|textbf|mathrm|mathbf)\s{0,2}\{([^{}\n]{0,80})\}|\\(?:,|;|quad|[()\[\]])")
+_STRUCK_OUT = re.compile(
+    r"~~[^~\n]{1,400}~~|<(?:del|s)>[^<>\n]{1,400}</(?:del|s)>|<!--.{0,4000}?-->"
+)
+_QUOTES = re.compile(
+    r"[*`\"\u201c\u201d\u00ab\u00bb\u201e]|(?<!\w)['\u2018\u2019]|['\u2018\u2019](?!\w)"
+)
+_LATEX = re.compile(
+    r"\\(?:text|textbf|mathrm|mathbf)\s{0,2}\{([^{}\n]{0,80})\}|\\(?:,|;|quad|[()\[\]])"
+)
 _LATEX_ARROW = re.compile(r"\\(?:long)?(?:right)?(?:arrow|to)\b")
 
 BACKWARD = re.compile(
