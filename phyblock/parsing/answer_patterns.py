@@ -77,7 +77,8 @@ CONCLUDED = re.compile(
     r"(?P<value>\(?[A-Z]\)?)[*_`]{0,3}(?=[\s.!,;]{0,3}(?:\Z|\n|[.!;]))",
 )
 CONDITIONAL = re.compile(
-    r"\b(?:if|unless|provided|assuming|(?<=, )falls|wenn|otherwise|sonst|or else|depend(?:s|ing))\b(?! (?:I|we) (?:had|have|must)\b)"
+    r"\b(?:if|unless|provided|assuming|(?<=, )falls|wenn|otherwise|sonst|or else|depend(?:s"
+    r"|ing))\b(?! (?:I|we) (?:had|have|must)\b)"
     r"|如果|否则|取决于",
     re.IGNORECASE,
 )
@@ -88,17 +89,23 @@ QUOTED = re.compile(
 )
 """An answer in quotation marks within a sentence: somebody else's words."""
 TURNED = re.compile(
-    r"(?:\b(?:but|however|actually|yet|aber|doch)\b|但是?|不过)[^\n]{0,100}?(?:\b(?:is|be|ist)\s|是)(?:option )?"
+    r"(?:\b(?:but|however|actually|yet|aber|doch)\b|但是?|不过)[^\n]{0,100}?(?:\b(?:is|be|ist)\s"
+    r"|是)(?:option )?"
     r"\(?(?P<value>[A-Z])\)?\s{0,2}(?=[.!;。]|\Z)",
     re.IGNORECASE,
 )
 """A turn away from the answer that was stated: "I would answer A, but the picture shows that it is D"."""
 VERDICT = re.compile(
-    r"(?:^|[.;,]\s|\n)[\s*\-_(\[]{0,6}(?:option )?(?P<letter>[A-Z])[*_)\]]{0,3}\s?[:.\-\u2013\u2014]?\s{0,3}"
-    r"(?:(?P<yes>✓|✔|✅|☑|(?:yes|correct|matches|fits|right|true)\b)|(?:✗|✘|❌|×|☒|(?:no|wrong|incorrect|false|does not|doesn't|not)\b))",
+    r"(?:^|[.;,]\s"
+    r"|\n)[\s*\-_(\[]{0,6}(?:option )?(?P<letter>[A-Z])[*_)\]]{0,3}\s?[:.\-\u2013\u2014]?\s{0,3}"
+    r"(?:(?P<yes>✓|✔|✅|☑|(?:yes|correct|matches|fits|right|true)\b)|(?:✗|✘|❌|×|☒|(?:no|wrong"
+    r"|incorrect|false|does not|doesn't|not)\b))",
     re.IGNORECASE,
 )
-TAG = re.compile(r"<(?:final_)?answer>\s{0,20}(?P<value>[^<>]{1,400})", re.IGNORECASE)
+TAG = re.compile(
+    r"<(?:final_)?answer>\s{0,20}(?P<value>[^<>]{1,400})",
+    re.IGNORECASE,
+)
 BOX = re.compile(r"\\boxed\s{0,2}\{(?P<value>[^\n]{1,80}?)\}{1,3}(?=[^}]|\Z)")
 JSON = re.compile(
     r"[\"'](?:final[_ ]?)?(?:answer|choice|option|selected_option|order|ordering|letter)[\"']"
@@ -108,7 +115,8 @@ JSON = re.compile(
 REVISED = re.compile(
     r"\b(?:wait|actually|instead|rather|however|but|correct(?:ion|ed|ing)|revis\w+|mistake\w*|wrong"
     r"|incorrect|re-?(?:check|think|consider|examin|evaluat|look|assess)\w*|second thought|hmm+|no,"
-    r"|final(?:ly)?|therefore|thus|hence|so|overall|conclusion|conclude|doch|aber|sondern|因此|所以|但)\b"
+    r"|final(?:ly)?|therefore|thus|hence|so|overall|conclusion|conclude|doch|aber|sondern|因此|所以"
+    r"|但)\b"
     r"|因此|所以|但是?|不过",
     re.IGNORECASE,
 )

@@ -69,7 +69,8 @@ _NAMES_FIRST = re.compile(
     r"\s{0,20}(?:(?:the )?block |with |the )?(?:index|block|candidate|积木|#)\W{0,4}\d", re.I
 )
 _LABELED = re.compile(
-    r"\s{0,20}[-#>]{0,4}\s{0,3}(?:\d{1,2}[.)]\s)?(?P<label>[^:=：\[\n]{1,80}?)\s{0,3}(?:[:=：]|\b(?:is|are|would be|ist|lautet|est|es)\b:?|是|为)\s{0,3}"
+    r"\s{0,20}[-#>]{0,4}\s{0,3}(?:\d{1,2}[.)]\s)?(?P<label>[^:=：\[\n]{1,80}?)\s{0,3}(?:[:=：]"
+    r"|\b(?:is|are|would be|ist|lautet|est|es)\b:?|是|为)\s{0,3}"
     r"(?P<value>[\s(\[{<#]{0,4}(?:(?:blocks?|index|indices|积木)\s)?\d[^\n]{0,400})",
     re.IGNORECASE,
 )

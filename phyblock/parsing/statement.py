@@ -19,8 +19,10 @@ MOST_AT_ONCE = 22
 _STATEMENT_CHARS = 600
 
 VERB = (
-    r"(?:\b(?:mov(?:e[sd]?|ing)|plac(?:e[sd]?|ing)|put(?:s|ting)?|add(?:s|ed|ing)?|stack(?:s|ed|ing)?"
-    r"|position(?:s|ed|ing)?(?=\s(?:the|a|block|index|#))|set(?:s|ting)?|us(?:e[sd]?|ing)|lay(?:s|ing)?|insert(?:s|ed|ing)?"
+    r"(?:\b(?:mov(?:e[sd]?|ing)|plac(?:e[sd]?|ing)|put(?:s|ting)?|add(?:s|ed|ing)?|stack(?:s|ed"
+    r"|ing)?"
+    r"|position(?:s|ed|ing)?(?=\s(?:the|a|block|index|#))|set(?:s|ting)?|us(?:e[sd]?|ing)|lay(?:s"
+    r"|ing)?|insert(?:s|ed|ing)?"
     r"|attach(?:es|ed|ing)?|install(?:s|ed|ing)?|drop(?:s|ped)?|pick(?:s|ed)?(?: up)?|take|grab"
     r"|(?:start|begin)(?:s|ing)? with|stand"
     r"|beweg(?:e|en|t)|verschieb(?:e|en|t)|platzier(?:e|en|t)|leg(?:e|en|t)|setz(?:e|en|t)"
@@ -38,7 +40,8 @@ _NOUN = (
     r"|积木|方块|木块|块|编号|索引|序号|ブロック|番号|블록|번호)"
 )
 _PLURAL = re.compile(
-    r"\b(?:ind(?:ices|exes|izes)|blocks|cubes|arches|cylinders|pieces|bricks|candidates|numbers|ids|blöcken?|bausteinen?|steinen?"
+    r"\b(?:ind(?:ices|exes|izes)|blocks|cubes|arches|cylinders|pieces|bricks|candidates|numbers|ids"
+    r"|blöcken?|bausteinen?|steinen?"
     r"|klötze|bloques|blocs|blocos|blocchi|piezas|peças|pièces|блоки)\b|积木|方块|木块|块",
     re.IGNORECASE,
 )
@@ -53,20 +56,24 @@ _DIGITS = rf"[0-9]{{1,6}}(?![0-9]|\.[0-9]|[a-wyz]){_UNIT}"
 _TO = r"\s{0,2}(?:-|\u2013|\u2014|~|\bto\b|\bthrough\b|\bthru\b|\bbis\b|至|到)\s{0,2}"
 _OR = r"\s{0,3},?\s{0,3}(?:\bor\b|\boder\b|\bou\b|/|或者?)\s{0,3}"
 _AND = (
-    r"\s{0,3}(?:, ?(?:and|then|und)\b|,|、|&|\+|\band then\b|\band\b|\bund\b|\bet\b|\by\b|\bthen\b|和|与|及)"
+    r"\s{0,3}(?:, ?(?:and|then|und)\b|,|、|&|\+|\band then\b|\band\b|\bund\b|\bet\b|\by\b|\bthen\b|和"
+    r"|与|及)"
     r"\s{0,3}"
 )
 _LINK = rf"(?:{_OR}|{_TO}|{_AND})#?"
 _GROUP = rf"(?P<first>{_DIGITS}|{_WORD_NUMBER})(?P<more>(?:{_LINK}{_DIGITS}){{0,40}})"
 _BETWEEN = r"[\s:=#(\[{<.\-→]{0,5}"
 _MENTION = re.compile(
-    rf"(?<![a-zа-я])(?P<noun>{_NOUN}(?:{_BETWEEN}(?:with|mit|the|of|is|con|avec|com|dem|der|{_NOUN}))"
+    rf"(?<![a-zа-я])(?P<noun>{_NOUN}(?:{_BETWEEN}(?:with|mit|the|of|is|con|avec|com|dem|der"
+    rf"|{_NOUN}))"
     rf"{{0,4}}{_BETWEEN}){_GROUP}"
     rf"|(?P<call>{VERB}(?:[ ]?block)?\s?[(\[]\s{{0,3}}(?:(?:block|id|index|n)\s?[=:]\s?)?#?)"
     rf"(?P<called>[0-9]{{1,6}})(?=\s{{0,3}}[,)\]])"
     rf"|(?P<verb>{VERB}\s(?:the\s)?#?)(?P<moved>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})"
-    rf"(?=\s{{0,3}}(?:\Z|[.,;:()\u2014\u2013]|(?:on|onto|to|at|next|and|then|in|beside|over|above|auf)\b))"
-    r"|(?:(?<=\()#?(?=[0-9][^()]{0,40}\))|(?<!\w)#)(?P<bare>[0-9]{1,6}(?:(?:, ?|\s?&\s?|/| or |,? and | und |、)[0-9]{1,6}){0,8})(?![\w]|\.[0-9])"
+    rf"(?=\s{{0,3}}(?:\Z|[.,;:()\u2014\u2013]|(?:on|onto|to|at|next|and|then|in|beside|over|above"
+    rf"|auf)\b))"
+    r"|(?:(?<=\()#?(?=[0-9][^()]{0,40}\))|(?<!\w)#)(?P<bare>[0-9]{1,6}(?:(?:, ?|\s?&\s?|/| or "
+    r"|,? and | und |、)[0-9]{1,6}){0,8})(?![\w]|\.[0-9])"
     r"|(?P<cjk>[0-9]{1,6}(?:(?:、|,|和|-|至|到)[0-9]{1,6}){0,20})(?=\s?(?:号|號|番))",
     re.IGNORECASE,
 )
@@ -78,42 +85,60 @@ _TIMES = re.compile(
     re.IGNORECASE,
 )
 _SO_MANY = re.compile(
-    r"(?:(?P<n>\d{1,2})\s?[x×]\s{0,2}|\b(?P<word>two|three|four|five|six|zwei|drei|vier|deux|trois|dos|tres)"
+    r"(?:(?P<n>\d{1,2})\s?[x×]\s{0,2}|\b(?P<word>two|three|four|five|six|zwei|drei|vier|deux|trois"
+    r"|dos|tres)"
     r"\s(?:\w{2,12}\s){0,3}?)\(?\Z",
     re.IGNORECASE,
 )
 _HERE = re.compile(
-    r"\b(?:on top(?! of)|(?:on|in|at|to|from|under) (?:the |its )?(?:left|right|ground|floor|table|bottom"
+    r"\b(?:on top(?! of)|(?:on|in|at|to|from|under) (?:the |its )?(?:left|right|ground|floor|table"
+    r"|bottom"
     r"|base|middle|center|centre|top|front|back|rear|side|first|second|third|next)"
     r"(?: (?:side|layer|half|level|row|end|structure|position|corner))?(?! (?:of|block|cube)))\b",
     re.IGNORECASE,
 )
 _SUPPORT = re.compile(
-    r"(?:\b(?:on top of|on|onto|upon|atop|over|above|under|underneath|below|beneath|beside|besides|next to"
-    r"|near|between|against|behind|in front of|adjacent to|touch\w{0,3}|support(?:s|ed by|ing)?|rest(?:s|ing)? on"
-    r"|(?:left|right|top|side|front|edges?|ends?|cent(?:er|re)|middle|back|rear) of|relative to|connect\w{0,3}"
-    r"|bridg\w{1,3}|span(?:s|ning)?|across|alongside|to|toward|(?:align\w{0,3}|flush|level|contact|parallel) with"
-    r"|instead of|rather than|not|never|don't|without|except|like|as with|same as|before|after|once|until|when|if"
-    r"|since|because|while|so that|auf|über|unter|neben|zwischen|hinter|vor|statt|nicht|ohne|kein\w{0,2}|sobre"
+    r"(?:\b(?:on top of|on|onto|upon|atop|over|above|under|underneath|below|beneath|beside|besides"
+    r"|next to"
+    r"|near|between|against|behind|in front of|adjacent to|touch\w{0,3}|support(?:s|ed by|ing)?"
+    r"|rest(?:s|ing)? on"
+    r"|(?:left|right|top|side|front|edges?|ends?|cent(?:er|re)|middle|back|rear) of|relative to"
+    r"|connect\w{0,3}"
+    r"|bridg\w{1,3}|span(?:s|ning)?|across|alongside|to|toward|(?:align\w{0,3}|flush|level|contact"
+    r"|parallel) with"
+    r"|instead of|rather than|not|never|don't|without|except|like|as with|same as|before|after|once"
+    r"|until|when|if"
+    r"|since|because|while|so that|auf|über|unter|neben|zwischen|hinter|vor|statt|nicht|ohne"
+    r"|kein\w{0,2}|sobre"
     r"|encima de|sur|dessus d\w|à côté d\w|entre|debajo de|sopra|accanto|su|на|над|рядом с|не)\b"
     r"|在|到|于|不要?|上的|の上)"
-    rf"(?:[\s(,]{{0,3}}(?!{VERB}|(?:it|them|each)\b)[^\W\d]{{1,16}}){{0,7}}[\s(#]{{0,3}}\Z",
+    rf"(?:[\s(,]{{0,3}}(?!{VERB}|(?:it|them)\b)[^\W\d]{{1,16}}){{0,7}}[\s(#]{{0,3}}\Z",
     re.IGNORECASE,
 )
 _NEGATED = re.compile(
-    rf"(?:\b(?:not|never|avoid|without|cannot|nicht|no|ne|не)\b|n't\b|不要?|别)\s{{0,2}}(?:\w{{1,12}}\s){{0,2}}{VERB}"
-    r"[^,;]{0,60}\Z|\b(?:remov\w{1,3}|discard|ignor\w{1,3}|skip|exclud\w{1,3}|reject|leave out|avoid|omit|entfern\w{1,3}"
+    rf"(?:\b(?:not|never|avoid|without|cannot|nicht|no|ne|не)\b|n't\b|不要?"
+    rf"|别)\s{{0,2}}(?:\w{{1,12}}\s){{0,2}}{VERB}"
+    r"[^,;]{0,60}\Z|\b(?:remov\w{1,3}|discard|ignor\w{1,3}|skip|exclud\w{1,3}|reject|leave out"
+    r"|avoid|omit|entfern\w{1,3}"
     r"|unused|spare)\b[^,;]{0,60}\Z",
     re.IGNORECASE,
 )
 _PIECES = re.compile(
-    r"(?<=[^\d\s])(?<!\b[Nn][or])[.](?=\s|\Z)|(?<=\d)[.](?=\s\D|\Z)|[;!?。；]|,(?=\s{0,2}[^\W\d]{0,12}\s?\bit\b)"
+    r"(?<=[^\d\s])(?<!\b[Nn][or])[.](?=\s|\Z)|(?<=\d)[.](?=\s\D|\Z)|[;!?。；]"
+    r"|,(?=\s{0,2}[^\W\d]{0,12}\s?\bit\b)"
 )
-_PIECE_VERB = re.compile(rf"{VERB}|\b(?:then|next(?! to)|finally|lastly|afterwards|dann|danach|zuletzt|puis|ensuite|enfin|luego)\b|然后|最后", re.IGNORECASE)
+_PIECE_VERB = re.compile(
+    rf"{VERB}|\b(?:then|next(?! to)|finally|lastly|afterwards|dann|danach|zuletzt|puis|ensuite"
+    rf"|enfin|luego)\b|然后|最后",
+    re.IGNORECASE,
+)
 _JOINS = re.compile(
-    rf"(?:[\s,()\]\-→>&+、，。]|\([^()\n]{{0,80}}\)|\b(?:and|then|und|dann|et|puis|y|luego|followed by|finally|also|next"
-    rf"|another|again|more|the|a|one|an|(?:red|blue|green|yellow|orange|purple|long|small|large|vertical|horizontal"
-    r"|cube|arch|cylinder|cuboid|prism|triangle|roof|base|pillar|column|beam|bar|bridge|block|index|le|la|der|die|das))\b"
+    rf"(?:[\s,()\]\-→>&+、，。]|\([^()\n]{{0,80}}\)|\b(?:and|then|und|dann|et|puis|y|luego|followed by"
+    rf"|finally|also|next"
+    rf"|another|again|more|the|a|one|an|(?:red|blue|green|yellow|orange|purple|long|small|large"
+    rf"|vertical|horizontal"
+    r"|cube|arch|cylinder|cuboid|prism|triangle|roof|base|pillar|column|beam|bar|bridge|block|index"
+    r"|le|la|der|die|das))\b"
     rf"|\b(?:by|first|last|finish(?:ing)?)\b|然后|接着|最后|和|再|{VERB}){{1,16}}\Z",
     re.IGNORECASE,
 )
@@ -126,7 +151,8 @@ _IS_WHOLE = re.compile(
 )
 _CHAIN = re.compile(
     r"[\s(\[{<]{0,4}(?:(?:blocks?|index|indices|candidates?|积木|#)[\s:#]{0,3})?(?P<list>\d{1,6}(?:\s{0,3}"
-    r"(?P<sign>,|、|;|\||->|→|>|=>|-|\u2013|/|then|and|\s)(?:\s?(?:and|then|block|index|#)){0,2}[\s#]{0,3}\d{1,6}){0,63})"
+    r"(?P<sign>,|、|;|\||->|→|>|=>|-|\u2013|/|then|and|\s)(?:\s?(?:and|then|block|index"
+    r"|#)){0,2}[\s#]{0,3}\d{1,6}){0,63})"
     r"[\s)\]}>.]{0,4}\Z",
     re.IGNORECASE,
 )

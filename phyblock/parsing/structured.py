@@ -22,28 +22,37 @@ _TRAILING_COMMA = re.compile(r",(?=\s{0,20}[}\]])")
 _COMMENT = re.compile(r"(?<![:\"'\w])//[^\n\"]{0,200}$", re.MULTILINE)
 
 _PLAN_KEY = re.compile(
-    r"(?:(?:final|assembly|build(?:ing)?|placement|block|construction|my|the|ordered|move|proposed|correct)[ _-]?){0,3}"
-    r"(?:plan|steps?|sequence|order(?:ing)?|answer|solution|actions?|moves|instructions|result|output|layers"
+    r"(?:(?:final|assembly|build(?:ing)?|placement|block|construction|my|the|ordered|move|proposed"
+    r"|correct)[ _-]?){0,3}"
+    r"(?:plan|steps?|sequence|order(?:ing)?|answer|solution|actions?|moves|instructions|result"
+    r"|output|layers"
     r"|assembly|reihenfolge|schritte|antwort|orden|pasos|respuesta|ordre|étapes|顺序|步骤|答案|计划|搭建顺序)",
     re.IGNORECASE,
 )
 _STEP_KEY = re.compile(
-    r"(?:.{0,40}[ _:-])?(?:step|layer|level|schritt|paso|étape|phase|stage|ebene|move|第|步骤|层)[ _#-]{0,2}(?P<n>\d{1,3})\D{0,3}"
+    r"(?:.{0,40}[ _:-])?(?:step|layer|level|schritt|paso|étape|phase|stage|ebene|move|第|步骤"
+    r"|层)[ _#-]{0,2}(?P<n>\d{1,3})\D{0,3}"
     r"|(?P<bare>\d{1,3})",
     re.IGNORECASE,
 )
 _TIERS = ("ground", "base", "bottom", "lower", "middle", "mid", "upper", "top", "roof")
 _OPPOSITE_KEY = re.compile(
-    r"(?:un|not[ _-]?|non[ _-]?)(?:used|needed|required|necessary|selected|placed)|distract|exclud|reject|discard"
-    r"|remain|left[ _-]?over|spare|available|candidate(?:s|_list)|ignor|skip|avoid|wrong|draft|example|attempt"
-    r"|alternativ|initial|previous|old|count|total|number_of|num_|confidence|layers?_count|reason|thought|analysis"
-    r"|explanation|descri|comment|note|supports?$|depend|on[ _]?top|below|position|coord|rotation|orient|size"
-    r"|color|colour|shape|type|blocks?[ _](?:needed|required|used)|required|needed|selected|inventory|dictionary"
+    r"(?:un|not[ _-]?|non[ _-]?)(?:used|needed|required|necessary|selected|placed)|distract|exclud"
+    r"|reject|discard"
+    r"|remain|left[ _-]?over|spare|available|candidate(?:s|_list)|ignor|skip|avoid|wrong|draft"
+    r"|example|attempt"
+    r"|alternativ|initial|previous|old|count|total|number_of|num_|confidence|layers?_count|reason"
+    r"|thought|analysis"
+    r"|explanation|descri|comment|note|supports?$|depend|on[ _]?top|below|position|coord|rotation"
+    r"|orient|size"
+    r"|color|colour|shape|type|blocks?[ _](?:needed|required|used)|required|needed|selected"
+    r"|inventory|dictionary"
     r"|unbenutzt|übrig|未使用|多余|干扰|剩余",
     re.IGNORECASE,
 )
 _INDEX_KEY = re.compile(
-    r"(?:(?:block|candidate|piece)[ _-]?)?(?:index|idx|id|number|no)|block|candidate|piece|move|place|baustein|积木|编号",
+    r"(?:(?:block|candidate|piece)[ _-]?)?(?:index|idx|id|number|no)|block|candidate|piece|move"
+    r"|place|baustein|积木|编号",
     re.IGNORECASE,
 )
 _ACTION_KEY = re.compile(
@@ -239,7 +248,8 @@ _STEP_COLUMN = re.compile(
     re.IGNORECASE,
 )
 _BLOCK_COLUMN = re.compile(
-    r"block|ind(?:ex|ice)|idx|candidate|piece|move|action|^id$|baustein|bloc|bloque|aktion|积木|编号|块|ブロック",
+    r"block|ind(?:ex|ice)|idx|candidate|piece|move|action|^id$|baustein|bloc|bloque|aktion|积木|编号|块"
+    r"|ブロック",
     re.IGNORECASE,
 )
 _TABLE_CHARS = 20_000

@@ -29,9 +29,11 @@ _LATEX = re.compile(
 _LATEX_ARROW = re.compile(r"\\(?:long)?(?:right)?(?:arrow|to)\b")
 
 BACKWARD = re.compile(
-    r"\b(?:in |the )?revers(?:e|ed)(?: (?:order|of))?\b|\bbackwards?\b|from (?:the )?last to (?:the )?first"
+    r"\b(?:in |the )?revers(?:e|ed)(?: (?:order|of))?\b|\bbackwards?\b"
+    r"|from (?:the )?last to (?:the )?first"
     r"|last (?:step|block|one|item|picture) first|read (?:it )?from (?:the )?(?:bottom|end|right)"
-    r"|umgekehrte?r? reihenfolge|rückwärts|von hinten|倒序|逆序|反过来|从后(?:往|到|向)前|相反的?顺序|ordre inverse|orden inverso",
+    r"|umgekehrte?r? reihenfolge|rückwärts|von hinten|倒序|逆序|反过来|从后(?:往|到|向)前|相反的?顺序|ordre inverse"
+    r"|orden inverso",
     re.IGNORECASE,
 )
 """That a list stands in the opposite order."""
