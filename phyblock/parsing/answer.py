@@ -11,9 +11,8 @@ failure, and no later rule is tried. Nothing raises on any text.
 from __future__ import annotations
 
 import re
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from phyblock.parsing.answer_order import OrderReader
 from phyblock.parsing.answer_patterns import (
@@ -32,19 +31,23 @@ from phyblock.parsing.answer_patterns import (
     ORDER,
     QUOTED,
     REJECTS,
-    REVISED,
     SENTENCE,
     TAG,
-    TURNED,
     UNSURE,
     VERDICT,
 )
+from phyblock.parsing.answer_statements import (
+    Reader,
+    forward,
+    is_conditional,
+    settle,
+    statements,
+    turned,
+)
 from phyblock.parsing.answer_value import CONTRADICTION, ChoiceReader
-from phyblock.parsing.text_forms import BACKWARD, answer_of
+from phyblock.parsing.text_forms import answer_of
 
 __all__ = ["ParsedAnswer", "parse_answer"]
-
-Reader = ChoiceReader | OrderReader
 
 
 @dataclass(frozen=True)
@@ -69,23 +72,10 @@ def parse_answer(text: str, options: Sequence[str], is_ordering: bool) -> Parsed
     return ParsedAnswer(None, None)
 
 
-@dataclass(frozen=True)
-class _Statement:
-    """A place that states an answer: where it begins and ends, what it names, how firmly."""
-
-    start: int
-    end: int
-    letters: str
-    weight: int
-
-
 _SENTENCE_CHARS = 240
 _CUT_OFF_CHARS = 12
 _WHOLE_CHARS = 300
 _LINE_CHARS = 240
-_REVISION_CHARS = 4000
-_MOST_STATEMENTS = 100
-"""Of each kind, from the end: a reply that repeats itself for pages is still read at once."""
 
 
 def _whole(text: str, reader: Reader) -> str | None:
@@ -96,57 +86,28 @@ def _marked(pattern: re.Pattern[str]) -> Callable[[str, Reader], str | None]:
     """A rule for answers in a mark of their own: tags, a box, a field."""
 
     def find(text: str, reader: Reader) -> str | None:
-        return _settle(text, list(_statements(text, pattern, reader.read, 0)))
+        return settle(text, list(statements(text, pattern, reader.read, 0)))
 
     return find
 
 
 def _stated(text: str, reader: Reader) -> str | None:
     """Lines and sentences that say what the answer is; a line outweighs a sentence."""
-    stated = list(_statements(text, LINE, reader.read, 1))
+    stated = list(statements(text, LINE, reader.read, 1))
     lines = {statement.end for statement in stated}
-    for statement in _statements(text, SENTENCE, reader.read, 0):
+    for statement in statements(text, SENTENCE, reader.read, 0):
         if statement.end not in lines:
             stated.append(statement)
     if isinstance(reader, ChoiceReader):
-        stated += _statements(text, CHOSEN, reader.letter, 0)
-        stated += _statements(text, IS_RIGHT, reader.exact, 0)
+        stated += statements(text, CHOSEN, reader.letter, 0)
+        stated += statements(text, IS_RIGHT, reader.exact, 0)
     else:
-        stated += _statements(text, ORDER, reader.read, 0)
-        stated = [_forward(text, statement) for statement in stated]
-    firm = [statement for statement in stated if not _is_conditional(text, statement)]
+        stated += statements(text, ORDER, reader.read, 0)
+        stated = [forward(text, statement) for statement in stated]
+    firm = [statement for statement in stated if not is_conditional(text, statement)]
     if stated and not firm:
         return CONTRADICTION
-    return _turned(text, sorted(firm, key=lambda statement: statement.start), reader)
-
-
-def _is_conditional(text: str, stated: _Statement) -> bool:
-    """Whether a statement holds only under a condition, said before it or right behind it."""
-    start = max(0, stated.start - _SENTENCE_CHARS)
-    before = re.split(r"[.!?\n](?=\s|\Z)", text[start : stated.start])[-1]
-    after = re.split(r"[.!?\n]", text[stated.end : stated.end + _SENTENCE_CHARS], maxsplit=1)[0]
-    return bool(CONDITIONAL.search(before) or CONDITIONAL.search(after))
-
-
-def _forward(text: str, stated: _Statement) -> _Statement:
-    """An order from first to last, where its line says that it goes from last to first."""
-    line = text[
-        max(text.rfind("\n", 0, stated.start) + 1, stated.end - _SENTENCE_CHARS) : stated.end
-    ]
-    return replace(stated, letters=stated.letters[::-1]) if BACKWARD.search(line) else stated
-
-
-def _turned(text: str, stated: Sequence[_Statement], reader: Reader) -> str | None:
-    """What statements come to, unless the text turns to another option behind the last of them."""
-    settled = _settle(text, stated)
-    turn = TURNED.search(text, stated[-1].end) if stated else None
-    if not settled or turn is None or turn["value"].upper() in ("", settled):
-        return settled
-    letter = turn["value"].upper()
-    is_firm = (
-        stated[-1].weight or not isinstance(reader, ChoiceReader) or letter not in reader.letters
-    )
-    return CONTRADICTION if is_firm else letter
+    return turned(text, sorted(firm, key=lambda statement: statement.start), reader)
 
 
 def _verdicts(text: str, reader: Reader) -> str | None:
@@ -163,29 +124,6 @@ def _verdicts(text: str, reader: Reader) -> str | None:
 
 
 _MANY = 3
-
-
-def _statements(
-    text: str, pattern: re.Pattern[str], read: Callable[[str], str | None], weight: int
-) -> Iterator[_Statement]:
-    for match in deque(pattern.finditer(text), maxlen=_MOST_STATEMENTS):
-        letters = read(match["value"])
-        if letters is not None:
-            lead = match.groupdict().get("lead") or ""
-            firm = weight + ("final" in lead.lower())
-            yield _Statement(match.start(), match.end(), letters, firm)
-
-
-def _settle(text: str, stated: Sequence[_Statement]) -> str | None:
-    """The last word: what all say, or what the last says where it outweighs or revises others."""
-    if not stated:
-        return None
-    last = stated[-1]
-    for other in reversed(stated):
-        if other.letters != last.letters and other.weight >= last.weight:
-            between = text[max(other.end, last.start - _REVISION_CHARS) : last.end]
-            return last.letters if REVISED.search(between) else CONTRADICTION
-    return last.letters
 
 
 def _outer_line(text: str, reader: Reader) -> str | None:

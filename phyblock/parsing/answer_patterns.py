@@ -84,7 +84,8 @@ CONDITIONAL = re.compile(
 )
 """That an answer holds only under a condition."""
 QUOTED = re.compile(
-    rf"(?<=\w )[\"\u201c\u00ab](?:[^\"\u201d\u00bb\n]{{0,40}}?(?:{_WORDS})\s?[:：][^\"\u201d\u00bb\n]{{0,40}})[\"\u201d\u00bb]",
+    rf"(?<=\w )[\"\u201c\u00ab](?:[^\"\u201d\u00bb\n]{{0,40}}?(?:{_WORDS})\s?[:：]"
+    r"[^\"\u201d\u00bb\n]{0,40})[\"\u201d\u00bb]",
     re.IGNORECASE,
 )
 """An answer in quotation marks within a sentence: somebody else's words."""
@@ -94,7 +95,7 @@ TURNED = re.compile(
     r"\(?(?P<value>[A-Z])\)?\s{0,2}(?=[.!;。]|\Z)",
     re.IGNORECASE,
 )
-"""A turn away from the answer that was stated: "I would answer A, but the picture shows that it is D"."""
+"""A turn away from the stated answer: "I would answer A, but the picture shows that it is D"."""
 VERDICT = re.compile(
     r"(?:^|[.;,]\s"
     r"|\n)[\s*\-_(\[]{0,6}(?:option )?(?P<letter>[A-Z])[*_)\]]{0,3}\s?[:.\-\u2013\u2014]?\s{0,3}"

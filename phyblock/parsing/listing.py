@@ -1,4 +1,4 @@
-"""The lists of a reply: runs of steps, numbered or marked items, sentences, labelled numbers, JSON, tables.
+"""The lists of a reply: steps, numbered or marked items, sentences, labels, JSON, tables.
 
 A list knows what stands above it, so that it can be told what it is to the one before it.
 """
@@ -9,7 +9,22 @@ import re
 from bisect import bisect_left
 from dataclasses import dataclass, field
 
-from phyblock.parsing.statement import MOST_AT_ONCE, VERB, chain, read_statement
+from phyblock.parsing.line_patterns import (
+    ARRAY,
+    FENCE,
+    INLINE_STEP,
+    LABELED,
+    LAYER,
+    MARKED,
+    NAMES_FIRST,
+    NOUN_LABEL,
+    NUMBERED,
+    SENTENCE_END,
+    STARTS_MOVING,
+    STEP,
+    TAG,
+)
+from phyblock.parsing.statement import MOST_AT_ONCE, chain, read_statement
 from phyblock.parsing.structured import Found, find_json, find_tables
 from phyblock.parsing.text_forms import plain_line
 
@@ -44,57 +59,12 @@ class Listing:
         return self.form in ("steps", "json", "table") or 2 * self.n_moves >= self.n_named
 
 
-_STEP_WORD = r"(?:steps?|schritte?|pasos?|étapes?|etape|passo|шаг|stap|krok|adım|步骤|步驟|ステップ|단계|第(?=\s?\d))"
-_INLINE_STEP = re.compile(
-    rf"(?:(?<=[{{,;])|(?<=[^\d\s]\.)|(?<=[\w)\]] \d\.)|(?<=[\w)\]] \d\d\.))[ \t]{{0,4}}(?=[\"'*]{{0,3}}{_STEP_WORD}[\s_#]{{0,3}}\d{{1,3}}[\"'*]{{0,3}}\s?[:.)=\-\u2013\u2014])"
-    rf"|(?<=[{{,;])[ \t]{{0,4}}(?=[\"'][^\"'\n:]{{1,40}}:?[ _-]step[\s_#]{{0,3}}\d{{1,3}}[\"'])"
-    rf"|(?<=\S)[ \t](?=\d{{1,2}}[.)] (?:\*\*)?(?:{VERB}))",
-    re.IGNORECASE,
-)
-_STEP = re.compile(
-    rf"[\s>+\-#({{|\[\d.)•·]{{0,16}}(?:[^\n:.]{{0,40}}?[ :_-]{{1,2}})??{_STEP_WORD}[\s_#]{{0,3}}(?P<number>\d{{1,3}})(?!\d)\s?步?"
-    r"(?: ?(?:&|and|to|-|\u2013) ?(?P<last>\d{1,3})(?![\w.]))?"
-    r"\s{0,3}(?:\([^()\n]{0,60}\)\s?)?(?P<sign>[:.)=\-\u2013\u2014、,\]}>]|(?=\s)|\Z)",
-    re.IGNORECASE,
-)
-_NUMBERED = re.compile(
-    r"[\s>+\-#({|•·]{0,8}(?P<number>\d{1,3})(?:st|nd|rd|th)?\s?(?:[.):、](?!\d)|\)\.?)\s{0,4}(?=\D|\d)"
-)
-_MARKED = re.compile(r"\s{0,40}(?:[-+•·▪–]|>)\s{1,4}(?=\S)|\s{0,40}[a-h][.)]\s")
-_STARTS_MOVING = re.compile(
-    rf"[\s>\[{{(]{{0,12}}(?:(?:first|then|next|finally|now|please|und|dann|zuerst),?\s)?(?:robot\.)?(?:{VERB})",
-    re.I,
-)
-_NAMES_FIRST = re.compile(
-    r"\s{0,20}(?:(?:the )?block |with |the )?(?:index|block|candidate|积木|#)\W{0,4}\d", re.I
-)
-_LABELED = re.compile(
-    r"\s{0,20}[-#>]{0,4}\s{0,3}(?:\d{1,2}[.)]\s)?(?P<label>[^:=：\[\n]{1,80}?)\s{0,3}(?:[:=：]"
-    r"|\b(?:is|are|would be|ist|lautet|est|es)\b:?|是|为)\s{0,3}"
-    r"(?P<value>[\s(\[{<#]{0,4}(?:(?:blocks?|index|indices|积木)\s)?\d[^\n]{0,400})",
-    re.IGNORECASE,
-)
-_ARRAY = re.compile(
-    r"\[\s{0,9}(?:[\"']?\d{1,6}[\"']?\s{0,9},\s{0,9}){1,63}[\"']?\d{1,6}[\"']?\s{0,9}\]"
-)
-_TAG = re.compile(r"</?[a-z_]{1,20}(?:\s[^<>\n]{0,80})?>", re.IGNORECASE)
-_NOUN_LABEL = re.compile(
-    r"[-\s]{0,4}(?:block|index|id|candidate|piece|number)(?: (?:index|id|number))?\s*", re.I
-)
-_FENCE = re.compile(
-    r"\s{0,20}(?:[>*+-]\s{1,4})?(?:`{3,}|~{3,})|\s{0,20}(?:json|plaintext|text)\s*\Z"
-)
-_LAYER = re.compile(
-    r"layer|level|step|stage|phase|part|ebene|schicht|层|structure|base|bottom|middle|top|then|next",
-    re.I,
-)
-_SENTENCE_END = re.compile(r"(?<=[\d)\]])[.;]\s{1,4}(?=\S)")
 _ABOVE = 12
 
 
 def listings(text: str) -> tuple[list[Listing], list[str]]:
     """The lists of a text in order, and the lines that stand below the last one."""
-    text = _INLINE_STEP.sub("\n", _TAG.sub("\n", text))
+    text = INLINE_STEP.sub("\n", TAG.sub("\n", text))
     reader = _Reader()
     forms = sorted(_apart(text), key=lambda found: found.start)
     starts = [found.start for found in forms]
@@ -144,15 +114,15 @@ class _Reader:
     def read(self, number: int, raw: str) -> None:
         """Add a line: an item of a list, what belongs to an item, or what stands between lists."""
         line = plain_line(raw).rstrip()
-        if _FENCE.match(raw) or not line.strip(" \t[]{}()|,.:;#-=~"):
+        if FENCE.match(raw) or not line.strip(" \t[]{}()|,.:;#-=~"):
             return
-        for pattern, name in ((_STEP, "_steps"), (_NUMBERED, "_numbered")):
+        for pattern, name in ((STEP, "_steps"), (NUMBERED, "_numbered")):
             head = pattern.match(line)
             if head is not None and self._item(number, line, head, name):
                 return
         if not self._other(number, line):
             self.above = [*self.above[-_ABOVE:], line.strip()]
-            if not _MARKED.match(line):
+            if not MARKED.match(line):
                 self._open = None
 
     def _item(self, at: int, line: str, head: re.Match[str], name: str) -> bool:
@@ -179,13 +149,13 @@ class _Reader:
 
     def _other(self, at: int, line: str) -> bool:
         """Take a line without a number of its own; False where it names nothing that counts."""
-        marked = _MARKED.match(line)
+        marked = MARKED.match(line)
         body = line[marked.end() :] if marked else line
-        if self._open is not None and not self._open.ends_named or self._is_nested(at, marked):
+        if (self._open is not None and not self._open.ends_named) or self._is_nested(at, marked):
             statement = read_statement(body.replace("{", " ").replace("}", " "), is_item=False)
             assert self._open is not None
             if statement.has_verb or (
-                self._open.form == "steps" and _NAMES_FIRST.match(body) and statement.numbers
+                self._open.form == "steps" and NAMES_FIRST.match(body) and statement.numbers
             ):
                 return self._add(self._open, at, body, is_item=False, is_nested=True)
         if self._is_detail(at, line, body, is_marked=marked is not None):
@@ -216,7 +186,7 @@ class _Reader:
             return False
         if marked is None and not statement.has_verb:
             return False
-        form = "marked" if marked or _STARTS_MOVING.match(line) else "sentences"
+        form = "marked" if marked or STARTS_MOVING.match(line) else "sentences"
         return self._extend(form, at, body, is_item=marked is not None)
 
     def _is_nested(self, at: int, marked: re.Match[str] | None) -> bool:
@@ -256,14 +226,14 @@ class _Reader:
 
     def _take_labeled(self, at: int, line: str) -> bool:
         """Numbers with a label before them ("Order: 3, 5, 12"), or an array somewhere in a line."""
-        labeled = _LABELED.match(line)
+        labeled = LABELED.match(line)
         if labeled and (
             labeled["label"].count("(") > labeled["label"].count(")")
-            or _NOUN_LABEL.fullmatch(labeled["label"])
+            or NOUN_LABEL.fullmatch(labeled["label"])
         ):
             labeled = None
         value, _, rest = (
-            _SENTENCE_END.sub("\n", labeled["value"], count=1).partition("\n")
+            SENTENCE_END.sub("\n", labeled["value"], count=1).partition("\n")
             if labeled
             else ("", "", "")
         )
@@ -274,7 +244,7 @@ class _Reader:
                 read_statement(value, is_item=True).numbers if len(labeled["label"]) < 30 else ()
             )
         if not listed:
-            arrays = list(_ARRAY.finditer(line))
+            arrays = list(ARRAY.finditer(line))
             if not arrays:
                 return False
             listed, label = chain(arrays[-1][0])[0], line[: arrays[-1].start()]
@@ -282,7 +252,7 @@ class _Reader:
             label = labeled["label"] if labeled else ""
         last = self.done[-1] if self.done else None
         self._open = None
-        if last is not None and last.form == "labeled" and not self.above and _LAYER.search(label):
+        if last is not None and last.form == "labeled" and not self.above and LAYER.search(label):
             last.numbers += listed
             last.last_line = at
             last.label = f"{last.label}, {label}"

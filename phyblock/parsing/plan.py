@@ -17,6 +17,21 @@ from typing import Literal, get_args
 
 from phyblock.domain import Plan
 from phyblock.parsing.listing import Listing, listings
+from phyblock.parsing.plan_patterns import (
+    AGAIN,
+    CHOICE,
+    DOWNWARD,
+    EXPLANATION,
+    HEADING_CHARS,
+    NOT_REVERSED,
+    OPTION,
+    OR_ELSE,
+    PART,
+    REFUSAL,
+    REVISION,
+    SUPPOSED,
+)
+from phyblock.parsing.plan_rank import LAST, MOVES, rank_of
 from phyblock.parsing.text_forms import BACKWARD, answer_of
 from phyblock.words import PlanParser
 
@@ -101,119 +116,19 @@ class _Plan:
         return [number for listing in self.lists for number in listing.numbers]
 
 
-_PLAN_WORD = re.compile(
-    r"order|sequence|plan\b|assembl|build|\bsteps?\b|instruction|answer|solution|\bmoves?\b"
-    r"|placement|construct|result"
-    r"|reihenfolge|anleitung|antwort|schritt|aufbau|ordre|étapes|réponse|orden|pasos|respuesta"
-    r"|secuencia|ordine"
-    r"|bottom[- ](?:to|up)|from the (?:bottom|ground)|von unten|从下到上|порядок|план|ответ|顺序|步骤|答案"
-    r"|计划|方案|顺|序列|手順|順序|순서",
-    re.IGNORECASE,
-)
-_CATALOGUE_WORD = re.compile(
-    r"dictionary|catalog|required|needed|\bselect|candidate|available|inventory|\bused\b|indices"
-    r"|identif|distractor"
-    r"|unused|legend|analysis|possible|not needed|leftover|remaining|options|extra|benötigt"
-    r"|verfügbar|übrig|nécessaires"
-    r"|necesarios|需要|可用|候选|清单|未使用|多余|剩余",
-    re.IGNORECASE,
-)
-_FINAL_LABEL = re.compile(
-    r"(?:final|answer|plan|order|sequence|antwort|reihenfolge|respuesta|réponse|ответ|答案|顺序"
-    r"|步骤)\W*\Z",
-    re.IGNORECASE,
-)
-_EXAMPLE = re.compile(
-    r"(?:\bexample\b|\be\.g\.|for instance|\bsample (?:output|answer|plan)|beispiel|\bejemplo"
-    r"|\bexemple|例如|示例|例)[^.!?。]{0,40}\Z",
-    re.IGNORECASE,
-)
-_NOT_MEANT = re.compile(
-    r"(?:\b(?:wrong|incorrect|invalid|bad|mistaken|rejected|falsch\w{0,2})\b[^.!?]{0,40}|^\W*(?:if"
-    r"|unless|falls|wenn)\b[^.!?]{0,80})[:：]\W*\Z",
-    re.IGNORECASE,
-)
-_EXPLANATION = re.compile(
-    r"expla(?:in|nation)|rationale|reasoning|justif|verif|\bcheck|validat|\bwhy\b|\bnotes?\b"
-    r"|remark|stability|überprüf|验证|检查|erklärung|begründung|解释|说明",
-    re.IGNORECASE,
-)
-_OPTION = re.compile(
-    r"\b(?P<kind>plan|option|alternative|variant|variante|solution|approach|version|possibility"
-    r"|candidate plan|lösung|方案)"
-    r"\s{0,2}#?(?P<name>[A-D]|[1-4]|one|two|three|I{1,3})\b",
-    re.IGNORECASE,
-)
-_OR_ELSE = re.compile(
-    r"^\W*(?:or|oder|ou|或者?|alternativ\w*|another (?:valid |possible )?\w+|or (?:else"
-    r"|alternatively).{0,40})\b\W*",
-    re.IGNORECASE,
-)
-_CHOICE = re.compile(
-    r"\b(?:choose|chose|pick|select|prefer|recommend|go(?:ing)? with|went with|use|best|better"
-    r"|final|submit|take|answer is"
-    r"|wähle|nehme|entscheide|选择?|采用)[^.\n]{0,40}?(?:plan|option|alternative|variant|solution"
-    r"|approach|version|lösung|方案)\s{0,2}#?(?P<a>[A-D]|[1-4]|one|two|three|I{1,3})\b"
-    r"|\b(?:plan|option|alternative|variant|solution|approach|version|lösung)\s{0,2}#?(?P<b>[A-D]"
-    r"|[1-4]|one|two|three|I{1,3})\b"
-    r"\s(?:is|seems|looks|ist|wins)\s?(?:the |my |more |clearly |a )?(?:better|best|final|correct"
-    r"|right|stable|preferred|chosen|answer|one|besser|richtig)",
-    re.IGNORECASE,
-)
-_REVISION = re.compile(
-    r"final|correct|revis|updat|actual|summar|complete|overall|optimi|improv|korrigier"
-    r"|\b(?:instead|answer|again|better|so|thus|therefore|wait|output)\b",
-    re.IGNORECASE,
-)
-_PART = re.compile(
-    r"structure|layer|level|\b(?:left|right|cent(?:er|re)|middle|upper|lower|bottom|top|base|part"
-    r"|section|component|side"
-    r"|tower|building|house|second|third|next|then|phase|stage|step)\b|\bstep\s?\d|schicht|ebene"
-    r"|teil|turm|层|部分",
-    re.IGNORECASE,
-)
-_HEADING_CHARS = 80
-_REFUSAL = re.compile(
-    r"\bI(?:['\u2019]m| am) (?:sorry|unable|not able|afraid)|\bI (?:cannot|can['\u2019]?t|could not"
-    r"|won['\u2019]t|am not able)"
-    r"|\b(?:cannot|can['\u2019]t|not possible to|impossible to|unable to) (?:determine|give|provide"
-    r"|build|produce|see|view|make|create|identify|plan|be built)"
-    r"|as an ai|please (?:provide|send|upload|share)|(?:is|are) not visible|need to see"
-    r"|no (?:valid )?plan\b|ich kann (?:das |die |den |leider )?(?:\w+ )?(?:nicht|kein)|leider|无法"
-    r"|抱歉|不能确定|lo siento|désolé|не могу",
-    re.IGNORECASE,
-)
-_AGAIN = re.compile(
-    r"\brepeat (?:the |this |these )?(?:above |same |whole )?(?:assembly |building )?(?:order|steps"
-    r"|sequence|plan|instructions)\b"
-    r"[^.\n]{0,30}\b(?:for|to build) (?:the )?(?:second|other)\b",
-    re.IGNORECASE,
-)
-_NOT_REVERSED = re.compile(
-    r"\b(?:not|never|don't|do not|isn't|no need|take (?:it|them) apart|dis\w+|undo"
-    r"|remov\w+)\b[^.\n]{0,40}revers",
-    re.IGNORECASE,
-)
-_DOWNWARD = re.compile(
-    r"top[- ](?:to|down)[- ]?(?:bottom)?\b|von oben nach unten|从上到下|de haut en bas|de arriba (?:a"
-    r"|hacia) abajo",
-    re.IGNORECASE,
-)
-
-
 def _choose(answer: str) -> _Read:
     """The plan among the lists of an answer."""
     found, below = listings(answer)
     named = [listing for listing in found if listing.numbers]
-    ranks = [_rank(listing) for listing in named]
+    ranks = [rank_of(listing) for listing in named]
     best = max(ranks, default=0)
     if not best:
-        if _REFUSAL.search(answer):
+        if REFUSAL.search(answer):
             return "refusal"
         return (
             "catalogue" if named or any(f.form in ("json", "table") for f in found) else "no_plan"
         )
-    if _REFUSAL.search(answer) and (best == _LAST or _is_declined(answer, named)):
+    if REFUSAL.search(answer) and (best == LAST or _is_declined(named)):
         return "refusal"
     plans = _plans(named, ranks, best, found)
     plans[-1].below = below
@@ -221,80 +136,11 @@ def _choose(answer: str) -> _Read:
     if plan is None:
         return "two_plans"
     if plan is plans[-1] and _is_cut_off(answer, found, below):
-        firm = plans if len(plans) > 1 else [*_plans(named, ranks, _MOVES, found), plan]
+        firm = plans if len(plans) > 1 else [*_plans(named, ranks, MOVES, found), plan]
         plan = firm[-2] if len(firm) > 1 else plan
     form = plan.lists[-1].form
-    numbers = plan.numbers * (2 if any(map(_AGAIN.search, below)) else 1)
+    numbers = plan.numbers * (2 if any(map(AGAIN.search, below)) else 1)
     return form, numbers[::-1] if _is_reversed(plan, form) else numbers
-
-
-def _rank(listing: Listing) -> int:
-    """How surely a list is a plan, by its form, its label and the heading above it; 0 is not at all."""
-    heading = "" if listing.heading.endswith((".", "。")) else listing.heading
-    if listing.above and (
-        _EXAMPLE.search(listing.above[-1]) or _NOT_MEANT.search(listing.above[-1])
-    ):
-        return _NO
-    if listing.form == "numbers":
-        is_list = len(listing.numbers) > 1 and (not heading or _PLAN_WORD.search(heading))
-        return _LAST if is_list else _NO
-    is_catalogue = _names_catalogue(heading)
-    if listing.form == "labeled":
-        return _rank_of_label(listing, heading, is_catalogue=is_catalogue)
-    if listing.form in ("json", "table") or (listing.form == "steps" and listing.n_moves):
-        return _ASKED
-    if listing.form == "steps":
-        return _MOVES
-    if is_catalogue or listing.form == "sentences":
-        return _LAST if listing.n_moves and not listing.leaves else _NO
-    if listing.is_firm:
-        is_final = bool(_REVISION.search(heading))
-        return _ASKED if is_final else _MOVES if listing.form == "numbered" else _MARKED
-    if listing.own == listing.numbers and len(listing.own) > 2:
-        return _NO
-    return (
-        _LAST
-        if _PLAN_WORD.search(heading) or listing.form in ("numbered", "chain") or not heading
-        else _NO
-    )
-
-
-_NO, _LAST, _MARKED, _MOVES, _ASKED = range(5)
-
-
-def _rank_of_label(listing: Listing, heading: str, *, is_catalogue: bool) -> int:
-    """The rank of numbers that stand behind a label."""
-    label, many = listing.label, len(listing.numbers) > 1
-    if (
-        _NOT_MEANT.search(f"{label}:")
-        or _names_catalogue(label)
-        or re.match(
-            r"\W*(?:the )?(?:top|upper|roof)\b.*(?:bottom|base|ground|lower)\b(?! to)", label, re.I
-        )
-    ):
-        return _DOWNWARD.search(label) is not None and _MARKED or _NO
-    if _FINAL_LABEL.search(label):
-        return _ASKED if many or re.search("answer|final|plan", label, re.IGNORECASE) else _NO
-    if (
-        _PLAN_WORD.search(label)
-        or _DOWNWARD.search(label)
-        or (_PLAN_WORD.search(heading) and not is_catalogue)
-    ):
-        return _MARKED if many else _NO
-    is_short = len(label) < _LABEL_CHARS and not _BLOCK_WORD.search(label)
-    return _LAST if many and not is_catalogue and (is_short or _LAYERS.match(label)) else _NO
-
-
-_LABEL_CHARS = 20
-_BLOCK_WORD = re.compile("block|index|indices", re.IGNORECASE)
-_LAYERS = re.compile(
-    r"\W*(?:(?:the )?(?:bottom|ground|base|first)\b|(?:layer|level|ebene|schicht|层) ?1)",
-    re.IGNORECASE,
-)
-
-
-def _names_catalogue(title: str) -> bool:
-    return bool(_CATALOGUE_WORD.search(title)) and not _PLAN_WORD.search(title)
 
 
 def _plans(named: list[Listing], ranks: list[int], best: int, found: list[Listing]) -> list[_Plan]:
@@ -309,7 +155,7 @@ def _plans(named: list[Listing], ranks: list[int], best: int, found: list[Listin
             continue
         relation = _relation(passed, plans, listing)
         title = " ".join(passed[-2:])
-        option = _OPTION.search(f"{title} {listing.label}")
+        option = OPTION.search(f"{title} {listing.label}")
         if relation == "part":
             plans[-1].lists.append(listing)
         elif relation == "explanation":
@@ -329,16 +175,16 @@ def _relation(passed: list[str], plans: list[_Plan], listing: Listing) -> str:
     title = lines[0].strip() if len(lines) == 1 else ""
     if not plans:
         return "other"
-    if any(_OPTION.search(line) or _OR_ELSE.match(line) for line in lines[-2:]):
+    if any(OPTION.search(line) or OR_ELSE.match(line) for line in lines[-2:]):
         return "option"
     before = plans[-1].lists[-1]
     if listing.form == "labeled" and not any(passed):
         return "other"
-    if len(lines) > 1 or len(title) > _HEADING_CHARS or _REVISION.search(title) or "" in passed:
-        return "explanation" if any(_EXPLANATION.search(line) for line in lines[:1]) else "other"
-    if _EXPLANATION.search(title):
+    if len(lines) > 1 or len(title) > HEADING_CHARS or REVISION.search(title) or "" in passed:
+        return "explanation" if any(EXPLANATION.search(line) for line in lines[:1]) else "other"
+    if EXPLANATION.search(title):
         return "explanation"
-    part = _PART.search(title) if title else before.numbers != listing.numbers
+    part = PART.search(title) if title else before.numbers != listing.numbers
     if not (part and before.ends_named):
         return "other"
     return "skip" if plans[-1].explained else "part"
@@ -351,7 +197,7 @@ def _chosen(plans: list[_Plan], answer: str) -> _Plan | None:
     if options and last.option:
         if len({tuple(plan.numbers) for plan in plans}) == 1:
             return last
-        chosen = [match["a"] or match["b"] for match in _CHOICE.finditer(answer)]
+        chosen = [match["a"] or match["b"] for match in CHOICE.finditer(answer)]
         named = [plan for plan in plans if chosen and plan.option == chosen[-1].lower()]
         return named[-1] if named else (last if len(plans) == 1 else None)
     return last
@@ -365,24 +211,16 @@ def _is_cut_off(answer: str, found: list[Listing], below: list[str]) -> bool:
     return unclosed or (not found[-1].ends_named)
 
 
-def _is_declined(answer: str, named: list[Listing]) -> bool:
+def _is_declined(named: list[Listing]) -> bool:
     """Whether a refusal says of its list that it is only how one might look."""
-    return any(
-        re.search(
-            r"would|could|generic|hypothetical|in general|typical|illustrat|placeholder|candidates",
-            line,
-            re.IGNORECASE,
-        )
-        for listing in named
-        for line in listing.above[-2:]
-    )
+    return any(SUPPOSED.search(line) for listing in named for line in listing.above[-2:])
 
 
 def _is_reversed(plan: _Plan, form: str) -> bool:
     """Whether the reply says that its list is to be built from its end."""
     said = [plan.title, *plan.lists[-1].above[-3:], plan.lists[-1].label, *plan.below[:4]]
-    if any(BACKWARD.search(line) and not _NOT_REVERSED.search(line) for line in said):
+    if any(BACKWARD.search(line) and not NOT_REVERSED.search(line) for line in said):
         return True
     return form in ("labeled", "chain", "marked") and bool(
-        _DOWNWARD.search(" ".join(said[:-4] or said))
+        DOWNWARD.search(" ".join(said[:-4] or said))
     )

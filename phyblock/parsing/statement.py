@@ -15,7 +15,7 @@ from phyblock.parsing.text_forms import number_of_word
 __all__ = ["MOST_AT_ONCE", "VERB", "Statement", "chain", "read_statement"]
 
 MOST_AT_ONCE = 22
-"""Blocks that one statement moves at most: longer ranges and multiplicities are taken for others."""
+"""Blocks that one statement moves at most: longer ranges and multiplicities are none."""
 _STATEMENT_CHARS = 600
 
 VERB = (
@@ -56,7 +56,8 @@ _DIGITS = rf"[0-9]{{1,6}}(?![0-9]|\.[0-9]|[a-wyz]){_UNIT}"
 _TO = r"\s{0,2}(?:-|\u2013|\u2014|~|\bto\b|\bthrough\b|\bthru\b|\bbis\b|至|到)\s{0,2}"
 _OR = r"\s{0,3},?\s{0,3}(?:\bor\b|\boder\b|\bou\b|/|或者?)\s{0,3}"
 _AND = (
-    r"\s{0,3}(?:, ?(?:and|then|und)\b|,|、|&|\+|\band then\b|\band\b|\bund\b|\bet\b|\by\b|\bthen\b|和"
+    r"\s{0,3}(?:, ?(?:and|then|und)\b|,|、|&|\+|\band then\b|\band\b|\bund\b|\bet\b|\by\b|\bthen\b"
+    r"|和"
     r"|与|及)"
     r"\s{0,3}"
 )
@@ -133,7 +134,8 @@ _PIECE_VERB = re.compile(
     re.IGNORECASE,
 )
 _JOINS = re.compile(
-    rf"(?:[\s,()\]\-→>&+、，。]|\([^()\n]{{0,80}}\)|\b(?:and|then|und|dann|et|puis|y|luego|followed by"
+    rf"(?:[\s,()\]\-→>&+、，。]|\([^()\n]{{0,80}}\)|\b(?:and|then|und|dann|et|puis|y|luego"
+    r"|followed by"
     rf"|finally|also|next"
     rf"|another|again|more|the|a|one|an|(?:red|blue|green|yellow|orange|purple|long|small|large"
     rf"|vertical|horizontal"
@@ -172,7 +174,7 @@ class Statement:
 
 
 def read_statement(text: str, *, is_item: bool) -> Statement:
-    """What a line without markup moves; `is_item`: it is an item of a list, where a number may do."""
+    """What a line without markup moves; in an item of a list (`is_item`) a number alone may do."""
     text = _HERE.sub(" ", text[:_STATEMENT_CHARS])
     bare: tuple[int, ...] = ()
     moved: list[int] = []
@@ -189,7 +191,7 @@ def read_statement(text: str, *, is_item: bool) -> Statement:
 
 
 def chain(text: str) -> tuple[tuple[int, ...], bool]:
-    """The numbers of a text that is numbers alone ("3, 5, 12"), and whether arrows say the order."""
+    """The numbers of a text of numbers alone ("3, 5, 12"), and whether arrows say the order."""
     found = _CHAIN.match(text)
     if found is None:
         return (), False

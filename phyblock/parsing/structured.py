@@ -1,4 +1,4 @@
-"""Lists in a form of their own: JSON, read by its keys, and Markdown tables, read by their columns."""
+"""Lists in a form of their own: JSON, read by its keys, and tables, read by their columns."""
 
 from __future__ import annotations
 

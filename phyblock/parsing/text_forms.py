@@ -32,7 +32,8 @@ BACKWARD = re.compile(
     r"\b(?:in |the )?revers(?:e|ed)(?: (?:order|of))?\b|\bbackwards?\b"
     r"|from (?:the )?last to (?:the )?first"
     r"|last (?:step|block|one|item|picture) first|read (?:it )?from (?:the )?(?:bottom|end|right)"
-    r"|umgekehrte?r? reihenfolge|rückwärts|von hinten|倒序|逆序|反过来|从后(?:往|到|向)前|相反的?顺序|ordre inverse"
+    r"|umgekehrte?r? reihenfolge|rückwärts|von hinten|倒序|逆序|反过来|从后(?:往|到|向)前|相反的?顺序"
+    r"|ordre inverse"
     r"|orden inverso",
     re.IGNORECASE,
 )
@@ -41,19 +42,27 @@ _NUMBER_WORDS = {
     word: number
     for number, words in enumerate(
         (
-            "one eins un une uno uno um один 一", "two zwei deux dos due dois два 二 两",
-            "three drei trois tres tre três три 三", "four vier quatre cuatro quattro quatro четыре 四",
-            "five fünf cinq cinco cinque пять 五", "six sechs seis sei шесть 六",
-            "seven sieben sept siete sette sete семь 七", "eight acht huit ocho otto oito восемь 八",
-            "nine neun neuf nueve nove девять 九", "ten zehn dix diez dieci dez десять 十",
-            "eleven elf onze once undici одиннадцать 十一", "twelve zwölf douze doce dodici двенадцать 十二",
-            "thirteen dreizehn treize trece tredici 十三", "fourteen vierzehn quatorze catorce 十四",
-            "fifteen fünfzehn quinze quince quindici 十五", "sixteen sechzehn seize dieciséis sedici 十六",
+            "one eins un une uno uno um один 一",
+            "two zwei deux dos due dois два 二 两",
+            "three drei trois tres tre três три 三",
+            "four vier quatre cuatro quattro quatro четыре 四",
+            "five fünf cinq cinco cinque пять 五",
+            "six sechs seis sei шесть 六",
+            "seven sieben sept siete sette sete семь 七",
+            "eight acht huit ocho otto oito восемь 八",
+            "nine neun neuf nueve nove девять 九",
+            "ten zehn dix diez dieci dez десять 十",
+            "eleven elf onze once undici одиннадцать 十一",
+            "twelve zwölf douze doce dodici двенадцать 十二",
+            "thirteen dreizehn treize trece tredici 十三",
+            "fourteen vierzehn quatorze catorce 十四",
+            "fifteen fünfzehn quinze quince quindici 十五",
+            "sixteen sechzehn seize dieciséis sedici 十六",
         ),
         start=1,
     )
     for word in words.split()
-}  # fmt: skip
+}
 
 
 def answer_of(text: str) -> str | None:

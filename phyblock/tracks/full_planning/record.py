@@ -21,6 +21,10 @@ class PlanParse(Line):
     """Candidate numbers in order."""
     dropped: tuple[int, ...] = ()
     """Numbers that no candidate has."""
+    version: int = 1
+    """Version of the parser."""
+    problem: str | None = None
+    """Why nothing could be read."""
 
 
 PLAN_COLUMNS = {"parser": "object", "plan": "object", "dropped": "object"}

@@ -11,7 +11,7 @@ from typing import Any
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
 from phyblock.models.base import Image, Request
-from phyblock.parsing import ParsedPlan, parse_plan
+from phyblock.parsing import ParsedPlan, parse_plan, reader_version
 from phyblock.scoring import AssemblyScorer, Score
 from phyblock.tracks.full_planning.baselines import PlanSubject
 from phyblock.tracks.pictures import Pictures
@@ -52,6 +52,8 @@ class PlanJudgement:
                 "rule": self.parsed.rule,
                 "plan": list(self.parsed.plan.steps),
                 "dropped": list(self.parsed.dropped),
+                "version": reader_version(self.parser),
+                "problem": self.parsed.problem,
             },
             "scores": [_score(score) for score in self.scores],
         }
@@ -83,13 +85,15 @@ class FullPlanning:
         return {}
 
     def identity(self) -> dict[str, Any]:
-        """Name and version of the prompt, and a digest of all that decides the pictures."""
+        """Name and version of the prompt, a digest of the pictures, the version of the reader."""
+        reader = reader_version(self.rules.parser)
         if self._prompt is None or self._pictures is None:
-            return {"prompt": None, "pictures": None}
+            return {"prompt": None, "pictures": None, "reader": reader}
         keys = [self._pictures.keys(task) for task in self.items]
         return {
             "prompt": {"name": self._prompt.name, "version": self._prompt.version},
             "pictures": hashlib.sha256(json.dumps(keys).encode()).hexdigest(),
+            "reader": reader,
         }
 
     async def request(

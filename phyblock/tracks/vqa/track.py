@@ -16,7 +16,7 @@ from phyblock.domain.rotation import rotated, rotated_label
 from phyblock.errors import Problem, SpecError
 from phyblock.models.base import Image, Request
 from phyblock.models.guesses import Guesses
-from phyblock.parsing import ParsedAnswer, parse_answer
+from phyblock.parsing import READER_VERSION, ParsedAnswer, parse_answer
 from phyblock.tracks.prompts import Prompt
 from phyblock.tracks.vqa.baselines import ChoiceSubject
 from phyblock.tracks.vqa.pictures import OptionsAs, QuestionPictures, Shown
@@ -140,7 +140,7 @@ class Vqa:
         }
 
     def identity(self) -> dict[str, Any]:
-        """Digests of all questions, of those asked, the prompt and the pictures."""
+        """Digests of all questions, of those asked, prompt and pictures; the version of the reader."""
         counts = Counter(item.question.subtask for item in self.items)
         keys = [item.key for item in self.items]
         told: dict[str, Any] = {
@@ -149,6 +149,7 @@ class Vqa:
             "by_subtask": dict(counts),
             "prompt": None,
             "pictures": None,
+            "reader": READER_VERSION,
         }
         if self._prompt is not None and self._pictures is not None:
             told["prompt"] = {"name": self._prompt.name, "version": self._prompt.version}
