@@ -1,5 +1,7 @@
 """How replies state an answer, correct themselves, turn an option down, or say that they cannot."""
 
+# ruff: noqa: RUF001 -- replies come in other scripts
+
 from __future__ import annotations
 
 import re

@@ -47,7 +47,7 @@ _NEGATION = re.compile(
 )
 _SENTENCE_END = re.compile(r"[.!?。](?:\s|\Z)")
 _ARTICLES = re.compile(r"^(?:the|an|a)\s")
-EDGES = " \t\n.,:;!?()[]{}<>-\u2013\u2014。，"
+EDGES = " \t\n.,:;!?()[]{}<>-\u2013\u2014。，"  # noqa: RUF001
 _NUMBERED = re.compile(
     r"(?:the\s)?(?:option|choice|alternative)\s{0,2}(?:number\s{1,2}|no\.?\s{0,2}|#)?"
     r"\(?(?P<number>\d{1,2})(?![\d.,]?\d)",
@@ -242,7 +242,7 @@ def _head(value: str) -> tuple[re.Match[str] | None, bool]:
 
 def _is_word(head: re.Match[str], rest: str, after: str, *, named: bool) -> bool:
     """Whether a letter is a word of the sentence ("A cube") or of another language."""
-    closed = bool(re.match(r"\s?[)\]}>.:,;!。．，、：\n]|\s?\Z|\s[\-\u2013\u2014]", rest))
+    closed = bool(re.match(r"\s?[)\]}>.:,;!。．，、：\n]|\s?\Z|\s[\-\u2013\u2014]", rest))  # noqa: RUF001
     if head["open"] or closed:
         return False
     if head["letter"] == "a":

@@ -1,5 +1,7 @@
 """Forms of the lines of a reply: heads of steps, numbers, marks, labels, fences."""
 
+# ruff: noqa: RUF001 -- replies come in other scripts
+
 from __future__ import annotations
 
 import re

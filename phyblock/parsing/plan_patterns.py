@@ -1,5 +1,7 @@
 """Words by which replies announce plans, parts, choices, refusals and what is no plan."""
 
+# ruff: noqa: RUF001 -- replies come in other scripts
+
 from __future__ import annotations
 
 import re

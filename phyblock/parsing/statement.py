@@ -5,6 +5,8 @@ multiplicities are counted out; of alternatives the first one counts; what is sa
 is not.
 """
 
+# ruff: noqa: RUF001 -- replies come in other scripts
+
 from __future__ import annotations
 
 import re

@@ -1,5 +1,7 @@
 """What of a reply is read: the answer behind the thinking, in plain forms of its characters."""
 
+# ruff: noqa: RUF001 -- replies come in other scripts
+
 from __future__ import annotations
 
 import re
@@ -32,7 +34,8 @@ BACKWARD = re.compile(
     r"\b(?:in |the )?revers(?:e|ed)(?: (?:order|of))?\b|\bbackwards?\b"
     r"|from (?:the )?last to (?:the )?first"
     r"|last (?:step|block|one|item|picture) first|read (?:it )?from (?:the )?(?:bottom|end|right)"
-    r"|umgekehrte?r? reihenfolge|rückwärts|von hinten|倒序|逆序|反过来|从后(?:往|到|向)前|相反的?顺序"
+    r"|umgekehrte?r? reihenfolge|rückwärts|von hinten|倒序|逆序|反过来"
+    r"|从后(?:往|到|向)前|相反的?顺序"
     r"|ordre inverse"
     r"|orden inverso",
     re.IGNORECASE,

@@ -140,7 +140,7 @@ class Vqa:
         }
 
     def identity(self) -> dict[str, Any]:
-        """Digests of all questions, of those asked, prompt and pictures; the version of the reader."""
+        """Digests of all questions, of those asked, prompt and pictures; the reader's version."""
         counts = Counter(item.question.subtask for item in self.items)
         keys = [item.key for item in self.items]
         told: dict[str, Any] = {
