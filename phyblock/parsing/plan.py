@@ -197,7 +197,10 @@ def _chosen(plans: list[_Plan], answer: str) -> _Plan | None:
     if options and last.option:
         if len({tuple(plan.numbers) for plan in plans}) == 1:
             return last
-        chosen = [match["a"] or match["b"] for match in CHOICE.finditer(answer)]
+        chosen = [
+            match["a"] or match["b"] or match["c"] or match["d"]
+            for match in CHOICE.finditer(answer)
+        ]
         named = [plan for plan in plans if chosen and plan.option == chosen[-1].lower()]
         return named[-1] if named else (last if len(plans) == 1 else None)
     return last

@@ -86,11 +86,15 @@ CHOICE = re.compile(
     r"|\b(?:plan|option|alternative|variant|solution|approach|version|lösung)\s{0,2}#?(?P<b>[A-D]"
     r"|[1-4]|one|two|three|I{1,3})\b"
     r"\s(?:is|seems|looks|ist|wins)\s?(?:the |my |more |clearly |a )?(?:better|best|final|correct"
-    r"|right|stable|preferred|chosen|answer|one|besser|richtig)",
+    r"|right|stable|preferred|chosen|answer|one|besser|richtig)"
+    r"|\b(?:plan|option|alternative|variant|solution|version)\s?#?(?P<c>[A-D]|[1-4])\s?[(,:\-\u2013]{1,2}\s?"
+    r"(?:better|best|chosen|final|recommended|preferred)\b"
+    r"|\b(?:decision|choice|winner|entscheidung|wahl)\W{1,4}(?:is\s)?(?P<d>[A-D])\b(?!\w)",
     re.IGNORECASE,
 )
 REVISION = re.compile(
-    r"final|correct|revis|updat|actual|summar|complete|overall|optimi|improv|korrigier"
+    r"final|correct|revis|updat|actual|summar|complete|overall|optimi|improv|korrigier|attempt|error|mistake|oops"
+    r"|\btry\b|new plan"
     r"|\b(?:instead|answer|again|better|so|thus|therefore|wait|output)\b",
     re.IGNORECASE,
 )

@@ -82,7 +82,7 @@ _MENTION = re.compile(
 )
 _TIMES = re.compile(
     r"[\s)\]}]{0,3}(?:\s?\([^()\d\n]{0,60}\))?[\s,]{0,2}[(\[]?\s?(?:"
-    r"[x×]\s?(?P<a>\d{1,2})(?!\d)|(?P<b>\d{1,2})\s?(?:[x×](?!\w)|times\b|mal\b|fois\b|veces\b|次)"
+    r"[x×]\s?(?P<a>\d{1,2})(?!\d)|(?P<b>\d{1,2})\s?(?:[x×](?!\w)|of (?:them|these)\b|copies\b|pieces\b|times\b|mal\b|fois\b|veces\b|次)"
     r"|(?P<twice>twice|zweimal|deux fois|dos veces|两次|二次)|(?P<thrice>thrice|dreimal|三次)"
     r"|(?P<word>[^\W\d_]{2,8})\s(?:times|mal|fois|veces)\b)",
     re.IGNORECASE,
@@ -118,7 +118,14 @@ _SUPPORT = re.compile(
     rf"(?:[\s(,]{{0,3}}(?!{VERB}|(?:it|them)\b)[^\W\d]{{1,16}}){{0,7}}[\s(#]{{0,3}}\Z",
     re.IGNORECASE,
 )
+_STANDS = re.compile(
+    r"[\s)]{0,3}(?:\([^()\n]{0,40}\)\s?)?(?:as (?:a |the |its )?(?:support|reference|anchor)\b|(?:below|beneath|underneath)(?=\s?[,;]|\Z)"
+    r"|already\b|(?:being |is )?in place\b)",
+    re.IGNORECASE,
+)
+"""What stands behind a block that is there already."""
 _NEGATED = re.compile(
+    rf"\b(?:after|once|having|before|nachdem|bevor)\s(?:\w{{1,12}}\s){{0,2}}?{VERB}[^,;]{{0,40}}\Z|"
     rf"(?:\b(?:not|never|avoid|without|cannot|nicht|no|ne|не)\b|n't\b|不要?"
     rf"|别)\s{{0,2}}(?:\w{{1,12}}\s){{0,2}}{VERB}"
     r"[^,;]{0,60}\Z|\b(?:remov\w{1,3}|discard|ignor\w{1,3}|skip|exclud\w{1,3}|reject|leave out"
@@ -161,6 +168,7 @@ _CHAIN = re.compile(
     re.IGNORECASE,
 )
 _NUMBER = re.compile(r"\d{1,6}")
+_SAYS_NUMBER = re.compile(rf"\d|{_WORD_NUMBER}", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -177,7 +185,10 @@ class Statement:
 
 def read_statement(text: str, *, is_item: bool) -> Statement:
     """What a line without markup moves; in an item of a list (`is_item`) a number alone may do."""
-    text = _HERE.sub(" ", text[:_STATEMENT_CHARS])
+    text = text[:_STATEMENT_CHARS]
+    if not _SAYS_NUMBER.search(text):
+        return Statement(())
+    text = _HERE.sub(" ", text)
     bare: tuple[int, ...] = ()
     moved: list[int] = []
     for piece in _pieces(text):
@@ -221,6 +232,8 @@ def _moved(piece: str) -> list[int]:
     for mention in _MENTION.finditer(piece):
         start = mention.start() + len(mention["verb"] or mention["call"] or "")
         is_call = bool(mention["verb"] or mention["call"])
+        if not is_call and _STANDS.match(piece, mention.end()):
+            continue
         before = piece[max(0, start - 120) : start]
         if _NEGATED.search(before) or (not is_call and _SUPPORT.search(before)):
             continue

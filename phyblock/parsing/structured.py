@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from phyblock.parsing.statement import MOST_AT_ONCE, chain, read_statement
-from phyblock.parsing.text_forms import plain_line
+from phyblock.parsing.text_forms import BACKWARD, plain_line
 
 __all__ = ["Found", "find_json", "find_tables", "objects", "whole_number"]
 
@@ -66,6 +66,9 @@ _MANY_KEY = re.compile(
     r"blocks|indices|indexes|ids|candidates|pieces|block_ids|block_indices|积木", re.IGNORECASE
 )
 _LOOKS_KEY = re.compile(r"shape|color|colour|orientation|type|形状|颜色", re.IGNORECASE)
+_BACKWARD_KEY = re.compile(
+    r"revers|backward|top[ _-](?:to[ _-]bottom|down)|last[ _-]to[ _-]first", re.I
+)
 _CHOICE_KEY = re.compile(
     r"(?:plan|option|alternative|variant)[ _-]?(?P<which>[a-d1-4])", re.IGNORECASE
 )
@@ -163,6 +166,16 @@ def _line(text: str) -> Sequence[int]:
 def _object(fields: _Fields, *, is_plan: bool) -> list[int]:
     if _is_step(fields):
         return _step(fields)
+    found = _ordered(fields, is_plan=is_plan)
+    is_reversed = any(
+        BACKWARD.search(value) if isinstance(value, str) else _BACKWARD_KEY.search(key)
+        for key, value in fields
+    )
+    return found[::-1] if is_reversed else found
+
+
+def _ordered(fields: _Fields, *, is_plan: bool) -> list[int]:
+    """The blocks of an object of steps, layers or plans, in the order in which they stand."""
     steps = [(match, value) for key, value in fields if (match := _STEP_KEY.fullmatch(key.strip()))]
     plans = [value for key, value in fields if _PLAN_KEY.fullmatch(key.strip())]
     choices = [(m["which"], v) for k, v in fields if (m := _CHOICE_KEY.fullmatch(k.strip()))]

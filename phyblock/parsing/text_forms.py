@@ -10,9 +10,10 @@ import unicodedata
 __all__ = ["BACKWARD", "answer_of", "number_of_word", "plain_forms", "plain_line"]
 
 _NOT_ASCII = re.compile(r"[^\x00-\x7f]")
+_TAGS = r"(?:think(?:ing)?|thoughts?|reasoning|scratchpad|analysis|reflection)"
 _THINKING = re.compile(
-    r"(?P<closes></(?:think(?:ing)?|thought|reasoning)>|\[/THINK\]|◁/think▷)"
-    r"|(?P<opens><(?:think(?:ing)?|thought|reasoning)>|\[THINK\]|◁think▷)",
+    rf"(?P<closes></{_TAGS}>|\[/THINK\]|◁/think▷|<\|channel\|>final<\|message\|>)"
+    rf"|(?P<opens><{_TAGS}>|\[THINK\]|◁think▷|<\|channel\|>analysis<\|message\|>)",
     re.IGNORECASE,
 )
 _NEXT_TURN = re.compile(
