@@ -78,7 +78,7 @@ def _official(text: str) -> _Read:
 
 
 _FRAME = re.compile(
-    r"<(?:final_)?answer>(?P<tag>.{1,20000}?)(?:</(?:final_)?answer>|\Z)"
+    r"<(?:final_)?answer>(?P<tag>(?:(?!<(?:final_)?answer>).){1,20000}?)(?:</(?:final_)?answer>|\Z)"
     r"|\\boxed\s{0,2}\{(?P<boxed>(?:[^{}]|\{[^{}]{0,200}\}){1,4000})\}",
     re.IGNORECASE | re.DOTALL,
 )

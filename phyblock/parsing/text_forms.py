@@ -21,7 +21,7 @@ _NEXT_TURN = re.compile(
 )
 """What a server should have stopped at: behind it a model plays the next turn."""
 _STRUCK_OUT = re.compile(
-    r"~~[^~\n]{1,400}~~|<(?:del|s)>[^<>\n]{1,400}</(?:del|s)>|<!--.{0,4000}?-->"
+    r"~~[^~\n]{1,400}~~|<(?:del|s)>[^<>\n]{1,400}</(?:del|s)>|<!--(?:(?!<!--).){0,4000}?-->"
 )
 _QUOTES = re.compile(
     r"[*`\"\u201c\u201d\u00ab\u00bb\u201e]|(?<!\w)['\u2018\u2019]|['\u2018\u2019](?!\w)"
