@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-__all__ = ["bundled", "cache_dir", "reply_cache_file"]
+__all__ = ["bundled", "bundled_sets", "cache_dir", "reply_cache_file"]
 
 _PACKAGE = Path(__file__).parent
 
@@ -17,6 +17,11 @@ def bundled(*parts: str) -> Path:
     """
     inside = _PACKAGE / "bundled"
     return (inside if inside.is_dir() else _PACKAGE.parent).joinpath(*parts)
+
+
+def bundled_sets(file: str) -> list[str]:
+    """Names of the bundled data sets that hold a file of this name, sorted."""
+    return sorted(path.parent.name for path in bundled("benchmarks", "data").glob(f"*/{file}"))
 
 
 def cache_dir() -> Path:

@@ -15,6 +15,8 @@ __all__ = [
     "PLAN_PARSERS",
     "SETTINGS",
     "Background",
+    "CandidateOrder",
+    "CandidateScale",
     "Criterion",
     "DataFormat",
     "Finish",
@@ -65,11 +67,14 @@ DataFormat = Literal["builtin", "official"]
 """Layouts of data sets and question sets."""
 
 Background = Literal["checkerboard", "white", "light-wood", "dark-wood", "concrete", "lawn"]
-"""The six backgrounds of the paper; the checkerboard is dark."""
+"""The six backgrounds of the paper; the checkerboard is dark, and where nothing else is said."""
 BACKGROUNDS: tuple[Background, ...] = get_args(Background)
 PictureName = Literal["goal", "candidates"]
 PictureSource = Literal["render", "dataset"]
 PictureLayout = Literal["composite", "separate"]
+CandidateOrder = Literal["file", "shuffled"]
+"""In which order candidates are numbered and shown."""
+CandidateScale = Literal["common", "fit"]
 
 Role = Literal["system", "user", "assistant"]
 """Who speaks in a chat message."""

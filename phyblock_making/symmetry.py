@@ -27,10 +27,12 @@ from phyblock_making.poses import POSES
 __all__ = [
     "SYMMETRIES",
     "Symmetry",
+    "angles_deg",
     "canonical_form",
     "find_twins",
     "fingerprint",
     "transformed",
+    "turned_form",
 ]
 
 Matrix = NDArray[np.float64]
@@ -81,6 +83,11 @@ def canonical_form(blocks: Sequence[Block]) -> tuple[tuple[object, ...], ...]:
     return min(_form(transformed(blocks, symmetry)) for symmetry in SYMMETRIES)
 
 
+def turned_form(blocks: Sequence[Block]) -> tuple[tuple[object, ...], ...]:
+    """A name of the structure that turning and shifting it keeps, and mirroring does not."""
+    return min(_form(transformed(blocks, Symmetry(turns))) for turns in range(4))
+
+
 def fingerprint(blocks: Sequence[Block]) -> bytes:
     """16 bytes that are equal for equal canonical forms, and in practice for no others."""
     return hashlib.sha256(repr(canonical_form(blocks)).encode()).digest()[:16]
@@ -115,7 +122,7 @@ def _turned(block_type: BlockType, euler_deg: Euler, symmetry: Symmetry) -> Eule
     """Angles of the image of a pose, as `POSES` names them where it does."""
     body = _MIRROR if symmetry.mirrored else np.eye(3)
     image = symmetry.matrix @ euler_deg_to_matrix(euler_deg) @ body
-    angles = _angles_deg(image)
+    angles = angles_deg(image)
     wanted = _pose_class(block_type, angles)
     for known in POSES[block_type].values():
         if _pose_class(block_type, known) == wanted:
@@ -132,7 +139,7 @@ def _pose_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, ...]:
     return orientation_class(block_type, euler_deg)
 
 
-def _angles_deg(rotation: Matrix) -> Euler:
+def angles_deg(rotation: Matrix) -> Euler:
     """Extrinsic x-y-z angles [degrees] of a rotation matrix: R = Rz Ry Rx."""
     sine = -float(rotation[2, 0])
     if abs(sine) > 1 - 1e-9:

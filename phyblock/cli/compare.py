@@ -10,7 +10,7 @@ from phyblock.cli.console import make_console, print_view, shown_path
 from phyblock.cli.names import split_names
 from phyblock.cli.paths import UserPath
 from phyblock.report.compare import compare_models, compare_runs
-from phyblock.report.compare_view import compare_view, flipped_lines, write_comparison
+from phyblock.report.compare_view import compare_view, flipped_lines, ranks_view, write_comparison
 from phyblock.tables.load import load_run
 
 __all__ = ["command"]
@@ -33,8 +33,9 @@ def command(
 ) -> None:
     """Compare the models of the folder RUN with one another, or those of RUN with OTHER's.
 
-    Pairs of samples of the same scene or question and seed; intervals from resampling base scenes;
-    p values with Holm's correction.
+    Pairs of samples of the same scene or question and seed, tested by a t test that knows which
+    scenes share base scenes; p values with Holm's correction, and the difference that each test
+    could have found.
     """
     names = split_names(models)
     first = load_run(run, texts=False)
@@ -45,6 +46,8 @@ def command(
     )
     console = make_console()
     print_view(console, compare_view(found))
+    if len(found.ranks) > 2:
+        print_view(console, ranks_view(found))
     if found.table[["a", "b"]].drop_duplicates().shape[0] == 1:
         for line in flipped_lines(found):
             console.print(line, markup=False, soft_wrap=True)

@@ -1,7 +1,8 @@
-"""`phyblock episode`: one step-planning episode, as text or as moving pictures."""
+"""`phyblock episode`: one episode of a run, as text or as moving pictures."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 
 import click
@@ -11,13 +12,15 @@ from phyblock.cli.paths import UserPath
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.files import write_named
-from phyblock.records import MANIFEST, RECORDS, read_manifest
+from phyblock.records import MANIFEST, RECORDS, Record, read_manifest
 from phyblock.records.reading import newest_starts, run_records
-from phyblock.run.data import open_dataset
+from phyblock.run.data import recorded_dataset
 from phyblock.sim import PictureStyle
 from phyblock.sim.film import episode_gif, episode_images, episode_sheet
-from phyblock.tracks.step_planning.film import episode_film, episode_table
-from phyblock.tracks.step_planning.record import EpisodeRecord
+from phyblock.tables.design import read_design
+from phyblock.tables.track_report import EpisodeView
+from phyblock.tracks import kind_of, kinds
+from phyblock.tracks.showing import as_recorded
 
 __all__ = ["command"]
 
@@ -48,16 +51,18 @@ def command(
 ) -> None:
     """Show the episode SAMPLE of the folder RUN: every step, wrong ones too.
 
-    SAMPLE is as in records.jsonl (step_planning/MODEL/SCENE/sSEED); a part of it will do where
-    only one episode has it.
+    SAMPLE is as in records.jsonl (TRACK/MODEL/SCENE/sSEED); a part of it will do where only one
+    episode has it.
     """
-    record = _find(run, sample)
+    views = _views()
+    record = _find(run, sample, views)
+    view = views[record.track]
     console = make_console()
-    print_view(console, episode_table(record))
+    print_view(console, view.table(record))
     if gif is None and sheet is None:
         return
     task = _task(run, record, data)
-    steps = list(episode_film(record, task))
+    steps = list(view.frames(record, task))
     images = episode_images(task.scene, task.candidates, steps, PictureStyle(size))
     for path, make in ((gif, episode_gif), (sheet, episode_sheet)):
         if path is not None:
@@ -65,18 +70,25 @@ def command(
             console.print(f"{len(images)} frames in {shown_path(path)}", markup=False)
 
 
-def _find(run: Path, sample: str) -> EpisodeRecord:
+def _views() -> dict[str, EpisodeView]:
+    """How episodes are shown, by track."""
+    views = {name: kind.report().episodes for name, kind in kinds().items() if kind.plays}
+    return {name: view for name, view in views.items() if view is not None}
+
+
+def _find(run: Path, sample: str, tracks: Collection[str]) -> Record:
     """The one episode that `sample` means; StoreError with the others when there is not one."""
     lines = run_records(run)
-    starts = newest_starts(lines, EpisodeRecord)
+    starts = newest_starts(lines, tracks)
     episodes = list(starts)
     if not episodes:
         hint = "phyblock run steps makes runs with episodes"
-        message = "holds no episodes of step planning"
+        titles = ", ".join(kind_of(name).title.lower() for name in tracks)
+        message = f"holds no episodes of {titles}"
         raise StoreError(Problem(str(run / RECORDS), message, hint=hint))
     found = [sample] if sample in episodes else [name for name in episodes if sample in name]
     if len(found) == 1:
-        return next(r for r in lines.at([starts[found[0]]]) if isinstance(r, EpisodeRecord))
+        return next(iter(lines.at([starts[found[0]]])))
     message = "holds no such episode" if not found else f"holds {len(found)} such episodes"
     offered = found or episodes
     more = [f"and {len(offered) - _NAMED} more"] if len(offered) > _NAMED else []
@@ -85,16 +97,11 @@ def _find(run: Path, sample: str) -> EpisodeRecord:
     raise StoreError(problem)
 
 
-def _task(run: Path, record: EpisodeRecord, data: Path | None) -> AssemblyTask:
-    about = read_manifest(run).dataset
-    hint = "name the folder where it is now with --data"
-    if about is None:
-        raise StoreError(Problem(str(run / MANIFEST), "names no data set", "dataset"))
-    root = data or Path(about.root)
-    if not root.is_dir():
-        raise DataError(Problem(str(root), "the data set of the run is not there", hint=hint))
-    tasks = {task.scene.id: task for task in open_dataset(about.format, root).tasks}
+def _task(run: Path, record: Record, data: Path | None) -> AssemblyTask:
+    manifest = read_manifest(run)
+    levels = read_design(manifest.fields(), str(run / MANIFEST)).suite.levels
+    dataset = recorded_dataset(run, manifest, levels, data)
+    tasks = {task.scene.id: task for task in dataset.tasks}
     if record.scene not in tasks:
-        message = "holds no such scene"
-        raise DataError(Problem(str(root), message, "scene", record.scene, hint=hint))
-    return tasks[record.scene]
+        raise DataError(Problem(str(dataset.root), "holds no such scene", "scene", record.scene))
+    return as_recorded(tasks[record.scene], record)

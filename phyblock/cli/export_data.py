@@ -1,39 +1,37 @@
-"""`phyblock export-data`: questions with their pictures, for other tools."""
+"""`phyblock export-data`: what tracks ask about, with its pictures, for other tools."""
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import click
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
-from phyblock.datasets import SCENES_FILE
-from phyblock.domain import SUBTASKS
-from phyblock.report.export.questions import QUESTION_FORMATS, export_questions
-from phyblock.resources import bundled, cache_dir
-from phyblock.run.data import open_dataset
-from phyblock.sim import PictureStyle
-from phyblock.tracks.vqa.opening import open_questions, select_questions
-from phyblock.tracks.vqa.pictures import QuestionPictures
+from phyblock.datasets.named import read_data_set
+from phyblock.tables.track_report import ItemExport
+from phyblock.tracks import kinds
 
 __all__ = ["command"]
 
-_LEVELS = (1, 2, 3, 4)
+
+def _exports() -> dict[str, ItemExport]:
+    """What the tracks write, by the word after `--to`; of two, the later track has it."""
+    brought = [kind.report().export for kind in kinds().values()]
+    return {form: export for export in brought if export is not None for form in export.formats}
+
+
+_EXPORTS = _exports()
+_SETS = dict.fromkeys(export.items for export in _EXPORTS.values())
 
 
 @click.command("export-data")
-@click.option(
-    "--to", "form", required=True, type=click.Choice(list(QUESTION_FORMATS)), help="The format."
-)
+@click.option("--to", "form", required=True, type=click.Choice(list(_EXPORTS)), help="The format.")
 @click.option("--out", required=True, type=UserPath(), help="Folder to write.")
 @click.option(
     "--questions",
     type=NAME_OR_PATH,
-    default="phyblock-vqa",
-    show_default=True,
-    help="A set of questions, or folder.",
+    help=f"A set of questions, or folder. [default: {', '.join(_SETS)}]",
 )
 @click.option(
     "--data",
@@ -52,24 +50,12 @@ _LEVELS = (1, 2, 3, 4)
     help="Edge of a picture in pixels.",
 )
 def command(
-    form: str, out: Path, questions: str, data: str, limit: int | None, size_px: int
+    form: str, out: Path, questions: str | None, data: str, limit: int | None, size_px: int
 ) -> None:
     """Write questions with their pictures: a VLMEvalKit TSV, or a Hugging Face dataset."""
-    scenes = open_dataset("builtin", _found(data, SCENES_FILE))
-    asked = open_questions("builtin", _found(questions, "questions.jsonl"), scenes)
-    tasks = select_questions(asked.tasks, SUBTASKS, _LEVELS, None, limit)
-    workers = min(4, os.cpu_count() or 1)
-    style = PictureStyle(size_px=size_px)
-    pictures = QuestionPictures(cache_dir() / "pictures", style, "images", workers)
-    try:
-        files = export_questions(tasks, pictures, form, out)
-    finally:
-        pictures.close()
+    export = _EXPORTS[form]
+    scenes = read_data_set(data)
+    files = export.write(form, out, questions or export.items, scenes, limit, size_px)
     console = make_console()
     for file in files:
         console.print(shown_path(file), markup=False, soft_wrap=True)
-
-
-def _found(name: str, file: str) -> Path:
-    """The folder that a name means: a path that holds `file`, else a bundled data set."""
-    return Path(name) if (Path(name) / file).is_file() else bundled("benchmarks", "data", name)

@@ -9,7 +9,12 @@ from phyblock.errors import Problem, SpecError
 from phyblock.resources import bundled
 from phyblock.specs import did_you_mean
 
-__all__ = ["find_models_file", "find_suite", "what_it_is"]
+__all__ = ["bundled_suites", "find_models_file", "find_suite", "what_it_is"]
+
+
+def bundled_suites() -> list[str]:
+    """Names of the suites that come with the project, sorted."""
+    return sorted(path.stem for path in bundled("benchmarks").glob("*.yaml"))
 
 
 def find_suite(name: str) -> Path:
@@ -24,7 +29,7 @@ def find_suite(name: str) -> Path:
         inside = bundled("benchmarks", f"{path.stem}.yaml")
         if os.path.isfile(inside):
             return inside
-    names = sorted(p.stem for p in bundled("benchmarks").glob("*.yaml"))
+    names = bundled_suites()
     hint = did_you_mean(path.stem, names)
     allowed = "a suite file, or a bundled suite: " + ", ".join(names)
     message = what_it_is(path) or "there is no such suite"

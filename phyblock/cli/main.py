@@ -21,7 +21,7 @@ _VERBS = {
     "figures": "Draw a run's figures, as SVG and PNG.",
     "compare": "Compare models on the same samples: difference, interval, verdict.",
     "export": "Write a run for Inspect AI, Hugging Face datasets, or as CSV or Parquet.",
-    "episode": "Show a step-planning episode, as text or as a GIF.",
+    "episode": "Show an episode step by step, as text or as a GIF.",
     "export-data": "Write questions with pictures for VLMEvalKit or Hugging Face.",
     "models": "List models with kinds, prices and keys; check one.",
     "validate": "Check suites, models files and data sets.",

@@ -8,7 +8,7 @@ import click
 
 from phyblock.cli.console import counted, make_console, plain_table, shown_path
 from phyblock.cli.files import find_models_file
-from phyblock.cli.paths import NAME_OR_PATH
+from phyblock.cli.paths import models_file_option
 from phyblock.errors import ModelError, Problem, SpecError
 from phyblock.models import ModelConfig, api_key_status, price_of
 from phyblock.registry import baseline_names
@@ -24,12 +24,7 @@ _WIDE = 130
 
 
 @click.group("models", invoke_without_command=True)
-@click.option(
-    "--models-file",
-    type=NAME_OR_PATH,
-    metavar="FILE",
-    help="Models file instead of models.yaml.",
-)
+@models_file_option
 @click.pass_context
 def command(ctx: click.Context, models_file: str | None) -> None:
     """List the models that suites may name; `check NAME` makes one tiny call."""

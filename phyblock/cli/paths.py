@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-__all__ = ["NAME_OR_PATH", "UserPath"]
+__all__ = ["NAME_OR_PATH", "UserPath", "models_file_option"]
 
 
 class UserPath(click.Path):
@@ -40,3 +40,10 @@ class UserPath(click.Path):
 
 NAME_OR_PATH = UserPath(path_type=str)
 """The name of something bundled, or a path, as text."""
+
+models_file_option = click.option(
+    "--models-file",
+    type=NAME_OR_PATH,
+    metavar="FILE",
+    help="Models file instead of models.yaml.",
+)

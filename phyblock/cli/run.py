@@ -14,9 +14,9 @@ from rich.console import Console
 from phyblock import report
 from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.estimate_view import show_estimate
-from phyblock.cli.files import find_models_file, find_suite
+from phyblock.cli.files import bundled_suites, find_models_file, find_suite
 from phyblock.cli.names import split_names
-from phyblock.cli.paths import NAME_OR_PATH, UserPath
+from phyblock.cli.paths import NAME_OR_PATH, UserPath, models_file_option
 from phyblock.cli.progress import ProgressView
 from phyblock.cli.report import show_page
 from phyblock.cli.summary import print_summary
@@ -35,7 +35,7 @@ __all__ = ["command"]
 _INTERRUPTED = 130
 
 
-@click.command("run")
+@click.command("run", epilog=f"Bundled suites: {', '.join(bundled_suites())}.")
 @click.argument("suite", type=NAME_OR_PATH)
 @click.option(
     "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Override a value of the suite."
@@ -53,12 +53,7 @@ _INTERRUPTED = 130
     type=UserPath(),
     help="Folder of the run. [default: results/SUITE-DIGEST]",
 )
-@click.option(
-    "--models-file",
-    type=NAME_OR_PATH,
-    metavar="FILE",
-    help="Models file instead of models.yaml.",
-)
+@models_file_option
 @click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
 @click.option("--dry-run", is_flag=True, help="Print calls, tokens and dollars; call nothing.")
 @click.option("--retry-failed", is_flag=True, help="Ask again where a request was rejected.")
@@ -77,8 +72,7 @@ def command(
     no_report: bool,
     yes: bool,
 ) -> int:
-    """Run SUITE: a YAML file, or a bundled suite (quick, full, steps, vqa, paper-table1,
-    paper-random).
+    """Run SUITE: a YAML file, or the name of a bundled suite.
 
     Records are kept as they come; the same command again goes on where it stopped and asks
     nothing twice.

@@ -24,7 +24,8 @@ __all__ = ["command"]
 def command(
     run: Path, parser: str | None, matcher: str | None, out: Path | None, data: Path | None
 ) -> None:
-    """Read and score the stored plans of the folder RUN again; no model is called.
+    """Read and score the stored plans of the folder RUN again, and count again what measures
+    count; no model is called.
 
     The new scores go to RUN/scores/PARSER-MATCHER (or --out); RUN itself stays as it is.
     """

@@ -12,6 +12,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.report import TextTable, to_latex, to_markdown
 from phyblock.report.write import make_tables, table_names
 from phyblock.tables.load import load_run
+from phyblock.tables.showing import marked
 from phyblock.tracks.kind import kinds
 
 __all__ = ["command"]
@@ -37,11 +38,13 @@ def command(run: Path, paper: bool, names: tuple[str, ...], form: str) -> None:
     loaded = load_run(run, texts=False)
     if paper:
         views = {}
-        known = [kind.report().paper_tables for kind in kinds().values()]
-        for number, table in sorted((n, t) for tables in known for n, t in tables.items()):
+        known = [kind.report() for kind in kinds().values()]
+        tables = {n: (t, one) for one in known for n, t in one.paper_tables.items()}
+        for number, (table, of_track) in sorted(tables.items()):
             frame = table.frame(loaded)
             if len(frame):
-                views[f"paper{number}"] = table.view(frame, loaded)
+                words = of_track.showing(loaded)
+                views[f"paper{number}"] = marked(table.view(frame, loaded), words)
     else:
         frames, views = make_tables(loaded, names or table_names(loaded))
         views = {name: view for name, view in views.items() if name in names or len(frames[name])}

@@ -11,7 +11,7 @@ import click
 from phyblock.bounded import read_bytes
 from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.files import find_models_file, find_suite
-from phyblock.cli.paths import NAME_OR_PATH, UserPath
+from phyblock.cli.paths import UserPath, models_file_option
 from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
 from phyblock.resources import bundled
@@ -29,12 +29,7 @@ _SUITE_KEY = re.compile(rf"^(?:{'|'.join(suite_model().model_fields)})[ \t]*:", 
 @click.option(
     "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Override a value of the suites."
 )
-@click.option(
-    "--models-file",
-    type=NAME_OR_PATH,
-    metavar="FILE",
-    help="Models file that suites are checked against.",
-)
+@models_file_option
 def command(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | None) -> None:
     """Check FILES: suites (or names of bundled ones) and models files, data set folders, official
     checkouts.

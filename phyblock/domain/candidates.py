@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from phyblock.domain.blocks import BlockType, Color, Euler
-from phyblock.domain.scene import Look, Oriented, Scene
+from phyblock.domain.scene import Kind, Look, Oriented, Scene
 
 __all__ = ["MAX_CANDIDATES", "Candidate", "CandidateSet"]
 
@@ -39,6 +39,10 @@ class CandidateSet:
     def index_of(self, look: Look) -> int | None:
         """The 1-based number of the first candidate that looks like `look`, or None."""
         return next((i for i, c in enumerate(self.candidates, 1) if c.look == look), None)
+
+    def first_of(self, kind: Kind) -> int | None:
+        """The 1-based number of the first candidate of a kind, or None."""
+        return next((i for i, c in enumerate(self.candidates, 1) if c.kind == kind), None)
 
     def missing(self, scene: Scene) -> tuple[int, ...]:
         """Orders of the scene's blocks that no candidate can stand for in setting A."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
 from phyblock.domain.scene import Block, Scene
+from phyblock.words import Background
 
 __all__ = [
     "CATEGORIES",
@@ -86,6 +87,7 @@ class QuestionPicture:
     asked about (`block`). `blocks` are drawn at the poses they have here, which need not be goal
     poses; `view_deg` is the camera's azimuth and elevation [degrees]; the camera is framed on
     `framed`, or on `blocks` where that is empty, so that pictures that are compared share a camera.
+    `background` is None where the picture is drawn on whatever ground a run draws on.
     """
 
     label: str
@@ -93,6 +95,7 @@ class QuestionPicture:
     view_deg: tuple[float, float]
     marks: tuple[Mark, ...] = ()
     framed: tuple[Block, ...] = ()
+    background: Background | None = None
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from phyblock.datasets import SCENES_FILE, AssemblyTask, read_builtin, read_official
-from phyblock.errors import DataError, Problem
-from phyblock.resources import bundled
+from phyblock.datasets import AssemblyTask
+from phyblock.datasets.named import read_data_set
 
 __all__ = ["read_tasks"]
 
@@ -16,13 +15,4 @@ def read_tasks(data: str | Path) -> tuple[AssemblyTask, ...]:
 
     Raises DataError when there is no such data set, or with everything that is wrong in it.
     """
-    path = Path(data)
-    if not path.is_dir() and len(path.parts) == 1:
-        path = bundled("benchmarks", "data", str(data))
-    if (path / SCENES_FILE).is_file():
-        return read_builtin(path).tasks
-    if path.is_dir():
-        return read_official(path).tasks
-    names = sorted(p.parent.name for p in bundled("benchmarks", "data").glob(f"*/{SCENES_FILE}"))
-    allowed = f"a folder with {SCENES_FILE}, an official checkout, or: {', '.join(names)}"
-    raise DataError(Problem(str(data), "there is no such data set", allowed=allowed))
+    return read_data_set(str(data)).tasks

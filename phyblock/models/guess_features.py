@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 
 from phyblock.domain.question import Question
 
-__all__ = ["option_features"]
+__all__ = ["option_features", "text_features"]
 
 _WORD = re.compile(r"[a-z]+|\d+(?:\.\d+)?")
 _CROSSED = 0.25
@@ -22,10 +22,15 @@ _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 def option_features(question: Question) -> list[Mapping[str, float]]:
     """Features of each option of a question, by name; 0 where a name is missing."""
-    words = [_words(option) for option in question.options]
-    asked = set(_words(question.text))
-    numbers = [_number(option) for option in question.options]
-    lengths = [len(option) for option in question.options]
+    return text_features(question.text, question.options)
+
+
+def text_features(text: str, options: Sequence[str]) -> list[Mapping[str, float]]:
+    """Features of each of the options beside one another and the text that asks for one."""
+    words = [_words(option) for option in options]
+    asked = set(_words(text))
+    numbers = [_number(option) for option in options]
+    lengths = [len(option) for option in options]
     return [
         {
             **_word_features(words[i], asked),
@@ -34,7 +39,7 @@ def option_features(question: Question) -> list[Mapping[str, float]]:
             **_rank("length", lengths, i),
             "asked about": float(len(asked.intersection(words[i]))),
         }
-        for i in range(len(question.options))
+        for i in range(len(options))
     ]
 
 

@@ -11,7 +11,6 @@ lies above chance tells of a shortcut.
 
 from __future__ import annotations
 
-import functools
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
@@ -20,12 +19,24 @@ from phyblock.domain.question import Question, Subtask, is_picture_option
 from phyblock.errors import Problem, SpecError
 from phyblock.models.guess_features import option_features
 
-__all__ = ["PROBES", "Guesses", "majority_rule", "text_rule"]
+__all__ = [
+    "FOLDS",
+    "PROBES",
+    "Folds",
+    "Guesses",
+    "Likings",
+    "majority_rule",
+    "text_likings",
+    "text_rule",
+]
 
 Rule = Callable[[Question], tuple[int, ...]]
 """A guess: the indices that `Question.answer` would hold."""
+Likings = Callable[[Question], Sequence[float]]
+"""How much each option of a question is taken to be right, on a scale of its own."""
 
-_FOLDS = 5
+FOLDS = 5
+"""Parts that a set is learned in: each is answered by what the other four teach."""
 _SEED = 0
 _STRENGTH = 0.05
 
@@ -51,27 +62,43 @@ def majority_rule(known: Sequence[Question]) -> Rule:
     return guess
 
 
-def text_rule(known: Sequence[Question]) -> Rule:
+def text_likings(known: Sequence[Question], strength: float = _STRENGTH) -> Likings:
     """A logistic regression over the words of question and option, their numbers and likeness.
 
-    It gives every option a probability of being right, from that option beside the other three;
-    an order is the most frequent one. Raises SpecError where scikit-learn is not installed.
+    It gives every option a log-odds of being right, from that option beside the other three. The
+    larger `strength` (the inverse of the penalty on weights), the more it learns by heart. At
+    least one of the known questions must have a single answer. Raises SpecError where scikit-learn
+    is not installed.
     """
-    majority = majority_rule(known)
     single = [question for question in known if len(question.answer) == 1]
-    if not single:
-        return majority
-    vectorizer, regression = _models()
+    vectorizer, regression = _models(strength)
     rows = [features for question in single for features in option_features(question)]
     is_right = [index in q.answer for q in single for index in range(len(q.options))]
     regression.fit(vectorizer.fit_transform(rows), is_right)
 
+    def likings(question: Question) -> list[float]:
+        rows = vectorizer.transform(option_features(question))
+        found: list[float] = regression.decision_function(rows).tolist()
+        return found
+
+    return likings
+
+
+def text_rule(known: Sequence[Question]) -> Rule:
+    """The option that `text_likings` likes best; an order is the most frequent one.
+
+    Raises SpecError where scikit-learn is not installed.
+    """
+    majority = majority_rule(known)
+    if all(len(question.answer) != 1 for question in known):
+        return majority
+    likings = text_likings(known)
+
     def guess(question: Question) -> tuple[int, ...]:
         if question.subtask == "OR":
             return majority(question)
-        rows = vectorizer.transform(option_features(question))
-        chances = regression.decision_function(rows).tolist()
-        return (max(range(len(chances)), key=lambda index: chances[index]),)
+        liked = likings(question)
+        return (max(range(len(liked)), key=lambda index: liked[index]),)
 
     return guess
 
@@ -83,11 +110,37 @@ PROBES: Mapping[str, Callable[[Sequence[Question]], Rule]] = {
 """What learns a rule from known questions of one subtask, by the name of the baseline."""
 
 
+class Folds:
+    """Questions dealt into five folds by the base scene that they are filed under, in turn."""
+
+    def __init__(self, questions: Sequence[Question]) -> None:
+        self._questions = questions
+        bases = sorted({_base(question) for question in questions})
+        self._fold = {base: place % FOLDS for place, base in enumerate(bases)}
+
+    def of(self, question: Question) -> int:
+        """The fold of a question; KeyError where its base scene was not dealt."""
+        return self._fold[_base(question)]
+
+    def is_known(self, fold: int, question: Question) -> bool:
+        """Whether a question shares no base scene with those of a fold."""
+        return all(self._fold.get(base) != fold for base in _bases(question))
+
+    def known(self, fold: int, subtask: Subtask) -> list[Question]:
+        """The questions of a subtask that share no base scene with those of a fold."""
+        return [
+            question
+            for question in self._questions
+            if question.subtask == subtask and self.is_known(fold, question)
+        ]
+
+
 class Guesses:
     """What each probe answers to questions of a set, or to rotations of them; made when asked."""
 
     def __init__(self, questions: Sequence[Question]) -> None:
-        self._questions = questions
+        self._folds = Folds(questions)
+        self._rules: dict[tuple[str, Subtask, int], Rule] = {}
 
     def of(self, question: Question) -> Mapping[str, tuple[int, ...]]:
         """Guesses by the name of the probe; each is worked out when it is looked up."""
@@ -95,36 +148,10 @@ class Guesses:
 
     def guess(self, probe: str, question: Question) -> tuple[int, ...]:
         """The guess of one probe; KeyError for an unknown one, SpecError as `text_rule`."""
-        make, fold = PROBES[probe], self._folds[_base(question)]
-        return self._rule(probe, make, question.subtask, fold)(question)
-
-    @functools.cached_property
-    def _folds(self) -> Mapping[str, int]:
-        """The fold of each base scene that questions are filed under, dealt in turn."""
-        bases = sorted({_base(question) for question in self._questions})
-        return {base: place % _FOLDS for place, base in enumerate(bases)}
-
-    def _rule(
-        self,
-        probe: str,
-        make: Callable[[Sequence[Question]], Rule],
-        subtask: Subtask,
-        fold: int,
-    ) -> Rule:
-        name = (probe, subtask, fold)
+        name = (probe, question.subtask, self._folds.of(question))
         if name not in self._rules:
-            held_out = {base for base, place in self._folds.items() if place == fold}
-            known = [
-                question
-                for question in self._questions
-                if question.subtask == subtask and not held_out.intersection(_bases(question))
-            ]
-            self._rules[name] = make(known)
-        return self._rules[name]
-
-    @functools.cached_property
-    def _rules(self) -> dict[tuple[str, Subtask, int], Rule]:
-        return {}
+            self._rules[name] = PROBES[probe](self._folds.known(name[2], question.subtask))
+        return self._rules[name](question)
 
 
 class _Lazy(Mapping[str, tuple[int, ...]]):
@@ -167,7 +194,7 @@ def _first(question: Question) -> tuple[int, ...]:
     return tuple(range(len(question.options))) if question.subtask == "OR" else (0,)
 
 
-def _models() -> tuple[Any, Any]:
+def _models(strength: float) -> tuple[Any, Any]:
     try:
         from sklearn.feature_extraction import DictVectorizer  # type: ignore[import-untyped]
         from sklearn.linear_model import LogisticRegression  # type: ignore[import-untyped]
@@ -175,4 +202,4 @@ def _models() -> tuple[Any, Any]:
         hint = "pip install 'phyblock[audit]'"
         message = "the text-only probe needs scikit-learn, which is not installed"
         raise SpecError(Problem("text-only", message, hint=hint)) from error
-    return DictVectorizer(), LogisticRegression(C=_STRENGTH, max_iter=1000, random_state=_SEED)
+    return DictVectorizer(), LogisticRegression(C=strength, max_iter=1000, random_state=_SEED)

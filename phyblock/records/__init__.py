@@ -16,11 +16,10 @@ from phyblock.records.record import (
     Score,
     SentImage,
     SentPrompt,
-    StoredError,
-    StoredReply,
-    StoredUsage,
+    ShownScene,
 )
 from phyblock.records.record_lines import RecordedLines, RecordLines, record_adapter
+from phyblock.records.reply import StoredError, StoredReply, StoredUsage
 from phyblock.records.scene import StoredScene
 
 __all__ = [
@@ -45,6 +44,7 @@ __all__ = [
     "Score",
     "SentImage",
     "SentPrompt",
+    "ShownScene",
     "StoredError",
     "StoredQuestion",
     "StoredReply",

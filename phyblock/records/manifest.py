@@ -57,6 +57,8 @@ class ManifestModel(Line):
     """What the paper calls it."""
     size_b: float | None = None
     """Its size [billion parameters]."""
+    kind: str = ""
+    """`litellm`: asked over the network; `replay`: a recording; `baseline`: a rule."""
 
 
 class ManifestDataset(Line):
@@ -66,6 +68,8 @@ class ManifestDataset(Line):
     """Its name."""
     sha256: str
     """Digest of the scenes that were asked about."""
+    version: Annotated[int, Field(ge=1)] = 1
+    """Its version; results on different versions are never mixed."""
     format: str = "builtin"
     """Its layout."""
     root: str = ""
@@ -108,6 +112,9 @@ class Manifest(Line):
     """Distinct scenes."""
     scenes_by_level: dict[int, int] = Field(default_factory=dict)
     """Scenes of each level; one scene may be of several."""
+    floors: dict[str, dict[str, dict[str, float]]] = Field(default_factory=dict)
+    """By track and baseline that never sees the goal, what it reaches on these scenes, in [0, 1]:
+    by measure, cell, setting, matcher and criterion."""
     versions: dict[str, str] = Field(default_factory=dict)
     """Of Python and of libraries."""
 

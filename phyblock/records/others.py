@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from phyblock.records.line import Line, Whole
-from phyblock.records.record import StoredReply
+from phyblock.records.reply import StoredReply
 from phyblock.words import Role
 
 __all__ = ["PictureMark", "Prompt", "PromptMessage", "Turn"]

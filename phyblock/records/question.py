@@ -24,6 +24,7 @@ from phyblock.records.decode import shown
 from phyblock.records.faults import Fault, fits, free_of
 from phyblock.records.line import Line
 from phyblock.records.picture import OF_BLOCKS, About, Picture, StoredPicture
+from phyblock.words import Background
 
 __all__ = ["Options", "SceneId", "StoredQuestion"]
 
@@ -117,6 +118,8 @@ class StoredQuestion(Line, extra="forbid"):
     """`A` to `D`; for ordering all four letters in the right order, like `BADC`."""
     colors: Annotated[dict[str, Color], OF_BLOCKS] = Field(default_factory=dict)
     """By order, the colors of blocks that are recolored; left out where none is."""
+    background: Background | None = None
+    """Ground of all its pictures; left out where a run's own is drawn, as in older sets."""
     pictures: Annotated[tuple[Picture, ...], Filled(_MOST_PICTURES), fits(_picture_faults)]
     """Its pictures."""
     evidence: dict[str, Any] = Field(default_factory=dict)
@@ -132,7 +135,8 @@ class StoredQuestion(Line, extra="forbid"):
             for block, before in zip(question.scene.blocks, original.blocks, strict=True)
             if block.color != before.color
         }
-        optional: dict[str, Any] = {"colors": colors}
+        grounds = [picture.background for picture in question.pictures[:1]]
+        optional: dict[str, Any] = {"colors": colors, "background": (*grounds, None)[0]}
         return cls(
             id=question.id,
             subtask=question.subtask,
@@ -162,7 +166,10 @@ class StoredQuestion(Line, extra="forbid"):
             self.question,
             self.options,
             tuple(map(LETTERS.index, self.answer)),
-            tuple(picture.picture(scene) for picture in self.pictures),
+            tuple(
+                replace(picture.picture(scene), background=self.background)
+                for picture in self.pictures
+            ),
             self.wording,
             self.evidence,
         )

@@ -11,8 +11,9 @@ from phyblock.records.known import known_records
 from phyblock.records.lines import TurnLines
 from phyblock.records.manifest import Manifest, read_manifest
 from phyblock.records.others import Turn
-from phyblock.records.record import Record, StoredReply
+from phyblock.records.record import Record
 from phyblock.records.record_lines import RecordLines
+from phyblock.records.reply import StoredReply
 
 __all__ = ["any_records", "collect_turns", "newest_starts", "read_records", "run_records"]
 
@@ -34,15 +35,15 @@ def any_records(folder: Path) -> RecordLines:
     return RecordLines(folder, known_records(), None)
 
 
-def newest_starts(lines: RecordLines, kind: type[Record] = Record) -> dict[str, int]:
+def newest_starts(lines: RecordLines, tracks: Collection[str] | None = None) -> dict[str, int]:
     """Where the newest record of every sample begins [bytes], in order of first appearance.
 
-    Only samples whose record is of the type `kind` are taken.
+    Only samples of `tracks` are taken, of all where it is None.
     """
     found: dict[str, int] = {}
     start = 0
     for _, record in lines:
-        if isinstance(record, kind):
+        if tracks is None or record.track in tracks:
             found[record.sample] = start
         start = lines.whole_bytes
     return found

@@ -7,111 +7,23 @@ its own, with its name as the literal type of `track`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import Any, ClassVar
 
 from pydantic import Field
-from typing_extensions import Self
 
-from phyblock.records.line import LARGEST_WHOLE, Amount, Line, Usd, Whole, encodable
-from phyblock.words import Finish, Outcome
+from phyblock.records.line import Amount, Line, Whole
+from phyblock.records.reply import StoredError, StoredReply
+from phyblock.words import Outcome
 
 __all__ = [
     "AskedTurn",
-    "ErrorKind",
     "Record",
     "Recorded",
     "Score",
     "SentImage",
     "SentPrompt",
-    "StoredError",
-    "StoredReply",
-    "StoredUsage",
+    "ShownScene",
 ]
-
-ErrorKind = Literal["retryable", "sample", "refused", "unavailable"]
-
-_NumberT = TypeVar("_NumberT", int, float)
-
-
-def _within(number: _NumberT | None, least: int) -> _NumberT | None:
-    return number if number is not None and least <= number <= LARGEST_WHOLE else None
-
-
-class StoredUsage(Line):
-    """Tokens of a reply as the provider counted them; null where it did not say."""
-
-    prompt_tokens: Whole | None
-    """Tokens of the prompt, pictures included."""
-    completion_tokens: Whole | None
-    """Tokens of the reply."""
-    reasoning_tokens: Whole | None = None
-    """Those of `completion_tokens` that were spent on reasoning."""
-
-
-class StoredReply(Line):
-    """An answer that was read."""
-
-    text: str
-    """The answer."""
-    reasoning: str = ""
-    """The reasoning that the provider showed beside it."""
-    finish: Finish = "stop"
-    """Why it ended: by itself, at the token limit, by a content filter, or not said."""
-    usage: StoredUsage
-    """Its tokens."""
-    cost_usd: Usd | None
-    """Its price [US dollars]; null: not known."""
-    billed_usd: Usd | None = None
-    """What `max_cost_usd` counted [US dollars], failed attempts included, a reply without token
-    counts at its dearest; null: no limit was set."""
-    latency_s: Amount = 0.0
-    """Time of the successful request alone [s]."""
-    provider_model: str = ""
-    """The model that the provider says it used."""
-    attempts: Whole = 1
-    """Requests sent for it, 0 from the cache."""
-    cached: bool
-    """Whether it came from the cache."""
-    seed_sent: bool = True
-    """Whether the provider takes a seed; where not, seeds are independent repeats."""
-
-    @classmethod
-    def of(cls, reply: Mapping[str, Any]) -> Self:
-        """Store a reply, given by its fields, without what no file could hold.
-
-        It is paid for: an absurd number in it is one that is not known.
-        """
-        texts = {name: encodable(text) for name, text in reply.items() if isinstance(text, str)}
-        usage = reply["usage"].items()
-        counts = {name: _within(count, -LARGEST_WHOLE) for name, count in usage}
-        money = {name: _within(reply.get(name), 0) for name in ("cost_usd", "billed_usd")}
-        return cls.model_validate({**reply, **texts, **money, "usage": counts})
-
-    @property
-    def tokens(self) -> int:
-        """Tokens of prompt and reply, as far as they are known."""
-        return (self.usage.prompt_tokens or 0) + (self.usage.completion_tokens or 0)
-
-    @property
-    def limit_usd(self) -> float:
-        """What a limit counted for it, else its cost unless that was paid elsewhere."""
-        if self.billed_usd is not None:
-            return self.billed_usd
-        return 0.0 if self.cached else self.cost_usd or 0.0
-
-
-class StoredError(Line):
-    """Why there is no reply."""
-
-    kind: ErrorKind
-    """`retryable`: every attempt failed; `sample`: this request cannot succeed; `refused`: by a
-    content policy."""
-    status: Whole | None = None
-    """HTTP status, where there was one."""
-    message: str = ""
-    """What was said."""
-    billed_usd: Usd | None = None
-    """As of a reply."""
 
 
 class SentImage(Line):
@@ -174,6 +86,15 @@ class AskedTurn(Line):
     """What was sent."""
 
 
+class ShownScene(Line):
+    """How a scene was shown, where that was not as the file has it."""
+
+    order: tuple[Whole, ...]
+    """The number in the file of each candidate, in the order shown."""
+    goal: str | None
+    """The scene whose goal was shown; null: none was."""
+
+
 class Record(Line):
     """A sample's stored outcome."""
 
@@ -211,6 +132,8 @@ class Record(Line):
     """When it was written, UTC."""
     run: str = ""
     """Digest of the run that it belongs to; older records have none."""
+    shown: ShownScene | None = None
+    """How the scene was shown; null: as the file has it."""
     counts: dict[str, tuple[Amount, ...]] = Field(default_factory=dict)
     """By name, what was counted for measures beside `scores`."""
 
@@ -310,3 +233,5 @@ class Recorded(Line):
     """The reply."""
     error: StoredError | None = None
     """The error."""
+    shown: ShownScene | None = None
+    """How the item was shown."""

@@ -19,10 +19,25 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str) -> None:
     The track says what must agree in how the two were asked and scored; scenes of a name must be
     the same.
     """
+    _check_version(run, first)
     check = kind_of(track).report().check_alike
     if check is not None:
         check(run, first, cells)
     _check_scenes(run, first)
+
+
+def _check_version(run: Run, first: Run) -> None:
+    """Scenes of two versions of a data set may share a name and nothing else."""
+    found, wanted = run.manifest.dataset, first.manifest.dataset
+    if found is None or wanted is None or found.name != wanted.name:
+        return
+    if found.version != wanted.version:
+        message = f"is of another version of {found.name} than {first.path}"
+        hint = "run the suite again on the newer version"
+        where, field = str(run.path), "dataset.version"
+        raise SpecError(
+            Problem(where, message, field, str(found.version), str(wanted.version), hint)
+        )
 
 
 def _check_scenes(run: Run, first: Run) -> None:

@@ -98,7 +98,7 @@ class Comparable:
         asked = unflat(totals)[..., -1] > 0
 
         def metric(sums: Floats) -> Floats:
-            # A resample without a stratum that was asked has no value.
+            # Sums without a stratum that was asked have no value.
             return np.asarray(values(unflat(sums)[..., :-1], asked)[..., -1])
 
         return metric

@@ -13,18 +13,16 @@ import pandas as pd
 from phyblock.errors import Problem, SpecError
 from phyblock.report.alike import check_alike
 from phyblock.report.comparable import Comparable, Part, comparable, comparable_tracks
-from phyblock.scoring.uncertainty import CONFIDENCE, Clusters, Floats, bootstrap, holm
-from phyblock.tables.intervals import parents_of, resampler
+from phyblock.report.verdicts import ranks, with_verdicts
+from phyblock.scoring.uncertainty import Clusters, Floats, jackknife
+from phyblock.tables.intervals import parents_of
 from phyblock.tables.load import Run
 
-__all__ = ["COMPARE_RESAMPLES", "Comparison", "Side", "compare", "compare_models", "compare_runs"]
-
-COMPARE_RESAMPLES = 10_000
-"""More than tables take, for p values that stay fine after Holm's correction."""
+__all__ = ["Comparison", "Side", "compare", "compare_models", "compare_runs"]
 
 _FLIPPED = ["a", "b", "scene", "item", "seed", "right", "value_a", "value_b"]
 _AT_ONCE = 100
-"""Pairs that are resampled together, which bounds memory."""
+"""Pairs that are estimated together, which bounds memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +40,19 @@ class Comparison:
 
     `table` has one row a pair and part of the track (levels, categories of questions): a, b, part,
     value_a, value_b, difference (a minus b), se, lo, hi [all in `unit`], p, p_holm (corrected for
-    all rows), verdict, better, worse and same (samples on which a has the better, worse, same
-    value), n_samples, n_scenes, n_clusters. `flipped` has one row a pair and sample that one side
-    alone got wholly right: a, b, scene, item (scene or question), seed, right (that side's label),
-    value_a, value_b. `name` is what the values are called, `unit` theirs, `how` says what they are.
+    all rows), verdict, detectable (the difference that a single test finds in four of five cases)
+    and detectable_holm (the same at the first step of Holm's correction) [in `unit`], better,
+    worse and same (samples on which a has the better, worse, same value), n_samples, n_scenes,
+    n_clusters. `ranks` has one row a model where all pairs of several models were compared as a
+    whole: model, value, best and worst rank that the model may have. `flipped` has one row a pair
+    and sample that one side alone got wholly right: a, b, scene, item (scene or question), seed,
+    right (that side's label), value_a, value_b. `name` is what the values are called, `unit`
+    theirs, `how` says what they are.
     """
 
     table: pd.DataFrame
     flipped: pd.DataFrame
+    ranks: pd.DataFrame
     name: str
     unit: str
     how: str
@@ -161,13 +164,15 @@ def compare(
             flips = [
                 _flipped(*pair, one, what, part) for pair, one in zip(labels, counted, strict=True)
             ]
-    table = pd.concat(tables, ignore_index=True)
-    table.insert(list(table).index("p") + 1, "p_holm", holm(table["p"]))
-    verdicts = [_verdict(row, what) for row in table.to_dict("records")]
-    table.insert(list(table).index("p_holm") + 1, "verdict", verdicts)
+    table = with_verdicts(pd.concat(tables, ignore_index=True), what.measure)
     flipped = pd.concat([pd.DataFrame(columns=_FLIPPED), *(f for f in flips if len(f))])
     return Comparison(
-        table, flipped.reset_index(drop=True), what.measure.heading, what.measure.unit, what.how
+        table,
+        flipped.reset_index(drop=True),
+        ranks(table, what.measure),
+        what.measure.heading,
+        what.measure.unit,
+        what.how,
     )
 
 
@@ -201,14 +206,14 @@ def _differences(
     place = {scene: n for n, scene in enumerate(scenes)}
     clusters = Clusters.of([tuple(parents[scene]) or (scene,) for scene in scenes])
     batches = [
-        _resampled(paired[start : start + _AT_ONCE], place, clusters, what, part)
+        _estimated(paired[start : start + _AT_ONCE], place, clusters, what, part)
         for start in range(0, len(paired), _AT_ONCE)
     ]
     keys = pd.DataFrame(list(labels), columns=["a", "b"]).assign(part=part.name)
     return pd.concat([keys, pd.concat(batches, ignore_index=True)], axis=1)
 
 
-def _resampled(
+def _estimated(
     paired: Sequence[_Paired | None],
     place: Mapping[str, int],
     clusters: Clusters,
@@ -225,14 +230,7 @@ def _resampled(
     totals = counts.sum(axis=0)
     whole = what.whole(part, totals)
     sizes = clusters.behind(seen)
-    found = bootstrap(
-        counts,
-        clusters,
-        lambda sums: _difference(whole(sums)),
-        resampler(),
-        resamples=COMPARE_RESAMPLES,
-        n_clusters=sizes,
-    )
+    found = jackknife(counts, clusters, lambda sums: _difference(whole(sums)), n_clusters=sizes)
     values = whole(totals)
     numbers = {"value_a": values[:, 0], "value_b": values[:, 1], "difference": found.value}
     numbers |= {"se": found.se, "lo": found.lo, "hi": found.hi}
@@ -264,14 +262,3 @@ def _flipped(a: str, b: str, one: _Paired | None, what: Comparable, part: Part) 
     table["right"] = np.where(right[:, 0], a, b)
     rows = table.loc[right[:, 0] != right[:, 1], _FLIPPED]
     return rows.sort_values(["right", "scene", "item", "seed"])
-
-
-def _verdict(row: Mapping[Any, Any], what: Comparable) -> str:
-    if np.isnan(row["difference"]):
-        return "nothing to compare"
-    if np.isnan(row["p_holm"]):
-        return "cannot tell: a single base scene"
-    if row["p_holm"] >= 1 - CONFIDENCE:
-        return "cannot tell"
-    a_is_better = (row["difference"] > 0) == (what.measure.better == "higher")
-    return f"{row['a' if a_is_better else 'b']} is better"

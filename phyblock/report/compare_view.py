@@ -7,13 +7,14 @@ from pathlib import Path
 import pandas as pd
 
 from phyblock.folders import OutFolder
-from phyblock.report.compare import COMPARE_RESAMPLES, Comparison
+from phyblock.report.compare import Comparison
+from phyblock.scoring.uncertainty import POWER
 from phyblock.tables.csv_text import to_csv
 from phyblock.tables.latex import to_latex
 from phyblock.tables.markdown import to_markdown
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, between, level_name, number
 
-__all__ = ["compare_view", "flipped_lines", "p_text", "write_comparison"]
+__all__ = ["compare_view", "flipped_lines", "p_text", "ranks_view", "write_comparison"]
 
 _LEAST_P = 0.001
 
@@ -28,7 +29,7 @@ def compare_view(found: Comparison) -> TextTable:
         *([] if one_part else [Column("Part", is_text=True)]),
         *(
             Column(name, f"{found.name} ({found.unit})" if found.unit else found.name)
-            for name in ("A", "B", "A - B", "SE", "95 % CI")
+            for name in ("A", "B", "A - B", "95 % CI", "finds")
         ),
         Column("p (Holm)"),
         Column("Verdict", is_text=True),
@@ -45,8 +46,8 @@ def compare_view(found: Comparison) -> TextTable:
                 number(row["value_a"]),
                 number(row["value_b"]),
                 number(row["difference"], signed=True),
-                number(row["se"]),
                 between(row["lo"], row["hi"], signed=True),
+                number(row["detectable_holm"]),
                 p_text(row["p_holm"]),
                 row["verdict"],
                 *(str(row[name]) for name in ("better", "worse", "same")),
@@ -69,13 +70,36 @@ def _notes(found: Comparison) -> tuple[str, ...]:
     if most is not None:
         notes.append(
             f"{most['n_samples']} samples of {most['n_scenes']} scenes from {most['n_clusters']} "
-            f"base scenes, which were resampled {COMPARE_RESAMPLES:,} times."
+            "base scenes; scenes that share one are not taken as independent."
+        )
+        notes.append(
+            f"“finds”: the difference that this comparison would find in {POWER:.0%} of cases; "
+            f"a single one of these tests, in the median, {number(table['detectable'].median())}."
         )
     notes.append(
         f"p values are corrected for {table['p'].notna().sum()} comparisons (Holm); “cannot tell” "
         "stands where p is 0.05 or more."
     )
     return tuple(notes)
+
+
+def ranks_view(found: Comparison) -> TextTable:
+    """The rank that each model may have, out of `Comparison.ranks`, the best first."""
+    rows = [
+        (row["model"], number(row["value"]), _range(row["best"], row["worst"]))
+        for row in found.ranks.to_dict("records")
+    ]
+    value = f"{found.name} ({found.unit})" if found.unit else found.name
+    return TextTable(
+        "Ranks that each model may have",
+        (Column("Model", is_text=True), Column(value), Column("Rank")),
+        tuple(rows),
+        ("All ranges hold at once with 95 % confidence, by the comparisons above.",),
+    )
+
+
+def _range(best: int, worst: int) -> str:
+    return str(best) if best == worst else f"{best} to {worst}"
 
 
 def p_text(p: float) -> str:
@@ -104,12 +128,16 @@ def flipped_lines(found: Comparison) -> tuple[str, ...]:
 
 
 def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:
-    """Write comparison.csv, .md, .tex and flipped.csv into `folder`; StoreError if it cannot be."""
+    """Write comparison (.csv, .md, .tex), flipped.csv and ranks.csv into `folder`.
+
+    Raises StoreError where they cannot be written.
+    """
     view = compare_view(found)
     texts: dict[str, bytes | str] = {
         "comparison.csv": to_csv(found.table, "%.6f"),
         "comparison.md": to_markdown(view),
         "comparison.tex": to_latex(view, "phyblock-comparison"),
         "flipped.csv": to_csv(found.flipped, "%.2f"),
+        "ranks.csv": to_csv(found.ranks, "%.6f"),
     }
     return OutFolder(folder).write(texts)

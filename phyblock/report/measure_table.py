@@ -72,9 +72,8 @@ def headline_view(track: str, table: pd.DataFrame, run: Run) -> TextTable:
         rows.append(tuple(texts))
     columns = [Column(name, heading) for heading in headings for name in ("Value", "95 % CI")]
     kind = kind_of(track)
-    suite = f", suite {run.design.suite.name}" if run.design.suite.name else ""
     return TextTable(
-        f"{kind.title}{suite}",
+        f"{kind.title}{run.design.of_suite}",
         (Column("Model", is_text=True), *columns),
         tuple(rows),
         tuple(kind.report().notes(run)),

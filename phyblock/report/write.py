@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
+from phyblock.report.floors import floor_lines, floors_frame, floors_view
 from phyblock.report.measure_table import (
     headline_frame,
     headline_view,
@@ -22,6 +23,7 @@ from phyblock.tables.csv_text import to_csv
 from phyblock.tables.latex import to_latex
 from phyblock.tables.load import Run, load_run
 from phyblock.tables.markdown import to_markdown
+from phyblock.tables.showing import marked
 from phyblock.tables.text_table import TextTable
 from phyblock.tables.track_report import TableMaker
 from phyblock.tracks.estimates import all_estimates
@@ -89,6 +91,7 @@ _ESTIMATES = "estimates"
 _OF_ANY_TRACK = {
     _ESTIMATES: TableMaker(all_estimates),
     "measures": TableMaker(measures_frame, measures_view, _ESTIMATES),
+    "floors": TableMaker(floors_frame, floors_view, _ESTIMATES, lines=floor_lines),
     "coverage": TableMaker(coverage_frame, coverage_view, in_terminal=coverage_in_terminal),
     "cost": TableMaker(cost_frame, cost_view, "coverage"),
 }
@@ -99,9 +102,18 @@ def table_makers(run: Run) -> dict[str, TableMaker]:
     """Tables of a run by name: of its tracks, in their order, then those of any run."""
     makers: dict[str, TableMaker] = {}
     for track in run.design.suite.tracks:
-        own = kind_of(track).report().tables
-        makers |= own or {track: _headline_maker(track)}
+        report = kind_of(track).report()
+        own = report.tables or {track: _headline_maker(track)}
+        words = report.showing(run)
+        makers |= {name: replace(one, view=_marked(one, words)) for name, one in own.items()}
     return makers | _OF_ANY_TRACK
+
+
+def _marked(
+    maker: TableMaker, words: tuple[str, ...]
+) -> Callable[[pd.DataFrame, Run], TextTable] | None:
+    view = maker.view
+    return view and (lambda table, run: marked(view(table, run), words))
 
 
 def _headline_maker(track: str) -> TableMaker:

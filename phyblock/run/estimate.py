@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 from phyblock.models import Estimate as CallEstimate
@@ -26,6 +25,7 @@ from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
 from phyblock.run.samples import Sample
 from phyblock.run.store import holds_run
+from phyblock.tracks import AnyTrack, Item, shown_item
 
 __all__ = ["Estimate", "estimate"]
 
@@ -74,11 +74,23 @@ def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
         ]
         for track in plan.tracks:
             for item in track.items:
-                outlines = list(track.outlines(item))
-                for model, row in zip(plan.models, rows, strict=True):
-                    sample = partial(Sample, track, model.name, item)
-                    _add(row, plan, model, sample, outlines, settled, cache)
+                for seeds, outlines in _outlines(track, item, plan.suite.seeds):
+                    for model, row in zip(plan.models, rows, strict=True):
+                        samples = [Sample(track, model.name, item, seed) for seed in seeds]
+                        _add(row, model, samples, outlines, settled, cache)
     return rows
+
+
+def _outlines(
+    track: AnyTrack, item: Item, seeds: Sequence[int]
+) -> Iterator[tuple[Sequence[int], Sequence[tuple[Request, bool]]]]:
+    """The outlines of an item, with the seeds that show it so."""
+    shown = {seed: shown_item(track, item, seed) for seed in seeds}
+    if alike := [seed for seed in seeds if shown[seed] is item]:
+        yield alike, list(track.outlines(item))
+    for seed in seeds:
+        if seed not in alike:
+            yield [seed], list(track.outlines(shown[seed]))
 
 
 def _settled(plan: RunPlan, folder: Path) -> set[str]:
@@ -92,25 +104,24 @@ def _settled(plan: RunPlan, folder: Path) -> set[str]:
 
 def _add(
     row: Estimate,
-    plan: RunPlan,
     model: PlannedModel,
-    sample: Callable[[int], Sample],
+    samples: Sequence[Sample],
     outlines: Sequence[tuple[Request, bool]],
     settled: set[str],
     cache: ReplyCache | None,
 ) -> None:
-    """Count one item of one model, all its seeds."""
+    """Count one item of one model, with seeds that show it alike."""
     config = model.config
     expected = []
     if config.kind == "litellm":
         asked = [(replace(outline, params=config.params), real) for outline, real in outlines]
         expected = [(request, real, estimate_call(config, request)) for request, real in asked]
-    for seed in plan.suite.seeds:
-        if sample(seed).id in settled:
+    for sample in samples:
+        if sample.id in settled:
             row.done += 1
             continue
         for request, is_real, tokens in expected:
-            key = reply_key(config, replace(request, seed=seed)) if is_real and cache else ""
+            key = reply_key(config, replace(request, seed=sample.seed)) if is_real and cache else ""
             if key and cache is not None and key in cache:
                 row.cached += 1
             else:

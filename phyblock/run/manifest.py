@@ -11,6 +11,7 @@ from importlib.metadata import version
 from typing import Any
 
 from phyblock.datasets import Dataset
+from phyblock.datasets.version import UNNUMBERED, read_version
 from phyblock.records import FORMAT, Manifest
 from phyblock.run.models import PlannedModel
 from phyblock.specs import LoadedSuite
@@ -31,7 +32,7 @@ def make_manifest(
     """The manifest; `identity` digests what decides the results, so that only the same run goes
     on in a folder. Limits, prices, tables and paths are no part of it.
     """
-    suite = loaded.suite
+    suite, data_version = loaded.suite, read_version(dataset.root)
     inputs: dict[str, Any] = {
         "format": FORMAT,
         "suite": suite.identity(),
@@ -39,7 +40,7 @@ def make_manifest(
             {"name": m.name, "published": m.published, "size_b": m.size_b, **_identity(m)}
             for m in models
         ],
-        "dataset": {"name": dataset.name, "sha256": dataset.sha256},
+        "dataset": _dataset(dataset, data_version),
         "tracks": {track.name: track.identity() for track in tracks},
         "limit": limit,
     }
@@ -50,7 +51,12 @@ def make_manifest(
         "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         **inputs,
         "suite": suite.model_dump(mode="json"),
-        "dataset": {**inputs["dataset"], "format": suite.dataset.format, "root": str(dataset.root)},
+        "dataset": {
+            **inputs["dataset"],
+            "version": data_version,
+            "format": suite.dataset.format,
+            "root": str(dataset.root),
+        },
         **_of_tracks(loaded),
         "items": {track.name: len(track.items) for track in tracks},
         "scenes": len(scenes),
@@ -60,6 +66,12 @@ def make_manifest(
         "versions": {"python": platform.python_version(), **{n: version(n) for n in _LIBRARIES}},
     }
     return Manifest.model_validate(fields)
+
+
+def _dataset(dataset: Dataset, data_version: int) -> dict[str, object]:
+    """What of the data decides the results; runs from before versions were counted say none."""
+    known: dict[str, object] = {"name": dataset.name, "sha256": dataset.sha256}
+    return known if data_version == UNNUMBERED else {**known, "version": data_version}
 
 
 def _identity(model: PlannedModel) -> dict[str, object]:

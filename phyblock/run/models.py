@@ -10,6 +10,7 @@ from phyblock.datasets import recorded_models
 from phyblock.datasets.published_names import match_published
 from phyblock.errors import Problem, SpecError
 from phyblock.models import ModelConfig, Price, server_address
+from phyblock.records import RECORDS, RecordedLines
 from phyblock.registry import baseline_names
 from phyblock.specs import (
     RECORDED,
@@ -19,8 +20,9 @@ from phyblock.specs import (
     did_you_mean,
     resolve_models,
 )
+from phyblock.words import CandidateOrder
 
-__all__ = ["PlannedModel", "plan_models", "to_config"]
+__all__ = ["PlannedModel", "plan_models", "recorded_order", "to_config"]
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,18 @@ def plan_models(
     else:
         specs = resolve_models(loaded, known)
     return tuple(_planned(name, spec, loaded.suite) for name, spec in specs.items())
+
+
+def recorded_order(folder: Path) -> CandidateOrder:
+    """The order in which candidates were shown to a recorded model.
+
+    A run of our own says so in its records; raw replies name numbers of the file.
+    """
+    lines = RecordedLines(folder / RECORDS) if (folder / RECORDS).is_file() else ()
+    shown = next((record.shown for _, record in lines if record.shown), None)
+    if shown is None or list(shown.order) == sorted(shown.order):
+        return "file"
+    return "shuffled"
 
 
 def _check_known(names: Sequence[str], known: Sequence[str], message: str) -> None:

@@ -2,32 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from phyblock.datasets import Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.records import Manifest
 from phyblock.run.data import open_dataset
+from phyblock.run.floors import floor_values
 from phyblock.run.manifest import make_manifest
-from phyblock.run.models import PlannedModel, plan_models
+from phyblock.run.models import PlannedModel, plan_models, recorded_order
 from phyblock.run.samples import Sample
 from phyblock.specs import LoadedSuite, ModelSpec, SuiteSpec
 from phyblock.tracks import AnyTrack, EpisodeTrack, Opening, kind_of, open_tracks
 from phyblock.tracks.selection import select_tasks
+from phyblock.words import CandidateOrder
 
 __all__ = ["RunPlan", "make_plan"]
 
 
 @dataclass(frozen=True)
 class RunPlan:
-    """Everything a run needs; `manifest` is what `run.yaml` holds."""
+    """Everything a run needs; `manifest` is what `run.yaml` holds, but for what floors reach;
+    `reopened` opens a track under a suite, without prompts.
+    """
 
     suite: SuiteSpec
     models: tuple[PlannedModel, ...]
     dataset: Dataset
     tracks: tuple[AnyTrack, ...]
     manifest: Manifest
+    reopened: Callable[[str, SuiteSpec], AnyTrack]
+
+    def begun(self) -> Manifest:
+        """The manifest of a run that begins, with what floors reach; it takes some seconds."""
+        floors = floor_values(self.manifest, self.suite, self.reopened)
+        return self.manifest.model_copy(update={"floors": floors})
 
     @property
     def samples_per_model(self) -> int:
@@ -74,13 +84,18 @@ def make_plan(
     models = plan_models(loaded, known, only)
     asks = any(model.config.kind != "replay" for model in models)
     tracks = open_tracks(Opening(loaded, dataset, limit, asks), suite.tracks)
-    _check_models(models, tracks)
+    _check_models(models, tracks, suite.candidates.order)
     tasks = select_tasks(dataset.tasks, suite.levels, limit)
     selected = replace(dataset, tasks=tasks)
     if not any(track.items for track in tracks):
         raise SpecError(_nothing(loaded, dataset, limit))
     manifest = make_manifest(loaded, models, selected, tracks, limit)
-    return RunPlan(suite, models, selected, tracks, manifest)
+
+    def reopened(name: str, one: SuiteSpec) -> AnyTrack:
+        opening = Opening(replace(loaded, suite=one), dataset, limit, with_prompts=False)
+        return kind_of(name).open(opening)
+
+    return RunPlan(suite, models, selected, tracks, manifest, reopened)
 
 
 def _nothing(loaded: LoadedSuite, dataset: Dataset, limit: int | None) -> Problem:
@@ -90,8 +105,10 @@ def _nothing(loaded: LoadedSuite, dataset: Dataset, limit: int | None) -> Proble
     return Problem(str(loaded.path), "the suite has no samples", "", found, allowed)
 
 
-def _check_models(models: Sequence[PlannedModel], tracks: Sequence[AnyTrack]) -> None:
-    """Every model can answer what every track asks."""
+def _check_models(
+    models: Sequence[PlannedModel], tracks: Sequence[AnyTrack], order: CandidateOrder
+) -> None:
+    """Every model can answer what every track asks, and means the numbers that are shown."""
     problems = []
     for model in models:
         for track in tracks:
@@ -99,6 +116,10 @@ def _check_models(models: Sequence[PlannedModel], tracks: Sequence[AnyTrack]) ->
             if model.config.kind == "replay" and isinstance(track, EpisodeTrack):
                 message = f"is a recording, which cannot answer in {track.name}"
                 problems.append(Problem(where, message, "tracks", track.name))
+            recorded = model.config.recording
+            if recorded is not None and (found := recorded_order(recorded)) != order:
+                message = f"is a recording of candidates in the order {found}"
+                problems.append(Problem(where, message, "candidates.order", order, found))
             able = kind_of(track.name).baselines
             if model.config.kind != "baseline" or model.config.id in able:
                 continue

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import yaml
 from pydantic import ValidationError
 
-from phyblock.datasets import AssemblyTask
-from phyblock.errors import DataError, Problem, StoreError
+from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, writing
 from phyblock.parsing import reader_version
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
 from phyblock.records.reading import read_records
-from phyblock.run.data import open_dataset
+from phyblock.run.data import recorded_dataset
+from phyblock.run.floors import floor_values
 from phyblock.run.folder import check_place, run_folder
 from phyblock.run.records import judged
+from phyblock.run.reopen import reopen_tracks
+from phyblock.run.replayed import counted_again
 from phyblock.specs import SuiteSpec, suite_model
-from phyblock.tracks import kinds
-from phyblock.tracks.selection import select_tasks
+from phyblock.tracks import AnyTrack, EpisodeTrack, kind_of, shown_item
+from phyblock.tracks.counting import counts_samples
 from phyblock.words import Matcher, PlanParser
 
 __all__ = ["rescore"]
@@ -38,9 +40,10 @@ def rescore(
 
     The new folder (`<run>/scores/<parser>-<matcher>` when `out` is None) holds a manifest and
     records like any run, so that tables and notebooks read it. Parser and matcher are those of
-    plans: records of other tracks are taken over as they are. `data` is where the data set is now,
+    plans. Of other tracks, what measures count of each sample is counted again; where nothing is,
+    their records are taken over as they are. `data` is where the data set is now,
     if it has moved. Raises StoreError for a folder that is no run or cannot be written, DataError
-    when the data set is not what the run was made on.
+    when the data are not what the run was made on.
     """
     manifest = read_manifest(folder)
     suite = _suite(folder, manifest, parser, matcher)
@@ -51,9 +54,26 @@ def rescore(
     if out is None:
         run_folder(folder).check([f"{name}/"])
     _check_target(target, identity)
-    tasks = _tasks(folder, manifest, suite, data)
-    rescored = {kind.name: kind.rescored for kind in kinds().values() if kind.rescored is not None}
-    tracks = {name: rescored[name](suite, tasks) for name in suite.tracks if name in rescored}
+    names = [name for name in suite.tracks if kind_of(name).rescored or counts_samples(name)]
+    dataset = recorded_dataset(folder, manifest, suite.levels, data)
+
+    def reopened(name: str, one: SuiteSpec) -> AnyTrack:
+        return reopen_tracks(folder, manifest, one, [name], dataset)[name]
+
+    tracks = reopen_tracks(folder, manifest, suite, names, dataset)
+    records = asyncio.run(_judged_again(folder, manifest, tracks))
+    told = {"identity": identity, "suite": suite.model_dump(mode="json")}
+    scored = manifest.model_copy(update=told)
+    floors = floor_values(scored, suite, reopened)
+    _write(target, scored.model_copy(update={"floors": floors}), records)
+    return target
+
+
+async def _judged_again(
+    folder: Path, manifest: Manifest, tracks: Mapping[str, AnyTrack]
+) -> list[Record]:
+    """The records of a run, those of `tracks` judged anew."""
+    where = str(folder / RECORDS)
     items = {(name, item.key): item for name, track in tracks.items() for item in track.items}
     records: list[Record] = []
     for record in read_records(folder, manifest):
@@ -63,16 +83,15 @@ def rescore(
             continue
         item = items.get((track.name, record.item))
         if item is None:
-            where, hint = str(folder / RECORDS), "the file was changed: restore it from a copy"
-            raise StoreError(
-                Problem(where, "names a scene that the run has not", "scene", record.scene,
-                        hint=hint)
-            )  # fmt: skip
+            message, hint = "names an item that the run has not", "restore the file from a copy"
+            raise StoreError(Problem(where, message, "key", record.item, hint=hint))
+        item = shown_item(track, item, record.seed)
+        if isinstance(track, EpisodeTrack):
+            records.append(await counted_again(track, item, record, where))
+            continue
         judgement = track.judge(item, None if record.reply is None else record.reply.text)
         records.append(judged(record.as_given(), item, judgement))
-    told = {"identity": identity, "suite": suite.model_dump(mode="json")}
-    _write(target, manifest.model_copy(update=told), records)
-    return target
+    return records
 
 
 def _check_target(target: Path, identity: str) -> None:
@@ -98,33 +117,9 @@ def _suite(
         scoring = suite.scoring.model_copy(update={"matchers": matchers})
         return suite.model_copy(update={"scoring": scoring, "parser": parser or suite.parser})
     except ValidationError as error:
-        raise _broken(folder, "suite") from error
-
-
-def _tasks(
-    folder: Path, manifest: Manifest, suite: SuiteSpec, data: Path | None
-) -> tuple[AssemblyTask, ...]:
-    """The tasks of the run, known to be those that it was made on."""
-    recorded = manifest.dataset
-    if recorded is None:
-        raise _broken(folder, "dataset")
-    hint = "name the folder where it is now with --data"
-    root = data or Path(recorded.root)
-    if not root.is_dir():
-        raise DataError(Problem(str(root), "the data set of the run is not there", hint=hint))
-    dataset = open_dataset(suite.dataset.format, root)
-    dataset = replace(dataset, tasks=select_tasks(dataset.tasks, suite.levels, manifest.limit))
-    if dataset.sha256 != recorded.sha256:
-        message = "is not the data set that the run was made on, or it was changed since"
-        raise DataError(
-            Problem(str(root), message, "sha256", dataset.sha256, recorded.sha256, hint)
-        )
-    return dataset.tasks
-
-
-def _broken(folder: Path, field: str) -> StoreError:
-    hint = "run.yaml is written by `phyblock run` and is never edited"
-    return StoreError(Problem(str(folder / MANIFEST), "is missing or wrong", field, hint=hint))
+        hint = "run.yaml is written by `phyblock run` and is never edited"
+        problem = Problem(str(folder / MANIFEST), "is missing or wrong", "suite", hint=hint)
+        raise StoreError(problem) from error
 
 
 def _write(folder: Path, manifest: Manifest, records: Sequence[Record]) -> None:

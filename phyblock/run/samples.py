@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
@@ -13,7 +13,7 @@ from phyblock.records import Record, SentPrompt, StoredReply, Turn
 from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, begun, judged
 from phyblock.run.writer import RecordWriter
-from phyblock.tracks import AnyTrack, Episode, EpisodeTrack, Item, SingleTrack
+from phyblock.tracks import AnyTrack, Episode, EpisodeTrack, Item, SingleTrack, shown_item
 
 __all__ = ["Sample", "SampleRunner"]
 
@@ -33,6 +33,10 @@ class Sample:
     def id(self) -> str:
         """Its name inside the run."""
         return f"{self.track.name}/{self.model}/{self.item.key}/s{self.seed}"
+
+    def shown(self) -> Sample:
+        """The sample with its item as its seed shows it."""
+        return replace(self, item=shown_item(self.track, self.item, self.seed))
 
 
 class SampleRunner:
@@ -62,6 +66,7 @@ class SampleRunner:
         Raises UnavailableError, BudgetReachedError and HaltedError as models do, and what making
         a prompt or writing a turn raises.
         """
+        sample = sample.shown()
         if isinstance(sample.track, EpisodeTrack):
             return await self._play(sample, sample.track, model, params)
         return await self._ask(sample, sample.track, model, params)

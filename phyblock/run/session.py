@@ -22,7 +22,7 @@ from phyblock.resources import reply_cache_file
 from phyblock.run.events import ModelNotice, RunNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.plan import RunPlan
-from phyblock.run.store import RunStore
+from phyblock.run.store import RunStore, holds_run
 
 __all__ = ["SERVERS", "Session", "check_ready"]
 
@@ -77,7 +77,9 @@ class Session:
     async def __aenter__(self) -> Session:
         plan = self._plan
         try:
-            self._store = RunStore(self._folder, plan.manifest, plan.sample_ids())
+            is_there = holds_run(self._folder, plan.manifest)
+            manifest = plan.manifest if is_there else plan.begun()
+            self._store = RunStore(self._folder, manifest, plan.sample_ids())
             if self._use_cache and any(m.config.kind == "litellm" for m in plan.models):
                 self._cache = SharedCache(reply_cache_file(), self._tell)
                 await self._cache.open()

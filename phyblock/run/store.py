@@ -155,7 +155,9 @@ def holds_run(folder: Path, manifest: Manifest) -> bool:
         return False
     names = _changed(found, manifest)
     changed = f"different: {', '.join(names) or 'how pictures are drawn'}"
-    raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=_HINT))
+    made, now = (one.dataset.version if one.dataset else 1 for one in (found, manifest))
+    hint = _HINT if made == now else f"its data are version {made}, these version {now}; {_HINT}"
+    raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=hint))
 
 
 def _changed(found: Manifest, wanted: Manifest) -> list[str]:

@@ -1,6 +1,7 @@
 """Pure scoring: plans against AOV graphs, error types, counts and micro averages."""
 
 from phyblock.scoring.assembly import AssemblyScorer, Score
+from phyblock.scoring.choices import LetterRates, chance, letter_rates
 from phyblock.scoring.error_types import ERROR_TYPES, ErrorType, count_errors, step_errors
 from phyblock.scoring.level1 import level1_counts
 from phyblock.scoring.match import (
@@ -18,45 +19,28 @@ from phyblock.scoring.steps import (
     gated,
     placed_counts,
 )
-from phyblock.scoring.vqa import (
-    Accuracy,
-    Answered,
-    LetterRates,
-    MacroAccuracy,
-    chance,
-    circular,
-    letter_rates,
-    macro_accuracy,
-    subtask_accuracies,
-)
 
 __all__ = [
     "ERROR_TYPES",
     "MOVE_OUTCOMES",
-    "Accuracy",
-    "Answered",
     "Assembly",
     "AssemblyScorer",
     "Counts",
     "ErrorType",
     "Goal",
     "LetterRates",
-    "MacroAccuracy",
     "Match",
     "Move",
     "MoveOutcome",
     "Score",
     "attempted_counts",
     "chance",
-    "circular",
     "count_errors",
     "gated",
     "letter_rates",
     "level1_counts",
-    "macro_accuracy",
     "match_plan",
     "micro",
     "placed_counts",
     "step_errors",
-    "subtask_accuracies",
 ]

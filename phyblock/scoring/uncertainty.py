@@ -1,38 +1,44 @@
-"""How sure a number is: intervals by resampling base scenes, paired differences, Holm's correction.
+"""How sure a number is: a cluster jackknife over base scenes, tests of differences, ranks.
 
-Scenes made from the same base scene succeed and fail together, so it is base scenes that are drawn
-with replacement. A scene weighs the product of how often its base scenes were drawn: once in a
-resample that draws each of them once, not at all where one of them is not drawn. This is the
-pigeonhole bootstrap (Owen, *The pigeonhole bootstrap*, Annals of Applied Statistics 1, 2007; for
-units with two memberships of one kind: Davezies, D'Haultfoeuille and Guyonvarch, Annals of
-Statistics 49, 2021). For scenes of one base scene each it is the usual cluster bootstrap. With two
-each, its standard errors are not too small, and too large where scenes of common origin have little
-in common (docs/statistics.md has the simulation).
+Scenes made from the same base scene succeed and fail together, and a scene that combines two base
+scenes shares something with every scene made from either of them. The variance of a statistic then
+sums over all pairs of units that have a base scene in common: the dyadic cluster-robust variance
+(Aronow, Samii and Assenova, *Cluster-robust variance estimation for dyadic data*, Political
+Analysis 23, 2015), written by inclusion and exclusion (Cameron, Gelbach and Miller, *Robust
+inference with multiway clustering*, Journal of Business & Economic Statistics 29, 2011). Each of
+its terms is taken by leaving units out and measuring again, which needs no derivative of the
+statistic and is less optimistic than one with few clusters (MacKinnon, Nielsen and Webb, *Fast and
+reliable jackknife and bootstrap methods for cluster-robust inference*, Journal of Applied
+Econometrics 38, 2023). docs/statistics.md has the simulation.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtr, ndtri, stdtr, stdtrit  # type: ignore[import-untyped]
+from scipy.special import stdtr, stdtrit  # type: ignore[import-untyped]
 
 __all__ = [
     "CONFIDENCE",
-    "RESAMPLES",
+    "POWER",
     "Clusters",
     "Estimate",
     "Floats",
     "Metric",
-    "bootstrap",
+    "detectable",
     "f1_of",
     "holm",
+    "in_unit_range",
+    "jackknife",
+    "least_p",
     "precision_of",
+    "rank_ranges",
     "ratio_of",
     "recall_of",
-    "resample_weights",
 ]
 
 Floats = NDArray[np.float64]
@@ -41,8 +47,8 @@ Metric = Callable[[Floats], Floats]
 """
 
 CONFIDENCE = 0.95
-RESAMPLES = 2_000
-_CHUNK = 500
+POWER = 0.8
+"""How often a difference is found that `detectable` names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +90,10 @@ class Clusters:
 class Estimate:
     """A measured value, or an array of them, with its uncertainty.
 
-    `value` is of all units, `se` the standard deviation over resamples, `lo` and `hi` bound the
-    interval, `p` is two-sided against zero and agrees with the interval. `n_clusters` are behind
-    each value. All are of one shape; NaN where there is no value, and in all but `value` with
-    fewer than two clusters.
+    `value` is of all units, `se` its standard error, `lo` and `hi` bound the interval, `p` is
+    two-sided against zero, by Student's t with one degree of freedom less than `n_clusters`, which
+    are behind each value. All are of one shape; NaN where there is no value, and in all but `value`
+    with fewer than two clusters.
     """
 
     value: Floats
@@ -98,87 +104,121 @@ class Estimate:
     n_clusters: NDArray[np.intp]
 
 
-def bootstrap(
+def jackknife(
     counts: ArrayLike,
     clusters: Clusters,
     metric: Metric,
-    rng: np.random.Generator,
     *,
-    resamples: int = RESAMPLES,
     n_clusters: ArrayLike | None = None,
 ) -> Estimate:
-    """Estimate `metric` of the summed `counts`, with a percentile interval.
+    """Estimate `metric` of the summed `counts`, with a t test against zero and its interval.
 
     `counts` has shape (units, *cells, counts of a cell); the result has that of `metric` of the
-    sums, (*cells,) as a rule. All cells see the same resamples, so that a metric that subtracts
-    one cell from another is a paired comparison. Percentiles are widened for few clusters
-    (Hesterberg, *What teachers should know about the bootstrap*, The American Statistician 69,
-    2015), so that the interval of a mean is as wide as Student's. `n_clusters`, of the result's
-    shape, says how many clusters are behind each value where some cells lack units. Without units
-    there is no value.
+    sums, (*cells,) as a rule. A metric that subtracts one cell from another is a paired comparison.
+    `n_clusters`, of the result's shape, says how many clusters are behind each value where some
+    cells lack units. Without units there is no value.
+
+    For units of one cluster each, the interval of a mean is Student's. The variance is never less
+    than that of units taken as independent, which keeps it above zero where units of common origin
+    go opposite ways. `p` is never less than `least_p`. There is no standard error where leaving
+    out a cluster leaves nothing to measure.
     """
     given = np.asarray(counts, dtype=np.float64)
-    value = _measure(metric, given.sum(axis=0))
+    total = given.sum(axis=0)
+    value = _measured(metric, total)
     behind = np.broadcast_to(
         np.asarray(clusters.size if n_clusters is None else n_clusters, dtype=np.intp), value.shape
     )
-    if not len(given):
-        none = np.full(value.shape, np.nan)
-        return Estimate(none, none, none, none, none, behind)
-    flat = given.reshape(len(given), -1)
-    draws = np.concatenate(
-        [
-            _measure(metric, (weights @ flat).reshape(len(weights), *given.shape[1:]))
-            for weights in resample_weights(clusters, rng, resamples)
-        ]
-    )
-    unknown = np.isnan(value) | np.isnan(draws).all(axis=0) | (behind < 2)
-    spread = np.full((4, *value.shape), np.nan)
-    for n in np.unique(behind[~unknown]):
-        cells = (behind == n) & ~unknown
-        spread[:, cells] = _spread(draws[:, cells], int(n))
-    se, lo, hi, p = spread
-    return Estimate(value, se, lo, hi, p, behind)
+    shared = np.zeros(value.shape)
+    for sign, units, groups in _in_common(clusters):
+        shared += sign * _squares(given[units], groups, total, metric, value)
+    alone = _squares(given, np.arange(len(given)), total, metric, value)
+    df = np.where(behind > 1, behind - 1.0, np.nan)
+    se = np.sqrt(np.maximum(shared, alone) * df / behind)
+    wide = stdtrit(df, (1 + CONFIDENCE) / 2) * se
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = np.where(value == 0, 0 * se, np.abs(value) / se)
+    p = np.minimum(np.maximum(2 * stdtr(df, -t), least_p(behind)), 1) + 0 * se
+    return Estimate(value, se, value - wide, value + wide, p, behind)
 
 
-def _spread(draws: Floats, n: int) -> Floats:
-    """Standard error, interval and p value, shape (4, cells), of draws (resamples, cells)."""
-    # The share of resamples to cut off on a side, for n clusters.
-    tail = float(ndtr(np.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 - CONFIDENCE) / 2)))
-    whole = not np.isnan(draws).any()
-    quantile, std = (np.quantile, np.std) if whole else (np.nanquantile, np.nanstd)
-    lo, hi = quantile(draws, [tail, 1 - tail], axis=0)
-    return np.stack([std(draws, axis=0, ddof=1), lo, hi, _p_value(draws, n)])
+def in_unit_range(found: Estimate) -> Estimate:
+    """The same estimates of shares, with Wilson's interval in the place of Student's.
+
+    Of a share p with standard error s, its effective number of samples is p (1 - p) / s^2 (Kish),
+    and where every unit agrees on 0 or on 1, so that s says nothing, the number of clusters; the
+    interval is that of Wilson (Journal of the American Statistical Association 22, 1927) with
+    Student's quantile (Dean and Pagano, *Evaluating confidence interval methods for binomial
+    proportions in clustered surveys*, Journal of Survey Statistics and Methodology 3, 2015). It
+    stays in [0, 1] and has a width at 0 and at 1 as well.
+    """
+    share, behind = found.value, found.n_clusters.astype(np.float64)
+    known = ~np.isnan(found.se)
+    t = stdtrit(np.where(known & (behind > 1), behind - 1, np.nan), (1 + CONFIDENCE) / 2)
+    at_end = (share <= 0) | (share >= 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # s^2 / (p (1 - p)), the inverse of the effective number, is 0 where nothing varies.
+        per_sample = np.where(at_end, 1 / behind, found.se**2 / (share * (1 - share)))
+    scale = 1 + t**2 * per_sample
+    centre = (share + t**2 * per_sample / 2) / scale
+    half = t * np.sqrt(per_sample * (share * (1 - share) + t**2 * per_sample / 4)) / scale
+    # Rounding leaves no share outside of its interval.
+    lo, hi = np.minimum(centre - half, share), np.maximum(centre + half, share)
+    lo, hi = np.maximum(lo, 0.0), np.minimum(hi, 1.0)
+    return replace(found, lo=np.where(known, lo, np.nan), hi=np.where(known, hi, np.nan))
 
 
-def resample_weights(
-    clusters: Clusters, rng: np.random.Generator, resamples: int
-) -> Iterator[Floats]:
-    """Weights of all units, shape (some resamples, units), until there were `resamples` of them."""
-    even = np.full(clusters.size, 1 / clusters.size)
-    for start in range(0, resamples, _CHUNK):
-        size = min(_CHUNK, resamples - start)
-        times = np.ones((size, clusters.size + 1))
-        times[:, :-1] = rng.multinomial(clusters.size, even, size=size)
-        weights = times[:, clusters.members[:, 0]]
-        for member in clusters.members.T[1:]:
-            weights *= times[:, member]
-        yield weights
+def least_p(n_clusters: ArrayLike) -> Floats:
+    """The least p value that so many clusters can give: all signs alike, in a sign test.
+
+    Without it a few clusters that happen to agree exactly would leave no doubt at all.
+    """
+    return np.asarray(np.minimum(1.0, 2.0 ** (1.0 - np.asarray(n_clusters, dtype=np.float64))))
 
 
-def _measure(metric: Metric, sums: Floats) -> Floats:
+def detectable(se: ArrayLike, n_clusters: ArrayLike, level: float) -> Floats:
+    """The difference that a test at `level` finds in `POWER` of cases, in the unit of `se`.
+
+    Bloom, *Minimum detectable effects*, Evaluation Review 19, 1995: the sum of the two quantiles
+    of Student's t, times the standard error. NaN with fewer than two clusters.
+    """
+    behind = np.asarray(n_clusters, dtype=np.float64)
+    df = np.where(behind > 1, behind - 1.0, np.nan)
+    return np.asarray((stdtrit(df, 1 - level / 2) + stdtrit(df, POWER)) * np.asarray(se))
+
+
+def _in_common(
+    clusters: Clusters,
+) -> Iterator[tuple[int, NDArray[np.intp], NDArray[np.intp]]]:
+    """For one, two, ... base scenes in common: the sign, the units, and the group of each.
+
+    A unit of two base scenes is in two groups of one, and in one group of two.
+    """
+    members = np.sort(clusters.members, axis=1)
+    for size in range(1, members.shape[1] + 1):
+        sets = [members[:, list(of)] for of in combinations(range(members.shape[1]), size)]
+        stacked = np.concatenate(sets)
+        units = np.tile(np.arange(len(members)), len(sets))
+        whole = (stacked < clusters.size).all(axis=1)
+        _, groups = np.unique(stacked[whole], axis=0, return_inverse=True)
+        yield (1 if size % 2 else -1), units[whole], groups.reshape(-1)
+
+
+def _squares(
+    counts: Floats, groups: NDArray[np.intp], total: Floats, metric: Metric, value: Floats
+) -> Floats:
+    """The squared changes of the metric as each group is left out, summed over groups."""
+    if not len(groups):
+        return np.zeros(value.shape)
+    dropped = np.zeros((int(groups.max()) + 1, *total.shape))
+    np.add.at(dropped, groups, counts)
+    change = _measured(metric, total - dropped) - value
+    return np.asarray((change**2).sum(axis=0))
+
+
+def _measured(metric: Metric, sums: Floats) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(metric(sums), dtype=np.float64)
-
-
-def _p_value(draws: Floats, n: int) -> Floats:
-    """Twice the tail at which the interval would end at zero, at most 1; ties count half."""
-    known = (~np.isnan(draws)).sum(axis=0)
-    below = (draws < 0).sum(axis=0) + 0.5 * (draws == 0).sum(axis=0)
-    # No resample beyond zero does not make it impossible: half a resample stands for that.
-    tail = (np.minimum(below, known - below) + 0.5) / (known + 1)
-    widened = stdtr(n - 1, ndtri(tail) * np.sqrt((n - 1) / n))
-    return np.asarray(np.minimum(2 * widened, 1.0), dtype=np.float64)
 
 
 def holm(p: ArrayLike) -> Floats:
@@ -193,6 +233,17 @@ def holm(p: ArrayLike) -> Floats:
     corrected = np.full(given.shape, np.nan)
     corrected[order] = np.minimum(np.maximum.accumulate(steps), 1.0)
     return corrected
+
+
+def rank_ranges(is_better: ArrayLike) -> NDArray[np.intp]:
+    """The best and the worst rank that each of n models may have, shape (n, 2), from 1.
+
+    `is_better` (n, n) says of which pairs it was found that the first is better than the second.
+    With pairs tested together at a level, all ranges hold at once at that level (Mogstad, Romano,
+    Shaikh and Wilhelm, *Inference for ranks*, Review of Economic Studies 91, 2024).
+    """
+    known = np.asarray(is_better, dtype=bool)
+    return np.stack([1 + known.sum(axis=0), len(known) - known.sum(axis=1)], axis=1)
 
 
 def precision_of(sums: Floats) -> Floats:
@@ -212,11 +263,13 @@ def f1_of(sums: Floats) -> Floats:
 
 
 def ratio_of(sums: Floats) -> Floats:
-    """Part / whole of counts (..., [part, whole]), as right answers of answers; NaN for no whole.
+    """Part / whole of counts (..., [part, whole]), as right answers of answers.
 
-    The mean of such ratios over the axis before the last is a macro average.
+    NaN for no whole, and for a part that is more than the whole, which is no share of it: the
+    paper's criterion `membership` counts repeated steps again. The mean of such ratios over the
+    axis before the last is a macro average.
     """
     part, whole = sums[..., 0], sums[..., 1]
     out = np.full(part.shape, np.nan)
-    np.divide(part, whole, out=out, where=whole != 0)
+    np.divide(part, whole, out=out, where=(whole > 0) & (part <= whole))
     return out

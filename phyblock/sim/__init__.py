@@ -1,8 +1,8 @@
 """Geometry, contact, stability and pictures, on a physics engine and a renderer of one's choice.
 
 `engine` and `renderer` say what is asked of the two, and `registry` lists all that there are.
-PyBullet is one of each (`bullet`). It is loaded when a world or a picture is made, never by
-importing this package.
+PyBullet is the engine (`bullet`), loaded when a world is made, never by importing this package; the
+renderer is our own (`raster`).
 """
 
 from phyblock.sim.pictures import (
@@ -13,8 +13,9 @@ from phyblock.sim.pictures import (
     composite_png,
     goal_key,
     goal_png,
+    goal_style,
 )
-from phyblock.sim.stability import Stability, Trial, check, check_prefixes, check_removal
+from phyblock.sim.stability import Stability, Trial, check
 from phyblock.sim.support import Gap, Overlap, find_gaps, find_overlaps, support_graph
 from phyblock.sim.world import Physics, Pose, World
 
@@ -31,12 +32,11 @@ __all__ = [
     "candidates_key",
     "candidates_png",
     "check",
-    "check_prefixes",
-    "check_removal",
     "composite_png",
     "find_gaps",
     "find_overlaps",
     "goal_key",
     "goal_png",
+    "goal_style",
     "support_graph",
 ]

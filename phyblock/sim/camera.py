@@ -1,4 +1,4 @@
-"""Cameras: views by name or angle, and framing that never cuts anything off.
+"""Cameras: views by name or angle, and framing that cuts off nothing of what is framed.
 
 A view direction fixes three axes (right, up, forward). For them, "every point lies inside this
 window of the picture" is a set of linear inequalities in the camera's position, so the closest
@@ -14,12 +14,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from phyblock.sim.exact import dot, rounded, turned
+
 __all__ = ["FIELD_OF_VIEW_DEG", "FULL_WINDOW", "VIEWS", "Camera", "Window", "frame", "view_axes"]
+
+
+def _half_tangent(angle_deg: float) -> float:
+    return round(math.tan(math.radians(angle_deg / 2)), 12)
+
 
 FIELD_OF_VIEW_DEG = 30.0
 """Vertical and horizontal field of view; pictures are square."""
-_HALF_TANGENT = math.tan(math.radians(FIELD_OF_VIEW_DEG / 2))
+_HALF_TANGENT = _half_tangent(FIELD_OF_VIEW_DEG)
 _DEPTH_MARGIN_M = 0.02
+_NEARER = 0.9
+_LEAST_DEPTH_M = 0.05
+"""What is drawn and not framed is not nearer to the camera than this."""
 
 VIEWS: dict[str, tuple[float, float]] = {
     "oblique": (45.0, 22.0),
@@ -66,11 +76,11 @@ class Camera:
     @property
     def half_tangent(self) -> float:
         """Half the width of what is seen at a depth, as a share of that depth."""
-        return math.tan(math.radians(self.field_of_view_deg / 2))
+        return _half_tangent(self.field_of_view_deg)
 
     def project(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """Normalized picture coordinates of world points (n, 3), shape (n, 2)."""
-        right, up, depth = self.axes @ (points_m - self.eye_m).T
+        right, up, depth = turned(points_m - self.eye_m, self.axes).T
         seen: NDArray[np.float64] = np.stack([right, up], axis=1) / depth[:, None]
         seen /= self.half_tangent
         return seen
@@ -107,7 +117,7 @@ def view_axes(azimuth_deg: float, elevation_deg: float) -> NDArray[np.float64]:
         ]
     )
     right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
-    return np.stack([right, np.cross(towards, right), -towards])
+    return rounded(np.stack([right, np.cross(towards, right), -towards]))
 
 
 def frame(
@@ -115,13 +125,15 @@ def frame(
     axes: NDArray[np.float64],
     window: Window = FULL_WINDOW,
     min_distance_m: float = 0.0,
+    drawn_m: NDArray[np.float64] | None = None,
 ) -> Camera:
     """The closest camera with these axes that sees all points (n, 3) inside the window.
 
     It stays at least `min_distance_m` [m] from the nearest point, and centers the points in the
-    window. `points_m` must hold a point.
+    window. `points_m` must hold a point. `drawn_m` (k, 3) is all that is drawn, where that is
+    more: it may reach out of the window, but lies in front of the camera and between its planes.
     """
-    right, up, forward = axes @ points_m.T
+    right, up, forward = turned(points_m, axes).T
     spans = []
     for across, low, high in ((right, window.left, window.right), (up, window.bottom, window.top)):
         low_slope, high_slope = low * _HALF_TANGENT, high * _HALF_TANGENT
@@ -130,8 +142,10 @@ def frame(
         spans.append((most, least, low_slope, high_slope))
     limits = [(least - most) / (high - low) for most, least, low, high in spans]
     depth = min(*limits, float(forward.min()) - min_distance_m)
+    if drawn_m is not None and len(drawn_m):
+        forward = np.append(forward, dot(drawn_m, axes[2]))
+        depth = min(depth, float(forward.min()) - _LEAST_DEPTH_M)
     center = [(most + least + (high + low) * depth) / 2 for most, least, low, high in spans]
-    depths = forward - depth
-    near = max(float(depths.min()) - _DEPTH_MARGIN_M, 0.01)
-    eye = np.array([*center, depth]) @ axes
-    return Camera(eye, axes, near, float(depths.max()) + _DEPTH_MARGIN_M)
+    eye = rounded(turned(np.array([*center, depth]), axes.T))
+    near_m, far_m = float(forward.min()) - depth, float(forward.max()) - depth
+    return Camera(eye, axes, near_m * _NEARER, far_m + _DEPTH_MARGIN_M)

@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 
 from phyblock.sim.geometry import ConvexPiece
 
-__all__ = ["Axes", "Extent", "contact_extent", "drop_m", "moved", "separating_axes"]
+__all__ = [
+    "Axes",
+    "Extent",
+    "contact_corners_m",
+    "contact_extent",
+    "drop_m",
+    "moved",
+    "separating_axes",
+]
 
 _PATCH_DEPTH_M = 0.0005
 _LINE_M = 0.001
@@ -97,9 +105,7 @@ def contact_extent(
     the other with a face.
     """
     basis = _plane_basis(direction)
-    lower = _patch(first.vertices_m, direction, basis)
-    upper = _patch(second.vertices_m, -direction, basis)
-    shared = _clip(lower, upper) if len(upper) > 2 else _clip(upper, lower)
+    lower, upper, shared = _shared(first, second, direction, basis)
     if len(shared) < 2:
         return Extent()
     if len(lower) > 2 and len(upper) > 2:
@@ -107,6 +113,34 @@ def contact_extent(
     depth_m = _depth_inside(shared.mean(axis=0), lower if len(lower) > 2 else upper)
     length_m = float(np.linalg.norm(shared - shared[0], axis=1).max())
     return Extent(length_m=length_m, is_rim=depth_m < _LINE_M)
+
+
+def contact_corners_m(
+    first: ConvexPiece, second: ConvexPiece, direction: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Corners of the contact of two touching pieces, in the world, shape (k, 3) [m].
+
+    `direction` as for `contact_extent`; none where they meet in less than a line.
+    """
+    basis = _plane_basis(direction)
+    _, _, shared = _shared(first, second, direction, basis)
+    if len(shared) < 2:
+        return np.empty((0, 3))
+    corners: NDArray[np.float64] = shared @ basis
+    corners += (first.vertices_m @ direction).max() * direction
+    return corners
+
+
+def _shared(
+    first: ConvexPiece,
+    second: ConvexPiece,
+    direction: NDArray[np.float64],
+    basis: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """What the first shows, what the second shows, and what they share, in the plane's basis."""
+    lower = _patch(first.vertices_m, direction, basis)
+    upper = _patch(second.vertices_m, -direction, basis)
+    return lower, upper, _clip(lower, upper) if len(upper) > 2 else _clip(upper, lower)
 
 
 def _plane_basis(direction: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 A `PhysicsEngine` opens simulations; a `Simulation` holds blocks and moves them. The floor is the
 plane z = 0. Blocks are named by number, and `FLOOR` (0) stands for the floor; the caller names
 only blocks that are there. Poses are those of body frames (`phyblock.domain.blocks`). What a
-block is made of, an engine finds in `SHAPES` (mass, center of mass) and in
+block is made of, an engine finds in `SHAPES` (center of mass), in `Physics.mass_kg` and in
 `phyblock.sim.geometry` (`collision_pieces`, `solid_mesh` with its inertia).
 
 To add an engine: write a module with a class that follows `PhysicsEngine`, name it in
@@ -17,7 +17,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from phyblock.domain.blocks import FRICTION, BlockType
+from phyblock.domain.blocks import FRICTION, SHAPES, BlockType
 from phyblock.sim.pose import Pose
 
 __all__ = [
@@ -44,12 +44,18 @@ class Physics:
 
     Time step [s], iterations of the contact solver in each step, friction coefficient of any two
     bodies that touch, and gravity [m/s2], which is not straight down where the floor is to lean.
+    `mass_factors` names types of which every block has so many times its mass in plastic.
     """
 
     time_step_s: float = 1 / 240
     iterations: int = 50
     friction: float = FRICTION
     gravity_m_s2: Vector = (0.0, 0.0, -GRAVITY_M_S2)
+    mass_factors: tuple[tuple[BlockType, float], ...] = ()
+
+    def mass_kg(self, block_type: BlockType) -> float:
+        """Mass of a block of this type [kg]."""
+        return SHAPES[block_type].mass_kg * dict(self.mass_factors).get(block_type, 1.0)
 
 
 class Velocity(NamedTuple):

@@ -1,14 +1,20 @@
-"""Triangle meshes and what follows from them: normals, volume, center of mass, inertia."""
+"""Triangle meshes and what follows: normals, faces, volume, center of mass, inertia."""
 
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from phyblock.sim.exact import cross, dot, rounded, unit
+
 __all__ = ["Mesh"]
+
+_SMOOTH_COSINE = math.cos(math.radians(30))
+"""Triangles that meet at a smaller angle are parts of one surface, flat or curved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +39,38 @@ class Mesh:
     def normals(self) -> NDArray[np.float64]:
         """Outward unit normal of every triangle, shape (m, 3)."""
         a, b, c = self.corners_m.transpose(1, 0, 2)
-        normals: NDArray[np.float64] = np.cross(b - a, c - a)
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        return normals
+        return unit(cross(b - a, c - a))
+
+    @functools.cached_property
+    def faces(self) -> NDArray[np.int64]:
+        """The face that each triangle is part of, shape (m,), by the number of its first triangle.
+
+        Neighbors whose normals differ by less than 30 degrees are parts of one face, which is flat
+        or curved.
+        """
+        number = list(range(len(self.triangles)))
+        for one, other in self._neighbors():
+            if dot(self.normals[one], self.normals[other]) > _SMOOTH_COSINE:
+                low, high = sorted((number[one], number[other]))
+                number = [low if each == high else each for each in number]
+        return np.array(number)
+
+    @functools.cached_property
+    def corner_normals(self) -> NDArray[np.float64]:
+        """Outward unit normal of the face at each corner of every triangle, shape (m, 3, 3).
+
+        On a curved face it is the mean of the triangles' around the corner, each counted by its
+        angle there, which makes the facets of a cylinder look round.
+        """
+        before, after = (np.roll(self.corners_m, n, axis=1) - self.corners_m for n in (1, -1))
+        sines = np.sqrt(dot(crossed := cross(after, before), crossed))
+        angles = rounded(np.arctan2(sines, dot(after, before)))
+        corner = self.triangles * len(self.triangles) + self.faces[:, None]
+        _, place = np.unique(corner, return_inverse=True)
+        place = place.reshape(corner.shape)
+        sums = np.zeros((int(place.max()) + 1, 3))
+        np.add.at(sums, place, angles[..., None] * self.normals[:, None])
+        return rounded(unit(sums[place]))
 
     @functools.cached_property
     def volume_m3(self) -> float:
@@ -65,6 +100,17 @@ class Mesh:
         edges = np.concatenate([self.triangles[:, [i, (i + 1) % 3]] for i in range(3)])
         forward = {(int(a), int(b)) for a, b in edges}
         return len(forward) == len(edges) and all((b, a) in forward for a, b in forward)
+
+    def _neighbors(self) -> list[tuple[int, int]]:
+        """Pairs of triangles that share an edge."""
+        beside: dict[tuple[int, int], int] = {}
+        pairs = []
+        for number, (a, b, c) in enumerate(self.triangles.tolist()):
+            for start, end in ((a, b), (b, c), (c, a)):
+                if (end, start) in beside:
+                    pairs.append((beside[end, start], number))
+                beside[start, end] = number
+        return pairs
 
     @functools.cached_property
     def _tetrahedra_m3(self) -> NDArray[np.float64]:

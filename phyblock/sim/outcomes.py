@@ -1,10 +1,10 @@
 """What follows when a block is taken away, pushed or put down: settled poses, and who moved.
 
 An outcome counts only where every setting names the same blocks, and names them clearly: each
-either stayed where it was or moved far. Time step, solver and friction all vary, because which
-blocks fall changes with the time step alone in one removal of twenty. The floor leans a little,
-each time to another side, because a block whose weight is exactly over an edge falls in every
-simulation and stays on many a table.
+either stayed where it was or moved far. Time step, solver, friction and masses all vary, because
+which blocks fall changes with the time step alone in one removal of twenty. The floor leans a
+little, each time to another side, because a block whose weight is exactly over an edge falls in
+every simulation and stays on many a table.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from phyblock.domain.scene import Block
+from phyblock.sim.balance import FRICTIONS, MASSES
 from phyblock.sim.engine import GRAVITY_M_S2, Physics
 from phyblock.sim.pose import Pose
 from phyblock.sim.steps import groups, moments, wait
@@ -35,7 +36,7 @@ __all__ = [
 ]
 
 LEAN_DEG = 2.0
-"""How much the floor leans [degrees]; blocks begin to slide at 17."""
+"""How much the floor leans [degrees]; blocks begin to slide at 15, where friction is least."""
 
 
 def _leaning(physics: Physics, downhill: tuple[float, float]) -> Physics:
@@ -48,8 +49,8 @@ def _leaning(physics: Physics, downhill: tuple[float, float]) -> Physics:
 _ACROSS = math.sqrt(0.75)
 OUTCOME_SETTINGS: tuple[Physics, ...] = (
     Physics(1 / 240, 50, 0.35),
-    _leaning(Physics(1 / 200, 50, 0.40), (0.0, 1.0)),
-    _leaning(Physics(1 / 300, 80, 0.30), (_ACROSS, -0.5)),
+    _leaning(Physics(1 / 200, 50, FRICTIONS[1], mass_factors=MASSES[0]), (0.0, 1.0)),
+    _leaning(Physics(1 / 300, 80, FRICTIONS[0], mass_factors=MASSES[1]), (_ACROSS, -0.5)),
     _leaning(Physics(1 / 480, 100, 0.35), (-_ACROSS, -0.5)),
 )
 """What every outcome is tried under; the first gives the settled poses."""

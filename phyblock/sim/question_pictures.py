@@ -36,7 +36,7 @@ __all__ = [
     "question_png",
 ]
 
-QUESTION_RENDER_VERSION = 1
+QUESTION_RENDER_VERSION = 2
 """Raised whenever the same recipe gives other pixels, so that stored pictures are made again."""
 BLOCK_LABEL = "block"
 """The label of a picture that shows one block by itself."""
@@ -47,13 +47,14 @@ _SIZE_CUE = 0.25
 
 
 def question_png(picture_recipe: QuestionPicture, style: PictureStyle) -> bytes:
-    """PNG of a question's picture, square; the recipe's view takes the place of the style's.
+    """PNG of a question's picture, square; its view, and background if any, replace the style's.
 
     Raises DataError for a recipe with nothing to frame, ValueError for a view that a
     `PictureStyle` does not allow.
     """
     camera = question_camera(picture_recipe, style)
-    image = picture(drawn_blocks(picture_recipe), camera, style.background, style.size_px)
+    ground = picture_recipe.background or style.background
+    image = picture(drawn_blocks(picture_recipe), camera, ground, style.size_px)
     return to_png(draw_marks(image, picture_recipe.marks, camera))
 
 
@@ -65,14 +66,15 @@ def question_camera(picture_recipe: QuestionPicture, style: PictureStyle) -> Cam
     """
     azimuth_deg, elevation_deg = picture_recipe.view_deg
     seen = replace(style, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
-    framed = _drawn(picture_recipe.framed) or drawn_blocks(picture_recipe)
+    shown = drawn_blocks(picture_recipe)
+    framed = _drawn(picture_recipe.framed) or shown
     if _is_alone(picture_recipe):
-        framed = drawn_blocks(picture_recipe)
+        framed = shown
         shape = SHAPES[framed[0].type]
         share = math.dist(shape.low_m, shape.high_m) / _LARGEST_DIAGONAL_M
         window = _BLOCK_WINDOW.scaled(share**_SIZE_CUE)
         return frame(framed[0].vertices_m, view_axes(azimuth_deg, elevation_deg), window)
-    return camera_for(framed, seen, picture_recipe.label)
+    return camera_for(framed, seen, picture_recipe.label, shown)
 
 
 def drawn_blocks(picture_recipe: QuestionPicture) -> list[DrawnBlock]:
@@ -92,7 +94,7 @@ def question_key(picture_recipe: QuestionPicture, style: PictureStyle) -> str:
         "kind": "question",
         "render_version": [RENDER_VERSION, QUESTION_RENDER_VERSION],
         **pixel_versions(),
-        "style": [style.size_px, style.background],
+        "style": [style.size_px, picture_recipe.background or style.background],
         "view": list(picture_recipe.view_deg),
         "alone": _is_alone(picture_recipe),
         "blocks": _field_values(drawn_blocks(picture_recipe)),

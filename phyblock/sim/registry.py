@@ -19,14 +19,12 @@ from phyblock.sim.renderer import Renderer
 __all__ = ["DEFAULT_ENGINE", "ENGINES", "RENDERERS", "physics_engine", "renderer"]
 
 DEFAULT_ENGINE = "pybullet"
-_DEFAULT_RENDERER = "tinyrenderer"
+_DEFAULT_RENDERER = "raster"
 
 ENGINES: Mapping[str, str] = {"pybullet": "phyblock.sim.bullet.physics:BulletEngine"}
 """Where the factory of each physics engine is."""
 RENDERERS: Mapping[str, str] = {
-    "tinyrenderer": "phyblock.sim.bullet.renderer:tiny_renderer",
-    "egl": "phyblock.sim.bullet.renderer:egl_renderer",
-    "auto": "phyblock.sim.bullet.renderer:egl_or_tiny_renderer",
+    "raster": "phyblock.sim.raster.renderer:NumpyRenderer",
 }
 """Where the factory of each renderer is."""
 
@@ -45,7 +43,7 @@ def physics_engine() -> PhysicsEngine:
 
 
 def renderer() -> Renderer:
-    """The renderer that `PHYBLOCK_RENDERER` names, or PyBullet's TinyRenderer; one object too.
+    """The renderer that `PHYBLOCK_RENDERER` names, or our own; one object too.
 
     Raises InputError for a name that is not known, SimulationError for one that does not work
     here.

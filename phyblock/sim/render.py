@@ -1,9 +1,8 @@
 """Blocks to pixels, by whichever renderer is chosen.
 
-Renderers need no anti-aliasing: pictures are made at twice the size and scaled down. A block is
-drawn as its solid and as black bars along its true edges; outlines found afterwards in depth or
-segmentation would draw false diagonals. A block is no more than a color and two meshes here:
-physics lives in `phyblock.sim.world`.
+Renderers need no anti-aliasing: pictures are made at twice the size and scaled down. Outlines run
+where one face ends in the picture, which a renderer tells by number, so there are no false ones. A
+block is no more than a color and a mesh here: physics lives in `phyblock.sim.world`.
 """
 
 from __future__ import annotations
@@ -16,16 +15,33 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from phyblock.domain.blocks import BlockType, Color, Euler, euler_deg_to_quat_xyzw
+from phyblock.domain.blocks import (
+    BlockType,
+    Color,
+    Euler,
+    euler_deg_to_matrix,
+    euler_deg_to_quat_xyzw,
+)
 from phyblock.sim.camera import Camera
-from phyblock.sim.geometry import corners_m, edge_bars, solid_mesh
+from phyblock.sim.exact import rounded, turned
+from phyblock.sim.geometry import drawn_mesh
+from phyblock.sim.outlines import draw_outlines
 from phyblock.sim.pose import Pose
 from phyblock.sim.registry import renderer
-from phyblock.sim.renderer import Light, Prop, Renderer, Rgb
+from phyblock.sim.renderer import Light, Prop, Raster, Renderer, Rgb
 from phyblock.sim.textures import floor, shadow
 from phyblock.words import Background
 
-__all__ = ["COLOR_RGB", "SUPERSAMPLE", "DrawnBlock", "Shot", "empty_ground", "picture", "shoot"]
+__all__ = [
+    "COLOR_RGB",
+    "SUPERSAMPLE",
+    "DrawnBlock",
+    "Shot",
+    "empty_ground",
+    "picture",
+    "segments",
+    "shoot",
+]
 
 SUPERSAMPLE = 2
 
@@ -37,14 +53,6 @@ COLOR_RGB: dict[Color, Rgb] = {
     "orange": (250, 124, 46),
 }
 """Color of a fully lit face, 0..255."""
-_EDGE_RGB = (14, 14, 16)
-_EDGE_HALF_WIDTH_M = 0.0004
-_EDGE_HALF_WIDTH_PX = 0.45
-_EDGE_STEP_M = 0.0001
-
-_PROPS_PER_BLOCK = 2
-"""Its solid and its edges."""
-
 _AMBIENT = 0.55
 _DIFFUSE = 0.55
 _LIGHT_AZIMUTH_DEG = -18.0
@@ -62,19 +70,22 @@ class DrawnBlock:
 
     @property
     def vertices_m(self) -> NDArray[np.float64]:
-        """World corners of the solid, shape (n, 3) [m]."""
-        return corners_m(self.type, self.position_m, self.euler_deg)
+        """World corners of what is drawn, shape (n, 3) [m]."""
+        matrix = rounded(euler_deg_to_matrix(self.euler_deg))
+        vertices: NDArray[np.float64] = turned(drawn_mesh(self.type).vertices_m, matrix)
+        vertices += np.array(self.position_m)
+        return vertices
 
     @property
     def triangles_m(self) -> NDArray[np.float64]:
-        """World corners of the solid's triangles, shape (m, 3, 3) [m]."""
-        triangles: NDArray[np.float64] = self.vertices_m[solid_mesh(self.type).triangles]
+        """World corners of the triangles that are drawn, shape (m, 3, 3) [m]."""
+        triangles: NDArray[np.float64] = self.vertices_m[drawn_mesh(self.type).triangles]
         return triangles
 
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """Blocks as the renderer gives them, before floor and smoothing.
+    """Blocks with their outlines, before floor and smoothing.
 
     `rgb` shape (size, size, 3), 0..255; `block` shape (size, size), the 0-based number of the
     block seen in each pixel, -1 where there is none.
@@ -90,20 +101,19 @@ def shoot(
     size_px: int,
     drawn_by: Renderer | None = None,
 ) -> Shot:
-    """Draw blocks (one at least) alone, with no floor, at exactly `size_px` and unsmoothed.
+    """Draw blocks alone, with no floor, at exactly `size_px` and unsmoothed.
 
     The chosen renderer draws unless another is given.
     """
-    half_width_m = _edge_half_width_m(blocks, camera, size_px)
-    props: list[Prop] = []
-    for block in blocks:
-        pose = Pose(np.array(block.position_m), euler_deg_to_quat_xyzw(block.euler_deg))
-        props.append(Prop(solid_mesh(block.type), COLOR_RGB[block.color], pose))
-        props.append(Prop(edge_bars(block.type, half_width_m), _EDGE_RGB, pose))
-    light = Light(light_direction(camera), _AMBIENT, _DIFFUSE)
-    raster = (drawn_by or renderer()).draw(props, camera, light, size_px)
-    # Floor division takes -1, for no prop, to -1.
-    return Shot(raster.rgb, raster.prop // _PROPS_PER_BLOCK)
+    raster = _raster(blocks, camera, size_px, drawn_by)
+    rgb = draw_outlines(raster.rgb, raster, None)
+    return Shot(rgb, raster.prop)
+
+
+def segments(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> NDArray[np.int64]:
+    """The 0-based number of the block seen in each pixel, shape (size, size), -1 for none."""
+    light = Light(np.array([0.0, 0.0, 1.0]), 1.0, 0.0)
+    return renderer().draw(_props(blocks), camera, light, size_px).prop
 
 
 def picture(
@@ -122,12 +132,30 @@ def picture(
     large_px = size_px * SUPERSAMPLE
     image = floor(background, camera, large_px) if ground is None else ground.copy()
     if blocks:
-        shot = shoot(blocks, camera, large_px, drawn_by)
-        triangles = [block.triangles_m for block in blocks]
-        image *= shadow(background, camera, large_px, triangles, light_direction(camera))
-        np.copyto(image, shot.rgb, where=shot.block[..., None] >= 0)
+        raster = _raster(blocks, camera, large_px, drawn_by)
+        image *= shadow(background, raster.shaded)
+        np.copyto(image, raster.rgb, where=raster.prop[..., None] >= 0)
+        image = draw_outlines(image, raster, background)
     pixels = np.rint(image, out=image).astype(np.uint8)
     return Image.fromarray(pixels).resize((size_px, size_px), Image.Resampling.BOX)
+
+
+def _raster(
+    blocks: Sequence[DrawnBlock], camera: Camera, size_px: int, drawn_by: Renderer | None
+) -> Raster:
+    light = Light(light_direction(camera), _AMBIENT, _DIFFUSE)
+    return (drawn_by or renderer()).draw(_props(blocks), camera, light, size_px)
+
+
+def _props(blocks: Sequence[DrawnBlock]) -> list[Prop]:
+    return [
+        Prop(
+            drawn_mesh(block.type),
+            COLOR_RGB[block.color],
+            Pose(np.array(block.position_m), euler_deg_to_quat_xyzw(block.euler_deg)),
+        )
+        for block in blocks
+    ]
 
 
 def empty_ground(background: Background, camera: Camera, size_px: int) -> NDArray[np.float32]:
@@ -141,15 +169,5 @@ def light_direction(camera: Camera) -> NDArray[np.float64]:
     azimuth = math.atan2(-right[0], right[1]) + math.radians(_LIGHT_AZIMUTH_DEG)
     elevation = math.radians(_LIGHT_ELEVATION_DEG)
     flat = math.cos(elevation)
-    return np.array(
-        [flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation)], dtype=np.float64
-    )
-
-
-def _edge_half_width_m(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> float:
-    """True width, but never finer than a pixel of the finished picture; in steps of 0.1 mm."""
-    places = np.array([block.position_m for block in blocks])
-    depth_m = float(((places - camera.eye_m) @ camera.axes[2]).mean())
-    pixel_m = camera.width_m(depth_m) * SUPERSAMPLE / size_px
-    finest_m = max(_EDGE_HALF_WIDTH_M, _EDGE_HALF_WIDTH_PX * pixel_m)
-    return round(math.ceil(finest_m / _EDGE_STEP_M) * _EDGE_STEP_M, 6)
+    towards = [flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation)]
+    return rounded(np.array(towards))

@@ -1,7 +1,7 @@
 """What `sim` asks of a renderer: colored meshes and a camera in, pixels out.
 
-A renderer draws meshes alone, with no floor, shadow or smoothing: those are made in
-`phyblock.sim.render`, in the same way for every renderer.
+A renderer draws meshes alone and says where the ground is in shadow; floor, outlines and smoothing
+are made in `phyblock.sim.render`, in the same way for every renderer.
 
 To add a renderer: write a module with a class that follows `Renderer`, name it in
 `phyblock.sim.registry`, and let `tests/sim/test_renderer_laws.py` tell what it lacks.
@@ -44,8 +44,8 @@ class Light:
     """A light from far away: `direction` (3,) is the unit vector to it, in the world.
 
     A face with the outward unit normal n has its mesh's color times
-    ambient + diffuse * max(0, n . direction), whatever stands in the way of the light. PyBullet's
-    EGL plugin alone is known to do otherwise: its faces differ less.
+    ambient + diffuse * max(0, n . direction), or times ambient where a mesh stands in the way of
+    the light.
     """
 
     direction: NDArray[np.float64]
@@ -58,11 +58,15 @@ class Raster:
     """What a renderer gives: `rgb` shape (size, size, 3), 0..255, row 0 on top.
 
     `prop` shape (size, size) is the place in the list of the prop that each pixel shows, -1 where
-    it shows none; what color such a pixel has does not matter.
+    it shows none; what color such a pixel has does not matter. `face` shape (size, size) tells the
+    faces of a prop apart, by any numbers: outlines run between them. `shaded` shape (size, size)
+    is where the ground, the plane z = 0, lies in shadow, whatever stands before it.
     """
 
     rgb: NDArray[np.uint8]
     prop: NDArray[np.int64]
+    face: NDArray[np.int64]
+    shaded: NDArray[np.bool_]
 
 
 @runtime_checkable

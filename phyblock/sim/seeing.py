@@ -26,13 +26,16 @@ __all__ = [
     "SEEN_PX",
     "Top",
     "block_mark",
+    "changed_pixels",
     "differing_pixels",
     "is_apart",
     "is_inside",
     "least_difference",
+    "mark_pixel",
     "seen",
     "seen_order",
     "shown_pixels",
+    "surface_at",
     "visible_tops",
 ]
 
@@ -69,8 +72,14 @@ def _seen(recipe: QuestionPicture, drawn_by: Renderer) -> Shot:
 
 def differing_pixels(one: Shot, other: Shot) -> int:
     """How many pixels of the two differ by more than a tenth of the scale in some channel."""
+    return int(changed_pixels(one, other).sum())
+
+
+def changed_pixels(one: Shot, other: Shot) -> NDArray[np.bool_]:
+    """Where the two differ by more than a tenth of the scale in some channel, shape of both."""
     step = np.abs(_colors(one) - _colors(other)).max(axis=2)
-    return int((step > _VISIBLE_STEP).sum())
+    changed: NDArray[np.bool_] = step > _VISIBLE_STEP
+    return changed
 
 
 def least_difference(shots: Sequence[Shot]) -> int:
@@ -131,16 +140,30 @@ def visible_tops(recipe: QuestionPicture, shot: Shot, step_px: int, least_rise: 
     return found
 
 
+def mark_pixel(recipe: QuestionPicture, position_m: tuple[float, float, float]) -> tuple[int, int]:
+    """The pixel (row, column) of `SEEN_PX` at a point of the world, the nearest one inside."""
+    camera = question_camera(recipe, _STYLE)
+    column, row = camera.to_pixels(np.array([position_m]), SEEN_PX)[0]
+    return int(np.clip(row, 0, SEEN_PX - 1)), int(np.clip(column, 0, SEEN_PX - 1))
+
+
 def seen_order(
     recipe: QuestionPicture, shot: Shot, position_m: tuple[float, float, float]
 ) -> int | None:
     """Order of the block that shows at a point of the world; None for the floor."""
-    camera = question_camera(recipe, _STYLE)
-    column, row = camera.to_pixels(np.array([position_m]), SEEN_PX)[0]
-    vertex = int(
-        shot.block[int(np.clip(row, 0, SEEN_PX - 1)), int(np.clip(column, 0, SEEN_PX - 1))]
-    )
+    vertex = int(shot.block[mark_pixel(recipe, position_m)])
     return recipe.blocks[vertex].order if vertex >= 0 else None
+
+
+def surface_at(
+    recipe: QuestionPicture, shot: Shot, position_m: tuple[float, float, float]
+) -> Top | None:
+    """The point of a block's surface that shows at a point of the world; None for the floor."""
+    pixel = mark_pixel(recipe, position_m)
+    vertex = int(shot.block[pixel])
+    if vertex < 0:
+        return None
+    return _hit(drawn_blocks(recipe)[vertex], question_camera(recipe, _STYLE), pixel)
 
 
 def is_apart(

@@ -15,10 +15,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 
+import numpy as np
 from PIL import Image
 
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block, Scene
+from phyblock.sim.camera import Camera
 from phyblock.sim.engine import PhysicsEngine
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_camera
@@ -190,12 +192,18 @@ class Lookout:
     """The place that a scene's goal is seen from; draws `state_picture`s as images, quickly."""
 
     def __init__(self, scene: Scene, style: PictureStyle) -> None:
-        self._style = style
-        self._camera = question_camera(state_picture(scene, scene.blocks, style), style)
-        self._ground = empty_ground(style.background, self._camera, style.size_px)
+        self._scene, self._style = scene, style
+        self._eye_m = self._camera(scene.blocks).eye_m
+        self._ground = empty_ground(style.background, self._camera(scene.blocks), style.size_px)
 
     def image(self, blocks: Sequence[Block]) -> Image.Image:
         """The blocks on the ground, an RGB image of the style's size."""
         drawn = [DrawnBlock(b.type, b.color, b.position_m, b.euler_deg) for b in blocks]
-        style = self._style
-        return picture(drawn, self._camera, style.background, style.size_px, self._ground)
+        style, camera = self._style, self._camera(blocks)
+        # Blocks that fell towards the camera may have pushed it back.
+        is_known = np.array_equal(camera.eye_m, self._eye_m)
+        ground = self._ground if is_known else None
+        return picture(drawn, camera, style.background, style.size_px, ground)
+
+    def _camera(self, blocks: Sequence[Block]) -> Camera:
+        return question_camera(state_picture(self._scene, blocks, self._style), self._style)

@@ -1,4 +1,4 @@
-"""Does it stand? Stability of a state, of every step of an order, and of what a removal leaves.
+"""Does it stand? Stability of a state.
 
 A verdict is only as good as the settings it was reached at, so every result carries them.
 """
@@ -18,8 +18,6 @@ __all__ = [
     "Stability",
     "Trial",
     "check",
-    "check_prefixes",
-    "check_removal",
     "movement",
     "verdict",
 ]
@@ -76,20 +74,6 @@ def check(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Stability:
             world.step(trial.duration_s)
             found.append(movement(blocks, world.poses(), trial))
     return verdict(found, trial)
-
-
-def check_prefixes(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> tuple[Stability, ...]:
-    """Stability after each step when blocks are placed in the order given; the last is the whole.
-
-    Each state is tried afresh, every block at its goal pose, so that no step is judged by the
-    drift of the ones before it.
-    """
-    return tuple(check(blocks[: count + 1], trial) for count in range(len(blocks)))
-
-
-def check_removal(blocks: Sequence[Block], order: int, trial: Trial = DEFAULT_TRIAL) -> Stability:
-    """Stability of what is left when the block with this order is taken away."""
-    return check([block for block in blocks if block.order != order], trial)
 
 
 def movement(blocks: Sequence[Block], poses: Mapping[int, Pose], trial: Trial) -> Movement:

@@ -51,8 +51,9 @@ def sample(surface: Surface, x_m: Grid, y_m: Grid, footprint_m: Grid) -> NDArray
     """
     maps = surface_map(surface)
     texel_m = PERIOD_M / _SIZE
-    depth = np.log2(np.maximum(footprint_m, texel_m) / texel_m)
-    level = np.clip(np.rint(depth), 0, len(maps) - 1).astype(np.int8)
+    # The nearest power of two: borders lie half way between powers, and need no logarithm.
+    borders = np.sqrt(2.0) * texel_m * np.ldexp(1.0, np.arange(len(maps) - 1))
+    level = np.searchsorted(borders.astype(np.float32), footprint_m).astype(np.int8)
     colors = np.empty((*x_m.shape, 3), dtype=np.float32)
     for number in np.unique(level).tolist():
         chosen = level == number

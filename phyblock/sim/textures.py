@@ -6,29 +6,29 @@ file, has no far edge, and costs less than drawing a textured plane in the softw
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFilter
+from PIL import Image, ImageFilter
 
 from phyblock.sim.camera import Camera
 from phyblock.sim.surfaces import PERIOD_M, SURFACES, Surface, sample
 from phyblock.words import Background
 
-__all__ = ["floor", "shadow"]
+__all__ = ["SHADOW_STRENGTH", "floor", "shadow"]
 
 _TILE_M = 0.4
 _LIGHT_TILE = np.array([39.0, 56.0, 75.0], dtype=np.float32)
 _DARK_TILE = np.array([21.0, 37.0, 53.0], dtype=np.float32)
 _FADE_FROM_M = np.float32(4.0)
 """Farther tiles blend into their mean color; at the horizon they are finer than a pixel."""
-_SHADOW_STRENGTH: dict[Background, float] = {
+_SOFTNESS = 340
+"""Pictures are this many times as wide as the blur at the edge of a shadow."""
+SHADOW_STRENGTH: dict[Background, float] = {
     "white": 0.16,
     "checkerboard": 0.5,
-    "light-wood": 0.34,
+    "light-wood": 0.3,
     "dark-wood": 0.5,
-    "concrete": 0.38,
+    "concrete": 0.3,
     "lawn": 0.48,
 }
 
@@ -78,26 +78,14 @@ def _surface(
     return sample(surface, places[0], places[1], footprint)
 
 
-def shadow(
-    background: Background,
-    camera: Camera,
-    size_px: int,
-    triangles_m: Iterable[NDArray[np.float64]],
-    light: NDArray[np.float64],
-) -> NDArray[np.float32]:
+def shadow(background: Background, shaded: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Share of light that is left on each pixel's floor, shape (size, size, 1), 0..1.
 
-    `triangles_m` are arrays of world triangles (m, 3, 3) [m]; `light` points to the light.
+    `shaded` shape (size, size) is where the shadow is; its edge is drawn soft.
     """
-    mask = Image.new("L", (size_px, size_px))
-    draw = ImageDraw.Draw(mask)
-    for corners in triangles_m:
-        fallen = corners - corners[..., 2:] * (light / light[2])
-        pixels = camera.to_pixels(fallen.reshape(-1, 3), size_px).reshape(-1, 6)
-        for polygon in pixels:
-            draw.polygon([float(number) for number in polygon], fill=255)
-    soft = mask.filter(ImageFilter.GaussianBlur(size_px / 340))
-    left = np.asarray(soft, dtype=np.float32)[..., None]
-    left *= -_SHADOW_STRENGTH[background] / 255.0
-    left += 1.0
+    mask = Image.fromarray(shaded.astype(np.uint8) * np.uint8(255))
+    soft = mask.filter(ImageFilter.GaussianBlur(len(shaded) / _SOFTNESS))
+    left: NDArray[np.float32] = np.asarray(soft, dtype=np.float32)[..., None]
+    left = left * np.float32(-SHADOW_STRENGTH[background] / 255.0)
+    left += np.float32(1.0)
     return left

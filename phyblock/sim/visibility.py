@@ -6,15 +6,17 @@ import numpy as np
 
 from phyblock.domain.scene import Scene
 from phyblock.sim.pictures import PictureStyle, drawn, goal_camera
-from phyblock.sim.render import shoot
+from phyblock.sim.render import segments
 
-__all__ = ["LEAST_SHARE", "hidden_blocks", "visible_shares"]
+__all__ = ["LEAST_SHARE", "LEAST_SHOWN", "hidden_blocks", "visible_shares"]
 
 LEAST_SHARE = 12 / 256**2
 """The least share of a goal picture that must show of a block: 48 pixels of 512 by 512.
 
 What cannot be seen cannot be planned.
 """
+LEAST_SHOWN = 0.03
+"""The least share of a block's own outline that must show in the goal picture of a scene."""
 _SIZE_PX = 256
 
 
@@ -25,17 +27,17 @@ def visible_shares(scene: Scene, style: PictureStyle) -> dict[int, float]:
     DataError for a scene without blocks.
     """
     camera, blocks = goal_camera(scene, style), drawn(scene)
-    together = shoot(blocks, camera, style.size_px).block
+    together = segments(blocks, camera, style.size_px)
     shares = {}
     for vertex, (block, one) in enumerate(zip(scene.blocks, blocks, strict=True)):
-        alone = shoot([one], camera, style.size_px).block == 0
+        alone = segments([one], camera, style.size_px) == 0
         shares[block.order] = float((together[alone] == vertex).sum() / max(alone.sum(), 1))
     return shares
 
 
 def hidden_blocks(scene: Scene) -> tuple[int, ...]:
     """Orders of the blocks that show less than `LEAST_SHARE` in the default goal picture."""
-    seen = shoot(drawn(scene), goal_camera(scene, PictureStyle()), _SIZE_PX).block
+    seen = segments(drawn(scene), goal_camera(scene, PictureStyle()), _SIZE_PX)
     counts = np.bincount(seen[seen >= 0], minlength=len(scene))
     least = LEAST_SHARE * _SIZE_PX**2
     return tuple(b.order for b, n in zip(scene.blocks, counts, strict=True) if n < least)

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Hashable
 from typing import Annotated, Any, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
+from typing_extensions import Self
 
 __all__ = [
     "Count",
     "Flag",
     "MaxTokens",
     "ModelName",
+    "PictureControls",
     "Section",
     "Temperature",
     "TemplateName",
@@ -74,6 +76,27 @@ ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._:+-]{0,79}$")
 """Names of models become names of folders and rows of tables, hence the narrow alphabet."""
 
 Flag = Annotated[bool, Field(strict=True)]
+
+
+class PictureControls(Section):
+    """What a section of a track says to find out what answers owe to the picture."""
+
+    blind: Flag = Field(
+        default=False,
+        description="Send no picture of what is asked about: of a question none at all, of a "
+        "scene its candidates alone.",
+    )
+    wrong_image: Flag = Field(
+        default=False,
+        description="Show another scene, which the seed draws; candidates stay the right ones.",
+    )
+
+    @model_validator(mode="after")
+    def _check_controls(self) -> Self:
+        if self.blind and self.wrong_image:
+            message = "shows another scene, where blind shows none"
+            raise refuse(message, at=("wrong_image",), hint="set one of them")
+        return self
 
 
 def _check_template(prompt: str) -> str:

@@ -68,6 +68,18 @@ RULES = (
         _SET_OFFICIAL + ", or use images.source: render",
     ),
     Rule(
+        ("candidates.order", "images.source"),
+        lambda get: get("candidates.order") == "shuffled" and get("images.source") == "dataset",
+        "the data set's own pictures show the candidates in the order of the file",
+        "use images.source: render, or candidates.order: file",
+    ),
+    Rule(
+        ("candidates.order", "models"),
+        lambda get: get("candidates.order") == "shuffled" and get("models") == "recorded",
+        "recorded replies name candidates by the numbers of the file",
+        "use candidates.order: file, or list the models",
+    ),
+    Rule(
         ("tables", "dataset.format"),
         lambda get: "published" in get("tables") and _unofficial(get),
         "published numbers compare with the official data set only",

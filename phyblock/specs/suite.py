@@ -37,6 +37,8 @@ from phyblock.specs.fields import (
 from phyblock.specs.rules import broken_rules, read_dotted
 from phyblock.words import (
     Background,
+    CandidateOrder,
+    CandidateScale,
     Criterion,
     DataFormat,
     Matcher,
@@ -52,6 +54,7 @@ __all__ = [
     "BUILTIN_DATASET",
     "PROMPT_WORDS",
     "RECORDED",
+    "CandidatesSpec",
     "DatasetSpec",
     "ImagesSpec",
     "LimitsSpec",
@@ -161,13 +164,28 @@ class ImagesSpec(Section):
     ] = Field(
         default=("goal", "candidates"), description="Order in which separate pictures are sent."
     )
+    candidate_scale: CandidateScale = Field(
+        default="common",
+        description="common: all rendered candidates of a grid are drawn at one scale. fit: each "
+        "fills its cell. The prompt says which.",
+    )
     size_px: Annotated[int, Field(strict=True, ge=128, le=2048)] = Field(
         default=512, description="Edge of a rendered picture [pixels]."
     )
-    background: Background = Field(
-        default="checkerboard",
-        description="Ground of rendered pictures, one of the paper's six; the checkerboard is "
-        "dark.",
+    background: Background | None = Field(
+        default=None,
+        description="Ground of all rendered pictures, one of the paper's six; the checkerboard is "
+        "dark. null: each question's own, and the checkerboard for all else.",
+    )
+
+
+class CandidatesSpec(Section):
+    """How candidates are offered."""
+
+    order: CandidateOrder = Field(
+        default="file",
+        description="file: numbered as in the data. shuffled: each seed draws another order for "
+        "every scene, the same for all models; numbers in pictures, prompts and replies go along.",
     )
 
 
@@ -257,6 +275,9 @@ class SuiteSpec(Section):
     )
     images: ImagesSpec = Field(
         default_factory=ImagesSpec, description="Which pictures a model is shown."
+    )
+    candidates: CandidatesSpec = Field(
+        default_factory=CandidatesSpec, description="How candidates are offered."
     )
     parser: PlanParser = Field(
         default="steps",

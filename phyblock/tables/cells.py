@@ -1,4 +1,4 @@
-"""The scores that enter each cell of a table, and their micro averages."""
+"""The scores that enter each cell of a table."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ __all__ = [
     "SIDE_METRICS",
     "cell_scores",
     "measured",
-    "micro_averages",
     "with_levels",
 ]
 
@@ -99,23 +98,3 @@ def measured(scores: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
     replied = scores[list(keys)].assign(replied=~scores["outcome"].isin(WITHOUT_REPLY))
     kept = replied.groupby(list(keys))["replied"].transform("any").astype(bool)
     return scores if kept.all() else scores[kept]
-
-
-def micro_averages(scores: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
-    """Counts summed over each group of `keys`, then divided: n, tp, fp, fn and the metrics.
-
-    A metric whose denominator is 0 is NaN. The index is `keys`.
-    """
-    groups = scores.groupby(list(keys), sort=False)
-    summed = groups[["tp", "fp", "fn"]].sum()
-    summed.insert(0, "n", groups.size())
-    tp, fp, fn = (summed[name].to_numpy(np.float64) for name in ("tp", "fp", "fn"))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        summed["precision"] = tp / _nonzero(tp + fp)
-        summed["recall"] = tp / _nonzero(tp + fn)
-        summed["f1"] = 2 * tp / _nonzero(2 * tp + fp + fn)
-    return summed
-
-
-def _nonzero(whole: np.ndarray) -> np.ndarray:
-    return np.where(whole == 0, np.nan, whole)

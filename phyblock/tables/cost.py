@@ -64,7 +64,6 @@ def cost_view(table: pd.DataFrame, run: Run) -> TextTable:
         )
         for row in table.to_dict("records")
     ]
-    name = f", suite {run.design.suite.name}" if run.design.suite.name else ""
     notes = ["Replies from the cache cost this run nothing; 100 replies are priced as if asked."]
     episodes = [known_track(name) for name in run.design.suite.tracks if known_track(name).plays]
     notes += [
@@ -72,7 +71,9 @@ def cost_view(table: pd.DataFrame, run: Run) -> TextTable:
         for kind in episodes
         if (table["track"] == kind.name).any()
     ]
-    return TextTable(f"Tokens, cost and latency{name}", columns, tuple(rows), tuple(notes))
+    return TextTable(
+        f"Tokens, cost and latency{run.design.of_suite}", columns, tuple(rows), tuple(notes)
+    )
 
 
 def _dollars(amount: float) -> str:

@@ -106,7 +106,7 @@ def coverage_view(table: pd.DataFrame, run: Run) -> TextTable:
     parts.append((Column("Cost"), [_cost(*cost) for cost in costs]))
     parts += [(column, cells) for column, cells in usage if set(cells) - {NO_VALUE, "0"}]
     return TextTable(
-        f"Coverage{_of_suite(run)}: what became of every sample",
+        f"Coverage{run.design.of_suite}: what became of every sample",
         tuple(column for column, _ in parts),
         tuple(zip(*(cells for _, cells in parts), strict=True)),
         tuple(_coverage_notes(table, run)),
@@ -143,10 +143,6 @@ def _coverage_notes(table: pd.DataFrame, run: Run) -> list[str]:
     if run.is_cut:
         notes.append("The last line of records.jsonl was cut off and is ignored.")
     return notes
-
-
-def _of_suite(run: Run) -> str:
-    return f", suite {run.design.suite.name}" if run.design.suite.name else ""
 
 
 def coverage_in_terminal(view: TextTable, table: pd.DataFrame) -> tuple[TextTable, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 from pydantic_core import PydanticCustomError
@@ -12,9 +12,11 @@ from pydantic_core import PydanticCustomError
 from phyblock.errors import Problem, StoreError
 from phyblock.registry import known_tracks, table_names
 from phyblock.tables.outcomes import WITHOUT_REPLY
-from phyblock.words import Criterion, MissingPolicy
+from phyblock.words import CandidateOrder, Criterion, MissingPolicy
 
-__all__ = ["OVERALL", "Design", "read_design"]
+__all__ = ["OVERALL", "Design", "SectionT", "read_design", "read_section"]
+
+SectionT = TypeVar("SectionT", bound=BaseModel)
 
 OVERALL = "overall"
 """Name of the row that pools the scenes of all levels."""
@@ -32,12 +34,18 @@ class _Scoring(_Part):
     missing: MissingPolicy
 
 
+class _Candidates(_Part):
+    order: CandidateOrder = "file"
+
+
 class _Suite(_Part):
     name: str = ""
+    description: str = ""
     tracks: tuple[str, ...] = Field(default_factory=lambda: tuple(known_tracks())[:1])
     levels: tuple[int, ...] = Field(min_length=1)
     settings: tuple[str, ...] = Field(min_length=1)
     seeds: tuple[int, ...] = Field(min_length=1)
+    candidates: _Candidates = _Candidates()
     scoring: _Scoring
     tables: tuple[str, ...] = Field(default_factory=table_names)
 
@@ -79,6 +87,11 @@ class Design(_Part):
     def published(self) -> dict[str, str]:
         """What the paper calls each model that it knows; Table 1 need not have a row of it."""
         return {model.name: model.published for model in self.models if model.published}
+
+    @property
+    def of_suite(self) -> str:
+        """The suite as captions of tables end in it, `, suite NAME`; "" where it has no name."""
+        return f", suite {self.suite.name}" if self.suite.name else ""
 
     def samples(self, track: str) -> int:
         """Samples that a complete run holds of one model in a track."""
@@ -133,12 +146,32 @@ def read_design(manifest: Mapping[str, Any], where: str = "run.yaml") -> Design:
     try:
         return Design.model_validate(dict(manifest))
     except ValidationError as error:
-        raise StoreError(
-            Problem(
-                where=where,
-                field=".".join(str(part) for part in found["loc"]),
-                message=found["msg"],
-                hint="run.yaml is written by `phyblock run` and is never edited",
-            )
-            for found in error.errors()
-        ) from error
+        raise _refused(error, where) from error
+
+
+def read_section(
+    suite: Mapping[str, Any], key: str, model: type[SectionT], where: str = "run.yaml"
+) -> SectionT:
+    """Read a section of a run's suite, with the defaults of what it does not say.
+
+    Fields that only another version knows are left out. Raises StoreError naming `where` and every
+    field that is wrong.
+    """
+    told = suite.get(key)
+    known = told if isinstance(told, Mapping) else {}
+    try:
+        return model.model_validate({n: known[n] for n in model.model_fields if n in known})
+    except ValidationError as error:
+        raise _refused(error, where, "suite", key) from error
+
+
+def _refused(error: ValidationError, where: str, *above: str) -> StoreError:
+    return StoreError(
+        Problem(
+            where=where,
+            field=".".join(str(part) for part in (*above, *found["loc"])),
+            message=found["msg"],
+            hint="run.yaml is written by `phyblock run` and is never edited",
+        )
+        for found in error.errors()
+    )

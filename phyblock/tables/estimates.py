@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from phyblock.scoring.uncertainty import Floats, bootstrap
-from phyblock.tables.intervals import CountCube, parents_of, resampler
+from phyblock.scoring.uncertainty import Floats, in_unit_range, jackknife
+from phyblock.tables.intervals import CountCube, parents_of
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, VARIANT, Cell, Counted, Measure
 
@@ -47,7 +47,7 @@ def estimate_frame(
 
     `value` is of the counts of all `n` samples, summed over scenes and seeds, in the measure's own
     unit; `mean` and `sd` (ddof = 1) are over the values of the `seeds` single seeds. `lo` and `hi`
-    bound a 95 % interval and `se` is the standard error, from resampling the `n_clusters` base
+    bound a 95 % interval and `se` is the standard error, from leaving out the `n_clusters` base
     scenes that the `n_scenes` scenes were made from; a scene's seeds stay together. Where a model
     said nothing at all in a cell, nothing was measured: NaN.
     """
@@ -65,7 +65,7 @@ def estimate_frame(
 
 
 def _joined(cells: Sequence[Cell]) -> Iterator[list[Cell]]:
-    """Cells that means join, together: they are resampled at once; all others alone."""
+    """Cells that means join, together: they are estimated at once; all others alone."""
     groups: list[list[Cell]] = []
     for cell in cells:
         linked = [
@@ -132,7 +132,7 @@ def value_of_cells(
 def _of_group(
     run: Run, table: pd.DataFrame, measures: Sequence[Measure], cells: Sequence[Cell]
 ) -> pd.DataFrame:
-    """Estimates of measures with the same counts, in cells that are resampled together."""
+    """Estimates of measures with the same counts, in cells that are estimated together."""
     counted = measures[0].counted
     strata = [cell.name for cell in cells if not cell.of]
     table = table[table[CELL].isin(strata)]
@@ -145,22 +145,24 @@ def _of_group(
     n = np.array([[sizes.get((*g, s), 0) for s in strata] for g in pool.groups])
     behind, fewest = _clusters_of_cells(pool, cells)
     # A part of a single base scene leaves a mean without an interval.
-    resampled = np.where(fewest < 2, fewest, behind)
+    usable = np.where(fewest < 2, fewest, behind)
     silent = np.array([[not heard.get((g[0], s), False) for s in strata] for g in pool.groups])
-    # Where a model said nothing, empty plans have counts, and no resample has a value.
+    # Where a model said nothing, empty plans have counts, and nothing was measured.
     counts = np.where(silent[None, :, :, None], np.nan, pool.counts)
 
     def all_values(sums: Floats) -> Floats:
         each = [value_of_cells(measure, cells, strata)(sums) for measure in measures]
         return np.stack(each, axis=-1)
 
-    found = bootstrap(
+    found = jackknife(
         counts,
         pool.cube.clusters,
         all_values,
-        resampler(),
-        n_clusters=np.repeat(resampled[:, :, None], len(measures), axis=-1),
+        n_clusters=np.repeat(usable[:, :, None], len(measures), axis=-1),
     )
+    is_share = np.array([measure.unit == "%" for measure in measures])
+    within = in_unit_range(found)
+    lo, hi = np.where(is_share, within.lo, found.lo), np.where(is_share, within.hi, found.hi)
     spread = _over_seeds(table, pool, counted, silent, all_values)
     members = np.array([[name in strata_of(cell, cells) for name in strata] for cell in cells])
     scenes = np.any(pool.present[:, :, None, :] & members, axis=-1).sum(axis=0)
@@ -177,8 +179,8 @@ def _of_group(
                         int(n[g][members[c]].sum()),
                         found.value[at],
                         *(values[at] for values in spread),
-                        found.lo[at],
-                        found.hi[at],
+                        lo[at],
+                        hi[at],
                         found.se[at],
                         int(scenes[g, c]),
                         int(behind[g, c]),

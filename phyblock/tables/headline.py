@@ -97,11 +97,10 @@ def interval_view(
         for cell in cells
         for name in ("%", "95 % CI")
     ]
-    suite = f", suite {run.design.suite.name}" if run.design.suite.name else ""
     most = f", at most {table['n_clusters'].max()} of them" if len(table) else ""
     return TextTable(
-        f"{caption} with 95 % intervals{suite}",
+        f"{caption} with 95 % intervals{run.design.of_suite}",
         (Column("Model", is_text=True), *columns),
         tuple(rows),
-        (f"Intervals: base scenes resampled{most}.",),
+        (f"Intervals: base scenes left out in turn{most}.",),
     )

@@ -1,4 +1,4 @@
-"""Counts by scene and cell, and what every resampling of base scenes begins with."""
+"""Counts by scene and cell, with the base scenes of each scene."""
 
 from __future__ import annotations
 
@@ -11,10 +11,7 @@ import pandas as pd
 from phyblock.scoring.uncertainty import Clusters, Floats
 from phyblock.tables.load import Run
 
-__all__ = ["BOOTSTRAP_SEED", "CountCube", "parents_of", "resampler"]
-
-BOOTSTRAP_SEED = 20_261_121
-"""Seed of every resampling, so that tables made again are the same."""
+__all__ = ["CountCube", "parents_of"]
 
 
 class CountCube:
@@ -41,11 +38,6 @@ class CountCube:
         self.present[scenes, cells] = True
         self.parents = [tuple(parents[scene]) or (scene,) for scene in self.scenes]
         self.clusters = Clusters.of(self.parents)
-
-
-def resampler() -> np.random.Generator:
-    """The generator that every resampling begins with."""
-    return np.random.default_rng(BOOTSTRAP_SEED)
 
 
 def parents_of(run: Run) -> pd.Series[Any]:

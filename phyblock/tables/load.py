@@ -6,13 +6,13 @@ import functools
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pandas as pd
 
-from phyblock.records import MANIFEST, Record, read_manifest
+from phyblock.records import MANIFEST, Manifest, Record, read_manifest
 from phyblock.records.reading import run_records
-from phyblock.tables.design import Design, read_design
+from phyblock.tables.design import Design, SectionT, read_design, read_section
 from phyblock.tables.flat import Flattened
 
 __all__ = ["Frames", "Run", "frames_of", "kept_per_run", "load_run", "once_per_run"]
@@ -27,7 +27,7 @@ class Frames(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run folder, read: `manifest` is its `run.yaml`, `design` the part that tables need.
+    """A run folder, read: `manifest` is its `run.yaml`, `design` the plan in it.
 
     `records` has one row a sample: track, model, scene, levels, parents, n_blocks, seed, outcome,
     the reply's text, tokens, cost_usd, latency_s and so on, error, prompt, parsed plan. `scores`
@@ -37,12 +37,19 @@ class Run:
     """
 
     path: Path
-    manifest: dict[str, Any] = field(repr=False)
+    manifest: Manifest = field(repr=False)
     design: Design = field(repr=False)
     records: pd.DataFrame = field(repr=False)
     scores: pd.DataFrame = field(repr=False)
     is_cut: bool = False
     made: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False, init=False)
+
+    def section(self, key: str, model: type[SectionT]) -> SectionT:
+        """A section of the run's suite, with the defaults of what it does not say.
+
+        Fields that only another version knows are left out; StoreError for a value that is wrong.
+        """
+        return read_section(self.manifest.suite, key, model, str(self.path / MANIFEST))
 
 
 def kept_per_run(make: Callable[[Run], pd.DataFrame]) -> Callable[[Run], pd.DataFrame]:
@@ -76,10 +83,9 @@ def load_run(path: str | Path, *, texts: bool = True) -> Run:
     that is corrupt, other than an unfinished last one, or of another run.
     """
     folder = Path(path)
-    facts = read_manifest(folder)
-    manifest = facts.fields()
-    design = read_design(manifest, str(folder / MANIFEST))
-    lines = run_records(folder, facts)
+    manifest = read_manifest(folder)
+    design = read_design(manifest.fields(), str(folder / MANIFEST))
+    lines = run_records(folder, manifest)
     records, scores = frames_of((record for _, record in lines), design, texts=texts)
     return Run(folder, manifest, design, records, scores, lines.is_cut)
 

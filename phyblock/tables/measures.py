@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,12 +12,15 @@ if TYPE_CHECKING:
     from phyblock.scoring.uncertainty import Metric
     from phyblock.tables.load import Run
 
-__all__ = ["CELL", "VARIANT", "Cell", "Counted", "Measure"]
+__all__ = ["CELL", "VARIANT", "WAY", "Cell", "Counted", "Measure", "way_name"]
 
 VARIANT = ("setting", "matcher", "criterion")
 """How a sample was counted; "" where its track knows no such choice."""
 CELL = "cell"
 """Column of the cell that a row of counts is pooled in."""
+
+WAY = ("measure", CELL, *VARIANT)
+"""What tells the values of one model apart."""
 
 Unit = Literal["%", "cm", "degrees", "steps", "blocks", ""]
 
@@ -87,3 +90,8 @@ class Measure:
     def scale(self) -> float:
         """What a value is multiplied by where it is shown."""
         return 100.0 if self.unit == "%" else 1.0
+
+
+def way_name(row: Mapping[Any, Any]) -> str:
+    """What a value is of, as a key: `f1/overall/A/optimal/aov`."""
+    return "/".join(str(row[name]) for name in WAY)

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from importlib.resources import files
+from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from phyblock.tables.load import Run
-from phyblock.tables.text_table import Column, TextTable, number
+from phyblock.tables.text_table import Column, TextTable, number, spread
 
 __all__ = [
     "HUMAN_ACCURACY",
     "HUMAN_NOTE",
     "NOTHING",
+    "OURS",
+    "PUBLISHED",
     "beside",
     "beside_view",
+    "cell_text",
     "interleaved",
     "published_table",
+    "row_name",
 ]
 
 HUMAN_ACCURACY = 94.7
@@ -28,6 +34,9 @@ HUMAN_NOTE = (
     "appendix): an accuracy, shown for scale."
 )
 """What stands under every table that shows it."""
+
+OURS, PUBLISHED = "run", "published"
+"""Where a row is from, in a table in which published rows may follow those of models."""
 
 _KINDS = {"published": "paper", "ours": "ours", "difference": "difference"}
 NOTHING = pd.DataFrame(
@@ -62,14 +71,25 @@ def beside(printed: pd.DataFrame, ours: pd.DataFrame, run: Run, keys: list[str])
     return table[["model", "published_name", *keys, "published", "ours", "difference"]]
 
 
+def row_name(row: Mapping[Hashable, Any]) -> str:
+    """What a row of a table is called in which published rows follow those of models."""
+    published = f"  as published ({row['published_name']})"
+    return str(row["model"]) if row["source"] == OURS else published
+
+
+def cell_text(row: Mapping[Hashable, Any], cell: str) -> str:
+    """A cell of such a row, with its spread over seeds where there is one."""
+    return spread(row[cell], row.get(f"{cell}_sd", np.nan))
+
+
 def interleaved(table: pd.DataFrame, cells: Sequence[str]) -> pd.DataFrame:
     """Cells of a table in which a published row may follow that of a model."""
     sources = table.to_dict("records")
-    ours = {row["model"]: row for row in sources if row["source"] == "run"}
+    ours = {row["model"]: row for row in sources if row["source"] == OURS}
     rows = [
         (row["model"], row["published_name"], cell, row[cell], ours[row["model"]][cell])
         for row in sources
-        if row["source"] == "published"
+        if row["source"] == PUBLISHED
         for cell in cells
     ]
     names = ["model", "published_name", "cell", "published", "ours"]
@@ -94,9 +114,8 @@ def beside_view(
             values = (number(by_cell[kind][cell], signed=signed) for cell in cells)
             rows.append((head, _KINDS[kind], *values))
     columns = [Column(names.get(cell, cell)) for cell in cells]
-    suite = f", suite {run.design.suite.name}" if run.design.suite.name else ""
     return TextTable(
-        f"Our numbers beside the paper's Table {number_in_paper}{suite} (%)",
+        f"Our numbers beside the paper's Table {number_in_paper}{run.design.of_suite} (%)",
         (Column("Model", is_text=True), Column("", is_text=True), *columns),
         tuple(rows),
         (note,),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -15,14 +15,17 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from phyblock.datasets import Dataset
+    from phyblock.datasets import AssemblyTask, Dataset
     from phyblock.models import Image
     from phyblock.records import Record
     from phyblock.sim import PictureStyle
+    from phyblock.sim.film import FilmStep
     from phyblock.tables.load import Run
 
 __all__ = [
     "WHOLE",
+    "EpisodeView",
+    "ItemExport",
     "KeptPictures",
     "PageItems",
     "PaperTable",
@@ -82,6 +85,31 @@ class PageItems:
 
 
 @dataclass(frozen=True)
+class EpisodeView:
+    """How `phyblock episode` shows a record: its steps as a table, and as frames of a film."""
+
+    table: Callable[[Any], TextTable]
+    frames: Callable[[Any, AssemblyTask], Iterable[FilmStep]]
+
+
+@dataclass(frozen=True)
+class ItemExport:
+    """How `phyblock export-data` writes what is asked about, with its pictures, for other tools.
+
+    `formats` are the words for `--to`; `items` names the bundled set that is written unless
+    another is named. `write` takes a format, the folder to write, the set by its name or folder,
+    the scenes that it is about, how many items to write at most (None: all) and the edge of a
+    picture [pixels]; it returns what it wrote. It raises DataError for a set or picture that cannot
+    be read, SpecError for a package that is not installed, StoreError for a folder that cannot be
+    written.
+    """
+
+    formats: tuple[str, ...]
+    items: str
+    write: Callable[[str, Path, str, Dataset, int | None, int], tuple[Path, ...]]
+
+
+@dataclass(frozen=True)
 class TableMaker:
     """How a table is made and how people read it; without `view` it is a CSV file alone.
 
@@ -126,9 +154,11 @@ class TrackReport:
     `tables`, `figures` and `paper_tables` (by their number in the paper) are its own; a figure is
     None for a run that has no numbers for it. `bars` is the name of the figure of its first
     measure. `check_alike` raises SpecError where the first run cannot be compared with the second
-    in these cells. `part_names` say what `Record.part` stands for. `items` opens, for the page and
-    out of a manifest, what was asked about where that is more than scenes; it raises DataError
-    where that is not what the run was made on.
+    in these cells. `part_names` say what `Record.part` stands for. `items` opens, for the page of a
+    run, what was asked about where that is more than scenes; it raises DataError
+    where that is not what the run was made on. `episodes` shows records that are episodes, `export`
+    writes what is asked about. `showing` says, in words that end every caption, what is unusual
+    about how items were shown.
     """
 
     measures: tuple[Measure, ...]
@@ -148,4 +178,7 @@ class TrackReport:
     paper_tables: Mapping[int, PaperTable] = field(default_factory=dict)
     check_alike: Callable[[Run, Run, Sequence[str]], None] | None = None
     part_names: Mapping[str, str] = field(default_factory=dict)
-    items: Callable[[Mapping[str, Any], Dataset], PageItems] | None = None
+    items: Callable[[Run, Dataset], PageItems] | None = None
+    episodes: EpisodeView | None = None
+    export: ItemExport | None = None
+    showing: Callable[[Run], tuple[str, ...]] = lambda _: ()

@@ -9,8 +9,10 @@ from phyblock.tracks.base import (
     EpisodeTrack,
     Item,
     Judgement,
+    ShowsBySeed,
     SingleTrack,
     Track,
+    shown_item,
 )
 from phyblock.tracks.kind import Opening, TrackKind, kind_of, kinds
 from phyblock.tracks.opening import open_tracks
@@ -30,6 +32,7 @@ __all__ = [
     "PicturePolicy",
     "Pictures",
     "Prompt",
+    "ShowsBySeed",
     "SingleTrack",
     "Studio",
     "TemplatePrompt",
@@ -38,4 +41,5 @@ __all__ = [
     "kind_of",
     "kinds",
     "open_tracks",
+    "shown_item",
 ]

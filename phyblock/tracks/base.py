@@ -17,8 +17,10 @@ __all__ = [
     "EpisodeTrack",
     "Item",
     "Judgement",
+    "ShowsBySeed",
     "SingleTrack",
     "Track",
+    "shown_item",
 ]
 
 
@@ -91,6 +93,21 @@ class SingleTrack(Track[ItemT], Protocol[ItemT]):
 
     def judge(self, item: ItemT, text: str | None) -> Judgement:
         """Read and score a reply; None, where there is no reply, is scored as nothing said."""
+
+
+@runtime_checkable
+class ShowsBySeed(Protocol[ItemT]):
+    """A track that shows an item otherwise with every seed, as with its candidates shuffled."""
+
+    def shown(self, item: ItemT, seed: int) -> ItemT:
+        """The item as a seed shows it, by which it is asked, judged and counted; its key is the
+        same.
+        """
+
+
+def shown_item(track: AnyTrack, item: Any, seed: int) -> Any:
+    """An item of a track as a seed shows it."""
+    return track.shown(item, seed) if isinstance(track, ShowsBySeed) else item
 
 
 class Episode(Protocol):

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from phyblock.registry import added_measures
 from phyblock.tables.measures import Counted
 from phyblock.tracks.kind import kind_of
 
-__all__ = ["sample_counts"]
+__all__ = ["counts_samples", "sample_counts"]
+
+
+def counts_samples(track: str) -> bool:
+    """Whether measures of a track count samples as they are judged."""
+    return bool(_sorts(track))
 
 
 def sample_counts(track: str, item: Any, judged: Any) -> Mapping[str, tuple[float, ...]]:
@@ -19,12 +24,17 @@ def sample_counts(track: str, item: Any, judged: Any) -> Mapping[str, tuple[floa
     not count a sample, its counts are empty: they are absent where a record was written before the
     measure was there, and `phyblock score` fills them in.
     """
-    added: list[Counted] = [measure.counted for measure in added_measures(track)]
-    found = {
-        counted.name: counted.sample(item, judged)
-        for counted in (*kind_of(track).counted, *added)
-        if counted.sample is not None
-    }
+    found = {name: count(item, judged) for name, count in _sorts(track).items()}
     return {
         name: tuple(float(number) for number in numbers or ()) for name, numbers in found.items()
+    }
+
+
+def _sorts(track: str) -> dict[str, Callable[[Any, Any], Sequence[float] | None]]:
+    """What counts a sample of a track, by name of the counts."""
+    added: list[Counted] = [measure.counted for measure in added_measures(track)]
+    return {
+        counted.name: counted.sample
+        for counted in (*kind_of(track).counted, *added)
+        if counted.sample is not None
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 import pandas as pd
 
 from phyblock.errors import Problem, StoreError
@@ -99,7 +100,7 @@ def counted_samples(run: Run, track: str, counted: Counted) -> pd.DataFrame:
     rows = records[(records["track"] == track) & ~left_out]
     where = str(run.path / RECORDS)
     found = [numbers_of(counted, counts, where) for counts in rows["counts"]]
-    rows = rows[[bool(numbers) for numbers in found]]
+    rows = rows[np.array([bool(numbers) for numbers in found], dtype=bool)]
     numbers = pd.DataFrame(
         [list(numbers) for numbers in found if numbers],
         columns=list(counted.columns),

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
 
-from phyblock.datasets import AssemblyTask, Dataset
-from phyblock.records import Record
+from phyblock.datasets import Dataset
+from phyblock.records import Manifest, Record
 from phyblock.registry import known_tracks
 from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tables.measures import Counted
 from phyblock.tables.track_report import TrackReport
-from phyblock.tracks.base import AnyTrack, SingleTrack
+from phyblock.tracks.base import AnyTrack
 
 __all__ = ["Opening", "TrackKind", "kind_of", "kinds"]
 
@@ -44,11 +44,11 @@ class TrackKind:
     benchmark's own reply form. `section` is the key, model and description of the part of a suite
     that is its own. `template` is the bundled prompt, None where it has none, and `prompt_field`
     where a suite names another. `own_data` gives the folder of data of its own as a suite says it,
-    `manifest` what the manifest says beyond what all tracks have. `rescored` makes the track out of
-    a suite and scenes for reading stored replies again; None where `phyblock score` takes its
-    records over as they are. With `plays`, samples are episodes of several turns. `record` is the
-    model of its records, where it adds something to them. `counted` is what its measures count of
-    every sample as it is judged.
+    `manifest` what the manifest says beyond what all tracks have. `own_root` tells where a run
+    found these data. With `rescored`, what its replies are worth depends on the suite's parser and
+    matchers, and `phyblock score` judges them again even where no measure counts samples. With
+    `plays`, samples are episodes of several turns. `record` is the model of its records, where it
+    adds something to them. `counted` is what its measures count of every sample as it is judged.
     """
 
     name: str
@@ -67,7 +67,8 @@ class TrackKind:
     own_data: Callable[[SuiteSpec], tuple[str, tuple[str, ...], bool] | None] | None = None
     manifest: Callable[[LoadedSuite], Mapping[str, Any]] | None = None
     plays: bool = False
-    rescored: Callable[[SuiteSpec, Sequence[AssemblyTask]], SingleTrack[Any]] | None = None
+    own_root: Callable[[Manifest], str | None] = lambda _: None
+    rescored: bool = False
     counted: tuple[Counted, ...] = ()
 
     def data_folder(self, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:

@@ -6,20 +6,27 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from phyblock.datasets import AssemblyTask
 from phyblock.resources import cache_dir
 from phyblock.sim import PictureStyle
 from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.specs.fields import PictureControls
+from phyblock.specs.suite import ImagesSpec
 from phyblock.tracks.base import AnyTrack
 from phyblock.tracks.kind import Opening, kind_of
 from phyblock.tracks.pictures import PicturePolicy, Pictures
 from phyblock.tracks.prompts import TemplatePrompt
+from phyblock.tracks.showing import Showing, TaskShowing
+from phyblock.words import BACKGROUNDS
 
 __all__ = [
     "assembly_pictures",
     "open_tracks",
     "picture_folder",
+    "picture_policy",
     "picture_style",
     "render_workers",
+    "task_showing",
     "template_prompt",
 ]
 
@@ -39,16 +46,36 @@ def picture_folder() -> Path:
     return cache_dir() / "pictures"
 
 
-def picture_style(suite: SuiteSpec) -> PictureStyle:
+def picture_style(images: ImagesSpec) -> PictureStyle:
     """How a suite wants pictures drawn."""
-    return PictureStyle(size_px=suite.images.size_px, background=suite.images.background)
+    ground = images.background or BACKGROUNDS[0]
+    return PictureStyle(images.size_px, ground, candidate_scale=images.candidate_scale)
+
+
+def picture_policy(images: ImagesSpec) -> PicturePolicy:
+    """Which pictures of goals and candidates a suite wants, and how they are drawn."""
+    return PicturePolicy(images.source, images.layout, images.order, picture_style(images))
 
 
 def assembly_pictures(suite: SuiteSpec) -> Pictures:
     """Pictures of goals and candidates as a suite wants them."""
-    images = suite.images
-    policy = PicturePolicy(images.source, images.layout, images.order, picture_style(suite))
-    return Pictures(picture_folder(), policy, render_workers())
+    return Pictures(picture_folder(), picture_policy(suite.images), render_workers())
+
+
+def task_showing(
+    suite: SuiteSpec,
+    section: type[PictureControls],
+    name: str,
+    tasks: Sequence[AssemblyTask],
+    pool: Sequence[AssemblyTask],
+) -> TaskShowing:
+    """How a suite shows the scenes of a track, whose section is of this type and name.
+
+    Raises SpecError where another goal is wanted and `pool` has none for one of `tasks`.
+    """
+    controls = suite.section(section)
+    how = Showing(suite.candidates.order, controls.blind, controls.wrong_image, suite.seeds)
+    return TaskShowing(how, tasks, pool, f"{name}.wrong_image")
 
 
 def template_prompt(loaded: LoadedSuite, name: str) -> TemplatePrompt:

@@ -19,10 +19,12 @@ from phyblock.sim import (
     composite_png,
     goal_key,
     goal_png,
+    goal_style,
 )
 from phyblock.sim.compose import to_png
+from phyblock.tracks.showing import ShownTask
 from phyblock.tracks.studio import Drawing, Studio, to_image
-from phyblock.words import PictureLayout, PictureName, PictureSource
+from phyblock.words import CandidateScale, PictureLayout, PictureName, PictureSource
 
 __all__ = ["PicturePolicy", "Pictures"]
 
@@ -48,17 +50,27 @@ class Pictures(Studio):
         super().__init__(folder, workers)
         self.policy = policy
 
+    @property
+    def candidate_scale(self) -> CandidateScale | None:
+        """How candidates are scaled, for the prompt; None where pictures are the data set's."""
+        return None if self.policy.source == "dataset" else self.policy.style.candidate_scale
+
+    def style_of(self, task: AssemblyTask) -> PictureStyle:
+        """How the pictures of a task are drawn: larger than usual where its goal is wide."""
+        return goal_style(task.scene, self.policy.style)
+
     async def of(self, task: AssemblyTask) -> tuple[Image, ...]:
         """The pictures of one task as they are sent.
 
         Raises DataError when the data set has no picture of it or a broken one, StoreError when
         the cache folder cannot be written.
         """
-        if (recent := self.recalled(task.key)) is not None:
+        name = _name(task)
+        if (recent := self.recalled(name)) is not None:
             return recent
         if self.policy.source == "dataset":
-            return self.remembered(task.key, self._from_dataset(task))
-        return self.remembered(task.key, await self.images(self._drawings(task)))
+            return self.remembered(name, self._from_dataset(task))
+        return self.remembered(name, await self.images(self._drawings(task)))
 
     def outline(self, task: AssemblyTask) -> tuple[tuple[Image, ...], bool]:
         """The pictures as far as they are at hand, and whether all are; nothing is rendered.
@@ -68,25 +80,34 @@ class Pictures(Studio):
         if self.policy.source == "dataset":
             return self._from_dataset(task), True
         drawings = self._drawings(task)
-        side = self.policy.style.size_px
-        wide = 2 * side if self.policy.layout == "composite" else side
+        side = self._shown_style(task).size_px
+        wide = 2 * side if drawings[0].label == "composite" else side
         return self.outlined(drawings, (wide, side))
 
     def keys(self, task: AssemblyTask) -> tuple[str, ...]:
         """What decides the pixels of a task's pictures: digests of content, style and renderer."""
         if self.policy.source == "dataset":
-            data = b"" if task.composite is None else read_picture(task.composite)
-            return (hashlib.sha256(data).hexdigest(),)
+            of = dict.fromkeys(one.composite for one in (task, _goal_of(task)) if one is not None)
+            parts = (b"" if path is None else read_picture(path) for path in of)
+            return tuple(hashlib.sha256(data).hexdigest() for data in parts)
         return tuple(drawing.key for drawing in self._drawings(task))
 
+    def _shown_style(self, task: AssemblyTask) -> PictureStyle:
+        """The style of what is shown: a goal that is not shown has no part in its size."""
+        goal = _goal_of(task)
+        return self.policy.style if goal is None else self.style_of(goal)
+
     def _drawings(self, task: AssemblyTask) -> tuple[Drawing, ...]:
-        scene, candidates, style = task.scene, task.candidates, self.policy.style
-        goal = Drawing("goal", goal_key(scene, style), partial(goal_png, scene, style))
+        candidates, style = task.candidates, self._shown_style(task)
         grid = Drawing(
             "candidates",
             candidates_key(candidates, style),
             partial(candidates_png, candidates, style),
         )
+        of = _goal_of(task)
+        if of is None:
+            return (grid,)
+        goal = Drawing("goal", goal_key(of.scene, style), partial(goal_png, of.scene, style))
         if self.policy.layout == "separate":
             apart = {"goal": goal, "candidates": grid}
             return tuple(apart[label] for label in self.policy.order)
@@ -94,22 +115,44 @@ class Pictures(Studio):
         return (Drawing("composite", key, partial(_composite, goal.make, grid.make)),)
 
     def _from_dataset(self, task: AssemblyTask) -> tuple[Image, ...]:
-        if task.composite is None:
-            where = f"scene {task.scene.id}"
-            hint = "render the pictures: --set images.source=render"
-            raise DataError(Problem(where, "the data set has no picture of it", hint=hint))
-        data = read_picture(task.composite)
-        if self.policy.layout == "composite":
+        of, data = _goal_of(task), _composite_file(task)
+        if self.policy.layout == "composite" and not isinstance(task, ShownTask):
             return (to_image(data, "composite"),)
-        halves = dict(zip(("goal", "candidates"), _halves(data, task.composite), strict=True))
+        _, grid = _halves(data, task.composite)
+        if of is None:
+            return (to_image(grid, "candidates"),)
+        goal, _ = _halves(_composite_file(of), of.composite)
+        if self.policy.layout == "composite":
+            return (to_image(composite_png(goal, grid), "composite"),)
+        halves = {"goal": goal, "candidates": grid}
         return tuple(to_image(halves[label], label) for label in self.policy.order)
+
+
+def _goal_of(task: AssemblyTask) -> AssemblyTask | None:
+    """The task whose goal is shown, None where none is."""
+    return task.goal if isinstance(task, ShownTask) else task
+
+
+def _name(task: AssemblyTask) -> str:
+    """Tells apart the ways in which a task is shown."""
+    if not isinstance(task, ShownTask):
+        return task.key
+    return f"{task.key} {task.order} {task.goal and task.goal.key}"
+
+
+def _composite_file(task: AssemblyTask) -> bytes:
+    if task.composite is None:
+        where = f"scene {task.scene.id}"
+        hint = "render the pictures: --set images.source=render"
+        raise DataError(Problem(where, "the data set has no picture of it", hint=hint))
+    return read_picture(task.composite)
 
 
 def _composite(make_goal: Callable[[], bytes], make_grid: Callable[[], bytes]) -> bytes:
     return composite_png(make_goal(), make_grid())
 
 
-def _halves(composite: bytes, path: Path) -> tuple[bytes, bytes]:
+def _halves(composite: bytes, path: Path | None) -> tuple[bytes, bytes]:
     """Goal and candidates cut out of a 2:1 composite: two squares but for the gap between."""
     with decoded(composite, str(path)) as picture:
         # PNG knows no CMYK, in which JPEG files may come.

@@ -8,13 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from phyblock.domain.candidates import MAX_CANDIDATES, Candidate
+from phyblock.domain.blocks import BlockType, orientation_class
+from phyblock.domain.candidates import MAX_CANDIDATES
 from phyblock.domain.scene import Block
 from phyblock.sim.stability import Stability, Trial
 from phyblock.sim.support import GROUND
 from phyblock_making.checks.finding import CheckName, Finding
 from phyblock_making.checks.scene_facts import SceneFacts
 from phyblock_making.checks.tolerances import LEVEL_LIMITS
+from phyblock_making.poses import POSES
 
 __all__ = ["CHECKS", "Check", "findings_of"]
 
@@ -148,10 +150,16 @@ def _unstable(facts: SceneFacts) -> Iterator[Finding]:
 
 
 def _hidden(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks that do not show in the goal picture."""
+    """Blocks of which too little shows in the goal picture, of the picture or of their outline."""
     for order in facts.hidden:
         message = f"block {order} does not show in the goal picture"
         yield Finding(facts.scene.id, "hidden", message, (order,))
+    least = facts.tolerances.shown
+    for order, share in facts.shown.items():
+        if share < least and order not in facts.hidden:
+            message = f"only {share:.1%} of the outline of block {order} shows in the goal picture"
+            covered, limit = 100 * (1 - share), 100 * (1 - least)
+            yield Finding(facts.scene.id, "hidden", message, (order,), covered, limit, "%")
 
 
 def _lacking_candidates(facts: SceneFacts) -> Iterator[Finding]:
@@ -177,13 +185,13 @@ def _too_many_candidates(facts: SceneFacts) -> Iterator[Finding]:
 
 
 def _distractors(facts: SceneFacts) -> Iterator[Finding]:
-    """Candidates that are not needed and are like no needed block."""
+    """Candidates that are not needed in poses that no design knows: these give themselves away."""
     scene = facts.scene
     looks = {block.look for block in scene.blocks}
     offered = () if facts.candidates is None else facts.candidates.candidates
     for i, candidate in enumerate(offered):
-        if candidate.look not in looks and not any(_near(candidate, b) for b in scene.blocks):
-            message = "differs from every needed block by more than one attribute"
+        if candidate.look not in looks and candidate.look[2] not in _poses(candidate.type):
+            message = "is not needed and stands as no block of a goal does"
             yield Finding(
                 scene.id,
                 "distractor",
@@ -224,11 +232,9 @@ def _fall(
     return Finding(facts.scene.id, check, message, shown.fallen, moved_mm, limit_mm, "mm")
 
 
-def _near(candidate: Candidate, block: Block) -> bool:
-    """Other in orientation, in color, or in type alone; a pose of another type is its own."""
-    if candidate.type != block.type:
-        return candidate.color == block.color
-    return candidate.color == block.color or candidate.look[2] == block.look[2]
+def _poses(block_type: BlockType) -> set[tuple[float, ...]]:
+    """The orientation classes in which designs lay down a type."""
+    return {orientation_class(block_type, euler) for euler in POSES[block_type].values()}
 
 
 def _fit_mm(facts: SceneFacts) -> float:

@@ -12,8 +12,8 @@ from phyblock.domain.scene import Block, Kind, Scene
 from phyblock.sim.stability import Stability, check
 from phyblock.sim.steps import check_at_rest, check_steps
 from phyblock.sim.support import GROUND, Gap, Overlap, find_gaps, find_overlaps, support_graph
-from phyblock.sim.visibility import hidden_blocks
-from phyblock_making.checks.tolerances import OURS, Tolerances
+from phyblock.sim.visibility import hidden_blocks, visible_shares
+from phyblock_making.checks.tolerances import OURS, VIEW, Tolerances
 
 __all__ = ["SceneFacts", "declared_orders", "graph_of"]
 
@@ -77,6 +77,11 @@ class SceneFacts:
         """What becomes of the structure after each step of the stored order."""
         blocks = self.scene.blocks if self.tolerances.last_step else self.scene.blocks[:-1]
         return check_steps(blocks, self.tolerances.step_trial)
+
+    @cached_property
+    def shown(self) -> Mapping[int, float]:
+        """For each block, by its order, the share of its outline that shows in the goal picture."""
+        return visible_shares(self.scene, VIEW)
 
     @cached_property
     def hidden(self) -> tuple[int, ...]:

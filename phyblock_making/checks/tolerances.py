@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.stability import DEFAULT_TRIAL, Trial
 from phyblock.sim.steps import Rest
 from phyblock.sim.support import FIT_TOLERANCE_M
+from phyblock.sim.visibility import LEAST_SHOWN
 
 __all__ = [
     "FINISHED_REST",
@@ -15,9 +17,13 @@ __all__ = [
     "OURS",
     "OURS_IN_HASTE",
     "STEP_TRIAL",
+    "VIEW",
     "Limits",
     "Tolerances",
 ]
+
+VIEW = PictureStyle(size_px=256)
+"""How the goal picture is drawn to see which blocks show in it."""
 
 STEP_TRIAL = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
 """Every step is tried at the first of the two time steps, for two seconds or until at rest."""
@@ -32,6 +38,7 @@ class Tolerances:
 
     `trial` is that of the finished structure, which is watched to its end, or until it is at rest
     as `rest` says; `step_trial` that of every step, `last_step` whether of the last step, too.
+    Of every block at least the share `shown` of its outline shows in the goal picture.
     """
 
     fit_m: float = FIT_TOLERANCE_M
@@ -39,6 +46,7 @@ class Tolerances:
     step_trial: Trial = STEP_TRIAL
     rest: Rest | None = None
     last_step: bool = True
+    shown: float = LEAST_SHOWN
 
 
 OURS = Tolerances()

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 from phyblock.cli.paths import NAME_OR_PATH
-from phyblock.datasets import QUESTIONS_FILE, QuestionSet, read_questions
-from phyblock.errors import DataError, Problem
-from phyblock.resources import bundled
-from phyblock_making.cli.scene_sets import read_data_set
+from phyblock.datasets import QuestionSet, read_questions
+from phyblock.datasets.named import find_questions, read_data_set
 
 __all__ = [
     "data_option",
-    "find_questions",
     "questions_argument",
     "questions_option",
     "read_question_set",
@@ -51,24 +46,6 @@ size_option = click.option(
     metavar="PX",
     help="Side of each picture.",
 )
-
-
-def find_questions(name: str) -> Path:
-    """The folder that `name` means: one with questions, or the name of a bundled set.
-
-    Raises DataError that lists the bundled sets when there is no such folder.
-    """
-    path = Path(name)
-    if path.is_dir():
-        return path
-    if path.name == QUESTIONS_FILE and path.is_file():
-        return path.parent
-    if len(path.parts) == 1 and bundled("benchmarks", "data", name, QUESTIONS_FILE).is_file():
-        return bundled("benchmarks", "data", name)
-    bundled_sets = bundled("benchmarks", "data").glob(f"*/{QUESTIONS_FILE}")
-    names = ", ".join(sorted(path.parent.name for path in bundled_sets))
-    allowed = f"a folder with {QUESTIONS_FILE}, or a bundled set: {names}"
-    raise DataError(Problem(name, "there are no such questions", allowed=allowed))
 
 
 def read_question_set(name: str, scenes: str = _SCENES) -> QuestionSet:

@@ -7,22 +7,27 @@ from dataclasses import replace
 from pathlib import Path
 
 import click
+from rich.console import Console
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.datasets import SCENES_FILE
+from phyblock.datasets.named import find_data_set
 from phyblock.files import check_free, make_folder, write_named
 from phyblock.folders import OutFolder
 from phyblock.sim import PictureStyle
 from phyblock.sim.marked import marked_png
+from phyblock_making.auditing.boosting import can_boost
 from phyblock_making.auditing.corrected_copy import CHANGES_FILE, write_fixed
 from phyblock_making.auditing.salvage import Salvage, salvage
 from phyblock_making.auditing.scene_audit import SceneAudit
 from phyblock_making.auditing.set_audit import Audit, audit_scenes, findings_csv
+from phyblock_making.auditing.tells import blind_scores, find_tells, learners
+from phyblock_making.checks.scene_facts import SceneFacts
 from phyblock_making.checks.set_checks import find_duplicates
 from phyblock_making.checks.tolerances import FOREIGN, Tolerances
-from phyblock_making.cli.scene_sets import find_data_set
 from phyblock_making.cli.scenes_audit_view import print_audit, print_changes, worst_scenes
+from phyblock_making.cli.scenes_tells_view import print_blind, print_tells
 from phyblock_making.cli.working import jobs_option, tracked
 
 __all__ = ["command"]
@@ -61,8 +66,9 @@ def command(
     """Audit the data set PATH: a folder with scenes.jsonl, an official checkout, or a bundled set.
 
     Nothing in PATH is changed. What cannot be read is a finding like all others. The findings go
-    to the CSV file, each of them; the tables show totals, disagreements and the worst scenes. The
-    exit code is 0 whatever is found.
+    to the CSV file, each of them; the tables show totals, disagreements and the worst scenes, then
+    what the candidate sets give away: by place, by the pose listed first, by how many poses are
+    offered, and to learners that never see the goal. The exit code is 0 whatever is found.
     """
     console = make_console()
     _check_places(table, fix, pictures)
@@ -71,6 +77,7 @@ def command(
     twins = find_duplicates(task.scene for task in salvaged.tasks)
     audit = Audit(tuple(audits), (*salvaged.findings, *twins))
     print_audit(console, audit, worst)
+    _print_candidates(console, salvaged)
     if table is not None:
         write_named(table, findings_csv(audit))
         console.print(f"{len(audit.findings)} findings in {shown_path(table)}", markup=False)
@@ -80,6 +87,18 @@ def command(
     if fix is not None:
         sets = {task.scene.id: task.candidates for task in salvaged.tasks}
         print_changes(console, write_fixed(fix, audits, sets), shown_path(fix))
+
+
+def _print_candidates(console: Console, salvaged: Salvage) -> None:
+    """What the candidate sets give away, of scenes that have one and an order to build in."""
+    tasks = [
+        (task.scene, task.candidates)
+        for task in salvaged.tasks
+        if task.candidates is not None and SceneFacts(task.scene).graph is not None
+    ]
+    if tasks:
+        print_tells(console, find_tells(tasks))
+        print_blind(console, blind_scores(tasks, learners()), can_boost())
 
 
 def _run(salvaged: Salvage, tolerances: Tolerances, jobs: int) -> list[SceneAudit]:

@@ -9,6 +9,7 @@ import click
 
 from phyblock.cli.console import shown_path
 from phyblock.cli.paths import UserPath
+from phyblock_making.auditing.given_away import MOST_SCENES, given_away_text
 from phyblock_making.cli.working import jobs_option, ray_option, seed_option, tracked
 from phyblock_making.scenes.scene_card import card
 from phyblock_making.scenes.scene_draft import Palette
@@ -86,10 +87,14 @@ def command(
         open_workers(jobs, ray_address) as workers,
         open_writer(out, kind, replace) as writer,
     ):
+        tasks = []
         for scene in tracked(produce(order, workers), count, "Making"):
-            writer.add(scene)
+            candidates = writer.add(scene)
+            if count <= MOST_SCENES:
+                tasks.append((scene, candidates))
         chosen = ",".join(map(str, levels))
         made_by = f"phyblock scenes generate --count {count} --seed {seed} --levels {chosen}"
         made_by += f" --palette {palette} --out {out.name}"
-        writer.finish(card(out.name, writer, made_by, _PALETTE_TEXT[kind]))
+        given_away = given_away_text(tasks)
+        writer.finish(card(out.name, writer, made_by, _PALETTE_TEXT[kind], given_away))
     click.echo(f"{count} scenes, all checks passed: {shown_path(out)}")

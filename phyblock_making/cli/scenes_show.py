@@ -7,10 +7,11 @@ import click
 from phyblock.cli.console import make_console, plain_table
 from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.datasets import AssemblyTask
+from phyblock.datasets.named import read_data_set
 from phyblock.domain import Block
 from phyblock.sim import PictureStyle
 from phyblock.sim.visibility import visible_shares
-from phyblock_making.cli.scene_sets import find_scenes, read_data_set
+from phyblock_making.cli.scene_sets import find_scenes
 
 __all__ = ["command"]
 

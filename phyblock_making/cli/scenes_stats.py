@@ -10,8 +10,8 @@ import click
 from phyblock.cli.console import make_console, plain_table
 from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.datasets import AssemblyTask, Dataset
+from phyblock.datasets.named import read_data_set
 from phyblock.domain import BLOCK_TYPES, COLORS, Scene
-from phyblock_making.cli.scene_sets import read_data_set
 
 __all__ = ["command"]
 

@@ -10,6 +10,7 @@ import click
 from phyblock.cli.console import make_console, plain_table
 from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.datasets import SCENES_FILE, AssemblyTask, read_builtin
+from phyblock.datasets.named import find_data_set
 from phyblock.errors import DataError, Problem
 from phyblock_making.auditing.set_verification import (
     LAWS,
@@ -18,7 +19,6 @@ from phyblock_making.auditing.set_verification import (
     verify_scenes,
 )
 from phyblock_making.checks.set_checks import find_duplicates, find_orphans
-from phyblock_making.cli.scene_sets import find_data_set
 from phyblock_making.cli.working import jobs_option, ray_option, tracked
 from phyblock_making.workers import open_workers
 

@@ -7,34 +7,39 @@ from functools import partial
 from pathlib import Path
 
 import click
-from rich.console import Console
 
-from phyblock.cli.console import counted, make_console, plain_table, shown_path
-from phyblock.cli.paths import UserPath
-from phyblock.domain import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
+from phyblock.cli.console import counted, make_console, shown_path
+from phyblock.cli.paths import NAME_OR_PATH, UserPath
+from phyblock.domain import SUBTASKS, Question
 from phyblock.files import make_folder, write_named
+from phyblock.folders import OutFolder
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from phyblock.tracks.vqa.opening import select_questions
+from phyblock_making.attacks.attacks import all_attacks, attack
+from phyblock_making.attacks.observed import Observed, observe_all
 from phyblock_making.cli.question_sets import (
     data_option,
     questions_argument,
     read_question_set,
     size_option,
 )
-from phyblock_making.cli.working import tracked
-from phyblock_making.questions.sheet import sheet_html
-from phyblock_making.questions.shortcuts import (
-    BALANCE,
-    GUESSABLE,
-    SubtaskAudit,
-    audit_questions,
-    duplicates_of,
+from phyblock_making.cli.vqa_attacks_view import (
+    attack_findings,
+    audit_json,
+    cut_findings,
+    print_attacks,
 )
+from phyblock_making.cli.vqa_audit_view import print_contents, print_findings, print_guessing
+from phyblock_making.cli.working import jobs_option, tracked
+from phyblock_making.questions.blind_picture import blind_png
+from phyblock_making.questions.sheet import Draw, sheet_html
+from phyblock_making.questions.shortcuts import SubtaskAudit, audit_questions
 
 __all__ = ["command"]
 
 _PER_SUBTASK = 5
+_ANSWERS = "answers.csv"
 
 
 @click.command("audit")
@@ -47,6 +52,12 @@ _PER_SUBTASK = 5
     help="Write an HTML page for a human check: pictures, questions, answers behind a fold.",
 )
 @click.option(
+    "--blind",
+    type=UserPath(file_okay=False),
+    metavar="DIR",
+    help="Write each question of the sheet as a PNG without its answer; answers.csv has those.",
+)
+@click.option(
     "--per-subtask",
     type=click.IntRange(1),
     default=_PER_SUBTASK,
@@ -56,15 +67,38 @@ _PER_SUBTASK = 5
 )
 @size_option
 @click.option(
-    "--no-text-probe", is_flag=True, help="Leave out the classifier, which needs scikit-learn."
+    "--no-text-probe", is_flag=True, help="Leave out what needs scikit-learn: classifiers."
 )
+@click.option("--no-pictures", is_flag=True, help="Leave out the attacks that look at pictures.")
+@click.option(
+    "--unseen",
+    type=NAME_OR_PATH,
+    metavar="PATH",
+    help="Another set of questions, of another seed: a text probe learns from it alone.",
+)
+@click.option(
+    "--unseen-data",
+    type=NAME_OR_PATH,
+    metavar="PATH",
+    help="The scenes that those are about, unless they are those of --data.",
+)
+@click.option(
+    "--json", "table", type=UserPath(dir_okay=False), metavar="FILE", help="All figures as JSON."
+)
+@jobs_option
 def command(
     questions: str,
     data: str,
     sheet: Path | None,
+    blind: Path | None,
     per_subtask: int,
     size: int,
     no_text_probe: bool,
+    no_pictures: bool,
+    unseen: str | None,
+    unseen_data: str | None,
+    table: Path | None,
+    jobs: int,
 ) -> None:
     """Audit the questions of PATH: what could be answered without looking, and what cannot be seen.
 
@@ -72,122 +106,70 @@ def command(
     By subtask: how often each letter is right; what the most frequent answer and a classifier of
     the texts alone reach on questions they were not trained on; options that read alike and
     repeated questions; the least visible block that is named; how questions cluster by scene.
-    The exit code is 0 whatever is found.
+    Then what attacks reach that look at pictures and know nothing of blocks, or only that what
+    rests on a block goes with it, beside the aims of the built-in sets; and which pictures are cut
+    open. The exit code is 0 whatever is found.
     """
+    for out in (sheet, table):
+        if out is not None:
+            make_folder(out.parent)
+    read = read_question_set(questions, data)
+    other = _other_set(unseen, unseen_data or data, read.root)
+    some = select_questions(read.tasks, SUBTASKS, range(1, 5), per_subtask, None)
+    chosen = [task.question for task in some]
+    if blind is not None:
+        OutFolder(blind).check([*map(_picture_name, chosen), _ANSWERS])
+    console, asked = make_console(), [task.question for task in read.tasks]
+    audits = _audits(asked, not no_text_probe)
+    print_guessing(console, audits)
+    print_contents(console, audits)
+    looked = [Observed(one) for one in asked] if no_pictures else _looked_at(asked, jobs)
+    attacks = all_attacks(other, with_texts=not no_text_probe)
+    attacked = [row for one in attacks for row in attack(one, looked)]
+    if attacked:
+        print_attacks(console, attacked)
+    print_findings(console, audits, asked, [*attack_findings(attacked), *cut_findings(looked)])
+    if table is not None:
+        write_named(table, audit_json(audits, looked, attacked))
+        console.print(f"all figures in {shown_path(table)}", markup=False)
+    draw = partial(question_png, style=PictureStyle(size))
     if sheet is not None:
-        make_folder(sheet.parent)
-    tasks = read_question_set(questions, data).tasks
-    asked = [task.question for task in tasks]
-    console = make_console()
-    audits = list(
-        tracked(
-            audit_questions(asked, with_text_probe=not no_text_probe),
-            len({question.subtask for question in asked}),
-            "Auditing",
-            "subtasks",
-        )
-    )
-    _print_guessing(console, audits)
-    _print_contents(console, audits)
-    _print_findings(console, audits, asked)
-    if sheet is not None:
-        some = select_questions(tasks, SUBTASKS, range(1, 5), per_subtask, None)
-        chosen = [task.question for task in some]
-        draw = partial(question_png, style=PictureStyle(size))
-        pieces = sheet_html(f"Questions of {questions}", chosen, draw)
-        write_named(sheet, "".join(pieces))
-        console.print(f"{counted(len(chosen), 'question')} in {shown_path(sheet)}", markup=False)
+        write_named(sheet, "".join(sheet_html(f"Questions of {questions}", chosen, draw)))
+    if blind is not None:
+        _write_blind(OutFolder(blind), chosen, draw)
+    for place in (sheet, blind):
+        if place is not None:
+            told = f"{counted(len(chosen), 'question')} in {shown_path(place)}"
+            console.print(told, markup=False)
 
 
-def _print_guessing(console: Console, audits: Sequence[SubtaskAudit]) -> None:
-    rows = [
-        (
-            one.subtask,
-            SUBTASK_NAMES[one.subtask],
-            str(one.n),
-            *(_letters(one)),
-            *(_percent(value) for value in (one.chance, one.majority, one.text_only)),
-        )
-        for one in audits
-    ]
-    headings = ("", "subtask", "n", *LETTERS, "chance", "majority", "text only")
-    console.print(plain_table(headings, rows, numbers=8))
-    console.print(
-        "Letters: share of questions where it is right [%]; of ordering, where its picture comes "
-        "first. Guesses: accuracy [%] on questions about other base scenes than those learned "
-        "from.",
-        style="dim",
-    )
-    console.print()
+def _other_set(unseen: str | None, data: str, mine: Path) -> list[Question]:
+    """The questions of another set; BadParameter where it is the one that is audited."""
+    if unseen is None:
+        return []
+    other = read_question_set(unseen, data)
+    if other.root.resolve() == mine.resolve():
+        raise click.BadParameter(f"{unseen} is the set that is audited", param_hint="--unseen")
+    return [task.question for task in other.tasks]
 
 
-def _letters(one: SubtaskAudit) -> list[str]:
-    counts = {
-        letter: sum(n for answer, n in one.letters.items() if answer[0] == letter)
-        for letter in LETTERS
-    }
-    return [_percent(counts[letter] / one.n) for letter in LETTERS]
+def _audits(asked: Sequence[Question], with_texts: bool) -> list[SubtaskAudit]:
+    subtasks = len({question.subtask for question in asked})
+    audits = audit_questions(asked, with_text_probe=with_texts)
+    return list(tracked(audits, subtasks, "Auditing", "subtasks"))
 
 
-def _print_contents(console: Console, audits: Sequence[SubtaskAudit]) -> None:
-    rows = [
-        (
-            one.subtask,
-            str(one.values),
-            str(len(one.ambiguous)),
-            str(len(one.duplicates)),
-            str(one.named),
-            "" if one.least_seen is None else _percent(one.least_seen[0]),
-            str(one.scenes),
-            str(one.bases),
-            str(one.most_of_a_scene),
-        )
-        for one in audits
-    ]
-    headings = (
-        "",
-        "answers",
-        "alike",
-        "repeats",
-        "named",
-        "least seen",
-        "scenes",
-        "base scenes",
-        "most of one",
-    )
-    console.print(plain_table(headings, rows, numbers=8))
-    console.print(
-        "answers: different right answers; alike: options that read alike; named: blocks that "
-        "words name, and the least that one of them shows of itself [%]; most of one: questions "
-        "about the scene with most.",
-        style="dim",
-    )
-    console.print()
+def _looked_at(asked: Sequence[Question], jobs: int) -> list[Observed]:
+    observed = observe_all(asked, min(jobs, len(asked)))
+    return list(tracked(observed, len(asked), "Looking", "questions"))
 
 
-def _print_findings(
-    console: Console, audits: Sequence[SubtaskAudit], asked: Sequence[Question]
-) -> None:
-    low, high = (round(100 * bound) for bound in BALANCE)
-    findings = []
-    for one in audits:
-        if not one.is_balanced:
-            findings.append(f"{one.subtask}: a letter is right outside of {low} to {high} %")
-        for name, reached in (("majority", one.majority), ("text only", one.text_only)):
-            if reached is not None and reached > GUESSABLE:
-                findings.append(f"{one.subtask}: {name} reaches {_percent(reached)} %")
-        if one.hidden and one.least_seen is not None:
-            findings.append(
-                f"{one.subtask}: {counted(one.hidden, 'named block')} hardly to be seen, the least "
-                f"in {one.least_seen[1]}"
-            )
-        findings += [f"{name}: options read alike" for name in one.ambiguous]
-    findings += [f"{name}: repeats {first}" for name, first in duplicates_of(asked).items()]
-    for finding in findings:
-        console.print(finding, style="red", markup=False, soft_wrap=True)
-    verdict = counted(len(findings), "finding") if findings else "nothing to find fault with"
-    console.print(f"{counted(len(asked), 'question')}, {verdict}", markup=False)
+def _picture_name(question: Question) -> str:
+    return f"{question.id}.png"
 
 
-def _percent(share: float | None) -> str:
-    return "" if share is None else f"{100 * share:.1f}"
+def _write_blind(folder: OutFolder, chosen: Sequence[Question], draw: Draw) -> None:
+    for question in chosen:
+        folder.write({_picture_name(question): blind_png(question, draw)})
+    rows = [f"{question.id},{question.answer_letters}" for question in chosen]
+    folder.write({_ANSWERS: "\n".join(("id,answer", *rows)) + "\n"})

@@ -10,10 +10,13 @@ from rich.progress import Progress, TaskID
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
+from phyblock.datasets.named import read_data_set
 from phyblock.domain import SUBTASKS, Question, Subtask
 from phyblock.errors import SpecError
+from phyblock_making.attacks.attack_card import attack_card
+from phyblock_making.attacks.attacks import Attacked, all_attacks, attack
+from phyblock_making.attacks.observed import Observed, observe
 from phyblock_making.cli.question_sets import data_option
-from phyblock_making.cli.scene_sets import read_data_set
 from phyblock_making.cli.subtasks_option import subtasks_option
 from phyblock_making.cli.working import jobs_option, ray_option, seed_option
 from phyblock_making.questions.question_files import check_place, write_questions
@@ -69,20 +72,33 @@ def command(
             progress.advance(bars[subtask])
 
         questions = list(make_questions(scenes, wanted, seed, workers, report))
+        observed = list(workers.map(observe, questions))
     made_by = f"phyblock vqa generate --data {data} --seed {seed} --out {out.name}"
     if len(subtasks) < len(SUBTASKS):
         made_by += f" --subtasks {','.join(subtasks)}"
     if per_subtask is not None:
         made_by += f" --per-subtask {per_subtask}"
     originals = {scene.id: scene for scene in scenes}
-    write_questions(out, questions, originals, read.name, made_by, _audits(questions))
+    audits, attacked = _audited(questions, observed)
+    told = attack_card(attacked, observed)
+    write_questions(out, questions, originals, read.name, made_by, audits, told)
     outcome = f"{len(questions)} questions in {len(subtasks)} subtasks"
     click.echo(f"{outcome}: {shown_path(out)}")
 
 
-def _audits(questions: Sequence[Question]) -> list[SubtaskAudit]:
-    """The audit for the data card; without the probe of the texts where scikit-learn is not."""
+def _audited(
+    questions: Sequence[Question], observed: Sequence[Observed]
+) -> tuple[list[SubtaskAudit], list[Attacked]]:
+    """Audit and attacks for the data card; without what learns where scikit-learn is not."""
     try:
-        return list(audit_questions(questions))
+        return _figures(questions, observed, with_texts=True)
     except SpecError:
-        return list(audit_questions(questions, with_text_probe=False))
+        return _figures(questions, observed, with_texts=False)
+
+
+def _figures(
+    questions: Sequence[Question], observed: Sequence[Observed], with_texts: bool
+) -> tuple[list[SubtaskAudit], list[Attacked]]:
+    audits = list(audit_questions(questions, with_text_probe=with_texts))
+    attacks = all_attacks(with_texts=with_texts)
+    return audits, [row for one in attacks for row in attack(one, observed)]

@@ -11,7 +11,7 @@ import click
 
 from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.files import find_models_file
-from phyblock.cli.paths import NAME_OR_PATH, UserPath
+from phyblock.cli.paths import UserPath, models_file_option
 from phyblock.domain import Question, Subtask
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import check_free, make_folder, write_named
@@ -59,12 +59,7 @@ _AT_ONCE = 8
     metavar="FILE",
     help="JSON Lines for review.",
 )
-@click.option(
-    "--models-file",
-    type=NAME_OR_PATH,
-    metavar="FILE",
-    help="Models file instead of models.yaml.",
-)
+@models_file_option
 @click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
 def command(
     name: str,

@@ -1,4 +1,8 @@
-"""AD: at which of four marked places a block stays when it is put down there, by simulation."""
+"""AD: at which of four marked places a block stays when it is put down there, by simulation.
+
+All places are on flat faces, and no more central where the block stays than elsewhere: what
+decides is a neighbor that the block comes down on, a plank that tips, or a gap that it bridges.
+"""
 
 from __future__ import annotations
 
@@ -18,37 +22,34 @@ from phyblock.domain.blocks import (
 )
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.sim.engine import Physics
-from phyblock.sim.outcomes import OUTCOME_SETTINGS, holds
+from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.question_pictures import BLOCK_LABEL
 from phyblock.sim.seeing import Top, is_apart, is_inside, seen, seen_order, visible_tops
-from phyblock.sim.support import bounds_m, drop_height_m
+from phyblock.sim.steps import groups
+from phyblock.sim.support import bounds_m
 from phyblock_making.poses import POSES
+from phyblock_making.questions.alike import ranked_as_drawn
+from phyblock_making.questions.annexes import with_annex
 from phyblock_making.questions.choices import pick, shuffled
-from phyblock_making.questions.goal_view import GOAL_VIEW
-from phyblock_making.questions.pictured_drafts import (
-    draft,
-    only_index,
-    picture_of,
-    state,
-)
+from phyblock_making.questions.goal_view import drawn_view
+from phyblock_making.questions.margins import group_of
+from phyblock_making.questions.pictured_drafts import draft, only_index, picture_of
+from phyblock_making.questions.placing import lowered, surely_stays, verdict
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.wording import slots_of
 
 __all__ = ["AffordanceMaker"]
 
-_BLOCKS_TRIED = 6
-_PLACES_TRIED = 40
+_ANNEXED = 0.5
+_BLOCKS_TRIED = 3
+_PLACES_TRIED = 90
+_ENOUGH, _MOST_OF_A_SORT = 4, 12
 _STEP_PX = 5
-_LEAST_RISE = 0.6
 _FLAT_RISE = 0.99
-_FLAT_GAP_M, _SLOPED_GAP_M = 0.0015, 0.03
-_SHIFTS_M = ((0.007, 0.0), (-0.007, 0.0), (0.0, 0.007), (0.0, -0.007))
-_CENTRAL_M = 0.022
-_CENTRAL_TRIED = 8
+_SHIFTS_M = ((0.005, 0.0), (-0.005, 0.0), (0.0, 0.005), (0.0, -0.005))
 _OFF_CENTER_M = 0.001
-_LIFT_M = 0.6
-_APART_PX = 18.0
+_APART_PX = 15.0
+_RIGHTS_TRIED = 12
 
 
 def _balanced() -> list[tuple[BlockType, Euler]]:
@@ -74,35 +75,41 @@ class AffordanceMaker:
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    scenes_tried = 400
+    scenes_tried = 200
     drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """One draft: a block in a pose drawn, one place where it stays, and three where not."""
-        plain = state(scene, scene.blocks, GOAL_VIEW)
-        tops = visible_tops(plain, seen(plain), _STEP_PX, _LEAST_RISE)
-        for _ in range(_BLOCKS_TRIED):
-            block = _drawn_block(scene, rng)
-            places = _places(scene, block, shuffled(rng, tops), plain)
+        annexed = with_annex(scene, rng) if rng.random() < _ANNEXED else None
+        blocks = annexed or scene.blocks
+        if not all(map(surely_stands, groups(blocks))):
+            return
+        view = drawn_view(rng)
+        plain = QuestionPicture("scene", blocks, view)
+        tops = visible_tops(plain, seen(plain), _STEP_PX, _FLAT_RISE)
+        for _ in range(_BLOCKS_TRIED if tops else 0):
+            block = _drawn_block(blocks, rng)
+            places = _places(plain, block, shuffled(rng, tops), rng)
             if places:
-                alone = QuestionPicture(BLOCK_LABEL, (block,), GOAL_VIEW)
+                alone = QuestionPicture(BLOCK_LABEL, (block,), view)
                 facts = {"block": block.type, "euler": list(block.euler_deg)}
                 yield draft(scene, rng, "ad-place", places, [plain, alone], block.type, facts=facts)
                 return
 
     def rederive(self, question: Question) -> tuple[int, ...]:
-        """By simulating the block at every place."""
+        """By statics and simulation of the block at every place."""
         slots_of(question)
         shown, alone = picture_of(question, "scene"), picture_of(question, BLOCK_LABEL)
-        if shown.blocks != question.scene.blocks or len(alone.blocks) != 1:
-            raise UnfairError("the pictures are not of the whole scene and of one block")
+        if len(alone.blocks) != 1:
+            raise UnfairError("the second picture is not of one block")
         stays = []
         for letter in LETTERS:
-            place_m = _marked(shown, letter)
-            verdict = _verdict(question.scene, alone.blocks[0], place_m, OUTCOME_SETTINGS)
-            if verdict is None:
-                raise UnfairError(f"the settings disagree on place {letter}")
-            stays.append(verdict)
+            x, y, _ = _marked(shown, letter)
+            put = lowered(alone.blocks[0], shown.blocks, x, y)
+            found = verdict((*shown.blocks, put), put.order)
+            if found is None:
+                raise UnfairError(f"it is not sure whether the block stays at place {letter}")
+            stays.append(found)
         return only_index(stays)
 
 
@@ -115,78 +122,68 @@ def _marked(shown: QuestionPicture, letter: str) -> tuple[float, float, float]:
     raise UnfairError(f"no place {letter} is marked on a block")
 
 
-def _drawn_block(scene: Scene, rng: np.random.Generator) -> Block:
+def _drawn_block(blocks: Sequence[Block], rng: np.random.Generator) -> Block:
     block_type, euler = pick(rng, _BALANCED)
-    order = max(block.order for block in scene.blocks) + 1
+    order = max(block.order for block in blocks) + 1
     return Block(order, block_type, pick(rng, COLORS), (0.0, 0.0, 0.0), euler, (), 1)
 
 
-def _places(scene: Scene, block: Block, tops: Sequence[Top], plain: QuestionPicture) -> list[Mark]:
-    """The right place and three wrong ones, apart in the picture; none where there are too few.
-
-    The right one is looked for first and on a flat top near the middle of a block: elsewhere it is
-    rare. Wrong ones may be anywhere.
-    """
-    central = [t for t in tops if t.off_center_m < _CENTRAL_M and t.rise >= _FLAT_RISE]
-    chosen = _first_sure(scene, block, central[:_CENTRAL_TRIED], True, [], plain)
-    if not chosen:
-        return []
-    chosen += _first_sure(scene, block, tops[:_PLACES_TRIED], False, chosen, plain)
-    return chosen if len(chosen) == len(LETTERS) else []
-
-
-def _first_sure(
-    scene: Scene,
-    block: Block,
-    tops: Sequence[Top],
-    stays: bool,
-    others: Sequence[Mark],
-    plain: QuestionPicture,
+def _places(
+    plain: QuestionPicture, block: Block, tops: Sequence[Top], rng: np.random.Generator
 ) -> list[Mark]:
-    """The first place where it surely stays, or as many where it surely does not as are wanted."""
-    marks: list[Mark] = []
-    wanted = 1 if stays else len(LETTERS) - 1
-    for top in tops:
-        mark = Mark("A", top.position_m)
-        is_fit = (
-            len(marks) < wanted
-            and is_apart(plain, mark, [*others, *marks], _APART_PX)
-            and is_inside(replace(plain, marks=(mark,)))
-            and _is_met(scene, block, top)
-        )
-        if is_fit and _is_sure(scene, block, top.position_m, stays):
-            marks.append(mark)
-    return marks
+    """The right place and three wrong ones, apart in the picture; none where there are too few."""
+    found: dict[bool, list[Top]] = {True: [], False: []}
+    for top in tops[:_PLACES_TRIED]:
+        others = [Mark("A", one.position_m) for sort in found.values() for one in sort]
+        if not is_apart(plain, Mark("A", top.position_m), others, _APART_PX / 2):
+            continue
+        stays = _by_statics(plain.blocks, block, top)
+        if stays is not None and len(found[stays]) < _MOST_OF_A_SORT:
+            found[stays].append(top)
+    if len(found[False]) < _ENOUGH:
+        return []
+    central = int(rng.integers(len(LETTERS)))
+    for right in found[True][:_RIGHTS_TRIED]:
+        together = [right, *found[False]]
+        marks = [Mark("A", top.position_m) for top in together]
+        apart = np.array([[is_apart(plain, a, [b], _APART_PX) for b in marks] for a in marks])
+        measures = np.array([_looks(plain, top) for top in together])
+        chosen = [marks[i] for i in (0, *ranked_as_drawn(measures, apart, rng, {0: central}))]
+        if len(chosen) == len(LETTERS) and _are_sure(plain, block, chosen):
+            return chosen
+    return []
 
 
-def _is_sure(scene: Scene, block: Block, place_m: tuple[float, float, float], stays: bool) -> bool:
-    """Whether it stays, or does not, at a place and likewise 7 mm off in every direction."""
-    x, y, z = place_m
-    places = [place_m, *((x + dx, y + dy, z) for dx, dy in _SHIFTS_M)]
-    quick = OUTCOME_SETTINGS[:1]
-    if any(_verdict(scene, block, place, quick) is not stays for place in places):
+def _looks(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
+    """How central a place is on its block, how high it is, and how far out in the structure."""
+    middle = np.mean([bounds_m(block).mean(axis=0) for block in plain.blocks], axis=0)
+    x, y, z = top.position_m
+    return (
+        20 * top.off_center_m,
+        10 * z,
+        3 * float(np.hypot(x - middle[0], y - middle[1])),
+    )
+
+
+def _by_statics(blocks: Sequence[Block], block: Block, top: Top) -> bool | None:
+    """Whether the block stays at a place, and likewise 5 mm off to any side; None where unsure."""
+    x, y, _ = top.position_m
+    put = lowered(block, blocks, x, y)
+    stays = surely_stays((*blocks, put), put.order)
+    if stays is None:
+        return None
+    for dx, dy in _SHIFTS_M:
+        put = lowered(block, blocks, x + dx, y + dy)
+        if is_balanced(group_of((*blocks, put), put.order)) is not stays:
+            return None
+    return stays
+
+
+def _are_sure(plain: QuestionPicture, block: Block, marks: Sequence[Mark]) -> bool:
+    """Whether, by simulation too, the first place holds and the others do not."""
+    if not is_inside(replace(plain, marks=tuple(marks))):
         return False
-    return _verdict(scene, block, place_m, OUTCOME_SETTINGS[1:]) is stays
-
-
-def _verdict(
-    scene: Scene, block: Block, place_m: tuple[float, float, float], settings: Sequence[Physics]
-) -> bool | None:
-    return holds((*scene.blocks, _put(scene, block, place_m)), block.order, settings)
-
-
-def _put(scene: Scene, block: Block, place_m: tuple[float, float, float]) -> Block:
-    """The block let down with the middle of its outline, seen from above, over a place."""
-    middle = bounds_m(block).mean(axis=0)
-    x = block.position_m[0] + place_m[0] - float(middle[0])
-    y = block.position_m[1] + place_m[1] - float(middle[1])
-    lifted = replace(block, position_m=(x, y, block.position_m[2] + _LIFT_M))
-    fall = drop_height_m(lifted, scene.blocks)
-    return replace(block, position_m=(x, y, lifted.position_m[2] - fall))
-
-
-def _is_met(scene: Scene, block: Block, top: Top) -> bool:
-    """Whether the block comes down onto the marked surface itself, not onto a neighbor."""
-    bottom = float(bounds_m(_put(scene, block, top.position_m))[0, 2])
-    most = _FLAT_GAP_M if top.rise >= _FLAT_RISE else _SLOPED_GAP_M
-    return -_FLAT_GAP_M <= bottom - top.position_m[2] <= most
+    puts = [lowered(block, plain.blocks, *mark.position_m[:2]) for mark in marks]
+    return all(
+        verdict((*plain.blocks, put), put.order) is (number == 0) for number, put in enumerate(puts)
+    )

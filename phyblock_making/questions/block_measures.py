@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import SHAPES, BlockType, Euler, orientation_class
 from phyblock.domain.scene import Block
 from phyblock.sim.support import bounds_m
-from phyblock_making.questions.goal_view import center_m, picture_axes
+from phyblock_making.questions.goal_view import View, center_m, picture_axes
 
 __all__ = [
     "height_m",
@@ -50,9 +50,9 @@ def volume_m3(block: Block) -> float:
     return SHAPES[block.type].volume_m3
 
 
-def offset_m(block: Block, other: Block) -> NDArray[np.float64]:
+def offset_m(block: Block, other: Block, view: View) -> NDArray[np.float64]:
     """From `other` to `block`: to the right of the picture, away from the viewer, up [m], (3,)."""
-    right, away = picture_axes()
+    right, away = picture_axes(view)
     step = center_m(block) - center_m(other)
     return np.array([step @ right, step @ away, step[2]])
 

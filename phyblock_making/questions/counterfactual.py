@@ -1,38 +1,49 @@
 """CF: what happens to the rest when a block is taken away, by simulation.
 
-Texts name the block taken away only where the options are pictures; where they are texts or
-places it is marked in the picture, so that no word of the question hints at the answer.
+The block is marked in the picture, so that no word of the question hints at the answer. Most
+questions break the naive rule that what rests on a block falls with it and nothing else: supports
+that are one too many, and weights that hold what they stand on. Nor is it enough to ask what rests
+on nothing else: a plank may need each of two supports.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
-from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.sim.outcomes import OUTCOME_SETTINGS, Outcome, Push, after, after_removal
-from phyblock.sim.seeing import block_mark, is_apart, seen, seen_order
-from phyblock_making.questions.choices import pick, shuffled
-from phyblock_making.questions.goal_view import COUNTED, GOAL_VIEW, NAMED, are_seen, require_seen
+from phyblock.sim.balance import is_balanced, surely_stands
+from phyblock.sim.outcomes import Outcome, after_removal
+from phyblock.sim.seeing import block_mark, is_apart, is_inside, seen, seen_order
+from phyblock_making.questions.alike import CHANGE, alike_wrong
+from phyblock_making.questions.annexes import with_annex
+from phyblock_making.questions.choices import shuffled
+from phyblock_making.questions.goal_view import (
+    COUNTED,
+    NAMED,
+    are_seen,
+    drawn_view,
+    require_seen,
+)
+from phyblock_making.questions.margins import group_of, is_sure, resting_on
 from phyblock_making.questions.pictured_drafts import (
-    are_told_apart,
     draft,
-    moved_between,
     of_kind,
     only_index,
     option_pictures,
     picture_of,
-    state,
+    story_of,
+    with_room,
 )
-from phyblock_making.questions.question_draft import Draft, UnfairError
-from phyblock_making.questions.referring import names, resolve_one
+from phyblock_making.questions.question_draft import Draft, Option, UnfairError
+from phyblock_making.questions.resting_states import states_at_rest
 from phyblock_making.questions.wording import slots_of
 
-__all__ = ["OUTCOME_TEXTS", "CounterfactualMaker", "marked_order"]
+__all__ = ["OUTCOME_TEXTS", "TAKEN", "CounterfactualMaker", "marked_order"]
 
 OUTCOME_TEXTS = (
     "No other block moves or falls.",
@@ -44,50 +55,76 @@ OUTCOME_TEXTS = (
 TAKEN = "X"
 """The letter of the block that is taken away or pushed."""
 _ALL_SEEN = 0.12
-_REMOVALS_TRIED = 5
-_OTHERS_TRIED = 4
-_TOPPLED_M = 0.06
+_STRUCTURES_TRIED = 4
+_VIEWS_TRIED = 3
+_REMOVALS_TRIED = 6
+_Sort = tuple[bool, bool]
+_SORTS: tuple[_Sort, ...] = ((False, False), (False, True), (True, False), (True, True))
+"""Whether it holds that what rests on the block goes with it, or what rests on nothing else."""
+_SHARES = (0.35, 0.25, 0.25, 0.15)
+"""How often removals of each sort are looked for: each rule is right in four cases of ten."""
+_WRONG = 3
+_STAYS_ASKED = 0.25
+
+
+class _Case(NamedTuple):
+    """A removal: what is shown, which block goes, and whether anything falls.
+
+    `resting` are the blocks that rest on it, directly or not, `only` those that rest on nothing
+    else. Whether anything falls is what statics alone say; a simulation decides.
+    """
+
+    blocks: tuple[Block, ...]
+    order: int
+    resting: frozenset[int]
+    only: frozenset[int]
+    falls: bool
+
+    @property
+    def sort(self) -> _Sort:
+        """Whether what rests on the block goes with it, and what rests on it alone."""
+        return (bool(self.resting) is self.falls, bool(self.only) is self.falls)
+
+    def is_as_expected(self, moved: Collection[int]) -> bool:
+        """Whether both rules hold, or fail, as they were thought to."""
+        return self.sort == (set(moved) == self.resting, set(moved) == self.only)
 
 
 class CounterfactualMaker:
     """Kinds: `cf-count` (texts), `cf-which` (marked blocks), `cf-picture` (settled scenes)."""
 
     subtask: Subtask = "CF"
-    scenes_tried = 170
-    drafts_a_scene = 3
+    scenes_tried = 400
+    drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """Drafts of all kinds about removals in a scene of which every block can be seen."""
-        orders = [block.order for block in scene.blocks]
-        if len(scene) < 4 or not are_seen(scene.blocks, orders, _ALL_SEEN):
-            return
-        taken = shuffled(rng, [o for o in orders if are_seen(scene.blocks, (o,), NAMED)])
-        makers = shuffled(rng, (_count, _which, _pictured))
-        for number, order in enumerate(taken[:_REMOVALS_TRIED]):
-            outcome = after_removal(scene.blocks, order)
-            if outcome.is_clear:
-                yield from makers[number % 3](scene, order, outcome, rng)
+        """Drafts about removals from the scene, or from a part of it with an annex."""
+        sort = _SORTS[int(rng.choice(len(_SORTS), p=_SHARES))]
+        kinds = shuffled(rng, (_count, _which, _pictured))
+        for number in range(_STRUCTURES_TRIED):
+            blocks = scene.blocks if number == 0 else with_annex(scene, rng)
+            for case in _cases(scene, blocks, sort, rng) if blocks else ():
+                yield from _drafts_of(scene, case, kinds, rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """By simulating the removal again."""
-        slots, kind = slots_of(question), of_kind(question)
-        shown, scene = picture_of(question, "scene"), question.scene
-        if shown.blocks != scene.blocks:
-            raise UnfairError("the first picture is not of the whole scene")
-        order = _taken(question, slots)
-        outcome = after_removal(scene.blocks, order)
-        if not outcome.is_clear:
-            raise UnfairError(f"the settings disagree on what follows without block {order}")
-        require_seen(scene.blocks, (order,), NAMED)
+        slots_of(question)
+        kind, shown = of_kind(question), picture_of(question, "scene")
+        order = marked_order(shown, TAKEN)
+        outcome = _outcome(shown.blocks, order)
+        if outcome is None:
+            raise UnfairError(f"it is not sure what follows without block {order}")
+        require_seen(shown, (order,), NAMED)
         if kind == "cf-count":
             right = OUTCOME_TEXTS[min(len(outcome.moved), 3)]
             return only_index([option == right for option in question.options])
         if kind == "cf-which":
             marked = [marked_order(shown, letter) for letter in LETTERS]
             return only_index([one in outcome.moved for one in marked])
-        expected = ((order,), outcome.moved)
-        movements = [moved_between(scene, option) for option in option_pictures(question)]
-        return only_index([one == expected for one in movements])
+        settled = replace(shown, blocks=outcome.settled)
+        expected = story_of(shown.blocks, settled)
+        options = option_pictures(question)
+        return only_index([story_of(shown.blocks, one) == expected for one in options])
 
 
 def marked_order(picture: QuestionPicture, letter: str) -> int:
@@ -100,118 +137,135 @@ def marked_order(picture: QuestionPicture, letter: str) -> int:
     raise UnfairError(f"no block is marked {letter}")
 
 
-def _taken(question: Question, slots: Mapping[str, str]) -> int:
-    if of_kind(question) == "cf-picture":
-        return resolve_one(slots["block"], question.scene.blocks).order
-    return marked_order(picture_of(question, "scene"), TAKEN)
+def _cases(
+    scene: Scene, blocks: tuple[Block, ...], sort: _Sort, rng: np.random.Generator
+) -> Iterator[_Case]:
+    """Removals of the sort wanted, as far as statics tell; from an annex where there is one."""
+    known = {block.order for block in scene.blocks}
+    added = [block for block in blocks if block.order not in known]
+    for block in shuffled(rng, added or blocks)[:_REMOVALS_TRIED]:
+        group = group_of(blocks, block.order)
+        left = [one for one in group if one.order != block.order]
+        resting = resting_on(group, block.order)
+        only = resting_on(group, block.order, only=True)
+        case = _Case(blocks, block.order, resting, only, not is_balanced(left))
+        if left and case.sort == sort:
+            yield case
 
 
-def _count(scene: Scene, order: int, outcome: Outcome, rng: np.random.Generator) -> Iterator[Draft]:
-    """How many others do not stay."""
-    moved = outcome.moved
-    plain = state(scene, scene.blocks, GOAL_VIEW)
-    mark = block_mark(plain, seen(plain), order, TAKEN)
-    if mark is None or not are_seen(scene.blocks, moved, COUNTED):
+def _outcome(blocks: Sequence[Block], order: int) -> Outcome | None:
+    """What surely follows a removal; None where settings or statics leave a doubt."""
+    group = group_of(blocks, order)
+    if not surely_stands(group):
+        return None
+    outcome = after_removal(blocks, order)
+    near = [block for block in group if block.order != order]
+    is_near = set(outcome.moved) <= {block.order for block in near}
+    return outcome if outcome.is_clear and is_near and is_sure(near, outcome.moved) else None
+
+
+def _drafts_of(
+    scene: Scene, case: _Case, kinds: Sequence[_Kind], rng: np.random.Generator
+) -> Iterator[Draft]:
+    """At most one draft about a removal, of the first kind that fits."""
+    for _ in range(_VIEWS_TRIED):
+        plain = QuestionPicture("scene", case.blocks, drawn_view(rng))
+        mark = block_mark(plain, seen(plain), case.order, TAKEN)
+        orders = [block.order for block in case.blocks]
+        if mark and are_seen(plain, (case.order,), NAMED) and are_seen(plain, orders, _ALL_SEEN):
+            break
+    else:
         return
-    number = min(len(moved), 3)
+    outcome = _outcome(case.blocks, case.order)
+    if outcome is None or not case.is_as_expected(outcome.moved):
+        return
+    facts = {
+        "removed": case.order,
+        "moved": list(outcome.moved),
+        "resting": sorted(case.resting),
+    }
+    for kind in kinds:
+        asked = kind(plain, case.order, outcome, rng)
+        if asked:
+            shown = replace(asked.about, marks=(mark,))
+            yield draft(scene, rng, asked.kind, asked.options, [shown], asked.value, {}, facts)
+            return
+
+
+class _Asked(NamedTuple):
+    """A kind of question, the picture that it is about, before any mark, options and value."""
+
+    kind: str
+    about: QuestionPicture
+    options: Sequence[Option]
+    value: str
+
+
+_Kind = Callable[[QuestionPicture, int, Outcome, np.random.Generator], _Asked | None]
+
+
+def _count(
+    plain: QuestionPicture, _: int, outcome: Outcome, rng: np.random.Generator
+) -> _Asked | None:
+    """How many others do not stay; that none moves is asked less often than it is found."""
+    is_rare = not outcome.moved and rng.random() > _STAYS_ASKED
+    if is_rare or not are_seen(plain, outcome.moved, COUNTED):
+        return None
+    number = min(len(outcome.moved), 3)
     others = [text for text in OUTCOME_TEXTS if text != OUTCOME_TEXTS[number]]
-    options = [OUTCOME_TEXTS[number], *shuffled(rng, others)]
-    shown = replace(plain, marks=(mark,))
-    facts = {"removed": order, "moved": list(moved)}
-    yield draft(scene, rng, "cf-count", options, [shown], str(number), facts=facts)
+    return _Asked("cf-count", plain, [OUTCOME_TEXTS[number], *shuffled(rng, others)], str(number))
 
 
-def _which(scene: Scene, order: int, outcome: Outcome, rng: np.random.Generator) -> Iterator[Draft]:
-    """One of four marked blocks that does not stay."""
-    moved = outcome.moved
-    plain = state(scene, scene.blocks, GOAL_VIEW)
-    shot = seen(plain)
+def _which(
+    plain: QuestionPicture, order: int, outcome: Outcome, rng: np.random.Generator
+) -> _Asked | None:
+    """One of four marked blocks that does not stay; those that rest on the block come first."""
+    if not outcome.moved:
+        return None
+    shot, moved = seen(plain), outcome.moved
     taken = block_mark(plain, shot, order, TAKEN)
     if taken is None:
-        return
-    rest = [b.order for b in scene.blocks if b.order != order]
+        return None
+    resting = resting_on(plain.blocks, order)
+    others = [b.order for b in plain.blocks if b.order != order and b.order not in moved]
+    near = [one for one in shuffled(rng, others) if one in resting]
+    near += [one for one in shuffled(rng, others) if one not in resting]
     chosen: list[Mark] = []
-    for group, most in ((moved, 1), ([o for o in rest if o not in moved], 4)):
-        for one in shuffled(rng, group):
+    for group, most in ((shuffled(rng, moved), 1), (near, 4)):
+        for one in group:
             mark = block_mark(plain, shot, one, "A")
             if mark is not None and len(chosen) < most and is_apart(plain, mark, [taken, *chosen]):
                 chosen.append(mark)
         if not chosen:
-            return
-    if len(chosen) == 4 and are_seen(scene.blocks, moved[:1], COUNTED):
-        facts = {"removed": order, "moved": list(moved)}
-        shown = replace(plain, marks=(taken,))
-        yield draft(scene, rng, "cf-which", chosen, [shown], "place", facts=facts)
+            return None
+    return _Asked("cf-which", plain, chosen, "place") if len(chosen) == 4 else None
 
 
 def _pictured(
-    scene: Scene, order: int, outcome: Outcome, rng: np.random.Generator
-) -> Iterator[Draft]:
-    """The settled scene among others of which some also lack the block."""
-    block = next(b for b in scene.blocks if b.order == order)
-    expressions = names(block, scene.blocks, ("color", "type", "layer", "side"))
-    if not expressions:
-        return
-    plain = state(scene, scene.blocks, GOAL_VIEW)
-    right = state(scene, outcome.settled, GOAL_VIEW)
-    chosen = [right]
-    for wrong in chain(_same_gone(scene, order, outcome, rng), _other_gone(scene, order, rng)):
-        tried = [*chosen, state(scene, wrong, GOAL_VIEW)]
-        if are_told_apart([plain, *tried]) and _are_clear(scene, tried):
-            chosen = tried
-        if len(chosen) == 4:
-            if not any(_lacks_only(scene, one, order) for one in chosen[1:]):
-                return
-            facts = {"removed": order, "moved": list(outcome.moved)}
-            slots = {"block": pick(rng, expressions[:2])}
-            value = "falls" if outcome.moved else "stays"
-            yield draft(scene, rng, "cf-picture", chosen, [plain], value, slots, facts)
-            return
+    plain: QuestionPicture, order: int, outcome: Outcome, rng: np.random.Generator
+) -> _Asked | None:
+    """The settled scene among others at rest, all of which lack the block.
 
-
-def _are_clear(scene: Scene, pictures: Sequence[QuestionPicture]) -> bool:
-    """Whether each picture tells which blocks are gone or moved, no two of them the same."""
+    As nothing changed less than a scene in which nothing moved, that is right in one of four.
+    """
+    if not outcome.moved and rng.random() > _STAYS_ASKED:
+        return None
+    roomy = replace(plain, framed=with_room(plain.blocks))
+    right = replace(roomy, blocks=outcome.settled)
+    change = int(rng.integers(1, _WRONG + 1)) if outcome.moved else 0
+    pool: list[QuestionPicture] = []
     try:
-        movements = [moved_between(scene, picture) for picture in pictures]
+        known = {story_of(plain.blocks, right)}
     except UnfairError:
-        return False
-    return len(set(movements)) == len(movements)
-
-
-def _lacks_only(scene: Scene, picture: QuestionPicture, order: int) -> bool:
-    return moved_between(scene, picture)[0] == (order,)
-
-
-def _same_gone(
-    scene: Scene, order: int, outcome: Outcome, rng: np.random.Generator
-) -> Iterator[tuple[Block, ...]]:
-    """Wrong outcomes without the right block: nothing falls, only a part falls, or too much."""
-    rest = tuple(block for block in scene.blocks if block.order != order)
-    if not outcome.moved:
-        yield from _toppled(rest, rng)
-        return
-    yield rest
-    settled = {block.order: block for block in outcome.settled}
-    for top in shuffled(rng, outcome.moved)[:2]:
-        yield tuple(b if b.order == top else settled[b.order] for b in rest)
-
-
-def _toppled(rest: Sequence[Block], rng: np.random.Generator) -> Iterator[tuple[Block, ...]]:
-    """The rest after a block that carries nothing was pushed off."""
-    carrying = {order for block in rest for order in block.depend}
-    tops = [b for b in rest if b.order not in carrying and b.depend]
-    for block in shuffled(rng, tops)[:2]:
-        direction = pick(rng, ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)))
-        push = Push(block.order, direction, _TOPPLED_M)
-        outcome = after(rest, push, OUTCOME_SETTINGS[:1])
-        if outcome.is_clear and outcome.moved:
-            yield outcome.settled
-
-
-def _other_gone(scene: Scene, order: int, rng: np.random.Generator) -> Iterator[tuple[Block, ...]]:
-    """What the removal of other blocks leaves; no answer hangs on it, so one setting will do."""
-    others = [block.order for block in scene.blocks if block.order != order]
-    for other in shuffled(rng, others)[:_OTHERS_TRIED]:
-        outcome = after_removal(scene.blocks, other, OUTCOME_SETTINGS[:1])
-        if outcome.is_clear:
-            yield outcome.settled
+        return None
+    for blocks in states_at_rest(plain.blocks, order, outcome, rng):
+        picture = replace(right, blocks=blocks)
+        try:
+            story = story_of(plain.blocks, picture)
+        except UnfairError:
+            continue
+        if story not in known and is_inside(picture):
+            known.add(story)
+            pool.append(picture)
+    wrong = alike_wrong(roomy, right, pool, rng, {CHANGE: change}) if len(pool) >= _WRONG else []
+    return _Asked("cf-picture", roomy, [right, *wrong], f"change {change}") if wrong else None

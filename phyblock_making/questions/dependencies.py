@@ -6,12 +6,18 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
-from phyblock.domain.question import Question, Subtask
+from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Scene
 from phyblock.sim.support import GROUND, support_graph
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import recolored
-from phyblock_making.questions.goal_view import NAMED, require_seen, shown_blocks
+from phyblock_making.questions.goal_view import (
+    NAMED,
+    View,
+    goal_picture,
+    require_seen,
+    shown_picture,
+)
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import Feature, names, resolve_one
 from phyblock_making.questions.static_drafts import StaticMaker, draft, seen_blocks
@@ -53,31 +59,32 @@ class DependencyMaker(StaticMaker):
     """RD: exactly one of four blocks has the relation; contacts are found in the geometry."""
 
     subtask: Subtask = "RD"
-    drafts_a_scene = 16
+    drafts_a_view = 16
 
-    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """One block to ask about and four to choose from, drawn again and again."""
         below = support_graph(scene.blocks)
         for _ in range(_TRIES):
             shown = recolored(scene, rng)
+            picture = goal_picture(shown, view)
             named = {
                 block.order: expressions[0]
-                for block in seen_blocks(shown, NAMED)
-                if (expressions := names(block, shown.blocks, _PLAIN))
+                for block in seen_blocks(picture, NAMED)
+                if (expressions := names(block, picture, _PLAIN))
             }
             if len(named) >= 5:
-                yield from _about_one(shown, named, below, rng)
+                yield from _about_one(shown, picture, named, below, rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """From the contacts of the blocks that the text and the options name."""
-        blocks, slots = shown_blocks(question), slots_of(question)
-        anchor = resolve_one(slots["block"], blocks)
-        named = [resolve_one(option, blocks) for option in question.options]
-        require_seen(blocks, [block.order for block in (anchor, *named)], NAMED)
+        picture, slots = shown_picture(question), slots_of(question)
+        anchor = resolve_one(slots["block"], picture)
+        named = [resolve_one(option, picture) for option in question.options]
+        require_seen(picture, [block.order for block in (anchor, *named)], NAMED)
         rule = question.wording.split("-")[1] if question.wording else ""
         if rule not in _RULES or anchor in named:
             raise UnfairError("asks about no dependency, or a block about itself")
-        below = support_graph(blocks)
+        below = support_graph(picture.blocks)
         right = [i for i, b in enumerate(named) if _RULES[rule](b.order, anchor.order, below)]
         if len(right) != 1:
             raise UnfairError(f"{len(right)} of the blocks fit")
@@ -85,7 +92,11 @@ class DependencyMaker(StaticMaker):
 
 
 def _about_one(
-    scene: Scene, named: Mapping[int, str], below: Below, rng: np.random.Generator
+    scene: Scene,
+    picture: QuestionPicture,
+    named: Mapping[int, str],
+    below: Below,
+    rng: np.random.Generator,
 ) -> Iterator[Draft]:
     types = {block.order: block.type for block in scene.blocks}
     anchor = pick(rng, list(named))
@@ -99,7 +110,9 @@ def _about_one(
             slots = {"block": named[anchor]}
             contacts = {str(o): sorted(below[o]) for o in (anchor, *chosen)}
             value = types[chosen[0]]
-            yield draft(scene, rng, f"rd-{rule}", slots, options, value, rule, rests_on=contacts)
+            yield draft(
+                scene, picture, rng, f"rd-{rule}", slots, options, value, rule, rests_on=contacts
+            )
 
 
 def _all_below(order: int, below: Below) -> set[int]:

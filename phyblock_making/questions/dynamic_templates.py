@@ -6,43 +6,56 @@ from collections.abc import Mapping
 
 __all__ = ["DYNAMIC_TEMPLATES"]
 
-_MATCH = (
-    "The first picture shows a structure. Which of the four pictures shows exactly the same"
-    " structure from another viewpoint?",
-    "Three of the four pictures differ from the structure in the first picture in one block."
-    " Which one shows the very same structure, seen from elsewhere?",
-    "The camera has moved around the structure in the first picture. Which of the four pictures"
-    " did it take of that structure, with every block unchanged?",
-)
-_SIDE = (
-    "The first picture shows a structure from the front. Which of the four pictures shows it"
-    " from {side_words}?",
-    "Looking at the structure in the first picture from the front, imagine walking around it until"
-    " you face it from {side_words}. Which of the four pictures do you see then?",
-    "If the first picture is the front view of the structure, which of the four pictures is the"
-    " view from {side_words}?",
-)
 _BUILD = (
-    "The four pictures show stages of building one structure, block by block, with no block ever"
-    " taken away. Put them in the order of building, earliest stage first.",
-    "A structure is built from the ground up. In which order were these four pictures taken, from"
-    " the earliest to the latest?",
-    "Sort the four pictures of one assembly by time: the first stage first, the most complete"
-    " stage last.",
+    "The four pictures show the same finished structure, which was built in four stages. In each"
+    " picture the blocks of one stage are {color}, and all the others {other}. A block can only be"
+    " put down when all that it rests on is in place. In which order were the stages built,"
+    " earliest first?",
+    "Four teams built this structure one after another, each finishing before the next began. Each"
+    " picture shows the blocks of one team in {color}, and those of the others in {other}. Nothing"
+    " was ever put in place from below. Order the pictures from the first team to the last.",
+    "A structure was put together from four subassemblies, one after the other. In every picture"
+    " one of them is {color} and the rest of the finished structure {other}. Which order of the"
+    " pictures is possible if every block needs what it rests on to be there already?",
+    "Each picture marks in {color} the blocks that were added on one of four days; blocks of the"
+    " other days are {other}. Blocks were only ever set down on what already stood. Sort the"
+    " pictures from the first day to the last.",
+    "In what sequence were the {color} parts of these four pictures of one structure assembled, if"
+    " no block can be placed before the blocks under it? All that is not of the stage shown is"
+    " {other}. Give the earliest stage first.",
+    "Building this structure took four steps. What one step added is {color} in one of the"
+    " pictures, and everything else, earlier or later, is {other}. Put the pictures in the order of"
+    " the steps, remembering that a block goes in after all those that carry it.",
 )
 _APART = (
-    "A structure is taken apart, block by block, and no block is ever put back. Put the four"
-    " pictures in the order in which they were taken, earliest first.",
-    "The four pictures show one structure while its blocks are removed one after another. In which"
-    " order were the pictures taken, from the earliest to the latest?",
-    "Sort the four pictures of one disassembly by time: the most complete stage first, the one"
-    " with the fewest blocks last.",
+    "The four pictures show the same structure before it is taken apart in four stages. In each"
+    " picture the blocks removed in one stage are {color}, and all the others {other}. A block can"
+    " only be lifted off when nothing rests on it any more. In which order do the stages follow,"
+    " earliest first?",
+    "Four teams dismantle this structure one after another. Each picture shows the blocks that one"
+    " team takes away in {color}, and the others in {other}. No block is pulled out from under"
+    " another. Order the pictures from the first team to the last.",
+    "This structure is cleared in four steps. What one step clears is {color} in one of the"
+    " pictures, and everything else, cleared earlier or later, is {other}. Blocks that carry"
+    " others have to wait. Put the pictures in the order of the steps.",
+    "Each picture marks in {color} the blocks that are taken down on one of four days; blocks of"
+    " the other days are {other}. Only blocks that carry nothing are ever taken. Sort the pictures"
+    " from the first day to the last.",
+    "In what sequence can the {color} parts of these four pictures be removed from the structure,"
+    " if a block has to stay as long as anything rests on it? All that is not of the stage shown is"
+    " {other}. Give the part that goes first, first.",
+    "A structure is divided into four subassemblies that are taken away one after the other. In"
+    " every picture one of them is {color} and the rest {other}. Which order of the pictures is"
+    " possible if nothing may be removed from below what it carries?",
 )
 _COUNT = (
     "What happens to the other blocks if the block marked X is removed?",
     "Suppose the block marked X is taken away at once. What happens to the rest of the structure?",
     "How will the structure change if the block marked X is taken out?",
     "The block marked X disappears. How many other blocks move or fall?",
+    "Imagine the same scene without the block marked X, everything else let go where it is now."
+    " What follows?",
+    "Somebody lifts the block marked X away without touching the others. What do they do?",
 )
 _WHICH = (
     "If the block marked X is removed, at which of the marked places A to D does the block there"
@@ -51,22 +64,36 @@ _WHICH = (
     " does not stay where it is. At which place?",
     "The block marked X is taken away. Which of the marked places A to D is on a block that moves"
     " or falls?",
+    "Three of the blocks marked A to D stay where they are when the block marked X is taken away."
+    " Where is the one that does not?",
+    "Which mark, A, B, C or D, is on a block that needs the block marked X in order to stay where"
+    " it is?",
 )
 _GONE = (
-    "What is likely to happen if the {block} is taken away? Choose the picture that shows the"
-    " scene after everything has come to rest.",
-    "How will the scene change if the {block} is removed? Which picture shows it once it has come"
-    " to rest?",
-    "Suppose the {block} is taken out. Which of the four pictures shows the result?",
-    "Which picture shows what follows the removal of the {block}?",
+    "What is likely to happen if the block marked X is taken away? Choose the picture that shows"
+    " the scene after everything has come to rest.",
+    "How will the scene change if the block marked X is removed? Which picture shows it once it has"
+    " come to rest?",
+    "Suppose the block marked X is taken out. Which of the four pictures shows the result?",
+    "Which picture shows what follows the removal of the block marked X?",
+    "The block marked X is gone in all four pictures. Which of them shows what its removal alone"
+    " leads to?",
+    "Nothing but the block marked X is touched, and it is taken away. What does the scene look like"
+    " then, once nothing moves any more?",
 )
 _NEXT = (
     "The first picture shows an unfinished structure. Which of the four pictures can be the next"
-    " step, with one more block in place that stays where it is put?",
+    " step, with one more block put down so that everything stays where it is?",
     "An assembly has come as far as the first picture shows. In which of the four pictures was the"
-    " next block added so that it stays put?",
-    "Which picture can come next in this assembly? The added block must stay where it is once it"
-    " is let go.",
+    " next block added so that nothing moves once it is let go?",
+    "Which picture can come next in this assembly? The added block, and all others, must stay where"
+    " they are once it is let go.",
+    "One more block is about to be let go on the structure in the first picture, in four different"
+    " places. In which picture will it stay put, and all else with it?",
+    "Three of the four pictures show the moment before something falls. Which one shows a next step"
+    " that holds?",
+    "The assembly in the first picture goes on with one block. Which of the four ways of adding it"
+    " does not end in a fall?",
 )
 _PUSHED = (
     "A finger slowly pushes the block marked X {direction} by 4.4 cm, a little less than the"
@@ -76,22 +103,34 @@ _PUSHED = (
     " cube, as seen in the picture. Which of the four pictures shows the result?",
     "What does the scene look like after the block marked X was pushed slowly {direction}, as seen"
     " in the picture, by 4.4 cm, a little less than the side of a cube?",
+    "Each of the four pictures shows what a slow push of one block by 4.4 cm, a little less than"
+    " the side of a cube, led to. Which one follows when the block marked X is pushed {direction},"
+    " as seen in the first picture?",
+    "Seen from here, the block marked X is moved {direction} by 4.4 cm, slowly, nearly the side of"
+    " a cube. Which picture was taken after that?",
 )
 _STAYS = (
-    "The block in the second picture is put down on the structure in the first, turned as it is"
-    " shown, with its middle straight above one of the marked places. At which place does it stay,"
-    " with nothing moving or falling?",
+    "The block in the second picture is lowered onto the structure in the first, turned as it is"
+    " shown, with its middle straight above one of the marked places, and let go where it first"
+    " touches something. At which place does it stay, with nothing moving or falling?",
     "At which of the places A to D can the block in the second picture be set down so that"
-    " everything stays as it is? Its middle goes straight above the place, and it is not turned.",
+    " everything stays as it is? Its middle goes straight above the place, it is not turned, and it"
+    " comes down until it touches something.",
     "Four places are marked. The block in the second picture is lowered, as it is turned there,"
-    " with its middle over one of them, and let go. At which place does it come to rest safely?",
+    " with its middle over one of them until it touches something, and let go. At which place does"
+    " it come to rest safely?",
+    "Three of the places A to D are wrong for the block in the second picture: lowered there,"
+    " turned as shown and with its middle over the mark, it would fall or tip something over as"
+    " soon as it is let go. Which place is right?",
+    "You hold the block in the second picture as it is turned there and let it down with its middle"
+    " over A, B, C or D until it meets the structure. Where can you let go without anything"
+    " falling?",
+    "Which of the places A to D bears the block in the second picture? It is let down straight,"
+    " turned as shown, its middle over the mark, and released at the first touch.",
 )
 _TARGET = " The small target of a mark lies on the block that is meant."
-_MARKED_STEMS = ("cf-count", "cf-which", "pd-push")
+_MARKED_STEMS = ("cf-count", "cf-which", "cf-picture", "pd-push")
 _STEMS: Mapping[str, tuple[str, ...]] = {
-    "vp-color": _MATCH,
-    "vp-form": _MATCH,
-    "vp-side": _SIDE,
     "or-build": _BUILD,
     "or-apart": _APART,
     "cf-count": _COUNT,

@@ -1,4 +1,4 @@
-"""What a question's picture shows: shares of blocks, where they are, and along which axes."""
+"""What a static question's picture shows: shares of blocks, where they are, along which axes."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from phyblock.domain.blocks import BlockType, euler_deg_to_matrix
 from phyblock.domain.question import Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.camera import VIEWS, view_axes
@@ -20,24 +21,32 @@ from phyblock_making.questions.question_draft import UnfairError
 
 __all__ = [
     "COUNTED",
+    "ELEVATIONS_DEG",
     "GOAL_VIEW",
     "NAMED",
     "SHAPED",
     "SHAPED_AREA",
     "STUDIED",
+    "View",
     "are_seen",
     "center_m",
+    "drawn_view",
     "goal_picture",
     "outermost",
     "picture_axes",
     "require_seen",
     "require_shapes_seen",
     "shares",
-    "shown_blocks",
+    "shown_picture",
+    "shows_profile",
 ]
 
-GOAL_VIEW: tuple[float, float] = VIEWS["oblique"]
-"""Azimuth and elevation of the goal picture [degrees]."""
+View = tuple[float, float]
+"""Azimuth and elevation of a camera [degrees]."""
+GOAL_VIEW: View = VIEWS["oblique"]
+"""Where goals of scenes are seen from, and questions of older sets."""
+ELEVATIONS_DEG = (18, 38)
+"""The views of static questions look down by this much: tops show, and so do sides."""
 COUNTED = 0.25
 """The least visible share of a block that is to be counted."""
 NAMED = 0.4
@@ -48,6 +57,15 @@ SHAPED = 0.28
 """The least visible share of every block where shapes are counted,"""
 SHAPED_AREA = 0.004
 """and the least share of the picture that it covers."""
+_PROFILE_AXES: Mapping[BlockType, int] = {
+    "arch": 0,
+    "triangle": 0,
+    "semi_cylinder": 0,
+    "cylinder": 2,
+}
+"""Body axes along which these types look like what they are, and from elsewhere like boxes."""
+_LEAST_PROFILE = 0.26
+"""The sine of 15 degrees: so far the face across that axis is turned to the viewer."""
 _SIZE_PX = 256
 _MIDDLE_GAP = 0.1
 """So much further out, of half the picture's width, is the middle of a block called leftmost,"""
@@ -55,39 +73,47 @@ _EDGE_GAP = 0.05
 """and so much its outer edge."""
 
 
-def goal_picture(scene: Scene) -> QuestionPicture:
-    """The whole scene from where goals are seen."""
-    return QuestionPicture("scene", scene.blocks, GOAL_VIEW)
+def drawn_view(rng: np.random.Generator) -> View:
+    """A view drawn evenly: from all round, looking down by `ELEVATIONS_DEG`, in whole degrees."""
+    low, high = ELEVATIONS_DEG
+    return (float(rng.integers(360)), float(rng.integers(low, high + 1)))
 
 
-def shown_blocks(question: Question) -> tuple[Block, ...]:
-    """The blocks of the one picture of a static question; UnfairError for other pictures."""
+def goal_picture(scene: Scene, view: View) -> QuestionPicture:
+    """The whole scene from a view."""
+    return QuestionPicture("scene", scene.blocks, view)
+
+
+def shown_picture(question: Question) -> QuestionPicture:
+    """The one picture of a static question; UnfairError for others, or one from too high or low."""
     labels = [picture.label for picture in question.pictures]
-    if labels != ["scene"] or question.pictures[0].view_deg != GOAL_VIEW:
-        raise UnfairError(f"has pictures {labels}, not the goal view alone")
-    return question.pictures[0].blocks
+    if labels != ["scene"]:
+        raise UnfairError(f"has pictures {labels}, not one of the scene alone")
+    low, high = ELEVATIONS_DEG
+    if not low <= question.pictures[0].view_deg[1] <= high:
+        raise UnfairError(f"is not seen from {low} to {high} degrees above the floor")
+    return question.pictures[0]
 
 
-def shares(blocks: Sequence[Block]) -> Mapping[int, float]:
-    """Visible share of each block, by order, in the goal view of these blocks."""
-    return _shares(tuple(_plain(block) for block in blocks))
+def shares(picture: QuestionPicture) -> Mapping[int, float]:
+    """Visible share of each block, by order, of a picture framed on the blocks that it draws."""
+    return _shares(tuple(map(_plain, picture.blocks)), picture.view_deg)
 
 
 @functools.lru_cache(maxsize=512)
-def _shares(blocks: tuple[Block, ...]) -> Mapping[int, float]:
-    style = PictureStyle(_SIZE_PX, "checkerboard", *GOAL_VIEW)
-    return visible_shares(Scene("", (1,), blocks, ()), style)
+def _shares(blocks: tuple[Block, ...], view: View) -> Mapping[int, float]:
+    return visible_shares(Scene("", (1,), blocks, ()), _style(view))
 
 
-def are_seen(blocks: Sequence[Block], orders: Collection[int], least: float) -> bool:
+def are_seen(picture: QuestionPicture, orders: Collection[int], least: float) -> bool:
     """Whether each of the named blocks shows at least this share of itself."""
-    seen = shares(blocks)
+    seen = shares(picture)
     return all(seen[order] >= least for order in orders)
 
 
-def require_seen(blocks: Sequence[Block], orders: Collection[int], least: float) -> None:
+def require_seen(picture: QuestionPicture, orders: Collection[int], least: float) -> None:
     """Raise UnfairError that names the blocks that show less than `least`."""
-    seen = shares(blocks)
+    seen = shares(picture)
     hidden = [order for order in sorted(orders) if seen[order] < least]
     if hidden:
         raise UnfairError(f"blocks {hidden} show less than {least:.0%} of themselves")
@@ -100,19 +126,19 @@ def center_m(block: Block) -> NDArray[np.float64]:
     return middle
 
 
-def picture_axes() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def picture_axes(view: View) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """To the right of the picture and away from the viewer along the floor, unit (3,) vectors."""
-    right, _, forward = view_axes(*GOAL_VIEW)
+    right, _, forward = view_axes(*view)
     away = np.array([forward[0], forward[1], 0.0])
     return right, away / np.linalg.norm(away)
 
 
-def outermost(orders: Sequence[int], blocks: Sequence[Block], to_left: bool) -> int | None:
-    """Which of the named blocks is farthest to a side of the goal view; None when that is close.
+def outermost(orders: Sequence[int], picture: QuestionPicture, to_left: bool) -> int | None:
+    """Which of the named blocks is farthest to a side of a picture; None when that is close.
 
     Both its middle and its outer edge have to be clearly farther out than those of the others.
     """
-    spans = _spans(tuple(blocks))
+    spans = _spans(tuple(map(_plain, picture.blocks)), picture.view_deg)
     sign = -1.0 if to_left else 1.0
     reach = {
         order: (sign * sum(spans[order]) / 2, max(sign * end for end in spans[order]))
@@ -127,10 +153,10 @@ def outermost(orders: Sequence[int], blocks: Sequence[Block], to_left: bool) -> 
 
 
 @functools.lru_cache(maxsize=512)
-def _spans(blocks: tuple[Block, ...]) -> Mapping[int, tuple[float, float]]:
-    """Left and right end of each block across the goal view, -1 to 1, by order."""
+def _spans(blocks: tuple[Block, ...], view: View) -> Mapping[int, tuple[float, float]]:
+    """Left and right end of each block across the picture, -1 to 1, by order."""
     scene = Scene("", (1,), blocks, ())
-    camera = goal_camera(scene, PictureStyle(_SIZE_PX, "checkerboard", *GOAL_VIEW))
+    camera = goal_camera(scene, _style(view))
     spans = {}
     for block, one in zip(blocks, drawn(scene), strict=True):
         across = camera.project(one.vertices_m)[:, 0]
@@ -139,10 +165,10 @@ def _spans(blocks: tuple[Block, ...]) -> Mapping[int, tuple[float, float]]:
 
 
 @functools.lru_cache(maxsize=512)
-def _areas(blocks: tuple[Block, ...]) -> Mapping[int, float]:
-    """Share of the goal view that each block covers, by order."""
+def _areas(blocks: tuple[Block, ...], view: View) -> Mapping[int, float]:
+    """Share of the picture that each block covers, by order."""
     scene = Scene("", (1,), blocks, ())
-    camera = goal_camera(scene, PictureStyle(_SIZE_PX, "checkerboard", *GOAL_VIEW))
+    camera = goal_camera(scene, _style(view))
     seen = shoot(drawn(scene), camera, _SIZE_PX).block
     counts = np.bincount(seen[seen >= 0], minlength=len(blocks))
     return {
@@ -150,13 +176,28 @@ def _areas(blocks: tuple[Block, ...]) -> Mapping[int, float]:
     }
 
 
-def require_shapes_seen(blocks: Sequence[Block]) -> None:
+def shows_profile(block: Block, view: View) -> bool:
+    """Whether a view shows the face that tells an arch, a prism or a half cylinder from a box."""
+    axis = _PROFILE_AXES.get(block.type)
+    if axis is None:
+        return True
+    along = euler_deg_to_matrix(block.euler_deg)[:, axis]
+    return bool(abs(along @ view_axes(*view)[2]) >= _LEAST_PROFILE)
+
+
+def require_shapes_seen(picture: QuestionPicture) -> None:
     """Raise UnfairError unless every block shows enough of itself to tell its shape."""
-    require_seen(blocks, [block.order for block in blocks], SHAPED)
-    areas = _areas(tuple(_plain(block) for block in blocks))
+    require_seen(picture, [block.order for block in picture.blocks], SHAPED)
+    if not all(shows_profile(block, picture.view_deg) for block in picture.blocks):
+        raise UnfairError("some block is seen from a side that does not tell its shape")
+    areas = _areas(tuple(map(_plain, picture.blocks)), picture.view_deg)
     small = [order for order, area in sorted(areas.items()) if area < SHAPED_AREA]
     if small:
         raise UnfairError(f"blocks {small} cover less than {SHAPED_AREA:.1%} of the picture")
+
+
+def _style(view: View) -> PictureStyle:
+    return PictureStyle(_SIZE_PX, "checkerboard", *view)
 
 
 def _plain(block: Block) -> Block:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from phyblock.domain.question import Subtask
 from phyblock_making.questions.affordance import AffordanceMaker
 from phyblock_making.questions.counterfactual import CounterfactualMaker
-from phyblock_making.questions.counts import CountMaker, LayerMaker, NumberMaker, TypeMaker
+from phyblock_making.questions.counts import NumberMaker
 from phyblock_making.questions.dependencies import DependencyMaker
 from phyblock_making.questions.distances import DistanceMaker
 from phyblock_making.questions.ordering import OrderingMaker
@@ -17,6 +17,7 @@ from phyblock_making.questions.properties import ColorMaker, ShapeMaker
 from phyblock_making.questions.question_draft import Maker
 from phyblock_making.questions.rotations import RotationMaker
 from phyblock_making.questions.sizes import SizeMaker
+from phyblock_making.questions.tallies import TallyMaker
 from phyblock_making.questions.viewpoint import ViewpointMaker
 
 __all__ = ["MAKERS"]
@@ -30,9 +31,9 @@ _MAKERS: tuple[Maker, ...] = (
     DistanceMaker(),
     DependencyMaker(),
     RotationMaker(),
-    CountMaker(),
-    LayerMaker(),
-    TypeMaker(),
+    TallyMaker("OC"),
+    TallyMaker("LC"),
+    TallyMaker("TC"),
     ViewpointMaker(),
     CounterfactualMaker(),
     PredictiveMaker(),

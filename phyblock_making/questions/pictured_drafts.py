@@ -8,8 +8,9 @@ import numpy as np
 
 from phyblock.domain.question import LETTERS, Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
-from phyblock.sim.outcomes import DEFAULT_LIMITS, Limits
+from phyblock.sim.outcomes import DEFAULT_LIMITS
 from phyblock.sim.seeing import is_inside, least_difference, seen
+from phyblock.sim.support import whole_bounds_m
 from phyblock.sim.world import Pose
 from phyblock_making.questions.choices import pick
 from phyblock_making.questions.question_draft import Draft, Option, UnfairError
@@ -27,11 +28,16 @@ __all__ = [
     "picture_of",
     "same_blocks",
     "state",
+    "story_of",
+    "with_room",
 ]
 
 LEAST_PIXELS = 220
 """In so many pixels of 256 by 256 any two pictures that are compared differ, at the least."""
-_SAME = Limits(still_m=0.002, still_deg=2.0, moved_m=0.002, moved_deg=2.0)
+_ALIKE_M = 0.002
+_ALIKE_DEG = 2.0
+_LEVEL_M, _DOWN_M = 0.004, 0.008
+_ROOM_M = 0.06
 
 
 def state(
@@ -39,6 +45,22 @@ def state(
 ) -> QuestionPicture:
     """Blocks of a scene, whose whole frames the picture, so that all its states share a camera."""
     return QuestionPicture(label, tuple(blocks), view_deg, framed=scene.blocks)
+
+
+def with_room(blocks: Sequence[Block], above_m: float = 0.0) -> tuple[Block, ...]:
+    """What to frame a picture on for floor all round the blocks, and some air above them [m]."""
+    low, high = whole_bounds_m(blocks)
+    first = max(block.order for block in blocks) + 1
+    height_m = round(float(high[2]) + above_m, 4) if above_m else 0.0125
+    corners = [
+        Block(first + i, "cuboid1", "red", (x, y, height_m), (0.0, 0.0, 0.0), (), 1)
+        for i, (x, y) in enumerate(
+            (round(float(x), 4), round(float(y), 4))
+            for x in (low[0] - _ROOM_M, high[0] + _ROOM_M)
+            for y in (low[1] - _ROOM_M, high[1] + _ROOM_M)
+        )
+    ]
+    return (*blocks, *corners)
 
 
 def are_told_apart(pictures: Sequence[QuestionPicture], least: int = LEAST_PIXELS) -> bool:
@@ -53,9 +75,9 @@ def are_alike(one: Block, other: Block) -> bool:
     if one.kind != other.kind:
         return False
     start, end = Pose.goal(one), Pose.goal(other)
-    if end.distance_m(start) > _SAME.still_m:
+    if end.distance_m(start) > _ALIKE_M:
         return False
-    return one.look == other.look or end.angle_deg(start) <= _SAME.still_deg
+    return one.look == other.look or end.angle_deg(start) <= _ALIKE_DEG
 
 
 def same_blocks(one: Sequence[Block], other: Sequence[Block]) -> bool:
@@ -90,6 +112,22 @@ def moved_between(
             raise UnfairError(f"picture {picture.label} shows block {block.order} hardly moved")
     gone = set(goal) - {block.order for block in picture.blocks}
     return tuple(sorted(gone)), tuple(sorted(moved))
+
+
+def story_of(
+    blocks: Sequence[Block], picture: QuestionPicture
+) -> tuple[tuple[int, ...], tuple[int, ...], frozenset[int]]:
+    """Who is gone, who moved, and who came down: words that two pictures can be compared by.
+
+    UnfairError as `moved_between`, and where it is hard to tell whether a block came down.
+    """
+    gone, moved = moved_between(Scene("", (1,), tuple(blocks), ()), picture)
+    before = {block.order: block.position_m[2] for block in blocks}
+    after = {block.order: block.position_m[2] for block in picture.blocks}
+    down_m = {order: before[order] - after[order] for order in moved}
+    if any(_LEVEL_M < abs(height) < _DOWN_M for height in down_m.values()):
+        raise UnfairError(f"picture {picture.label} shows a block hardly lower than before")
+    return gone, moved, frozenset(order for order, height in down_m.items() if height >= _DOWN_M)
 
 
 def draft(

@@ -12,7 +12,15 @@ from phyblock.domain.scene import Block, Scene
 from phyblock_making.questions.block_measures import height_m
 from phyblock_making.questions.choices import shuffled
 from phyblock_making.questions.coloring import recolored
-from phyblock_making.questions.goal_view import NAMED, STUDIED, require_seen, shown_blocks
+from phyblock_making.questions.goal_view import (
+    NAMED,
+    STUDIED,
+    View,
+    goal_picture,
+    require_seen,
+    shown_picture,
+    shows_profile,
+)
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import SHAPE_WORDS, Feature, resolve_one, shape_word
 from phyblock_making.questions.static_drafts import (
@@ -38,25 +46,29 @@ class ShapeMaker(StaticMaker):
 
     subtask: Subtask = "SH"
 
-    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """One a block that shows enough of itself."""
-        for block in shuffled(rng, seen_blocks(scene, STUDIED)):
-            if _hides_its_shape(block, scene.blocks):
+        for block in shuffled(rng, seen_blocks(goal_picture(scene, view), STUDIED)):
+            if _hides_its_shape(block, scene.blocks) or not shows_profile(block, view):
                 continue
             shown = recolored(scene, rng)
+            picture = goal_picture(shown, view)
             again = next(b for b in shown.blocks if b.order == block.order)
-            name = drawn_name(rng, again, shown, _BY_LOOKS)
+            name = drawn_name(rng, again, picture, _BY_LOOKS)
             if name is not None:
                 right = shape_word(block.type)
                 options = [right, *wrong_options(rng, list(SHAPE_WORDS), right)]
-                yield draft(shown, rng, "sh", {"block": name}, options, right, block=block.order)
+                slots, order = {"block": name}, block.order
+                yield draft(shown, picture, rng, "sh", slots, options, right, block=order)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """The word for the type of the block that the text names."""
-        blocks = shown_blocks(question)
-        block = resolve_one(slots_of(question)["block"], blocks)
-        require_seen(blocks, [block.order], STUDIED)
-        if _hides_its_shape(block, blocks):
+        picture = shown_picture(question)
+        block = resolve_one(slots_of(question)["block"], picture)
+        require_seen(picture, [block.order], STUDIED)
+        if not shows_profile(block, picture.view_deg):
+            raise UnfairError("is seen from a side that does not tell its shape")
+        if _hides_its_shape(block, picture.blocks):
             raise UnfairError("a half cylinder that stands and carries looks like a cylinder")
         return index_of(question, shape_word(block.type))
 
@@ -66,23 +78,23 @@ class ColorMaker(StaticMaker):
 
     subtask: Subtask = "CO"
 
-    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """One a block that can be named."""
-        for block in shuffled(rng, seen_blocks(scene, NAMED)):
+        for block in shuffled(rng, seen_blocks(goal_picture(scene, view), NAMED)):
             shown = recolored(scene, rng)
+            picture = goal_picture(shown, view)
             again = next(b for b in shown.blocks if b.order == block.order)
-            name = drawn_name(rng, again, shown, _BY_SHAPE)
+            name = drawn_name(rng, again, picture, _BY_SHAPE)
             if name is not None:
                 options = [again.color, *wrong_options(rng, COLORS, again.color)]
-                yield draft(
-                    shown, rng, "co", {"block": name}, options, again.color, block=block.order
-                )
+                slots, order = {"block": name}, block.order
+                yield draft(shown, picture, rng, "co", slots, options, again.color, block=order)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """The color of the block that the text names."""
-        blocks = shown_blocks(question)
-        block = resolve_one(slots_of(question)["block"], blocks)
-        require_seen(blocks, [block.order], NAMED)
+        picture = shown_picture(question)
+        block = resolve_one(slots_of(question)["block"], picture)
+        require_seen(picture, [block.order], NAMED)
         return index_of(question, block.color)
 
 

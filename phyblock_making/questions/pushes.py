@@ -1,67 +1,74 @@
-"""PD, pushes: the settled scene after a block was pushed, among what else could be thought of."""
+"""PD, pushes: the settled scene after a block was pushed, among what other pushes lead to.
+
+Every option is what really follows one of four pushes: of the block itself or of one close by, to
+the right or to the left. Which of the four is asked about is drawn, so that the pictures alone say
+nothing.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import chain
+from itertools import product
 
 import numpy as np
 
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.camera import view_axes
-from phyblock.sim.outcomes import (
-    OUTCOME_SETTINGS,
-    Outcome,
-    Push,
-    after,
-    after_removal,
-)
+from phyblock.sim.outcomes import OUTCOME_SETTINGS, Outcome, Push, after
 from phyblock.sim.seeing import block_mark, seen, shown_pixels
+from phyblock.sim.steps import groups
+from phyblock.sim.support import bounds_m, boxes_near
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.counterfactual import TAKEN
+from phyblock_making.questions.margins import group_of, is_sure
 from phyblock_making.questions.pictured_drafts import (
     are_told_apart,
     draft,
-    moved_between,
     state,
+    story_of,
+    with_room,
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError
 
-__all__ = ["meant_push", "push_drafts", "what_happened"]
+__all__ = ["meant_push", "push_drafts", "sure_push", "what_happened"]
 
-_PUSHES_TRIED = 4
+_BLOCKS_TRIED = 3
+_PUSHES_TRIED = 9
+_OPTIONS = 4
 _FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
-_LEVEL_M, _DOWN_M = 0.004, 0.008
-_PUSH_ELEVATION_DEG = 26.0
+_ELEVATIONS_DEG = (20, 32)
 _DIRECTIONS = {"to the right": 1, "to the left": -1}
 _LEAST_SHOWN = 60
+_TOUCH_M = 0.002
+_ALONG_M = 0.01
+_REACH_M = 0.12
 
 
 def push_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-    """A block pushed to the right or left as seen, and what else could have been thought of."""
-    view = (pick(rng, _FRONTS_DEG), _PUSH_ELEVATION_DEG)
-    plain = state(scene, scene.blocks, view)
+    """A block pushed to the right or left as seen, and what follows other pushes close by."""
+    view = (pick(rng, _FRONTS_DEG), float(rng.integers(_ELEVATIONS_DEG[0], _ELEVATIONS_DEG[1] + 1)))
+    plain = replace(state(scene, scene.blocks, view), framed=with_room(scene.blocks))
     shot = seen(plain)
     if min(shown_pixels(plain, shot).values()) < _LEAST_SHOWN:
         return
-    for block in shuffled(rng, scene.blocks)[:_PUSHES_TRIED]:
-        mark = block_mark(plain, shot, block.order, TAKEN)
-        if mark is None:
+    for block in shuffled(rng, scene.blocks)[:_BLOCKS_TRIED]:
+        told = _told_apart(plain, _pushes(plain, block.order, rng))
+        if len(told) < _OPTIONS:
             continue
-        direction = pick(rng, tuple(_DIRECTIONS))
-        push = meant_push(plain, block.order, direction)
-        outcome = after(scene.blocks, push)
-        if not outcome.is_clear or block.order not in outcome.moved:
+        (order, direction), right = told.pop(int(rng.integers(_OPTIONS)))
+        mark = block_mark(plain, shot, order, TAKEN)
+        outcome = sure_push(scene.blocks, meant_push(plain, order, direction)) if mark else None
+        if mark is None or outcome is None:
             continue
-        wrong = _misjudged(scene, push, outcome, rng)
-        options = _distinct(scene, plain, chain([outcome.settled], wrong), push)
-        if len(options) == 4:
-            facts = {"pushed": block.order, "moved": list(outcome.moved)}
-            slots = {"direction": direction}
+        right = replace(right, blocks=outcome.settled)
+        if are_told_apart([right, *(picture for _, picture in told)]):
+            facts = {"pushed": order, "moved": list(outcome.moved)}
+            options = [right, *(picture for _, picture in told)]
             shown = [replace(plain, marks=(mark,))]
             value = "falls" if len(outcome.moved) > 1 else "slides"
+            slots = {"direction": direction}
             yield draft(scene, rng, "pd-push", options, shown, value, slots, facts)
             return
 
@@ -73,96 +80,75 @@ def meant_push(picture: QuestionPicture, order: int, direction: str) -> Push:
     return Push(order, (x, y))
 
 
-def _misjudged(
-    scene: Scene, push: Push, outcome: Outcome, rng: np.random.Generator
-) -> Iterator[tuple[Block, ...]]:
-    """Wrong outcomes: the others stay, it carries too few or too many along, it goes elsewhere.
-
-    No answer hangs on them, so one setting will do.
-    """
-    quick = OUTCOME_SETTINGS[:1]
-    slid = _slid(scene, push, {push.order})
-    if outcome.moved != (push.order,):
-        yield slid
-    back = replace(push, direction=(-push.direction[0], -push.direction[1]))
-    opposite = after(scene.blocks, back, quick)
-    if opposite.is_clear:
-        yield opposite.settled
-    carried = _above(scene, push.order)
-    if len(carried) > 1:
-        yield _slid(scene, push, carried)
-    for other in shuffled(rng, [b for b in scene.blocks if b.order != push.order])[:3]:
-        elsewhere = after(scene.blocks, replace(push, order=other.order), quick)
-        if elsewhere.is_clear and elsewhere.moved:
-            yield elsewhere.settled
-    gone = after_removal(scene.blocks, push.order, quick)
-    if gone.is_clear and gone.moved:
-        settled = {block.order: block for block in (*slid, *gone.settled)}
-        yield tuple(settled[block.order] for block in scene.blocks)
-
-
-def _slid(scene: Scene, push: Push, orders: set[int]) -> tuple[Block, ...]:
-    """The scene with some blocks shifted as far as the push goes, all else in place."""
-    x, y = (part * push.distance_m for part in push.direction)
-    return tuple(
-        replace(
-            b,
-            position_m=(
-                round(b.position_m[0] + x, 4),
-                round(b.position_m[1] + y, 4),
-                b.position_m[2],
-            ),
-        )
-        if b.order in orders
-        else b
-        for b in scene.blocks
-    )
-
-
-def _above(scene: Scene, order: int) -> set[int]:
-    """A block and all that rests on it, directly or not."""
-    standing_on = {order}
-    for _ in scene.blocks:
-        standing_on |= {b.order for b in scene.blocks if standing_on & set(b.depend)}
-    return standing_on
-
-
-def _distinct(
-    scene: Scene, plain: QuestionPicture, states: Iterable[Sequence[Block]], push: Push
-) -> list[QuestionPicture]:
-    """Pictures of the states, four at most, that tell different stories in different pixels."""
-    chosen: list[QuestionPicture] = []
-    stories: list[object] = []
-    for blocks in states:
-        picture = state(scene, blocks, plain.view_deg)
-        try:
-            story = what_happened(scene, picture, push)
-        except UnfairError:
-            story = None
-        is_new = story is not None and story not in stories
-        if is_new and are_told_apart([plain, *chosen, picture]):
-            chosen.append(picture)
-            stories.append(story)
-        if len(chosen) in (0, 4):
-            break
-    return chosen
+def sure_push(blocks: Sequence[Block], push: Push) -> Outcome | None:
+    """What surely follows a push; None where settings, or statics if none came down, doubt it."""
+    outcome = after(blocks, push)
+    if not outcome.is_clear or push.order not in outcome.moved:
+        return None
+    height = {block.order: block.position_m[2] for block in blocks}
+    if any(height[b.order] - b.position_m[2] > _TOUCH_M for b in outcome.settled):
+        return outcome
+    return outcome if is_sure(group_of(outcome.settled, push.order), ()) else None
 
 
 def what_happened(
-    scene: Scene, picture: QuestionPicture, push: Push
-) -> tuple[tuple[int, ...], tuple[int, ...], bool, frozenset[int]]:
+    blocks: Sequence[Block], picture: QuestionPicture, push: Push
+) -> tuple[tuple[int, ...], tuple[int, ...], frozenset[int], frozenset[int]]:
     """What a picture says happened, in words that two settled scenes can be compared by.
 
-    Who is gone, who moved, whether the pushed block went with the push, and who came down.
-    UnfairError where it is hard to tell whether a block came down.
+    Who is gone, who moved, who came down, and who went the way of the push. UnfairError as
+    `story_of`.
     """
-    gone, moved = moved_between(scene, picture)
-    goal = {block.order: block for block in scene.blocks}
-    now = {block.order: block for block in picture.blocks}
-    start, end = goal[push.order].position_m, now[push.order].position_m
-    along = sum((e - s) * d for s, e, d in zip(start, end, push.direction, strict=False))
-    down_m = {order: goal[order].position_m[2] - now[order].position_m[2] for order in moved}
-    if any(_LEVEL_M < abs(height) < _DOWN_M for height in down_m.values()):
-        raise UnfairError(f"picture {picture.label} shows a block hardly lower than before")
-    dropped = frozenset(order for order, height in down_m.items() if height >= _DOWN_M)
-    return gone, moved, along > 0, dropped
+    story = story_of(blocks, picture)
+    start = {block.order: block.position_m for block in blocks}
+    along = {
+        b.order: sum(
+            (end - begin) * way
+            for begin, end, way in zip(start[b.order], b.position_m, push.direction, strict=False)
+        )
+        for b in picture.blocks
+    }
+    return (*story, frozenset(order for order, way_m in along.items() if way_m > _ALONG_M))
+
+
+def _pushes(plain: QuestionPicture, order: int, rng: np.random.Generator) -> list[tuple[int, str]]:
+    """Pushes of a block and of those that it touches, to either side, in an order drawn."""
+    boxes = {block.order: bounds_m(block) for block in plain.blocks}
+    touching = [one for one, box in boxes.items() if boxes_near(box, boxes[order], _TOUCH_M)]
+    return shuffled(rng, list(product(touching, _DIRECTIONS)))[:_PUSHES_TRIED]
+
+
+def _told_apart(
+    plain: QuestionPicture, pushes: Sequence[tuple[int, str]]
+) -> list[tuple[tuple[int, str], QuestionPicture]]:
+    """The first four pushes of which each leads to a picture that tells a story of its own.
+
+    Settings are compared for the one that is asked about alone; one will do to look for others.
+    Blocks that stand far away are left alone.
+    """
+    found: list[tuple[tuple[int, str], QuestionPicture]] = []
+    stories: set[object] = set()
+    near = next(
+        group
+        for group in groups(plain.blocks, _REACH_M)
+        if any(block.order == pushes[0][0] for block in group)
+    )
+    axis = meant_push(plain, pushes[0][0], next(iter(_DIRECTIONS)))
+    for order, direction in pushes:
+        outcome = after(near, meant_push(plain, order, direction), OUTCOME_SETTINGS[:1])
+        if not outcome.is_clear or order not in outcome.moved:
+            continue
+        settled = {block.order: block for block in outcome.settled}
+        blocks = tuple(settled.get(block.order, block) for block in plain.blocks)
+        picture = replace(plain, blocks=blocks)
+        try:
+            story = what_happened(plain.blocks, picture, axis)
+        except UnfairError:
+            continue
+        pictures = [plain, *(one for _, one in found), picture]
+        if story not in stories and are_told_apart(pictures):
+            stories.add(story)
+            found.append(((order, direction), picture))
+        if len(found) == _OPTIONS:
+            break
+    return found

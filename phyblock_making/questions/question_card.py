@@ -25,12 +25,14 @@ which gives the same bytes with any number of processes. No picture is stored: e
 ## How they were made
 
 Every scene gives drafts: fair questions with their right option, distractors and evidence. From
-the drafts of all scenes a greedy choice takes the questions of a subtask so that sorts of
-questions, answer values, values under each set of options and under each word of the question,
-wordings, levels and scenes are as even as the scenes allow, and so that each option text, and each
-word in one, is right in one of four cases in which it is offered. The same block, color or number
-is not asked about twice in a scene. Letters go round within sets of options, so that each is right
-equally often; in ordering, all orders are drawn.
+the drafts of all scenes chance leaves out some, until the texts of those kept tell nothing of what
+is right (rejection sampling by a conditional logit over the texts, learned on other scenes). Of
+these a greedy choice evens out sorts, wordings and sets of options, never answers: what is evened
+out in a whole set is rare in one part where it was frequent in the other. The same block, color or
+number is not asked about twice in a scene. Letters are drawn until each is right about as often.
+
+Static questions and viewpoints are seen from all round, 18 to 38 degrees above the floor. Each
+question has one of the six backgrounds. Both are drawn.
 
 Texts come from templates with slots (`wording`). Blocks are named by color, type, layer, place in
 the picture or what they rest on, so that exactly one block fits.
@@ -81,20 +83,37 @@ What was unfair became a rule for all:
   degrees, and a turned block rests on what it rested on;
 * a layer is counted only where what rests on what can be told from heights: a block wedged
   between two roofs looks as if it stood beside them;
-* outcomes are tried under four settings (time step, solver, friction, and a floor that leans by 2
-  degrees to three sides), because weight exactly over an edge falls in every simulation and stays
-  on many a table; all must name the same blocks, each either clearly moved or clearly still;
-* a pushed block goes as far as the text says, in every setting, and came down or did not in all;
-  one that only slid did not turn by more than 10 degrees;
-* blocks are shifted and pushed by lengths that are no multiple of the grid of the structures;
-* of next steps at most one obviously floats; the others are blocks of the goal at wrong places;
-* of the pictures of removals at least one wrong one lacks the right block, so that to look for
-  what is gone is not enough; the removed block shows 40% of itself, the others 12%;
+* outcomes are tried under four settings (time step, solver, friction from 0.28 to 0.45, masses 15 %
+  off, and a floor that leans by 2 degrees to three sides); all must name the same blocks, each
+  either clearly moved or clearly still;
+* nothing hangs on an edge: by statics, the blocks that stay stand, and those that go cannot be
+  borne, with every weight 5 mm off to any of eight sides, those frictions and those masses;
+* of removals four in ten follow the rule that what rests on a block falls with it; in the others a
+  support is one too many, or a weight holds what it stands on. Planks with weights or a column are
+  added for them (`add`), on structures of which some upper blocks may be left out (`without`);
+* pictures of removals all lack the right block; in all of them everything is at rest and nothing
+  hangs free; that nothing else moved is right in about one of four;
+* every picture of a push is what really follows one of four pushes close by, and which one is asked
+  about is drawn; it goes as far as the text says in every setting, and came down or did not in all;
+* blocks are pushed by a length that is no multiple of the grid of the structures;
+* the four pictures of a next step add one and the same block, let down at places drawn alike; of
+  those that do not stay three are taken so that the right one's rank among the four in colored
+  area, and about its ranks in seven other measures of pixels, are drawn;
+* stages of building are colored in pictures of the whole structure, so that none is larger for
+  being early; a cut in four is refused where number, area or height of the blocks sorts it;
+* places for a block are all on flat faces, with the right one's rank in distance from the middle of
+  its block drawn; they hold, or do not, also 5 mm off in four directions, and blocks without a
+  clear middle are not put down;
+* an arch, a triangular prism, a half cylinder or a cylinder is called that, and its shape asked
+  for, only where its profile is turned to the viewer by 15 degrees: from behind an arch looks like
+  a box;
+* what is hidden is counted only where a block that shows rests on it alone, one at the most;
+* heights are asked for "above the ground", left and right "in the picture";
 * other viewpoints to a side are asked for from straight in front alone: a slanted view has a
   mirror image that could be one of the same side;
-* options of viewpoints are four versions of one block, and the true one is drawn evenly;
-* places for a block hold, or do not, also 7 mm off in four directions, and blocks without a clear
-  middle are not put down;
+* options of viewpoints are one structure with two changes (mirrored, two colors exchanged, a block
+  shifted) each made or not, with equal blocks and colors; the true one is drawn evenly, and the
+  nearest histogram of visible colors is right for one of the four;
 * pictures that are options differ in 220 of 256 x 256 pixels at least, and cut nothing off.
 
 ## What is in it
@@ -105,7 +124,7 @@ What was unfair became a rule for all:
 
 A to D: share of questions whose right option has that letter (ordering: that comes first). The
 last column is the share of the most frequent right option text.
-{audit}
+{audit}{attacks}
 ## The file
 
 `questions.jsonl` holds one question a line; docs/vqa.md describes the fields.
@@ -136,8 +155,12 @@ def question_card(
     questions: Sequence[Question],
     made_by: str,
     audits: Sequence[SubtaskAudit] = (),
+    attacks: str = "",
 ) -> str:
-    """Markdown text of the card of a set of questions called `name` about those scenes."""
+    """Markdown text of the card of a set of questions called `name` about those scenes.
+
+    `attacks` is the section about what attacks reach, empty for none.
+    """
     by_subtask = {s: [q for q in questions if q.subtask == s] for s in SUBTASKS}
     return _TEXT.format(
         name=name,
@@ -153,6 +176,7 @@ def question_card(
         area=SHAPED_AREA,
         rows="\n".join(_row(asked) for asked in by_subtask.values() if asked),
         audit=_audit_text(audits) if audits else "",
+        attacks=attacks,
     )
 
 

@@ -28,8 +28,9 @@ class Draft:
 
     `scene` is the scene as shown, recolored where that is needed; `options` has the right one
     first, or for ordering all four in the right order. `wording` is the id of the template that
-    `text` was filled from. `kind` names a sort of question within a subtask and `value` the
-    answer's value: production takes as even a share of both as the scenes allow. `evidence` is
+    `text` was filled from. `kind` names a sort of question within a subtask, and `value` a sort
+    of answer: production takes as even a share of kinds as the scenes allow, and of values where
+    the options are no texts. `evidence` is
     what JSON can hold, and names no letters: they are dealt later; `evidence["slots"]` holds what
     the template was filled with.
     """

@@ -40,15 +40,19 @@ def write_questions(
     scenes_name: str,
     made_by: str,
     audits: Sequence[SubtaskAudit] = (),
+    attacks: str = "",
 ) -> None:
     """Write the questions, sorted as they are, with card and checksums; StoreError if it cannot.
 
     `originals` are the scenes as stored, by id, of the set `scenes_name`; `made_by` is the command
-    that makes the same files; `audits` are told of in the card.
+    that makes the same files; `audits` are told of in the card, and `attacks` is its section about
+    those.
     """
     lines = "".join(f"{StoredQuestion.of(q, originals[q.scene.id]).as_json()}\n" for q in questions)
     files = {
-        _CARD_FILE: question_card(folder.name, scenes_name, questions, made_by, audits).encode(),
+        _CARD_FILE: question_card(
+            folder.name, scenes_name, questions, made_by, audits, attacks
+        ).encode(),
         QUESTIONS_FILE: lines.encode(),
     }
     sums = "".join(f"{hashlib.sha256(d).hexdigest()}  {name}\n" for name, d in files.items())

@@ -1,4 +1,4 @@
-"""Questions from one seed: drafts of all scenes, an even choice of them, letters dealt evenly."""
+"""Questions from one seed: drafts of all scenes, a choice of them, letters and backgrounds."""
 
 from __future__ import annotations
 
@@ -18,6 +18,9 @@ from phyblock.domain.question import (
 )
 from phyblock.domain.scene import Block, Scene
 from phyblock.errors import DataError, Problem
+from phyblock.words import BACKGROUNDS, Background
+from phyblock_making.questions.choices import pick, shuffled
+from phyblock_making.questions.letters import even_letters
 from phyblock_making.questions.makers import MAKERS
 from phyblock_making.questions.question_draft import Draft, Option
 from phyblock_making.questions.selection import Pooled, select
@@ -103,32 +106,26 @@ def _texts(options: Sequence[Option]) -> tuple[str, ...]:
 def _dealt(
     subtask: Subtask, taken: Sequence[Pooled], rng: np.random.Generator
 ) -> Iterator[Question]:
-    """Questions with letters: each order of the options, or each right letter, as often."""
+    """Questions in an order drawn, with letters that are drawn and about as often right."""
     width = max(3, len(str(len(taken))))
-    in_order = sorted(
-        taken, key=lambda one: (one.draft.kind, sorted(one.option_texts), one.draft.value)
-    )
-    places = [_places(subtask, number, rng) for number in range(len(in_order))]
-    dealt = list(zip(in_order, places, strict=True))
-    for number, i in enumerate(rng.permutation(len(dealt)).tolist(), 1):
-        one, order = dealt[i]
-        yield _question(f"{subtask.lower()}-{number:0{width}d}", subtask, one.draft, order)
+    letters = even_letters(len(taken), rng)
+    for number, (one, right) in enumerate(zip(shuffled(rng, taken), letters, strict=True), 1):
+        order = _places(subtask, right, rng)
+        name = f"{subtask.lower()}-{number:0{width}d}"
+        yield _question(name, subtask, one.draft, order, pick(rng, BACKGROUNDS))
 
 
-def _places(subtask: Subtask, number: int, rng: np.random.Generator) -> list[int]:
-    """For each option of a draft, where it is put.
-
-    The right option goes round the letters, which deals them evenly within every kind, set of
-    options and value; the others follow in an order drawn.
-    """
+def _places(subtask: Subtask, right: int, rng: np.random.Generator) -> list[int]:
+    """For each option of a draft, where it is put; the right one, which is first, at `right`."""
     if subtask == "OR":
         return [int(i) for i in rng.permutation(len(LETTERS))]
-    right = number % len(LETTERS)
     rest = [place for place in range(len(LETTERS)) if place != right]
     return [right, *(rest[int(i)] for i in rng.permutation(len(rest)))]
 
 
-def _question(name: str, subtask: Subtask, draft: Draft, places: Sequence[int]) -> Question:
+def _question(
+    name: str, subtask: Subtask, draft: Draft, places: Sequence[int], background: Background
+) -> Question:
     options: list[str] = [""] * len(places)
     pictures = list(draft.pictures)
     marks: list[Mark] = []
@@ -148,7 +145,7 @@ def _question(name: str, subtask: Subtask, draft: Draft, places: Sequence[int]) 
         pictures[0] = replace(pictures[0], marks=(*pictures[0].marks, *lettered))
     pictures += sorted(shown, key=lambda picture: picture.label)
     answer = tuple(places) if subtask == "OR" else (places[0],)
-    tidy = tuple(map(tidy_picture, pictures))
+    tidy = tuple(replace(tidy_picture(one), background=background) for one in pictures)
     evidence = dict(draft.evidence)
     text, wording = draft.text, draft.wording
     return Question(

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from phyblock.domain.blocks import COLORS, BlockType, Color
+from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block
 from phyblock.sim.support import bounds_m
-from phyblock_making.questions.goal_view import outermost
+from phyblock_making.questions.goal_view import outermost, shows_profile
 from phyblock_making.questions.question_draft import UnfairError
 
 __all__ = ["SHAPE_WORDS", "Feature", "names", "resolve", "resolve_one", "shape_word"]
@@ -80,7 +81,7 @@ def shape_word(block_type: BlockType) -> str:
     return next(word for word, types in SHAPE_WORDS.items() if block_type in types)
 
 
-def resolve(text: str, blocks: Sequence[Block], loosely: bool = False) -> tuple[int, ...]:
+def resolve(text: str, picture: QuestionPicture, loosely: bool = False) -> tuple[int, ...]:
     """Orders of the blocks that an expression fits, of those that stand in the picture.
 
     None when what it says is too close to call: two blocks about as far to the left, or two
@@ -92,43 +93,43 @@ def resolve(text: str, blocks: Sequence[Block], loosely: bool = False) -> tuple[
     if match is None:
         raise UnfairError(f"{text!r} names no block")
     words = match.groupdict()
-    fitting = [block for block in blocks if _fits(block, words, loosely)]
+    fitting = [block for block in picture.blocks if _fits(block, words, loosely, picture)]
     if words["layer"] is not None:
         layers = [block.layer for block in fitting]
         if len(set(layers)) < len(layers):
             return ()
         fitting = [block for block in fitting if block.layer == int(words["layer"])]
     if words["support"] is not None:
-        below = resolve(words["support"], blocks, loosely)
+        below = resolve(words["support"], picture, loosely)
         fitting = [b for b in fitting if len(below) == 1 and set(b.depend) == set(below)]
     if words["side"] is not None:
-        fitting = _outermost(fitting, blocks, words["side"])
+        fitting = _outermost(fitting, picture, words["side"])
     return tuple(block.order for block in fitting)
 
 
-def resolve_one(text: str, blocks: Sequence[Block]) -> Block:
+def resolve_one(text: str, picture: QuestionPicture) -> Block:
     """The one block that an expression fits, even loosely; UnfairError otherwise."""
-    orders, loose = resolve(text, blocks), resolve(text, blocks, loosely=True)
+    orders, loose = resolve(text, picture), resolve(text, picture, loosely=True)
     if len(orders) != 1:
         raise UnfairError(f"{text!r} fits {len(orders)} blocks")
     if loose != orders:
         raise UnfairError(f"{text!r} may be taken for another block")
-    return next(block for block in blocks if block.order == orders[0])
+    return next(block for block in picture.blocks if block.order == orders[0])
 
 
-def names(block: Block, blocks: Sequence[Block], features: Sequence[Feature]) -> tuple[str, ...]:
+def names(block: Block, picture: QuestionPicture, features: Sequence[Feature]) -> tuple[str, ...]:
     """Expressions that fit this block alone and speak of these features only, shortest first."""
     shortest: list[_Expression] = []
-    for expression in _expressions(block, blocks, features):
+    for expression in _expressions(block, picture, features):
         is_longer = any(_is_part(shorter, expression) for shorter in shortest)
-        readings = (resolve(expression.text, blocks, loosely) for loosely in (False, True))
+        readings = (resolve(expression.text, picture, loosely) for loosely in (False, True))
         if not is_longer and all(reading == (block.order,) for reading in readings):
             shortest.append(expression)
     return tuple(expression.text for expression in shortest)
 
 
 def _expressions(
-    block: Block, blocks: Sequence[Block], features: Sequence[Feature]
+    block: Block, picture: QuestionPicture, features: Sequence[Feature]
 ) -> Iterator[_Expression]:
     """All that is true of a block, the simple before the long."""
     colors: list[Color | None] = [block.color, None] if "color" in features else [None]
@@ -141,10 +142,10 @@ def _expressions(
                 yield _Expression(one.noun, one.color, side=side)
         if "layer" in features:
             yield _Expression(one.noun, one.color, layer=block.layer)
-    below = [other for other in blocks if other.order in block.depend]
+    below = [other for other in picture.blocks if other.order in block.depend]
     if "support" in features and len(below) == 1:
         plain = [f for f in features if f in ("color", "type")]
-        for name in names(below[0], blocks, plain):
+        for name in names(below[0], picture, plain):
             for one in simple:
                 yield _Expression(one.noun, one.color, support=name)
 
@@ -170,14 +171,19 @@ def _is_part(shorter: _Expression, longer: _Expression) -> bool:
     return fits and all(short is None or short == long for short, long in pairs)
 
 
-def _fits(block: Block, words: Mapping[str, str | None], loosely: bool) -> bool:
+def _fits(
+    block: Block, words: Mapping[str, str | None], loosely: bool, picture: QuestionPicture
+) -> bool:
     types = set(_NOUNS[words["noun"] or "block"])
+    if loosely and words["noun"] != "block" and not shows_profile(block, picture.view_deg):
+        # Seen from this side, it may be taken for anything but what it is.
+        return block.type not in types and words["color"] in (None, block.color)
     if loosely:
         types = types.union(*(alike for alike in _ALIKE if alike & types))
     return block.type in types and words["color"] in (None, block.color)
 
 
-def _outermost(fitting: list[Block], blocks: Sequence[Block], side: str) -> list[Block]:
+def _outermost(fitting: list[Block], picture: QuestionPicture, side: str) -> list[Block]:
     """The one that is clearly outermost, or none."""
     if not fitting:
         return []
@@ -188,5 +194,5 @@ def _outermost(fitting: list[Block], blocks: Sequence[Block], side: str) -> list
             reach[ranked[0].order] - reach[ranked[1].order] >= _TOP_GAP_M
         )
         return ranked[:1] if is_clear else []
-    order = outermost([b.order for b in fitting], blocks, to_left=side == "leftmost")
+    order = outermost([b.order for b in fitting], picture, to_left=side == "leftmost")
     return [block for block in fitting if block.order == order]

@@ -1,4 +1,4 @@
-"""Relative rotation: by how much one of two blocks of a type is turned about the vertical."""
+"""Relative rotation: how one of two blocks of a type is turned, about whichever axis."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
+from phyblock.sim.outcomes import holds
 from phyblock.sim.support import (
     FIT_TOLERANCE_M,
     bounds_m,
@@ -17,37 +18,44 @@ from phyblock.sim.support import (
     find_overlaps,
     support_graph,
 )
+from phyblock_making.questions.axis_turns import AXIS_TURNS, LONG_TYPES, axis_turns, tipped_over
 from phyblock_making.questions.block_measures import turned_about_vertical, vertical_turns_deg
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import with_own_colors
 from phyblock_making.questions.goal_view import (
-    GOAL_VIEW,
     NAMED,
     STUDIED,
+    View,
     are_seen,
+    goal_picture,
     require_seen,
-    shown_blocks,
+    shown_picture,
 )
+from phyblock_making.questions.loose_blocks import put_beside
+from phyblock_making.questions.pictured_drafts import only_index
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import resolve_one, shape_word
 from phyblock_making.questions.static_drafts import (
     StaticMaker,
     draft,
-    index_of,
     seen_blocks,
 )
-from phyblock_making.questions.wording import slots_of
+from phyblock_making.questions.wording import slots_of, stem_of
 
 __all__ = ["RotationMaker"]
 
 
 @dataclass(frozen=True)
 class _Rule:
-    """How turns about the vertical are told of a sort of block, and what can be told apart."""
+    """One way of telling how a block is turned, compared with another of its type.
 
+    `phrases` are those of the options that are true of the two.
+    """
+
+    stem: str
     kind: str
-    phrase_of: Callable[[int], str]
     options: tuple[str, ...]
+    phrases: Callable[[Block, Block], Sequence[str]]
 
 
 def _angle(turn_deg: int) -> str:
@@ -63,93 +71,131 @@ def _direction(turn_deg: int) -> str:
     return "counterclockwise" if turn_deg > 0 else "clockwise"
 
 
-_ANGLE = _Rule("angle", _angle, tuple(map(_angle, (0, 30, 60, 90))))
-"""A block that a half turn about the vertical maps to itself."""
-_TURN = _Rule("turn", _turn, tuple(map(_turn, (0, 90, -90, 180))))
-"""A block without such a symmetry."""
+def _angles(block: Block, other: Block) -> Sequence[str]:
+    if vertical_turns_deg(block, block) != (0, 180):
+        return ()
+    return [_angle(turn) for turn in vertical_turns_deg(block, other)]
+
+
+def _turns(block: Block, other: Block) -> Sequence[str]:
+    if vertical_turns_deg(block, block) != (0,):
+        return ()
+    return [_turn(turn) for turn in vertical_turns_deg(block, other)]
+
+
+_RULES: tuple[_Rule, ...] = (
+    # A block that a half turn about the vertical maps to itself,
+    _Rule("angle", "vertical", tuple(map(_angle, (0, 30, 60, 90))), _angles),
+    # one without such a symmetry,
+    _Rule("turn", "vertical", tuple(map(_turn, (0, 90, -90, 180))), _turns),
+    # and one with a length, which may roll over or stand on end as well.
+    _Rule("axis", "axis", AXIS_TURNS, axis_turns),
+)
 _PAIRS = 6
+_LOOSE = 4
 _NEAR_M = 0.002
 
 
 class RotationMaker(StaticMaker):
-    """RR: a block that carries nothing is turned on the spot; both have colors of their own."""
+    """RR: two blocks of a type, with colors of their own.
+
+    Either one that carries nothing is turned on the spot about the vertical, or a loose one
+    beside the structure lies as another block of it would after a turn about some axis.
+    """
 
     subtask: Subtask = "RR"
 
-    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """Pairs of a type, one of them turned so that an angle drawn comes out."""
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """Pairs of a type, one of them oriented so that a phrase drawn comes out."""
+        picture = goal_picture(scene, view)
+        long = [block for block in seen_blocks(picture, STUDIED) if block.type in LONG_TYPES]
+        for other in shuffled(rng, long)[:_LOOSE]:
+            yield from _about_some_axis(view, scene, other, rng)
         carrying = {order for block in scene.blocks for order in block.depend}
-        seen = {block.order for block in seen_blocks(scene, NAMED)}
         pairs = [
             (one, other)
-            for one, other in itertools.permutations(scene.blocks, 2)
-            if {one.order, other.order} <= seen
-            and one.order not in carrying
-            and _rule(one)
-            and vertical_turns_deg(one, other)
+            for one, other in itertools.permutations(seen_blocks(picture, NAMED), 2)
+            if one.type == other.type and one.order not in carrying
         ]
         for one, other in shuffled(rng, pairs)[:_PAIRS]:
-            rule = _rule(one)
-            made = _turned(scene, one, other, rule, rng) if rule else None
-            if made is not None:
-                yield made
+            for rule in _RULES[:2]:
+                yield from _on_the_spot(view, scene, (one, other), rule, rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """From the orientations in the picture, up to the symmetry of the type."""
-        blocks, slots = shown_blocks(question), slots_of(question)
-        one, other = (resolve_one(slots[name], blocks) for name in ("block", "other"))
-        require_seen(blocks, [one.order, other.order], STUDIED)
-        rule = _rule(one)
-        turns = [rule.phrase_of(turn) for turn in vertical_turns_deg(one, other)] if rule else []
-        if not turns or not rule:
-            raise UnfairError("are not of one type, or not turned about the vertical alone")
-        also_true = {phrase for phrase in turns if phrase != turns[0]} & set(question.options)
-        if question.wording and not question.wording.startswith(f"rr-{rule.kind}-"):
-            raise UnfairError("asks for a direction that is not there, or not for one that is")
-        if also_true:
-            raise UnfairError(f"{min(also_true)} is as true")
-        return index_of(question, turns[0])
+        picture, slots = shown_picture(question), slots_of(question)
+        one, other = (resolve_one(slots[name], picture) for name in ("block", "other"))
+        require_seen(picture, [one.order, other.order], STUDIED)
+        rule = next((r for r in _RULES if stem_of(question.wording) == f"rr-{r.stem}"), None)
+        true = rule.phrases(one, other) if rule else ()
+        if not true:
+            raise UnfairError("are not of one type, or not turned as the wording asks")
+        return only_index([option in true for option in question.options])
 
 
-def _turned(
-    scene: Scene, one: Block, other: Block, rule: _Rule, rng: np.random.Generator
-) -> Draft | None:
-    """A draft in which `one` stands at an angle drawn to `other`; None when it does not fit."""
+def _about_some_axis(
+    view: View, scene: Scene, other: Block, rng: np.random.Generator
+) -> Iterator[Draft]:
+    """A loose block beside the structure that lies as `other` would after a turn drawn."""
+    rule = _RULES[2]
     phrase = pick(rng, rule.options)
-    colored = with_own_colors(scene, [one.order, other.order], rng)
-    mine, its = (next(b for b in colored.blocks if b.order == x.order) for x in (one, other))
+    try:
+        turned = [one for one in tipped_over(other) if rule.phrases(one, other) == (phrase,)]
+    except UnfairError:
+        return
+    if not turned:
+        return
+    loose = put_beside(pick(rng, turned), scene.blocks, rng)
+    every = replace(scene, blocks=(*scene.blocks, loose))
+    every = with_own_colors(every, [other.order, loose.order], rng)
+    picture = goal_picture(every, view)
+    if holds(every.blocks, loose.order) and are_seen(picture, (loose.order, other.order), STUDIED):
+        colored = replace(every, blocks=every.blocks[:-1])
+        its = next(block for block in colored.blocks if block.order == other.order)
+        yield from _drafted(colored, picture, (every.blocks[-1], its), rule, phrase, rng)
+
+
+def _on_the_spot(
+    view: View, scene: Scene, pair: tuple[Block, Block], rule: _Rule, rng: np.random.Generator
+) -> Iterator[Draft]:
+    """The first of two is turned about the vertical so that a phrase drawn is true."""
+    phrase = pick(rng, rule.options)
+    colored = with_own_colors(scene, [block.order for block in pair], rng)
+    mine, its = (next(b for b in colored.blocks if b.order == x.order) for x in pair)
     for turn in shuffled(rng, range(0, 360, 15)):
         moved = turned_about_vertical(mine, turn) if turn else mine
-        if phrase in [rule.phrase_of(t) for t in vertical_turns_deg(moved, its)[:1]]:
-            blocks = tuple(moved if b.order == one.order else b for b in colored.blocks)
-            if _is_sound(blocks, moved, mine, its):
-                return _draft(colored, blocks, (mine, its), rule, phrase, rng)
-    return None
+        if phrase in rule.phrases(moved, its)[:1]:
+            blocks = tuple(moved if b.order == mine.order else b for b in colored.blocks)
+            picture = goal_picture(replace(colored, blocks=blocks), view)
+            if _is_sound(picture, moved, mine, its):
+                yield from _drafted(colored, picture, (mine, its), rule, phrase, rng)
+                return
 
 
-def _draft(
+def _drafted(
     scene: Scene,
-    blocks: tuple[Block, ...],
+    picture: QuestionPicture,
     pair: tuple[Block, Block],
     rule: _Rule,
     phrase: str,
     rng: np.random.Generator,
-) -> Draft:
+) -> Iterator[Draft]:
+    """The draft, where color and shape are names that fit both blocks as they are seen."""
     options = [phrase, *(option for option in rule.options if option != phrase)]
     noun = shape_word(pair[0].type)
     slots = {"block": f"{pair[0].color} {noun}", "other": f"{pair[1].color} {noun}"}
-    made = draft(scene, rng, f"rr-{rule.kind}", slots, options, phrase, rule.kind, turned=phrase)
-    return replace(made, pictures=(QuestionPicture("scene", blocks, GOAL_VIEW, (), scene.blocks),))
+    try:
+        for name in slots.values():
+            resolve_one(name, picture)
+    except UnfairError:
+        return
+    stem = f"rr-{rule.stem}"
+    yield draft(scene, picture, rng, stem, slots, options, phrase, rule.kind, turned=phrase)
 
 
-def _rule(block: Block) -> _Rule | None:
-    """How turns of a block are told; None when a quarter turn already maps it to itself."""
-    return {(0,): _TURN, (0, 180): _ANGLE}.get(vertical_turns_deg(block, block))
-
-
-def _is_sound(blocks: Sequence[Block], moved: Block, before: Block, other: Block) -> bool:
+def _is_sound(picture: QuestionPicture, moved: Block, before: Block, other: Block) -> bool:
     """Whether the moved block fits, rests on what it rested on, and both show enough."""
-    near = [block for block in blocks if block is not moved and _is_near(block, moved, before)]
+    near = [b for b in picture.blocks if b is not moved and _is_near(b, moved, before)]
     if drop_height_m(moved, near) > FIT_TOLERANCE_M:
         return False
     if any(moved.order in (o.first, o.second) for o in find_overlaps([*near, moved])):
@@ -157,7 +203,7 @@ def _is_sound(blocks: Sequence[Block], moved: Block, before: Block, other: Block
     rests_on = [support_graph([*near, block])[moved.order] for block in (moved, before)]
     if rests_on[0] != rests_on[1]:
         return False
-    return are_seen(blocks, (moved.order, other.order), STUDIED)
+    return are_seen(picture, (moved.order, other.order), STUDIED)
 
 
 def _is_near(block: Block, *others: Block) -> bool:

@@ -1,39 +1,33 @@
-"""Choosing among drafts: even shares of sorts, values and scenes; texts that tell nothing.
+"""Choosing among drafts: answers are drawn, what a reader sees beside them is evened out.
 
-Greedy: of a few hundred drafts drawn from the pool, the one is taken that evens out best what was
-taken so far. Two rules are at work. Of what should be even (sorts, values in a sort, values given
-the set of options, values given a word of the question, wordings, scenes, levels), the rarer is
-preferred. And every option text, and every word in one, should be right in one of four cases in
-which it is offered: then no reader of texts alone does better than chance.
+Drafts of each sort are taken in turns from all scenes, so that none counts for more than another.
+Of these, chance leaves out some until the texts of those kept tell nothing of what is right
+(`answer_odds`). Of those the greedy choice takes, out of a hundred or so at a time, the one that
+evens out best what was taken so far. Where options are texts it goes by what the text itself says
+alone, sort, wording and set of options: to choose by the scene as well would choose answers, for
+large scenes have larger numbers, and to even out answers would make what is right often in some
+questions rare in the others.
 """
 
 from __future__ import annotations
 
-import re
 from collections import Counter, defaultdict
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from phyblock_making.questions.answer_odds import Texts, keeping_odds
 from phyblock_making.questions.question_draft import Draft
 
 __all__ = ["Pooled", "select"]
 
-_LOOKED_AT = 300
-_OPTIONS = 4
-_WEIGHTS = {
-    "kind": 6.0,
-    "value": 4.0,
-    "options": 2.0,
-    "word": 0.5,
-    "wording": 1.0,
-    "scene": 3.0,
-    "level": 0.3,
-}
-_RIGHT_WEIGHT = 0.25
-_WORD_WEIGHT = 0.04
-_WORD = re.compile(r"[\w.]+")
+_LOOKED_AT = 100
+_SPREAD = 20
+"""So many times the drafts that are wanted of a sort are looked at, where the pool has them,"""
+_SPARE = 2
+"""and so many times the drafts that are wanted are kept at the least."""
+_WEIGHTS = {"kind": 6.0, "wording": 2.0, "options": 0.2, "value": 4.0, "scene": 3.0, "level": 0.3}
 
 
 @dataclass(frozen=True)
@@ -52,16 +46,23 @@ class Pooled:
         options = frozenset(o for o in draft.options if not isinstance(o, str))
         return (draft.scene.id, colors, draft.kind, slots, draft.pictures, options)
 
+    @property
+    def texts(self) -> Texts:
+        """What a reader without pictures sees."""
+        scene = self.draft.scene
+        group = (scene.parents or (scene.id,))[0]
+        return Texts(group, self.draft.kind, self.draft.text, self.option_texts)
+
 
 def select(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list[Pooled]:
     """At most `count` drafts of the pool, no two the same question about the same scene."""
-    tally = _Tally(pool)
-    left = list(pool)
+    left = _kept(_spread(pool, count, rng), count, rng)
+    tally = _Tally(left)
     taken: list[Pooled] = []
     keys: set[Hashable] = set()
     while left and len(taken) < count:
         size = min(_LOOKED_AT, len(left))
-        drawn = sorted(rng.choice(len(left), size=size, replace=False).tolist())
+        drawn = rng.choice(len(left), size=size, replace=False).tolist()
         best = min(drawn, key=lambda i: tally.cost(left[i]))
         chosen = left[best]
         left[best] = left[-1]
@@ -73,13 +74,33 @@ def select(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list
     return taken
 
 
+def _spread(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list[Pooled]:
+    """Drafts of each sort, one of each scene in turns, several times as many as are wanted."""
+    turns: dict[str, list[tuple[int, int, Pooled]]] = defaultdict(list)
+    of_scene: Counter[tuple[str, str]] = Counter()
+    for place, i in enumerate(rng.permutation(len(pool)).tolist()):
+        draft = pool[i].draft
+        turns[draft.kind].append((of_scene[draft.kind, draft.scene.id], place, pool[i]))
+        of_scene[draft.kind, draft.scene.id] += 1
+    most = -(-_SPREAD * count // max(len(turns), 1))
+    ranked = (sorted(group, key=lambda entry: entry[:2])[:most] for group in turns.values())
+    return [one for group in ranked for _, _, one in group]
+
+
+def _kept(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list[Pooled]:
+    """The drafts that chance leaves; more likely ones as well where they would be too few."""
+    odds = np.array(keeping_odds([one.texts for one in pool]))
+    rank = rng.random(len(pool)) / np.maximum(odds, 1e-9)
+    least = float(np.sort(rank)[: _SPARE * count][-1]) if len(pool) else 0.0
+    return [one for one, place in zip(pool, rank, strict=True) if place <= max(1.0, least)]
+
+
 class _Tally:
     """What was taken so far, and how much less even a further draft would make it."""
 
     def __init__(self, pool: Sequence[Pooled]) -> None:
         self._members: dict[Hashable, set[Hashable]] = defaultdict(set)
         self._counts: Counter[tuple[Hashable, Hashable]] = Counter()
-        self._balance: Counter[Hashable] = Counter()
         for one in pool:
             for group, member, _ in _even(one):
                 self._members[group].add(member)
@@ -90,46 +111,25 @@ class _Tally:
         for group, member, weight in _even(one):
             counts = [self._counts[group, other] for other in self._members[group]]
             cost += weight * (self._counts[group, member] - sum(counts) / len(counts))
-        for text, step, weight in _right_and_wrong(one):
-            cost += weight * step * (2 * self._balance[text] + step)
         return cost
 
     def add(self, one: Pooled) -> None:
         """Count a draft as taken."""
         for group, member, _ in _even(one):
             self._counts[group, member] += 1
-        for text, step, _ in _right_and_wrong(one):
-            self._balance[text] += step
 
 
 def _even(one: Pooled) -> Iterator[tuple[Hashable, Hashable, float]]:
     """Groups, the draft's member of each, and weights: members should be equally frequent."""
     draft = one.draft
     yield "kind", draft.kind, _WEIGHTS["kind"]
-    yield ("value", draft.kind), draft.value, _WEIGHTS["value"]
-    yield ("options", frozenset(one.option_texts)), draft.value, _WEIGHTS["options"]
     yield ("wording", draft.kind), draft.wording, _WEIGHTS["wording"]
-    yield ("value", draft.wording), draft.value, _WEIGHTS["wording"]
+    if one.option_texts:
+        yield ("options", draft.kind), frozenset(one.option_texts), _WEIGHTS["options"]
+        return
+    yield ("value", draft.kind), draft.value, _WEIGHTS["value"]
     yield "scene", draft.scene.id, _WEIGHTS["scene"]
     yield "level", draft.scene.level, _WEIGHTS["level"]
-    for word in sorted(_slot_words(draft)):
-        yield ("word", draft.kind, word), draft.value, _WEIGHTS["word"]
-
-
-def _right_and_wrong(one: Pooled) -> Iterator[tuple[Hashable, int, float]]:
-    """Texts and words of options: +3 where right, -1 where wrong, so that chance adds to 0."""
-    kind = one.draft.kind
-    for i, option in enumerate(one.option_texts):
-        step = _OPTIONS - 1 if i == 0 else -1
-        yield option, step, _RIGHT_WEIGHT
-        yield (kind, option), step, _RIGHT_WEIGHT
-        for word in sorted(set(_WORD.findall(option))):
-            yield ("word", word), step, _WORD_WEIGHT
-            yield ("word", kind, word), step, _WORD_WEIGHT
-
-
-def _slot_words(draft: Draft) -> set[str]:
-    return {word for slot in _slots(draft).values() for word in _WORD.findall(str(slot))}
 
 
 def _slots(draft: Draft) -> Mapping[str, object]:

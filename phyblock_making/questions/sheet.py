@@ -15,9 +15,10 @@ from phyblock.domain.question import (
     is_picture_option,
 )
 
-__all__ = ["sheet_html"]
+__all__ = ["Draw", "sheet_html"]
 
 Draw = Callable[[QuestionPicture], bytes]
+"""Gives the PNG of a picture."""
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #8884; --soft: #8882; }

@@ -5,20 +5,19 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from phyblock.domain.question import LETTERS, SUBTASKS, Question, Subtask
+from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block
 from phyblock.models.guesses import Guesses
-from phyblock_making.questions.goal_view import GOAL_VIEW, shares
+from phyblock_making.questions.goal_view import shares
+from phyblock_making.questions.letters import BALANCE
 from phyblock_making.questions.question_draft import UnfairError
 from phyblock_making.questions.referring import resolve
 
-__all__ = ["BALANCE", "GUESSABLE", "SubtaskAudit", "audit_questions", "duplicates_of", "referents"]
+__all__ = ["GUESSABLE", "SubtaskAudit", "audit_questions", "duplicates_of", "referents"]
 
-BALANCE = (0.22, 0.28)
-"""Shares of right answers that every letter is to stay within."""
 GUESSABLE = 0.32
 """What guessing without a picture may reach: chance plus noise."""
 _DIGITS = 6
@@ -69,29 +68,22 @@ class SubtaskAudit:
         low, high = self.letter_shares
         return BALANCE[0] <= low and high <= BALANCE[1]
 
-    @property
-    def noise(self) -> float:
-        """Standard error of a guesser's accuracy."""
-        return math.sqrt(self.chance * (1 - self.chance) / self.n)
-
 
 def audit_questions(
     questions: Sequence[Question],
     *,
     with_text_probe: bool = True,
-    report: Callable[[Subtask], None] = lambda _: None,
 ) -> Iterator[SubtaskAudit]:
     """An audit of each subtask that has questions, in the paper's order.
 
-    `report` hears of each question whose picture was looked at. Raises SpecError where the
-    text-only probe is wanted and scikit-learn is not installed.
+    Raises SpecError where the text-only probe is wanted and scikit-learn is not installed.
     """
     guesses = Guesses(questions)
     repeated = duplicates_of(questions)
     for subtask in SUBTASKS:
         mine = [question for question in questions if question.subtask == subtask]
         if mine:
-            yield _audit(subtask, mine, guesses, repeated, with_text_probe, report)
+            yield _audit(subtask, mine, guesses, repeated, with_text_probe)
 
 
 def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
@@ -111,13 +103,13 @@ def referents(question: Question) -> dict[int, float]:
     Of static questions alone: where marks or pictures say what is meant, nothing is named.
     """
     picture = question.pictures[0] if question.pictures else None
-    if picture is None or picture.view_deg != GOAL_VIEW or picture.label != "scene":
+    if picture is None or picture.label != "scene":
         return {}
     slots = question.evidence.get("slots", {})
     named: set[int] = set()
     for text in (*(str(slot) for slot in slots.values()), *question.options):
-        named.update(_named(text, picture.blocks))
-    seen = shares(picture.blocks) if named else {}
+        named.update(_named(text, picture))
+    seen = shares(picture) if named else {}
     return {order: seen[order] for order in sorted(named)}
 
 
@@ -127,12 +119,10 @@ def _audit(
     guesses: Guesses,
     repeated: dict[str, str],
     with_text_probe: bool,
-    report: Callable[[Subtask], None],
 ) -> SubtaskAudit:
     seen: list[tuple[float, str]] = []
     for question in questions:
         seen += [(share, question.id) for share in referents(question).values()]
-        report(subtask)
     scenes = Counter(question.scene.id for question in questions)
     chances = [1 / math.factorial(4) if subtask == "OR" else 1 / len(q.options) for q in questions]
     return SubtaskAudit(
@@ -162,10 +152,10 @@ def _accuracy(probe: str, questions: Sequence[Question], guesses: Guesses) -> fl
     return right / len(questions)
 
 
-def _named(text: str, blocks: Sequence[Block]) -> tuple[int, ...]:
+def _named(text: str, picture: QuestionPicture) -> tuple[int, ...]:
     """The block that a text names; none where it is no expression, or fits several."""
     try:
-        orders = resolve(text.lower(), blocks)
+        orders = resolve(text.lower(), picture)
     except UnfairError:
         return ()
     return orders if len(orders) == 1 else ()

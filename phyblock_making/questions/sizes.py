@@ -12,7 +12,13 @@ from phyblock.domain.scene import Block, Scene
 from phyblock_making.questions.block_measures import height_m, length_m, volume_m3
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import with_own_colors
-from phyblock_making.questions.goal_view import STUDIED, require_seen, shown_blocks
+from phyblock_making.questions.goal_view import (
+    STUDIED,
+    View,
+    goal_picture,
+    require_seen,
+    shown_picture,
+)
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import resolve_one
 from phyblock_making.questions.static_drafts import (
@@ -57,30 +63,30 @@ class SizeMaker(StaticMaker):
 
     subtask: Subtask = "SI"
 
-    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Comparisons of four blocks, and of two, in turns."""
-        seen = seen_blocks(scene, STUDIED)
+        seen = seen_blocks(goal_picture(scene, view), STUDIED)
         for _ in range(_TRIES):
             if len(seen) >= 4:
-                yield from _which_of_four(scene, shuffled(rng, seen)[:4], rng)
+                yield from _which_of_four(view, scene, shuffled(rng, seen)[:4], rng)
             if len(seen) >= 2:
-                yield from _how_many_times(scene, shuffled(rng, seen)[:2], rng)
+                yield from _how_many_times(view, scene, shuffled(rng, seen)[:2], rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """From the measures of the blocks that the text or the options name."""
-        blocks = shown_blocks(question)
+        picture = shown_picture(question)
         slots = slots_of(question)
         if "comparison" in slots:
-            named = [resolve_one(option, blocks) for option in question.options]
-            require_seen(blocks, [block.order for block in named], STUDIED)
+            named = [resolve_one(option, picture) for option in question.options]
+            require_seen(picture, [block.order for block in named], STUDIED)
             return (named.index(_extreme(named, slots["comparison"])),)
-        one, other = (resolve_one(slots[name], blocks) for name in ("block", "other"))
-        require_seen(blocks, [one.order, other.order], STUDIED)
+        one, other = (resolve_one(slots[name], picture) for name in ("block", "other"))
+        require_seen(picture, [one.order, other.order], STUDIED)
         return index_of(question, _times(one, other))
 
 
 def _which_of_four(
-    scene: Scene, chosen: Sequence[Block], rng: np.random.Generator
+    view: View, scene: Scene, chosen: Sequence[Block], rng: np.random.Generator
 ) -> Iterator[Draft]:
     comparison = pick(rng, list(_WHICH))
     try:
@@ -94,6 +100,7 @@ def _which_of_four(
     measure = _WHICH[comparison].measure
     yield draft(
         shown,
+        goal_picture(shown, view),
         rng,
         f"si-{_stem(comparison)}",
         {"comparison": comparison},
@@ -105,7 +112,7 @@ def _which_of_four(
 
 
 def _how_many_times(
-    scene: Scene, chosen: Sequence[Block], rng: np.random.Generator
+    view: View, scene: Scene, chosen: Sequence[Block], rng: np.random.Generator
 ) -> Iterator[Draft]:
     one, other = chosen
     try:
@@ -119,7 +126,9 @@ def _how_many_times(
     colors = {block.order: block.color for block in shown.blocks}
     slots = {"block": f"{colors[one.order]} block", "other": f"{colors[other.order]} block"}
     heights = {str(block.order): round(height_m(block), 6) for block in chosen}
-    yield draft(shown, rng, "si-times", slots, [right, *wrong], right, "times", measures=heights)
+    picture = goal_picture(shown, view)
+    options = [right, *wrong]
+    yield draft(shown, picture, rng, "si-times", slots, options, right, "times", measures=heights)
 
 
 def _stem(comparison: str) -> str:

@@ -1,16 +1,18 @@
-"""What the makers of static subtasks share: one goal view, wordings, options that are texts."""
+"""What the makers of static subtasks share: one picture, wordings, options that are texts."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from phyblock.domain.question import Question
+from phyblock.domain.question import Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock_making.questions.choices import pick, shuffled
-from phyblock_making.questions.goal_view import goal_picture, shares
+from phyblock_making.questions.goal_view import View, drawn_view, shares
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import Feature, names
 from phyblock_making.questions.wording import fill, wording_ids
@@ -28,15 +30,31 @@ __all__ = [
 _NAMES_DRAWN_FROM = 3
 
 
-class StaticMaker:
-    """Drafts cost little, so every scene is asked."""
+class StaticMaker(ABC):
+    """Drafts cost little, so every scene is asked, each time from views drawn for it."""
 
     scenes_tried: int = 400
-    drafts_a_scene: int = 12
+    views_a_scene: int = 1
+    drafts_a_view: int = 12
+
+    @property
+    def drafts_a_scene(self) -> int:
+        """The most drafts that are taken of one scene."""
+        return self.views_a_scene * self.drafts_a_view
+
+    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """Fair questions about a scene, view by view."""
+        for _ in range(self.views_a_scene):
+            yield from islice(self.seen_from(drawn_view(rng), scene, rng), self.drafts_a_view)
+
+    @abstractmethod
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """Fair questions about a scene that is seen from a view."""
 
 
 def draft(
     scene: Scene,
+    picture: QuestionPicture,
     rng: np.random.Generator,
     stem: str,
     slots: Mapping[str, str],
@@ -45,13 +63,13 @@ def draft(
     kind: str = "",
     **evidence: Any,
 ) -> Draft:
-    """A draft about the goal view, in a wording drawn from those of a stem; right option first."""
+    """A draft about one picture, in a wording drawn from those of a stem; right option first."""
     wording = pick(rng, wording_ids(stem))
     return Draft(
         scene=scene,
         text=fill(wording, **slots),
         options=tuple(options),
-        pictures=(goal_picture(scene),),
+        pictures=(picture,),
         wording=wording,
         value=value,
         kind=kind,
@@ -66,17 +84,17 @@ def wrong_options(
     return shuffled(rng, [option for option in allowed if option != right])[:count]
 
 
-def seen_blocks(scene: Scene, least: float) -> list[Block]:
-    """The blocks that show at least this share of themselves in the goal view."""
-    seen = shares(scene.blocks)
-    return [block for block in scene.blocks if seen[block.order] >= least]
+def seen_blocks(picture: QuestionPicture, least: float) -> list[Block]:
+    """The blocks that show at least this share of themselves in a picture."""
+    seen = shares(picture)
+    return [block for block in picture.blocks if seen[block.order] >= least]
 
 
 def drawn_name(
-    rng: np.random.Generator, block: Block, scene: Scene, features: Sequence[Feature]
+    rng: np.random.Generator, block: Block, picture: QuestionPicture, features: Sequence[Feature]
 ) -> str | None:
     """One of the shortest expressions that fit a block alone, or None when nothing does."""
-    expressions = names(block, scene.blocks, features)
+    expressions = names(block, picture, features)
     return pick(rng, expressions[:_NAMES_DRAWN_FROM]) if expressions else None
 
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from phyblock_making.questions.counting_templates import COUNTING_TEMPLATES
+from phyblock_making.questions.viewpoint_templates import VIEWPOINT_TEMPLATES
+
 __all__ = ["TEMPLATES"]
 
 TEMPLATES: Mapping[str, str] = {
@@ -50,6 +53,15 @@ TEMPLATES: Mapping[str, str] = {
     "rp-upright-3": "What is the position of the {block} with respect to the {other}?",
     "rp-extreme-1": "Which of these blocks is {extreme} in the picture?",
     "rp-extreme-2": "In the picture, which of these four blocks is {extreme}?",
+    "rp-highest-1": "Which of these blocks reaches highest above the ground?",
+    "rp-highest-2": "Of these four blocks, which one has its top the farthest above the ground?",
+    "rp-highest-3": "Whose highest point is the highest above the ground?",
+    "rp-lowest-1": "Which of these blocks has its top nearest to the ground?",
+    "rp-lowest-2": "Whose highest point is the lowest above the ground?",
+    "rp-front-1": "Which of these blocks is nearest to the viewer, measured along the floor?",
+    "rp-front-2": "Of these four blocks, which one stands farthest to the front?",
+    "rp-back-1": "Which of these blocks is farthest from the viewer, measured along the floor?",
+    "rp-back-2": "Of these four blocks, which one stands farthest to the back?",
     "rp-nearest-1": "Which of these blocks is nearest to the {other}, from middle to middle?",
     "rp-nearest-2": "Whose middle is the closest to the middle of the {other}?",
     "ap-top-1": "If {scale}, how high above the ground is the top of the {block}?",
@@ -70,6 +82,28 @@ TEMPLATES: Mapping[str, str] = {
     "ap-rise-2": (
         "Take as scale that {scale}. What is the difference in height between the highest points "
         "of the {block} and the {other}?"
+    ),
+    "ap-gap-1": "If {scale}, how wide is the gap between the {block} and the {other}?",
+    "ap-gap-2": (
+        "Take as scale that {scale}. How much room is there between the {block} and the {other},"
+        " from side to side?"
+    ),
+    "ap-span-1": (
+        "If {scale}, how far does all that stands in the picture reach from end to end, measured "
+        "along the ground in the direction of the length of the {block}?"
+    ),
+    "ap-span-2": (
+        "Take as scale that {scale}. A box is to hold everything in the picture as it stands. How "
+        "long must it be in the direction of the length of the {block}?"
+    ),
+    "ap-place-1": (
+        "If {scale}, how far along the length of the {other}, and how far across it, is the middle "
+        "of the {block} from its middle, seen straight from above?"
+    ),
+    "ap-place-2": (
+        "Take as scale that {scale}. Starting from the middle of the {other}, go along its length "
+        "and then square to it until you are over or under the middle of the {block}. How far is "
+        "each way?"
     ),
     "rd-on-1": "Which of these blocks rests directly on the {block}?",
     "rd-on-2": "Which block is directly supported by the {block}?",
@@ -100,30 +134,19 @@ TEMPLATES: Mapping[str, str] = {
         "The {other} is turned on the spot until it is oriented like the {block}. "
         "Seen from above, what is that turn?"
     ),
-    "oc-1": "How many blocks are there in all?",
-    "oc-2": "How many blocks is the structure made of?",
-    "oc-3": "Count all the blocks in the picture. How many are there?",
-    "oc-4": "What is the total number of blocks?",
-    "lc-1": (
-        "A block on the ground is in layer 1, any other block is one layer above the highest block "
-        "it rests on. How many layers does the structure have?"
+    "rr-axis-1": (
+        "The {other} is to be oriented like the {block}. Which turn does that, if its length is "
+        "its longest side?"
     ),
-    "lc-2": (
-        "How many layers are there, when a block counts one layer more than the highest block "
-        "under it, starting with 1 on the ground?"
+    "rr-axis-2": (
+        "Take the length of a block as its longest side. Which turn of the {other} would give it "
+        "the orientation of the {block}?"
     ),
-    "lc-3": (
-        "Counting upward from the ground, how many blocks are in the longest chain in which each "
-        "block rests on the one before?"
+    "rr-axis-3": (
+        "How would the {other} have to be turned to be oriented as the {block} is? Its length is "
+        "its longest side."
     ),
-    "tc-1": (
-        "Blocks of the same shape and size are of one type, whatever their color. "
-        "How many types are there in the picture?"
-    ),
-    "tc-2": (
-        "How many different types of blocks does the structure use, if types differ in shape or "
-        "size, not in color?"
-    ),
-    "tc-3": "How many different block types (by shape and size, not color) can you count?",
+    **COUNTING_TEMPLATES,
+    **VIEWPOINT_TEMPLATES,
 }
 """An id is the subtask, a kind where there are several, and a number: `rp-corner-2`."""

@@ -1,25 +1,29 @@
 """VP: which picture shows the same structure from elsewhere, or how it looks from a given side.
 
-The four options of a match are versions of one block among which the true one is drawn evenly,
-so that they differ pairwise in that block alone and none of them is the odd one out.
+The structures of four options come from two changes, each made or not: mirroring, two blocks that
+exchange their colors, a block that is put a little elsewhere. All have the same blocks in the same
+colors, none is the odd one out, and any of the four may be the one that is shown: it is drawn. So
+options alone tell nothing. Comparing how much of each color shows does not either: a set of options
+is used where that is right for one of the four that may be shown, which is what chance gives.
+Scenes are recolored, as many are their own mirror image.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from phyblock.domain.blocks import COLORS, BlockType, Euler
+from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.sim.outcomes import OUTCOME_SETTINGS, holds
 from phyblock.sim.seeing import seen, shown_pixels
-from phyblock.sim.support import bounds_m, drop_height_m, find_overlaps
-from phyblock_making.poses import POSES
 from phyblock_making.questions.choices import pick, shuffled
-from phyblock_making.questions.goal_view import GOAL_VIEW
+from phyblock_making.questions.coloring import recolored
+from phyblock_making.questions.goal_view import View, drawn_view
 from phyblock_making.questions.pictured_drafts import (
     are_told_apart,
     draft,
@@ -28,46 +32,63 @@ from phyblock_making.questions.pictured_drafts import (
     option_pictures,
     picture_of,
     same_blocks,
-    state,
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError
+from phyblock_making.questions.shifts import shifted
 from phyblock_making.questions.wording import slots_of
-from phyblock_making.symmetry import Symmetry, fingerprint, transformed
+from phyblock_making.symmetry import Symmetry, transformed, turned_form
 
 __all__ = ["ViewpointMaker"]
 
-View = tuple[float, float]
-Shift = tuple[float, float]
-_TURNS_DEG = (-120.0, -90.0, -60.0, 60.0, 90.0, 120.0, 180.0)
-_ELEVATIONS_DEG = (22.0, 32.0)
 _FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
 """Straight on: a mirror image of a slanted view can be a true view of the same side."""
+_FRONT_ELEVATION_DEG = 22.0
 _SIDES: dict[str, float] = {"its right side": 90.0, "its left side": -90.0, "behind": 180.0}
-_BLOCKS_TRIED = 4
-_VERSIONS_TRIED = 8
-_LEAST_SHOWN = 60
-_SEEN_EVERYWHERE = 24
+_LEAST_TURN_DEG = 60
+_FAMILIES_TRIED = 8
+_LEAST_SHOWN = 100
+"""Pixels of 256 x 256 that both views show of blocks that exchange their colors."""
+_SHOWN_IN_FRONT = 0.8
+"""The least share of all blocks of which the front view shows something."""
 _SIDE_PIXELS = 500
-"""Whole pictures are compared by side, not versions of one block."""
-_LIFT_M = 0.4
-_SHIFTS_M = ((0.0, 0.0), (0.025, 0.0), (-0.025, 0.0), (0.0, 0.025), (0.0, -0.025))
-_TYPES: tuple[BlockType, ...] = ("cube", "cuboid1", "cuboid2", "triangle", "semi_cylinder", "arch")
+"""Whole pictures are compared by side, not structures that are nearly alike."""
+
+
+@dataclass(frozen=True)
+class _Structure:
+    """Blocks as they stand; `is_mirrored` where views go round them the other way."""
+
+    blocks: tuple[Block, ...]
+    is_mirrored: bool = False
+
+    def mirrored(self) -> _Structure:
+        """Its mirror image, which shows the mirrored picture from the mirrored view."""
+        return _Structure(transformed(self.blocks, Symmetry(0, True)), not self.is_mirrored)
+
+    def seen_from(self, view: View) -> QuestionPicture:
+        """The picture from a view; of a mirrored structure from the mirrored view."""
+        azimuth = (180.0 - view[0]) % 360 if self.is_mirrored else view[0] % 360
+        return QuestionPicture("scene", self.blocks, (azimuth, view[1]))
 
 
 class ViewpointMaker:
-    """Kinds: `vp-color` and `vp-form`, which match versions of one block; `vp-side`."""
+    """Kinds: `vp-match`, a structure from anywhere; `vp-side`, what is seen from a side named."""
 
     subtask: Subtask = "VP"
-    scenes_tried = 180
+    scenes_tried = 300
     drafts_a_scene = 2
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """One draft of each kind at most."""
-        for kind in shuffled(rng, ("vp-color", "vp-form", "vp-side")):
-            if kind == "vp-side":
-                yield from _side(scene, rng)
-            else:
-                yield from _match(scene, rng, kind)
+        scene, view = recolored(scene, rng), drawn_view(rng)
+        turn = float(rng.integers(_LEAST_TURN_DEG, 361 - _LEAST_TURN_DEG))
+        yield from _match(scene, rng, "vp-match", view, (view[0] + turn, drawn_view(rng)[1]), "")
+        side = pick(rng, tuple(_SIDES))
+        front = (pick(rng, _FRONTS_DEG), _FRONT_ELEVATION_DEG)
+        if side == "behind":
+            yield from _match(scene, rng, "vp-side", front, _from_side(front, side), side)
+        else:
+            yield from _side(scene, rng, front, side)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """By the blocks in the pictures, whichever side they are seen from."""
@@ -76,122 +97,140 @@ class ViewpointMaker:
         if of_kind(question) == "vp-side":
             if shown.view_deg[0] not in _FRONTS_DEG:
                 raise UnfairError("the first picture is not straight from the front")
-            azimuth = shown.view_deg[0] + _SIDES[slots["side_words"]]
+            azimuth = _from_side(shown.view_deg, slots["side_words"])[0]
             right = [(option.view_deg[0] - azimuth) % 360 == 0 for option in options]
             alike = [same_blocks(shown.blocks, option.blocks) for option in options]
             return only_index([a and b for a, b in zip(right, alike, strict=True)])
-        form = fingerprint(shown.blocks)
-        return only_index([fingerprint(option.blocks) == form for option in options])
+        form = turned_form(shown.blocks)
+        return only_index([turned_form(option.blocks) == form for option in options])
 
 
-def _match(scene: Scene, rng: np.random.Generator, kind: str) -> Iterator[Draft]:
-    other = ((GOAL_VIEW[0] + pick(rng, _TURNS_DEG)) % 360, pick(rng, _ELEVATIONS_DEG))
-    for block in shuffled(rng, _shown_from_both(scene, other))[:_BLOCKS_TRIED]:
-        versions = _colored(block, rng) if kind == "vp-color" else _formed(scene, block, rng)
-        chosen = _told_apart(scene, versions, (GOAL_VIEW, other))
-        if chosen is None:
+def _from_side(front: View, side: str) -> View:
+    return (front[0] + _SIDES[side], front[1])
+
+
+def _match(
+    scene: Scene, rng: np.random.Generator, stem: str, first: View, second: View, side: str
+) -> Iterator[Draft]:
+    """Four structures from the second view, one of which the first picture shows."""
+    for _ in range(_FAMILIES_TRIED):
+        family, changes = _family(scene, rng, (first, second))
+        if not family or _hits(family, first, second) != 1.0:
             continue
-        dealt = shuffled(rng, chosen)
-        shown = state(scene, _with(scene, dealt[0]), GOAL_VIEW)
-        options = [state(scene, _with(scene, one), other) for one in dealt]
-        yield draft(scene, rng, kind, options, [shown], kind, facts={"block": block.order})
-        return
+        shown, options = ([one.seen_from(view) for one in family] for view in (first, second))
+        if are_told_apart(shown) and are_told_apart(options):
+            right = int(rng.integers(len(family)))
+            order = [right, *(i for i in range(len(family)) if i != right)]
+            slots = {"side_words": side} if side else {}
+            facts = {"changes": changes}
+            dealt = [options[i] for i in order]
+            value = side or changes
+            yield draft(scene, rng, stem, dealt, [shown[right]], value, slots, facts)
+            return
 
 
-def _shown_from_both(scene: Scene, other: View) -> list[Block]:
-    """Blocks that both views show well."""
-    counts = []
-    for view in (GOAL_VIEW, other):
-        picture = state(scene, scene.blocks, view)
-        counts.append(shown_pixels(picture, seen(picture)))
-    return [b for b in scene.blocks if min(one[b.order] for one in counts) >= 2 * _LEAST_SHOWN]
+def _family(
+    scene: Scene, rng: np.random.Generator, views: Sequence[View]
+) -> tuple[tuple[_Structure, ...], str]:
+    """A structure with each of two changes made or not; none where two of them are the same."""
+    base = _Structure(scene.blocks)
+    names = shuffled(rng, ("mirror", "swap", "swap", "shift"))[:2]
+    changed = [base]
+    touched: list[int] = []
+    for name in names:
+        made = _changed(base, name, rng, views)
+        if made is None:
+            return (), ""
+        touched += [] if made.is_mirrored else _differing(base, made)
+        changed += [_like(base, made, one) for one in changed]
+    forms = {turned_form(one.blocks) for one in changed}
+    if len(forms) < len(changed) or len(set(touched)) < len(touched):
+        return (), ""
+    return tuple(changed), "+".join(sorted(names))
 
 
-def _colored(block: Block, rng: np.random.Generator) -> list[Block]:
-    return [replace(block, color=color) for color in shuffled(rng, COLORS)]
+def _differing(base: _Structure, changed: _Structure) -> list[int]:
+    """Orders of the blocks that a change alters."""
+    pairs = zip(base.blocks, changed.blocks, strict=True)
+    return [before.order for before, after in pairs if before != after]
 
 
-def _formed(scene: Scene, block: Block, rng: np.random.Generator) -> list[Block]:
-    """Blocks of other types and poses in the place of one that carries nothing, at rest there."""
-    if any(block.order in other.depend for other in scene.blocks):
-        return []
-    rest = [other for other in scene.blocks if other.order != block.order]
-    versions = [block]
-    for block_type, euler, shift in _pool(block, rng):
-        version = _let_down(replace(block, type=block_type, euler_deg=euler), shift, rest, block)
-        if version is not None:
-            versions.append(version)
-        if len(versions) > _VERSIONS_TRIED:
-            break
-    return versions
-
-
-def _pool(block: Block, rng: np.random.Generator) -> list[tuple[BlockType, Euler, Shift]]:
-    """Poses, and shifts from the middle; those of the same type come first, as harder to tell."""
-    same = [(block.type, e, shift) for e in POSES[block.type].values() for shift in _SHIFTS_M]
-    other = [(t, e, (0.0, 0.0)) for t in _TYPES if t != block.type for e in POSES[t].values()]
-    return shuffled(rng, same) + shuffled(rng, other)
-
-
-def _let_down(
-    version: Block, shift: tuple[float, float], rest: Sequence[Block], model: Block
-) -> Block | None:
-    """The version over the model's middle, let down onto what the model rests on, if it stays."""
-    middle, now = bounds_m(model).mean(axis=0), bounds_m(version).mean(axis=0)
-    x, y, z = version.position_m
-    x, y = x + float(middle[0] - now[0]) + shift[0], y + float(middle[1] - now[1]) + shift[1]
-    lifted = replace(version, position_m=(x, y, z + _LIFT_M))
-    fall = drop_height_m(lifted, rest)
-    lowered = (round(x, 4) + 0.0, round(y, 4) + 0.0, round(z + _LIFT_M - fall, 4) + 0.0)
-    placed = replace(version, position_m=lowered)
-    if abs(bounds_m(placed)[0, 2] - bounds_m(model)[0, 2]) > 0.0005:
+def _changed(
+    base: _Structure, name: str, rng: np.random.Generator, views: Sequence[View]
+) -> _Structure | None:
+    if name == "mirror":
+        return base.mirrored()
+    if name == "shift":
+        blocks = shifted(base.blocks, rng)
+        return None if blocks is None else _Structure(blocks)
+    counts = [_pixels(base, view) for view in views]
+    shown = [b for b in base.blocks if min(one[b.order] for one in counts) >= _LEAST_SHOWN]
+    pairs = [(a, b) for a, b in itertools.combinations(shown, 2) if a.color != b.color]
+    if not pairs:
         return None
-    if find_overlaps((*rest, placed)):
-        return None
-    stays = holds((*rest, placed), placed.order, OUTCOME_SETTINGS[:1])
-    return placed if stays else None
+    one, other = pick(rng, pairs)
+    colors = {one.order: other.color, other.order: one.color}
+    return _Structure(tuple(replace(b, color=colors.get(b.order, b.color)) for b in base.blocks))
 
 
-def _told_apart(
-    scene: Scene, versions: Sequence[Block], views: Sequence[View]
-) -> list[Block] | None:
-    """Four versions of a block that every view tells from one another."""
-    chosen: list[Block] = []
-    for version in versions:
-        tried = [*chosen, version]
-        states = [_with(scene, one) for one in tried]
-        if len({fingerprint(blocks) for blocks in states}) < len(tried):
-            continue
-        if len(tried) == 1 or all(
-            are_told_apart([state(scene, blocks, view) for blocks in states]) for view in views
-        ):
-            chosen = tried
-        if len(chosen) == 4:
-            return chosen
-    return None
+def _like(base: _Structure, changed: _Structure, other: _Structure) -> _Structure:
+    """What was changed from `base` changed in another structure as well."""
+    if changed.is_mirrored:
+        return other.mirrored()
+    if other.is_mirrored:
+        return _like(base, changed, other.mirrored()).mirrored()
+    altered = _differing(base, changed)
+    new = {block.order: block for block in changed.blocks if block.order in altered}
+    return _Structure(tuple(new.get(block.order, block) for block in other.blocks))
 
 
-def _with(scene: Scene, version: Block) -> tuple[Block, ...]:
-    return tuple(version if b.order == version.order else b for b in scene.blocks)
-
-
-def _side(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-    """Left, right and back of a structure, and the mirror image of the one that is asked for."""
-    front = pick(rng, _FRONTS_DEG)
-    shown = state(scene, scene.blocks, (front, 22.0))
-    if min(shown_pixels(shown, seen(shown)).values()) < _SEEN_EVERYWHERE:
+def _side(scene: Scene, rng: np.random.Generator, front: View, side: str) -> Iterator[Draft]:
+    """Left and right of a structure and of its mirror image; either may be the one shown."""
+    base = _Structure(scene.blocks)
+    views = [_from_side(front, name) for name in (side, _opposite(side))]
+    options = [one.seen_from(view) for one in (base, base.mirrored()) for view in views]
+    shown = base.seen_from(front)
+    pixels = _pixels(base, front).values()
+    if sum(n > 0 for n in pixels) < _SHOWN_IN_FRONT * len(pixels):
         return
-    side = pick(rng, tuple(_SIDES))
-    order = [side, *(name for name in _SIDES if name != side)]
-    views = [((front + _SIDES[name]) % 360, 22.0) for name in order]
-    options = [state(scene, scene.blocks, view) for view in views]
-    options.append(_mirrored(scene, views[0]))
     if are_told_apart([shown, *options], least=_SIDE_PIXELS):
-        yield draft(scene, rng, "vp-side", options, [shown], side, {"side_words": side})
+        if rng.random() < 0.5:
+            # The mirror image is shown: what it looks like from a side is the other side mirrored.
+            shown, options = base.mirrored().seen_from(front), options[::-1]
+        facts = {"changes": "mirror"}
+        yield draft(scene, rng, "vp-side", options, [shown], side, {"side_words": side}, facts)
 
 
-def _mirrored(scene: Scene, view: View) -> QuestionPicture:
-    """What a mirror beside the camera shows: the structure mirrored across the camera's plane."""
-    mirrored = transformed(scene.blocks, Symmetry(0, True))
-    turned = (180.0 - view[0]) % 360
-    return QuestionPicture("scene", mirrored, (turned, view[1]))
+def _opposite(side: str) -> str:
+    return next(name for name in _SIDES if name not in (side, "behind"))
+
+
+def _hits(family: Sequence[_Structure], first: View, second: View) -> float:
+    """How many of the structures the nearest histogram of colors finds again; ties count in part.
+
+    By two ways to measure, the sum of differences and of their squares; 0 where they disagree.
+    """
+    shown, options = (np.array([_histogram(s, view) for s in family]) for view in (first, second))
+    apart = shown[:, None, :] - options[None, :, :]
+    found = []
+    for far in (np.abs(apart).sum(axis=2), (apart**2).sum(axis=2)):
+        nearest = far <= far.min(axis=1, keepdims=True) + 1e-9
+        found.append(float((np.diag(nearest) / nearest.sum(axis=1)).sum()))
+    return found[0] if found[0] == found[1] else 0.0
+
+
+def _histogram(structure: _Structure, view: View) -> NDArray[np.float64]:
+    """Share of each color in what shows of the blocks, rounded to a thousandth."""
+    pixels = _pixels(structure, view)
+    counts = np.zeros(len(COLORS))
+    for block in structure.blocks:
+        counts[COLORS.index(block.color)] += pixels[block.order]
+    shares: NDArray[np.float64] = np.round(counts / counts.sum(), 3)
+    return shares
+
+
+def _pixels(structure: _Structure, view: View) -> dict[int, int]:
+    """How many pixels show each block, by order: those of its mirror image, whatever the colors."""
+    plain = (structure.mirrored() if structure.is_mirrored else structure).seen_from(view)
+    plain = replace(plain, blocks=tuple(replace(b, color="red") for b in plain.blocks))
+    return shown_pixels(plain, seen(plain))

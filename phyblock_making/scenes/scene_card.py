@@ -5,9 +5,9 @@ from __future__ import annotations
 from phyblock.sim.stability import DEFAULT_TRIAL
 from phyblock.sim.steps import DEFAULT_REST
 from phyblock.sim.support import FIT_TOLERANCE_M
-from phyblock.sim.visibility import LEAST_SHARE
+from phyblock.sim.visibility import LEAST_SHARE, LEAST_SHOWN
 from phyblock_making.checks.tolerances import FINISHED_REST, LEVEL_LIMITS
-from phyblock_making.scenes.scene_files import QUANTITIES, LevelStatistics, SetWriter
+from phyblock_making.scenes.scene_files import QUANTITIES, SET_VERSION, LevelStatistics, SetWriter
 
 __all__ = ["card"]
 
@@ -17,6 +17,8 @@ _TEXT = """# {name}
 {levels}.
 {shared} scenes count in level 1 and in level 2.
 {base} are base scenes, {varied} are made from them.
+
+Version {version} (also in `VERSION`): results on different versions of a set are never mixed.
 
 ## How it was made
 
@@ -38,9 +40,10 @@ cluster by it. Scenes that differ by turning, mirroring or shifting alone count 
 `depend` comes from the contacts of the finished structure and `layer` from the longest path in
 that graph; neither is written by hand. Colors: {palette}.
 
-Each scene has at most 16 candidates: every look that it needs, and distractors that differ from a
-needed block by one attribute, orientation before color before type. No two candidates look the
-same. They are grouped by type and color, so that a number tells nothing about being needed.
+Each scene has at most 16 candidates: every look that it needs, and distractors drawn by a seed as
+often as goals need them, so that every look is needed in the same share of the sets that offer it:
+neither type, color, pose, number of poses nor place tells what is needed. No two candidates look
+the same. Types that goals have low are listed first, the rest of the order is drawn.
 
 ## How it was checked
 
@@ -54,7 +57,8 @@ A scene is in the set only when
   the whole {duration:g} s);
 * so does every intermediate structure when blocks are placed in the stored order, at the first
   setting; a step ends early once no corner was faster than {speed:g} mm/s for {quiet:g} s;
-* every block shows in the goal picture, on {pixels:g} of 512 by 512 pixels at least;
+* every block shows in the goal picture: on {pixels:g} of 512 by 512 pixels at least, and with at
+  least {shown:.0%} of the outline that it has when it is drawn alone;
 * no other scene in the set is the same but for turning, mirroring or shifting;
 * it keeps the limits of its levels:
 
@@ -72,7 +76,7 @@ Mean and most, over the scenes of a level:
 
 The candidate sets hold {candidates}.
 
-"""
+{given_away}"""
 _FILE_TEXT = """## The file
 
 `scenes.jsonl` holds one scene a line, sorted by `id`:
@@ -89,8 +93,13 @@ _FILE_TEXT = """## The file
 """
 
 
-def card(name: str, written: SetWriter, command: str, palette_text: str) -> str:
-    """Markdown text of the card, after all scenes were added; `command` is what made them."""
+def card(
+    name: str, written: SetWriter, command: str, palette_text: str, given_away: str = ""
+) -> str:
+    """Markdown text of the card, after all scenes were added; `command` is what made them.
+
+    `given_away` is a section on the candidate sets.
+    """
     levels = dict(sorted(written.levels.items()))
     settings = " and at ".join(
         f"1/{round(1 / physics.time_step_s)} s ({physics.iterations} solver iterations)"
@@ -114,6 +123,9 @@ def card(name: str, written: SetWriter, command: str, palette_text: str) -> str:
         finished_quiet=FINISHED_REST.quiet_s,
         quiet=DEFAULT_REST.quiet_s,
         pixels=LEAST_SHARE * 512**2,
+        shown=LEAST_SHOWN,
+        version=SET_VERSION,
+        given_away=given_away,
         limits="\n".join(_limit(level) for level in levels),
         heads=" | ".join(f"{quantity}, mean | most" for quantity in QUANTITIES),
         rules="|".join("---|---" for _ in QUANTITIES),

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from phyblock.datasets.version import VERSION_FILE
+from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, check_free, writing
@@ -20,6 +22,7 @@ from phyblock_making.scenes.scene_draft import PALETTES, Palette
 __all__ = [
     "CARD_FILE",
     "SCENES_FILE",
+    "SET_VERSION",
     "SUMS_FILE",
     "LevelStatistics",
     "SetWriter",
@@ -30,6 +33,10 @@ __all__ = [
 SCENES_FILE = "scenes.jsonl"
 CARD_FILE = "README.md"
 SUMS_FILE = "SHA256SUMS"
+SET_VERSION = 2
+"""Counts what makes other scenes or candidate sets out of the same seed: 2 offers distractors as
+often as goals need them, and shows at least 3 % of every block's outline.
+"""
 QUANTITIES = ("blocks", "types", "colors", "layers")
 
 
@@ -66,8 +73,8 @@ class SetWriter:
         self.shared = self.base = self.count = 0
         self.sizes: set[int] = set()
 
-    def add(self, scene: Scene) -> None:
-        """Append a scene with a candidate set of its own."""
+    def add(self, scene: Scene) -> CandidateSet:
+        """Append a scene with a candidate set of its own, which is returned."""
         candidates = make_candidates(scene, palette=PALETTES[self._palette])
         with (self._parts / f"{scene.levels[0]}").open("a", encoding="utf-8", newline="\n") as file:
             file.write(StoredScene.of(scene, candidates).as_json() + "\n")
@@ -77,6 +84,7 @@ class SetWriter:
         self.shared += len(scene.levels) > 1
         self.base += scene.parents == (scene.id,)
         self.sizes.add(len(candidates))
+        return candidates
 
     def finish(self, card: str) -> None:
         """Put the scenes together, sorted by id, and write the card and the checksums."""
@@ -87,6 +95,7 @@ class SetWriter:
                     shutil.copyfileobj(file, out)
         whole.replace(self._folder / SCENES_FILE)
         atomic_write(self._folder / CARD_FILE, card)
+        atomic_write(self._folder / VERSION_FILE, f"{SET_VERSION}\n")
         atomic_write(self._folder / SUMS_FILE, sums_text(self._folder))
 
 
@@ -100,7 +109,7 @@ def open_writer(folder: Path, palette: Palette, replace: bool = False) -> Iterat
         hint = "give another --out, or --replace"
         raise StoreError(Problem(str(folder), "holds a data set already", hint=hint))
     if not (folder / SCENES_FILE).exists():
-        others = [folder / name for name in (SCENES_FILE, CARD_FILE, SUMS_FILE)]
+        others = [folder / name for name in (SCENES_FILE, CARD_FILE, VERSION_FILE, SUMS_FILE)]
         check_free(others, "give another --out")
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -109,7 +118,7 @@ def open_writer(folder: Path, palette: Palette, replace: bool = False) -> Iterat
 
 
 def sums_text(folder: Path) -> str:
-    """Checksums of the scenes and the card, as `sha256sum -c` reads them."""
-    names = (CARD_FILE, SCENES_FILE)
+    """Checksums of the scenes, the card and the version, as `sha256sum -c` reads them."""
+    names = (CARD_FILE, SCENES_FILE, VERSION_FILE)
     sums = [hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in names]
     return "".join(f"{one}  {name}\n" for one, name in zip(sums, names, strict=True))

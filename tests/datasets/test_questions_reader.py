@@ -56,6 +56,15 @@ def test_a_sound_question_is_read(tmp_path: Path, scenes: Dataset) -> None:
     assert not task.files
 
 
+def test_a_background_is_that_of_all_pictures(tmp_path: Path, scenes: Dataset) -> None:
+    recipes = [{"label": label, "view": [45, 22]} for label in ("scene", "block")]
+    asked = QUESTION | {"background": "lawn", "pictures": recipes}
+    task = read_one(tmp_path / "q", scenes, asked)
+    assert [picture.background for picture in task.question.pictures] == ["lawn", "lawn"]
+    plain = read_one(tmp_path / "p", scenes, QUESTION | {"background": None})
+    assert plain.question.pictures[0].background is None
+
+
 def test_a_picture_is_the_scene_but_for_what_its_recipe_says(
     tmp_path: Path, scenes: Dataset
 ) -> None:
@@ -106,6 +115,7 @@ BROKEN = {
     "another category": ({"category": "dynamic_reasoning"}, "category", '"dynamic_reasoning"'),
     "a blank text": ({"question": " "}, "question", '" "'),
     "a color of no block": ({"colors": {"7": "red"}}, "colors", '"7"'),
+    "an unknown background": ({"background": "sand"}, "background", '"sand"'),
     "an unknown color": ({"colors": {"1": "pink"}}, "colors.1", '"pink"'),
     "a misspelled field": ({"colours": {"1": "red"}}, "colours", ""),
     "places that are not marked": (

@@ -39,9 +39,10 @@ def _temple(s: Pad) -> None:
         s.put("cuboid3", x=depth, pose="flat-y")
     for depth in (-1, 1):
         s.put("cuboid2", x=depth, pose="flat-y")
-    for depth in (-1, 1):
-        s.put("triangle", -1, depth, pose="ramp-y")
-        s.put("triangle", 1, depth, pose="ramp+y")
+    # A ramp behind these two, on the left, would show from nowhere in front.
+    s.put("triangle", 1, -1, pose="ramp+y")
+    s.put("triangle", -1, 1, pose="ramp-y")
+    s.put("triangle", 1, 1, pose="ramp+y")
 
 
 def _aqueduct(s: Pad) -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import re
+from collections import Counter
 from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.domain import Candidate, CandidateSet
+from phyblock.domain import Candidate, CandidateSet, Plan
 from phyblock.errors import DataError, SpecError
 from phyblock.models import Gate, ModelConfig, Reply, Request, build_model
 from phyblock.tracks.full_planning.baselines import PLAN_RULES, PlanSubject
@@ -56,6 +57,23 @@ def test_all_candidates_names_each_once(key: str) -> None:
     assert steps("all-candidates", make_request(key)) == [1, 2, 3, 4, 5]
 
 
+@given(keys, seeds, st.lists(st.integers(1, 5), min_size=1).map(tuple))
+def test_goal_blind_says_what_was_learned(key: str, seed: int, plan: tuple[int, ...]) -> None:
+    subject = PlanSubject(SCENE, CANDIDATES, lambda: Plan(plan))
+    assert steps("goal-blind", replace(make_request(key, seed), subject=subject)) == list(plan)
+
+
+@given(keys, seeds)
+def test_first_pose_names_the_right_kinds_each_in_the_pose_listed_first(
+    key: str, seed: int
+) -> None:
+    subject = PlanSubject(SCENE, CANDIDATES)
+    named = steps("first-pose", replace(make_request(key, seed), subject=subject))
+    assert Counter(CANDIDATES[n].kind for n in named) == Counter(b.kind for b in SCENE.blocks)
+    for n in named:
+        assert all(CANDIDATES[other].kind != CANDIDATES[n].kind for other in range(1, n))
+
+
 @given(keys, seeds)
 def test_the_oracle_gives_a_valid_order_of_the_right_looks(key: str, seed: int) -> None:
     given_steps = steps("oracle", make_request(key, seed))
@@ -82,7 +100,7 @@ def test_what_is_drawn_depends_on_seed_and_key_alone(name: str) -> None:
     forwards = {(r.key, r.seed): reply(name, r) for r in many}
     backwards = {(r.key, r.seed): reply(name, r) for r in reversed(many)}
     assert forwards == backwards
-    if name != "all-candidates":
+    if name not in ("all-candidates", "goal-blind"):
         assert len({answer.text for answer in forwards.values()}) > 1
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from phyblock.domain import LETTERS, Question, Scene
 from phyblock.domain.rotation import rotated
-from phyblock.models.guesses import PROBES, Guesses
+from phyblock.models.guesses import FOLDS, PROBES, Folds, Guesses
 
 WORDS = ("cube", "arch", "cylinder", "cuboid", "cone", "prism")
 
@@ -91,6 +92,21 @@ def test_no_question_is_answered_by_its_own_scenes_answers() -> None:
         shown = tuple(options[place] for place in order)
         found.append(question(number, shown, (order.index(0),)))
     assert accuracy("majority", found) < 0.5
+
+
+def test_what_is_learned_from_shares_no_base_scene_with_what_is_answered() -> None:
+    plain = made_by(fair, 120)
+    found = [
+        replace(one, scene=replace(one.scene, parents=(f"base{n % 40}", f"base{n * 7 % 40}")))
+        for n, one in enumerate(plain)
+    ]
+    folds = Folds(found)
+    for fold in range(FOLDS):
+        held_out = {base for q in found if folds.of(q) == fold for base in q.scene.parents[:1]}
+        known = folds.known(fold, "SH")
+        assert held_out
+        assert known
+        assert all(held_out.isdisjoint(question.scene.parents) for question in known)
 
 
 def test_a_rotated_question_is_answered_with_the_same_words() -> None:

@@ -11,6 +11,7 @@ import yaml
 from hypothesis import settings
 from hypothesis import strategies as st
 
+from phyblock.records import Manifest
 from phyblock.records.known import known_records
 from phyblock.report import Run, read_design
 from phyblock.scoring import ERROR_TYPES
@@ -126,7 +127,8 @@ def frames_from(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) 
 
 def run_of(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Run:
     frames = frames_from(records, facts)
-    return Run(Path("run"), dict(facts), read_design(facts), frames.records, frames.scores)
+    manifest = Manifest.model_validate(dict(facts))
+    return Run(Path("run"), manifest, read_design(facts), frames.records, frames.scores)
 
 
 def write_run(folder: Path, records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Path:

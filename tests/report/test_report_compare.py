@@ -3,6 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given
@@ -11,7 +12,13 @@ from phyblock.errors import SpecError
 from phyblock.report import Run
 from phyblock.report.comparable import comparable
 from phyblock.report.compare import Side, compare, compare_models, compare_runs
-from phyblock.report.compare_view import compare_view, flipped_lines, p_text, write_comparison
+from phyblock.report.compare_view import (
+    compare_view,
+    flipped_lines,
+    p_text,
+    ranks_view,
+    write_comparison,
+)
 from tests.report.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
 
 Records = list[dict[str, Any]]
@@ -85,14 +92,48 @@ def test_flipped_samples_are_those_that_one_side_alone_got_right() -> None:
 
 
 def test_what_cannot_be_told_is_said() -> None:
-    same = dict.fromkeys(LEVELS, 2)
-    run = one_seed(*plans("alpha", same), *plans("beta", same))
-    verdicts = compare_models(run).table.set_index("part")["verdict"]
-    assert verdicts["overall"] == "cannot tell"
+    for n, verdict in ((12, "cannot tell"), (4, "too few base scenes to tell")):
+        right = {f"{scene:03}": 1 + scene % 3 for scene in range(n)}
+        other = {scene: 4 - tp for scene, tp in right.items()}
+        run = one_seed(
+            *plans("alpha", right),
+            *plans("beta", other),
+            scenes_by_level={2: n},
+            scenes=n,
+            levels=[2],
+        )
+        verdicts = compare_models(run).table.set_index("part")["verdict"]
+        assert verdicts["overall"] == verdict
     lone = one_seed(*plans("alpha", {"000": 4}), *plans("beta", {"000": 0}))
     verdicts = compare_models(lone).table.set_index("part")["verdict"]
     assert verdicts["overall"] == "cannot tell: a single base scene"
     assert verdicts["3"] == "nothing to compare"
+
+
+def test_a_gap_is_found_among_many_models_and_ranks_say_what_is_sure() -> None:
+    scenes = [f"{n:03}" for n in range(60)]
+    draw = np.random.default_rng(7)
+    strength = {"best": 0.75, **{f"model-{n:02}": 0.5 for n in range(25)}}
+    run = one_seed(
+        *(
+            one
+            for model, share in strength.items()
+            for one in plans(model, {scene: int(draw.binomial(4, share)) for scene in scenes})
+        ),
+        models=list(strength),
+        scenes_by_level={2: 60},
+        scenes=60,
+        levels=[2],
+    )
+    found = compare_models(run)
+    assert len(found.table) == 26 * 25 // 2
+    against_best = found.table[found.table["a"] == "best"]
+    assert (against_best["verdict"] == "best is better").all()
+    ranks = found.ranks.set_index("model")
+    assert tuple(ranks.loc["best", ["best", "worst"]]) == (1, 1)
+    assert (ranks.loc[ranks.index != "best", "best"] > 1).all()
+    assert [row[0] for row in ranks_view(found).rows] == list(found.ranks["model"])
+    assert (found.table["detectable"] < found.table["detectable_holm"]).all()
 
 
 def test_a_clear_difference_is_told_and_corrected_for_the_number_of_pairs() -> None:
@@ -192,6 +233,7 @@ def test_a_comparison_is_written_and_p_values_are_readable(tmp_path: Path) -> No
         "comparison.md",
         "comparison.tex",
         "flipped.csv",
+        "ranks.csv",
     ]
     assert len(pd.read_csv(files[0])) == 5
     assert (p_text(0.0004), p_text(0.05), p_text(float("nan"))) == ("< 0.001", "0.050", "\u2013")

@@ -52,7 +52,7 @@ def test_records_have_one_row_a_sample_and_scores_one_a_score(tmp_path: Path) ->
         ["beta", "selection", "", 3],
     ]
     assert run.path == tmp_path / "run"
-    assert run.manifest["scenes"] == 5
+    assert run.manifest.scenes == 5
 
 
 def test_texts_can_be_left_on_disk(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
 from phyblock.report import Run, published_table, to_latex, to_markdown
+from phyblock.report.write import make_tables
 from phyblock.tracks.vqa.accuracy import questions_frame
 from phyblock.tracks.vqa.answers import CELLS, letters_frame
 from phyblock.tracks.vqa.table2 import letters_view, published_cells, table2_frame, table2_view
@@ -143,7 +144,7 @@ def test_circular_needs_every_rotation_of_a_seed() -> None:
     assert cell(run, "SH", "chance") == pytest.approx(0.25**4)
     lacking = run_of(records[1:], facts(seeds=(0, 1), circular=True))
     assert cell(lacking, "SH") == 0.25
-    assert "[circular]" in table2_view(table2_frame(run), run).caption
+    assert "[circular]" in make_tables(run, ["table2"])[1]["table2"].caption
 
 
 def test_the_published_row_stands_under_its_model() -> None:
@@ -183,7 +184,8 @@ def test_letters_are_those_of_questions_with_one_answer() -> None:
 )
 def test_how_questions_were_shown_is_in_the_captions(shown: dict[str, Any], words: str) -> None:
     run = run_of(complete({}), facts(**shown))
-    for view in (table2_view(table2_frame(run), run), letters_view(letters_frame(run), run)):
+    _, views = make_tables(run, ["table2"])
+    for view in (views["table2"], views["letters"]):
         assert words in view.caption
         assert words in to_markdown(view)
         assert words in to_latex(view, "x")

@@ -70,12 +70,12 @@ def test_a_mistake_of_ours_loses_no_call_under_way(
         if isinstance(event, SampleDone | Stopping):
             raise ZeroDivisionError("in watch")
 
-    if place == "judge":
-        monkeypatch.setattr(FullPlanning, "judge", judges_badly)
-
     async def run() -> None:
         watch = watches_badly if place == "watch" else nobody
         async with session(workspace, watch, "alpha") as opened:
+            # Floors were judged when it opened, before anything was asked.
+            if place == "judge":
+                monkeypatch.setattr(FullPlanning, "judge", judges_badly)
             await opened.run()
 
     with Running(FirstAtOnce()) as running:

@@ -207,7 +207,7 @@ def test_an_episode_of_which_no_reply_is_whole_is_no_parse_failure(
     ("fields", "message"),
     [
         ({"tracks": ["full_planning", "step_planning"], "models": ["repeat"]}, "has no rule for"),
-        ({"models": ["all-candidates"]}, "has no rule for step_planning"),
+        ({"models": ["majority"]}, "has no rule for step_planning"),
         ({"steps": {"max_steps": 0}}, "steps.max_steps"),
     ],
 )

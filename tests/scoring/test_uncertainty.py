@@ -13,15 +13,18 @@ from scipy import stats
 
 from phyblock.datasets import read_official
 from phyblock.scoring.uncertainty import (
+    POWER,
     Clusters,
     Floats,
-    bootstrap,
+    detectable,
     f1_of,
     holm,
+    in_unit_range,
+    jackknife,
     precision_of,
+    rank_ranges,
     ratio_of,
     recall_of,
-    resample_weights,
 )
 from tests.scoring.worlds import World
 
@@ -38,22 +41,38 @@ def alone(n: int) -> Clusters:
     return Clusters.of([[str(i)] for i in range(n)])
 
 
-@given(MEMBERS)
-def test_a_unit_weighs_the_product_of_the_draws_of_its_base_scenes(
-    parents: list[list[str]],
+def mean_of(sums: Floats) -> Floats:
+    return np.asarray(sums[..., 0] / sums[..., 1])
+
+
+def difference_of(sums: Floats) -> Floats:
+    return np.asarray(f1_of(sums)[..., 0] - f1_of(sums)[..., 1])
+
+
+@given(MEMBERS, st.integers(0, 2**32 - 1))
+def test_the_variance_sums_over_all_pairs_that_have_a_base_scene_in_common(
+    parents: list[list[str]], seed: int
 ) -> None:
+    # Of a sum, leaving a group out changes it by the group: the formula can be written out.
+    x = rng(seed).normal(size=len(parents))
     clusters = Clusters.of(parents)
-    times = rng().multinomial(clusters.size, np.full(clusters.size, 1 / clusters.size), size=20)
-    names = list(dict.fromkeys(name for unit in parents for name in unit))
-    drawn = [dict(zip(names, row, strict=True)) for row in times]
-    wanted = [[np.prod([row[name] for name in set(unit)]) for unit in parents] for row in drawn]
-    assert np.array_equal(np.concatenate(list(resample_weights(clusters, rng(), 20))), wanted)
+    in_common = [[bool(set(a) & set(b)) for b in parents] for a in parents]
+    variance = max(float(x @ np.array(in_common) @ x), float(x @ x))
+    found = jackknife(x[:, None], clusters, lambda sums: sums[..., 0])
+    n = clusters.size
+    if n < 2:
+        assert np.isnan(found.se)
+    else:
+        assert found.se == pytest.approx(np.sqrt(variance * (n - 1) / n))
 
 
-def test_units_of_one_base_scene_each_weigh_as_many_as_there_are() -> None:
-    weights = np.concatenate(list(resample_weights(alone(7), rng(), 1200)))
-    assert weights.shape == (1200, 7)
-    assert np.array_equal(weights.sum(axis=1), np.full(1200, 7.0))
+@given(hnp.arrays(float, st.integers(2, 30), elements=st.floats(-1e3, 1e3, width=32)))
+def test_a_mean_of_lone_units_has_students_interval(x: np.ndarray) -> None:
+    found = jackknife(np.stack([x, np.ones(len(x))], 1), alone(len(x)), mean_of)
+    se = x.std(ddof=1) / np.sqrt(len(x))
+    assert found.se == pytest.approx(se, abs=1e-9)
+    lo, hi = x.mean() + stats.t.ppf([0.025, 0.975], len(x) - 1) * se
+    assert (found.lo, found.hi) == pytest.approx((lo, hi), abs=1e-6)
 
 
 @given(hnp.arrays(np.int64, (6, 3), elements=st.integers(0, 9)), st.integers(2, 5))
@@ -61,78 +80,83 @@ def test_counts_a_whole_number_of_times_as_large_change_nothing(
     counts: np.ndarray, times: int
 ) -> None:
     for metric in (precision_of, recall_of, f1_of):
-        once, often = (
-            bootstrap(counts * k, alone(6), metric, rng(), resamples=200) for k in (1, times)
-        )
+        once, often = (jackknife(counts * k, alone(6), metric) for k in (1, times))
         for name in ("value", "se", "lo", "hi", "p"):
             a, b = getattr(once, name), getattr(often, name)
             assert np.allclose(a, b, equal_nan=True)
 
 
 @given(hnp.arrays(np.int64, (8, 3), elements=st.integers(0, 9)))
-def test_an_interval_holds_its_median_draw_and_stays_in_the_range_of_f1(counts: np.ndarray) -> None:
-    found = bootstrap(counts, alone(8), f1_of, rng(), resamples=400)
-    if np.isnan(found.value):
-        assert all(np.isnan([found.se, found.lo, found.hi, found.p]))
+def test_the_interval_of_a_share_holds_it_and_stays_in_its_range(counts: np.ndarray) -> None:
+    found = in_unit_range(jackknife(counts, alone(8), f1_of))
+    if np.isnan(found.se):
+        assert np.isnan([found.lo, found.hi, found.p]).all()
     else:
-        assert 0 <= found.lo <= found.hi <= 1
+        assert 0 <= found.lo <= found.value <= found.hi <= 1
+
+
+@given(st.integers(2, 300), st.booleans())
+def test_none_of_n_and_all_of_n_have_wilsons_interval(n: int, is_right: bool) -> None:
+    found = in_unit_range(jackknife([[int(is_right), 1]] * n, alone(n), ratio_of))
+    assert found.hi > found.lo
+    quantile = stats.t.ppf(0.975, n - 1) ** 2
+    assert found.hi - found.lo == pytest.approx(quantile / (n + quantile))
+    assert found.hi == 1 if is_right else found.lo == 0
 
 
 @given(hnp.arrays(np.int64, (8, 3), elements=st.integers(0, 9)))
 def test_nothing_differs_from_itself(counts: np.ndarray) -> None:
-    counts[0] = (1, 0, 0)
+    counts[0] = counts[1] = (1, 0, 0)
     pair = np.stack([counts, counts], axis=1)
-    found = bootstrap(
-        pair, alone(8), lambda sums: np.diff(f1_of(sums))[..., 0], rng(), resamples=200
-    )
+    found = jackknife(pair, alone(8), difference_of)
     assert (found.value, found.se, found.lo, found.hi, found.p) == (0, 0, 0, 0, 1)
 
 
 def test_a_difference_and_its_opposite_mirror_each_other() -> None:
     counts, clusters, _ = World(bases=20, pairs=15).draw(rng(3), models=2)
-
-    def difference(sums: Floats) -> Floats:
-        return f1_of(sums)[..., 0] - f1_of(sums)[..., 1]
-
-    one = bootstrap(counts, clusters, difference, rng(), resamples=2000)
-    other = bootstrap(counts[:, ::-1], clusters, difference, rng(), resamples=2000)
-    assert one.value == -other.value
-    assert one.lo == pytest.approx(-other.hi)
-    assert one.p == pytest.approx(other.p)
+    one, other = (jackknife(given, clusters, difference_of) for given in (counts, counts[:, ::-1]))
+    assert (one.value, one.lo, one.p) == pytest.approx((-other.value, -other.hi, other.p))
 
 
-def test_standard_error_and_interval_agree_with_scipy_for_lone_scenes() -> None:
-    right = rng(1).binomial(10, 0.3, size=80)
-    counts = np.stack([right, 10 - right, 10 - right], axis=1)
-    ours = bootstrap(counts, alone(80), f1_of, rng(2), resamples=20_000)
-    theirs = stats.bootstrap(
-        (right,), lambda x, axis: x.mean(axis=axis) / 10, method="percentile", n_resamples=20_000
-    )
-    assert ours.value == pytest.approx(right.mean() / 10)
-    assert ours.se == pytest.approx(theirs.standard_error, rel=0.03)
-    assert ours.lo == pytest.approx(theirs.confidence_interval.low, abs=0.003)
-    assert ours.hi == pytest.approx(theirs.confidence_interval.high, abs=0.003)
+@given(st.integers(2, 12))
+def test_a_few_scenes_that_agree_leave_as_much_doubt_as_a_sign_test(n: int) -> None:
+    counts = np.array([[[5, 0, 0], [0, 5, 5]]] * n)
+    found = jackknife(counts, alone(n), difference_of)
+    assert found.value == 1
+    assert found.p == pytest.approx(stats.binomtest(n, n).pvalue)
 
 
-@pytest.mark.parametrize("n", [3, 5, 12])
-def test_few_clusters_give_intervals_as_wide_as_students(n: int) -> None:
-    x = rng(n).normal(100, 1, n)
-    found = bootstrap(np.stack([x, np.ones(n)], 1), alone(n), ratio_of, rng(), resamples=20_000)
-    se = x.std(ddof=1) / np.sqrt(n)
-    # Draws reach no further than the least and the greatest value.
-    lo = max(x.mean() + stats.t.ppf(0.025, n - 1) * se, x.min())
-    assert found.lo == pytest.approx(lo, abs=0.35 * se)
+@given(st.floats(0.001, 10), st.integers(5, 200), st.sampled_from([0.05, 0.01, 0.001]))
+def test_what_is_detectable_is_found_in_four_of_five_cases(se: float, n: int, level: float) -> None:
+    df = n - 1
+    effect = float(detectable(se, n, level))
+    # The estimate, less the effect, over its standard error, is Student's t.
+    found = stats.t.sf(stats.t.isf(level / 2, df) - effect / se, df)
+    assert found == pytest.approx(POWER, abs=1e-6)
+
+
+@given(st.integers(1, 7), st.data())
+def test_ranks_are_what_the_pairs_allow(n: int, data: st.DataObject) -> None:
+    strength = data.draw(st.permutations(range(n)))
+    sure = data.draw(hnp.arrays(bool, (n, n)))
+    is_better = [[sure[a, b] and strength[a] > strength[b] for b in range(n)] for a in range(n)]
+    ranks = rank_ranges(is_better)
+    for model in range(n):
+        rank = 1 + sum(other > strength[model] for other in strength)
+        assert ranks[model, 0] <= rank <= ranks[model, 1]
+    if sure.all():
+        assert (ranks[:, 0] == ranks[:, 1]).all()
 
 
 def test_no_interval_comes_from_a_single_base_scene() -> None:
-    found = bootstrap([[1, 1, 0]] * 4, Clusters.of([["a"]] * 4), f1_of, rng(), resamples=10_000)
+    found = jackknife([[1, 1, 0]] * 4, Clusters.of([["a"]] * 4), f1_of)
     assert found.value == pytest.approx(2 / 3)
     assert all(np.isnan([found.se, found.lo, found.hi, found.p]))
     assert found.n_clusters == 1
 
 
 def test_nothing_measured_is_no_value() -> None:
-    found = bootstrap(np.zeros((0, 2, 3)), Clusters.of([]), f1_of, rng())
+    found = jackknife(np.zeros((0, 2, 3)), Clusters.of([]), f1_of)
     assert found.value.shape == (2,)
     assert np.isnan([found.value, found.se, found.lo, found.hi, found.p]).all()
 
@@ -142,13 +166,11 @@ def test_a_unit_without_a_base_scene_is_refused() -> None:
         Clusters.of([["a"], []])
 
 
-def test_macro_means_are_recomputed_in_every_resample() -> None:
+def test_macro_means_are_measured_anew_without_each_group() -> None:
     counts = np.zeros((40, 2, 2))
     counts[:30, 0] = [[n % 3 == 0, 1] for n in range(30)]
     counts[30:, 1] = [[1, 1]] * 10
-    found = bootstrap(
-        counts, alone(40), lambda sums: ratio_of(sums).mean(axis=-1), rng(), resamples=10_000
-    )
+    found = jackknife(counts, alone(40), lambda sums: ratio_of(sums).mean(axis=-1))
     assert found.value == pytest.approx((1 / 3 + 1) / 2)
     assert found.se == pytest.approx(np.sqrt(1 / 3 * 2 / 3 / 30) / 2, rel=0.06)
 
@@ -180,18 +202,14 @@ def official(official_dir: Path) -> tuple[dict[str, Floats], Clusters, Clusters]
     return counts, Clusters.of([s.parents for s in scenes]), alone(len(scenes))
 
 
-def test_recorded_scenes_of_common_origin_double_the_naive_standard_error(
+def test_recorded_scenes_of_common_origin_widen_the_naive_standard_error(
     official: tuple[dict[str, Floats], Clusters, Clusters],
 ) -> None:
     counts, clusters, naive = official
     gpt_4o = counts["gpt-4o"]
     assert clusters.size == 150
-    assert 100 * bootstrap(gpt_4o, naive, f1_of, rng(), resamples=10_000).se == pytest.approx(
-        1.3, abs=0.1
-    )
-    assert 100 * bootstrap(gpt_4o, clusters, f1_of, rng(), resamples=10_000).se == pytest.approx(
-        2.7, abs=0.1
-    )
+    assert 100 * jackknife(gpt_4o, naive, f1_of).se == pytest.approx(1.3, abs=0.1)
+    assert 100 * jackknife(gpt_4o, clusters, f1_of).se == pytest.approx(2.2, abs=0.1)
 
 
 def test_recorded_models_are_compared_in_pairs(
@@ -199,37 +217,33 @@ def test_recorded_models_are_compared_in_pairs(
 ) -> None:
     counts, clusters, _ = official
     pair = np.stack([counts["gpt-4o"], counts["gemini-2.0-flash"]], axis=1)
-    found = bootstrap(
-        pair, clusters, lambda s: f1_of(s)[..., 0] - f1_of(s)[..., 1], rng(), resamples=10_000
-    )
+    found = jackknife(pair, clusters, difference_of)
     assert 100 * found.value == pytest.approx(-0.5, abs=0.1)
-    assert 100 * found.se == pytest.approx(2.2, abs=0.1)
+    assert 100 * found.se == pytest.approx(1.5, abs=0.1)
     assert found.p > 0.5
 
 
-def covered(world: World, worlds: int) -> float:
-    """The share of worlds whose interval holds the true F1."""
-    draw = rng(20261121)
-    truth = world.true_f1(draw)
-    hits = 0
-    for _ in range(worlds):
-        counts, clusters, _ = world.draw(draw)
-        found = bootstrap(counts[:, 0], clusters, f1_of, draw, resamples=500)
-        hits += bool(found.lo <= truth <= found.hi)
-    return hits / worlds
+WORLDS = [
+    World(bases=150, pairs=0),
+    World(bases=12, pairs=0),
+    World(bases=150, pairs=250),
+    World(bases=150, pairs=250, base_sd=0, scene_sd=1),
+    World(bases=15, pairs=20),
+    World(bases=15, pairs=20, ease=-3),
+]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "world",
-    [
-        World(bases=150, pairs=0),
-        World(bases=40, pairs=0),
-        World(bases=12, pairs=0),
-        World(bases=150, pairs=250),
-        World(bases=40, pairs=60),
-    ],
-    ids=str,
-)
-def test_intervals_hold_the_truth_as_often_as_they_say(world: World) -> None:
-    assert 0.90 <= covered(world, 600) <= 0.98
+@pytest.mark.parametrize("world", WORLDS, ids=str)
+def test_intervals_hold_the_truth_and_tests_err_as_often_as_they_say(world: World) -> None:
+    draw = rng(20261121)
+    truth = world.true_f1(draw)
+    n, covered, erred = 1000, 0, 0
+    for _ in range(n):
+        counts, clusters, _ = world.draw(draw, models=2)
+        found = in_unit_range(jackknife(counts[:, 0], clusters, f1_of))
+        covered += bool(found.lo <= truth <= found.hi)
+        # Both models are alike in truth.
+        erred += bool(jackknife(counts, clusters, difference_of).p < 0.05)
+    assert 0.93 <= covered / n <= 0.97
+    assert 0.03 <= erred / n <= 0.07

@@ -44,4 +44,4 @@ class BoxRenderer:
             bright = np.array(props[place].rgb) * (light.ambient + light.diffuse * facing)
             rgb[rows, columns] = bright.clip(0, 255)
             shown[rows, columns] = place
-        return Raster(rgb, shown)
+        return Raster(rgb, shown, np.zeros_like(shown), np.zeros(shown.shape, dtype=np.bool_))

@@ -33,11 +33,12 @@ def projected(scene: Scene, style: PictureStyle) -> np.ndarray:
 
 @given(azimuths, elevations)
 def test_axes_are_a_right_handed_frame(azimuth_deg: float, elevation_deg: float) -> None:
+    """But for their rounding to 12 decimals."""
     right, up, forward = view_axes(azimuth_deg, elevation_deg)
     assert_allclose(
-        np.stack([right, up, forward]) @ np.stack([right, up, forward]).T, np.eye(3), atol=1e-12
+        np.stack([right, up, forward]) @ np.stack([right, up, forward]).T, np.eye(3), atol=1e-11
     )
-    assert_allclose(np.cross(right, up), -forward, atol=1e-12)
+    assert_allclose(np.cross(right, up), -forward, atol=1e-11)
     assert up[2] >= -1e-12
     assert right[2] == 0
 

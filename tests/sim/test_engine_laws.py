@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -192,6 +193,20 @@ def test_friction_holds_a_block_on_a_floor_that_leans(
         assert (opened.pose(1).distance_m(Pose.goal(one)) > 0.02) == slides
 
 
+def test_masses_decide_on_a_beam(moving_engine: PhysicsEngine) -> None:
+    """A slab holds a cylinder on the other end where it is heavy."""
+    beam = counterweighted_beam()
+    beam[2] = replace(beam[2], type="cylinder", position_m=(0.0, 0.07, 0.125))
+    beam[3] = replace(beam[3], type="cuboid1", position_m=(0.0, -0.05, 0.0875))
+    for factor, falls in ((0.3, True), (2.0, False)):
+        physics = Physics(mass_factors=(("cuboid1", factor),))
+        assert physics.mass_kg("cuboid1") == pytest.approx(factor * SHAPES["cuboid1"].mass_kg)
+        with moving_engine.open(physics) as opened:
+            add_all(opened, beam)
+            opened.step(240)
+            assert (opened.pose(2).angle_deg(Pose.goal(beam[1])) > 5) == falls
+
+
 def test_the_chosen_engine_decides_what_stands(monkeypatch: pytest.MonkeyPatch) -> None:
     """What was found by one engine is not told as the other's."""
     tipping = counterweighted_beam()[:3]
@@ -211,7 +226,7 @@ def test_the_chosen_engine_decides_what_stands(monkeypatch: pytest.MonkeyPatch) 
         ("phyblock.nowhere:Engine", "cannot be imported"),
         ("phyblock.sim.engine:FLOOR", "can be called"),
         ("phyblock.sim.engine:Engine", "cannot be imported"),
-        ("phyblock.sim.bullet.renderer:tiny_renderer", "names no physics engine"),
+        ("phyblock.sim.raster.renderer:NumpyRenderer", "names no physics engine"),
     ],
 )
 def test_a_word_that_names_no_engine_is_refused(word: str, message: str) -> None:

@@ -49,6 +49,14 @@ def test_any_orientation_comes_back_from_its_quaternion(x: float, y: float, z: f
     assert Pose.goal(back).angle_deg(pose) < 0.01
 
 
+def test_a_picture_stands_on_its_own_background_or_on_the_style_s() -> None:
+    for background in BACKGROUNDS:
+        own, style = replace(PLAIN, background=background), replace(STYLE, background=background)
+        assert question_png(own, STYLE) == question_png(PLAIN, style)
+        assert question_key(own, STYLE) == question_key(PLAIN, style)
+    assert len({question_key(replace(PLAIN, background=b), STYLE) for b in BACKGROUNDS}) == 6
+
+
 @settings(max_examples=12, deadline=None)
 @given(angles, angles, angles, st.floats(0, 360), st.floats(5, 90))
 def test_nothing_is_cut_off_whatever_the_pose(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from phyblock.domain import Candidate, CandidateSet, euler_deg_to_quat_xyzw
-from phyblock.errors import InputError, SimulationError
+from phyblock.errors import InputError
 from phyblock.sim import PictureStyle, candidates_key, candidates_png
 from phyblock.sim.camera import FULL_WINDOW, Camera, frame, view_axes
 from phyblock.sim.geometry import solid_mesh
@@ -24,8 +25,6 @@ SIZE_PX = 120
 COLORS = ((240, 40, 40), (40, 200, 60), (60, 80, 240))
 EVEN = Light(np.array([0.0, 0.0, 1.0]), 1.0, 0.0)
 CUBE = solid_mesh("cube")
-OWN_LIGHT = ("egl",)
-"""Renderers whose plugin cannot be told how bright a face is to be."""
 HALF_DIAGONAL_M = 0.0434
 APART = ((0.0, 0.0, 0.025), (0.0, 0.3, 0.025), (0.1, 0.15, 0.3))
 
@@ -33,20 +32,10 @@ APART = ((0.0, 0.0, 0.025), (0.0, 0.3, 0.025), (0.1, 0.15, 0.3))
 def chosen(word: str) -> Renderer:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PHYBLOCK_RENDERER", word)
-        try:
-            return renderer()
-        except SimulationError as error:
-            pytest.skip(str(error))
+        return renderer()
 
 
-def words() -> list[object]:
-    """What chooses each renderer; `auto` is a choice among the others."""
-    slow = {"egl": [pytest.mark.slow]}
-    named = [pytest.param(word, marks=slow.get(word, ())) for word in RENDERERS if word != "auto"]
-    return [*named, BOX_RENDERER]
-
-
-@pytest.fixture(params=words(), scope="module")
+@pytest.fixture(params=[*RENDERERS, BOX_RENDERER], scope="module")
 def drawn_by(request: pytest.FixtureRequest) -> Renderer:
     """Any renderer."""
     return chosen(request.param)
@@ -92,8 +81,10 @@ def test_a_picture_has_the_size_asked_for_and_numbers_what_it_shows(drawn_by: Re
     props = cubes(*APART)
     raster = drawn_by.draw(props, camera_on(props), EVEN, SIZE_PX)
     assert (raster.rgb.shape, raster.rgb.dtype) == ((SIZE_PX, SIZE_PX, 3), np.uint8)
-    assert raster.prop.shape == (SIZE_PX, SIZE_PX)
-    assert np.issubdtype(raster.prop.dtype, np.integer)
+    for numbers in (raster.prop, raster.face):
+        assert numbers.shape == (SIZE_PX, SIZE_PX)
+        assert np.issubdtype(numbers.dtype, np.integer)
+    assert (raster.shaded.shape, raster.shaded.dtype) == ((SIZE_PX, SIZE_PX), np.bool_)
     assert places(raster) == {-1, 0, 1, 2}
 
 
@@ -113,8 +104,7 @@ def test_what_nothing_hides_shows_in_its_color_where_the_camera_says(
         raster = drawn_by.draw([prop], camera, EVEN, SIZE_PX)
         shown, color = at_center(raster, camera, prop)
         assert shown == 0
-        if drawn_by.name not in OWN_LIGHT:
-            assert_allclose(color, COLORS[place], atol=2)
+        assert_allclose(color, COLORS[place], atol=2)
         pixels = camera.to_pixels(CUBE.vertices_m + prop.pose.position_m, SIZE_PX)
         rows, columns = np.nonzero(raster.prop == 0)
         found = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
@@ -165,10 +155,17 @@ def test_a_picture_does_not_depend_on_those_before_it(drawn_by: Renderer) -> Non
     assert again.prop.tobytes() == one.prop.tobytes()
 
 
+def test_threads_do_not_disturb_one_another(drawn_by: Renderer) -> None:
+    props = cubes(*APART)
+    cameras = [camera_on(props, azimuth_deg) for azimuth_deg in range(0, 360, 45)]
+    alone = [drawn_by.draw(props, camera, EVEN, SIZE_PX).rgb.tobytes() for camera in cameras]
+    with ThreadPoolExecutor(4) as pool:
+        drawn = pool.map(lambda camera: drawn_by.draw(props, camera, EVEN, SIZE_PX), cameras)
+        assert [raster.rgb.tobytes() for raster in drawn] == alone
+
+
 def test_a_face_is_as_bright_as_the_light_says(drawn_by: Renderer) -> None:
     """The upper face of a cube, seen from above."""
-    if drawn_by.name in OWN_LIGHT:
-        pytest.skip("the renderer has a light of its own")
     (prop,) = cubes(APART[0])
     camera = camera_on([prop], elevation_deg=90.0)
     for direction in ((0.0, 0.6, 0.8), (0.0, 0.0, 1.0), (0.0, 0.8, -0.6)):
@@ -181,7 +178,7 @@ def test_pictures_of_two_renderers_are_never_mixed(monkeypatch: pytest.MonkeyPat
     looks = (Candidate("arch", "red", (0.0, 0.0, 0.0)), Candidate("cube", "blue", (0.0, 0.0, 0.0)))
     candidates, style = CandidateSet(looks), PictureStyle(128)
     found = []
-    for word in ("tinyrenderer", BOX_RENDERER, "tinyrenderer"):
+    for word in ("raster", BOX_RENDERER, "raster"):
         monkeypatch.setenv("PHYBLOCK_RENDERER", word)
         found.append((candidates_key(candidates, style), candidates_png(candidates, style)))
     assert found[0] == found[2]
@@ -192,7 +189,7 @@ def test_pictures_of_two_renderers_are_never_mixed(monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize(
     ("word", "message"),
     [
-        ("vulkan", "allowed: tinyrenderer, egl, auto, or module:factory"),
+        ("vulkan", "allowed: raster, or module:factory"),
         ("phyblock.nowhere:Renderer", "cannot be imported"),
         ("phyblock.sim.bullet.physics:BulletEngine", "names no renderer"),
     ],

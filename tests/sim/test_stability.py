@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from phyblock.datasets import read_official
-from phyblock.sim import Physics, Trial, check, check_prefixes, check_removal
+from phyblock.sim import Physics, Trial, check
 from tests.sim.structures import block, counterweighted_beam, tower
 from tests.sim.test_support import FLOATING
 
@@ -34,13 +34,18 @@ def test_an_overhang_falls() -> None:
 def test_prefixes_find_what_stands_only_when_finished() -> None:
     blocks = counterweighted_beam()
     assert check(blocks, QUICK).stable
-    assert [step.stable for step in check_prefixes(blocks, QUICK)] == [True, True, False, True]
+    assert [check(blocks[:count], QUICK).stable for count in range(1, 5)] == [
+        True,
+        True,
+        False,
+        True,
+    ]
 
 
-def test_removing_the_base_fells_what_rests_on_it_alone() -> None:
+def test_what_rests_on_nothing_falls_alone() -> None:
     blocks = [*tower(3), block(4, "cube", (0.2, 0.0, 0.025))]
-    assert check_removal(blocks, 1, QUICK).fallen == (2, 3)
-    assert check_removal(blocks, 4, QUICK).stable
+    assert check(blocks[1:], QUICK).fallen == (2, 3)
+    assert check(blocks[:-1], QUICK).stable
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from phyblock.domain import Block
-from phyblock.sim import Trial, check_prefixes
+from phyblock.sim import Trial, check
 from phyblock.sim.stability import DEFAULT_TRIAL
 from phyblock.sim.steps import Rest, check_at_rest, check_steps, groups
 from phyblock.sim.support import bounds_m
@@ -37,14 +37,14 @@ def two_gates() -> list[Block]:
 def test_steps_stand_as_the_long_trial_says(name: str) -> None:
     blocks = SCENES[name]
     assert [step.fallen for step in check_steps(blocks, FIRST)] == [()] * len(blocks)
-    assert all(step.stable for step in check_prefixes(blocks[:4], FIRST))
+    assert all(check(blocks[:count], FIRST).stable for count in range(1, 5))
     assert check_at_rest(blocks, FIRST).stable
 
 
 def test_what_falls_midway_is_named_at_its_step() -> None:
     steps = check_steps(beam(), FIRST)
     assert [step.fallen for step in steps] == [(), (), (2, 3), ()]
-    assert [step.fallen for step in check_prefixes(beam(), FIRST)] == [(), (), (2, 3), ()]
+    assert [check(beam()[:n], FIRST).fallen for n in range(1, 5)] == [(), (), (2, 3), ()]
 
 
 def test_a_slow_tip_is_not_taken_for_rest() -> None:

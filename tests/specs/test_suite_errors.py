@@ -113,6 +113,16 @@ BAD = [
     ("name: s\nmodels: recorded\n", "2:9", "models", "official data set only", "",
      "dataset.format to official"),
     (HEAD + "prompt: official\n", "3:9", "prompt", "checkout", "", "prompt: default"),
+    (HEAD + "candidates: {order: random}\n", "3:21", "candidates.order", "choices",
+     "file, shuffled", ""),
+    (HEAD + "full_planning: {blind: true, wrong_image: true}\n", "3:43",
+     "full_planning.wrong_image", "where blind shows none", "", "set one of them"),
+    ("name: s\ndataset: {format: official, path: data}\nmodels: recorded\n"
+     "candidates: {order: shuffled}\n", "4:21", "candidates.order",
+     "recorded replies name candidates by the numbers of the file", "", "list the models"),
+    ("name: s\ndataset: {format: official, path: data}\nmodels: [oracle]\n"
+     "images: {source: dataset}\ncandidates: {order: shuffled}\n", "5:21", "candidates.order",
+     "show the candidates in the order of the file", "", "images.source: render"),
     (HEAD + "images: {source: dataset}\n", "3:18", "images.source", "official", "", "render"),
     (HEAD + "dataset: {format: official, path: .}\nscoring: {matchers: [optimal], level1: aov}\n"
      "levels: [2]\ntables: [published]\n", "4:21", "scoring.matchers", "paper matcher", "", "add"),

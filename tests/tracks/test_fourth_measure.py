@@ -13,8 +13,11 @@ import pytest
 
 from phyblock import registry
 from phyblock.cli.main import phyblock
+from phyblock.errors import StoreError
+from phyblock.run.rescore import rescore
 from phyblock.scoring.uncertainty import ratio_of
 from phyblock.tables.measures import Counted, Measure
+from tests.vqa_set import write_questions
 from tests.workspace import Workspace
 
 
@@ -77,7 +80,7 @@ def check_everywhere(folder: Path) -> None:
     with (folder / "tables" / "estimates.csv").open(newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["measure"] == "distance"]
     whole = {row["model"]: row for row in rows if row["cell"] == "overall"}
-    assert float(whole["oracle"]["value"]) == float(whole["oracle"]["hi"]) == 0
+    assert float(whole["oracle"]["value"]) == float(whole["oracle"]["lo"]) == 0
     row = whole["all-candidates"]
     assert 0.5 < float(row["lo"]) <= float(row["value"]) <= float(row["hi"]) < 1
     assert {row["cell"] for row in rows} == {"1", "2", "3", "4", "overall"}
@@ -96,7 +99,7 @@ def test_a_measure_is_in_tables_intervals_comparisons_and_the_report(
     here: Workspace,
 ) -> None:
     assert not command("run", "suite.yaml", "--out", here.out)
-    assert all(set(record["counts"]) == {"order_edits"} for record in here.records())
+    assert all(set(record["counts"]) == {"poses", "order_edits"} for record in here.records())
     check_everywhere(here.out)
 
 
@@ -104,7 +107,7 @@ def test_scoring_again_fills_in_what_older_records_lack(
     here: Workspace, request: pytest.FixtureRequest
 ) -> None:
     assert not command("run", "suite.yaml", "--out", here.out, "--no-report")
-    assert not any("counts" in record for record in here.records())
+    assert not any("order_edits" in record["counts"] for record in here.records())
     request.getfixturevalue("added")
     command("report", here.out)
     with (here.out / "tables" / "estimates.csv").open(newline="") as file:
@@ -138,3 +141,53 @@ def test_episodes_are_counted_when_they_have_ended(
             row["model"]: row for row in csv.DictReader(file) if row["measure"] == measure.name
         }
     assert float(values["oracle"]["value"]) == 1
+
+
+def is_right(_: Any, judged: Any) -> tuple[float, float]:
+    return judged.fields()["answer"]["correct"], 1
+
+
+@pytest.mark.parametrize(
+    ("track", "more", "counts"),
+    [
+        ("step_planning", {"steps": {"physics": "off"}, "levels": [3]}, first_is_placed),
+        ("vqa", {"vqa": {"path": "./questions", "subtasks": ["SH"], "circular": True}}, is_right),
+    ],
+)
+def test_scoring_again_counts_in_every_track(
+    here: Workspace, request: pytest.FixtureRequest, track: str, more: Any, counts: Any
+) -> None:
+    write_questions(here.root / "questions")
+    here.write_suite(tracks=[track], models=["oracle", "random"], **more)
+    folders = [here.root / name for name in ("out", "same", "new", "scored")]
+    old, same, new, scored = folders
+    assert not command("run", "suite.yaml", "--out", old, "--no-report")
+    rescore(old, None, None, same)
+    counted = Counted("sampled", ("part", "whole"), sample=counts)
+    registry.add_measure(track, Measure("part", "Part", counted, ratio_of, "a part"))
+    request.addfinalizer(lambda: registry.remove_measure(track, "part"))
+    assert not command("run", "suite.yaml", "--out", new, "--no-report")
+    rescore(old, None, None, scored)
+    before, unchanged, fresh, again = map(here.records, folders)
+    assert unchanged == before
+    counts_now = {line["sample"]: line["counts"] for line in fresh}
+    assert again == [{**line, "counts": counts_now[line["sample"]]} for line in before]
+    assert len({tuple(now["sampled"]) for now in counts_now.values()}) == 2
+
+
+def test_an_episode_that_goes_otherwise_is_not_counted(
+    here: Workspace, request: pytest.FixtureRequest
+) -> None:
+    here.write_suite(tracks=["step_planning"], steps={"physics": "off"}, levels=[3])
+    assert not command("run", "suite.yaml", "--out", here.out, "--no-report")
+    counted = Counted("first_steps", ("placed", "n"), sample=first_is_placed)
+    registry.add_measure("step_planning", Measure("first", "First", counted, ratio_of))
+    request.addfinalizer(lambda: registry.remove_measure("step_planning", "first"))
+    path = here.out / "records.jsonl"
+    lines = here.records()
+    lines[0]["turns"][0]["reply"]["text"] = "Done"
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
+    with pytest.raises(StoreError, match="goes otherwise than it did") as caught:
+        rescore(here.out, None, None, here.root / "scored")
+    assert lines[0]["sample"] in str(caught.value)
+    assert not (here.root / "scored").exists()

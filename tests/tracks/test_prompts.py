@@ -19,7 +19,7 @@ from tests.workspace import Workspace
 GOAL = Image(b"goal", "goal", 8, 8)
 GRID = Image(b"grid", "candidates", 8, 8)
 BOTH = Image(b"both", "composite", 16, 8)
-FACTS = {"pictures": ["goal", "candidates"], "n_candidates": 16}
+FACTS = {"pictures": ["goal", "candidates"], "n_candidates": 16, "candidate_scale": "common"}
 
 
 def template(folder: Path, text: str) -> TemplatePrompt:
@@ -75,17 +75,32 @@ def test_what_is_wrong_is_said_with_file_and_line(
     assert said in problem.message
 
 
-@pytest.mark.parametrize("labels", [("composite",), ("goal", "candidates"), ("candidates", "goal")])
-def test_the_default_prompt_speaks_of_the_pictures_that_are_sent(labels: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    "labels",
+    [("composite",), ("goal", "candidates"), ("candidates", "goal"), ("candidates",)],
+)
+@pytest.mark.parametrize("scale", ["common", "fit", None])
+def test_the_default_prompt_speaks_of_the_pictures_that_are_sent(
+    labels: tuple[str, ...], scale: str | None
+) -> None:
     prompt = TemplatePrompt(bundled("prompts", "full_planning.j2"), "default")
     sent = tuple(Image(b"", label, 8, 8) for label in labels)
-    system, user = prompt.messages(sent, {"pictures": list(labels), "n_candidates": 9})
+    is_blind = labels == ("candidates",)
+    facts = {"pictures": list(labels), "n_candidates": 9, "candidate_scale": scale}
+    facts["is_blind"] = is_blind
+    system, user = prompt.messages(sent, facts)
     assert (system.role, user.role) == ("system", "user")
     *pictures, text = user.parts
     assert pictures == list(sent)
     assert isinstance(text, str)
     assert "grid of 9 blocks" in text
-    if len(labels) == 2:
+    assert ("drawn at one scale" in text) == (scale == "common")
+    assert ("drawn to fill its cell" in text) == (scale == "fit")
+    assert ("goal, a finished structure of blocks, is not available" in text) == is_blind
+    assert ("study the goal" in text) != is_blind
+    if is_blind:
+        assert "one picture: the candidates" in text
+    elif len(labels) == 2:
         assert "in this order: " + ", then ".join(labels) in text
     else:
         assert "left half shows the goal" in text
@@ -94,11 +109,16 @@ def test_the_default_prompt_speaks_of_the_pictures_that_are_sent(labels: tuple[s
     assert parse_plan("Step1: Move block with index 4", 16, "steps").plan.steps == (4,)
 
 
-def test_facts_hold_the_labels_and_the_number_of_candidates_alone(workspace: Workspace) -> None:
+def test_facts_hold_what_is_shown_alone(workspace: Workspace) -> None:
     track = FullPlanning(PlanningRules("steps", ("A",), ("optimal",), None))
     for task in read_builtin(workspace.root / "data").tasks:
         facts = track.facts(task, (GOAL, GRID))
-        assert facts == {"pictures": ["goal", "candidates"], "n_candidates": len(task.candidates)}
+        assert facts == {
+            "pictures": ["goal", "candidates"],
+            "n_candidates": len(task.candidates),
+            "candidate_scale": None,
+            "is_blind": False,
+        }
 
 
 def test_the_official_prompt_is_the_recorded_text_to_the_letter(official_checkout: Path) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -80,3 +82,33 @@ def test_counts_of_another_measure_name_the_file(tmp_path: Path) -> None:
     assert json.loads((folder / "records.jsonl").read_text())["counts"] == {"sampled": [1]}
     with pytest.raises(StoreError, match=r"records.jsonl: counts.sampled: was counted in another"):
         track_estimates(load_run(folder), "full_planning")
+
+
+MADE_ELSEWHERE = {"phyblock/cli/main.py": {"vqa"}}
+"""The verb of the package beside this one that makes questions."""
+
+
+def test_only_the_registry_and_its_own_folder_name_a_track() -> None:
+    """In imports, names and texts, documentation too, but for the names of pages of it."""
+    root = Path(registry.__file__).parent
+    names = set(registry.known_tracks())
+    folders = [folder for folder in (root / "tracks").iterdir() if folder.name in names]
+    assert len(folders) == len(names)
+    found = {
+        f"{place}: {name}"
+        for path in root.rglob("*.py")
+        if path != root / "registry.py" and not {*path.parents} & {*folders}
+        for place in [path.relative_to(root.parent).as_posix()]
+        for name in tracks_named(path, names) - MADE_ELSEWHERE.get(place, set())
+    }
+    assert not found
+
+
+def tracks_named(path: Path, tracks: set[str]) -> set[str]:
+    """Tracks that a module names."""
+    texts: list[str] = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            texts.append(re.sub(r"\w+\.md", "", node.value))
+        texts += [str(getattr(node, part, "")) for part in ("module", "name", "id", "attr", "arg")]
+    return {word for text in texts for word in re.findall(r"\w+", text)} & tracks

@@ -143,6 +143,16 @@ def test_a_composite_is_described_as_one() -> None:
     assert "9 blocks" in text(user)
 
 
+def test_the_scale_of_the_candidates_is_told_where_it_is_known() -> None:
+    prompt = StepPrompt(TEMPLATE, "success", "text", None, True)
+    said = [
+        text(prompt.messages((GOAL, CANDIDATES), current(1), [], 16, 8, scale)[1])
+        for scale in ("common", "fit", None)
+    ]
+    assert ["drawn at one scale" in one for one in said] == [True, False, False]
+    assert ["drawn to fill its cell" in one for one in said] == [False, True, False]
+
+
 def test_an_empty_reply_stands_in_a_conversation_as_words() -> None:
     steps = [PastStep("(no operation)", "empty", " ", current(1))]
     assert text(ask("turns", steps)[2]) == "(no answer)"

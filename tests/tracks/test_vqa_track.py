@@ -21,10 +21,10 @@ from phyblock.errors import DataError, SpecError
 from phyblock.models.base import Image, Request
 from phyblock.resources import bundled
 from phyblock.sim import PictureStyle
-from phyblock.sim.question_pictures import question_png
+from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.tracks import TemplatePrompt
 from phyblock.tracks.vqa.baselines import ChoiceSubject
-from phyblock.tracks.vqa.pictures import QuestionPictures
+from phyblock.tracks.vqa.pictures import QuestionPictures, Shown
 from phyblock.tracks.vqa.track import Vqa, VqaRules
 from tests.vqa_set import write_questions
 from tests.workspace import Workspace
@@ -280,6 +280,24 @@ def test_identity_follows_questions_prompt_and_pictures(
     ]
     assert base not in others
     assert len(set(others)) == len(others)
+
+
+def test_questions_keep_their_background_unless_a_suite_gives_one(
+    question_set: QuestionSet, tmp_path: Path
+) -> None:
+    asked = next(task.question for task in question_set.tasks if task.key == "vp-000")
+    lawn = replace(asked, pictures=tuple(replace(p, background="lawn") for p in asked.pictures))
+    for question, ground, drawn in (
+        (asked, None, "checkerboard"),
+        (lawn, None, "lawn"),
+        (lawn, "white", "white"),
+        (asked, "white", "white"),
+    ):
+        pictures = QuestionPictures(tmp_path, STYLE, "images", 1, ground)  # type: ignore[arg-type]
+        style = replace(STYLE, background=drawn)
+        bare = [replace(picture, background=None) for picture in asked.pictures]
+        wanted = tuple(question_key(picture, style) for picture in bare)
+        assert pictures.keys(Shown(question, {})) == wanted
 
 
 def test_judging_reads_scores_and_says_what_was_right(question_set: QuestionSet) -> None:

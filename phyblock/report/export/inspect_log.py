@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from phyblock.extras import needs
 from phyblock.records import PromptMessage, Record, StoredReply
 from phyblock.records import Score as StoredScore
-from phyblock.report.export.rows import needs, newest_records, prompt_text
+from phyblock.report.export.rows import newest_records, prompt_text
 from phyblock.run.prompts import read_prompts
 from phyblock.scoring import Counts, micro
 from phyblock.tables.load import Run
@@ -58,7 +59,8 @@ def inspect_log(
     track, model = records[0].track, records[0].model
     seeds = run.design.suite.seeds
     name = f"phyblock/{track}"
-    digest = hashlib.sha256(f"{run.manifest['identity']} {track} {model}".encode()).hexdigest()[:22]
+    digest = hashlib.sha256(f"{run.manifest.identity} {track} {model}".encode()).hexdigest()[:22]
+    data = run.manifest.dataset
     counted = [r for r in records if r.outcome not in run.design.outcomes_left_out]
     samples = [_sample(record, prompts, seeds) for record in records]
     keys = sorted({str(sample.id) for sample in samples})
@@ -71,13 +73,13 @@ def inspect_log(
             created=min(record.time for record in records),
             task=name,
             dataset=EvalDataset(
-                name=str(run.manifest.get("dataset", {}).get("name") or run.design.suite.name),
+                name=(data.name if data else "") or run.design.suite.name,
                 samples=len(keys),
                 sample_ids=list(keys),
             ),
             model=model,
             config=EvalConfig(epochs=len(seeds)),
-            metadata={"suite": run.design.suite.name, "run": run.manifest["identity"]},
+            metadata={"suite": run.design.suite.name, "run": run.manifest.identity},
         ),
         results=EvalResults(
             total_samples=len(samples),

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from importlib import import_module
 from typing import Any
 
-from phyblock.errors import Problem, SpecError
 from phyblock.records import PictureMark, PromptMessage, Record
 from phyblock.records.known import record_types
 from phyblock.records.reading import read_records
@@ -15,20 +13,11 @@ from phyblock.run.prompts import read_prompts
 from phyblock.tables.load import Run
 from phyblock.tracks.estimates import numbers_of, stored_counts
 
-__all__ = ["as_json", "export_rows", "needs", "newest_records", "prompt_text", "track_columns"]
+__all__ = ["as_json", "export_rows", "newest_records", "prompt_text", "track_columns"]
 
 _SAMPLE = ("sample", "track", "model", "scene", "seed")
 _REPLY = ("finish", "cost_usd", "latency_s", "provider_model", "attempts", "cached")
 _USAGE = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
-
-
-def needs(package: str, extra: str, form: str) -> None:
-    """Raise SpecError that names the extra to install where a package of a format is not there."""
-    try:
-        import_module(package)
-    except ImportError as error:
-        name, hint = package.partition(".")[0], f"pip install 'phyblock[{extra}]'"
-        raise SpecError(Problem(f"--to {form}", f"needs the package {name}", hint=hint)) from error
 
 
 def newest_records(run: Run) -> list[Record]:

@@ -99,4 +99,4 @@ def _subtitle(run: Run, track: str, clusters: int) -> str:
     suite = f"Suite {run.design.suite.name}; " if run.design.suite.name else ""
     notes = kind_of(track).report().notes(run)[:1]
     how = "".join(note.partition(".")[0] + "; " for note in notes)
-    return f"{suite}{how}lines: 95 % intervals, {clusters} base scenes resampled"
+    return f"{suite}{how}lines: 95 % intervals over {clusters} base scenes"

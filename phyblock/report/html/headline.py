@@ -6,9 +6,11 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
+from phyblock.report.floors import Floor, floors_run, headline_floors
 from phyblock.report.measure_table import headline_columns, headline_of, main_heading
 from phyblock.tables.headline import Value
 from phyblock.tables.load import Run
+from phyblock.tables.showing import captioned
 from phyblock.tables.text_table import NO_VALUE, number
 from phyblock.tracks.kind import kind_of
 
@@ -52,7 +54,9 @@ class Headline:
     references: dict[str, float] = field(default_factory=dict)
 
 
-_BELOW = "Below each value stands its 95 % interval, from resampling the base scenes."
+_BELOW = "Below each value stands its 95 % interval, from leaving out each base scene in turn."
+
+_FLOOR = "The floor is the most that is reached without seeing the goal."
 
 
 def headlines(run: Run) -> list[Headline]:
@@ -66,15 +70,24 @@ def _headline(run: Run, track: str) -> Headline:
     values = headline_of(run, track)
     headings = [column.heading for column in columns]
     published = report.published(run)
+    floors = headline_floors(run, track)
+    own_floors = floors_run(run, track)
     main = headings.index(main_heading(run, track))
     rows = []
     for name, sort in kinds_of(run).items():
         found = [values.get((name, heading)) for heading in headings]
+        held = {} if name in own_floors else floors
         cells = [
-            *map(_cell, found),
+            *(_cell(value, held.get(head)) for value, head in zip(found, headings, strict=True)),
             *([_plain(published.get(name), NO_VALUE)] if published else []),
         ]
         rows.append(Row(name, sort, tuple(cells), _strip(found[main])))
+    if floors:
+        own = {heading: floor.value for heading, floor in floors.items()}
+        names = ", ".join(dict.fromkeys(floor.name for floor in floors.values()))
+        floor_cells = [_plain(own.get(heading)) for heading in headings]
+        empty = [Cell("")] if published else []
+        rows.append(Row(f"Floor: {names}", "reference", (*floor_cells, *empty)))
     references = report.references(run)
     for name, numbers in references.items():
         cells = [_plain(numbers.get(heading)) for heading in headings]
@@ -82,13 +95,14 @@ def _headline(run: Run, track: str) -> Headline:
     marked = {name: numbers.get(headings[main]) for name, numbers in references.items()}
     seeds = len(run.design.suite.seeds)
     mean = (f"Mean of {seeds} seeds.",) if seeds > 1 else ()
+    floor_note = (_FLOOR,) if floors else ()
     below = (_BELOW,) if any(cell.below for row in rows for cell in row.cells) else ()
     about = (report.reference_note,) if report.reference_note else ()
     return Headline(
-        kind.title,
+        captioned(kind.title, report.showing(run)),
         (*headings, *(["Published"] if published else [])),
         tuple(rows),
-        (" ".join((*report.notes(run), *about, *mean, *below)),),
+        (" ".join((*report.notes(run), *about, *mean, *floor_note, *below)),),
         main,
         headings[main],
         {
@@ -99,10 +113,12 @@ def _headline(run: Run, track: str) -> Headline:
     )
 
 
-def _cell(value: Value | None) -> Cell:
+def _cell(value: Value | None, floor: Floor | None) -> Cell:
     if value is None or math.isnan(value.shown):
         return Cell(NO_VALUE)
     below = "" if math.isnan(value.lo) else f"{number(value.lo)} to {number(value.hi)}"
+    if below and floor is not None and not floor.is_below(value.lo, value.hi):
+        below += ", not above the floor"
     return Cell(number(value.shown), value.shown, below)
 
 
@@ -120,7 +136,7 @@ def _plain(value: float | None, blank: str = "") -> Cell:
 
 def kinds_of(run: Run) -> dict[str, Kind]:
     """Which models are baselines; these come last."""
-    kinds = {model["name"]: model.get("kind") for model in run.manifest["models"]}
+    kinds = {model.name: model.kind for model in run.manifest.models}
     baselines = [name for name in run.design.model_names if kinds.get(name) == "baseline"]
     models = [name for name in run.design.model_names if name not in baselines]
     return {**dict.fromkeys(models, "model"), **dict.fromkeys(baselines, "baseline")}

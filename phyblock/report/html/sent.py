@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,6 @@ from phyblock.datasets import AssemblyTask
 from phyblock.files import atomic_write
 from phyblock.models import Image
 from phyblock.resources import cache_dir
-from phyblock.sim import PictureStyle
 from phyblock.tables.track_report import PageItems
 from phyblock.tracks import PicturePolicy, Pictures
 
@@ -29,24 +28,21 @@ class PictureShelf:
     into the cache; on a file system where that is not possible they are copied, up to 256 MiB.
     """
 
-    def __init__(self, folder: Path, earlier: Path, suite: Mapping[str, Any]) -> None:
-        """Put pictures, drawn as `suite` says, into `folder` unless `earlier` holds them."""
+    def __init__(self, folder: Path, earlier: Path, policy: PicturePolicy) -> None:
+        """Put pictures, drawn as `policy` says, into `folder` unless `earlier` holds them."""
         self.names: dict[str, str] = {}
         self._folder = folder
         self._earlier = earlier
         self._cache = cache_dir() / "pictures"
-        self._suite = suite
-        images = suite["images"]
-        self._style = PictureStyle(size_px=images["size_px"], background=images["background"])
+        self._policy = policy
         self._room = _MOST_COPIED_BYTES
 
     def add_scenes(self, tasks: Iterable[AssemblyTask]) -> None:
-        """Keep goals and candidates; raises OSError where the disk refuses."""
-        images = self._suite["images"]
-        order = tuple(images["order"])
-        policy = PicturePolicy(images["source"], images["layout"], order, self._style)
-        pictures = Pictures(self._cache, policy, 1)
-        is_drawn = images["source"] == "render"
+        """Keep goals and candidates of tasks as they were shown; raises OSError where the disk
+        refuses.
+        """
+        pictures = Pictures(self._cache, self._policy, 1)
+        is_drawn = self._policy.source == "render"
         for task in tasks:
             found, are_real = pictures.outline(task)
             if are_real:
@@ -54,7 +50,7 @@ class PictureShelf:
 
     def add_items(self, items: PageItems, asked: Iterable[Any]) -> None:
         """Keep the pictures of what was asked about; raises OSError where the disk refuses."""
-        pictures = items.pictures(self._cache, self._style)
+        pictures = items.pictures(self._cache, self._policy.style)
         for shown in asked:
             found, are_real = pictures.outline(shown)
             if are_real:

@@ -6,22 +6,17 @@ Without them the page still shows every reply, plan and score; it cannot draw.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from phyblock.datasets import AssemblyTask, Dataset
-from phyblock.errors import DataError, Problem
-from phyblock.run.data import open_dataset
-from phyblock.tables.design import Design
+from phyblock.errors import DataError
+from phyblock.run.data import recorded_dataset
+from phyblock.tables.load import Run
 from phyblock.tables.track_report import PageItems
 from phyblock.tracks.kind import kind_of
-from phyblock.tracks.selection import select_tasks
 
 __all__ = ["Sources", "open_sources"]
-
-_HINT = "name the folder where it is now with --data"
-_CHANGED = "is not the data set that the run was made on, or it was changed since"
 
 
 @dataclass(frozen=True)
@@ -35,17 +30,16 @@ class Sources:
     lacking: str = ""
 
 
-def open_sources(manifest: Mapping[str, Any], design: Design, data: Path | None) -> Sources:
+def open_sources(run: Run, data: Path | None) -> Sources:
     """The scenes of a run, from `data` or from where the run found them, and what else
     its tracks asked about.
 
     Raises DataError when `data` is given and is not what the run was made on.
     """
-    recorded = manifest.get("dataset") or {}
     try:
-        dataset = _dataset(manifest, design, data or Path(recorded.get("root", "")))
+        dataset = recorded_dataset(run.path, run.manifest, run.design.suite.levels, data)
         tasks = {task.scene.id: task for task in dataset.tasks}
-        return Sources(tasks, _items(manifest, design, dataset))
+        return Sources(tasks, _items(run, dataset))
     except DataError as error:
         if data is not None:
             raise
@@ -54,23 +48,7 @@ def open_sources(manifest: Mapping[str, Any], design: Design, data: Path | None)
         return Sources(lacking=f"Nothing can be drawn without the data set ({said}); {how}.")
 
 
-def _dataset(manifest: Mapping[str, Any], design: Design, root: Path) -> Dataset:
-    """All tasks of the data set, of which those of the run are known to be the run's."""
-    recorded = manifest.get("dataset") or {}
-    if not root.is_dir():
-        raise DataError(Problem(str(root), "the data set of the run is not there", hint=_HINT))
-    dataset = open_dataset(recorded.get("format", "builtin"), root)
-    tasks = select_tasks(dataset.tasks, design.suite.levels, manifest.get("limit"))
-    chosen = replace(dataset, tasks=tasks).sha256
-    if chosen != recorded.get("sha256"):
-        wanted = str(recorded.get("sha256"))
-        raise DataError(Problem(str(root), _CHANGED, "sha256", chosen, wanted, _HINT))
-    return dataset
-
-
-def _items(manifest: Mapping[str, Any], design: Design, dataset: Dataset) -> dict[str, PageItems]:
+def _items(run: Run, dataset: Dataset) -> dict[str, PageItems]:
     """What was asked about, by track, where it is more than scenes."""
-    openers = {name: kind_of(name).report().items for name in design.suite.tracks}
-    return {
-        name: opener(manifest, dataset) for name, opener in openers.items() if opener is not None
-    }
+    openers = {name: kind_of(name).report().items for name in run.design.suite.tracks}
+    return {name: opener(run, dataset) for name, opener in openers.items() if opener is not None}

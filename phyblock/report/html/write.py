@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from phyblock.datasets import AssemblyTask
 from phyblock.files import writing
 from phyblock.folders import OutFolder
 from phyblock.records import MANIFEST, PROMPTS, RECORDS
@@ -22,9 +24,12 @@ from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.sources import Sources, open_sources
 from phyblock.report.write import TablesWritten
 from phyblock.run.folder import run_folder
+from phyblock.specs.suite import ImagesSpec
 from phyblock.tables.load import Run
 from phyblock.tracks.drawable import kit, scene_entry
 from phyblock.tracks.kind import kind_of
+from phyblock.tracks.opening import picture_policy
+from phyblock.tracks.showing import in_order
 
 __all__ = ["REPORT_FILE", "page_files", "write_report"]
 
@@ -50,7 +55,7 @@ def write_report(
     StoreError where the folder cannot be written or something is in the way that we never wrote.
     """
     run = written.run
-    sources = open_sources(run.manifest, run.design, data)
+    sources = open_sources(run, data)
     out = run_folder(run.path)
     out.check(page_files())
     with out.alone(), writing(run.path / REPORT_FILE):
@@ -119,10 +124,10 @@ def _keep_pictures(
     """Addresses of the pictures at hand as seen from the page, by digest."""
     place = f"{_FOLDER}/{_PICTURES}/"
     with out.making(place) as new:
-        shelf = PictureShelf(new, out.path / place, run.manifest["suite"])
-        if scenes := _scenes(run):
-            known = (sources.tasks.get(scene) for scene in scenes)
-            shelf.add_scenes(task for task in known if task is not None)
+        policy = picture_policy(run.section("images", ImagesSpec))
+        shelf = PictureShelf(new, out.path / place, policy)
+        if sources.tasks:
+            shelf.add_scenes(_scenes(run, sources.tasks))
         for track, items in sources.items.items():
             shelf.add_items(items, [shown for item, shown in asked.items() if item.track == track])
     return {digest: f"{place}{name}" for digest, name in shelf.names.items()}
@@ -136,9 +141,18 @@ def _part_names(run: Run) -> dict[str, str]:
     return names
 
 
-def _scenes(run: Run) -> list[str]:
-    """Scenes that were asked about as such: their names are those of the items."""
-    return list(run.records.loc[run.records["item"] == run.records["scene"], "scene"].unique())
+def _scenes(run: Run, tasks: Mapping[str, AssemblyTask]) -> Iterator[AssemblyTask]:
+    """Scenes that were asked about as such, in every form in which they were shown: their names
+    are those of the items.
+    """
+    asked = run.records[run.records["item"] == run.records["scene"]]
+    forms = asked["shown"].map(json.dumps)
+    for scene, form in dict.fromkeys(zip(asked["scene"], forms, strict=True)):
+        task, shown = tasks.get(scene), json.loads(form)
+        if task is not None and shown:
+            yield in_order(task, shown["order"], tasks.get(shown["goal"]))
+        elif task is not None:
+            yield task
 
 
 def _page(written: TablesWritten, figures: Sequence[Path], build: str) -> str:
@@ -155,21 +169,19 @@ def _page(written: TablesWritten, figures: Sequence[Path], build: str) -> str:
 
 def _about(run: Run) -> dict[str, Any]:
     manifest, design = run.manifest, run.design
-    suite = manifest["suite"]
-    versions = manifest.get("versions") or {}
     facts = {
-        "Data": (manifest.get("dataset") or {}).get("name"),
+        "Data": manifest.dataset.name if manifest.dataset else "",
         "Scenes": f"{design.scenes:,}",
         "Models": f"{len(design.model_names)}",
         "Seeds": f"{len(design.suite.seeds)}",
         "Samples": f"{len(run.records):,}",
-        "Made": str(manifest.get("created", ""))[:10],
-        "phyblock": versions.get("phyblock"),
-        "Run": str(manifest["identity"])[:12],
+        "Made": manifest.created[:10],
+        "phyblock": manifest.versions.get("phyblock"),
+        "Run": manifest.identity[:12],
     }
     return {
         "title": design.suite.name or run.path.name,
-        "description": suite.get("description") or "",
+        "description": design.suite.description,
         "facts": [(name, text) for name, text in facts.items() if text],
     }
 

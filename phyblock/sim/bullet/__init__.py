@@ -1,1 +1,1 @@
-"""PyBullet behind the two protocols: the only package that imports it, and then late."""
+"""PyBullet behind the protocol of engines: the only package that imports it, and then late."""

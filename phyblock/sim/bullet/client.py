@@ -12,7 +12,7 @@ from typing import cast
 
 from phyblock.errors import SimulationError
 
-__all__ = ["client", "connect", "load", "version"]
+__all__ = ["client", "load", "version"]
 
 
 @functools.cache
@@ -29,8 +29,9 @@ def load() -> ModuleType:
     return cast(ModuleType, pybullet)
 
 
-def connect() -> tuple[ModuleType, int]:
-    """The module and the id of a fresh DIRECT client, which the caller closes.
+@contextlib.contextmanager
+def client() -> Iterator[tuple[ModuleType, int]]:
+    """The module and the id of a fresh DIRECT client, closed on leaving.
 
     Raises SimulationError when PyBullet has no client left to give.
     """
@@ -38,13 +39,6 @@ def connect() -> tuple[ModuleType, int]:
     number = bullet.connect(bullet.DIRECT)
     if number < 0:
         raise SimulationError("PyBullet gave no client: too many are open in this process")
-    return bullet, number
-
-
-@contextlib.contextmanager
-def client() -> Iterator[tuple[ModuleType, int]]:
-    """The module and the id of a fresh DIRECT client, closed on leaving; raises as `connect`."""
-    bullet, number = connect()
     try:
         yield bullet, number
     finally:

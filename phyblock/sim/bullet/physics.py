@@ -70,6 +70,7 @@ class BulletSimulation:
     def __init__(self, bullet: ModuleType, client: int, physics: Physics) -> None:
         self._bullet = bullet
         self._client = client
+        self._physics = physics
         self._friction = math.sqrt(physics.friction)
         self._shapes: dict[BlockType, int] = {}
         self._bodies: dict[int, _Body] = {}
@@ -86,18 +87,18 @@ class BulletSimulation:
 
     def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
         """Put a block at a pose, at rest."""
-        shape = SHAPES[block_type]
+        mass_kg = self._physics.mass_kg(block_type)
         body = self._bullet.createMultiBody(
-            baseMass=shape.mass_kg,
+            baseMass=mass_kg,
             baseCollisionShapeIndex=self._shape(block_type),
             physicsClientId=self._client,
         )
-        inertia = np.diag(solid_mesh(block_type).inertia_m2) * shape.mass_kg
+        inertia = np.diag(solid_mesh(block_type).inertia_m2) * mass_kg
         self._bullet.changeDynamics(
             body, -1, localInertiaDiagonal=inertia.tolist(), physicsClientId=self._client
         )
         self._set_friction(body)
-        offset_m = np.array(shape.center_of_mass_m)
+        offset_m = np.array(SHAPES[block_type].center_of_mass_m)
         center_m = pose.position_m + quat_xyzw_to_matrix(pose.quat_xyzw) @ offset_m
         self._bullet.resetBasePositionAndOrientation(
             body, center_m.tolist(), pose.quat_xyzw.tolist(), physicsClientId=self._client

@@ -3,10 +3,12 @@
 from phyblock.resources import bundled
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.full_planning.baselines import PLAN_RULES, PlanSubject
-from phyblock.tracks.full_planning.opening import open_full_planning, rescored_planning
+from phyblock.tracks.full_planning.opening import open_full_planning
 from phyblock.tracks.full_planning.record import PlanRecord
+from phyblock.tracks.full_planning.spec import PlanningSpec
 from phyblock.tracks.full_planning.track import FullPlanning
 from phyblock.tracks.kind import TrackKind
+from phyblock.tracks.poses import POSE_COUNTS
 
 __all__ = ["TRACK"]
 
@@ -26,8 +28,10 @@ TRACK = TrackKind(
     report=_report,
     subject=PlanSubject,
     baselines=PLAN_RULES,
+    section=("full_planning", PlanningSpec, "How scenes are shown in the full_planning track."),
     record=PlanRecord,
     template=bundled("prompts", "full_planning.j2"),
+    counted=(POSE_COUNTS,),
     tables=("assembly", "table1", "errors"),
-    rescored=rescored_planning,
+    rescored=True,
 )

@@ -47,7 +47,7 @@ def assembly_frame(run: Run) -> pd.DataFrame:
     `n` samples are scored of `expected`; tp, fp, fn are sums over them and precision, recall, f1
     the micro averages in [0, 1], NaN where undefined. `*_mean` and `*_sd` (ddof = 1) are taken
     over the micro averages of the `seeds` single seeds; `*_lo`, `*_hi` bound a 95 % interval and
-    `*_se` is its standard error, from resampling the `n_clusters` base scenes that the `n_scenes`
+    `*_se` is its standard error, from leaving out the `n_clusters` base scenes that the `n_scenes`
     scenes were made from (see `estimate_frame`). A cell in which no sample has a reply has
     counts, if the suite counts empty plans, but no metrics: nothing was measured. `matcher` is ""
     for a Level-1 criterion that knows none.

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from phyblock.domain import Block, CandidateSet, Scene
+from phyblock.domain import Block, CandidateSet, Plan, Scene
 from phyblock.errors import DataError, Problem
 
-__all__ = ["PLAN_RULES", "PlanSubject"]
+__all__ = ["PLAN_FLOORS", "PLAN_RULES", "PlanSubject"]
 
 _RANDOM_STEPS = 4
 """As in the paper's Random row."""
@@ -18,10 +18,11 @@ _RANDOM_STEPS = 4
 
 @dataclass(frozen=True)
 class PlanSubject:
-    """A whole plan is asked for."""
+    """A whole plan is asked for; `guess` gives one that was learned without the goal."""
 
     scene: Scene
     candidates: CandidateSet
+    guess: Callable[[], Plan] = field(default=Plan, compare=False)
 
 
 def _plan(steps: Iterable[int]) -> str:
@@ -50,6 +51,18 @@ def _unoriented_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
     )
 
 
+def _first_poses(subject: PlanSubject, rng: np.random.Generator) -> str:
+    """A valid order of the right kinds, of each kind the pose that is listed first."""
+    blocks = subject.scene.blocks
+    order = subject.scene.graph.random_order(rng)
+    first = subject.candidates.first_of
+    return _plan(first(blocks[v].kind) or _needed(subject, blocks[v]) for v in order)
+
+
+def _goal_blind(subject: PlanSubject, _: np.random.Generator) -> str:
+    return _plan(subject.guess().steps)
+
+
 def _needed(subject: PlanSubject, block: Block) -> int:
     index = subject.candidates.index_of(block.look)
     if index is None:
@@ -72,7 +85,11 @@ def _turned(candidates: CandidateSet, block: Block, rng: np.random.Generator) ->
 PLAN_RULES = {
     "random": _random_plan,
     "all-candidates": _all_candidates,
+    "goal-blind": _goal_blind,
+    "first-pose": _first_poses,
     "oracle": _oracle_plan,
     "oracle-no-orientation": _unoriented_plan,
 }
 """Rules by name of the baseline."""
+PLAN_FLOORS = ("goal-blind", "all-candidates", "random")
+"""Those that never see the goal."""

@@ -10,6 +10,8 @@ from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Cell, Counted, Measure
 from phyblock.tables.outcomes import WITHOUT_REPLY
 from phyblock.tables.text_table import level_name
+from phyblock.tracks.full_planning.baselines import PLAN_FLOORS
+from phyblock.tracks.poses import POSE_MEASURES
 
 __all__ = ["NAME", "PLANNING_MEASURES", "in_levels", "is_asked", "level_cells"]
 
@@ -41,7 +43,11 @@ def _steps(run: Run) -> pd.DataFrame:
 _STEPS = Counted("steps", ("tp", "fp", "fn"), _steps)
 
 PLANNING_MEASURES = (
-    Measure("f1", "F1", _STEPS, f1_of, "harmonic mean of precision and recall", over="steps"),
+    Measure(
+        "f1", "F1", _STEPS, f1_of, "harmonic mean of precision and recall", over="steps",
+        floors=PLAN_FLOORS,
+    ),
     Measure("precision", "Precision", _STEPS, precision_of, "right steps of those proposed"),
     Measure("recall", "Recall", _STEPS, recall_of, "blocks of the goal that a right step placed"),
-)
+    *POSE_MEASURES,
+)  # fmt: skip

@@ -7,30 +7,28 @@ from collections.abc import Sequence
 from phyblock.datasets import AssemblyTask, Dataset, official_prompt
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.tracks.full_planning.spec import PlanningSpec
 from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
 from phyblock.tracks.kind import Opening
-from phyblock.tracks.opening import assembly_pictures, template_prompt
+from phyblock.tracks.opening import assembly_pictures, task_showing, template_prompt
 from phyblock.tracks.prompts import OfficialPrompt, Prompt
 from phyblock.tracks.selection import select_tasks
 
-__all__ = ["open_full_planning", "rescored_planning"]
+__all__ = ["open_full_planning"]
 
 
 def open_full_planning(opening: Opening) -> FullPlanning:
     """The track; SpecError, DataError or PromptError with what is wrong."""
     suite = opening.loaded.suite
     tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit)
+    pool = opening.dataset.tasks
+    showing = task_showing(suite, PlanningSpec, FullPlanning.name, tasks, pool)
     if not opening.with_prompts:
-        return FullPlanning(_rules(suite), items=tasks)
+        return FullPlanning(_rules(suite), items=tasks, showing=showing, pool=pool)
     if suite.images.source == "dataset":
         _check_composites(opening.dataset, tasks)
     pictures = assembly_pictures(suite)
-    return FullPlanning(_rules(suite), _prompt(opening.loaded), pictures, tasks)
-
-
-def rescored_planning(suite: SuiteSpec, tasks: Sequence[AssemblyTask]) -> FullPlanning:
-    """The track for reading stored replies again; nothing is asked."""
-    return FullPlanning(_rules(suite), items=tasks)
+    return FullPlanning(_rules(suite), _prompt(opening.loaded), pictures, tasks, showing, pool)
 
 
 def _rules(suite: SuiteSpec) -> PlanningRules:

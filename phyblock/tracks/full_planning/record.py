@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
-from phyblock.records import Line, Record
+from phyblock.records import Line, Record, ShownScene
 
 __all__ = ["PLAN_COLUMNS", "PlanParse", "PlanRecord", "plan_row"]
 
@@ -18,7 +18,9 @@ class PlanParse(Line):
     rule: str | None
     """The rule that matched; null: nothing could be read."""
     plan: tuple[int, ...]
-    """Candidate numbers in order."""
+    """Candidate numbers in order, as they were shown."""
+    file_plan: tuple[int, ...] | None = None
+    """The same in the numbers of the file; null: those are the ones that were shown."""
     dropped: tuple[int, ...] = ()
     """Numbers that no candidate has."""
     version: int = 1
@@ -27,14 +29,22 @@ class PlanParse(Line):
     """Why nothing could be read."""
 
 
-PLAN_COLUMNS = {"parser": "object", "plan": "object", "dropped": "object"}
+PLAN_COLUMNS = dict.fromkeys(("parser", "plan", "file_plan", "dropped", "shown"), "object")
 
 
-def plan_row(parse: PlanParse | None) -> Mapping[str, Any]:
-    """The values of `PLAN_COLUMNS`."""
+def plan_row(parse: PlanParse | None, shown: ShownScene | None) -> Mapping[str, Any]:
+    """The values of `PLAN_COLUMNS`; `shown` is None for what was shown as the file has it."""
+    told = None if shown is None else shown.fields()
     if parse is None:
-        return dict.fromkeys(PLAN_COLUMNS)
-    return {"parser": parse.parser, "plan": list(parse.plan), "dropped": list(parse.dropped)}
+        return {**dict.fromkeys(PLAN_COLUMNS), "shown": told}
+    in_file = parse.plan if parse.file_plan is None else parse.file_plan
+    return {
+        "parser": parse.parser,
+        "plan": list(parse.plan),
+        "file_plan": list(in_file),
+        "dropped": list(parse.dropped),
+        "shown": told,
+    }
 
 
 class PlanRecord(Record):
@@ -48,5 +58,5 @@ class PlanRecord(Record):
     columns: ClassVar[Mapping[str, str]] = PLAN_COLUMNS
 
     def row(self) -> Mapping[str, Any]:
-        """The plan, and by which parser it was read."""
-        return plan_row(self.parse)
+        """The plan in both numberings, and by which parser it was read."""
+        return plan_row(self.parse, self.shown)

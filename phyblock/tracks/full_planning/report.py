@@ -4,18 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import pandas as pd
+
 from phyblock.errors import Problem, SpecError
 from phyblock.tables.cells import METRICS
 from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run
 from phyblock.tables.paper_numbers import HUMAN_ACCURACY, HUMAN_NOTE, published_table
+from phyblock.tables.showing import planning_words
 from phyblock.tables.track_report import PaperTable, Shown, TableMaker, TrackReport
 from phyblock.tracks.full_planning.assembly import assembly_frame, table1_frame
 from phyblock.tracks.full_planning.errors import errors_frame
 from phyblock.tracks.full_planning.figures.errors import error_bars
 from phyblock.tracks.full_planning.figures.levels import f1_radar, settings_dots
 from phyblock.tracks.full_planning.figures.scatter import f1_by_cost, f1_by_size
-from phyblock.tracks.full_planning.measures import PLANNING_MEASURES, in_levels, level_cells
+from phyblock.tracks.full_planning.measures import (
+    NAME,
+    PLANNING_MEASURES,
+    in_levels,
+    level_cells,
+)
 from phyblock.tracks.full_planning.published import (
     PUBLISHED_SETTING,
     published_frame,
@@ -37,6 +45,7 @@ from phyblock.tracks.full_planning.views import (
     table1_in_terminal,
     table1_view,
 )
+from phyblock.tracks.orders import order_frame, order_in_terminal, order_view
 
 __all__ = ["REPORT"]
 
@@ -71,6 +80,11 @@ def _published(run: Run) -> Mapping[str, float]:
     frame = published_frame(run)
     frame = frame[(frame["level"] == OVERALL) & (frame["metric"] == "f1")]
     return dict(zip(frame["model"], frame["published"], strict=True))
+
+
+def _orders(run: Run) -> pd.DataFrame:
+    criterion = run.design.criterion(OVERALL)
+    return order_frame(NAME, criterion, run.design.matchers(criterion)[0], run)
 
 
 def _notes(run: Run) -> Sequence[str]:
@@ -111,6 +125,7 @@ REPORT = TrackReport(
         "table5": TableMaker(table5_frame, table5_view, "table1"),
         "settings": TableMaker(settings_frame, settings_view, "table1"),
         "errors": TableMaker(errors_frame, errors_view, in_terminal=errors_in_terminal),
+        "orders": TableMaker(_orders, order_view, "table1", in_terminal=order_in_terminal),
         "published": TableMaker(published_frame, published_view, lines=published_lines),
     },
     bars="f1-levels",
@@ -134,4 +149,5 @@ REPORT = TrackReport(
         5: PaperTable(paper_table5_frame, paper_table5_view),
     },
     check_alike=_check_alike,
+    showing=lambda run: planning_words(run, NAME),
 )

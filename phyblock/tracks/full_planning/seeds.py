@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pandas as pd
 
-from phyblock.scoring.uncertainty import RESAMPLES
 from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run
 from phyblock.tables.paper_numbers import beside, published_table
@@ -102,7 +101,7 @@ def intervals_view(table: pd.DataFrame, run: Run) -> TextTable:
         for model in design.model_names
     ]
     return TextTable(
-        f"F1 with 95 % intervals (%){f', suite {design.suite.name}' if design.suite.name else ''}",
+        f"F1 with 95 % intervals (%){design.of_suite}",
         (
             Column("Model", is_text=True),
             *(
@@ -116,7 +115,7 @@ def intervals_view(table: pd.DataFrame, run: Run) -> TextTable:
             f"Setting {design.setting}, matcher {design.matcher}; F1 is pooled over "
             f"{len(design.suite.seeds)} seed{'s' if len(design.suite.seeds) > 1 else ''}.",
             *_sizes(table, run),
-            f"Intervals: base scenes resampled {RESAMPLES:,} times, micro averages recomputed.",
+            "Intervals: each base scene left out in turn, micro averages taken anew.",
         ),
     )
 

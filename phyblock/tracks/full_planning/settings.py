@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from phyblock.scoring.uncertainty import Floats, bootstrap, f1_of
+from phyblock.scoring.uncertainty import Floats, f1_of, jackknife
 from phyblock.tables.cells import cell_scores, measured
-from phyblock.tables.intervals import CountCube, parents_of, resampler
+from phyblock.tables.intervals import CountCube, parents_of
 from phyblock.tables.load import Run, once_per_run
 from phyblock.tables.text_table import Column, TextTable, between, level_name, number
 from phyblock.tracks.full_planning.measures import NAME
@@ -39,11 +39,10 @@ def settings_frame(run: Run) -> pd.DataFrame:
             continue
         both = np.array([[kept[model, setting] for setting in "AB"] for model in models])
         n_clusters = cube.clusters.behind(cube.present[:, both[:, 0]])
-        found = bootstrap(
+        found = jackknife(
             cube.counts[:, both],
             cube.clusters,
             _both_and_difference,
-            resampler(),
             n_clusters=np.repeat(n_clusters[:, None], 3, axis=1),
         )
         part = pd.DataFrame({"model": models, "level": level})
@@ -95,7 +94,7 @@ def settings_view(table: pd.DataFrame, run: Run) -> TextTable:
     ]
     note = f"Matcher {design.matcher}; the difference is paired"
     if len(table):
-        note += f", its interval from resampling {table['n_clusters'].max()} base scenes"
+        note += f", its interval from leaving out each of {table['n_clusters'].max()} base scenes"
     return TextTable(
         "F1 in setting A (with orientation) and in setting B (without), in percent",
         (Column("Model", is_text=True), *columns),

@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from phyblock.datasets import AssemblyTask
@@ -14,8 +15,10 @@ from phyblock.models.base import Image, Request
 from phyblock.parsing import ParsedPlan, parse_plan, reader_version
 from phyblock.scoring import AssemblyScorer, Score
 from phyblock.tracks.full_planning.baselines import PlanSubject
+from phyblock.tracks.full_planning.guessing import BlindGuesses
 from phyblock.tracks.pictures import Pictures
 from phyblock.tracks.prompts import Prompt
+from phyblock.tracks.showing import Showing, TaskShowing, file_plan, told_of
 from phyblock.words import Level1Criterion, Matcher, PlanParser, Setting
 
 __all__ = ["FullPlanning", "PlanJudgement", "PlanningRules"]
@@ -38,6 +41,13 @@ class PlanJudgement:
     parser: PlanParser
     parsed: ParsedPlan
     scores: tuple[Score, ...]
+    in_file: tuple[int, ...] | None = None
+    """The plan in the numbers of the file, where others were shown."""
+
+    @property
+    def steps(self) -> tuple[int, ...]:
+        """The candidates that were named, in order."""
+        return self.parsed.plan.steps
 
     @property
     def is_read(self) -> bool:
@@ -51,12 +61,16 @@ class PlanJudgement:
                 "parser": self.parser,
                 "rule": self.parsed.rule,
                 "plan": list(self.parsed.plan.steps),
+                "file_plan": self.in_file,
                 "dropped": list(self.parsed.dropped),
                 "version": reader_version(self.parser),
                 "problem": self.parsed.problem,
             },
             "scores": [_score(score) for score in self.scores],
         }
+
+
+_PLAIN = TaskShowing(Showing())
 
 
 class FullPlanning:
@@ -70,26 +84,35 @@ class FullPlanning:
         prompt: Prompt | None = None,
         pictures: Pictures | None = None,
         items: Sequence[AssemblyTask] = (),
+        showing: TaskShowing = _PLAIN,
+        pool: Sequence[AssemblyTask] = (),
     ) -> None:
-        """`prompt` and `pictures` are None where every model is a recording."""
+        """`prompt` and `pictures` are None where every model is a recording; from `pool`, else
+        `items`, baselines learn.
+        """
         self.rules = rules
         self.items = items
         self.template = "" if prompt is None else prompt.name
         self._prompt = prompt
         self._pictures = pictures
-        self._scorers: dict[str, AssemblyScorer] = {}
+        self._showing = showing
+        self._guesses = BlindGuesses(showing, pool or items, rules.settings[0])
+        self._scorers: dict[object, AssemblyScorer] = {}
+
+    def shown(self, item: AssemblyTask, seed: int) -> AssemblyTask:
+        """The scene as a seed shows it."""
+        return self._showing.of(item, seed)
 
     def about(self, item: AssemblyTask) -> dict[str, Any]:
-        """Nothing: the scene says it all."""
-        del item
-        return {}
+        """How the scene is shown, where not as the file has it."""
+        return told_of(item)
 
     def identity(self) -> dict[str, Any]:
         """Name and version of the prompt, a digest of the pictures, the version of the reader."""
         reader = reader_version(self.rules.parser)
         if self._prompt is None or self._pictures is None:
             return {"prompt": None, "pictures": None, "reader": reader}
-        keys = [self._pictures.keys(task) for task in self.items]
+        keys = [self._pictures.keys(task) for task in self._showing.each(self.items)]
         return {
             "prompt": {"name": self._prompt.name, "version": self._prompt.version},
             "pictures": hashlib.sha256(json.dumps(keys).encode()).hexdigest(),
@@ -101,13 +124,13 @@ class FullPlanning:
     ) -> Request:
         """The request of one sample; without messages for models that need none."""
         if not with_messages or self._prompt is None or self._pictures is None:
-            return Request(item.key, seed, (), params, "", PlanSubject(item.scene, item.candidates))
+            return Request(item.key, seed, (), params, "", self._subject(item))
         return self._request(item, seed, params, self._prompt, await self._pictures.of(item))
 
     def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
         """The one request, made without rendering, and whether its pictures are the real ones."""
         if self._prompt is None or self._pictures is None:
-            yield Request(item.key, 0, (), {}, "", PlanSubject(item.scene, item.candidates)), True
+            yield Request(item.key, 0, (), {}, "", self._subject(item)), True
             return
         pictures, real = self._pictures.outline(item)
         yield self._request(item, 0, {}, self._prompt, pictures), real
@@ -121,14 +144,20 @@ class FullPlanning:
         pictures: tuple[Image, ...],
     ) -> Request:
         messages = prompt.messages(pictures, self.facts(item, pictures))
-        subject = PlanSubject(item.scene, item.candidates)
+        subject = self._subject(item)
         return Request(item.key, seed, messages, params, prompt.version, subject)
+
+    def _subject(self, item: AssemblyTask) -> PlanSubject:
+        guess = partial(self._guesses.plan, item)
+        return PlanSubject(item.scene, item.candidates, guess)
 
     def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
         """What templates may use; nothing in it gives an answer away."""
         return {
             "pictures": [picture.label for picture in pictures],
             "n_candidates": len(item.candidates),
+            "is_blind": self._showing.how.blind,
+            "candidate_scale": None if self._pictures is None else self._pictures.candidate_scale,
         }
 
     def judge(self, item: AssemblyTask, text: str | None) -> PlanJudgement:
@@ -138,12 +167,14 @@ class FullPlanning:
             if text is None
             else parse_plan(text, len(item.candidates), self.rules.parser)
         )
-        scorer = self._scorers.get(item.key)
+        key = (item.key, item.candidates)
+        scorer = self._scorers.get(key)
         if scorer is None:
             scorer = AssemblyScorer(item.scene, item.candidates, self.rules.settings)
-            self._scorers[item.key] = scorer
+            self._scorers[key] = scorer
         scores = scorer.score(parsed.plan, self.rules.matchers, self.rules.level1)
-        return PlanJudgement(self.rules.parser, parsed, scores)
+        in_file = file_plan(item, parsed.plan.steps)
+        return PlanJudgement(self.rules.parser, parsed, scores, in_file)
 
     def close(self) -> None:
         """Stop the processes that draw pictures."""

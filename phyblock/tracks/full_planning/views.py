@@ -64,7 +64,7 @@ def table1_view(table: pd.DataFrame, run: Run) -> TextTable:
         (row["model"], *(_percent(row, cell) for cell in cells)) for row in table.to_dict("records")
     ]
     return TextTable(
-        f"Assembly planning (%){_of_suite(design)}",
+        f"Assembly planning (%){design.of_suite}",
         (_MODEL, *columns),
         tuple(rows),
         (_how(design), *_table1_notes(run), _LABELS_NOTE),
@@ -119,10 +119,6 @@ def _how(design: Design) -> str:
     )
 
 
-def _of_suite(design: Design) -> str:
-    return f", suite {design.suite.name}" if design.suite.name else ""
-
-
 def errors_view(table: pd.DataFrame, run: Run) -> TextTable:
     """Error types out of `errors_frame`: a count and a share (%) a type."""
     design = run.design
@@ -142,7 +138,7 @@ def errors_view(table: pd.DataFrame, run: Run) -> TextTable:
         for row in table.to_dict("records")
     ]
     return TextTable(
-        f"Wrong steps by type{_of_suite(design)}",
+        f"Wrong steps by type{design.of_suite}",
         (_MODEL, Column("Level", is_text=True), Column("Plans"), Column("Wrong steps"), *pairs),
         tuple(rows),
         (
@@ -187,7 +183,7 @@ def published_view(table: pd.DataFrame, run: Run) -> TextTable:
         for label, metric in zip((model, f"({name})", ""), METRICS, strict=True)
     ]
     return TextTable(
-        f"Our numbers beside the paper's Table 1{_of_suite(run.design)} (%)",
+        f"Our numbers beside the paper's Table 1{run.design.of_suite} (%)",
         columns,
         tuple(rows),
         tuple(_difference_notes(table, run.design)),

@@ -3,6 +3,7 @@
 from phyblock.resources import bundled
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.kind import TrackKind
+from phyblock.tracks.poses import POSE_COUNTS
 from phyblock.tracks.step_planning.baselines import STEP_RULES, StepSubject
 from phyblock.tracks.step_planning.opening import open_step_planning
 from phyblock.tracks.step_planning.record import EpisodeRecord
@@ -32,5 +33,6 @@ TRACK = TrackKind(
     record=EpisodeRecord,
     template=bundled("prompts", "step_planning.j2"),
     prompt_field=("steps", "prompt"),
+    counted=(POSE_COUNTS,),
     tables=("table3", "endings", "progress"),
 )

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from phyblock.domain import CandidateSet, Scene
+from phyblock.domain import CandidateSet, Plan, Scene
 
-__all__ = ["STEP_RULES", "StepSubject"]
+__all__ = ["STEP_FLOORS", "STEP_RULES", "StepSubject"]
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,8 @@ class StepSubject:
 
     `valid` are the candidates that would be placed now, in ascending order; empty when the goal
     is complete. `exact` are those of them that are also turned as the goal is. `last_failed` is
-    the candidate whose move failed last, if the last move did.
+    the candidate whose move failed last, if the last move did; `step` is how many steps were taken.
+    `guess` gives a plan that was learned without the goal.
     """
 
     scene: Scene
@@ -25,6 +27,8 @@ class StepSubject:
     valid: tuple[int, ...]
     exact: tuple[int, ...]
     last_failed: int | None = None
+    step: int = 0
+    guess: Callable[[], Plan] = field(default=Plan, compare=False)
 
 
 def _random_step(subject: StepSubject, rng: np.random.Generator) -> str:
@@ -57,6 +61,24 @@ def _repeated_step(subject: StepSubject, rng: np.random.Generator) -> str:
     return _random_step(subject, rng) if subject.last_failed is None else _step(subject.last_failed)
 
 
+def _next_candidate(subject: StepSubject, _: np.random.Generator) -> str:
+    """Every candidate once, in their order."""
+    return _step(subject.step + 1 if subject.step < len(subject.candidates) else None)
+
+
+def _next_guess(subject: StepSubject, _: np.random.Generator) -> str:
+    plan = subject.guess().steps
+    return _step(plan[subject.step] if subject.step < len(plan) else None)
+
+
+def _first_pose(subject: StepSubject, rng: np.random.Generator) -> str:
+    """The kind of a right move, in the pose of it that is listed first."""
+    if not subject.exact:
+        return _oracle_step(subject, rng)
+    index = subject.exact[int(rng.integers(len(subject.exact)))]
+    return _step(subject.candidates.first_of(subject.candidates[index].kind))
+
+
 def _step(index: int | None) -> str:
     return "Next plan: Done" if index is None else f"Next plan: Move({index})"
 
@@ -66,5 +88,10 @@ STEP_RULES = {
     "oracle": _oracle_step,
     "oracle-no-orientation": _unoriented_step,
     "repeat": _repeated_step,
+    "all-candidates": _next_candidate,
+    "goal-blind": _next_guess,
+    "first-pose": _first_pose,
 }
 """Rules by name of the baseline."""
+STEP_FLOORS = ("goal-blind", "all-candidates", "random", "repeat")
+"""Those that never see the goal."""

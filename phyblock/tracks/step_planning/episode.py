@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, get_args
 
 from phyblock.datasets import AssemblyTask
-from phyblock.domain import Block
+from phyblock.domain import Block, Plan
 from phyblock.models.base import Image, Message, Reply, Request
 from phyblock.parsing.move import MoveProblem, ParsedMove, parse_move
 from phyblock.scoring import (
@@ -19,6 +19,7 @@ from phyblock.scoring import (
     placed_counts,
 )
 from phyblock.sim.site import Settled
+from phyblock.tracks.showing import file_plan
 from phyblock.tracks.step_planning.baselines import StepSubject
 from phyblock.tracks.step_planning.prompt import PastStep, StepOutcome
 from phyblock.tracks.step_planning.rules import Ending, StepRules, Tally, majority
@@ -36,10 +37,12 @@ class Desk:
 
     `settle` lets blocks go at their goal poses; `write` gives the messages of the step after the
     given ones, with the picture of the assembly that is among them, and is None for models that
-    need no messages; `version` is that of the prompt.
+    need no messages; `version` is that of the prompt. `guess` gives a plan that was learned
+    without the goal.
     """
 
     settle: Callable[[Sequence[Block]], Awaitable[Settled]]
+    guess: Callable[[], Plan] = Plan
     write: (
         Callable[
             [Sequence[PastStep], Sequence[Block]], Awaitable[tuple[tuple[Message, ...], Image]]
@@ -94,6 +97,8 @@ class StepEpisode:
             self._assembly.right_moves(),
             self._assembly.exact_moves(),
             self._tally.last_failed,
+            self._tally.steps,
+            self._desk.guess,
         )
         return Request(
             key if samples == 1 else f"{key}.{sample + 1}",
@@ -135,17 +140,27 @@ class StepEpisode:
         """What became of every step, in order."""
         return [step.outcome for step in self._past]
 
+    @property
+    def steps(self) -> list[int]:
+        """The candidates of all moves that were attempted, in order."""
+        return [turn["parse"]["move"] for turn in self._turns if _is_attempt(turn)]
+
     def fields(self) -> dict[str, Any]:
         """What the record says of the episode (docs/results.md)."""
         placed = [outcome == "placed" for outcome in self.outcomes]
-        attempts = [turn for turn in self._turns if _is_attempt(turn)]
-        plan = [turn["parse"]["move"] for turn in attempts]
+        plan = self.steps
         return {
-            "parse": {"parser": "move", "rule": None, "plan": plan, "dropped": []},
+            "parse": {
+                "parser": "move",
+                "rule": None,
+                "plan": plan,
+                "file_plan": file_plan(self._task, plan),
+                "dropped": [],
+            },
             "scores": [
                 score
                 for setting in self._rules.settings
-                for score in self._scores(setting, len(attempts))
+                for score in self._scores(setting, len(plan))
             ],
             "setting": self._rules.accepts,
             "ending": self.ending or "unanswered",

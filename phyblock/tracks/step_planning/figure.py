@@ -18,6 +18,7 @@ from phyblock.tables.drawing import (
 )
 from phyblock.tables.load import Run
 from phyblock.tracks.step_planning.episodes import progress_frame
+from phyblock.tracks.step_planning.measures import is_asked
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,7 +42,7 @@ def step_progress(run: Run) -> pd.DataFrame:
 
 def progress_by_turn(run: Run) -> Figure | None:
     """How far the structure is after each step, a line a model; None without an episode."""
-    if "step_planning" not in run.design.suite.tracks:
+    if not is_asked(run):
         return None
     table = step_progress(run)
     if not len(table.columns):

@@ -11,6 +11,8 @@ from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, VARIANT, Counted, Measure
 from phyblock.tables.outcomes import WITHOUT_REPLY
 from phyblock.tables.track_report import WHOLE
+from phyblock.tracks.poses import POSE_MEASURES
+from phyblock.tracks.step_planning.baselines import STEP_FLOORS
 from phyblock.tracks.step_planning.episodes import NAME, episodes_frame
 
 __all__ = ["COUNTED", "NAME", "STEP_MEASURES", "is_asked"]
@@ -51,11 +53,15 @@ _MOVES = Counted("moves", ("tp", "fp", "fn"), _moves)
 _ENDS = Counted("episodes", ("completed", "episodes"), _episodes)
 
 STEP_MEASURES = (
-    Measure("f1", "F1", _MOVES, f1_of, "harmonic mean of precision and recall", over="moves"),
+    Measure(
+        "f1", "F1", _MOVES, f1_of, "harmonic mean of precision and recall", over="moves",
+        floors=STEP_FLOORS,
+    ),
     Measure("precision", "Precision", _MOVES, precision_of, "right moves of those counted"),
     Measure("recall", "Recall", _MOVES, recall_of, "blocks of the goal that were placed"),
     Measure(
         "completion", "Completed", _ENDS, ratio_of, "episodes that placed the whole goal",
         over="episodes",
     ),
+    *POSE_MEASURES,
 )  # fmt: skip

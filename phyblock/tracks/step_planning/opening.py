@@ -5,7 +5,7 @@ from __future__ import annotations
 from phyblock.errors import Problem, SpecError
 from phyblock.specs import SuiteSpec
 from phyblock.tracks.kind import Opening
-from phyblock.tracks.opening import assembly_pictures, template_prompt
+from phyblock.tracks.opening import assembly_pictures, task_showing, template_prompt
 from phyblock.tracks.selection import select_tasks
 from phyblock.tracks.step_planning.prompt import StepPrompt
 from phyblock.tracks.step_planning.rules import StepLimits, StepRules
@@ -20,8 +20,10 @@ def open_step_planning(opening: Opening) -> StepPlanning:
     loaded, suite = opening.loaded, opening.loaded.suite
     tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit)
     rules = _rules(suite)
+    pool = opening.dataset.tasks
+    showing = task_showing(suite, StepsSpec, "steps", tasks, pool)
     if not opening.with_prompts:
-        return StepPlanning(rules, items=tasks)
+        return StepPlanning(rules, items=tasks, showing=showing, pool=pool)
     if suite.images.source == "dataset":
         where = loaded.where("images", "source")
         message = "step planning draws every state, so the goal must be drawn as well"
@@ -30,8 +32,8 @@ def open_step_planning(opening: Opening) -> StepPlanning:
     steps = suite.section(StepsSpec)
     shown = (steps.feedback, steps.history, steps.memory, steps.cot)
     template = template_prompt(loaded, StepPlanning.name)
-    prompt = StepPrompt(template, *shown, gating=rules.gating, accepts=rules.accepts)
-    return StepPlanning(rules, prompt, assembly_pictures(suite), tasks)
+    prompt = StepPrompt(template, *shown, rules.gating, rules.accepts, steps.blind)
+    return StepPlanning(rules, prompt, assembly_pictures(suite), tasks, showing, pool)
 
 
 def _rules(suite: SuiteSpec) -> StepRules:

@@ -14,7 +14,7 @@ from phyblock.models.base import Image, Message
 from phyblock.parsing.move import MoveProblem
 from phyblock.scoring import MoveOutcome
 from phyblock.tracks.prompts import TemplatePrompt
-from phyblock.words import Gating, Setting
+from phyblock.words import CandidateScale, Gating, Setting
 
 __all__ = ["FEEDBACKS", "Feedback", "History", "PastStep", "StepOutcome", "StepPrompt"]
 
@@ -67,7 +67,8 @@ class PastStep:
 class StepPrompt:
     """A template with its rules; `memory` is how many earlier steps are shown, None for all.
 
-    By `gating` and the setting `accepts` a move succeeds, of which the model is told.
+    By `gating` and the setting `accepts` a move succeeds, of which the model is told; with
+    `is_blind` it is not shown the goal.
     """
 
     template: TemplatePrompt
@@ -77,6 +78,7 @@ class StepPrompt:
     cot: bool
     gating: Gating = "aov"
     accepts: Setting = "A"
+    is_blind: bool = False
 
     def __post_init__(self) -> None:
         """Raise PromptError where the template has no text for the turns of a conversation."""
@@ -90,15 +92,21 @@ class StepPrompt:
         past: Sequence[PastStep],
         n_candidates: int,
         max_steps: int,
+        candidate_scale: CandidateScale | None = None,
     ) -> tuple[Message, ...]:
-        """The messages of the step after `past`; `fixed` are the goal and the candidates."""
+        """The messages of the step after `past`; `fixed` are the goal and the candidates.
+
+        `candidate_scale` is None where the pictures are not drawn here.
+        """
         hidden = 0 if self.memory is None else max(0, len(past) - self.memory)
         facts: dict[str, object] = {
             "n_candidates": n_candidates,
+            "candidate_scale": candidate_scale,
             "max_steps": max_steps,
             "cot": self.cot,
             "gating": self.gating,
             "setting": self.accepts,
+            "is_blind": self.is_blind,
             "n_hidden": hidden,
         }
         facts["answer"] = self.template.text("answer", facts)

@@ -79,7 +79,7 @@ class EpisodeRecord(Record):
     def row(self) -> Mapping[str, Any]:
         """The moves that were attempted, as a plan, and how the episode went."""
         went = ("ending", "max_steps", "outcomes", "progress")
-        return {**plan_row(self.parse), **{name: getattr(self, name) for name in went}}
+        return {**plan_row(self.parse, self.shown), **{name: getattr(self, name) for name in went}}
 
     exported: ClassVar[Mapping[str, str]] = {"ending": "string"}
 

@@ -3,12 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 from phyblock.errors import Problem, SpecError
 from phyblock.tables.load import Run
-from phyblock.tables.track_report import WHOLE, PaperTable, Shown, TableMaker, TrackReport
-from phyblock.tracks.step_planning.episodes import endings_frame, moves_frame, progress_frame
+from phyblock.tables.showing import planning_words
+from phyblock.tables.track_report import (
+    WHOLE,
+    EpisodeView,
+    PaperTable,
+    Shown,
+    TableMaker,
+    TrackReport,
+)
+from phyblock.tracks.orders import order_frame, order_in_terminal, order_view
+from phyblock.tracks.step_planning.episodes import (
+    NAME,
+    endings_frame,
+    moves_frame,
+    progress_frame,
+)
 from phyblock.tracks.step_planning.figure import progress_by_turn
+from phyblock.tracks.step_planning.film import episode_film, episode_table
 from phyblock.tracks.step_planning.measures import STEP_MEASURES
 from phyblock.tracks.step_planning.table3 import (
     endings_view,
@@ -76,9 +92,17 @@ REPORT = TrackReport(
         "endings": TableMaker(endings_frame, endings_view, in_terminal=episodes_in_terminal),
         "moves": TableMaker(moves_frame, moves_view, "endings"),
         "progress": TableMaker(progress_frame, progress_view),
+        "step_orders": TableMaker(
+            partial(order_frame, NAME, "placed", ""),
+            order_view,
+            "table3",
+            in_terminal=order_in_terminal,
+        ),
     },
     figures={"step-progress": progress_by_turn},
     figure_titles={"step-progress": "Blocks placed, turn by turn"},
     paper_tables={3: PaperTable(paper_table3_frame, paper_table3_view)},
     check_alike=_check_alike,
+    showing=lambda run: planning_words(run, "steps"),
+    episodes=EpisodeView(episode_table, episode_film),
 )

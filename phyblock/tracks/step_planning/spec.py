@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from phyblock.specs.fields import Count, Flag, Section, TemplateName
+from phyblock.specs.fields import Count, Flag, PictureControls, TemplateName
 from phyblock.tracks.step_planning.prompt import Feedback, History
 from phyblock.words import Gating, Physics, Setting
 
@@ -15,7 +15,7 @@ __all__ = ["StepsSpec"]
 PositiveUsd = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 
 
-class StepsSpec(Section):
+class StepsSpec(PictureControls):
     """The rules of the step_planning track: the simulator, what is shown, when it ends."""
 
     setting: Setting | None = Field(

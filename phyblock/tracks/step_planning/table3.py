@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,12 +12,22 @@ from phyblock.tables.cells import METRIC_NAMES, METRICS, SIDE_METRICS
 from phyblock.tables.headline import interval_frame, interval_view
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
-from phyblock.tables.paper_numbers import NOTHING, beside_view, interleaved, published_table
-from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number, spread
+from phyblock.tables.paper_numbers import (
+    NOTHING,
+    OURS,
+    PUBLISHED,
+    beside_view,
+    cell_text,
+    interleaved,
+    published_table,
+    row_name,
+)
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.step_planning.episodes import STEP_OUTCOMES, endings_frame
 from phyblock.tracks.step_planning.measures import COUNTED, NAME, is_asked
 from phyblock.tracks.step_planning.rules import ENDINGS
+from phyblock.tracks.step_planning.spec import StepsSpec
 
 __all__ = [
     "ENDING_NAMES",
@@ -36,7 +45,6 @@ __all__ = [
     "table3_view",
 ]
 
-_OURS, _PUBLISHED = "run", "published"
 _MODEL = Column("Model", is_text=True)
 _GROUPS = {"placed": "Placed blocks", "attempted": "All attempted moves"}
 ENDING_NAMES = {
@@ -136,7 +144,7 @@ def table3_frame(run: Run) -> pd.DataFrame:
     kinds = {"": "_mean", "_sd": "_sd"} if several else {"": ""}
     rows: list[dict[str, Any]] = []
     for model in design.model_names:
-        row: dict[str, Any] = {"model": model, "source": _OURS, "published_name": ""}
+        row: dict[str, Any] = {"model": model, "source": OURS, "published_name": ""}
         for criterion in COUNTED:
             cells = scores[(model, criterion)]
             row |= {
@@ -148,7 +156,7 @@ def table3_frame(run: Run) -> pd.DataFrame:
         row |= {"completion": 100 * ended["completion"], "detour": ended["detour"], "n": ended["n"]}
         rows.append(row)
         if printed := published_scores(design.published.get(model, "")):
-            about = {"model": model, "source": _PUBLISHED}
+            about = {"model": model, "source": PUBLISHED}
             rows.append({**about, "published_name": design.published[model], **printed})
     return pd.DataFrame(rows)
 
@@ -168,42 +176,29 @@ def table3_view(table: pd.DataFrame, run: Run) -> TextTable:
     cells = [f"{criterion}_{metric}" for criterion in COUNTED for metric in METRICS]
     rows = tuple(
         (
-            _row_name(row),
-            *(_cell(row, cell) for cell in cells),
+            row_name(row),
+            *(cell_text(row, cell) for cell in cells),
             number(row["completion"]),
             number(row["detour"], 2),
         )
         for row in table.to_dict("records")
     )
     return TextTable(
-        f"Step-by-step planning (%){_of_suite(run)}",
+        f"Step-by-step planning (%){run.design.of_suite}",
         (_MODEL, *columns, Column("Completed"), Column("Steps / fewest")),
         rows,
         tuple(_notes(table, run)),
     )
 
 
-def _row_name(row: Mapping[Hashable, Any]) -> str:
-    published = f"  as published ({row['published_name']})"
-    return str(row["model"]) if row["source"] == _OURS else published
-
-
-def _cell(row: Mapping[Hashable, Any], cell: str) -> str:
-    return spread(row[cell], row.get(f"{cell}_sd", np.nan))
-
-
-def _of_suite(run: Run) -> str:
-    return f", suite {run.design.suite.name}" if run.design.suite.name else ""
-
-
 def _notes(table: pd.DataFrame, run: Run) -> list[str]:
-    steps = run.manifest["suite"].get("steps", {})
+    steps = run.section("steps", StepsSpec)
     seeds = len(run.design.suite.seeds)
-    accepts = steps.get("setting") or run.design.setting
+    accepts = steps.setting or run.design.setting
     notes = [
         f"Scored in setting {run.design.setting}. The simulator goes by setting {accepts}, gating "
-        f"{steps.get('gating')}, physics {steps.get('physics')}; feedback {steps.get('feedback')}, "
-        f"history as {steps.get('history')}. Micro averages.",
+        f"{steps.gating}, physics {steps.physics}; feedback {steps.feedback}, "
+        f"history as {steps.history}. Micro averages.",
         "Placed blocks: those in the world; one is wrong when the goal has no such block left in "
         "this setting, or when it fell. A simulator that goes by the same setting places no wrong "
         "one, so precision is then below 100 by collapses alone. The paper does not say how its "
@@ -212,7 +207,7 @@ def _notes(table: pd.DataFrame, run: Run) -> list[str]:
     ]
     if seeds > 1:
         notes.append(f"Mean ± standard deviation over {seeds} seeds.")
-    ours = table[table["source"] == _OURS]
+    ours = table[table["source"] == OURS]
     expected = run.design.samples(NAME)
     short = [
         f"{row['model']} {row['n']:.0f}" for row in ours.to_dict("records") if row["n"] < expected
@@ -237,7 +232,7 @@ def endings_view(table: pd.DataFrame, run: Run) -> TextTable:
         for row in table.to_dict("records")
     )
     return TextTable(
-        f"How episodes ended (%){_of_suite(run)}",
+        f"How episodes ended (%){run.design.of_suite}",
         (_MODEL, Column("Episodes"), *columns, Column("Steps"), Column("Steps / fewest")),
         rows,
         ("Steps is the mean over all episodes; Steps / fewest is over those completed.",),
@@ -256,7 +251,7 @@ def moves_view(table: pd.DataFrame, run: Run) -> TextTable:
     )
     columns = [Column(_OUTCOMES[name]) for name in STEP_OUTCOMES]
     return TextTable(
-        f"What became of steps (%){_of_suite(run)}",
+        f"What became of steps (%){run.design.of_suite}",
         (_MODEL, Column("Steps"), *columns),
         rows,
         ("Shares of all steps. Unread: no single operation could be read in the reply.",),
@@ -273,7 +268,7 @@ def progress_view(table: pd.DataFrame, run: Run) -> TextTable:
         for model in run.design.model_names
     )
     return TextTable(
-        f"Blocks of the goal that are placed after so many steps (%){_of_suite(run)}",
+        f"Blocks of the goal that are placed after so many steps (%){run.design.of_suite}",
         (_MODEL, *(Column(str(step)) for step in shown)),
         rows,
         ("Mean over episodes; one that has ended keeps what it had. Every step: progress.csv.",),

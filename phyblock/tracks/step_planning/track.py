@@ -24,7 +24,9 @@ from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.sim.registry import DEFAULT_ENGINE, physics_engine
 from phyblock.sim.site import ONE_SETTING, Settled, settle, state_picture
 from phyblock.sim.stability import DEFAULT_TRIAL
+from phyblock.tracks.full_planning.guessing import BlindGuesses
 from phyblock.tracks.pictures import Pictures
+from phyblock.tracks.showing import Showing, TaskShowing, told_of
 from phyblock.tracks.step_planning.baselines import StepSubject
 from phyblock.tracks.step_planning.episode import Desk, StepEpisode
 from phyblock.tracks.step_planning.prompt import PastStep, StepPrompt
@@ -46,6 +48,9 @@ class _Sight:
     pictures: Pictures
 
 
+_PLAIN = TaskShowing(Showing())
+
+
 class StepPlanning:
     """Episodes of one operation a step; see `StepEpisode`."""
 
@@ -57,17 +62,27 @@ class StepPlanning:
         prompt: StepPrompt | None = None,
         pictures: Pictures | None = None,
         items: Sequence[AssemblyTask] = (),
+        showing: TaskShowing = _PLAIN,
+        pool: Sequence[AssemblyTask] = (),
     ) -> None:
-        """`prompt` and `pictures` are None where every model is a recording."""
+        """`prompt` and `pictures` are None where every model is a recording; from `pool`, else
+        `items`, baselines learn.
+        """
         self.rules = rules
         self.items = items
         self.template = "" if prompt is None else prompt.template.name
+        self._showing = showing
+        self._guesses = BlindGuesses(showing, pool or items, rules.accepts)
         self._sight = _Sight(prompt, pictures) if prompt and pictures else None
         self._settled: OrderedDict[tuple[Block, ...], Settled] = OrderedDict()
 
+    def shown(self, item: AssemblyTask, seed: int) -> AssemblyTask:
+        """The scene as a seed shows it."""
+        return self._showing.of(item, seed)
+
     def about(self, item: AssemblyTask) -> dict[str, Any]:
-        """The most steps that an episode of it can take."""
-        return {"max_steps": self.rules.limits.max_steps(len(item.scene))}
+        """The most steps that an episode of it can take, and how the scene is shown."""
+        return {"max_steps": self.rules.limits.max_steps(len(item.scene)), **told_of(item)}
 
     def identity(self) -> dict[str, Any]:
         """Name and version of the prompt, a digest of the pictures, the reader's version, and the
@@ -77,7 +92,7 @@ class StepPlanning:
         if self._sight is None:
             return {"prompt": None, "pictures": None, **rest}
         template = self._sight.prompt.template
-        keys = [self._sight.pictures.keys(task) for task in self.items]
+        keys = [self._sight.pictures.keys(task) for task in self._showing.each(self.items)]
         return {
             "prompt": {"name": template.name, "version": template.version},
             "pictures": hashlib.sha256(json.dumps(keys).encode()).hexdigest(),
@@ -88,10 +103,10 @@ class StepPlanning:
         self, item: AssemblyTask, seed: int, params: Mapping[str, object], *, with_messages: bool
     ) -> StepEpisode:
         """An episode that has not begun."""
-        desk = Desk(self._settle)
+        desk = Desk(self._settle, partial(self._guesses.plan, item))
         if with_messages and self._sight is not None:
             version = self._sight.prompt.template.version
-            desk = Desk(self._settle, partial(self._write, self._sight, item), version)
+            desk = replace(desk, write=partial(self._write, self._sight, item), version=version)
         return StepEpisode(item, seed, params, self.rules, desk)
 
     def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
@@ -102,7 +117,9 @@ class StepPlanning:
         """
         rules = self.rules
         assembly = Assembly(item.scene, item.candidates, rules.accepts, rules.gating)
-        subject = StepSubject(item.scene, item.candidates, assembly.right_moves(), ())
+        guess = partial(self._guesses.plan, item)
+        right = assembly.right_moves()
+        subject = StepSubject(item.scene, item.candidates, right, (), guess=guess)
         for step in range(rules.limits.max_steps(len(item.scene))):
             for sample in range(rules.samples):
                 request = Request(f"{item.key}/{step + 1}", sample, (), {}, "", subject)
@@ -122,7 +139,7 @@ class StepPlanning:
         pictures = self._sight.pictures
         fixed, is_fixed_real = pictures.outline(item)
         drawing = self._drawing(self._sight, item, ())
-        side = pictures.policy.style.size_px
+        side = pictures.style_of(item).size_px
         (current,), is_current_real = pictures.outlined((drawing,), (side, side))
         messages = self._messages(self._sight, item, fixed, current, past)
         version = self._sight.prompt.template.version
@@ -157,10 +174,11 @@ class StepPlanning:
         past: Sequence[PastStep],
     ) -> tuple[Message, ...]:
         most = self.rules.limits.max_steps(len(item.scene))
-        return sight.prompt.messages(fixed, current, past, len(item.candidates), most)
+        scale = sight.pictures.candidate_scale
+        return sight.prompt.messages(fixed, current, past, len(item.candidates), most, scale)
 
     def _drawing(self, sight: _Sight, item: AssemblyTask, blocks: Sequence[Block]) -> Drawing:
-        style = sight.pictures.policy.style
+        style = sight.pictures.style_of(item)
         recipe = state_picture(item.scene, blocks, style)
         return Drawing(
             recipe.label, question_key(recipe, style), partial(question_png, recipe, style)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from phyblock.records import Manifest
 from phyblock.resources import bundled
 from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tables.track_report import TrackReport
@@ -24,6 +25,10 @@ def _questions(suite: SuiteSpec) -> tuple[str, tuple[str, ...], bool]:
 def _manifest(loaded: LoadedSuite) -> Mapping[str, Any]:
     spec = loaded.suite.section(VqaSpec)
     return {"questions": {"format": spec.format, "root": str(loaded.folders[Vqa.name])}}
+
+
+def _found_at(manifest: Manifest) -> str | None:
+    return None if manifest.questions is None else manifest.questions.root
 
 
 def _report() -> TrackReport:
@@ -48,4 +53,5 @@ TRACK = TrackKind(
     tables=("table2",),
     own_data=_questions,
     manifest=_manifest,
+    own_root=_found_at,
 )

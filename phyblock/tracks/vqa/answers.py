@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
-from phyblock.scoring import Answered, letter_rates
+from phyblock.scoring import letter_rates
 from phyblock.tables.load import Run, once_per_run
 from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.tracks.vqa.spec import VqaSpec
 
 __all__ = [
     "CELLS",
     "OVERALL_CELL",
-    "Showing",
     "answers_of",
     "expected_answers",
     "letters_frame",
+    "question_digest",
     "questions_counted",
     "scored_answers",
     "showing",
@@ -35,25 +35,14 @@ CELLS: tuple[str, ...] = (
 """Cells in the order of Table 2: the subtasks of a category, its average, ..., the overall one."""
 
 
-@dataclass(frozen=True)
-class Showing:
-    """How a run showed its questions."""
-
-    options_as: str = "images"
-    circular: bool = False
-    blind: bool = False
-    wrong_image: bool = False
-
-    @property
-    def rotations(self) -> int:
-        """How often each question was asked with one seed."""
-        return len(LETTERS) if self.circular else 1
-
-
-def showing(run: Run) -> Showing:
+def showing(run: Run) -> VqaSpec:
     """What the run's suite says of it."""
-    section = run.manifest.get("suite", {}).get("vqa", {})
-    return Showing(**{name: section[name] for name in Showing.__annotations__ if name in section})
+    return run.section("vqa", VqaSpec)
+
+
+def question_digest(run: Run) -> str | None:
+    """Digest of the set that the run's questions were chosen from; None where it is not told."""
+    return run.manifest.tracks.get(_TRACK, {}).get("questions")
 
 
 @once_per_run
@@ -87,8 +76,8 @@ def letters_frame(run: Run) -> pd.DataFrame:
     """
     rows = []
     for model in run.design.model_names:
-        answers = _answers(scored_answers(run, model))
-        rates = letter_rates(answers)
+        answers = scored_answers(run, model)
+        rates = letter_rates(zip(answers["right"], answers["given"], strict=True))
         row: dict[str, Any] = {"model": model, "n": rates.n}
         row["unread"] = rates.n - sum(rates.given.values())
         for letter in LETTERS:
@@ -123,17 +112,7 @@ def scored_answers(run: Run, model: str) -> pd.DataFrame:
     return samples[~names.isin(set(names[left_out]))]
 
 
-def _answers(samples: pd.DataFrame) -> list[Answered]:
-    columns = ("question", "seed", "subtask", "right", "given", "rotation")
-    return [
-        Answered(f"{question} s{seed}", subtask, right, given, int(rotation))
-        for question, seed, subtask, right, given, rotation in zip(
-            *(samples[name] for name in columns), strict=True
-        )
-    ]
-
-
 def expected_answers(run: Run) -> dict[str, int]:
     """Samples of each subtask that a complete run holds of one model."""
-    told = run.manifest.get("tracks", {}).get(_TRACK, {}).get("by_subtask", {})
+    told = run.manifest.tracks.get(_TRACK, {}).get("by_subtask", {})
     return {name: count * len(run.design.suite.seeds) for name, count in told.items()}

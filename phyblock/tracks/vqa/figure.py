@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 
 from phyblock.domain import CATEGORIES, SUBTASKS
-from phyblock.scoring import chance
 from phyblock.tables.drawing import (
     MUTED,
     headed,
@@ -16,7 +15,7 @@ from phyblock.tables.drawing import (
 )
 from phyblock.tables.load import Run
 from phyblock.tracks.vqa.accuracy import questions_frame
-from phyblock.tracks.vqa.answers import showing
+from phyblock.tracks.vqa.measures import guessing, is_asked
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,7 +38,7 @@ def accuracy_by_subtask(run: Run) -> pd.DataFrame:
 
 def vqa_heat_map(run: Run) -> Figure | None:
     """A row a model, a column a subtask, categories apart; None without a question."""
-    if "vqa" not in run.design.suite.tracks:
+    if not is_asked(run):
         return None
     table = accuracy_by_subtask(run)
     if table.empty:
@@ -69,7 +68,8 @@ def vqa_heat_map(run: Run) -> Figure | None:
     bar.set_label("Right answers (%)")
     bar.outline.set_visible(False)
     name = f"Suite {run.design.suite.name}, " if run.design.suite.name else ""
-    guessed = {subtask: 100 * chance(subtask) ** showing(run).rotations for subtask in ("SH", "OR")}
-    guessing = f"guessing gives {guessed['SH']:.2g}, in OR {guessed['OR']:.1g}"
-    headed(figure, "Questions by subtask", f"{name}right answers (%); {guessing}")
+    chance = (
+        f"guessing gives {100 * guessing(run, 'SH'):.2g}, in OR {100 * guessing(run, 'OR'):.1g}"
+    )
+    headed(figure, "Questions by subtask", f"{name}right answers (%); {chance}")
     return figure

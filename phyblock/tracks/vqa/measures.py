@@ -112,6 +112,7 @@ ACCURACY = Measure(
     "questions that were answered right; under circular evaluation in every rotation",
     over="questions",
     chance=guessing,
+    floors=("majority", "text-only", "random"),
 )
 EACH_ROTATION = Measure(
     "each_rotation",

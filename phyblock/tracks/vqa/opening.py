@@ -15,7 +15,7 @@ from phyblock.datasets import (
 )
 from phyblock.domain import SUBTASKS, Subtask
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.resources import bundled
+from phyblock.resources import bundled_sets
 from phyblock.tracks.kind import Opening
 from phyblock.tracks.opening import (
     picture_folder,
@@ -48,7 +48,11 @@ def open_vqa(opening: Opening) -> Vqa:
     if not opening.with_prompts:
         return Vqa(rules, questions, tasks)
     pictures = QuestionPictures(
-        picture_folder(), picture_style(suite), spec.options_as, render_workers()
+        picture_folder(),
+        picture_style(suite.images),
+        spec.options_as,
+        render_workers(),
+        suite.images.background,
     )
     return Vqa(rules, questions, tasks, template_prompt(loaded, Vqa.name), pictures)
 
@@ -59,8 +63,8 @@ def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSe
         return read_official_questions(path, dataset)
     if (path / QUESTIONS_FILE).is_file():
         return read_questions(path, dataset)
-    names = sorted(p.parent.name for p in bundled("benchmarks", "data").glob(f"*/{QUESTIONS_FILE}"))
-    allowed = f"a folder with {QUESTIONS_FILE}, or a bundled set of questions: {', '.join(names)}"
+    names = ", ".join(bundled_sets(QUESTIONS_FILE))
+    allowed = f"a folder with {QUESTIONS_FILE}, or a bundled set of questions: {names}"
     raise DataError(Problem(str(path), "holds no questions", "vqa.path", allowed=allowed))
 
 

@@ -9,10 +9,12 @@ from typing import Any
 from phyblock.datasets import Dataset, QuestionTask
 from phyblock.domain import Question, QuestionPicture
 from phyblock.errors import DataError, Problem
-from phyblock.records import Record
+from phyblock.records import MANIFEST, Record
 from phyblock.sim import PictureStyle
+from phyblock.tables.load import Run
 from phyblock.tables.track_report import PageItems
 from phyblock.tracks.drawable import block_entry, rounded
+from phyblock.tracks.vqa.answers import question_digest, showing
 from phyblock.tracks.vqa.opening import open_questions
 from phyblock.tracks.vqa.pictures import QuestionPictures, Shown
 from phyblock.tracks.vqa.record import ChoiceRecord
@@ -23,16 +25,19 @@ __all__ = ["question_items"]
 _CHANGED = "is not the data set that the run was made on, or it was changed since"
 
 
-def question_items(manifest: Mapping[str, Any], dataset: Dataset) -> PageItems:
+def question_items(run: Run, dataset: Dataset) -> PageItems:
     """The questions of a run; DataError where they are not what it was made on."""
-    recorded, suite = manifest["questions"], manifest["suite"]
-    questions = open_questions(recorded["format"], Path(recorded["root"]), dataset)
-    if questions.sha256 != manifest["tracks"]["vqa"]["questions"]:
+    recorded, shown = run.manifest.questions, showing(run)
+    if recorded is None:
+        raise DataError(Problem(str(run.path / MANIFEST), "names no questions", "questions"))
+    questions = open_questions(recorded.format, Path(recorded.root), dataset)
+    if questions.sha256 != question_digest(run):
         raise DataError(Problem(str(questions.root), _CHANGED, "sha256", questions.sha256))
     by_id = {task.question.id: task for task in questions.tasks}
 
     def pictures(folder: Path, style: PictureStyle) -> QuestionPictures:
-        return QuestionPictures(folder, style, suite["vqa"]["options_as"], 1)
+        ground = run.manifest.suite["images"]["background"]
+        return QuestionPictures(folder, style, shown.options_as, 1, ground)
 
     return PageItems(lambda record: _shown(record, by_id), _entry, pictures)
 

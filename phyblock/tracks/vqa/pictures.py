@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal
@@ -17,6 +17,7 @@ from phyblock.sim import PictureStyle
 from phyblock.sim.lettered import LETTERED_VERSION, lettered_sheet_png, sheet_size_px
 from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.tracks.studio import Drawing, Studio, to_image
+from phyblock.words import Background
 
 __all__ = ["OptionsAs", "QuestionPictures", "Shown"]
 
@@ -46,13 +47,20 @@ class QuestionPictures(Studio):
     """The pictures of questions under one style, as many as the question has.
 
     First the scene, then the block by itself where there is one, then the options A to D: each a
-    picture of its own (`images`), or all on one sheet (`letters`).
+    picture of its own (`images`), or all on one sheet (`letters`). Questions bring backgrounds of
+    their own, which `background` overrides; those that bring none have the style's.
     """
 
     def __init__(
-        self, folder: Path, style: PictureStyle, options_as: OptionsAs, workers: int
+        self,
+        folder: Path,
+        style: PictureStyle,
+        options_as: OptionsAs,
+        workers: int,
+        background: Background | None = None,
     ) -> None:
         super().__init__(folder, workers)
+        self._background = background
         self._style = style
         self._options_as = options_as
 
@@ -106,6 +114,7 @@ class QuestionPictures(Studio):
             key = hashlib.sha256(read_picture(path)).hexdigest()
             return Drawing(label, key, partial(read_picture, path))
         recipe = _recipe(shown.question, label)
+        recipe = replace(recipe, background=self._background or recipe.background)
         key = question_key(recipe, self._style)
         return Drawing(label, key, partial(question_png, recipe, self._style))
 

@@ -8,9 +8,11 @@ from phyblock.domain import CATEGORIES, SUBTASK_NAMES
 from phyblock.errors import Problem, SpecError
 from phyblock.tables.load import Run
 from phyblock.tables.paper_numbers import HUMAN_ACCURACY, HUMAN_NOTE
+from phyblock.tables.showing import control_words
 from phyblock.tables.track_report import PaperTable, Shown, TableMaker, TrackReport
 from phyblock.tracks.vqa.accuracy import questions_frame
-from phyblock.tracks.vqa.answers import OVERALL_CELL, letters_frame, showing
+from phyblock.tracks.vqa.answers import OVERALL_CELL, letters_frame, question_digest, showing
+from phyblock.tracks.vqa.export import QUESTION_EXPORT
 from phyblock.tracks.vqa.figure import vqa_heat_map
 from phyblock.tracks.vqa.measures import (
     ACCURACY,
@@ -54,6 +56,13 @@ def _notes(_: Run) -> Sequence[str]:
     return (f"Accuracy in percent. {macro}, as far as they were asked.",)
 
 
+def _how_shown(run: Run) -> tuple[str, ...]:
+    shown = showing(run)
+    circular = ("circular",) if shown.circular else ()
+    letters = ("options on one sheet",) if shown.options_as == "letters" else ()
+    return (*circular, *control_words(run, NAME), *letters)
+
+
 def _check_alike(run: Run, first: Run, _: Sequence[str]) -> None:
     circular = [showing(one).circular for one in (run, first)]
     if circular[0] != circular[1]:
@@ -61,7 +70,7 @@ def _check_alike(run: Run, first: Run, _: Sequence[str]) -> None:
         message = f"counts right answers in another way than {first.path}"
         raise SpecError(Problem(str(run.path), message, "vqa.circular", found, allowed))
     # Digests of the sets that questions were chosen from.
-    sets = [one.manifest.get("tracks", {}).get(NAME, {}).get("questions") for one in (run, first)]
+    sets = [question_digest(one) for one in (run, first)]
     if sets[0] != sets[1]:
         message = f"asked questions of another set than {first.path}"
         raise SpecError(Problem(str(run.path), message, "questions", str(sets[0]), str(sets[1])))
@@ -85,6 +94,8 @@ REPORT = TrackReport(
     figure_titles={"vqa-subtasks": "VQA accuracy by subtask"},
     paper_tables={2: PaperTable(paper_table2_frame, paper_table2_view)},
     check_alike=_check_alike,
+    showing=_how_shown,
     part_names={str(short): name for short, name in SUBTASK_NAMES.items()},
     items=question_items,
+    export=QUESTION_EXPORT,
 )

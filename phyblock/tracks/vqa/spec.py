@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from phyblock.domain import SUBTASKS, Subtask
-from phyblock.specs.fields import Count, Flag, Section, TemplateName, UniqueSome
+from phyblock.domain import LETTERS, SUBTASKS, Subtask
+from phyblock.specs.fields import Count, Flag, PictureControls, TemplateName, UniqueSome
 from phyblock.tracks.vqa.pictures import OptionsAs
 from phyblock.words import DataFormat
 
@@ -15,7 +15,7 @@ BUILTIN_QUESTIONS = "phyblock-vqa"
 """The bundled question set that is used when a suite names none."""
 
 
-class VqaSpec(Section):
+class VqaSpec(PictureControls):
     """The questions of the vqa track and how they are shown."""
 
     format: DataFormat = Field(
@@ -42,8 +42,11 @@ class VqaSpec(Section):
         default=False,
         description="Ask every rotation of the options; a question is right only if all are.",
     )
-    blind: Flag = Field(default=False, description="Send no picture.")
-    wrong_image: Flag = Field(default=False, description="Show pictures of another scene.")
     prompt: TemplateName = Field(
         default="default", description="default, or the path of a .j2 template."
     )
+
+    @property
+    def rotations(self) -> int:
+        """How often each question is asked with one seed."""
+        return len(LETTERS) if self.circular else 1

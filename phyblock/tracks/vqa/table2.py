@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -14,8 +13,17 @@ from phyblock.tables.estimates import strata_of
 from phyblock.tables.headline import interval_frame, interval_view
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
-from phyblock.tables.paper_numbers import NOTHING, beside_view, interleaved, published_table
-from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number, spread
+from phyblock.tables.paper_numbers import (
+    NOTHING,
+    OURS,
+    PUBLISHED,
+    beside_view,
+    cell_text,
+    interleaved,
+    published_table,
+    row_name,
+)
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.vqa.accuracy import questions_frame
 from phyblock.tracks.vqa.answers import CELLS, OVERALL_CELL, showing
@@ -33,7 +41,6 @@ __all__ = [
     "vqa_intervals_view",
 ]
 
-OURS, PUBLISHED = "run", "published"
 _MODEL = Column("Model", is_text=True)
 _GROUPS = {
     "object_property": "Object Property",
@@ -90,18 +97,18 @@ def table2_view(table: pd.DataFrame, run: Run) -> TextTable:
         for name in (*subtasks, category)
     ]
     rows = tuple(
-        (_row_name(row), *(_cell(row, cell) for cell in CELLS)) for row in table.to_dict("records")
+        (row_name(row), *(cell_text(row, cell) for cell in CELLS))
+        for row in table.to_dict("records")
     )
-    suite = f", suite {run.design.suite.name}" if run.design.suite.name else ""
     return TextTable(
-        f"Physical-understanding VQA (%){suite}{_how_shown(run)}",
+        f"Physical-understanding VQA (%){run.design.of_suite}",
         (_MODEL, *columns, Column("Avg", "Overall")),
         rows,
         tuple(_notes(table, run)),
     )
 
 
-def letters_view(table: pd.DataFrame, run: Run) -> TextTable:
+def letters_view(table: pd.DataFrame, _: Run) -> TextTable:
     """Rates of letters out of `letters_frame`."""
     columns = [Column(kind, letter) for letter in LETTERS for kind in ("right", "given")]
     names = [f"{kind}_{letter.lower()}" for letter in LETTERS for kind in ("right", "given")]
@@ -110,32 +117,11 @@ def letters_view(table: pd.DataFrame, run: Run) -> TextTable:
         for row in table.to_dict("records")
     )
     return TextTable(
-        f"Letters that are right and letters given (%){_how_shown(run)}",
+        "Letters that are right and letters given (%)",
         (_MODEL, Column("n"), Column("No letter"), *columns),
         rows,
         ("Shares of all scored answers; questions of ordering have no one letter.",),
     )
-
-
-def _row_name(row: Mapping[Hashable, str]) -> str:
-    return row["model"] if row["source"] == OURS else f"  as published ({row['published_name']})"
-
-
-def _cell(row: Mapping[Hashable, float], cell: str) -> str:
-    return spread(row[cell], row.get(f"{cell}_sd", np.nan))
-
-
-def _how_shown(run: Run) -> str:
-    """What is unusual about how questions were shown, as the end of a caption."""
-    shown = showing(run)
-    parts = {
-        "circular": shown.circular,
-        "blind": shown.blind,
-        "pictures of another scene": shown.wrong_image,
-        "options on one sheet": shown.options_as == "letters",
-    }
-    told = [name for name, holds in parts.items() if holds]
-    return f" [{', '.join(told)}]" if told else ""
 
 
 def _notes(table: pd.DataFrame, run: Run) -> list[str]:

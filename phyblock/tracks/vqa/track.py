@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import json
 from collections import Counter
@@ -13,10 +12,10 @@ from typing import Any
 from phyblock.datasets import QuestionSet, QuestionTask
 from phyblock.domain import LETTERS, Question, Scene, is_picture_option
 from phyblock.domain.rotation import rotated, rotated_label
-from phyblock.errors import Problem, SpecError
 from phyblock.models.base import Image, Request
 from phyblock.models.guesses import Guesses
 from phyblock.parsing import READER_VERSION, ParsedAnswer, parse_answer
+from phyblock.tracks.elsewhere import Elsewhere
 from phyblock.tracks.prompts import Prompt
 from phyblock.tracks.vqa.baselines import ChoiceSubject
 from phyblock.tracks.vqa.pictures import OptionsAs, QuestionPictures, Shown
@@ -112,6 +111,7 @@ class Vqa:
         """
         rotations = range(len(LETTERS)) if rules.circular else range(1)
         self.rules = rules
+        self._tasks = {task.key: task for task in tasks}
         self.items: Sequence[AskedQuestion] = tuple(
             asked(task, rotation, is_one_of_many=rules.circular)
             for task in tasks
@@ -122,8 +122,10 @@ class Vqa:
         self._prompt = prompt
         self._pictures = pictures
         self._guesses = Guesses([task.question for task in questions.tasks])
+        self._elsewhere: Elsewhere[QuestionTask] | None = None
         if rules.wrong_image:
-            self._check_elsewhere()
+            self._elsewhere = Elsewhere(questions.tasks, _sort_of)
+            self._elsewhere.check(tasks, "question", "vqa.wrong_image")
 
     def about(self, item: AskedQuestion) -> dict[str, Any]:
         """Which question it is and how it is shown."""
@@ -227,47 +229,19 @@ class Vqa:
         Which other one depends on the question and the seed alone, so it is the same for all
         models and for all rotations.
         """
-        if not self.rules.wrong_image:
+        if self._elsewhere is None:
             return item.shown
-        others = self._elsewhere[item.question.id]
-        digest = hashlib.sha256(f"wrong image|{seed}|{item.question.id}".encode()).digest()
-        return asked(others[int.from_bytes(digest, "big") % len(others)], item.rotation).shown
-
-    @functools.cached_property
-    def _elsewhere(self) -> dict[str, list[QuestionTask]]:
-        """For each question asked, those with like pictures of a scene that shares no parent."""
-        alike: dict[object, list[QuestionTask]] = {}
-        for task in self._questions.tasks:
-            alike.setdefault(_sort_of(Shown(task.question, task.files)), []).append(task)
-        return {
-            item.question.id: [
-                task
-                for task in alike.get(_sort_of(item.shown), ())
-                if not set(_parents(task.question)) & set(_parents(item.question))
-            ]
-            for item in self.items
-            if not item.rotation
-        }
-
-    def _check_elsewhere(self) -> None:
-        lacking = [name for name, others in self._elsewhere.items() if not others]
-        if lacking:
-            message = "has no question of the same kind about another scene to take pictures from"
-            problem = Problem(f"question {lacking[0]}", message, "vqa.wrong_image")
-            raise SpecError(problem)
+        other = self._elsewhere.of(self._tasks[item.question.id], seed)
+        return asked(other, item.rotation).shown
 
 
-def _sort_of(shown: Shown) -> tuple[object, ...]:
+def _sort_of(task: QuestionTask) -> tuple[object, ...]:
     """What pictures must share to stand in for one another: a text may speak of place B."""
     marks = sorted(
         (picture.label, *sorted(mark.letter for mark in picture.marks))
-        for picture in shown.question.pictures
+        for picture in task.question.pictures
     )
-    return (shown.question.subtask, shown.labels, *marks)
-
-
-def _parents(question: Question) -> tuple[str, ...]:
-    return question.scene.parents or (question.scene.id,)
+    return (task.question.subtask, Shown(task.question, task.files).labels, *marks)
 
 
 def _digest(content: object) -> str:

@@ -100,14 +100,14 @@ def test_a_broken_scene_is_named_with_what_and_where(
     assert all(text.startswith(scene.id) for texts in found.values() for text in texts)
 
 
-def test_candidates_that_lack_a_block_or_stray_too_far_are_named() -> None:
+def test_candidates_that_lack_a_block_or_stand_strangely_are_named() -> None:
     whole = make_candidates(GATE)
     needed = {block.look for block in GATE.blocks}
     lacking = CandidateSet(tuple(c for c in whole.candidates if c.look not in needed))
     assert any("that block 1 needs" in text for text in failed(GATE, lacking)["candidate set"])
-    strange = replace(whole.candidates[0], type="cube", color="blue", euler_deg=(0.0, 0.0, 0.0))
+    strange = replace(whole.candidates[0], type="arch", color="red", euler_deg=(45.0, 0.0, 0.0))
     (text,) = failed(GATE, CandidateSet((*whole.candidates[:-1], strange)))["candidate set"]
-    assert "by more than one attribute" in text
+    assert "stands as no block of a goal does" in text
 
 
 def test_duplicates_are_found_turned_and_mirrored() -> None:
@@ -126,7 +126,7 @@ def test_parents_must_be_base_scenes_of_the_set() -> None:
 def test_pictures_tell_apart_all_looks_in_use() -> None:
     looks, alike = check_looks(task.candidates for task in TASKS)
     assert alike == ()
-    assert looks >= 40
+    assert looks >= 30  # Poses that no goal needs are not offered: they give themselves away.
     candidate = TASKS[0].candidates.candidates[0]
     turned = replace(candidate, euler_deg=(0.0, 0.0, 0.05))
     twins = CandidateSet((replace(candidate, euler_deg=(0.0, 0.0, 0.0)), turned))
@@ -136,7 +136,7 @@ def test_pictures_tell_apart_all_looks_in_use() -> None:
 def test_a_changed_or_missing_file_is_named(tmp_path: Path) -> None:
     folder = tmp_path / "set"
     shutil.copytree(BUILT_IN, folder)
-    assert check_sums(folder) == (2, ())
+    assert check_sums(folder) == (3, ())
     (folder / "README.md").write_text("changed\n")
     (folder / "scenes.jsonl").unlink()
     _, problems = check_sums(folder)

@@ -50,7 +50,7 @@ def offering(scene: Scene, change: object) -> SceneFacts:
     return SceneFacts(scene, CandidateSet(change(OFFERED.candidates)), QUICK)
 
 
-STRANGE = replace(OFFERED.candidates[0], type="cube", color="blue", euler_deg=(0.0, 0.0, 0.0))
+STRANGE = replace(OFFERED.candidates[0], type="arch", color="red", euler_deg=(45.0, 0.0, 0.0))
 SPOILED = {
     "size": lambda: SceneFacts(replace(GATE, levels=(4,))),
     "palette": lambda: SceneFacts(with_block(3, color="green")),

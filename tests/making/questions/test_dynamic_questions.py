@@ -12,6 +12,7 @@ from phyblock.domain import LETTERS, Question, Subtask
 from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled
 from phyblock.sim.seeing import is_inside, least_difference, seen
+from phyblock.sim.support import find_gaps
 from phyblock_making.questions.counterfactual import OUTCOME_TEXTS
 from phyblock_making.questions.pictured_drafts import LEAST_PIXELS
 from phyblock_making.questions.question_production import make_questions
@@ -20,7 +21,9 @@ from phyblock_making.workers import open_workers
 
 DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
 SMALL = [task.scene for task in DATA.tasks if len(task.scene) in (4, 5)]
-SCENES = tuple(SMALL[::24])
+TOWERS = [task.scene for task in DATA.tasks if len(task.scene) in (8, 9)]
+SCENES = (*SMALL[::30], *TOWERS[::20])
+HANGS_M = 0.004
 WANTED: dict[Subtask, int] = {"VP": 3, "CF": 3, "PD": 1, "OR": 2}
 
 
@@ -55,6 +58,22 @@ def test_pictures_of_options_are_whole_and_told_apart(questions: list[Question])
             assert least_difference([seen(option) for option in options]) >= LEAST_PIXELS
 
 
+def test_pictures_of_stages_show_the_same_blocks(questions: list[Question]) -> None:
+    """Nothing is larger or smaller for being early: one outline, two colors."""
+    for question in [question for question in questions if question.subtask == "OR"]:
+        shots = [seen(picture).block >= 0 for picture in question.pictures]
+        assert all((shot == shots[0]).all() for shot in shots)
+        for picture in question.pictures:
+            assert len({block.color for block in picture.blocks}) == 2
+
+
+def test_nothing_hangs_free_in_a_picture_of_what_follows(questions: list[Question]) -> None:
+    for question in questions:
+        if question.evidence["kind"] in ("cf-picture", "pd-push", "pd-next"):
+            for picture in question.pictures:
+                assert find_gaps(picture.blocks, HANGS_M) == ()
+
+
 def test_texts_of_outcomes_are_always_all_offered(questions: list[Question]) -> None:
     for question in questions:
         if question.evidence["kind"] == "cf-count":
@@ -63,7 +82,7 @@ def test_texts_of_outcomes_are_always_all_offered(questions: list[Question]) -> 
 
 def test_a_changed_picture_is_found_out(questions: list[Question]) -> None:
     """The right picture put in a wrong one's place: two options are right, or none."""
-    matching = next(q for q in questions if q.evidence["kind"] in ("vp-color", "vp-form"))
+    matching = next(q for q in questions if q.evidence["kind"] == "vp-match")
     right = matching.pictures[1 + matching.answer[0]]
     copied = [
         replace(right, label=picture.label) if picture.label in LETTERS else picture

@@ -66,8 +66,9 @@ def test_named_blocks_are_looked_for_in_the_picture(asked: list[Question]) -> No
     seen = referents(named)
     assert seen.keys() == {block.order for block in named.scene.blocks}
     assert all(0.5 < share <= 1 for share in seen.values())
-    turned = replace(named, pictures=(replace(named.pictures[0], view_deg=(0.0, 30.0)),))
-    assert referents(turned) == {}
+    turned = replace(named, pictures=(replace(named.pictures[0], view_deg=(225.0, 30.0)),))
+    assert referents(turned).keys() == seen.keys()
+    assert referents(turned) != seen
 
 
 def test_scenes_and_bases_are_counted(asked: list[Question]) -> None:

@@ -106,6 +106,7 @@ def test_what_is_written_is_read_back(tmp_path: Path, scenes: list[Scene]) -> No
     assert sorted(path.name for path in folder.iterdir()) == [
         "README.md",
         "SHA256SUMS",
+        "VERSION",
         "scenes.jsonl",
     ]
     assert writer.levels[2].scenes == 6

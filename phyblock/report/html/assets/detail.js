@@ -27,7 +27,8 @@ const Detail = (() => {
     }
   }
 
-  function build(loaded, scene, question) {
+  function build(loaded, inFile, question) {
+    const scene = inFile && asShown(inFile, loaded[0].record.shown);
     const several = loaded.length > 1;
     const all = columns(loaded.map((sample) => [
       several ? heading(sample) : null, question ? Question.answer(sample) : null, ...texts(sample)]));
@@ -36,6 +37,14 @@ const Detail = (() => {
       return [Question.about(question, loaded[0]), all];
     }
     return [assembly(loaded, scene, several), scene ? candidates(scene) : null, all].filter(Boolean);
+  }
+
+  /** The scene with its candidates in the order in which the samples' seed showed them. */
+  function asShown(scene, shown) {
+    if (!shown) return scene;
+    const number = (inFile) => inFile && shown.order.indexOf(inFile) + 1;
+    return { ...scene, candidates: shown.order.map((n) => scene.candidates[n - 1]),
+      blocks: scene.blocks.map((block) => ({ ...block, candidate: number(block.candidate) })) };
   }
 
   /** Goal and what was built side by side, under one clock; the steps below. */
@@ -101,9 +110,11 @@ const Detail = (() => {
   }
 
   function goal(scene, sample) {
-    const { levels } = sample;
+    const { levels, record: { shown } } = sample;
+    const other = shown && shown.goal !== sample.scene
+      ? (shown.goal ? `; shown was the goal of ${shown.goal}` : "; no goal was shown") : "";
     return el("figure", {}, el("figcaption", {}, "Goal ", el("span", { class: "muted" },
-      `${Words.count(scene.blocks.length, "block")}, level${levels.length > 1 ? "s" : ""} ${levels.join(" and ")}`)),
+      `${Words.count(scene.blocks.length, "block")}, level${levels.length > 1 ? "s" : ""} ${levels.join(" and ")}${other}`)),
     picture("Goal", scene.blocks, { view: Stage.HOME, grid: true }, "goal"));
   }
 

@@ -11,18 +11,25 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from phyblock.datasets import QuestionTask
-from phyblock.domain import LETTERS, is_picture_option
+from phyblock.datasets import Dataset, QuestionTask
+from phyblock.datasets.named import find_questions
+from phyblock.domain import LETTERS, SUBTASKS, is_picture_option
+from phyblock.extras import needs
 from phyblock.files import writing
 from phyblock.folders import OutFolder
 from phyblock.models.base import Image
-from phyblock.report.export.rows import needs
+from phyblock.sim import PictureStyle
+from phyblock.tables.track_report import ItemExport
+from phyblock.tracks.opening import picture_folder, render_workers
+from phyblock.tracks.vqa.opening import open_questions, select_questions
 from phyblock.tracks.vqa.pictures import QuestionPictures, Shown
+from phyblock.tracks.vqa.spec import BUILTIN_QUESTIONS
 
-__all__ = ["QUESTION_FORMATS", "export_questions"]
+__all__ = ["QUESTION_EXPORT", "export_questions"]
 
 MCQ_FILE, ORDERING_FILE = "PhyBlock_MCQ.tsv", "PhyBlock_Ordering.tsv"
 _TSV = ("index", "question", *LETTERS, "answer", "category", "l2-category", "scene")
+_LEVELS = (1, 2, 3, 4)
 _FILES = {
     "vlmevalkit": (MCQ_FILE, ORDERING_FILE),
     "hf": ("questions.parquet", "README.md", "dataset/"),
@@ -45,7 +52,7 @@ def export_questions(
     out = OutFolder(folder)
     out.check(_FILES[form])
     with writing(folder), out.making() as made:
-        files = QUESTION_FORMATS[form](tasks, pictures, made)
+        files = _FORMATS[form](tasks, pictures, made)
     return tuple(folder / file.relative_to(made) for file in files)
 
 
@@ -176,7 +183,25 @@ One row a question: `question`, four `options`, `answer` (a letter; four for ord
 `images` in the order sent with their `labels` (`scene`, `block`, or the letter of an option).
 """
 
-QUESTION_FORMATS: dict[
+_FORMATS: dict[
     str, Callable[[Sequence[QuestionTask], QuestionPictures, Path], tuple[Path, ...]]
 ] = {"vlmevalkit": _vlmevalkit, "hf": _hugging_face}
 """Formats of questions by the word after `--to`."""
+
+
+def _write(
+    form: str, out: Path, questions: str, scenes: Dataset, limit: int | None, size_px: int
+) -> tuple[Path, ...]:
+    """As `ItemExport` says; a `limit` is shared over subtasks."""
+    asked = open_questions("builtin", find_questions(questions), scenes)
+    tasks = select_questions(asked.tasks, SUBTASKS, _LEVELS, None, limit)
+    style = PictureStyle(size_px=size_px)
+    pictures = QuestionPictures(picture_folder(), style, "images", render_workers())
+    try:
+        return export_questions(tasks, pictures, form, out)
+    finally:
+        pictures.close()
+
+
+QUESTION_EXPORT = ItemExport(tuple(_FORMATS), BUILTIN_QUESTIONS, _write)
+"""What `phyblock export-data` writes."""

@@ -1,0 +1,98 @@
+"""What came back of a request, as it is stored: a reply, or why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal, TypeVar
+
+from typing_extensions import Self
+
+from phyblock.records.line import LARGEST_WHOLE, Amount, Line, Usd, Whole, encodable
+from phyblock.words import Finish
+
+__all__ = ["ErrorKind", "StoredError", "StoredReply", "StoredUsage"]
+
+ErrorKind = Literal["retryable", "sample", "refused", "unavailable"]
+
+_NumberT = TypeVar("_NumberT", int, float)
+
+
+def _within(number: _NumberT | None, least: int) -> _NumberT | None:
+    return number if number is not None and least <= number <= LARGEST_WHOLE else None
+
+
+class StoredUsage(Line):
+    """Tokens of a reply as the provider counted them; null where it did not say."""
+
+    prompt_tokens: Whole | None
+    """Tokens of the prompt, pictures included."""
+    completion_tokens: Whole | None
+    """Tokens of the reply."""
+    reasoning_tokens: Whole | None = None
+    """Those of `completion_tokens` that were spent on reasoning."""
+
+
+class StoredReply(Line):
+    """An answer that was read."""
+
+    text: str
+    """The answer."""
+    reasoning: str = ""
+    """The reasoning that the provider showed beside it."""
+    finish: Finish = "stop"
+    """Why it ended: by itself, at the token limit, by a content filter, or not said."""
+    usage: StoredUsage
+    """Its tokens."""
+    cost_usd: Usd | None
+    """Its price [US dollars]; null: not known."""
+    billed_usd: Usd | None = None
+    """What `max_cost_usd` counted [US dollars], failed attempts included, a reply without token
+    counts at its dearest; null: no limit was set."""
+    latency_s: Amount = 0.0
+    """Time of the successful request alone [s]."""
+    provider_model: str = ""
+    """The model that the provider says it used."""
+    attempts: Whole = 1
+    """Requests sent for it, 0 from the cache."""
+    cached: bool
+    """Whether it came from the cache."""
+    seed_sent: bool = True
+    """Whether the provider takes a seed; where not, seeds are independent repeats."""
+
+    @classmethod
+    def of(cls, reply: Mapping[str, Any]) -> Self:
+        """Store a reply, given by its fields, without what no file could hold.
+
+        It is paid for: an absurd number in it is one that is not known.
+        """
+        texts = {name: encodable(text) for name, text in reply.items() if isinstance(text, str)}
+        usage = reply["usage"].items()
+        counts = {name: _within(count, -LARGEST_WHOLE) for name, count in usage}
+        money = {name: _within(reply.get(name), 0) for name in ("cost_usd", "billed_usd")}
+        return cls.model_validate({**reply, **texts, **money, "usage": counts})
+
+    @property
+    def tokens(self) -> int:
+        """Tokens of prompt and reply, as far as they are known."""
+        return (self.usage.prompt_tokens or 0) + (self.usage.completion_tokens or 0)
+
+    @property
+    def limit_usd(self) -> float:
+        """What a limit counted for it, else its cost unless that was paid elsewhere."""
+        if self.billed_usd is not None:
+            return self.billed_usd
+        return 0.0 if self.cached else self.cost_usd or 0.0
+
+
+class StoredError(Line):
+    """Why there is no reply."""
+
+    kind: ErrorKind
+    """`retryable`: every attempt failed; `sample`: this request cannot succeed; `refused`: by a
+    content policy."""
+    status: Whole | None = None
+    """HTTP status, where there was one."""
+    message: str = ""
+    """What was said."""
+    billed_usd: Usd | None = None
+    """As of a reply."""

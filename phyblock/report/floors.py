@@ -1,0 +1,199 @@
+"""What answers reach that never see the goal, and which models are above that.
+
+A floor is a baseline of the run, what `run.yaml` says that one would reach, or the chance of
+guessing; the strongest is the one to hold models against.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+
+from phyblock.report.measure_table import headline_columns, main_heading
+from phyblock.tables.headline import headline_rows
+from phyblock.tables.load import Run
+from phyblock.tables.measures import CELL, VARIANT, Measure, way_name
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
+from phyblock.tracks.estimates import track_estimates, track_measures
+from phyblock.tracks.kind import kind_of
+
+__all__ = [
+    "Floor",
+    "floor_lines",
+    "floors_frame",
+    "floors_run",
+    "floors_view",
+    "headline_floors",
+    "strongest_floors",
+]
+
+CHANCE = "chance"
+"""Name of the floor that is uniform guessing."""
+_COLUMNS = (
+    *("track", "measure", *VARIANT, CELL),
+    *("floor", "floor_value", "model", "value", "lo", "hi", "verdict"),
+)
+_VERDICTS = {True: "above", False: "not above", None: "cannot tell"}
+
+
+@dataclass(frozen=True)
+class Floor:
+    """The strongest floor of a cell: its name, and its value in the measure's own unit."""
+
+    name: str
+    value: float
+
+    def is_below(self, lo: float, hi: float, better: str = "higher") -> bool | None:
+        """Whether an interval lies wholly on the better side; None where there is none."""
+        if math.isnan(lo) or math.isnan(hi):
+            return None
+        return lo > self.value if better == "higher" else hi < self.value
+
+
+def floors_frame(run: Run) -> pd.DataFrame:
+    """One row a track, measure that has floors, way of counting, cell and model.
+
+    `floor` is the strongest of the cell and `floor_value` what it reaches; `value` is the model's,
+    with the 95 % interval `lo` to `hi`, all in the measure's own unit. `verdict` is `above` where
+    the whole interval is better than the floor, `not above`, or `cannot tell` where there is no
+    interval. Floors themselves have no row.
+    """
+    rows = []
+    place = {name: number for number, name in enumerate(run.design.model_names)}
+    for track in run.design.suite.tracks:
+        found = track_estimates(run, track)
+        found = found.sort_values("model", key=lambda names: names.map(place), kind="stable")
+        for measure in track_measures(track):
+            floors = strongest_floors(run, track, measure)
+            named = floors_run(run, track)
+            for row in found[found["measure"] == measure.name].to_dict("records"):
+                floor = floors.get(way_name(row))
+                if floor is None or row["model"] in named:
+                    continue
+                verdict = _VERDICTS[floor.is_below(row["lo"], row["hi"], measure.better)]
+                about = {"track": track, "floor": floor.name, "floor_value": floor.value}
+                numbers = {str(name): value for name, value in row.items()}
+                rows.append({**numbers, **about, "verdict": verdict})
+    return pd.DataFrame(rows, columns=list(_COLUMNS))
+
+
+def strongest_floors(run: Run, track: str, measure: Measure) -> dict[str, Floor]:
+    """The strongest floor of every cell that has one, by `way_name`."""
+    best: dict[str, Floor] = {}
+    for way, floor in _known_floors(run, track, measure):
+        other = best.get(way)
+        is_higher = other is None or floor.value > other.value
+        if other is None or is_higher == (measure.better == "higher"):
+            best[way] = floor
+    return best
+
+
+def floors_run(run: Run, track: str) -> set[str]:
+    """The models of a run that are floors of a track."""
+    named = {floor for measure in track_measures(track) for floor in measure.floors}
+    return named & {model.name for model in run.manifest.models if model.kind == "baseline"}
+
+
+def headline_floors(run: Run, track: str) -> dict[str, Floor]:
+    """The strongest floor of the columns of a track's headline that have one, by heading.
+
+    Values are as shown, in percent.
+    """
+    rows = headline_rows(track_estimates(run, track), run.design)
+    found: dict[str, Floor] = {}
+    for column in headline_columns(run, track):
+        mine = rows[(rows["measure"] == column.measure) & (rows[CELL] == column.cell)]
+        mine = mine[(mine["criterion"] == column.criterion) | (not column.criterion)]
+        if len(mine):
+            (measure,) = (m for m in track_measures(track) if m.name == column.measure)
+            floor = strongest_floors(run, track, measure).get(way_name(mine.iloc[0].to_dict()))
+            if floor is not None:
+                found[column.heading] = Floor(floor.name, measure.scale * floor.value)
+    return found
+
+
+def _known_floors(run: Run, track: str, measure: Measure) -> Iterator[tuple[str, Floor]]:
+    """Floors that were run, then those that the manifest knows, then chance."""
+    found = track_estimates(run, track)
+    found = found[found["measure"] == measure.name]
+    asked = [name for name in measure.floors if name in floors_run(run, track)]
+    for row in found[found["model"].isin(asked)].to_dict("records"):
+        if not math.isnan(row["value"]):
+            yield way_name(row), Floor(str(row["model"]), float(row["value"]))
+    computed = run.manifest.floors.get(track, {})
+    for name in measure.floors:
+        for way, value in computed.get(name, {}).items() if name not in asked else ():
+            yield way, Floor(name, float(value))
+    if measure.chance is not None:
+        for row in found.drop_duplicates([CELL, *VARIANT]).to_dict("records"):
+            yield way_name(row), Floor(CHANCE, measure.chance(run, str(row[CELL])))
+
+
+def floors_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """A row a part and setting out of `floors_frame`: the floor, and who is above it or not."""
+    rows = []
+    for track in run.design.suite.tracks:
+        cells = {cell.name: cell for cell in kind_of(track).report().cells(run)}
+        parts = {name for cell in cells.values() for name in cell.of if not cells[name].of}
+        for measure in track_measures(track):
+            mine = table[(table["track"] == track) & (table["measure"] == measure.name)]
+            mine = mine[mine["matcher"].isin(["", run.design.matcher]) & ~mine[CELL].isin(parts)]
+            for key, group in mine.groupby(["setting", "criterion", CELL], sort=False):
+                setting, criterion, cell = map(str, key)
+                heading = f"{measure.heading}, {cells[cell].heading}"
+                rows.append(_row(heading, setting, criterion, group, measure))
+    columns = ("Measure", "Setting", "Counted by", "Strongest floor", "Floor", "Above", "Not above")
+    return TextTable(
+        "Floors: what is reached without seeing the goal",
+        tuple(Column(name, is_text=name != "Floor") for name in columns),
+        tuple(rows),
+        (
+            "Above: the whole 95 % interval is. In brackets: those of which a single base scene "
+            "does not tell.",
+        ),
+    )
+
+
+def _row(
+    heading: str, setting: str, criterion: str, group: pd.DataFrame, measure: Measure
+) -> tuple[str, ...]:
+    first = group.iloc[0]
+    models = {
+        verdict: group.loc[group["verdict"] == verdict, "model"].tolist()
+        for verdict in _VERDICTS.values()
+    }
+    unclear = [f"({name})" for name in models["cannot tell"]]
+    return (
+        heading,
+        setting or NO_VALUE,
+        criterion or NO_VALUE,
+        str(first["floor"]),
+        number(measure.scale * first["floor_value"]),
+        ", ".join(models["above"]) or NO_VALUE,
+        ", ".join([*models["not above"], *unclear]) or NO_VALUE,
+    )
+
+
+def floor_lines(table: pd.DataFrame, run: Run) -> Sequence[str]:
+    """For the terminal: the strongest floor of each track's main number, and who is not above."""
+    lines = ["Floors: what is reached without seeing the goal"]
+    for track in run.design.suite.tracks:
+        heading = main_heading(run, track)
+        (main,) = (shown for shown in headline_columns(run, track) if shown.heading == heading)
+        mine = headline_rows(table[table["track"] == track], run.design)
+        mine = mine[(mine["measure"] == main.measure) & (mine[CELL] == main.cell)]
+        mine = mine[(mine["criterion"] == main.criterion) | (not main.criterion)]
+        if len(mine):
+            (measure,) = (m for m in track_measures(track) if m.name == main.measure)
+            lines.append(f"{kind_of(track).title}, {heading}: {_told(mine, measure)}")
+    return lines if len(lines) > 1 else ()
+
+
+def _told(rows: pd.DataFrame, measure: Measure) -> str:
+    first = rows.iloc[0]
+    floor = f"{first['floor']} {number(measure.scale * first['floor_value'])}"
+    below = rows.loc[rows["verdict"] == "not above", "model"].tolist()
+    return f"{floor}; " + (f"not above it: {', '.join(below)}" if below else "all are above it")

@@ -1,0 +1,91 @@
+"""What answers reach that never see the goal: worked out for the scenes of a run, without a call.
+
+A track whose replies can be read again without a model (`rescored`) is answered here by the rules
+of its own baselines. What they reach stands in `run.yaml`, so that tables need nothing but the
+run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from phyblock.models.base import Reply
+from phyblock.records import MANIFEST, Manifest, Record
+from phyblock.records.manifest import ManifestModel
+from phyblock.run.records import begun, judged
+from phyblock.specs import SuiteSpec
+from phyblock.tables.design import read_design
+from phyblock.tables.load import Run, frames_of
+from phyblock.tables.measures import WAY, way_name
+from phyblock.tracks import AnyTrack, SingleTrack, kind_of, shown_item
+from phyblock.tracks.estimates import track_estimates, track_measures
+
+__all__ = ["COMPUTED_FLOORS", "FloorValues", "floor_values"]
+
+COMPUTED_FLOORS = ("goal-blind", "all-candidates")
+"""Those that leave nothing to chance; `random` stays below them."""
+FloorValues = dict[str, dict[str, dict[str, float]]]
+"""Values by track, floor and way of counting (`way_name`)."""
+
+
+def floor_values(
+    manifest: Manifest,
+    suite: SuiteSpec,
+    reopened: Callable[[str, SuiteSpec], AnyTrack],
+) -> FloorValues:
+    """What the floors of `COMPUTED_FLOORS` reach on a run, for every measure that names them.
+
+    `reopened` opens a track under a suite, without prompts. Floors learn under each setting of
+    the suite; the best value counts.
+    """
+    found: FloorValues = {}
+    for name in suite.tracks:
+        named = {floor for measure in track_measures(name) for floor in measure.floors}
+        floors = [floor for floor in COMPUTED_FLOORS if floor in named]
+        if not kind_of(name).rescored or not floors:
+            continue
+        found[name] = {floor: {} for floor in floors}
+        for setting in suite.settings:
+            # What is learned goes by the first setting; what scores best in B may be either.
+            others = (other for other in suite.settings if other != setting)
+            one = suite.model_copy(update={"settings": (setting, *others)})
+            records = list(_answered(reopened(name, one), floors, one))
+            for floor, way, value in _estimates(manifest, name, floors, records):
+                found[name][floor][way] = max(value, found[name][floor].get(way, value))
+    return found
+
+
+def _answered(track: AnyTrack, floors: Sequence[str], suite: SuiteSpec) -> Iterator[Record]:
+    """The judged answers of floors; one seed tells all unless each shows another order."""
+    assert isinstance(track, SingleTrack)
+    rules = kind_of(track.name).baselines
+    seeds = suite.seeds if suite.candidates.order == "shuffled" else suite.seeds[:1]
+    for item in track.items:
+        for seed in seeds:
+            shown = shown_item(track, item, seed)
+            ((request, _),) = track.outlines(shown)
+            for floor in floors:
+                text = rules[floor](request.subject, np.random.default_rng(seed))
+                sample = f"{track.name}/{floor}/{item.key}/s{seed}"
+                fields = begun(sample, track.name, floor, shown, seed, Reply(text, cost_usd=0.0))
+                yield judged({**fields, **track.about(shown)}, shown, track.judge(shown, text))
+
+
+def _estimates(
+    manifest: Manifest, track: str, floors: Sequence[str], records: Sequence[Record]
+) -> Iterator[tuple[str, str, float]]:
+    """Floor, way of counting and value, of measures that name floors."""
+    models = tuple(ManifestModel(name=floor) for floor in floors)
+    facts = manifest.model_copy(update={"models": models})
+    design = read_design(facts.fields())
+    run = Run(Path(MANIFEST), facts, design, *frames_of(records, design, texts=False))
+    measures = [measure.name for measure in track_measures(track) if measure.floors]
+    rows = track_estimates(run, track)
+    columns = ["model", *WAY, "value"]
+    for row in rows.loc[rows["measure"].isin(measures), columns].to_dict("records"):
+        if not math.isnan(row["value"]):
+            yield str(row["model"]), way_name(row), float(row["value"])

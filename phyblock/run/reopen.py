@@ -1,0 +1,53 @@
+"""The tracks of a run opened again, for judging what it stored: nobody is asked anything."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+
+from phyblock.datasets import Dataset
+from phyblock.errors import DataError, Problem
+from phyblock.records import MANIFEST, Manifest
+from phyblock.run.data import CHANGED
+from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.specs.yaml_source import YamlSource
+from phyblock.tracks import AnyTrack, kind_of
+from phyblock.tracks.kind import Opening
+from phyblock.tracks.opening import open_tracks
+
+__all__ = ["reopen_tracks"]
+
+
+def reopen_tracks(
+    folder: Path,
+    manifest: Manifest,
+    suite: SuiteSpec,
+    names: Collection[str],
+    dataset: Dataset,
+) -> dict[str, AnyTrack]:
+    """The tracks of these names, known to ask what the run in `folder` asked.
+
+    `dataset` is the run's. Raises DataError for other data of a track than those that the run was
+    made on, or another simulator.
+    """
+    path = folder / MANIFEST
+    folders = {
+        name: Path(root) for name in names if (root := kind_of(name).own_root(manifest)) is not None
+    }
+    source = YamlSource(str(path))
+    loaded = LoadedSuite(suite, path, dataset.root, source, folders)
+    opening = Opening(loaded, dataset, manifest.limit, with_prompts=False)
+    tracks = {track.name: track for track in open_tracks(opening, tuple(names))}
+    for name, track in tracks.items():
+        _check_alike(name, track, manifest, folders.get(name, dataset.root))
+    return tracks
+
+
+def _check_alike(name: str, track: AnyTrack, manifest: Manifest, root: Path) -> None:
+    """Raise DataError where a track asks something else, or in another simulator."""
+    told = manifest.tracks.get(name, {})
+    for key, value in track.identity().items():
+        # Prompts and pictures are left out by a track that asks nobody.
+        if value is not None and value != told.get(key):
+            field, was = f"tracks.{name}.{key}", str(told.get(key))
+            raise DataError(Problem(str(root), CHANGED, field, str(value), was))

@@ -1,0 +1,43 @@
+"""Episodes played again from the replies that a run stored."""
+
+from __future__ import annotations
+
+from phyblock.errors import Problem, StoreError
+from phyblock.models.stored import reply_of
+from phyblock.records import Record
+from phyblock.run.records import judged
+from phyblock.tracks import Episode, EpisodeTrack, Item
+
+__all__ = ["counted_again"]
+
+
+async def counted_again(
+    track: EpisodeTrack[Item], item: Item, record: Record, where: str
+) -> Record:
+    """A record of an episode with what measures count of it now; all else stays as it is.
+
+    Raises StoreError, which names `where`, for an episode that goes otherwise than it did.
+    """
+    episode = await _played(track, item, record)
+    given = record.as_given()
+    turns = {"turns": given["turns"]} if "turns" in given else {}
+    again = judged(given, item, episode, turns)
+    was, now = record.fields(), again.fields()
+    changed = [name for name in was if name != "counts" and was[name] != now.get(name)]
+    if changed:
+        message = "goes otherwise than it did, in another version or another simulator"
+        raise StoreError(Problem(where, message, changed[0], record.sample))
+    return record.model_copy(update={"counts": again.counts})
+
+
+async def _played(track: EpisodeTrack[Item], item: Item, record: Record) -> Episode:
+    """The episode that the replies of a record make, to where it ends or they do."""
+    episode = track.start(item, record.seed, {}, with_messages=False)
+    for turn in record.asked_turns:
+        request = await episode.request()
+        if request is None:
+            return episode
+        episode.take(request, reply_of(turn.reply))
+    # What the last reply comes to shows when the next is asked for: blocks are let go.
+    await episode.request()
+    return episode

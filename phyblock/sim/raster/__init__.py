@@ -1,0 +1,1 @@
+"""Our renderer: triangles to pixels in numpy, with shadows, the same bytes on every machine."""

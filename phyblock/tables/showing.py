@@ -1,0 +1,36 @@
+"""What is unusual about how a run showed what it asked about, as captions say it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from phyblock.tables.load import Run
+from phyblock.tables.text_table import TextTable
+
+__all__ = ["captioned", "control_words", "marked", "planning_words"]
+
+_CONTROLS = {"blind": "blind", "wrong_image": "pictures of another scene"}
+"""What captions say of the controls that sections of tracks may set."""
+_ORDERS = {"shuffled": "candidates shuffled"}
+
+
+def control_words(run: Run, section: str) -> tuple[str, ...]:
+    """The controls that a track's section of the suite sets; older runs have no such section."""
+    held = run.manifest.suite.get(section) or {}
+    return tuple(words for name, words in _CONTROLS.items() if held.get(name))
+
+
+def planning_words(run: Run, section: str) -> tuple[str, ...]:
+    """What is unusual about how scenes were shown."""
+    order = _ORDERS.get(run.design.suite.candidates.order)
+    return (*((order,) if order else ()), *control_words(run, section))
+
+
+def captioned(caption: str, words: tuple[str, ...]) -> str:
+    """The caption with the words at its end, in brackets."""
+    return f"{caption} [{', '.join(words)}]" if words else caption
+
+
+def marked(view: TextTable, words: tuple[str, ...]) -> TextTable:
+    """The view with the words at the end of its caption."""
+    return replace(view, caption=captioned(view.caption, words))

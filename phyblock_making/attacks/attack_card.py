@@ -1,0 +1,70 @@
+"""What attacks reach on a set, for its data card, beside the first version of phyblock-vqa."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from phyblock_making.attacks.attacks import Attacked
+from phyblock_making.attacks.observed import Observed
+
+__all__ = ["attack_card"]
+
+VERSION_1: Mapping[str, Mapping[str, int]] = {
+    "area": {"VP": 25, "CF": 26, "PD": 21, "OR": 100},
+    "colors": {"VP": 54, "CF": 25, "PD": 33},
+    "change": {"VP": 41, "CF": 32, "PD": 35},
+    "odd one out": {"VP": 26, "CF": 40, "PD": 23, "OR": 0},
+    "central": {"CF": 42, "AD": 70},
+    "central and flat": {"CF": 36, "AD": 100},
+    "linear probe": {"VP": 60, "CF": 77, "PD": 63, "OR": 100, "AD": 100},
+    "boosted probe": {"VP": 56, "CF": 71, "PD": 63, "OR": 95, "AD": 100},
+    "support": {"CF": 99},
+    "sole support": {"CF": 97},
+    "text, within the set": {
+        **{"": 41, "SH": 49, "CO": 49, "SI": 53, "NU": 39, "RP": 43, "AP": 45, "RD": 45, "RR": 37},
+        **{"OC": 39, "LC": 37, "TC": 39, "VP": 29, "CF": 36, "PD": 39, "AD": 26},
+    },
+}
+"""What each attack reached [%] on the questions that came before there were attacks."""
+_CUTS_1 = "59 in 47 questions, 47 of them to be seen"
+
+_TEXT = """
+## Attacks
+
+From `phyblock vqa audit`; docs/vqa.md says what each goes by. Accuracy [%] of the better of both
+ways to read an attack, with a 95 % interval; the last column is what it reached on the first
+version of `phyblock-vqa`.
+
+| attack | subtask | n | chance | reached | 95 % | aim | aim is | version 1 |
+|---|---|---|---|---|---|---|---|---|
+{rows}
+
+Pictures with a block before the camera's near plane or beyond its far one: {cuts} (version 1:
+{cuts_1}).
+"""
+
+
+def attack_card(attacked: Sequence[Attacked], observed: Sequence[Observed]) -> str:
+    """A section of Markdown, kinds of questions left out; empty where nothing was attacked."""
+    rows = [_row(one) for one in attacked if not one.kind]
+    if not rows:
+        return ""
+    cuts = [cut for one in observed for cut in one.cuts]
+    told = "none"
+    if cuts:
+        questions = sum(bool(one.cuts) for one in observed)
+        shown = sum(cut.pixels > 0 for cut in cuts)
+        told = f"{len(cuts)} in {questions} questions, {shown} of them to be seen"
+    return _TEXT.format(rows="\n".join(rows), cuts=told, cuts_1=_CUTS_1)
+
+
+def _row(one: Attacked) -> str:
+    rate, aim = one.best
+    interval = "" if math.isnan(rate.low) else f"{100 * rate.low:.0f} to {100 * rate.high:.0f}"
+    cells = [
+        *(one.attack.name, one.subtask or "all", one.n, f"{100 * one.chance:.0f}"),
+        *(f"{100 * rate.value:.0f}", interval, f"{100 * aim:.0f}", one.verdict),
+        VERSION_1.get(one.attack.name, {}).get(one.subtask, ""),
+    ]
+    return f"| {' | '.join(map(str, cells))} |"

@@ -1,0 +1,79 @@
+"""The rules that make counterfactual questions easy: what rests on a block goes with it.
+
+When X is taken away, all that rests on it moves, directly or not, and nothing else does; or only
+what rests on nothing else. Neither needs physics: no lever, no weight that held something down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from phyblock.domain.question import LETTERS, Question, QuestionPicture
+from phyblock.domain.scene import Block
+from phyblock.sim.support import support_graph
+from phyblock_making.attacks.cues import Floats
+from phyblock_making.questions.counterfactual import OUTCOME_TEXTS, marked_order
+from phyblock_making.questions.pictured_drafts import moved_between, option_pictures, picture_of
+from phyblock_making.questions.question_draft import UnfairError
+
+__all__ = ["naive_likings", "resting_on", "resting_only_on"]
+
+Falls = Callable[[Sequence[Block], int], frozenset[int]]
+"""Orders of the blocks that a rule says move when one of some blocks is taken away."""
+
+_UNTOLD = -1000.0
+
+
+def naive_likings(question: Question, falls: Falls) -> Floats | None:
+    """How well each option of a question about a removal fits a rule.
+
+    None for other questions, and where the options say something that the rule has no word for.
+    The block taken away is the one that the evidence calls `removed`.
+    """
+    removed = question.evidence.get("removed")
+    if question.subtask != "CF" or not isinstance(removed, int):
+        return None
+    shown = picture_of(question, "scene")
+    moved = falls(shown.blocks, removed)
+    if any(picture.label in LETTERS for picture in question.pictures):
+        told = [_told(question, shown, picture) for picture in option_pictures(question)]
+        expected = {("gone", removed), *(("moved", order) for order in moved)}
+        return np.array([_UNTOLD if t is None else -len(t ^ expected) for t in told], dtype=float)
+    if set(question.options) == set(OUTCOME_TEXTS):
+        right = OUTCOME_TEXTS[min(len(moved), len(OUTCOME_TEXTS) - 1)]
+        return np.array([float(option == right) for option in question.options])
+    if {mark.letter for mark in shown.marks} >= set(LETTERS):
+        return np.array([float(marked_order(shown, letter) in moved) for letter in LETTERS])
+    return None
+
+
+def resting_on(blocks: Sequence[Block], order: int) -> frozenset[int]:
+    """Those that rest on it, directly or not, by contact."""
+    rests_on = support_graph(blocks)
+    above = {order}
+    for _ in blocks:
+        above |= {one for one, below in rests_on.items() if above & below}
+    return frozenset(above - {order})
+
+
+def resting_only_on(blocks: Sequence[Block], order: int) -> frozenset[int]:
+    """Those that rest, by contact, on nothing but it and others that do."""
+    rests_on = support_graph(blocks)
+    above = {order}
+    for _ in blocks:
+        above |= {one for one, below in rests_on.items() if below and below <= above}
+    return frozenset(above - {order})
+
+
+def _told(
+    question: Question, shown: QuestionPicture, option: QuestionPicture
+) -> set[tuple[str, int]] | None:
+    """What an option shows as gone and as moved; None where that is hard to tell."""
+    try:
+        gone, moved = moved_between(replace(question.scene, blocks=shown.blocks), option)
+    except UnfairError:
+        return None
+    return {*(("gone", order) for order in gone), *(("moved", order) for order in moved)}

@@ -1,0 +1,45 @@
+"""What a reader of the support graph alone would say, and whether statics leave no doubt."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from phyblock.domain.scene import Block
+from phyblock.sim.balance import surely_falls, surely_stands
+from phyblock.sim.steps import groups
+from phyblock.sim.support import support_graph
+
+__all__ = ["group_of", "is_sure", "resting_on"]
+
+
+def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> frozenset[int]:
+    """Orders of the blocks that rest on one, directly or not; not its own.
+
+    With `only` they rest on nothing but it and others that do. The naive rule says that these, or
+    those, fall when it is taken away, and nothing else.
+    """
+    below = support_graph(blocks)
+    found: frozenset[int] = frozenset({order})
+    for _ in blocks:
+        found |= {
+            one for one, under in below.items() if under & found and (not only or under <= found)
+        }
+    return found - {order}
+
+
+def group_of(blocks: Sequence[Block], order: int) -> tuple[Block, ...]:
+    """The blocks in reach of one, itself among them."""
+    return next(group for group in groups(blocks) if any(b.order == order for b in group))
+
+
+def is_sure(left: Sequence[Block], moved: Collection[int]) -> bool:
+    """Whether blocks just left to themselves surely do what a simulation says.
+
+    Those that stay stand without those that go, and each lot of those that go cannot be borne
+    by those that stay: with every weight 5 mm off to any side, other masses, and friction to spare.
+    """
+    still = [block for block in left if block.order not in moved]
+    falling = groups([block for block in left if block.order in moved])
+    return all(surely_stands(group) for group in groups(still)) and all(
+        surely_falls([*still, *lot]) for lot in falling
+    )

@@ -1,0 +1,52 @@
+"""Results on different versions of a data set are never mixed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.datasets.version import UNNUMBERED, VERSION_FILE, read_version
+from phyblock.errors import DataError, SpecError
+from phyblock.records import read_manifest
+from phyblock.report.compare import compare_runs
+from phyblock.tables.load import load_run
+from tests.workspace import Workspace
+
+
+@given(st.integers(1, 999_999), st.sampled_from(["", "\n", " \n"]))
+def test_a_version_is_read_back(
+    tmp_path_factory: pytest.TempPathFactory, version: int, end: str
+) -> None:
+    folder = tmp_path_factory.mktemp("set")
+    assert read_version(folder) == UNNUMBERED
+    (folder / VERSION_FILE).write_text(f"{version}{end}", encoding="utf-8")
+    assert read_version(folder) == version
+
+
+@pytest.mark.parametrize("text", ["", "0", "two", "-1", "1.5", "1" * 7, "²"])
+def test_what_is_no_version_is_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / VERSION_FILE).write_text(text, encoding="utf-8")
+    with pytest.raises(DataError, match=r"VERSION: holds no version\n.*\n.*whole number from 1"):
+        read_version(tmp_path)
+
+
+def test_runs_on_two_versions_are_not_mixed(tmp_path: Path) -> None:
+    work = Workspace(tmp_path, tmp_path / "pictures")
+    folder = work.write_scenes()
+    work.write_suite(levels=[1])
+    assert work.run().code == 0
+    assert work.run().code == 0
+    (folder / VERSION_FILE).write_text("2\n", encoding="utf-8")
+    refused = work.run()
+    assert refused.code != 0
+    assert "out: holds another run" in refused.err
+    assert "its data are version 1, these version 2" in refused.err
+    newer = tmp_path / "newer"
+    assert work.phyblock("run", "suite.yaml", "--out", newer, "--no-report").code == 0
+    versions = [read_manifest(path).dataset for path in (work.out, newer)]
+    assert [data.version for data in versions if data is not None] == [1, 2]
+    with pytest.raises(SpecError, match="is of another version of data"):
+        compare_runs(load_run(work.out), load_run(newer), ["oracle"])

@@ -1,0 +1,69 @@
+"""Balance by statics: where it can be worked out by hand, and where a simulation says the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.datasets import read_builtin
+from phyblock.resources import bundled
+from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
+from phyblock.sim.steps import groups
+from tests.sim.structures import block, counterweighted_beam, tower, turned
+
+HALF_CUBE_M = 0.025
+offsets_m = st.floats(-0.045, 0.045)
+angles_deg = st.floats(0, 90)
+
+
+@given(offset_m=offsets_m, angle_deg=angles_deg)
+def test_a_cube_stands_on_another_as_far_as_its_middle_is_over_it(
+    offset_m: float, angle_deg: float
+) -> None:
+    pair = [block(1, "cube", (0, 0, 0.025)), block(2, "cube", (offset_m, 0, 0.075))]
+    pair = turned(pair, angle_deg, (0.3, -0.2))
+    inside_m = HALF_CUBE_M - abs(offset_m)
+    if abs(inside_m) > 1e-4:
+        assert is_balanced(pair) is (inside_m > 0)
+    if abs(abs(inside_m) - MARGIN_M) > 2e-3:
+        assert surely_stands(pair) is (inside_m > MARGIN_M)
+        assert surely_falls(pair) is (inside_m < -MARGIN_M)
+
+
+@given(offset_m=offsets_m)
+def test_nothing_both_stands_and_falls_for_sure(offset_m: float) -> None:
+    plank = [*tower(2), block(3, "cuboid3", (offset_m, 0, 0.1125))]
+    assert not (surely_stands(plank) and surely_falls(plank))
+    assert is_balanced(plank) or not surely_stands(plank)
+
+
+def test_a_weight_that_holds_a_plank_is_needed() -> None:
+    beam = counterweighted_beam()[:2]
+    beam += [block(n, "cylinder", (0, y, 0.125)) for n, y in ((3, 0.05), (4, -0.05))]
+    assert surely_stands(beam)
+    assert not is_balanced(beam[:3])
+    assert surely_falls([*beam[:2], replace(beam[2], position_m=(0, 0.07, 0.125))])
+
+
+def test_a_block_in_the_air_is_not_borne() -> None:
+    assert surely_falls([*tower(1), block(2, "cube", (0, 0, 0.08))])
+    assert is_balanced([])
+
+
+@pytest.mark.parametrize(("friction", "stays"), [(0.9, False), (1.1, True)])
+def test_friction_decides_on_a_slope(friction: float, stays: bool) -> None:
+    """The slope of a triangle on its long side falls by 45 degrees: a coefficient of 1 holds."""
+    wedge = block(1, "triangle", (0, 0, 0))
+    middle_m, out_m, up_m = 0.0707107 / 4, 0.0125 / 2**0.5, 0.01 / 2**0.5
+    at_m = (0, middle_m + out_m - up_m, middle_m + out_m + up_m)
+    slab = block(2, "cuboid1", at_m, (-45, 0, 0))
+    assert is_balanced([wedge, slab], friction) is stays
+
+
+def test_what_the_data_set_holds_stands() -> None:
+    data = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
+    for task in data.tasks[::80]:
+        assert all(is_balanced(group) for group in groups(task.scene.blocks))

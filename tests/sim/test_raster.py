@@ -1,0 +1,271 @@
+"""Our renderer against rays: what shows where, how bright it is, and what lies in shadow."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+import phyblock.sim
+from phyblock.domain import BLOCK_TYPES, Block, euler_deg_to_quat_xyzw, quat_xyzw_to_matrix
+from phyblock.sim.camera import FULL_WINDOW, Camera, frame, view_axes
+from phyblock.sim.geometry import drawn_mesh
+from phyblock.sim.pose import Pose
+from phyblock.sim.raster.renderer import NumpyRenderer
+from phyblock.sim.render import COLOR_RGB, light_direction
+from phyblock.sim.renderer import Light, Prop, Raster
+from tests.sim.structures import block, block_types, clouds, eulers
+
+SIZE_PX = 160
+RAYS = 40
+COLORS = tuple(COLOR_RGB)
+DIGEST = "077f19edea00090368f8a9efc8a70dd88b668db1ee19f511f0d31b1d2652a7d5"
+PRODUCTS = ("dot", "einsum", "inner", "linalg", "matmul", "tensordot", "vdot")
+RENDERER = NumpyRenderer()
+views = st.tuples(st.floats(-180, 180), st.floats(3, 90))
+
+
+@st.composite
+def heaps(draw: st.DrawFn) -> list[Block]:
+    """Three to six blocks in one another's way, in any orientation."""
+    reach = st.floats(-0.1, 0.1)
+    return [
+        block(i + 1, draw(block_types), (draw(reach), draw(reach), draw(reach) + 0.2), draw(eulers))
+        for i in range(draw(st.integers(3, 6)))
+    ]
+
+
+def props_of(blocks: list[Block]) -> list[Prop]:
+    return [
+        Prop(
+            drawn_mesh(one.type),
+            COLOR_RGB[COLORS[place % len(COLORS)]],
+            Pose(np.array(one.position_m), euler_deg_to_quat_xyzw(one.euler_deg)),
+        )
+        for place, one in enumerate(blocks)
+    ]
+
+
+def triangles_m(prop: Prop) -> NDArray[np.float64]:
+    rotation = quat_xyzw_to_matrix(prop.pose.quat_xyzw)
+    corners: NDArray[np.float64] = prop.mesh.corners_m @ rotation.T + prop.pose.position_m
+    return corners
+
+
+def camera_on(props: list[Prop], view: tuple[float, float]) -> Camera:
+    corners = np.vstack([triangles_m(prop).reshape(-1, 3) for prop in props])
+    return frame(corners, view_axes(*view), FULL_WINDOW.scaled(0.85), 0.3)
+
+
+def light_of(camera: Camera) -> Light:
+    return Light(light_direction(camera), 0.5, 0.5)
+
+
+def draw(props: list[Prop], camera: Camera) -> Raster:
+    return RENDERER.draw(props, camera, light_of(camera), SIZE_PX)
+
+
+def hits(
+    starts: NDArray[np.float64], ways: NDArray[np.float64], corners: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How far along each ray (n, 3) it first meets a triangle, inf for never, and the normal."""
+    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    crossed = np.cross(ways[:, None], two)
+    scale = np.where(np.abs(s := (one * crossed).sum(-1)) > 1e-14, s, np.inf)
+    offset = starts[:, None] - corners[:, 0]
+    u = (offset * crossed).sum(-1) / scale
+    turned = np.cross(offset, one)
+    v = (ways[:, None] * turned).sum(-1) / scale
+    away = (two * turned).sum(-1) / scale
+    met = np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (away > 1e-7), away, np.inf)
+    nearest = met.argmin(axis=1)
+    normals = np.cross(one, two)[nearest]
+    return met.min(axis=1), normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def rays(camera: Camera, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Directions of unit depth through the centers of pixels (n, 2), row and column."""
+    across = ((pixels[:, 1] + 0.5) / SIZE_PX * 2 - 1) * camera.half_tangent
+    up = (1 - (pixels[:, 0] + 0.5) / SIZE_PX * 2) * camera.half_tangent
+    return np.stack([across, up, np.ones(len(pixels))], axis=1) @ camera.axes
+
+
+def some_pixels(seed: int, n: int = RAYS) -> NDArray[np.int64]:
+    return np.random.default_rng(seed).integers(0, SIZE_PX, (n, 2))
+
+
+def met_by(
+    props: list[Prop], starts: NDArray[np.float64], ways: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How far along each ray meets each prop, (k, n), inf for never, and the normals, (k, n, 3)."""
+    found = [hits(starts, ways, triangles_m(prop)) for prop in props]
+    return np.stack([away for away, _ in found]), np.stack([normals for _, normals in found])
+
+
+def is_hidden(
+    props: list[Prop], points: NDArray[np.float64], way: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Whether anything stands in the way from points (n, 3)."""
+    away, _ = met_by(props, points, np.broadcast_to(way, points.shape))
+    return np.isfinite(away).any(axis=0)
+
+
+@given(clouds() | heaps(), views, st.integers(0, 2**31))
+@settings(max_examples=40, deadline=None)
+def test_each_pixel_shows_what_the_ray_through_its_center_meets(
+    blocks: list[Block], view: tuple[float, float], seed: int
+) -> None:
+    props = props_of(blocks)
+    camera = camera_on(props, view)
+    pixels = some_pixels(seed)
+    away, _ = met_by(props, np.broadcast_to(camera.eye_m, (RAYS, 3)), rays(camera, pixels))
+    shown = draw(props, camera).prop[pixels[:, 0], pixels[:, 1]]
+    # Where faces of two blocks lie in one plane, either may show; no prop is infinitely far.
+    away = np.vstack([away, np.full(RAYS, np.inf)])
+    off = away[shown, np.arange(RAYS)] - np.minimum(away.min(axis=0), 1e9)
+    wrong = np.where(shown < 0, np.isfinite(away).any(axis=0), off > 1e-6)
+    # A ray that grazes an edge may be taken to meet either side of it.
+    assert wrong.sum() <= 1
+
+
+@given(heaps(), views, st.integers(0, 2**31))
+@settings(max_examples=25, deadline=None)
+def test_a_pixel_is_as_bright_as_its_face_and_what_stands_before_the_light_say(
+    blocks: list[Block], view: tuple[float, float], seed: int
+) -> None:
+    """Points near the edge of a shadow are left out; round faces bend between their facets."""
+    props = props_of(blocks)
+    camera = camera_on(props, view)
+    light, pixels, raster = light_of(camera), some_pixels(seed, 5 * RAYS), draw(props, camera)
+    shown = raster.prop[pixels[:, 0], pixels[:, 1]]
+    pixels, shown = pixels[shown >= 0], shown[shown >= 0]
+    ways = rays(camera, pixels)
+    away, normals = met_by(props, np.broadcast_to(camera.eye_m, ways.shape), ways)
+    away, normals = away[shown, np.arange(len(shown))], normals[shown, np.arange(len(shown))]
+    points = camera.eye_m + np.where(np.isfinite(away), away, 0.0)[:, None] * ways
+    steps = 0.006 * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
+    hidden = np.stack([is_hidden(props, points + step, light.direction) for step in steps])
+    clear = np.isfinite(away) & (hidden.all(axis=0) | ~hidden.any(axis=0))
+    facing = np.maximum(normals @ light.direction, 0) * ~hidden[0]
+    colors = np.array([prop.rgb for prop in props])[shown]
+    found = raster.rgb[pixels[:, 0], pixels[:, 1]]
+    bright = light.ambient + light.diffuse * facing
+    off = np.abs(found - colors * bright[:, None]).max(axis=1, initial=0)
+    assert (off[clear] > 8).sum() <= 1
+
+
+@given(clouds(), views, st.integers(0, 2**31))
+@settings(max_examples=30, deadline=None)
+def test_the_ground_is_in_shadow_where_something_stands_before_the_light(
+    blocks: list[Block], view: tuple[float, float], seed: int
+) -> None:
+    props = props_of(blocks)
+    camera = camera_on(props, view)
+    pixels = some_pixels(seed)
+    ways = rays(camera, pixels)
+    below = ways[:, 2] < -1e-6
+    pixels, ways = pixels[below], ways[below]
+    ground = camera.eye_m + ways * (camera.eye_m[2] / -ways[:, 2:])
+    shaded = is_hidden(props, ground, light_of(camera).direction)
+    assert (draw(props, camera).shaded[pixels[:, 0], pixels[:, 1]] != shaded).sum() <= 1
+
+
+@given(clouds(), views, st.randoms(use_true_random=False))
+@settings(max_examples=20, deadline=None)
+def test_the_order_of_blocks_changes_their_numbers_alone(blocks, view, random) -> None:
+    props = props_of(blocks)
+    camera = camera_on(props, view)
+    order = list(range(len(props)))
+    random.shuffle(order)
+    one, other = draw(props, camera), draw([props[place] for place in order], camera)
+    assert one.rgb.tobytes() == other.rgb.tobytes()
+    assert one.shaded.tobytes() == other.shaded.tobytes()
+    assert (np.append(order, -1)[other.prop] == one.prop).all()
+
+
+@given(clouds(), views)
+@settings(max_examples=20, deadline=None)
+def test_with_even_light_every_pixel_has_the_color_of_what_it_shows(blocks, view) -> None:
+    props = props_of(blocks)
+    even = Light(np.array([0.0, 0.0, 1.0]), 1.0, 0.0)
+    raster = RENDERER.draw(props, camera_on(props, view), even, SIZE_PX)
+    colors = np.array([prop.rgb for prop in props])
+    assert (raster.rgb[raster.prop >= 0] == colors[raster.prop[raster.prop >= 0]]).all()
+
+
+@given(clouds(), views)
+@settings(max_examples=20, deadline=None)
+def test_half_a_pixel_to_the_side_changes_edges_alone(blocks, view) -> None:
+    """Every pixel that is not at an edge of the whole keeps showing a block, or the ground."""
+    props = props_of(blocks)
+    camera = camera_on(props, view)
+    depth_m = float(np.mean([(p.pose.position_m - camera.eye_m) @ camera.axes[2] for p in props]))
+    shift_m = camera.axes[0] * camera.width_m(depth_m) / SIZE_PX / 2
+    one, other = draw(props, camera), draw(props, replace(camera, eye_m=camera.eye_m + shift_m))
+    shown = one.prop >= 0
+    around = np.stack([np.roll(shown, (i, j), (0, 1)) for i in (-2, 0, 2) for j in (-2, 0, 2)])
+    inside = (around == shown).all(axis=0)
+    assert (shown[inside] == (other.prop >= 0)[inside]).all()
+
+
+@given(clouds(), views)
+@settings(max_examples=20, deadline=None)
+def test_a_picture_is_the_same_with_its_planes_wide_open(blocks, view) -> None:
+    props = props_of(blocks)
+    camera = camera_on(props, view)
+    depths = [(triangles_m(prop).reshape(-1, 3) - camera.eye_m) @ camera.axes[2] for prop in props]
+    assert camera.near_m < np.min(np.concatenate(depths))
+    assert np.max(np.concatenate(depths)) < camera.far_m
+    wide = draw(props, replace(camera, near_m=1e-6, far_m=1e9))
+    one = draw(props, camera)
+    assert one.rgb.tobytes() == wide.rgb.tobytes()
+    assert one.prop.tobytes() == wide.prop.tobytes()
+
+
+def test_what_reaches_behind_the_camera_is_drawn_as_far_as_it_is_before_it() -> None:
+    """A long block beside the eye: only what is in front of it can show."""
+    plank = Block(1, "cuboid3", "red", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (), 1)
+    camera = Camera(np.array([-0.05, 0.0, 0.05]), view_axes(180.0, 1.0), 1e-3, 10.0, 90.0)
+    shown = draw(props_of([plank]), camera).prop >= 0
+    assert shown[-1].any()
+    assert not shown[: SIZE_PX // 2].any()
+
+
+def test_the_bytes_of_a_picture_are_the_same_on_every_machine() -> None:
+    """Where these change on purpose, `RASTER_VERSION` is raised, or cached pictures are mixed."""
+    blocks = [
+        Block(
+            place,
+            kind,
+            "red",
+            (0.09 * place, 0.07 * (place % 3), 0.1),
+            (20.0 * place, 10.0, 35.0 * place),
+            (),
+            1,
+        )
+        for place, kind in enumerate(BLOCK_TYPES)
+    ]
+    props = props_of(blocks)
+    raster = draw(props, camera_on(props, (45.0, 22.0)))
+    digest = hashlib.sha256()
+    for part in (raster.rgb, raster.prop.astype("<i8"), raster.face.astype("<i8"), raster.shaded):
+        digest.update(part.tobytes())
+    assert digest.hexdigest() == DIGEST
+
+
+def test_no_matrix_product_decides_a_pixel() -> None:
+    """A BLAS adds up in another order on another machine."""
+    sim = Path(phyblock.sim.__file__).parent
+    named = ("exact", "camera", "outlines", "render", "surfaces", "textures")
+    for path in [*sim.glob("raster/*.py"), *(sim / f"{name}.py" for name in named)]:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            assert not isinstance(node, ast.MatMult), path
+            if isinstance(node, ast.Attribute):
+                is_numpy = isinstance(node.value, ast.Name) and node.value.id == "np"
+                assert not (is_numpy and node.attr in PRODUCTS), path
