@@ -21,6 +21,7 @@ from phyblock.parsing.answer_patterns import (
     CHOSEN,
     CONCLUDED,
     CONDITIONAL,
+    CORRECTED,
     DANGLES,
     IS_REJECTED,
     IS_RIGHT,
@@ -28,6 +29,7 @@ from phyblock.parsing.answer_patterns import (
     LABEL,
     LEADING,
     LINE,
+    NOT_BUT,
     ORDER,
     QUOTED,
     REJECTS,
@@ -63,7 +65,7 @@ class ParsedAnswer:
 
 def parse_answer(text: str, options: Sequence[str], is_ordering: bool) -> ParsedAnswer:
     """Read the answer out of a reply to a question that shows `options`, the first one as A."""
-    answer = QUOTED.sub(" ", answer_of(text) or "").strip()
+    answer = NOT_BUT.sub(r"\g<value>", QUOTED.sub(" ", answer_of(text) or "")).strip()
     reader = OrderReader(len(options)) if is_ordering else ChoiceReader(options)
     for rule, find in _ORDER_RULES if is_ordering else _CHOICE_RULES:
         found = find(answer, reader)
@@ -98,6 +100,7 @@ def _stated(text: str, reader: Reader) -> str | None:
     for statement in statements(text, SENTENCE, reader.read, 0):
         if statement.end not in lines:
             stated.append(statement)
+    stated += statements(text, CORRECTED, reader.read, 2)
     if isinstance(reader, ChoiceReader):
         stated += statements(text, CHOSEN, reader.letter, 0)
         stated += statements(text, IS_RIGHT, reader.exact, 0)
@@ -132,7 +135,12 @@ def _outer_line(text: str, reader: Reader) -> str | None:
     named = {letters for letters in found if letters is not None}
     if not named:
         return None
+    if found[1] is None and _WAIT.search(text):
+        return CONTRADICTION
     return named.pop() if len(named) == 1 else CONTRADICTION
+
+
+_WAIT = re.compile(r"\b(?:wait|correction|on second thought|mistake)\b", re.IGNORECASE)
 
 
 def _leading(text: str, reader: Reader) -> str | None:

@@ -12,6 +12,7 @@ __all__ = [
     "CHOSEN",
     "CONCLUDED",
     "CONDITIONAL",
+    "CORRECTED",
     "DANGLES",
     "IS_REJECTED",
     "IS_RIGHT",
@@ -19,6 +20,7 @@ __all__ = [
     "LABEL",
     "LEADING",
     "LINE",
+    "NOT_BUT",
     "ORDER",
     "QUOTED",
     "REJECTS",
@@ -78,6 +80,16 @@ CONCLUDED = re.compile(
     r"(?: (?:the |with )?(?:option|picture|image|choice|place))?)[ *_`]{0,4}"
     r"(?P<value>\(?[A-Z]\)?)[*_`]{0,3}(?=[\s.!,;]{0,3}(?:\Z|\n|[.!;]))",
 )
+CORRECTED = re.compile(
+    rf"\b(?P<lead>correction|edit|korrektur|final(?: decision| choice)?|更正)\s?[:：]{_VALUE}",
+    re.IGNORECASE,
+)
+"""An answer that takes the place of what was said before."""
+NOT_BUT = re.compile(
+    r"(?:\b(?:not|nicht|no es|n't)\s|不是)(?:option )?\(?[A-Z]\)?(?:,|，)?\s?"
+    r"(?:(?:but|sondern|es|it's|it is)\s|而是)(?:option )?(?P<value>\(?[A-Z]\)?(?![A-Za-z]))"
+)
+"""Not this but that: what is meant is that."""
 CONDITIONAL = re.compile(
     r"\b(?:if|unless|provided|assuming|(?<=, )falls|wenn|otherwise|sonst|or else|depend(?:s"
     r"|ing))\b(?! (?:I|we) (?:had|have|must)\b)"
@@ -86,8 +98,8 @@ CONDITIONAL = re.compile(
 )
 """That an answer holds only under a condition."""
 QUOTED = re.compile(
-    rf"(?<=\w )[\"\u201c\u00ab](?:[^\"\u201d\u00bb\n]{{0,40}}?(?:{_WORDS})\s?[:：]"
-    r"[^\"\u201d\u00bb\n]{0,40})[\"\u201d\u00bb]",
+    rf"(?<=[\w:] )[\"'\u201c\u00ab](?:[^\"'\u201d\u00bb\n]{{0,40}}?(?:{_WORDS})\s?[:：]"
+    r"[^\"'\u201d\u00bb\n]{0,40})[\"'\u201d\u00bb]",
     re.IGNORECASE,
 )
 """An answer in quotation marks within a sentence: somebody else's words."""

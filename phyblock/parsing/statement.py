@@ -82,7 +82,8 @@ _MENTION = re.compile(
 )
 _TIMES = re.compile(
     r"[\s)\]}]{0,3}(?:\s?\([^()\d\n]{0,60}\))?[\s,]{0,2}[(\[]?\s?(?:"
-    r"[x×]\s?(?P<a>\d{1,2})(?!\d)|(?P<b>\d{1,2})\s?(?:[x×](?!\w)|of (?:them|these)\b|copies\b|pieces\b"
+    r"[x×]\s?(?P<a>\d{1,2})(?!\d)|(?P<b>\d{1,2})\s?(?:[x×](?!\w)"
+    r"|of (?:them|these)\b|copies\b|pieces\b"
     r"|times\b|mal\b|fois\b|veces\b|次)"
     r"|(?P<twice>twice|zweimal|deux fois|dos veces|两次|二次)|(?P<thrice>thrice|dreimal|三次)"
     r"|(?P<word>[^\W\d_]{2,8})\s(?:times|mal|fois|veces)\b)",
