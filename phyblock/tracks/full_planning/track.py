@@ -108,15 +108,13 @@ class FullPlanning:
         return told_of(item)
 
     def identity(self) -> dict[str, Any]:
-        """Name and version of the prompt, a digest of the pictures, the version of the reader."""
-        reader = reader_version(self.rules.parser)
+        """Name and version of the prompt, and a digest of all that decides the pictures."""
         if self._prompt is None or self._pictures is None:
-            return {"prompt": None, "pictures": None, "reader": reader}
+            return {"prompt": None, "pictures": None}
         keys = [self._pictures.keys(task) for task in self._showing.each(self.items)]
         return {
             "prompt": {"name": self._prompt.name, "version": self._prompt.version},
             "pictures": hashlib.sha256(json.dumps(keys).encode()).hexdigest(),
-            "reader": reader,
         }
 
     async def request(

@@ -18,7 +18,6 @@ from typing import Any
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block
 from phyblock.models.base import Image, Message, Request
-from phyblock.parsing import READER_VERSION
 from phyblock.scoring import Assembly
 from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.sim.registry import DEFAULT_ENGINE, physics_engine
@@ -85,18 +84,18 @@ class StepPlanning:
         return {"max_steps": self.rules.limits.max_steps(len(item.scene)), **told_of(item)}
 
     def identity(self) -> dict[str, Any]:
-        """Name and version of the prompt, a digest of the pictures, the reader's version, and the
+        """Name and version of the prompt, a digest of all that decides the pictures, and the
         physics engine where blocks are let go in another one than PyBullet.
         """
-        rest = {"reader": READER_VERSION, **self._other_engine()}
+        engine = self._other_engine()
         if self._sight is None:
-            return {"prompt": None, "pictures": None, **rest}
+            return {"prompt": None, "pictures": None, **engine}
         template = self._sight.prompt.template
         keys = [self._sight.pictures.keys(task) for task in self._showing.each(self.items)]
         return {
             "prompt": {"name": template.name, "version": template.version},
             "pictures": hashlib.sha256(json.dumps(keys).encode()).hexdigest(),
-            **rest,
+            **engine,
         }
 
     def start(

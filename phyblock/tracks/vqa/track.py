@@ -14,7 +14,7 @@ from phyblock.domain import LETTERS, Question, Scene, is_picture_option
 from phyblock.domain.rotation import rotated, rotated_label
 from phyblock.models.base import Image, Request
 from phyblock.models.guesses import Guesses
-from phyblock.parsing import READER_VERSION, ParsedAnswer, parse_answer
+from phyblock.parsing import ParsedAnswer, parse_answer
 from phyblock.tracks.elsewhere import Elsewhere
 from phyblock.tracks.prompts import Prompt
 from phyblock.tracks.vqa.baselines import ChoiceSubject
@@ -142,7 +142,7 @@ class Vqa:
         }
 
     def identity(self) -> dict[str, Any]:
-        """Digests of all questions, of those asked, prompt and pictures; the reader's version."""
+        """Digests of all questions, of those asked, the prompt and the pictures."""
         counts = Counter(item.question.subtask for item in self.items)
         keys = [item.key for item in self.items]
         told: dict[str, Any] = {
@@ -151,7 +151,6 @@ class Vqa:
             "by_subtask": dict(counts),
             "prompt": None,
             "pictures": None,
-            "reader": READER_VERSION,
         }
         if self._prompt is not None and self._pictures is not None:
             told["prompt"] = {"name": self._prompt.name, "version": self._prompt.version}
