@@ -1,8 +1,8 @@
 """The plan parser against recorded replies that were read by eye.
 
-`gold.csv` holds digests of texts and readings, never a text. Of the replies on which the former
-default and the official parser differ, and the present one from either, all but two are in it;
-the others were drawn at random. `held_out` were read after the rules were written.
+`gold.csv` holds digests of texts and readings, never a text. All replies on which two of
+the former default, the present and the official parser differ are in it; the others were drawn at
+random. `held_out` were read after the rules had been written, before their readings were seen.
 """
 
 from __future__ import annotations

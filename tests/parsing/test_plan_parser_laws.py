@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from phyblock.parsing import PLAN_PROBLEMS, parse_plan
@@ -45,6 +45,7 @@ def said(text: str) -> set[int]:
 
 
 @pytest.mark.parametrize("parser", PLAN_PARSERS)
+@settings(deadline=None)
 @given(text=TEXTS, n_candidates=st.integers(0, 20))
 @example(text="Step1: Move blocks 3-6 and block three", n_candidates=16)
 @example(text="Step1: Move block with index " + "1" * 100_000, n_candidates=16)
@@ -63,6 +64,7 @@ def test_every_number_read_is_said_in_the_text(
     assert parsed.problem in (PLAN_PROBLEMS if parsed.rule is None else (None,))
 
 
+@settings(deadline=None)
 @given(text=TEXTS, n_candidates=st.integers(0, 20))
 def test_the_number_of_candidates_only_decides_what_is_dropped(
     text: str, n_candidates: int
@@ -78,6 +80,7 @@ def test_a_text_without_digits_is_a_parse_failure(text: str) -> None:
     assert parse_plan(text, 16).rule is None
 
 
+@settings(deadline=None)
 @given(steps=st.lists(st.integers(1, 16), min_size=1, max_size=30), preamble=TEXTS)
 def test_the_asked_form_is_read_after_any_reasoning(steps: list[int], preamble: str) -> None:
     lines = "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(steps, 1))
