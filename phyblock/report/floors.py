@@ -195,5 +195,9 @@ def floor_lines(table: pd.DataFrame, run: Run) -> Sequence[str]:
 def _told(rows: pd.DataFrame, measure: Measure) -> str:
     first = rows.iloc[0]
     floor = f"{first['floor']} {number(measure.scale * first['floor_value'])}"
-    below = rows.loc[rows["verdict"] == "not above", "model"].tolist()
-    return f"{floor}; " + (f"not above it: {', '.join(below)}" if below else "all are above it")
+    told = [
+        f"{verdict} it: {', '.join(rows.loc[rows['verdict'] == verdict, 'model'])}"
+        for verdict in ("above", "not above")
+        if (rows["verdict"] == verdict).any()
+    ]
+    return "; ".join([floor, *told])

@@ -22,9 +22,9 @@ from scipy.optimize import nnls  # type: ignore[import-untyped]
 
 from phyblock.domain.blocks import FRICTION, SHAPES, BlockType, euler_deg_to_matrix
 from phyblock.domain.scene import Block
-from phyblock.sim.convex import contact_corners_m, moved, separating_axes
-from phyblock.sim.geometry import ConvexPiece, collision_pieces
-from phyblock.sim.support import CONTACT_TOLERANCE_M, bounds_m, boxes_near
+from phyblock.sim.convex import contact_corners_m, cross, separating_axes
+from phyblock.sim.geometry import ConvexPiece
+from phyblock.sim.support import CONTACT_TOLERANCE_M, bounds_m, boxes_near, pieces_of
 
 __all__ = ["FRICTIONS", "MARGIN_M", "MASSES", "is_balanced", "surely_falls", "surely_stands"]
 
@@ -116,9 +116,9 @@ def _forces(blocks: Sequence[Block], friction: float) -> NDArray[np.float64]:
     columns = []
     for contact in _contacts(blocks):
         helper = _UP if abs(contact.normal[2]) < _STEEP else np.array([1.0, 0.0, 0.0])
-        side = np.cross(contact.normal, helper)
+        side = cross(contact.normal, helper)
         side /= np.linalg.norm(side)
-        across = np.cross(contact.normal, side)
+        across = cross(contact.normal, side)
         edges = contact.normal + friction * np.stack([side, -side, across, -across])
         places = np.repeat(contact.corners_m, len(edges), axis=0)
         wrenches = _wrenches(places, np.tile(edges, (len(contact.corners_m), 1)))
@@ -132,7 +132,7 @@ def _forces(blocks: Sequence[Block], friction: float) -> NDArray[np.float64]:
 
 def _wrenches(at_m: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
     """Forces (k, 3) and their moments about the origin in decimeters, shape (k, 6)."""
-    return np.hstack([force, 10 * np.cross(at_m, force)])
+    return np.hstack([force, 10 * cross(at_m, force)])
 
 
 def _contacts(blocks: Sequence[Block]) -> list[_Contact]:
@@ -145,7 +145,7 @@ def _contacts(blocks: Sequence[Block]) -> list[_Contact]:
 @functools.lru_cache(maxsize=_KEPT)
 def _on_floor(block: Block) -> tuple[NDArray[np.float64], ...]:
     """Where a block stands on the ground; empty where it does not."""
-    points = np.vstack([piece.vertices_m for piece in _pieces(block)])
+    points = np.vstack([piece.vertices_m for piece in pieces_of(block)])
     if points[:, 2].min() >= CONTACT_TOLERANCE_M:
         return ()
     return (_outline(points[points[:, 2] < points[:, 2].min() + CONTACT_TOLERANCE_M]),)
@@ -158,7 +158,7 @@ def _between(
     """Corners and normal of each contact of two blocks, the normal from the first on."""
     if not boxes_near(bounds_m(one), bounds_m(other), CONTACT_TOLERANCE_M):
         return ()
-    met = [_touching(a, b) for a in _pieces(one) for b in _pieces(other)]
+    met = [_touching(a, b) for a in pieces_of(one) for b in pieces_of(other)]
     return tuple(contact for contact in met if contact is not None)
 
 
@@ -179,9 +179,3 @@ def _outline(points: NDArray[np.float64]) -> NDArray[np.float64]:
     angles = np.arange(16) * math.pi / 8 + 0.01
     reach = points[:, :2] @ np.stack([np.cos(angles), np.sin(angles)])
     return points[sorted(set(reach.argmax(axis=0).tolist()))]
-
-
-@functools.lru_cache(maxsize=_KEPT)
-def _pieces(block: Block) -> list[ConvexPiece]:
-    rotation, position = euler_deg_to_matrix(block.euler_deg), np.array(block.position_m)
-    return [moved(piece, rotation, position) for piece in collision_pieces(block.type)]

@@ -77,8 +77,8 @@ def differing_pixels(one: Shot, other: Shot) -> int:
 
 def changed_pixels(one: Shot, other: Shot) -> NDArray[np.bool_]:
     """Where the two differ by more than a tenth of the scale in some channel, shape of both."""
-    step = np.abs(_colors(one) - _colors(other)).max(axis=2)
-    changed: NDArray[np.bool_] = step > _VISIBLE_STEP
+    step = np.abs(_colors(one) - _colors(other)) > _VISIBLE_STEP
+    changed: NDArray[np.bool_] = step[..., 0] | step[..., 1] | step[..., 2]
     return changed
 
 
@@ -177,9 +177,11 @@ def is_apart(
     return bool(apart.min(initial=np.inf) >= least_px)
 
 
-def _colors(shot: Shot) -> NDArray[np.int64]:
+@functools.lru_cache(maxsize=48)
+def _colors(shot: Shot) -> NDArray[np.int16]:
     """Colors with every pixel of the floor white."""
-    colors: NDArray[np.int64] = np.where(shot.block[..., None] >= 0, shot.rgb, 255).astype(np.int64)
+    colors = shot.rgb.astype(np.int16)
+    colors[shot.block < 0] = 255
     return colors
 
 

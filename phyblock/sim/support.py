@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -24,6 +25,7 @@ __all__ = [
     "drop_height_m",
     "find_gaps",
     "find_overlaps",
+    "pieces_of",
     "support_graph",
     "whole_bounds_m",
 ]
@@ -38,6 +40,7 @@ _MAX_CONTACT_OVERLAP_M = 0.003
 _MIN_VERTICAL = 0.7
 _MIN_AREA_M2 = 1e-5
 _MIN_LENGTH_M = 0.005
+_KEPT = 4096
 
 
 @dataclass(frozen=True)
@@ -128,10 +131,20 @@ def drop_height_m(block: Block, blocks: Sequence[Block]) -> float:
     return _clearance_m(_solid(block), [_solid(other) for other in blocks])
 
 
+@functools.lru_cache(maxsize=_KEPT)
 def bounds_m(block: Block) -> NDArray[np.float64]:
-    """Low and high corner of the box round a block, shape (2, 3) [m], world frame."""
+    """Low and high corner of the box round a block, shape (2, 3) [m], world frame; read-only."""
     corners = corners_m(block.type, block.position_m, block.euler_deg)
-    return np.stack([corners.min(axis=0), corners.max(axis=0)])
+    box: NDArray[np.float64] = np.stack([corners.min(axis=0), corners.max(axis=0)])
+    box.setflags(write=False)
+    return box
+
+
+@functools.lru_cache(maxsize=_KEPT)
+def pieces_of(block: Block) -> tuple[ConvexPiece, ...]:
+    """The convex pieces of a block where it is, world frame."""
+    rotation, position_m = euler_deg_to_matrix(block.euler_deg), np.array(block.position_m)
+    return tuple(moved(piece, rotation, position_m) for piece in collision_pieces(block.type))
 
 
 def whole_bounds_m(blocks: Iterable[Block]) -> NDArray[np.float64]:
@@ -147,9 +160,7 @@ def boxes_near(first: NDArray[np.float64], second: NDArray[np.float64], reach_m:
 
 
 def _solid(block: Block) -> _Solid:
-    rotation = euler_deg_to_matrix(block.euler_deg)
-    position = np.array(block.position_m)
-    pieces = tuple(moved(piece, rotation, position) for piece in collision_pieces(block.type))
+    pieces = pieces_of(block)
     points = np.vstack([piece.vertices_m for piece in pieces])
     return _Solid(block.order, pieces, np.stack([points.min(axis=0), points.max(axis=0)]))
 

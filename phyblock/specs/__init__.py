@@ -4,17 +4,14 @@ from phyblock.specs.loading import LoadedSuite, load_suite, resolve_models
 from phyblock.specs.model import ModelSpec, PriceSpec
 from phyblock.specs.models_file import load_models
 from phyblock.specs.schema import models_schema, suite_schema
-from phyblock.specs.suite import (
-    BUILTIN_DATASET,
-    RECORDED,
+from phyblock.specs.sections import (
     DatasetSpec,
     ImagesSpec,
     LimitsSpec,
     SamplingSpec,
     ScoringSpec,
-    SuiteSpec,
-    suite_model,
 )
+from phyblock.specs.suite import BUILTIN_DATASET, RECORDED, SuiteSpec, suite_model
 from phyblock.specs.words import did_you_mean
 
 __all__ = [

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, JsonValue, model_validator
 
 from phyblock.addresses import address_fault
 from phyblock.specs.fields import Count, MaxTokens, Section, Temperature, TimeoutS, TopP, refuse
-from phyblock.specs.suite import SamplingSpec
+from phyblock.specs.sections import SamplingSpec
 from phyblock.words import SeedMode, TransportName
 
 __all__ = ["ModelSpec", "PriceSpec"]

@@ -11,7 +11,7 @@ from phyblock.resources import cache_dir
 from phyblock.sim import PictureStyle
 from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.specs.fields import PictureControls
-from phyblock.specs.suite import ImagesSpec
+from phyblock.specs.sections import ImagesSpec
 from phyblock.tracks.base import AnyTrack
 from phyblock.tracks.kind import Opening, kind_of
 from phyblock.tracks.pictures import PicturePolicy, Pictures

@@ -43,7 +43,7 @@ __all__ = ["AffordanceMaker"]
 _ANNEXED = 0.5
 _BLOCKS_TRIED = 3
 _PLACES_TRIED = 90
-_ENOUGH, _MOST_OF_A_SORT = 4, 12
+_ENOUGH, _MOST_OF_A_SORT = 4, 10
 _STEP_PX = 5
 _FLAT_RISE = 0.99
 _SHIFTS_M = ((0.005, 0.0), (-0.005, 0.0), (0.0, 0.005), (0.0, -0.005))
@@ -75,7 +75,7 @@ class AffordanceMaker:
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    scenes_tried = 200
+    scenes_tried = 150
     drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -137,8 +137,12 @@ def _places(
         others = [Mark("A", one.position_m) for sort in found.values() for one in sort]
         if not is_apart(plain, Mark("A", top.position_m), others, _APART_PX / 2):
             continue
+        put = lowered(block, plain.blocks, *top.position_m[:2])
+        likely = is_balanced(group_of((*plain.blocks, put), put.order))
+        if len(found[likely]) == _MOST_OF_A_SORT:
+            continue
         stays = _by_statics(plain.blocks, block, top)
-        if stays is not None and len(found[stays]) < _MOST_OF_A_SORT:
+        if stays is not None:
             found[stays].append(top)
     if len(found[False]) < _ENOUGH:
         return []

@@ -49,12 +49,15 @@ def alike_wrong(
         return []
     start, shots = seen(first), [seen(one) for one in whole]
     together = [start, *shots]
-    apart = np.array([[differing_pixels(a, b) >= LEAST_PIXELS for b in together] for a in shots])
-    if not apart[0, 0]:
-        return []
-    apart[:, 1:] &= apart[:, :1] & apart[:, 0]
+    apart = np.zeros((len(together), len(together)), dtype=np.bool_)
+    for (i, one), (j, other) in itertools.combinations(enumerate(together), 2):
+        # A picture like the first one is none that could be chosen.
+        is_worth_it = i == 0 or (apart[0, i] and apart[0, j])
+        apart[i, j] = apart[j, i] = is_worth_it and differing_pixels(one, other) >= LEAST_PIXELS
+        if (i, j) == (0, 1) and not apart[i, j]:
+            return []
     measures = np.array([looks(start, shot) for shot in shots])
-    chosen = ranked_as_drawn(measures, apart[:, 1:], rng, held)
+    chosen = ranked_as_drawn(measures, apart[1:, 1:], rng, held)
     return [whole[i] for i in chosen]
 
 

@@ -8,6 +8,8 @@ on nothing else: a plank may need each of two supports.
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -18,8 +20,8 @@ from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, S
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.outcomes import Outcome, after_removal
-from phyblock.sim.seeing import block_mark, is_apart, is_inside, seen, seen_order
-from phyblock_making.questions.alike import CHANGE, alike_wrong
+from phyblock.sim.seeing import Top, block_mark, is_apart, is_inside, seen, seen_order, visible_tops
+from phyblock_making.questions.alike import AREA, CHANGE, alike_wrong, ranked_as_drawn
 from phyblock_making.questions.annexes import with_annex
 from phyblock_making.questions.choices import shuffled
 from phyblock_making.questions.goal_view import (
@@ -55,7 +57,7 @@ OUTCOME_TEXTS = (
 TAKEN = "X"
 """The letter of the block that is taken away or pushed."""
 _ALL_SEEN = 0.12
-_STRUCTURES_TRIED = 4
+_STRUCTURES_TRIED = 6
 _VIEWS_TRIED = 3
 _REMOVALS_TRIED = 6
 _Sort = tuple[bool, bool]
@@ -65,6 +67,9 @@ _SHARES = (0.35, 0.25, 0.25, 0.15)
 """How often removals of each sort are looked for: each rule is right in four cases of ten."""
 _WRONG = 3
 _STAYS_ASKED = 0.25
+_STEP_PX = 6
+_SPOTS_OF_A_BLOCK, _MOST_STAYING, _RIGHTS_TRIED = 2, 12, 4
+_LEVEL_RISE = 0.99
 
 
 class _Case(NamedTuple):
@@ -100,7 +105,8 @@ class CounterfactualMaker:
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Drafts about removals from the scene, or from a part of it with an annex."""
         sort = _SORTS[int(rng.choice(len(_SORTS), p=_SHARES))]
-        kinds = shuffled(rng, (_count, _which, _pictured))
+        # Nearly every removal can be counted, few can be pictured or marked: those come first.
+        kinds = [*shuffled(rng, (_which, _pictured)), _count]
         for number in range(_STRUCTURES_TRIED):
             blocks = scene.blocks if number == 0 else with_annex(scene, rng)
             for case in _cases(scene, blocks, sort, rng) if blocks else ():
@@ -219,26 +225,46 @@ def _count(
 def _which(
     plain: QuestionPicture, order: int, outcome: Outcome, rng: np.random.Generator
 ) -> _Asked | None:
-    """One of four marked blocks that does not stay; those that rest on the block come first."""
-    if not outcome.moved:
+    """One of four marked blocks that does not stay, its mark no more central than the others."""
+    taken = block_mark(plain, seen(plain), order, TAKEN)
+    if not outcome.moved or taken is None:
         return None
-    shot, moved = seen(plain), outcome.moved
-    taken = block_mark(plain, shot, order, TAKEN)
-    if taken is None:
-        return None
+    spots = _spots(plain, taken, rng)
+    staying = [spot for spot in spots if spot[0] != order and spot[0] not in outcome.moved]
     resting = resting_on(plain.blocks, order)
-    others = [b.order for b in plain.blocks if b.order != order and b.order not in moved]
-    near = [one for one in shuffled(rng, others) if one in resting]
-    near += [one for one in shuffled(rng, others) if one not in resting]
-    chosen: list[Mark] = []
-    for group, most in ((shuffled(rng, moved), 1), (near, 4)):
-        for one in group:
-            mark = block_mark(plain, shot, one, "A")
-            if mark is not None and len(chosen) < most and is_apart(plain, mark, [taken, *chosen]):
-                chosen.append(mark)
-        if not chosen:
-            return None
-    return _Asked("cf-which", plain, chosen, "place") if len(chosen) == 4 else None
+    central = int(rng.integers(_WRONG + 1))
+    for right in [spot for spot in spots if spot[0] in outcome.moved][:_RIGHTS_TRIED]:
+        together = [right, *staying[:_MOST_STAYING]]
+        marks = [Mark("A", top.position_m) for _, top in together]
+        apart = np.array([[is_apart(plain, a, [b]) for b in marks] for a in marks])
+        orders = np.array([one for one, _ in together])
+        apart &= orders[:, None] != orders
+        measures = [[*_mark_looks(top, taken), one in resting] for one, top in together]
+        wrong = ranked_as_drawn(np.array(measures, dtype=float), apart, rng, {0: central})
+        if wrong:
+            return _Asked("cf-which", plain, [marks[i] for i in (0, *wrong)], "place")
+    return None
+
+
+def _spots(plain: QuestionPicture, taken: Mark, rng: np.random.Generator) -> list[tuple[int, Top]]:
+    """Places for marks in an order drawn, a few on each block, none near the mark X."""
+    shot = seen(plain)
+    found: list[tuple[int, Top]] = []
+    number: Counter[int] = Counter()
+    for top in shuffled(rng, visible_tops(plain, shot, _STEP_PX, -1.0)):
+        order = seen_order(plain, shot, top.position_m)
+        is_free = order is not None and number[order] < _SPOTS_OF_A_BLOCK
+        if order is not None and is_free and is_apart(plain, Mark("A", top.position_m), [taken]):
+            number[order] += 1
+            found.append((order, top))
+    return found
+
+
+def _mark_looks(top: Top, taken: Mark) -> tuple[float, ...]:
+    """How central a mark is, those on level faces first; and how far it is from the mark X."""
+    is_level = top.rise >= _LEVEL_RISE
+    far_m = math.dist(top.position_m, taken.position_m)
+    return 20 * (top.off_center_m + (not is_level)), 20 * top.off_center_m, 3 * far_m
 
 
 def _pictured(
@@ -253,6 +279,7 @@ def _pictured(
     roomy = replace(plain, framed=with_room(plain.blocks))
     right = replace(roomy, blocks=outcome.settled)
     change = int(rng.integers(1, _WRONG + 1)) if outcome.moved else 0
+    ranks = {CHANGE: change, AREA: int(rng.integers(_WRONG + 1))}
     pool: list[QuestionPicture] = []
     try:
         known = {story_of(plain.blocks, right)}
@@ -267,5 +294,5 @@ def _pictured(
         if story not in known and is_inside(picture):
             known.add(story)
             pool.append(picture)
-    wrong = alike_wrong(roomy, right, pool, rng, {CHANGE: change}) if len(pool) >= _WRONG else []
+    wrong = alike_wrong(roomy, right, pool, rng, ranks) if len(pool) >= _WRONG else []
     return _Asked("cf-picture", roomy, [right, *wrong], f"change {change}") if wrong else None

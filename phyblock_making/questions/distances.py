@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -51,15 +51,14 @@ _APART = (1.2, 2.0)
 
 
 @functools.cache
-def _ladders() -> Mapping[float, Sequence[tuple[float, ...]]]:
-    """All sets of four values on the grid that may stand together, by each value in them."""
+def _ladders() -> Sequence[tuple[float, ...]]:
+    """All sets of four values on the grid that may stand together, rising."""
     grid = [_STEP_CM * n for n in range(1, round(_LONGEST_CM / _STEP_CM) + 1)]
-    found: dict[float, list[tuple[float, ...]]] = {value: [] for value in grid}
-    for four in itertools.combinations(grid, 4):
-        if all(_APART[0] * a <= b <= _APART[1] * a for a, b in itertools.pairwise(four)):
-            for value in four:
-                found[value].append(four)
-    return found
+    return [
+        four
+        for four in itertools.combinations(grid, 4)
+        if all(_APART[0] * a <= b <= _APART[1] * a for a, b in itertools.pairwise(four))
+    ]
 
 
 _KINDS: Mapping[str, str] = {
@@ -72,15 +71,21 @@ _KINDS: Mapping[str, str] = {
     "place": "place",
 }
 """Wordings, and the sorts of questions whose shares are even: heights are one of six."""
+_FEW_A_SCENE = ("gap", "span", "place")
+"""Kinds of which hardly any scene has four values that could be offered together."""
 _TRIES = 3
-_PAIRS = 60
-_STEPS_CM = (-5.0, 5.0)
+_PAIRS = 90
+_PLACE_STEP_CM = 5.0
+
+Values = tuple[float, ...]
+"""A length, or how far along and across [cm]."""
 
 
 class DistanceMaker(StaticMaker):
     """AP: a block of known size, named in the text, stands in the picture as the scale."""
 
     subtask: Subtask = "AP"
+    views_a_scene = 2
     drafts_a_view = 20
 
     def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -131,41 +136,80 @@ def _of_blocks(
     scale: str,
     rng: np.random.Generator,
 ) -> Iterator[Draft]:
-    pairs = list(itertools.permutations(blocks, 2))
+    pairs = shuffled(rng, list(itertools.permutations(blocks, 2)))[:_PAIRS]
     for rule in shuffled(rng, list(_KINDS)):
-        for one, other in shuffled(rng, pairs)[:_PAIRS]:
-            slots = {"block": named[one.order], "scale": scale}
-            if rule in PAIRED:
-                slots["other"] = named[other.order]
-            try:
-                options = _options(rule, one, other, picture, rng)
-            except UnfairError:
-                continue
-            if options:
-                evidence = {"right": options[0]}
-                stem, kind = f"ap-{rule}", _KINDS[rule]
-                yield draft(scene, picture, rng, stem, slots, options, options[0], kind, **evidence)
-                break
+        found = _by_value(rule, pairs if rule in PAIRED else [(b, b) for b in blocks], picture)
+        values = _options(rule, found, rng)
+        if not values:
+            continue
+        one, other = pick(rng, found[values[0]])
+        slots = {"block": named[one.order], "scale": scale}
+        if rule in PAIRED:
+            slots["other"] = named[other.order]
+        options = [_place_text(value) if rule == "place" else _shown(*value) for value in values]
+        evidence = {"right": options[0]}
+        stem, kind = f"ap-{rule}", _KINDS[rule]
+        yield draft(scene, picture, rng, stem, slots, options, options[0], kind, **evidence)
 
 
-def _options(
-    rule: str, one: Block, other: Block, picture: QuestionPicture, rng: np.random.Generator
-) -> list[str]:
-    """The right option and three others; none where no four stand together."""
+def _by_value(
+    rule: str, pairs: Sequence[tuple[Block, Block]], picture: QuestionPicture
+) -> Mapping[Values, Sequence[tuple[Block, Block]]]:
+    """The pairs of which something can be asked, by what the answer is."""
+    found: dict[Values, list[tuple[Block, Block]]] = {}
+    for one, other in pairs:
+        try:
+            found.setdefault(_values_cm(rule, one, other, picture), []).append((one, other))
+        except UnfairError:
+            continue
+    return found
+
+
+def _values_cm(rule: str, one: Block, other: Block, picture: QuestionPicture) -> Values:
     if rule == "place":
-        along, across = _place_cm(one, other, picture)
-        longer, wider = along + pick(rng, _STEPS_CM), across + pick(rng, _STEPS_CM)
-        if min(longer, wider) < 0:
-            return []
-        return [_place_text((a, b)) for a in (along, longer) for b in (across, wider)]
+        return _place_cm(one, other, picture)
     if rule == "span":
         require_seen(picture, [block.order for block in picture.blocks], COUNTED)
-    right = grid_cm(LENGTHS[rule](one, other, picture.blocks))
-    ladders = _ladders().get(right)
-    if not ladders:
-        return []
-    ladder = pick(rng, ladders)
-    return [_shown(value) for value in (right, *(value for value in ladder if value != right))]
+    return (grid_cm(LENGTHS[rule](one, other, picture.blocks)),)
+
+
+def _options(rule: str, found: Collection[Values], rng: np.random.Generator) -> Sequence[Values]:
+    """Four values, the right one first; none where no four stand together.
+
+    All four are true of something in the picture, and which one is asked for is drawn, so that a
+    length that is frequent is not right more often than the others beside it. Where no scene has
+    four, as of `_FEW_A_SCENE`, one that is true stands beside others, and chance leaves out most
+    of these (`answer_odds`).
+    """
+    fours = _squares(found) if rule == "place" else [*map(_each_alone, _ladders())]
+    whole = [four for four in fours if set(four) <= set(found)]
+    if whole:
+        four = pick(rng, whole)
+        return _first(pick(rng, four), four)
+    if rule not in _FEW_A_SCENE or not found:
+        return ()
+    right = pick(rng, sorted(found))
+    beside = [four for four in fours if right in four]
+    return _first(right, pick(rng, beside)) if beside else ()
+
+
+def _squares(found: Collection[Values]) -> Sequence[Sequence[Values]]:
+    """Places 5 cm from one another along and across, four at a time, one of them among `found`."""
+    step = _PLACE_STEP_CM
+    corners = {(a - x, b - y) for a, b in found for x in (0, step) for y in (0, step)}
+    return [
+        [(a + x, b + y) for x in (0, step) for y in (0, step)]
+        for a, b in sorted(corners)
+        if min(a, b) >= 0
+    ]
+
+
+def _each_alone(lengths: Sequence[float]) -> Sequence[Values]:
+    return [(length,) for length in lengths]
+
+
+def _first(right: Values, values: Sequence[Values]) -> Sequence[Values]:
+    return [right, *(value for value in values if value != right)]
 
 
 def _place_cm(one: Block, other: Block, picture: QuestionPicture) -> tuple[float, float]:
@@ -175,7 +219,7 @@ def _place_cm(one: Block, other: Block, picture: QuestionPicture) -> tuple[float
     return grid_cm(along), grid_cm(across)
 
 
-def _place_text(place_cm: tuple[float, float]) -> str:
+def _place_text(place_cm: Values) -> str:
     along, across = place_cm
     return f"{along:g} cm along and {across:g} cm across"
 

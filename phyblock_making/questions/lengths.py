@@ -58,10 +58,10 @@ def _bottom(one: Block, other: Block, blocks: Sequence[Block]) -> float:
 
 
 def _apart(one: Block, other: Block, blocks: Sequence[Block]) -> float:
-    require_joined(one, other, blocks)
     x, y, _ = np.abs(center_m(one) - center_m(other)).tolist()
     if min(x, y) > _SIDE_M:
         raise UnfairError("the blocks stand askew, so that their distance cannot be counted")
+    require_joined(one, other, blocks)
     return float(max(x, y))
 
 
@@ -72,9 +72,9 @@ def _rise(one: Block, other: Block, blocks: Sequence[Block]) -> float:
 
 def _gap(one: Block, other: Block, blocks: Sequence[Block]) -> float:
     """The clear way between two boxes that face each other, with nothing between them."""
-    require_joined(one, other, blocks)
     if any(block.type not in _BOXES or block.euler_deg[2] % 90 for block in (one, other)):
         raise UnfairError("the blocks do not face each other with flat sides")
+    require_joined(one, other, blocks)
     low = np.minimum(bounds_m(one)[1], bounds_m(other)[1])
     high = np.maximum(bounds_m(one)[0], bounds_m(other)[0])
     open_axes = [axis for axis in (0, 1) if high[axis] - low[axis] > _SIDE_M]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import functools
+from collections.abc import Collection, Mapping, Sequence
 
 from phyblock.domain.scene import Block
 from phyblock.sim.balance import surely_falls, surely_stands
@@ -18,13 +19,19 @@ def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> fr
     With `only` they rest on nothing but it and others that do. The naive rule says that these, or
     those, fall when it is taken away, and nothing else.
     """
-    below = support_graph(blocks)
+    below = _below(tuple(blocks))
     found: frozenset[int] = frozenset({order})
     for _ in blocks:
         found |= {
             one for one, under in below.items() if under & found and (not only or under <= found)
         }
     return found - {order}
+
+
+@functools.lru_cache(maxsize=64)
+def _below(blocks: tuple[Block, ...]) -> Mapping[int, frozenset[int]]:
+    """The support graph, which is asked again for every block of a structure."""
+    return support_graph(blocks)
 
 
 def group_of(blocks: Sequence[Block], order: int) -> tuple[Block, ...]:

@@ -111,8 +111,11 @@ def _places(
         if bounds_m(put)[0, 2] < _LEAST_HEIGHT_M:
             continue
         picture = replace(shown, blocks=(*shown.blocks, put))
+        likely = is_balanced(group_of(picture.blocks, put.order))
+        if len(found[likely]) == _MOST_OF_A_SORT:
+            continue
         stays = _clearly_stays(shown.blocks, put)
-        if stays is None or len(found[stays]) == _MOST_OF_A_SORT:
+        if stays is None:
             continue
         if shown_pixels(picture, seen(picture))[put.order] >= _LEAST_SHOWN:
             found[stays].append(picture)

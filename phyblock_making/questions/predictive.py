@@ -24,17 +24,21 @@ from phyblock_making.questions.wording import slots_of
 __all__ = ["PredictiveMaker"]
 
 
+_PUSHED = 0.55
+"""How often a push is looked for, which fewer scenes allow than a next step."""
+
+
 class PredictiveMaker:
     """Kinds: `pd-next` (the next step) and `pd-push` (the settled scene after a push)."""
 
     subtask: Subtask = "PD"
-    scenes_tried = 300
+    scenes_tried = 340
     drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """A push, which fewer scenes allow, where one is fair; else a next step."""
-        for make in (push_drafts, next_drafts):
-            yield from make(scene, rng)
+        """A push or a next step, as drawn, where one is fair."""
+        make = push_drafts if rng.random() < _PUSHED else next_drafts
+        yield from make(scene, rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """By statics and simulation."""

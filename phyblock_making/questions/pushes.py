@@ -20,7 +20,7 @@ from phyblock.sim.outcomes import OUTCOME_SETTINGS, Outcome, Push, after
 from phyblock.sim.seeing import block_mark, seen, shown_pixels
 from phyblock.sim.steps import groups
 from phyblock.sim.support import bounds_m, boxes_near
-from phyblock_making.questions.choices import pick, shuffled
+from phyblock_making.questions.choices import shuffled
 from phyblock_making.questions.counterfactual import TAKEN
 from phyblock_making.questions.margins import group_of, is_sure
 from phyblock_making.questions.pictured_drafts import (
@@ -48,11 +48,10 @@ _REACH_M = 0.12
 
 def push_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
     """A block pushed to the right or left as seen, and what follows other pushes close by."""
-    view = (pick(rng, _FRONTS_DEG), float(rng.integers(_ELEVATIONS_DEG[0], _ELEVATIONS_DEG[1] + 1)))
-    plain = replace(state(scene, scene.blocks, view), framed=with_room(scene.blocks))
-    shot = seen(plain)
-    if min(shown_pixels(plain, shot).values()) < _LEAST_SHOWN:
+    plain = _shown_whole(scene, rng)
+    if plain is None:
         return
+    shot = seen(plain)
     for block in shuffled(rng, scene.blocks)[:_BLOCKS_TRIED]:
         told = _told_apart(plain, _pushes(plain, block.order, rng))
         if len(told) < _OPTIONS:
@@ -71,6 +70,17 @@ def push_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
             slots = {"direction": direction}
             yield draft(scene, rng, "pd-push", options, shown, value, slots, facts)
             return
+
+
+def _shown_whole(scene: Scene, rng: np.random.Generator) -> QuestionPicture | None:
+    """A picture from the front, back or a side in which every block shows; None where none does."""
+    low, high = _ELEVATIONS_DEG
+    for front_deg in shuffled(rng, _FRONTS_DEG):
+        view = (front_deg, float(rng.integers(low, high + 1)))
+        plain = replace(state(scene, scene.blocks, view), framed=with_room(scene.blocks))
+        if min(shown_pixels(plain, seen(plain)).values()) >= _LEAST_SHOWN:
+            return plain
+    return None
 
 
 def meant_push(picture: QuestionPicture, order: int, direction: str) -> Push:
@@ -134,7 +144,9 @@ def _told_apart(
         if any(block.order == pushes[0][0] for block in group)
     )
     axis = meant_push(plain, pushes[0][0], next(iter(_DIRECTIONS)))
-    for order, direction in pushes:
+    for number, (order, direction) in enumerate(pushes):
+        if len(found) + len(pushes) - number < _OPTIONS:
+            break
         outcome = after(near, meant_push(plain, order, direction), OUTCOME_SETTINGS[:1])
         if not outcome.is_clear or order not in outcome.moved:
             continue

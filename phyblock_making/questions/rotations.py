@@ -149,7 +149,7 @@ def _about_some_axis(
     every = replace(scene, blocks=(*scene.blocks, loose))
     every = with_own_colors(every, [other.order, loose.order], rng)
     picture = goal_picture(every, view)
-    if holds(every.blocks, loose.order) and are_seen(picture, (loose.order, other.order), STUDIED):
+    if are_seen(picture, (loose.order, other.order), STUDIED) and holds(every.blocks, loose.order):
         colored = replace(every, blocks=every.blocks[:-1])
         its = next(block for block in colored.blocks if block.order == other.order)
         yield from _drafted(colored, picture, (every.blocks[-1], its), rule, phrase, rng)

@@ -100,14 +100,16 @@ def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
 def referents(question: Question) -> dict[int, float]:
     """Visible share of each block that question or options name in words, by its order.
 
-    Of static questions alone: where marks or pictures say what is meant, nothing is named.
+    Of static questions alone: where marks or pictures say what is meant, nothing is named. An
+    option that names a block says "the"; one without is a shape, which no block is meant by.
     """
     picture = question.pictures[0] if question.pictures else None
     if picture is None or picture.label != "scene":
         return {}
     slots = question.evidence.get("slots", {})
     named: set[int] = set()
-    for text in (*(str(slot) for slot in slots.values()), *question.options):
+    blocks = [option for option in question.options if option.startswith("the ")]
+    for text in (*(str(slot) for slot in slots.values()), *blocks):
         named.update(_named(text, picture))
     seen = shares(picture) if named else {}
     return {order: seen[order] for order in sorted(named)}

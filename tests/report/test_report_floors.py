@@ -53,7 +53,8 @@ def test_the_strongest_floor_is_named_and_whose_interval_is_above_it() -> None:
     weaker = run_with({"all-candidates": 0.2}, **counts)
     assert {floor for floor, _ in verdicts(weaker).values()} == {"random"}
     (title, line) = floor_lines(floors_frame(run), run)
-    assert line == "Full planning, Overall F1: goal-blind 30.0; not above it: middling, bad"
+    whole = "Full planning, Overall F1: goal-blind 30.0"
+    assert line == f"{whole}; above it: good; not above it: middling, bad"
     view = floors_view(floors_frame(run), run)
     assert ("F1, Overall", "A", "aov", "goal-blind", "30.0", "good", "middling, bad") in view.rows
     assert title.startswith("Floors")

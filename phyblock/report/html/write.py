@@ -24,7 +24,7 @@ from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.sources import Sources, open_sources
 from phyblock.report.write import TablesWritten
 from phyblock.run.folder import run_folder
-from phyblock.specs.suite import ImagesSpec
+from phyblock.specs.sections import ImagesSpec
 from phyblock.tables.load import Run
 from phyblock.tracks.drawable import kit, scene_entry
 from phyblock.tracks.kind import kind_of
