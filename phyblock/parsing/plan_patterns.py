@@ -59,7 +59,8 @@ EXAMPLE = re.compile(
 )
 NOT_MEANT = re.compile(
     r"(?:\b(?:wrong|incorrect|invalid|bad|mistaken|rejected|falsch\w{0,2})\b[^.!?]{0,40}|^\W*(?:if"
-    r"|unless|falls|wenn)\b[^.!?]{0,80}|\b(?:orders|sequences|plans)\b(?: \w{1,12}){0,3})[:：]\W*\Z",
+    r"|unless|falls|wenn)\b[^.!?]{0,80}|\b(?:orders|sequences|plans)\b(?: \w{1,12}){0,3})"
+    r"[:：]\W*\Z",
     re.IGNORECASE,
 )
 EXPLANATION = re.compile(
