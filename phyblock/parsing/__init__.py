@@ -8,18 +8,21 @@ from phyblock.parsing.move import (
     ParsedMove,
     parse_move,
 )
-from phyblock.parsing.plan import ParsedPlan, parse_plan
+from phyblock.parsing.plan import PLAN_PROBLEMS, ParsedPlan, PlanProblem, parse_plan
+from phyblock.parsing.version import READER_VERSION, reader_version
 
 __all__ = [
     "MOVE_PROBLEMS",
     "MOVE_RULES",
-    "PLAN_PARSERS",
+    "PLAN_PROBLEMS",
+    "READER_VERSION",
     "MoveProblem",
     "ParsedAnswer",
     "ParsedMove",
     "ParsedPlan",
-    "PlanParser",
+    "PlanProblem",
     "parse_answer",
     "parse_move",
     "parse_plan",
+    "reader_version",
 ]

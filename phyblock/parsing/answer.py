@@ -11,8 +11,7 @@ failure, and no later rule is tried. Nothing raises on any text.
 from __future__ import annotations
 
 import re
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from phyblock.parsing.answer_order import OrderReader
@@ -21,6 +20,8 @@ from phyblock.parsing.answer_patterns import (
     BRANDED,
     CHOSEN,
     CONCLUDED,
+    CONDITIONAL,
+    CORRECTED,
     DANGLES,
     IS_REJECTED,
     IS_RIGHT,
@@ -28,19 +29,27 @@ from phyblock.parsing.answer_patterns import (
     LABEL,
     LEADING,
     LINE,
+    NOT_BUT,
     ORDER,
+    QUOTED,
     REJECTS,
-    REVISED,
     SENTENCE,
     TAG,
     UNSURE,
+    VERDICT,
+)
+from phyblock.parsing.answer_statements import (
+    Reader,
+    forward,
+    is_conditional,
+    settle,
+    statements,
+    turned,
 )
 from phyblock.parsing.answer_value import CONTRADICTION, ChoiceReader
-from phyblock.parsing.text_forms import after_reasoning, plain_forms
+from phyblock.parsing.text_forms import answer_of
 
 __all__ = ["ParsedAnswer", "parse_answer"]
-
-Reader = ChoiceReader | OrderReader
 
 
 @dataclass(frozen=True)
@@ -56,7 +65,7 @@ class ParsedAnswer:
 
 def parse_answer(text: str, options: Sequence[str], is_ordering: bool) -> ParsedAnswer:
     """Read the answer out of a reply to a question that shows `options`, the first one as A."""
-    answer = plain_forms(after_reasoning(text)).strip()
+    answer = NOT_BUT.sub(r"\g<value>", QUOTED.sub(" ", answer_of(text) or "")).strip()
     reader = OrderReader(len(options)) if is_ordering else ChoiceReader(options)
     for rule, find in _ORDER_RULES if is_ordering else _CHOICE_RULES:
         found = find(answer, reader)
@@ -65,23 +74,10 @@ def parse_answer(text: str, options: Sequence[str], is_ordering: bool) -> Parsed
     return ParsedAnswer(None, None)
 
 
-@dataclass(frozen=True)
-class _Statement:
-    """A place that states an answer: where it begins and ends, what it names, how firmly."""
-
-    start: int
-    end: int
-    letters: str
-    weight: int
-
-
 _SENTENCE_CHARS = 240
 _CUT_OFF_CHARS = 12
 _WHOLE_CHARS = 300
 _LINE_CHARS = 240
-_REVISION_CHARS = 4000
-_MOST_STATEMENTS = 100
-"""Of each kind, from the end: a reply that repeats itself for pages is still read at once."""
 
 
 def _whole(text: str, reader: Reader) -> str | None:
@@ -92,47 +88,45 @@ def _marked(pattern: re.Pattern[str]) -> Callable[[str, Reader], str | None]:
     """A rule for answers in a mark of their own: tags, a box, a field."""
 
     def find(text: str, reader: Reader) -> str | None:
-        return _settle(text, list(_statements(text, pattern, reader.read, 0)))
+        return settle(text, list(statements(text, pattern, reader.read, 0)))
 
     return find
 
 
 def _stated(text: str, reader: Reader) -> str | None:
     """Lines and sentences that say what the answer is; a line outweighs a sentence."""
-    stated = list(_statements(text, LINE, reader.read, 1))
+    stated = list(statements(text, LINE, reader.read, 1))
     lines = {statement.end for statement in stated}
-    for statement in _statements(text, SENTENCE, reader.read, 0):
+    for statement in statements(text, SENTENCE, reader.read, 0):
         if statement.end not in lines:
             stated.append(statement)
+    stated += statements(text, CORRECTED, reader.read, 2)
     if isinstance(reader, ChoiceReader):
-        stated += _statements(text, CHOSEN, reader.letter, 0)
-        stated += _statements(text, IS_RIGHT, reader.exact, 0)
+        stated += statements(text, CHOSEN, reader.letter, 0)
+        stated += statements(text, IS_RIGHT, reader.exact, 0)
     else:
-        stated += _statements(text, ORDER, reader.read, 0)
-    return _settle(text, sorted(stated, key=lambda statement: statement.start))
+        stated += statements(text, ORDER, reader.read, 0)
+        stated = [forward(text, statement) for statement in stated]
+    firm = [statement for statement in stated if not is_conditional(text, statement)]
+    if stated and not firm:
+        return CONTRADICTION
+    return turned(text, sorted(firm, key=lambda statement: statement.start), reader)
 
 
-def _statements(
-    text: str, pattern: re.Pattern[str], read: Callable[[str], str | None], weight: int
-) -> Iterator[_Statement]:
-    for match in deque(pattern.finditer(text), maxlen=_MOST_STATEMENTS):
-        letters = read(match["value"])
-        if letters is not None:
-            lead = match.groupdict().get("lead") or ""
-            firm = weight + ("final" in lead.lower())
-            yield _Statement(match.start(), match.end(), letters, firm)
-
-
-def _settle(text: str, stated: Sequence[_Statement]) -> str | None:
-    """The last word: what all say, or what the last says where it outweighs or revises others."""
-    if not stated:
+def _verdicts(text: str, reader: Reader) -> str | None:
+    """The one option that is called right where every option is called right or wrong."""
+    found = {match["letter"].upper(): bool(match["yes"]) for match in VERDICT.finditer(text)}
+    if (
+        not isinstance(reader, ChoiceReader)
+        or len(found) < len(reader.letters)
+        or len(found) < _MANY
+    ):
         return None
-    last = stated[-1]
-    for other in reversed(stated):
-        if other.letters != last.letters and other.weight >= last.weight:
-            between = text[max(other.end, last.start - _REVISION_CHARS) : last.end]
-            return last.letters if REVISED.search(between) else CONTRADICTION
-    return last.letters
+    right = [letter for letter, is_right in found.items() if is_right]
+    return right[0] if len(right) == 1 and right[0] in reader.letters else CONTRADICTION
+
+
+_MANY = 3
 
 
 def _outer_line(text: str, reader: Reader) -> str | None:
@@ -141,7 +135,12 @@ def _outer_line(text: str, reader: Reader) -> str | None:
     named = {letters for letters in found if letters is not None}
     if not named:
         return None
+    if found[1] is None and _WAIT.search(text):
+        return CONTRADICTION
     return named.pop() if len(named) == 1 else CONTRADICTION
+
+
+_WAIT = re.compile(r"\b(?:wait|correction|on second thought|mistake)\b", re.IGNORECASE)
 
 
 def _leading(text: str, reader: Reader) -> str | None:
@@ -151,6 +150,9 @@ def _leading(text: str, reader: Reader) -> str | None:
         return None
     if IS_REJECTED.match(text, head.end("letter")):
         return None
+    first = _first_line(text)
+    if CONDITIONAL.search(first) or first.count("%") > 1:
+        return CONTRADICTION
     found = reader.letter(_first_line(text))
     labels = {match["letter"] for match in LABEL.finditer(text)} & set(reader.letters)
     return found if found is None or labels <= {found} else None
@@ -158,7 +160,12 @@ def _leading(text: str, reader: Reader) -> str | None:
 
 def _concluded(text: str, reader: Reader) -> str | None:
     found = [reader.exact(match["value"]) for match in CONCLUDED.finditer(text)]
-    return found[-1] if found and not UNSURE.search(text) else None
+    return found[-1] if found and not _is_open(text) else None
+
+
+def _is_open(text: str) -> bool:
+    """Whether a reply says that it cannot tell, or only under conditions."""
+    return bool(UNSURE.search(text) or CONDITIONAL.search(text))
 
 
 def _only_one_named(text: str, reader: Reader) -> str | None:
@@ -166,7 +173,7 @@ def _only_one_named(text: str, reader: Reader) -> str | None:
 
     Unless that is to turn it down, or the reply was cut off before it came to the others.
     """
-    if UNSURE.search(text):
+    if _is_open(text):
         return None
     found = [(match, match["a"] or match["b"] or match["c"]) for match in BRANDED.finditer(text)]
     named = {letter for _, letter in found} & set(reader.letters)
@@ -192,7 +199,7 @@ def _sentence_of(text: str, match: re.Match[str]) -> str:
 
 def _only_text(text: str, reader: Reader) -> str | None:
     """The one option whose words a short reply, or the last line of a long one, holds."""
-    if not isinstance(reader, ChoiceReader) or UNSURE.search(text):
+    if not isinstance(reader, ChoiceReader) or _is_open(text):
         return None
     last = _last_line(text)
     if DANGLES.search(last):
@@ -207,7 +214,7 @@ def _only_text(text: str, reader: Reader) -> str | None:
 
 def _only_order(text: str, reader: Reader) -> str | None:
     """The one order in the text; listing the pictures as they were shown is none."""
-    if not isinstance(reader, OrderReader) or UNSURE.search(text):
+    if not isinstance(reader, OrderReader) or _is_open(text):
         return None
     for piece in (_last_line(text), text):
         named = set(reader.orders(piece)) - {reader.letters}
@@ -225,7 +232,9 @@ def _last_line(text: str) -> str:
 
 
 def _list(text: str, reader: Reader) -> str | None:
-    return reader.listed(text) if isinstance(reader, OrderReader) else None
+    if not isinstance(reader, OrderReader):
+        return None
+    return reader.listed(text) or reader.ranked(text)
 
 
 _Rule = tuple[str, Callable[[str, Reader], str | None]]
@@ -235,6 +244,7 @@ _STRICT: tuple[_Rule, ...] = (
     ("boxed", _marked(BOX)),
     ("json", _marked(JSON)),
     ("stated", _stated),
+    ("verdicts", _verdicts),
     ("outer_line", _outer_line),
 )
 _CHOICE_RULES: tuple[_Rule, ...] = (

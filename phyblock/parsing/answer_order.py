@@ -5,13 +5,17 @@ from __future__ import annotations
 import re
 
 from phyblock.parsing.answer_value import CONTRADICTION, EDGES, LETTERS, unmarked
+from phyblock.parsing.text_forms import BACKWARD
 
 __all__ = ["OrderReader"]
 
 _BETWEEN = (
     r"(?:[\s,;>|/.:()\[\]{}<=\-\u2010-\u2015→⇒➔➜、\uff0c]"
-    r"|\b(?:and|then|to|first|next|finally|lastly|followed|by)\b){1,16}"
+    r"|\b(?:and|then|to|first|next|finally|lastly|followed|by|comes|goes)\b){1,16}"
 )
+_RANKS = "(first|second|third|fourth|last)"
+_CLAUSE = re.compile(r"[.;!?\n](?=\s)")
+_DENIED = re.compile(r"\b(?:not|nicht)\W{0,3}\Z|不是\s?\Z", re.IGNORECASE)
 _ARROW = re.compile(r"\\(?:long)?(?:right)?(?:arrow|to)\b")
 _THING = r"(?:(?:picture|image|option|figure|stage|step|photo|frame|img)\s{0,2}[(\[<]{0,1})?"
 
@@ -32,9 +36,13 @@ class OrderReader:
         ]
         self._order = re.compile(rf"{guard}(?:{'|'.join(ways)}){stop}", re.IGNORECASE)
         self._item = re.compile(
-            rf"^[\s>*+\-]{{0,6}}(?:step\s)?([1-{n}])(?:st|nd|rd|th)?\s?[.):\-]{{1,2}}\s{{0,3}}"
+            rf"^[\s>*+\-|]{{0,6}}(?:step\s)?([1-{n}])(?:st|nd|rd|th)?\s?[.):\-|]{{1,2}}\s{{0,3}}"
             rf"[(\[]?{_THING}([{self.letters}])(?![A-Za-z0-9'])",
             re.IGNORECASE | re.MULTILINE,
+        )
+
+        self._ranked = re.compile(
+            rf"(?<![A-Za-z0-9'])([{self.letters}])\s?(?:(?:is|comes|goes)\s)?(?:the\s)?(?:{_RANKS}\b|[:=→]\s?([1-{n}])(?!\d))"
         )
 
     def read(self, text: str) -> str | None:
@@ -53,8 +61,27 @@ class OrderReader:
     def orders(self, text: str) -> list[str]:
         """All orders in a text, each naming every option once."""
         value = unmarked(_ARROW.sub(" > ", text))
-        found = (self._letters(match) for match in self._order.finditer(value))
-        return [order for order in found if order]
+        found = []
+        for match in self._order.finditer(value):
+            before = _CLAUSE.split(value[max(0, match.start() - 60) : match.start()])[-1]
+            order = None if _DENIED.search(before) else self._letters(match)
+            if order:
+                found.append(order[::-1] if BACKWARD.search(before) else order)
+        return found
+
+    def ranked(self, text: str) -> str | None:
+        """The order that the places of all pictures say: "B is first, A second", "A: 2, B: 1"."""
+        places = {
+            "last": len(self.letters),
+            **dict(zip(("first", "second", "third", "fourth"), range(1, 5), strict=True)),
+        }
+        named = [
+            (int(m[3]) if m[3] else places[m[2]], m[1])
+            for m in self._ranked.finditer(unmarked(text))
+        ]
+        order = "".join(letter for _, letter in sorted(named))
+        is_whole = [place for place, _ in sorted(named)] == list(range(1, len(self.letters) + 1))
+        return order if is_whole and set(order) == set(self.letters) else None
 
     def listed(self, text: str) -> str | None:
         """The order in the last numbered list of letters."""

@@ -1,5 +1,7 @@
 """How replies state an answer, correct themselves, turn an option down, or say that they cannot."""
 
+# ruff: noqa: RUF001 -- replies come in other scripts
+
 from __future__ import annotations
 
 import re
@@ -9,6 +11,8 @@ __all__ = [
     "BRANDED",
     "CHOSEN",
     "CONCLUDED",
+    "CONDITIONAL",
+    "CORRECTED",
     "DANGLES",
     "IS_REJECTED",
     "IS_RIGHT",
@@ -16,12 +20,16 @@ __all__ = [
     "LABEL",
     "LEADING",
     "LINE",
+    "NOT_BUT",
     "ORDER",
+    "QUOTED",
     "REJECTS",
     "REVISED",
     "SENTENCE",
     "TAG",
+    "TURNED",
     "UNSURE",
+    "VERDICT",
 ]
 
 _WORDS = (
@@ -48,7 +56,7 @@ SENTENCE = re.compile(
 )
 CHOSEN = re.compile(
     r"(?:\bI(?:['\u2019]ll|['\u2019]d| will| would| am going to)?"
-    r" (?:choose|pick|select|go with|answer)"
+    r" (?:choose|pick|select|prefer|go with|answer)"
     r"|\bmy (?:choice|pick|guess|selection) (?:is|would be)"
     r"|\b(?:correct|right|best) (?:option|choice|one|picture|image|letter|place|match)"
     r" (?:is|would be|must be|should be)"
@@ -72,7 +80,47 @@ CONCLUDED = re.compile(
     r"(?: (?:the |with )?(?:option|picture|image|choice|place))?)[ *_`]{0,4}"
     r"(?P<value>\(?[A-Z]\)?)[*_`]{0,3}(?=[\s.!,;]{0,3}(?:\Z|\n|[.!;]))",
 )
-TAG = re.compile(r"<(?:final_)?answer>\s{0,20}(?P<value>[^<>]{1,400})", re.IGNORECASE)
+CORRECTED = re.compile(
+    rf"\b(?P<lead>correction|edit|korrektur|final(?: decision| choice)?|更正)\s?[:：]{_VALUE}",
+    re.IGNORECASE,
+)
+"""An answer that takes the place of what was said before."""
+NOT_BUT = re.compile(
+    r"(?:\b(?:not|nicht|no es|n't)\s|不是)(?:option )?\(?[A-Z]\)?(?:,|，)?\s?"
+    r"(?:(?:but|sondern|es|it's|it is)\s|而是)(?:option )?(?P<value>\(?[A-Z]\)?(?![A-Za-z]))"
+)
+"""Not this but that: what is meant is that."""
+CONDITIONAL = re.compile(
+    r"\b(?:if|unless|provided|assuming|(?<=, )falls|wenn|otherwise|sonst|or else|depend(?:s"
+    r"|ing))\b(?! (?:I|we) (?:had|have|must)\b)"
+    r"|如果|否则|取决于",
+    re.IGNORECASE,
+)
+"""That an answer holds only under a condition."""
+QUOTED = re.compile(
+    rf"(?<=[\w:] )[\"'\u201c\u00ab](?:[^\"'\u201d\u00bb\n]{{0,40}}?(?:{_WORDS})\s?[:：]"
+    r"[^\"'\u201d\u00bb\n]{0,40})[\"'\u201d\u00bb]",
+    re.IGNORECASE,
+)
+"""An answer in quotation marks within a sentence: somebody else's words."""
+TURNED = re.compile(
+    r"(?:\b(?:but|however|actually|yet|aber|doch)\b|但是?|不过)[^\n]{0,100}?(?:\b(?:is|be|ist)\s"
+    r"|是)(?:option )?"
+    r"\(?(?P<value>[A-Z])\)?\s{0,2}(?=[.!;。]|\Z)",
+    re.IGNORECASE,
+)
+"""A turn away from the stated answer: "I would answer A, but the picture shows that it is D"."""
+VERDICT = re.compile(
+    r"(?:^|[.;,]\s"
+    r"|\n)[\s*\-_(\[]{0,6}(?:option )?(?P<letter>[A-Z])[*_)\]]{0,3}\s?[:.\-\u2013\u2014]?\s{0,3}"
+    r"(?:(?P<yes>✓|✔|✅|☑|(?:yes|correct|matches|fits|right|true)\b)|(?:✗|✘|❌|×|☒|(?:no|wrong"
+    r"|incorrect|false|does not|doesn't|not)\b))",
+    re.IGNORECASE,
+)
+TAG = re.compile(
+    r"<(?:final_)?answer>\s{0,20}(?P<value>[^<>]{1,400})",
+    re.IGNORECASE,
+)
 BOX = re.compile(r"\\boxed\s{0,2}\{(?P<value>[^\n]{1,80}?)\}{1,3}(?=[^}]|\Z)")
 JSON = re.compile(
     r"[\"'](?:final[_ ]?)?(?:answer|choice|option|selected_option|order|ordering|letter)[\"']"
@@ -82,7 +130,8 @@ JSON = re.compile(
 REVISED = re.compile(
     r"\b(?:wait|actually|instead|rather|however|but|correct(?:ion|ed|ing)|revis\w+|mistake\w*|wrong"
     r"|incorrect|re-?(?:check|think|consider|examin|evaluat|look|assess)\w*|second thought|hmm+|no,"
-    r"|final(?:ly)?|therefore|thus|hence|so|overall|conclusion|conclude|doch|aber|sondern|因此|所以|但)\b"
+    r"|final(?:ly)?|therefore|thus|hence|so|overall|conclusion|conclude|doch|aber|sondern|因此|所以"
+    r"|但)\b"
     r"|因此|所以|但是?|不过",
     re.IGNORECASE,
 )

@@ -37,7 +37,7 @@ _ALSO = re.compile(
 )
 _AFTER_LETTER = re.compile(
     r"(?:because|since|as|is|was|would|which|with|due|for|from|given|based|matches|shows|if|and"
-    r"|but|not|\()\b",
+    r"|but|not|over|rather|instead|\()\b",
     re.IGNORECASE,
 )
 _NEGATION = re.compile(
@@ -75,7 +75,7 @@ _HEDGE = re.compile(
     re.IGNORECASE,
 )
 _TAKEN_BACK = re.compile(
-    r"[)\]]?\s?\?\s{0,3}(?:no|wait|or|hmm+|actually)\b"
+    r"[)\]]?\s?(?:\?|\.{2,}|…)\s{0,3}(?:no|wait|or|hmm+|actually)\b"
     r"|(?:(?!because|since|as\b|while|but|not)[^.,;\n]){0,40}?"
     r"\b(?:and|or)\s{1,2}(?:option\s)?[(\[]?[A-Z][)\]]",
     re.IGNORECASE,

@@ -15,7 +15,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from phyblock.parsing.text_forms import after_reasoning, plain_forms
+from phyblock.parsing.statement import read_statement
+from phyblock.parsing.text_forms import answer_of
 
 __all__ = ["MOVE_PROBLEMS", "MOVE_RULES", "MoveProblem", "ParsedMove", "parse_move"]
 
@@ -53,7 +54,7 @@ _PHRASE = (
     rf"move\s{{1,3}}(?:the\s)?(?:block|candidate)\s{{1,3}}(?:with\s)?"
     rf"(?:the\s)?(?:index|number|id)\s{{0,3}}[=:#]?\s{{0,3}}[(\"'\[]?{_INTEGER}[)\"'\]]?"
 )
-_DONE = r"done(?:\s{0,3}\(\s{0,3}\))?"
+_DONE = r"(?:done|fertig|terminé|hecho|listo|готово|完成|完了|완료)(?:\s{0,3}\(\s{0,3}\))?"
 
 
 def _named(pattern: str, name: str) -> str:
@@ -77,21 +78,15 @@ _MANY = re.compile(
     re.IGNORECASE,
 )
 _DONE_SENTENCE = re.compile(
-    rf"(?:\A|[.!?:;\u2014]\s{{1,3}}|(?:->|\u2192|\bthen)\s{{0,3}}){_DONE}\s{{0,2}}[.!]?\Z",
+    rf"(?:\A|[.!?:\u2014]\s{{1,3}}|;\s{{0,3}}|(?:->|\u2192|\bthen)\s{{0,3}}){_DONE}\s{{0,2}}[.!]?\Z",
     re.IGNORECASE,
 )
-_LOOSE = re.compile(
-    r"\b(?:move|place|put|use|add|stack|choose|select|pick)\b[^\w\n]{0,6}"
-    r"(?:(?:the|block|candidate|number|index|with|no\.?|id) ){0,5}"
-    r"(?:block|candidate|number|index|no\.?|id|#)\s{0,2}[#:=(\"'\[]{0,3}" + _INTEGER,
-    re.IGNORECASE,
-)
+_CHOSEN = re.compile(r"\b(?:choose|select|pick|wähle|elijo|choisis)\b|选择?", re.IGNORECASE)
 _BARE = re.compile(rf"(?:{_LABEL})?[#(\[]?{_INTEGER}[)\].]?", re.IGNORECASE)
 _OBJECT = re.compile(r"\{[^{}]{0,600}\}")
 _FENCE = re.compile(r"(?:`{3,}|~{3,})\s{0,3}[\w+-]{0,16}")
-_MARKUP = re.compile(r"[*`_~]{1,3}|\\boxed\{|[{}]")
+_MARKUP = re.compile(r"</?(?:final_)?answer>|[*`_~]{1,3}|\\boxed\{|[{}]")
 _EDGES = " \t\r\f\v>#-*+\u2022|\"'"
-_THINKING_OPENS = re.compile(r"<think(?:ing)?>", re.IGNORECASE)
 _INDEX_KEYS = ("index", "block_index", "id", "block_id", "block", "candidate", "number")
 _INDEX_ALONE = _INDEX_KEYS[:4]
 """Keys that are enough without an action."""
@@ -100,7 +95,7 @@ _ACTION_KEYS = ("action", "operation", "next_plan", "next plan", "plan", "answer
 
 def parse_move(text: str) -> ParsedMove:
     """Read the one operation that a reply names."""
-    answer = plain_forms(_answer(text))
+    answer = answer_of(text) or ""
     lines = [line for line in map(_plain, answer.splitlines()) if line]
     if not lines:
         return ParsedMove(problem="no_move" if text.strip() else "empty")
@@ -108,13 +103,6 @@ def parse_move(text: str) -> ParsedMove:
         if found := find(answer, lines):
             return _verdict(found, rule)
     return ParsedMove(problem="no_move")
-
-
-def _answer(text: str) -> str:
-    """The reply without what is thought aloud; thoughts that never end hold no answer."""
-    answer = after_reasoning(text)
-    opened = _THINKING_OPENS.search(answer)
-    return answer[: opened.start()] if opened else answer
 
 
 def _plain(line: str) -> str:
@@ -214,8 +202,14 @@ def _anywhere(_: str, lines: list[str]) -> list[_Operation]:
 
 
 def _loose(_: str, lines: list[str]) -> list[int]:
-    last = [_number(match["number"]) for match in _LOOSE.finditer(lines[-1])]
-    return last or [_number(m["number"]) for line in lines for m in _LOOSE.finditer(line)]
+    """What sentences move or choose, those of the last line first."""
+    last = _moved(lines[-1])
+    return last or [number for line in lines for number in _moved(line)]
+
+
+def _moved(line: str) -> list[int]:
+    statement = read_statement(line.replace("_", " "), is_item=False)
+    return list(statement.numbers) if statement.has_verb or _CHOSEN.search(line) else []
 
 
 def _bare(_: str, lines: list[str]) -> list[int]:

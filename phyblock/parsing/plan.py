@@ -1,230 +1,229 @@
-"""Reply text -> Plan, with the rule that matched.
+"""Reply text -> Plan, with the rule that matched, or a named failure.
 
 `official` is the released code's rule: every `block with index N` of the whole reply, in order.
-`steps`, the default, reads the last well-formed step list first and grows lenient after that.
-Both drop numbers that no candidate has and report them. Neither raises on any text, and every
-index of a plan is a number that stands in the text.
+`steps`, the default, finds the lists of a reply (`listing`), joins those that are parts of one
+plan, and takes the last plan that is complete. It reads nothing where a careful reader would not:
+a catalogue of the candidates, a refusal, thoughts without an answer, two plans and no choice.
+
+Both drop numbers that no candidate has and report them. Neither raises on any text.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from typing import Literal
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal, get_args
 
 from phyblock.domain import Plan
-from phyblock.parsing.text_forms import after_reasoning
+from phyblock.parsing.listing import Listing, listings
+from phyblock.parsing.plan_patterns import (
+    AGAIN,
+    CHOICE,
+    DOWNWARD,
+    EXPLANATION,
+    HEADING_CHARS,
+    NOT_REVERSED,
+    OPTION,
+    OR_ELSE,
+    PART,
+    REFUSAL,
+    REVISION,
+    SUPPOSED,
+)
+from phyblock.parsing.plan_rank import LAST, MOVES, rank_of
+from phyblock.parsing.text_forms import BACKWARD, answer_of
 from phyblock.words import PlanParser
 
-__all__ = ["ParsedPlan", "parse_plan"]
+__all__ = ["PLAN_PROBLEMS", "ParsedPlan", "PlanProblem", "parse_plan"]
+
+PlanProblem = Literal["empty", "thoughts_only", "refusal", "catalogue", "two_plans", "no_plan"]
+PLAN_PROBLEMS: tuple[PlanProblem, ...] = get_args(PlanProblem)
 
 
 @dataclass(frozen=True)
 class ParsedPlan:
     """What was read out of a reply.
 
-    `rule` names the rule that matched, None when nothing could be read (a parse failure);
-    `dropped` are the numbers that were read but name no candidate, in order.
+    `rule` names the form of the list that was read, None when nothing could be read (a parse
+    failure): then `problem` says why. `dropped` are the numbers that were read but name no
+    candidate, in order.
     """
 
     plan: Plan
     rule: str | None
     dropped: tuple[int, ...] = ()
+    problem: PlanProblem | None = None
 
 
 def parse_plan(text: str, n_candidates: int, parser: PlanParser = "steps") -> ParsedPlan:
     """Read the plan out of a reply to a question with candidates 1..n_candidates."""
-    answer = text if parser == "official" else after_reasoning(text)
-    for rule, find in _RULES[parser]:
-        numbers = find(answer)
-        if numbers:
-            kept = tuple(n for n in numbers if 1 <= n <= n_candidates)
-            dropped = tuple(n for n in numbers if not 1 <= n <= n_candidates)
-            return ParsedPlan(Plan(kept), rule, dropped)
-    return ParsedPlan(Plan(), None)
+    read = _official(text) if parser == "official" else _steps(text)
+    if isinstance(read, str):
+        return ParsedPlan(Plan(), None, problem=read)
+    rule, numbers = read
+    kept = tuple(n for n in numbers if 1 <= n <= n_candidates)
+    return ParsedPlan(Plan(kept), rule, tuple(n for n in numbers if not 1 <= n <= n_candidates))
 
+
+_Read = tuple[str, Sequence[int]] | PlanProblem
 
 # Longer runs of digits are no block numbers, and int() refuses thousands of digits.
-_NUMBER = r"(\d{1,6})(?!\d)"
-_OFFICIAL = re.compile(r"block with index " + _NUMBER)
-# A head inside a line (one-line JSON) needs a colon or the like after it: "on top of block 3,
-# step 2 being done" holds none. "Step 2 & 3:" is a head for two steps.
-_STEP_HEAD = re.compile(
-    r"(?:(?P<line>^[ \t>*+\-\"'`_#({]{0,16})"
-    r"|[{,;][\s\"'*]{0,16}|[\"'][^\"'\n:]{1,40}:?[ _-])"
-    r"(?P<at>)step[\s_#]{0,3}(?P<number>\d{1,3})(?!\d)"
-    r"(?: ?(?:&|and|to|-|\u2013) ?(?P<last>\d{1,3})(?![\w.]))?"
-    r"[\"'*`_ ]{0,6}(?:[:.)=\-\u2013\u2014\uff1a]|(?(line)(?=\s)|(?!)))",
-    re.IGNORECASE | re.MULTILINE,
-)
-_LIST_HEAD = re.compile(r"^[ \t>*+\-]{0,8}(?P<at>)(?P<number>\d{1,3})[.):\uff1a]", re.MULTILINE)
-# "1, 2 and 3" are three numbers; of alternatives ("1, 2 or 3", "1/2/3") the first one counts.
-_MORE = r"(?:\s{0,3}(?:, and|,|&|and)\s{0,3}\d{1,6}(?!\d)){0,15}"
-_NUMBERS = _NUMBER + rf"((?!{_MORE}\s{{0,3}},?\s{{0,3}}or\b){_MORE})?"
-_INDEX = r"\bind(?:ex(?:es)?|ices)\b[^\w\n]{0,6}" + _NUMBERS
-_ANY_INDEX = re.compile(_INDEX, re.IGNORECASE)
-_MOVE_INDEX = re.compile(
-    r"\b(?:move|place|put|add|stack|position|use)\b[^\n]{0,120}?" + _INDEX, re.IGNORECASE
-)
-# "Move 4 blue cubes" counts blocks and names none.
-_LOOSE = re.compile(
-    r"\b(?:move|place|put|use|add|block|index|id)s?\b[^\w\n]{0,6}"
-    r"(?:(?:the|block|with|index|number|no\.?) ){0,4}[^\w\n]{0,6}"
-    + _NUMBERS
-    + r"(?!\s{1,3}(?:\w{1,20}\s){0,2}(?:block|cube|cuboid|cylinder|arche|prism|triangle|piece)s\b)",
-    re.IGNORECASE,
-)
-_JSON_INDEX = re.compile(
-    r"[\"'](?:(?:block|candidate)[_ -]?)?(?:index|idx|id|number|block|candidate)[\"']"
-    r"\s{0,9}:\s{0,9}[\"']?" + _NUMBER,
-    re.IGNORECASE,
-)
-_ARRAY = re.compile(
-    r"\[\s{0,9}(?:[\"']?\d{1,6}[\"']?\s{0,9},\s{0,9}){0,63}[\"']?\d{1,6}[\"']?\s{0,9}\]"
-)
-_DIGITS = re.compile(r"\d{1,6}(?!\d)")
-_ITEM_CHARS = 400
-_MOST_STEPS_AT_ONCE = 22
+_OFFICIAL = re.compile(r"block with index (\d{1,6})(?!\d)")
 
-# Between two lists: a short heading that names a part ("Right structure:"), or none, means that
-# both belong to one plan, unless it announces another version of that plan.
-_HEADING_CHARS = 80
-_MARKUP = re.compile(r"`{3}\w*|[^\w\s]|^\s*(?:json|plaintext|text)\s*$", re.MULTILINE)
-_PART = re.compile(
-    r"structure|\b(?:left|right|cent(?:er|re)|middle|part|section|component|side|tower|building"
-    r"|house|second|third|[2-9])\b",
-    re.IGNORECASE,
+
+def _official(text: str) -> _Read:
+    numbers = [int(match.group(1)) for match in _OFFICIAL.finditer(text)]
+    return ("block_with_index", numbers) if numbers else "no_plan" if text.strip() else "empty"
+
+
+_FRAME = re.compile(
+    r"<(?:final_)?answer>(?P<tag>(?:(?!<(?:final_)?answer>).){1,20000}?)(?:</(?:final_)?answer>|\Z)"
+    r"|\\boxed\s{0,2}\{(?P<boxed>(?:[^{}]|\{[^{}]{0,200}\}){1,4000})\}",
+    re.IGNORECASE | re.DOTALL,
 )
-_REVISION = re.compile(
-    r"final|correct|revis|updat|actual|alternat|summar|option|complete|overall|optimi|improv"
-    r"|\b(?:instead|answer|again|better|so|thus|therefore|wait|or)\b",
-    re.IGNORECASE,
-)
-_EXPLANATION = re.compile(r"expla(?:in|nation)|rationale|reasoning|justif", re.IGNORECASE)
-_Relation = Literal["part", "explanation", "other"]
+
+
+def _steps(text: str) -> _Read:
+    answer = answer_of(text)
+    if answer is None:
+        return "thoughts_only"
+    for frame in reversed(list(_FRAME.finditer(answer))[-_MOST_FRAMES:]):
+        name = frame.lastgroup or "tag"
+        read = _choose(
+            f"Answer: {frame[name].strip()}" if "\n" not in frame[name].strip() else frame[name]
+        )
+        if not isinstance(read, str):
+            return name, read[1]
+    return _choose(answer) if answer else "empty"
+
+
+_MOST_FRAMES = 8
 
 
 @dataclass
-class _List:
-    """A numbered list: where it stands, the block numbers it names, and those of its last item."""
+class _Plan:
+    """Lists that are one plan."""
 
-    start: int
-    end: int
-    numbers: list[int]
-    last: list[int]
+    lists: list[Listing]
+    title: str
+    option: str = ""
+    explained: bool = False
+    below: list[str] = field(default_factory=list)
 
-
-def _numbers(match: re.Match[str]) -> list[int]:
-    more = _DIGITS.findall(match.group(2) or "")
-    return [int(match.group(1)), *(int(digits) for digits in more)]
-
-
-def _lists(text: str, head: re.Pattern[str], item: re.Pattern[str]) -> Iterator[_List]:
-    """Runs of items numbered 0 or 1, 2, 3, ... of which at least one names a block."""
-    heads = list(head.finditer(text))
-    starts = [match.start() for match in heads] + [len(text)]
-    run: _List | None = None
-    expected = 0
-    for match, following in zip(heads, starts[1:], strict=True):
-        number, steps = _steps_of(match)
-        if run is None or number != expected:
-            if run is not None and run.numbers:
-                yield run
-            run = _List(match.start("at"), 0, [], []) if number <= 1 else None
-        if run is not None:
-            line_end = text.find("\n", match.end(), following)
-            run.end = line_end if line_end >= 0 else following
-            named = item.search(text, match.end(), min(following, match.end() + _ITEM_CHARS))
-            run.last = _numbers(named) if named else []
-            run.numbers += run.last * (steps if len(run.last) == 1 else 1)
-        expected = number + steps
-    if run is not None and run.numbers:
-        yield run
+    @property
+    def numbers(self) -> list[int]:
+        return [number for listing in self.lists for number in listing.numbers]
 
 
-def _steps_of(head: re.Match[str]) -> tuple[int, int]:
-    """Number of the first step that a head stands for, and of how many steps it is the head."""
-    first = int(head["number"])
-    last = int(head.groupdict().get("last") or first)
-    return first, last - first + 1 if 0 <= last - first < _MOST_STEPS_AT_ONCE else 1
+def _choose(answer: str) -> _Read:
+    """The plan among the lists of an answer."""
+    found, below = listings(answer)
+    named = [listing for listing in found if listing.numbers]
+    ranks = [rank_of(listing) for listing in named]
+    best = max(ranks, default=0)
+    if not best:
+        if REFUSAL.search(answer):
+            return "refusal"
+        return (
+            "catalogue" if named or any(f.form in ("json", "table") for f in found) else "no_plan"
+        )
+    if REFUSAL.search(answer) and (best == LAST or _is_declined(named)):
+        return "refusal"
+    plans = _plans(named, ranks, best, found)
+    plans[-1].below = below
+    plan = _chosen(plans, answer)
+    if plan is None:
+        return "two_plans"
+    if plan is plans[-1] and _is_cut_off(answer, found, below):
+        firm = plans if len(plans) > 1 else [*_plans(named, ranks, MOVES, found), plan]
+        plan = firm[-2] if len(firm) > 1 else plan
+    form = plan.lists[-1].form
+    numbers = plan.numbers * (2 if any(map(AGAIN.search, below)) else 1)
+    return form, numbers[::-1] if _is_reversed(plan, form) else numbers
 
 
-def _last_list(text: str, head: re.Pattern[str], item: re.Pattern[str]) -> _List | None:
-    """The last list, with those right before it that are parts of the same plan."""
-    plan: _List | None = None
-    before: _List | None = None
-    explains = False
-    for found in _lists(text, head, item):
-        relation = _relation(text, before, found) if before else "other"
-        if plan is None or relation == "other":
-            plan, explains = replace(found, numbers=list(found.numbers)), False
+def _plans(named: list[Listing], ranks: list[int], best: int, found: list[Listing]) -> list[_Plan]:
+    """The lists of the best rank as plans: parts joined, explanations left out."""
+    plans: list[_Plan] = []
+    passed: list[str] = []
+    kept = {id(listing) for listing, rank in zip(named, ranks, strict=True) if rank == best}
+    for listing in found:
+        passed += listing.above
+        if id(listing) not in kept:
+            passed.append("")
+            continue
+        relation = _relation(passed, plans, listing)
+        title = " ".join(passed[-2:])
+        option = OPTION.search(f"{title} {listing.label}")
+        if relation == "part":
+            plans[-1].lists.append(listing)
         elif relation == "explanation":
-            explains = True
-        elif not explains:
-            plan.numbers += found.numbers
-        before = found
-    return plan
+            plans[-1].explained = True
+        elif relation != "skip":
+            name = option["name"].lower() if option else ("or" if relation == "option" else "")
+            plans.append(_Plan([listing], title, name))
+        passed = []
+    return plans
 
 
-def _relation(text: str, before: _List, found: _List) -> _Relation:
-    """What a list is to the one before it, by the text between them."""
-    between = _MARKUP.sub(" ", text[before.end : found.start])
-    heading = [line for line in between.splitlines() if line.strip()]
-    title = heading[0].strip() if len(heading) == 1 else ""
-    if len(heading) > 1 or len(title) > _HEADING_CHARS or _REVISION.search(title):
+def _relation(passed: list[str], plans: list[_Plan], listing: Listing) -> str:
+    """What a list is to the plan before it, by the lines between them."""
+    lines = [line for line in passed if line] or (
+        [listing.label] if listing.form == "labeled" else []
+    )
+    title = lines[0].strip() if len(lines) == 1 else ""
+    if not plans:
         return "other"
-    if _EXPLANATION.search(title):
+    if any(OPTION.search(line) or OR_ELSE.match(line) for line in lines[-2:]):
+        return "option"
+    before = plans[-1].lists[-1]
+    if listing.form == "labeled" and not any(passed):
+        return "other"
+    if len(lines) > 1 or len(title) > HEADING_CHARS or REVISION.search(title) or "" in passed:
+        return "explanation" if any(EXPLANATION.search(line) for line in lines[:1]) else "other"
+    if EXPLANATION.search(title):
         return "explanation"
-    # "Step 3: Determine the order" above a list names no block: it is a heading, not a part.
-    part = _PART.search(title) if title else before.numbers != found.numbers
-    return "part" if part and before.last else "other"
+    part = PART.search(title) if title else before.numbers != listing.numbers
+    if not (part and before.ends_named):
+        return "other"
+    return "skip" if plans[-1].explained else "part"
 
 
-def _step_list(text: str) -> list[int]:
-    steps = _last_list(text, _STEP_HEAD, _ANY_INDEX)
-    if steps is None:
-        return []
-    # Headings such as "Step 3: Determine the order" can stand above the list that is meant.
-    below = _last_list(text[steps.start :], _LIST_HEAD, _MOVE_INDEX)
-    return [] if below and len(below.numbers) > len(steps.numbers) else steps.numbers
+def _chosen(plans: list[_Plan], answer: str) -> _Plan | None:
+    """The last plan, or of several options the one that is said to be meant."""
+    last = plans[-1]
+    options = [plan for plan in plans if plan.option]
+    if options and last.option:
+        if len({tuple(plan.numbers) for plan in plans}) == 1:
+            return last
+        chosen = [
+            match["a"] or match["b"] or match["c"] or match["d"]
+            for match in CHOICE.finditer(answer)
+        ]
+        named = [plan for plan in plans if chosen and plan.option == chosen[-1].lower()]
+        return named[-1] if named else (last if len(plans) == 1 else None)
+    return last
 
 
-def _list_rule(head: re.Pattern[str], item: re.Pattern[str]) -> Callable[[str], list[int]]:
-    def find(text: str) -> list[int]:
-        found = _last_list(text, head, item)
-        return found.numbers if found else []
-
-    return find
-
-
-def _moves(text: str) -> list[int]:
-    return [n for match in _MOVE_INDEX.finditer(text) for n in _numbers(match)]
+def _is_cut_off(answer: str, found: list[Listing], below: list[str]) -> bool:
+    """Whether the text ends within its last list."""
+    if below and found[-1].form != "steps":
+        return False
+    unclosed = answer.count("{") > answer.count("}") or answer.count("```") % 2 == 1
+    return unclosed or (not found[-1].ends_named)
 
 
-def _json_fields(text: str) -> list[int]:
-    return [int(match.group(1)) for match in _JSON_INDEX.finditer(text)]
+def _is_declined(named: list[Listing]) -> bool:
+    """Whether a refusal says of its list that it is only how one might look."""
+    return any(SUPPOSED.search(line) for listing in named for line in listing.above[-2:])
 
 
-def _array(text: str) -> list[int]:
-    arrays = list(_ARRAY.finditer(text))
-    return [int(digits) for digits in _DIGITS.findall(arrays[-1].group())] if arrays else []
-
-
-def _official(text: str) -> list[int]:
-    return [int(match.group(1)) for match in _OFFICIAL.finditer(text)]
-
-
-_Rule = tuple[str, Callable[[str], list[int]]]
-_RULES: dict[PlanParser, tuple[_Rule, ...]] = {
-    "steps": (
-        ("step_list", _step_list),
-        ("numbered_list", _list_rule(_LIST_HEAD, _MOVE_INDEX)),
-        ("loose_step_list", _list_rule(_STEP_HEAD, _LOOSE)),
-        ("moves", _moves),
-        ("loose_numbered_list", _list_rule(_LIST_HEAD, _LOOSE)),
-        ("json_fields", _json_fields),
-        ("array", _array),
-    ),
-    "official": (("block_with_index", _official),),
-}
+def _is_reversed(plan: _Plan, form: str) -> bool:
+    """Whether the reply says that its list is to be built from its end."""
+    said = [plan.title, *plan.lists[-1].above[-3:], plan.lists[-1].label, *plan.below[:4]]
+    if any(BACKWARD.search(line) and not NOT_REVERSED.search(line) for line in said):
+        return True
+    return form in ("labeled", "chain", "marked") and bool(
+        DOWNWARD.search(" ".join(said[:-4] or said))
+    )

@@ -1,21 +1,103 @@
 """What of a reply is read: the answer behind the thinking, in plain forms of its characters."""
 
+# ruff: noqa: RUF001 -- replies come in other scripts
+
 from __future__ import annotations
 
 import re
 import unicodedata
 
-__all__ = ["after_reasoning", "plain_forms"]
+__all__ = ["BACKWARD", "answer_of", "number_of_word", "plain_forms", "plain_line"]
 
 _NOT_ASCII = re.compile(r"[^\x00-\x7f]")
-_THINKING_ENDS = re.compile(r"</think(?:ing)?>", re.IGNORECASE)
+_TAGS = r"(?:think(?:ing)?|thoughts?|reasoning|scratchpad|analysis|reflection)"
+_THINKING = re.compile(
+    rf"(?P<closes></{_TAGS}>|\[/THINK\]|◁/think▷|<\|channel\|>final<\|message\|>)"
+    rf"|(?P<opens><{_TAGS}>|\[THINK\]|◁think▷|<\|channel\|>analysis<\|message\|>)",
+    re.IGNORECASE,
+)
+_NEXT_TURN = re.compile(
+    r"</s>|<\|(?:im_end|endoftext|eot_id|end|user)\|>|<end_of_turn>|<｜end▁of▁sentence｜>"
+)
+"""What a server should have stopped at: behind it a model plays the next turn."""
+_STRUCK_OUT = re.compile(
+    r"~~[^~\n]{1,400}~~|<(?:del|s)>[^<>\n]{1,400}</(?:del|s)>|<!--(?:(?!<!--).){0,4000}?-->"
+)
+_QUOTES = re.compile(
+    r"[*`\"\u201c\u201d\u00ab\u00bb\u201e]|(?<!\w)['\u2018\u2019]|['\u2018\u2019](?!\w)"
+)
+_LATEX = re.compile(
+    r"\\(?:text|textbf|mathrm|mathbf)\s{0,2}\{([^{}\n]{0,80})\}|\\(?:,|;|quad|[()\[\]])"
+)
+_LATEX_ARROW = re.compile(r"\\(?:long)?(?:right)?(?:arrow|to)\b")
+
+BACKWARD = re.compile(
+    r"\b(?:in |the )?revers(?:e|ed)(?: (?:order|of))?\b|\bbackwards?\b"
+    r"|from (?:the )?last to (?:the )?first"
+    r"|last (?:step|block|one|item|picture) first|read (?:it )?from (?:the )?(?:bottom|end|right)"
+    r"|umgekehrte?r? reihenfolge|rückwärts|von hinten|倒序|逆序|反过来"
+    r"|从后(?:往|到|向)前|相反的?顺序"
+    r"|ordre inverse"
+    r"|orden inverso",
+    re.IGNORECASE,
+)
+"""That a list stands in the opposite order."""
+_NUMBER_WORDS = {
+    word: number
+    for number, words in enumerate(
+        (
+            "one eins un une uno uno um один 一",
+            "two zwei deux dos due dois два 二 两",
+            "three drei trois tres tre três три 三",
+            "four vier quatre cuatro quattro quatro четыре 四",
+            "five fünf cinq cinco cinque пять 五",
+            "six sechs seis sei шесть 六",
+            "seven sieben sept siete sette sete семь 七",
+            "eight acht huit ocho otto oito восемь 八",
+            "nine neun neuf nueve nove девять 九",
+            "ten zehn dix diez dieci dez десять 十",
+            "eleven elf onze once undici одиннадцать 十一",
+            "twelve zwölf douze doce dodici двенадцать 十二",
+            "thirteen dreizehn treize trece tredici 十三",
+            "fourteen vierzehn quatorze catorce 十四",
+            "fifteen fünfzehn quinze quince quindici 十五",
+            "sixteen sechzehn seize dieciséis sedici 十六",
+        ),
+        start=1,
+    )
+    for word in words.split()
+}
 
 
-def after_reasoning(text: str) -> str:
-    """What follows the last closing tag of a reasoning section, or the whole text."""
-    ends = list(_THINKING_ENDS.finditer(text))
-    tail = text[ends[-1].end() :] if ends else ""
-    return tail if tail.strip() else text
+def answer_of(text: str) -> str | None:
+    """What a reply says after its thoughts, or before thoughts that never end, in plain forms.
+
+    None where it consists of thoughts alone: they hold no answer, closed or not.
+    """
+    start, is_thinking, opened = 0, False, 0
+    for mark in _THINKING.finditer(text):
+        if mark["closes"]:
+            start, is_thinking = mark.end(), False
+        elif not is_thinking:
+            opened, is_thinking = mark.start(), True
+    answer = text[start:opened] if is_thinking else text[start:]
+    ends = _NEXT_TURN.search(answer)
+    if ends and answer[: ends.start()].strip():
+        answer = answer[: ends.start()]
+    if not answer.strip():
+        return None if start or is_thinking else ""
+    return plain_forms(_STRUCK_OUT.sub(" ", answer))
+
+
+def number_of_word(word: str) -> int | None:
+    """The number from one to sixteen that a word of some language is."""
+    return _NUMBER_WORDS.get(word.lower())
+
+
+def plain_line(line: str) -> str:
+    """A line without emphasis, quotation marks and LaTeX; underscores are spaces."""
+    value = _LATEX.sub(r" \1 ", _LATEX_ARROW.sub("→", line)) if "\\" in line else line
+    return _QUOTES.sub("", value).replace("_", " ")
 
 
 def plain_forms(text: str) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 
 from phyblock.datasets import Dataset
 from phyblock.datasets.version import UNNUMBERED, read_version
+from phyblock.parsing import READER_VERSION
 from phyblock.records import FORMAT, Manifest
 from phyblock.run.models import PlannedModel
 from phyblock.specs import LoadedSuite
@@ -44,7 +45,8 @@ def make_manifest(
         "tracks": {track.name: track.identity() for track in tracks},
         "limit": limit,
     }
-    canonical = json.dumps(inputs, sort_keys=True, separators=(",", ":"))
+    decided = {**inputs, "readers": READER_VERSION}
+    canonical = json.dumps(decided, sort_keys=True, separators=(",", ":"))
     scenes = [task.scene for task in dataset.tasks]
     fields = {
         "identity": hashlib.sha256(canonical.encode()).hexdigest(),
@@ -63,7 +65,11 @@ def make_manifest(
         "scenes_by_level": {
             level: sum(level in scene.levels for scene in scenes) for level in suite.levels
         },
-        "versions": {"python": platform.python_version(), **{n: version(n) for n in _LIBRARIES}},
+        "versions": {
+            "python": platform.python_version(),
+            "readers": str(READER_VERSION),
+            **{n: version(n) for n in _LIBRARIES},
+        },
     }
     return Manifest.model_validate(fields)
 

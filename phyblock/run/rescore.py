@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, writing
+from phyblock.parsing import reader_version
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
 from phyblock.records.reading import read_records
 from phyblock.run.data import recorded_dataset
@@ -48,7 +49,8 @@ def rescore(
     suite = _suite(folder, manifest, parser, matcher)
     name = f"scores/{suite.parser}-{suite.scoring.matchers[0]}"
     target = out or folder / name
-    identity = f"{manifest.identity} scored by {suite.parser}, {suite.scoring.matchers[0]}"
+    by = f"{suite.parser} {reader_version(suite.parser)}, {suite.scoring.matchers[0]}"
+    identity = f"{manifest.identity} scored by {by}"
     if out is None:
         run_folder(folder).check([f"{name}/"])
     _check_target(target, identity)

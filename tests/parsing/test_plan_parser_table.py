@@ -148,7 +148,6 @@ STEP_LISTS = {
         "Step1: Move block with index 4",
         (4,),
     ),
-    "cut off in the reasoning's answer": ("<think>\nStep1: index 9\n</think>\n", (9,)),
     "cut off in the list": (
         "Step1: Move block with index 3\nStep2: Move block with index 5\nStep3: Move block wi",
         (3, 5),
@@ -171,78 +170,79 @@ STEP_LISTS = {
 
 OTHER_RULES = {
     "a numbered list": (
-        "numbered_list",
+        "numbered",
         "1. Move block with index 10\n2. Move block with index 9\n3. Place block with index 4.",
         (10, 9, 4),
     ),
     "numbers and steps": (
-        "numbered_list",
+        "steps",
         "1. **Step 1**: Move block with index 8.\n2. **Step 2**: Move block with index 4.",
         (8, 4),
     ),
     "numbered parts": (
-        "numbered_list",
+        "numbered",
         "#### Structure 1:\n1. Move block with index 9\n2. Move block with index 6\n\n"
         "#### Structure 2:\n1. Move block with index 1\n2. Move block with index 7",
         (9, 6, 1, 7),
     ),
     "nested numbers": (
-        "numbered_list",
+        "numbered",
         "1. Left structure\n   1. Move block with index 3\n   2. Move block with index 4\n"
         "2. Right structure\n   1. Move block with index 5\n",
         (3, 4, 5),
     ),
     "a numbered plan under headings that are called steps": (
-        "numbered_list",
+        "numbered",
         "### Step 1: Analyze\nThe base is index 9.\n### Step 2: Plan\n"
         "1. Move block with index 9\n2. Move block with index 4\n3. Move block with index 2\n",
         (9, 4, 2),
     ),
     "an analysis list, then the plan": (
-        "numbered_list",
+        "numbered",
         "1. Red arch: index 1\n2. Blue cube: index 5\n\nPlan:\n"
         "1. Move block with index 5\n2. Move block with index 1",
         (5, 1),
     ),
     "steps without the word index": (
-        "loose_step_list",
+        "steps",
         "Step1: Move block 13 (orange)\nStep2: Move block #2\nStep3: Add block 4 and 5",
         (13, 2, 4, 5),
     ),
     "steps that count blocks": (
-        "loose_step_list",
+        "steps",
         "Step1: Place 2 orange blocks, block 7 first\nStep2: Move block 3",
         (7, 3),
     ),
     "sentences": (
-        "moves",
+        "marked",
         "First, move block with index 3. Then place block with index 4 on it and finally put the "
         "block with index 9 on top.",
         (3, 4, 9),
     ),
-    "bullets": ("moves", "- Move block with index 3\n- Move block with index 4", (3, 4)),
+    "bullets": ("marked", "- Move block with index 3\n- Move block with index 4", (3, 4)),
     "JSON objects on one line": (
-        "moves",
+        "json",
         '[{"step": 1, "action": "Move block with index 3"}, {"step": 2, "action": "move", '
         '"index": 5}]',
         (3, 5),
     ),
     "numbers without the word index": (
-        "loose_numbered_list",
+        "numbered",
         "1. Block 3 as the base\n2. Block 5 on top",
         (3, 5),
     ),
     "JSON objects": (
-        "json_fields",
+        "json",
         '[\n {"step": 1, "block_index": 3, "at": [0, 0, 1]},\n {"step": 2, "block_index": "5"}\n]',
         (3, 5),
     ),
-    "an array": ("array", "The order is [3, 5, 5, 1].", (3, 5, 5, 1)),
-    "an array in JSON": ("array", '```json\n{"plan": ["3", "5"]}\n```', (3, 5)),
-    "arrays, the last one counts": ("array", "Maybe [1, 2]? No: [2, 1]", (2, 1)),
+    "an array": ("labeled", "The order is [3, 5, 5, 1].", (3, 5, 5, 1)),
+    "an array in JSON": ("json", '```json\n{"plan": ["3", "5"]}\n```', (3, 5)),
+    "arrays, the last one counts": ("labeled", "Maybe [1, 2]? No: [2, 1]", (2, 1)),
 }
 
 NOTHING = {
+    "thoughts alone, for moves too": "<think>\nStep1: index 9\n</think>\n",
     "empty": "",
     "blank": " \n\t\n",
     "a refusal": "I'm sorry, but I can't help with identifying what is in these images.",
@@ -258,7 +258,8 @@ NOTHING = {
 def test_step_lists_are_read(name: str) -> None:
     text, plan = STEP_LISTS[name]
     parsed = parse_plan(text, N)
-    assert (parsed.plan.steps, parsed.rule, parsed.dropped) == (plan, "step_list", ())
+    assert (parsed.plan.steps, parsed.dropped) == (plan, ())
+    assert parsed.rule in ("steps", "numbered", "json")
 
 
 @pytest.mark.parametrize("name", OTHER_RULES)
@@ -285,7 +286,7 @@ def test_numbers_that_no_candidate_has_are_dropped_and_reported() -> None:
 
 def test_a_plan_of_unknown_blocks_alone_is_no_parse_failure() -> None:
     parsed = parse_plan("Step1: Move block with index 99", N)
-    assert (parsed.plan.steps, parsed.rule, parsed.dropped) == ((), "step_list", (99,))
+    assert (parsed.plan.steps, parsed.rule, parsed.dropped) == ((), "steps", (99,))
 
 
 def test_the_official_rule_reads_every_mention_of_the_whole_text() -> None:

@@ -23,6 +23,10 @@ class PlanParse(Line):
     """The same in the numbers of the file; null: those are the ones that were shown."""
     dropped: tuple[int, ...] = ()
     """Numbers that no candidate has."""
+    version: int = 1
+    """Version of the parser."""
+    problem: str | None = None
+    """Why nothing could be read."""
 
 
 PLAN_COLUMNS = dict.fromkeys(("parser", "plan", "file_plan", "dropped", "shown"), "object")

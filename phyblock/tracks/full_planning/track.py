@@ -12,7 +12,7 @@ from typing import Any
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
 from phyblock.models.base import Image, Request
-from phyblock.parsing import ParsedPlan, parse_plan
+from phyblock.parsing import ParsedPlan, parse_plan, reader_version
 from phyblock.scoring import AssemblyScorer, Score
 from phyblock.tracks.full_planning.baselines import PlanSubject
 from phyblock.tracks.full_planning.guessing import BlindGuesses
@@ -63,6 +63,8 @@ class PlanJudgement:
                 "plan": list(self.parsed.plan.steps),
                 "file_plan": self.in_file,
                 "dropped": list(self.parsed.dropped),
+                "version": reader_version(self.parser),
+                "problem": self.parsed.problem,
             },
             "scores": [_score(score) for score in self.scores],
         }

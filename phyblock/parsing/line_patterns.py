@@ -1,0 +1,76 @@
+"""Forms of the lines of a reply: heads of steps, numbers, marks, labels, fences."""
+
+# ruff: noqa: RUF001 -- replies come in other scripts
+
+from __future__ import annotations
+
+import re
+
+from phyblock.parsing.statement import VERB
+
+__all__ = [
+    "ARRAY",
+    "FENCE",
+    "INLINE_STEP",
+    "LABELED",
+    "LAYER",
+    "MARKED",
+    "NAMES_FIRST",
+    "NOUN_LABEL",
+    "NUMBERED",
+    "SENTENCE_END",
+    "STARTS_MOVING",
+    "STEP",
+    "TAG",
+]
+
+_STEP_WORD = (
+    r"(?:steps?|schritte?|pasos?|étapes?|etape|passo|шаг|stap|krok|adım"
+    r"|步骤|步驟|ステップ|단계|第(?=\s?\d))"
+)
+INLINE_STEP = re.compile(
+    rf"(?:(?<=[{{,;])|(?<=[^\d\s]\.)|(?<=[\w)\]] \d\.)|(?<=[\w)\]] \d\d\.))[ \t]{{0,4}}"
+    rf"(?=[\"'*]{{0,3}}{_STEP_WORD}[\s_#]{{0,3}}\d{{1,3}}[\"'*]{{0,3}}\s?[:.)=\-\u2013\u2014])"
+    rf"|(?<=[{{,;])[ \t]{{0,4}}(?=[\"'][^\"'\n:]{{1,40}}:?[ _-]step[\s_#]{{0,3}}\d{{1,3}}[\"'])"
+    rf"|(?<=\S)[ \t](?=\d{{1,2}}[.)] (?:\*\*)?(?:{VERB}))",
+    re.IGNORECASE,
+)
+STEP = re.compile(
+    rf"[\s>+\-#({{|\[\d.)•·]{{0,16}}(?:[^\n:.]{{0,40}}?[ :_-]{{1,2}})??"
+    rf"{_STEP_WORD}[\s_#]{{0,3}}(?P<number>\d{{1,3}})(?!\d)\s?步?"
+    r"(?: ?(?:&|and|to|-|\u2013) ?(?P<last>\d{1,3})(?![\w.]))?"
+    r"\s{0,3}(?:\([^()\n]{0,60}\)\s?)?(?P<sign>[:.)=\-\u2013\u2014、,\]}>]|(?=\s)|\Z)",
+    re.IGNORECASE,
+)
+NUMBERED = re.compile(
+    r"[\s>+\-#({|•·]{0,8}(?P<number>\d{1,3})(?:st|nd|rd|th)?\s?(?:[.):、](?!\d)|\)\.?)\s{0,4}(?=\D|\d)"
+)
+MARKED = re.compile(r"\s{0,40}(?:[-+•·▪–]|>)\s{1,4}(?=\S)|\s{0,40}[a-h][.)]\s")
+STARTS_MOVING = re.compile(
+    rf"[\s>\[{{(]{{0,12}}(?:(?:first|then|next|finally|now|please|und|dann|zuerst),?\s)?(?:robot\.)?(?:{VERB})",
+    re.I,
+)
+NAMES_FIRST = re.compile(
+    r"\s{0,20}(?:(?:the )?block |with |the )?(?:index|block|candidate|积木|#)\W{0,4}\d", re.I
+)
+LABELED = re.compile(
+    r"\s{0,20}[-#>]{0,4}\s{0,3}(?:\d{1,2}[.)]\s)?(?P<label>[^:=：\[\n]{1,80}?)\s{0,3}(?:[:=：]"
+    r"|\b(?:is|are|would be|ist|lautet|est|es)\b:?|是|为)\s{0,3}"
+    r"(?P<value>[\s(\[{<#]{0,4}(?:(?:blocks?|index|indices|积木)\s)?\d[^\n]{0,400})",
+    re.IGNORECASE,
+)
+ARRAY = re.compile(
+    r"\[\s{0,9}(?:[\"']?\d{1,6}[\"']?\s{0,9},\s{0,9}){1,63}[\"']?\d{1,6}[\"']?\s{0,9}\]"
+)
+TAG = re.compile(r"</?[a-z_]{1,20}(?:\s[^<>\n]{0,80})?>", re.IGNORECASE)
+NOUN_LABEL = re.compile(
+    r"[-\s]{0,4}(?:block|index|id|candidate|piece|number)(?: (?:index|id|number))?\s*", re.I
+)
+FENCE = re.compile(
+    r"\s{0,20}(?:[>*+-]\s{1,4})?(?:`{3,}|~{3,})|\s{0,20}(?:json|plaintext|text)\s*\Z"
+)
+LAYER = re.compile(
+    r"layer|level|step|stage|phase|part|ebene|schicht|层|structure|base|bottom|middle|top|then|next",
+    re.I,
+)
+SENTENCE_END = re.compile(r"(?<=[\d)\]])[.;]\s{1,4}(?=\S)")

@@ -1,0 +1,146 @@
+"""Words by which replies announce plans, parts, choices, refusals and what is no plan."""
+
+# ruff: noqa: RUF001 -- replies come in other scripts
+
+from __future__ import annotations
+
+import re
+
+__all__ = [
+    "AGAIN",
+    "BLOCK_WORD",
+    "CATALOGUE_WORD",
+    "CHOICE",
+    "DOWNWARD",
+    "EXAMPLE",
+    "EXPLANATION",
+    "FINAL_LABEL",
+    "HEADING_CHARS",
+    "LABEL_CHARS",
+    "LAYERS",
+    "NOT_MEANT",
+    "NOT_REVERSED",
+    "OPTION",
+    "OR_ELSE",
+    "PART",
+    "PLAN_WORD",
+    "REFUSAL",
+    "REVISION",
+    "SUPPOSED",
+]
+
+PLAN_WORD = re.compile(
+    r"order|sequence|plan\b|assembl|build|\bsteps?\b|instruction|answer|solution|\bmoves?\b"
+    r"|placement|construct|result"
+    r"|reihenfolge|anleitung|antwort|schritt|aufbau|ordre|étapes|réponse|orden|pasos|respuesta"
+    r"|secuencia|ordine"
+    r"|bottom[- ](?:to|up)|from the (?:bottom|ground)|von unten|从下到上|порядок|план|ответ"
+    r"|顺序|步骤|答案"
+    r"|计划|方案|顺|序列|手順|順序|순서",
+    re.IGNORECASE,
+)
+CATALOGUE_WORD = re.compile(
+    r"dictionary|catalog|required|needed|\bselect|candidate|available|inventory|\bused\b|indices"
+    r"|identif|distractor"
+    r"|unused|legend|analysis|possible|not needed|leftover|remaining|options|extra|benötigt"
+    r"|verfügbar|übrig|nécessaires"
+    r"|necesarios|需要|可用|候选|清单|未使用|多余|剩余",
+    re.IGNORECASE,
+)
+FINAL_LABEL = re.compile(
+    r"(?:final|answer|plan|order|sequence|antwort|reihenfolge|respuesta|réponse|ответ|答案|顺序"
+    r"|步骤)\W*\Z",
+    re.IGNORECASE,
+)
+EXAMPLE = re.compile(
+    r"(?:\bexample\b|\be\.g\.|for instance|\bsample (?:output|answer|plan)|beispiel|\bejemplo"
+    r"|\bexemple|例如|示例|例)[^.!?。]{0,40}\Z",
+    re.IGNORECASE,
+)
+NOT_MEANT = re.compile(
+    r"(?:\b(?:wrong|incorrect|invalid|bad|mistaken|rejected|falsch\w{0,2})\b[^.!?]{0,40}|^\W*(?:if"
+    r"|unless|falls|wenn)\b[^.!?]{0,80}|\b(?:orders|sequences|plans)\b(?: \w{1,12}){0,3})"
+    r"[:：]\W*\Z",
+    re.IGNORECASE,
+)
+EXPLANATION = re.compile(
+    r"expla(?:in|nation)|rationale|reasoning|justif|verif|\bcheck|validat|\bwhy\b|\bnotes?\b"
+    r"|remark|stability|überprüf|验证|检查|erklärung|begründung|解释|说明",
+    re.IGNORECASE,
+)
+OPTION = re.compile(
+    r"\b(?P<kind>plan|option|alternative|variant|variante|solution|approach|version|possibility"
+    r"|candidate plan|lösung|方案)"
+    r"\s{0,2}#?(?P<name>[A-D]|[1-4]|one|two|three|I{1,3})\b",
+    re.IGNORECASE,
+)
+OR_ELSE = re.compile(
+    r"^\W*(?:or|oder|ou|或者?|alternativ\w*|another (?:valid |possible )?\w+|or (?:else"
+    r"|alternatively).{0,40})\b\W*",
+    re.IGNORECASE,
+)
+CHOICE = re.compile(
+    r"\b(?:choose|chose|pick|select|prefer|recommend|go(?:ing)? with|went with|use|best|better"
+    r"|final|submit|take|answer is"
+    r"|wähle|nehme|entscheide|选择?|采用)[^.\n]{0,40}?(?:plan|option|alternative|variant|solution"
+    r"|approach|version|lösung|方案)\s{0,2}#?(?P<a>[A-D]|[1-4]|one|two|three|I{1,3})\b"
+    r"|\b(?:plan|option|alternative|variant|solution|approach|version|lösung)\s{0,2}#?(?P<b>[A-D]"
+    r"|[1-4]|one|two|three|I{1,3})\b"
+    r"\s(?:is|seems|looks|ist|wins)\s?(?:the |my |more |clearly |a )?(?:better|best|final|correct"
+    r"|right|stable|preferred|chosen|answer|one|besser|richtig)"
+    r"|\b(?:plan|option|alternative|variant|solution|version)\s?#?(?P<c>[A-D]|[1-4])\s?[(,:\-\u2013]{1,2}\s?"
+    r"(?:better|best|chosen|final|recommended|preferred)\b"
+    r"|\b(?:decision|choice|winner|entscheidung|wahl)\W{1,4}(?:is\s)?(?P<d>[A-D])\b(?!\w)",
+    re.IGNORECASE,
+)
+REVISION = re.compile(
+    r"final|correct|revis|updat|actual|summar|complete|overall|optimi|improv|korrigier|attempt|error|mistake|oops"
+    r"|\btry\b|new plan"
+    r"|\b(?:instead|answer|again|better|so|thus|therefore|wait|output)\b",
+    re.IGNORECASE,
+)
+PART = re.compile(
+    r"structure|layer|level|\b(?:left|right|cent(?:er|re)|middle|upper|lower|bottom|top|base|part"
+    r"|section|component|side"
+    r"|tower|building|house|second|third|next|then|phase|stage|step)\b|\bstep\s?\d|schicht|ebene"
+    r"|teil|turm|层|部分",
+    re.IGNORECASE,
+)
+HEADING_CHARS = 80
+REFUSAL = re.compile(
+    r"\bI(?:['\u2019]m| am) (?:sorry|unable|not able|afraid)|\bI (?:cannot|can['\u2019]?t|could not"
+    r"|won['\u2019]t|am not able)"
+    r"|\b(?:cannot|can['\u2019]t|not possible to|impossible to|unable to) (?:determine|give|provide"
+    r"|build|produce|see|view|make|create|identify|plan|be built)"
+    r"|as an ai|please (?:provide|send|upload|share)|(?:is|are) not visible|need to see"
+    r"|no (?:valid )?plan\b|ich kann (?:das |die |den |leider )?(?:\w+ )?(?:nicht|kein)|leider|无法"
+    r"|抱歉|不能确定|lo siento|désolé|не могу",
+    re.IGNORECASE,
+)
+SUPPOSED = re.compile(
+    r"would|could|generic|hypothetical|in general|typical|illustrat|placeholder|candidates",
+    re.IGNORECASE,
+)
+AGAIN = re.compile(
+    r"\brepeat (?:the |this |these )?(?:above |same |whole )?(?:assembly |building )?(?:order|steps"
+    r"|sequence|plan|instructions)\b"
+    r"[^.\n]{0,30}\b(?:for|to build) (?:the )?(?:second|other)\b",
+    re.IGNORECASE,
+)
+NOT_REVERSED = re.compile(
+    r"\b(?:not|never|don't|do not|isn't|no need|take (?:it|them) apart|dis\w+|undo"
+    r"|remov\w+)\b[^.\n]{0,40}revers",
+    re.IGNORECASE,
+)
+DOWNWARD = re.compile(
+    r"top[- ](?:to|down)[- ]?(?:bottom)?\b|von oben nach unten|从上到下|de haut en bas"
+    r"|de arriba (?:a"
+    r"|hacia) abajo",
+    re.IGNORECASE,
+)
+LABEL_CHARS = 20
+BLOCK_WORD = re.compile("block|index|indices", re.IGNORECASE)
+LAYERS = re.compile(
+    r"\W*(?:(?:the )?(?:bottom|ground|base|first)\b|(?:layer|level|ebene|schicht|层) ?1)",
+    re.IGNORECASE,
+)

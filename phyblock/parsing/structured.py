@@ -1,0 +1,306 @@
+"""Lists in a form of their own: JSON, read by its keys, and tables, read by their columns."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from phyblock.parsing.statement import MOST_AT_ONCE, chain, read_statement
+from phyblock.parsing.text_forms import BACKWARD, plain_line
+
+__all__ = ["Found", "find_json", "find_tables", "objects", "whole_number"]
+
+_MOST_VALUES = 100
+"""JSON values that are tried, from the end: a reply that opens brackets for pages is still read."""
+_VALUE_CHARS = 20_000
+_OPENS = re.compile(r"\{|\[(?=\s{0,20}[\[{\"'\d])")
+_BRACKET = re.compile(r"\"(?:[^\"\\\n]|\\.){0,2000}\"|[\[\]{}]")
+_TRAILING_COMMA = re.compile(r",(?=\s{0,20}[}\]])")
+_COMMENT = re.compile(r"(?<![:\"'\w])//[^\n\"]{0,200}$", re.MULTILINE)
+
+_PLAN_KEY = re.compile(
+    r"(?:(?:final|assembly|build(?:ing)?|placement|block|construction|my|the|ordered|move|proposed"
+    r"|correct)[ _-]?){0,3}"
+    r"(?:plan|steps?|sequence|order(?:ing)?|answer|solution|actions?|moves|instructions|result"
+    r"|output|layers"
+    r"|assembly|reihenfolge|schritte|antwort|orden|pasos|respuesta|ordre|étapes|顺序|步骤|答案|计划|搭建顺序)",
+    re.IGNORECASE,
+)
+_STEP_KEY = re.compile(
+    r"(?:.{0,40}[ _:-])?(?:step|layer|level|schritt|paso|étape|phase|stage|ebene|move|第|步骤"
+    r"|层)[ _#-]{0,2}(?P<n>\d{1,3})\D{0,3}"
+    r"|(?P<bare>\d{1,3})",
+    re.IGNORECASE,
+)
+_TIERS = ("ground", "base", "bottom", "lower", "middle", "mid", "upper", "top", "roof")
+_OPPOSITE_KEY = re.compile(
+    r"(?:un|not[ _-]?|non[ _-]?)(?:used|needed|required|necessary|selected|placed)|distract|exclud"
+    r"|reject|discard"
+    r"|remain|left[ _-]?over|spare|available|candidate(?:s|_list)|ignor|skip|avoid|wrong|draft"
+    r"|example|attempt"
+    r"|alternativ|initial|previous|old|count|total|number_of|num_|confidence|layers?_count|reason"
+    r"|thought|analysis"
+    r"|explanation|descri|comment|note|supports?$|depend|on[ _]?top|below|position|coord|rotation"
+    r"|orient|size"
+    r"|color|colour|shape|type|blocks?[ _](?:needed|required|used)|required|needed|selected"
+    r"|inventory|dictionary"
+    r"|unbenutzt|übrig|未使用|多余|干扰|剩余",
+    re.IGNORECASE,
+)
+_INDEX_KEY = re.compile(
+    r"(?:(?:block|candidate|piece)[ _-]?)?(?:index|idx|id|number|no)|block|candidate|piece|move"
+    r"|place|baustein|积木|编号",
+    re.IGNORECASE,
+)
+_ACTION_KEY = re.compile(
+    r"action|instruction|operation|description|move|text|do|command", re.IGNORECASE
+)
+_TIMES_KEY = re.compile(r"count|times|quantity|qty|repeat|copies|anzahl|数量", re.IGNORECASE)
+_PLACE_KEY = re.compile(
+    r"step|order|sequence|layer|level|position_in_order|schritt|步骤", re.IGNORECASE
+)
+_MANY_KEY = re.compile(
+    r"blocks|indices|indexes|ids|candidates|pieces|block_ids|block_indices|积木", re.IGNORECASE
+)
+_LOOKS_KEY = re.compile(r"shape|color|colour|orientation|type|形状|颜色", re.IGNORECASE)
+_BACKWARD_KEY = re.compile(
+    r"revers|backward|top[ _-](?:to[ _-]bottom|down)|last[ _-]to[ _-]first", re.I
+)
+_CHOICE_KEY = re.compile(
+    r"(?:plan|option|alternative|variant)[ _-]?(?P<which>[a-d1-4])", re.IGNORECASE
+)
+
+
+@dataclass(frozen=True)
+class Found:
+    """A list in a form of its own: where it stands, the blocks it names, and whether it is a plan.
+
+    What is no plan (a catalogue of the candidates) stands there all the same, with no numbers.
+    """
+
+    start: int
+    end: int
+    form: str
+    numbers: tuple[int, ...]
+
+
+class _Fields(list[tuple[str, Any]]):
+    """The fields of a JSON object in order, keys that occur twice included."""
+
+
+def objects(text: str) -> Iterator[tuple[int, int, Any]]:
+    """The outermost JSON values of a text; objects are lists of fields."""
+    done = 0
+    for opens in list(_OPENS.finditer(text))[-_MOST_VALUES:]:
+        if opens.start() < done:
+            continue
+        end = _closing(text, opens.start())
+        value = _decoded(text[opens.start() : end]) if end else None
+        if value is not None:
+            done = end
+            yield opens.start(), end, value
+
+
+def find_json(text: str) -> list[Found]:
+    """The plans and catalogues that stand in a text as JSON."""
+    found = []
+    for start, end, value in objects(text):
+        is_array = isinstance(value, list) and not isinstance(value, _Fields)
+        if is_array and not any(isinstance(item, (list, str)) for item in value):
+            # An array of numbers is what its line says that it is.
+            continue
+        found.append(Found(start, end, "json", tuple(_read(value, is_plan=is_array))))
+    return found
+
+
+def whole_number(value: object) -> int | None:
+    """A JSON value that is a number of a block, also as text; None for others."""
+    if isinstance(value, str) and re.fullmatch(r"\s{0,9}#?\d{1,6}\s{0,9}", value):
+        return int(value.strip().lstrip("#"))
+    return value if isinstance(value, int) and not isinstance(value, bool) else None
+
+
+def _closing(text: str, start: int) -> int:
+    """Where the bracket at `start` is closed; 0 where it is not, or too late."""
+    depth = 0
+    for mark in _BRACKET.finditer(text, start, min(len(text), start + _VALUE_CHARS)):
+        if mark[0] in "[{":
+            depth += 1
+        elif mark[0] in "]}":
+            depth -= 1
+            if not depth:
+                return mark.end()
+    return 0
+
+
+def _decoded(piece: str) -> Any:
+    usual = _TRAILING_COMMA.sub("", _COMMENT.sub("", piece))
+    for way in (piece, usual, usual.replace("'", '"')):
+        try:
+            return json.loads(way, object_pairs_hook=_Fields)
+        except (ValueError, RecursionError):
+            continue
+    return None
+
+
+def _read(value: Any, *, is_plan: bool) -> list[int]:
+    """The blocks of a value; `is_plan`: a key said that it is one, so that numbers are blocks."""
+    if isinstance(value, _Fields):
+        return _object(value, is_plan=is_plan)
+    if isinstance(value, list):
+        return _items(value)
+    if isinstance(value, str):
+        return [number for line in value.splitlines() for number in _line(line)] if is_plan else []
+    number = whole_number(value)
+    return [number] if is_plan and number is not None else []
+
+
+def _line(text: str) -> Sequence[int]:
+    line = plain_line(text)
+    return chain(line)[0] or read_statement(line, is_item=True).numbers
+
+
+def _object(fields: _Fields, *, is_plan: bool) -> list[int]:
+    if _is_step(fields):
+        return _step(fields)
+    found = _ordered(fields, is_plan=is_plan)
+    is_reversed = any(
+        BACKWARD.search(value) if isinstance(value, str) else _BACKWARD_KEY.search(key)
+        for key, value in fields
+    )
+    return found[::-1] if is_reversed else found
+
+
+def _ordered(fields: _Fields, *, is_plan: bool) -> list[int]:
+    """The blocks of an object of steps, layers or plans, in the order in which they stand."""
+    steps = [(match, value) for key, value in fields if (match := _STEP_KEY.fullmatch(key.strip()))]
+    plans = [value for key, value in fields if _PLAN_KEY.fullmatch(key.strip())]
+    choices = [(m["which"], v) for k, v in fields if (m := _CHOICE_KEY.fullmatch(k.strip()))]
+    if len(choices) > 1:
+        chosen = [
+            str(v)[-1:].lower()
+            for k, v in fields
+            if re.search("chosen|choice|selected|best|final", k, re.I)
+        ]
+        return next((_read(v, is_plan=True) for n, v in choices if n.lower() in chosen), [])
+    if plans and not steps:
+        return next(
+            (found for value in reversed(plans) if (found := _read(value, is_plan=True))), []
+        )
+    if steps:
+        if len({int(m["n"] or m["bare"]) for m, _ in steps}) == len(steps):
+            steps.sort(key=lambda step: int(step[0]["n"] or step[0]["bare"]))
+        return [number for _, value in steps for number in _read(value, is_plan=True)]
+    kept = [(key, value) for key, value in fields if not _OPPOSITE_KEY.search(key)]
+    tiers = [_tier(key) for key, _ in kept]
+    if kept and all(tier is not None for tier in tiers):
+        kept = [kept[i] for i in sorted(range(len(kept)), key=lambda i: tiers[i] or 0)]
+    return [n for _, v in kept if isinstance(v, list) or is_plan for n in _read(v, is_plan=is_plan)]
+
+
+def _tier(key: str) -> int | None:
+    words = re.findall(r"[a-z]+", key.lower())
+    return next((_TIERS.index(word) for word in words if word in _TIERS), None)
+
+
+def _items(items: list[Any]) -> list[int]:
+    steps = [item for item in items if isinstance(item, _Fields)]
+    if steps and len(steps) == len(items) and all(_is_step(step) for step in steps):
+        looks = all(any(_LOOKS_KEY.fullmatch(k) for k, _ in step) for step in steps)
+        numbers = [n for step in steps for n in _step(step)]
+        has_place = any(_PLACE_KEY.fullmatch(key) for key, _ in steps[0])
+        if looks and not has_place and numbers == list(range(1, len(items) + 1)):
+            return []
+        places = [_place(step) for step in steps]
+        if None not in places and len(set(places)) == len(places):
+            steps.sort(key=lambda step: _place(step) or 0)
+        return [n for step in steps for n in _step(step)]
+    return [number for item in items for number in _read(item, is_plan=True)]
+
+
+def _is_step(fields: _Fields) -> bool:
+    """Whether an object is one step: it has the number of a block, some, or an action."""
+    keys = {key.strip() for key, value in fields if not isinstance(value, _Fields)}
+    named = any(_INDEX_KEY.fullmatch(k) or _MANY_KEY.fullmatch(k) for k in keys)
+    acts = any(_ACTION_KEY.fullmatch(k) for k in keys)
+    placed = any(_PLACE_KEY.fullmatch(k) for k in keys)
+    alone = any(isinstance(v, (list, _Fields)) for k, v in fields if _PLAN_KEY.fullmatch(k.strip()))
+    return not alone and ((named and (placed or acts or _one(fields))) or (acts and placed))
+
+
+def _one(fields: _Fields) -> bool:
+    return any(
+        _INDEX_KEY.fullmatch(k.strip()) and not isinstance(v, (list, _Fields)) for k, v in fields
+    )
+
+
+def _place(fields: _Fields) -> int | None:
+    return next((whole_number(v) for k, v in fields if _PLACE_KEY.fullmatch(k.strip())), None)
+
+
+def _step(fields: _Fields) -> list[int]:
+    """The blocks of one step: by its index, else by a list of them, else by what it does."""
+    found: list[int] = []
+    for pattern in (_INDEX_KEY, _MANY_KEY, _ACTION_KEY):
+        for key, value in fields:
+            if not found and pattern.fullmatch(key.strip()):
+                found = _read(value, is_plan=True)
+    times = next((whole_number(v) for k, v in fields if _TIMES_KEY.fullmatch(k.strip())), None)
+    return found * min(times or 1, MOST_AT_ONCE) if len(found) == 1 else found
+
+
+_TABLE = re.compile(
+    r"^[ \t]*\|?[^|\n]*\|[^\n]*\n[ \t]*\|?[ \t:|-]*-[ \t:|-]*\n(?:[^\n]*\|[^\n]*(?:\n|\Z))+",
+    re.MULTILINE,
+)
+_STEP_COLUMN = re.compile(
+    r"step|order|seq|^#$|^no\.?$|^nr\.?$|schritt|reihenfolge|paso|étape|步骤|顺序|序号|手順",
+    re.IGNORECASE,
+)
+_BLOCK_COLUMN = re.compile(
+    r"block|ind(?:ex|ice)|idx|candidate|piece|move|action|^id$|baustein|bloc|bloque|aktion|积木|编号|块"
+    r"|ブロック",
+    re.IGNORECASE,
+)
+_TABLE_CHARS = 20_000
+
+
+def find_tables(text: str) -> list[Found]:
+    """The tables of a text; one without a column of steps is a catalogue."""
+    found = []
+    for table in _TABLE.finditer(text) if "|" in text else ():
+        rows = [_cells(line) for line in table[0][:_TABLE_CHARS].strip().splitlines()]
+        found.append(Found(table.start(), table.end(), "table", tuple(_of_rows(rows[0], rows[2:]))))
+    return found
+
+
+def _cells(line: str) -> list[str]:
+    return [plain_line(cell).strip() for cell in line.strip().strip("|").split("|")]
+
+
+def _of_rows(head: list[str], rows: list[list[str]]) -> list[int]:
+    steps = next((i for i, name in enumerate(head) if _STEP_COLUMN.search(name)), None)
+    times = next((i for i, name in enumerate(head) if _TIMES_KEY.fullmatch(name)), None)
+    if steps is None:
+        return []
+    columns = [i for i, name in enumerate(head) if i != steps and _BLOCK_COLUMN.search(name)]
+    columns.sort(key=lambda i: not re.search("ind|no|id|编号", head[i], re.IGNORECASE))
+    rows = [row for row in rows if len(row) == len(head)]
+    order = [whole_number(re.sub(r"\D", "", row[steps])) for row in rows]
+    if None not in order and len(set(order)) == len(order):
+        rows = [
+            row for _, row in sorted(zip(order, rows, strict=True), key=lambda pair: pair[0] or 0)
+        ]
+    for column in columns:
+        named = [list(_line(row[column])) for row in rows]
+        if rows and all(named):
+            many = [(whole_number(row[times]) if times is not None else None) or 1 for row in rows]
+            return [
+                n
+                for numbers, k in zip(named, many, strict=True)
+                for n in numbers * min(k, MOST_AT_ONCE)
+            ]
+    return []

@@ -1,0 +1,15 @@
+"""Which version of the readers read a reply, so that readings of two versions are told apart."""
+
+from __future__ import annotations
+
+from phyblock.words import PlanParser
+
+__all__ = ["READER_VERSION", "reader_version"]
+
+READER_VERSION = 2
+"""Of the readers of plans, answers and moves; it goes up when any reply can be read otherwise."""
+
+
+def reader_version(parser: PlanParser) -> int:
+    """The version of a plan parser: `official` is the released code's rule and never changes."""
+    return 1 if parser == "official" else READER_VERSION

@@ -1,0 +1,53 @@
+"""The plan parser against recorded replies that were read by eye.
+
+`gold.csv` holds digests of texts and readings, never a text. All replies on which two of
+the former default, the present and the official parser differ are in it; the others were drawn at
+random. `held_out` were read after the rules had been written, before their readings were seen.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from phyblock.parsing import parse_plan
+from tests.official_replies import reply_texts
+
+N = 16
+GOLD = Path(__file__).with_name("gold.csv")
+
+
+@pytest.fixture(scope="module")
+def readings() -> dict[str, tuple[int, ...]]:
+    with GOLD.open(encoding="utf-8", newline="") as file:
+        return {row["sha256"]: tuple(map(int, row["plan"].split())) for row in csv.DictReader(file)}
+
+
+def gold_replies(
+    checkout: Path, readings: dict[str, tuple[int, ...]]
+) -> Iterator[tuple[tuple[str, str], str, tuple[int, ...]]]:
+    """Which reply it is, its text, and what a person reads in it."""
+    for which, text in reply_texts(checkout).items():
+        digest = hashlib.sha256(text.encode()).hexdigest()
+        if digest in readings:
+            yield which, text, readings[digest]
+
+
+def test_the_gold_set_is_large_and_of_both_kinds(readings: dict[str, tuple[int, ...]]) -> None:
+    assert len(readings) >= 400
+    assert sum(not plan for plan in readings.values()) >= 50
+
+
+def test_every_gold_reply_is_read_as_a_person_reads_it(
+    official_checkout: Path, readings: dict[str, tuple[int, ...]]
+) -> None:
+    misread = {
+        which: (parse_plan(text, N).plan.steps, plan)
+        for which, text, plan in gold_replies(official_checkout, readings)
+        if parse_plan(text, N).plan.steps != plan
+    }
+    assert misread == {}
