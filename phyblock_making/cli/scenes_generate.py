@@ -21,7 +21,7 @@ __all__ = ["command"]
 
 _PALETTE_TEXT: dict[Palette, str] = {
     "kit": "the official kit's twelve pairs of type and color",
-    "full": "all forty pairs of eight types and five colors",
+    "full": f"all {len(PALETTES['full'])} pairs of type and color",
 }
 
 
@@ -55,7 +55,7 @@ def _levels(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int
     type=click.Choice(["kit", "full"]),
     default="kit",
     show_default=True,
-    help="The kit's twelve pairs of type and color, or all forty.",
+    help="The kit's twelve pairs of type and color, or all that there are.",
 )
 @jobs_option
 @ray_option
