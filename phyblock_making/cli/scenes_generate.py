@@ -12,7 +12,7 @@ from phyblock.cli.paths import UserPath
 from phyblock_making.auditing.given_away import MOST_SCENES, given_away_text
 from phyblock_making.cli.working import jobs_option, ray_option, seed_option, tracked
 from phyblock_making.scenes.scene_card import card
-from phyblock_making.scenes.scene_draft import Palette
+from phyblock_making.scenes.scene_draft import PALETTES, Palette
 from phyblock_making.scenes.scene_files import open_writer
 from phyblock_making.scenes.scene_production import Order, produce, shares
 from phyblock_making.workers import open_workers
