@@ -12,7 +12,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.report.measure_table import headline_columns
 from phyblock.scoring.uncertainty import Floats, Metric
 from phyblock.tables.design import Design
-from phyblock.tables.estimates import strata_of, value_of_cells
+from phyblock.tables.estimates import pooled_in, value_of_cells
 from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Cell, Measure
@@ -47,44 +47,44 @@ class Comparable:
     parts: tuple[Part, ...]
     how: str
 
-    def strata(self, part: Part) -> tuple[str, ...]:
+    def pooled(self, part: Part) -> tuple[str, ...]:
         """The pooled cells that a part is made of."""
         (cell,) = (cell for cell in self.cells if cell.name == part.cell)
-        members = strata_of(cell, self.cells)
+        members = pooled_in(cell, self.cells)
         return tuple(cell.name for cell in self.cells if cell.name in members)
 
     def samples(self, run: Run, part: Part, design: Design) -> dict[str, pd.DataFrame]:
-        """Counts of a part by model, a row each by scene, item and seed, its stratum among them."""
-        strata = self.strata(part)
+        """Counts of a part by model, a row by scene, item and seed, with its pooled cell."""
+        pooled = self.pooled(part)
         rows = counted_samples(replace(run, design=design), self.track, self.measure.counted)
-        rows = headline_rows(rows[rows[CELL].isin(strata)], design)
+        rows = headline_rows(rows[rows[CELL].isin(pooled)], design)
         if part.criterion:
             rows = rows[rows["criterion"] == part.criterion]
         heard = rows.groupby(["model", CELL])["replied"].transform("any")
         rows = rows[heard.astype(bool)]
-        place = {name: number for number, name in enumerate(strata)}
-        indexed = rows.assign(stratum=rows[CELL].map(place)).set_index(_KEYS)
-        columns = ["stratum", *self.measure.counted.columns]
+        place = {name: number for number, name in enumerate(pooled)}
+        indexed = rows.assign(pooled_cell=rows[CELL].map(place)).set_index(_KEYS)
+        columns = ["pooled_cell", *self.measure.counted.columns]
         return {str(model): mine[columns] for model, mine in indexed.groupby("model", sort=False)}
 
     def counts(self, both: pd.DataFrame, part: Part) -> Floats:
-        """Counts of paired samples, flat over strata: (samples, 2, strata x (columns + 1)).
+        """Counts of paired samples, flat over pooled cells: (samples, 2, pooled x (columns + 1)).
 
-        Behind the columns of each stratum stands how many samples it has.
+        Behind the columns of each pooled cell stands how many samples it has.
         """
         columns = list(self.measure.counted.columns)
-        n_strata = len(self.strata(part))
-        counts = np.zeros((len(both), 2, n_strata, len(columns) + 1))
+        n_pooled = len(self.pooled(part))
+        counts = np.zeros((len(both), 2, n_pooled, len(columns) + 1))
         rows = np.arange(len(both))
         for side, name in enumerate("ab"):
-            stratum = both[name, "stratum"].to_numpy(np.intp)
-            counts[rows, side, stratum, :-1] = both[name][columns].to_numpy(np.float64)
-            counts[rows, side, stratum, -1] = 1
+            pooled_cell = both[name, "pooled_cell"].to_numpy(np.intp)
+            counts[rows, side, pooled_cell, :-1] = both[name][columns].to_numpy(np.float64)
+            counts[rows, side, pooled_cell, -1] = 1
         return counts.reshape(len(both), 2, -1)
 
     def n_counts(self, part: Part) -> int:
         """Length of the last axis of `counts`."""
-        return len(self.strata(part)) * (len(self.measure.counted.columns) + 1)
+        return len(self.pooled(part)) * (len(self.measure.counted.columns) + 1)
 
     def each(self, part: Part) -> Metric:
         """What one sample is worth."""
@@ -92,13 +92,13 @@ class Comparable:
         return lambda sums: self.measure.value(unflat(sums)[..., :-1].sum(axis=-2))
 
     def whole(self, part: Part, totals: Floats) -> Metric:
-        """What sums are worth; means are over the strata of which `totals` have samples."""
-        unflat, strata = self._unflat(part), self.strata(part)
-        values = value_of_cells(self.measure, self.cells_of(part), strata)
+        """What sums are worth; means are over the pooled cells of which `totals` have samples."""
+        unflat, pooled = self._unflat(part), self.pooled(part)
+        values = value_of_cells(self.measure, self.cells_of(part), pooled)
         asked = unflat(totals)[..., -1] > 0
 
         def metric(sums: Floats) -> Floats:
-            # Sums without a stratum that was asked have no value.
+            # Sums without a pooled cell that was asked have no value.
             return np.asarray(values(unflat(sums)[..., :-1], asked)[..., -1])
 
         return metric
@@ -111,7 +111,7 @@ class Comparable:
         return tuple(cell for cell in self.cells if cell.name in reached)
 
     def _unflat(self, part: Part) -> Callable[[Floats], Floats]:
-        shape = (len(self.strata(part)), len(self.measure.counted.columns) + 1)
+        shape = (len(self.pooled(part)), len(self.measure.counted.columns) + 1)
         return lambda sums: np.asarray(sums.reshape(*sums.shape[:-1], *shape))
 
 

@@ -15,7 +15,7 @@ import pandas as pd
 from phyblock.report.measure_table import headline_columns, main_heading
 from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
-from phyblock.tables.measures import CELL, VARIANT, Measure, way_name
+from phyblock.tables.measures import CELL, SCORED_BY, Measure, way_name
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
 from phyblock.tracks.estimates import track_estimates, track_measures
 from phyblock.tracks.kind import kind_of
@@ -33,7 +33,7 @@ __all__ = [
 CHANCE = "chance"
 """Name of the floor that is uniform guessing."""
 _COLUMNS = (
-    *("track", "measure", *VARIANT, CELL),
+    *("track", "measure", *SCORED_BY, CELL),
     *("floor", "floor_value", "model", "value", "lo", "hi", "verdict"),
 )
 _VERDICTS = {True: "above", False: "not above", None: "cannot tell"}
@@ -128,7 +128,7 @@ def _known_floors(run: Run, track: str, measure: Measure) -> Iterator[tuple[str,
         for way, value in computed.get(name, {}).items() if name not in asked else ():
             yield way, Floor(name, float(value))
     if measure.chance is not None:
-        for row in found.drop_duplicates([CELL, *VARIANT]).to_dict("records"):
+        for row in found.drop_duplicates([CELL, *SCORED_BY]).to_dict("records"):
             yield way_name(row), Floor(CHANCE, measure.chance(run, str(row[CELL])))
 
 

@@ -10,7 +10,7 @@ from phyblock.tables.headline import Value, headline_rows, headline_values
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
 from phyblock.tables.text_table import Column, TextTable, between, number
-from phyblock.tables.track_report import Shown
+from phyblock.tables.track_report import HeadlineColumn
 from phyblock.tracks.estimates import samples_lacking, track_estimates, track_measures
 from phyblock.tracks.kind import kind_of
 
@@ -27,13 +27,13 @@ __all__ = [
 _NUMBERS = ("value", "lo", "hi", "se", "mean", "sd")
 
 
-def headline_columns(run: Run, track: str) -> tuple[Shown, ...]:
+def headline_columns(run: Run, track: str) -> tuple[HeadlineColumn, ...]:
     """The columns of a track's headline: those it chooses, else its first measure in every cell."""
     report = kind_of(track).report()
     if report.headline is not None:
         return report.headline(run)
     (first, *_) = report.measures
-    return tuple(Shown(first.name, cell.name, cell.heading) for cell in report.cells(run))
+    return tuple(HeadlineColumn(first.name, cell.name, cell.heading) for cell in report.cells(run))
 
 
 def main_heading(run: Run, track: str) -> str:

@@ -18,7 +18,7 @@ from phyblock.records import (
 )
 from phyblock.records.known import known_records
 from phyblock.tracks import Episode, Item, Judgement
-from phyblock.tracks.counting import sample_counts
+from phyblock.tracks.counting import count_sample
 from phyblock.words import Outcome
 
 __all__ = ["about_prompt", "begun", "judged"]
@@ -67,7 +67,7 @@ def judged(
     """
     outcome = _outcome(fields["reply"], fields["error"], judgement.is_read)
     told = {**fields, "outcome": outcome, **judgement.fields(), **(more or {})}
-    if counts := sample_counts(fields["track"], item, judgement):
+    if counts := count_sample(fields["track"], item, judgement):
         told["counts"] = {**fields.get("counts", {}), **counts}
     return known_records().validate_python(told)
 

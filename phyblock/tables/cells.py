@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.tables.design import OVERALL
-from phyblock.tables.load import Run, kept_per_run
+from phyblock.tables.load import Run, made_once
 from phyblock.tables.outcomes import WITHOUT_REPLY
 
 __all__ = [
@@ -71,7 +71,7 @@ def _taken(column: pd.Series[Any], rows: np.ndarray[Any, np.dtype[np.intp]]) -> 
     return pd.Series(column.array.take(rows), dtype=column.dtype, copy=False)
 
 
-@kept_per_run
+@made_once
 def cell_scores(run: Run) -> pd.DataFrame:
     """Scores by level, each level under its criterion alone, without those the run leaves out.
 

@@ -11,15 +11,15 @@ import pandas as pd
 from phyblock.scoring.uncertainty import Floats, in_unit_range, jackknife
 from phyblock.tables.intervals import CountCube, parents_of
 from phyblock.tables.load import Run
-from phyblock.tables.measures import CELL, VARIANT, Cell, Counted, Measure
+from phyblock.tables.measures import CELL, SCORED_BY, Cell, Measure, SampleCounts
 
-__all__ = ["ESTIMATE_COLUMNS", "estimate_frame", "strata_of", "value_of_cells"]
+__all__ = ["ESTIMATE_COLUMNS", "estimate_frame", "pooled_in", "value_of_cells"]
 
-_GROUP = ("model", *VARIANT)
+_GROUP = ("model", *SCORED_BY)
 ESTIMATE_COLUMNS = (
     "measure",
     "model",
-    *VARIANT,
+    *SCORED_BY,
     CELL,
     "n",
     "value",
@@ -39,11 +39,11 @@ def estimate_frame(
     run: Run,
     measures: Sequence[Measure],
     cells: Sequence[Cell],
-    counts_of: Callable[[Counted], pd.DataFrame],
+    counts_of: Callable[[SampleCounts], pd.DataFrame],
 ) -> pd.DataFrame:
     """One row a measure, model, way of counting and cell, in `ESTIMATE_COLUMNS`.
 
-    `counts_of` gives the counts of a family of measures, as `Counted` says.
+    `counts_of` gives the counts of a family of measures, as `SampleCounts` says.
 
     `value` is of the counts of all `n` samples, summed over scenes and seeds, in the measure's own
     unit; `mean` and `sd` (ddof = 1) are over the values of the `seeds` single seeds. `lo` and `hi`
@@ -80,43 +80,43 @@ def _joined(cells: Sequence[Cell]) -> Iterator[list[Cell]]:
 
 @dataclass(frozen=True)
 class _Pool:
-    """The counts of a group of cells: `counts` has shape (scenes, groups, strata, columns)."""
+    """The counts of a group of cells: `counts` has shape (scenes, groups, pooled, columns)."""
 
     groups: list[tuple[str, ...]]
-    strata: list[str]
+    pooled: list[str]
     scenes: list[str]
     counts: Floats
     present: np.ndarray
     cube: CountCube
 
 
-def _pool(run: Run, table: pd.DataFrame, counted: Counted, strata: Sequence[str]) -> _Pool:
+def _pool(run: Run, table: pd.DataFrame, counted: SampleCounts, pooled: Sequence[str]) -> _Pool:
     by = [*_GROUP, CELL]
     cube = CountCube(table, parents_of(run), by, counted.columns)
     groups = list(dict.fromkeys(cell[:-1] for cell in cube.cells))
-    shape = (len(cube.scenes), len(groups), len(strata))
+    shape = (len(cube.scenes), len(groups), len(pooled))
     counts = np.zeros((*shape, len(counted.columns)))
     present = np.zeros(shape, dtype=bool)
     places = {group: place for place, group in enumerate(groups)}
     for column, cell in enumerate(cube.cells):
-        at = (slice(None), places[cell[:-1]], strata.index(cell[-1]))
+        at = (slice(None), places[cell[:-1]], pooled.index(cell[-1]))
         counts[at], present[at] = cube.counts[:, column], cube.present[:, column]
-    return _Pool(groups, list(strata), list(cube.scenes), counts, present, cube)
+    return _Pool(groups, list(pooled), list(cube.scenes), counts, present, cube)
 
 
 def value_of_cells(
-    measure: Measure, cells: Sequence[Cell], strata: Sequence[str]
+    measure: Measure, cells: Sequence[Cell], pooled: Sequence[str]
 ) -> Callable[..., Floats]:
-    """From sums of counts (..., strata, columns) to values of the cells (..., cells).
+    """From sums of counts (..., pooled, columns) to values of the cells (..., cells).
 
-    With `asked`, of shape (..., strata), means are over the strata that were asked alone.
+    With `asked`, of shape (..., pooled), means are over the pooled cells that were asked alone.
     """
 
     def values(sums: Floats, asked: np.ndarray | None = None) -> Floats:
         single = measure.value(sums)
         mask = np.ones(single.shape, dtype=bool) if asked is None else asked
         mask = np.broadcast_to(mask, single.shape)
-        known = {name: (single[..., n], mask[..., n]) for n, name in enumerate(strata)}
+        known = {name: (single[..., n], mask[..., n]) for n, name in enumerate(pooled)}
         for cell in cells:
             if cell.of:
                 parts = np.stack([known[name][0] for name in cell.of], axis=-1)
@@ -134,24 +134,24 @@ def _of_group(
 ) -> pd.DataFrame:
     """Estimates of measures with the same counts, in cells that are estimated together."""
     counted = measures[0].counted
-    strata = [cell.name for cell in cells if not cell.of]
-    table = table[table[CELL].isin(strata)]
+    pooled = [cell.name for cell in cells if not cell.of]
+    table = table[table[CELL].isin(pooled)]
     if table.empty:
         return pd.DataFrame()
     keys = [*_GROUP, CELL]
     heard = table.groupby(["model", CELL])["replied"].any().to_dict()
-    pool = _pool(run, table, counted, strata)
+    pool = _pool(run, table, counted, pooled)
     sizes = table.groupby(keys).size().to_dict()
-    n = np.array([[sizes.get((*g, s), 0) for s in strata] for g in pool.groups])
+    n = np.array([[sizes.get((*g, s), 0) for s in pooled] for g in pool.groups])
     behind, fewest = _clusters_of_cells(pool, cells)
     # A part of a single base scene leaves a mean without an interval.
     usable = np.where(fewest < 2, fewest, behind)
-    silent = np.array([[not heard.get((g[0], s), False) for s in strata] for g in pool.groups])
+    silent = np.array([[not heard.get((g[0], s), False) for s in pooled] for g in pool.groups])
     # Where a model said nothing, empty plans have counts, and nothing was measured.
     counts = np.where(silent[None, :, :, None], np.nan, pool.counts)
 
     def all_values(sums: Floats) -> Floats:
-        each = [value_of_cells(measure, cells, strata)(sums) for measure in measures]
+        each = [value_of_cells(measure, cells, pooled)(sums) for measure in measures]
         return np.stack(each, axis=-1)
 
     found = jackknife(
@@ -164,7 +164,7 @@ def _of_group(
     within = in_unit_range(found)
     lo, hi = np.where(is_share, within.lo, found.lo), np.where(is_share, within.hi, found.hi)
     spread = _over_seeds(table, pool, counted, silent, all_values)
-    members = np.array([[name in strata_of(cell, cells) for name in strata] for cell in cells])
+    members = np.array([[name in pooled_in(cell, cells) for name in pooled] for cell in cells])
     scenes = np.any(pool.present[:, :, None, :] & members, axis=-1).sum(axis=0)
     rows = []
     for g, group in enumerate(pool.groups):
@@ -192,7 +192,7 @@ def _of_group(
 def _over_seeds(
     table: pd.DataFrame,
     pool: _Pool,
-    counted: Counted,
+    counted: SampleCounts,
     silent: np.ndarray,
     values: Callable[[Floats], Floats],
 ) -> tuple[np.ndarray, Floats, Floats]:
@@ -202,7 +202,7 @@ def _over_seeds(
     groups = {group: place for place, group in enumerate(pool.groups)}
     totals = table.groupby(["seed", *_GROUP, CELL], sort=False)[list(counted.columns)].sum()
     for key, row in zip(totals.index, totals.to_numpy(np.float64), strict=True):
-        sums[seeds.index(key[0]), groups[key[1:-1]], pool.strata.index(key[-1])] = row
+        sums[seeds.index(key[0]), groups[key[1:-1]], pool.pooled.index(key[-1])] = row
     each = values(np.where(silent[..., None], np.nan, sums))
     known = ~np.isnan(each)
     count = known.sum(axis=0)
@@ -213,23 +213,23 @@ def _over_seeds(
     return count, mean, sd
 
 
-def strata_of(cell: Cell, cells: Sequence[Cell]) -> frozenset[str]:
+def pooled_in(cell: Cell, cells: Sequence[Cell]) -> frozenset[str]:
     """The pooled cells that a cell is made of."""
     if not cell.of:
         return frozenset([cell.name])
     by_name: Mapping[str, Cell] = {other.name: other for other in cells}
-    return frozenset().union(*(strata_of(by_name[name], cells) for name in cell.of))
+    return frozenset().union(*(pooled_in(by_name[name], cells) for name in cell.of))
 
 
 def _clusters_of_cells(pool: _Pool, cells: Sequence[Cell]) -> tuple[np.ndarray, np.ndarray]:
     """Base scenes behind each group and cell, and the fewest that are behind a part of it."""
-    by_stratum = pool.cube.clusters.behind(pool.present.reshape(len(pool.scenes), -1)).reshape(
+    by_cell = pool.cube.clusters.behind(pool.present.reshape(len(pool.scenes), -1)).reshape(
         pool.present.shape[1:]
     )
     behind, fewest = [], []
     for cell in cells:
-        members = [name in strata_of(cell, cells) for name in pool.strata]
+        members = [name in pooled_in(cell, cells) for name in pool.pooled]
         seen = np.any(pool.present[:, :, members], axis=-1)
         behind.append(pool.cube.clusters.behind(seen))
-        fewest.append(by_stratum[:, members].min(axis=-1))
+        fewest.append(by_cell[:, members].min(axis=-1))
     return np.stack(behind, axis=-1), np.stack(fewest, axis=-1)

@@ -11,7 +11,7 @@ from phyblock.tables.design import Design
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Measure
 from phyblock.tables.text_table import Column, TextTable, between, number
-from phyblock.tables.track_report import Shown
+from phyblock.tables.track_report import HeadlineColumn
 
 __all__ = ["Value", "headline_rows", "headline_values", "interval_frame", "interval_view"]
 
@@ -39,7 +39,10 @@ def headline_rows(found: pd.DataFrame, design: Design) -> pd.DataFrame:
 
 
 def headline_values(
-    found: pd.DataFrame, design: Design, measures: Sequence[Measure], columns: Sequence[Shown]
+    found: pd.DataFrame,
+    design: Design,
+    measures: Sequence[Measure],
+    columns: Sequence[HeadlineColumn],
 ) -> Mapping[tuple[str, str], Value]:
     """Values by model and heading."""
     scale = {measure.name: measure.scale for measure in measures}

@@ -15,7 +15,7 @@ from phyblock.records.reading import run_records
 from phyblock.tables.design import Design, SectionT, read_design, read_section
 from phyblock.tables.flat import Flattened
 
-__all__ = ["Frames", "Run", "frames_of", "kept_per_run", "load_run", "once_per_run"]
+__all__ = ["Frames", "Run", "frames_of", "load_run", "made_once", "made_once_copied"]
 
 
 class Frames(NamedTuple):
@@ -52,7 +52,7 @@ class Run:
         return read_section(self.manifest.suite, key, model, str(self.path / MANIFEST))
 
 
-def kept_per_run(make: Callable[[Run], pd.DataFrame]) -> Callable[[Run], pd.DataFrame]:
+def made_once(make: Callable[[Run], pd.DataFrame]) -> Callable[[Run], pd.DataFrame]:
     """A function of a run that works once; all its callers share the frame."""
 
     @functools.wraps(make)
@@ -65,9 +65,9 @@ def kept_per_run(make: Callable[[Run], pd.DataFrame]) -> Callable[[Run], pd.Data
     return made
 
 
-def once_per_run(make: Callable[[Run], pd.DataFrame]) -> Callable[[Run], pd.DataFrame]:
+def made_once_copied(make: Callable[[Run], pd.DataFrame]) -> Callable[[Run], pd.DataFrame]:
     """A function of a run that works once and returns copies of its frame."""
-    kept = kept_per_run(make)
+    kept = made_once(make)
 
     @functools.wraps(make)
     def made(run: Run) -> pd.DataFrame:

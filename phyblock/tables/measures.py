@@ -12,14 +12,14 @@ if TYPE_CHECKING:
     from phyblock.scoring.uncertainty import Metric
     from phyblock.tables.load import Run
 
-__all__ = ["CELL", "VARIANT", "WAY", "Cell", "Counted", "Measure", "way_name"]
+__all__ = ["CELL", "SCORED_BY", "WAY", "Cell", "Measure", "SampleCounts", "way_name"]
 
-VARIANT = ("setting", "matcher", "criterion")
-"""How a sample was counted; "" where its track knows no such choice."""
+SCORED_BY = ("setting", "matcher", "criterion")
+"""Columns that say how a sample was scored; "" where its track knows no such choice."""
 CELL = "cell"
 """Column of the cell that a row of counts is pooled in."""
 
-WAY = ("measure", CELL, *VARIANT)
+WAY = ("measure", CELL, *SCORED_BY)
 """What tells the values of one model apart."""
 
 Unit = Literal["%", "cm", "degrees", "steps", "blocks", ""]
@@ -40,11 +40,11 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Counted:
+class SampleCounts:
     """Counts of samples, from which one or several measures are made.
 
     `frame` makes them out of a run: a row a sample, way of counting it and cell that it is pooled
-    in, with the columns `model`, `scene`, `item`, `seed`, those of `VARIANT`, `CELL`, `replied`
+    in, with the columns `model`, `scene`, `item`, `seed`, those of `SCORED_BY`, `CELL`, `replied`
     (whether the model said anything), and one of each name in `columns`. Samples that the run
     leaves out have no row. Instead of it, `sample` counts one sample when its reply is judged: it
     is given the item that was asked about and the track's judgement of the reply (or the episode
@@ -71,7 +71,7 @@ class Measure:
 
     name: str
     heading: str
-    counted: Counted
+    counted: SampleCounts
     value: Metric
     meaning: str = ""
     unit: Unit = "%"

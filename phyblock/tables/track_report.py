@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 __all__ = [
     "WHOLE",
     "EpisodeView",
+    "HeadlineColumn",
     "ItemExport",
     "KeptPictures",
     "PageItems",
     "PaperTable",
-    "Shown",
     "TableMaker",
     "TrackReport",
     "in_whole",
@@ -37,7 +37,7 @@ __all__ = [
 
 
 @dataclass(frozen=True)
-class Shown:
+class HeadlineColumn:
     """A measure in a cell, as a column of a headline table.
 
     `criterion` says how it is counted, where one measure is counted in several ways.
@@ -164,7 +164,7 @@ class TrackReport:
     measures: tuple[Measure, ...]
     cells: Callable[[Run], tuple[Cell, ...]] = lambda _: (WHOLE,)
     in_cells: Callable[[pd.DataFrame, Run], pd.DataFrame] = in_whole
-    headline: Callable[[Run], tuple[Shown, ...]] | None = None
+    headline: Callable[[Run], tuple[HeadlineColumn, ...]] | None = None
     main: str = ""
     short: str = ""
     published: Callable[[Run], Mapping[str, float]] = lambda _: {}

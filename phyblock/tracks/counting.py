@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from phyblock.registry import added_measures
-from phyblock.tables.measures import Counted
+from phyblock.tables.measures import SampleCounts
 from phyblock.tracks.kind import kind_of
 
-__all__ = ["counts_samples", "sample_counts"]
+__all__ = ["count_sample", "counts_samples"]
 
 
 def counts_samples(track: str) -> bool:
@@ -17,7 +17,7 @@ def counts_samples(track: str) -> bool:
     return bool(_sorts(track))
 
 
-def sample_counts(track: str, item: Any, judged: Any) -> Mapping[str, tuple[float, ...]]:
+def count_sample(track: str, item: Any, judged: Any) -> Mapping[str, tuple[float, ...]]:
     """What the measures of a track count of one sample, by name of the counts.
 
     `judged` is the judgement of the reply, or the episode once it has ended. Where a measure does
@@ -32,7 +32,7 @@ def sample_counts(track: str, item: Any, judged: Any) -> Mapping[str, tuple[floa
 
 def _sorts(track: str) -> dict[str, Callable[[Any, Any], Sequence[float] | None]]:
     """What counts a sample of a track, by name of the counts."""
-    added: list[Counted] = [measure.counted for measure in added_measures(track)]
+    added: list[SampleCounts] = [measure.counted for measure in added_measures(track)]
     return {
         counted.name: counted.sample
         for counted in (*kind_of(track).counted, *added)

@@ -12,7 +12,7 @@ from phyblock.records import RECORDS
 from phyblock.registry import added_measures
 from phyblock.tables.estimates import ESTIMATE_COLUMNS, estimate_frame
 from phyblock.tables.load import Run
-from phyblock.tables.measures import VARIANT, Counted, Measure
+from phyblock.tables.measures import SCORED_BY, Measure, SampleCounts
 from phyblock.tables.outcomes import WITHOUT_REPLY
 from phyblock.tracks.kind import kind_of
 
@@ -42,7 +42,7 @@ def track_measures(track: str) -> tuple[Measure, ...]:
 
 
 def numbers_of(
-    counted: Counted, counts: Mapping[str, Sequence[float]] | None, where: str
+    counted: SampleCounts, counts: Mapping[str, Sequence[float]] | None, where: str
 ) -> Sequence[float] | None:
     """What a record at `where` holds of these counts; None where they are lacking, () for none.
 
@@ -56,7 +56,7 @@ def numbers_of(
     return numbers
 
 
-def samples_lacking(run: Run, track: str, counted: Counted) -> int:
+def samples_lacking(run: Run, track: str, counted: SampleCounts) -> int:
     """Samples that were judged before these counts were there."""
     if counted.sample is None:
         return 0
@@ -64,7 +64,7 @@ def samples_lacking(run: Run, track: str, counted: Counted) -> int:
     return sum(counted.name not in (counts or {}) for counts in rows["counts"])
 
 
-def stored_counts(track: str) -> tuple[Counted, ...]:
+def stored_counts(track: str) -> tuple[SampleCounts, ...]:
     """What measures of a track count of each sample as it is judged."""
     counted = {measure.counted.name: measure.counted for measure in track_measures(track)}
     return tuple(one for one in counted.values() if one.sample is not None)
@@ -91,8 +91,8 @@ def all_estimates(run: Run) -> pd.DataFrame:
     return pd.concat(known, ignore_index=True)[columns] if known else pd.DataFrame(columns=columns)
 
 
-def counted_samples(run: Run, track: str, counted: Counted) -> pd.DataFrame:
-    """The counts of samples that measures of a track are made from; see `Counted`."""
+def counted_samples(run: Run, track: str, counted: SampleCounts) -> pd.DataFrame:
+    """The counts of samples that measures of a track are made from; see `SampleCounts`."""
     if counted.frame is not None:
         return counted.frame(run)
     records = run.records
@@ -108,6 +108,6 @@ def counted_samples(run: Run, track: str, counted: Counted) -> pd.DataFrame:
         dtype="float64",
     )
     kept = rows[["sample", "model", "scene", "seed", "item"]].assign(
-        **dict.fromkeys(VARIANT, ""), replied=~rows["outcome"].isin(WITHOUT_REPLY)
+        **dict.fromkeys(SCORED_BY, ""), replied=~rows["outcome"].isin(WITHOUT_REPLY)
     )
     return kind_of(track).report().in_cells(pd.concat([kept, numbers], axis=1), run)

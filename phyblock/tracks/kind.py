@@ -13,7 +13,7 @@ from phyblock.datasets import Dataset
 from phyblock.records import Manifest, Record
 from phyblock.registry import known_tracks
 from phyblock.specs import LoadedSuite, SuiteSpec
-from phyblock.tables.measures import Counted
+from phyblock.tables.measures import SampleCounts
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.base import AnyTrack
 
@@ -69,7 +69,7 @@ class TrackKind:
     plays: bool = False
     own_root: Callable[[Manifest], str | None] = lambda _: None
     rescored: bool = False
-    counted: tuple[Counted, ...] = ()
+    counted: tuple[SampleCounts, ...] = ()
 
     def data_folder(self, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:
         """The folder of its own data: text, path of keys, whether it may be a bundled set."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from phyblock.domain import CandidateSet, Scene
 from phyblock.scoring.uncertainty import Floats, ratio_of
-from phyblock.tables.measures import Counted, Measure
+from phyblock.tables.measures import Measure, SampleCounts
 
 __all__ = ["POSE_COUNTS", "POSE_MEASURES", "pose_choices", "pose_counts"]
 
@@ -65,7 +65,9 @@ def _gap(sums: Floats) -> Floats:
     return np.asarray(_first(sums) - _later(sums))
 
 
-POSE_COUNTS = Counted("poses", ("first_right", "first_n", "later_right", "later_n"), sample=_count)
+POSE_COUNTS = SampleCounts(
+    "poses", ("first_right", "first_n", "later_right", "later_n"), sample=_count
+)
 POSE_MEASURES = (
     Measure(
         "pose_first",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import BlockType, euler_deg_to_matrix
 from phyblock.domain.question import Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
-from phyblock.sim.camera import VIEWS, view_axes
+from phyblock.sim.camera import view_axes
 from phyblock.sim.pictures import PictureStyle, drawn, goal_camera
 from phyblock.sim.render import shoot
 from phyblock.sim.support import bounds_m
@@ -22,7 +22,6 @@ from phyblock_making.questions.question_draft import UnfairError
 __all__ = [
     "COUNTED",
     "ELEVATIONS_DEG",
-    "GOAL_VIEW",
     "NAMED",
     "SHAPED",
     "SHAPED_AREA",
@@ -43,8 +42,6 @@ __all__ = [
 
 View = tuple[float, float]
 """Azimuth and elevation of a camera [degrees]."""
-GOAL_VIEW: View = VIEWS["oblique"]
-"""Where goals of scenes are seen from, and questions of older sets."""
 ELEVATIONS_DEG = (18, 38)
 """The views of static questions look down by this much: tops show, and so do sides."""
 COUNTED = 0.25

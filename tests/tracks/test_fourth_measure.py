@@ -16,7 +16,7 @@ from phyblock.cli.main import phyblock
 from phyblock.errors import StoreError
 from phyblock.run.rescore import rescore
 from phyblock.scoring.uncertainty import ratio_of
-from phyblock.tables.measures import Counted, Measure
+from phyblock.tables.measures import Measure, SampleCounts
 from tests.vqa_set import write_questions
 from tests.workspace import Workspace
 
@@ -46,7 +46,7 @@ def edits_to_a_valid_order(task: Any, judged: Any) -> tuple[float, float]:
 DISTANCE = Measure(
     "distance",
     "Distance",
-    Counted("order_edits", ("edits", "n"), sample=edits_to_a_valid_order),
+    SampleCounts("order_edits", ("edits", "n"), sample=edits_to_a_valid_order),
     ratio_of,
     "edits from the plan to the nearest valid order, over the longer of both",
     better="lower",
@@ -129,7 +129,7 @@ def first_is_placed(_: Any, episode: Any) -> tuple[float, float]:
 def test_episodes_are_counted_when_they_have_ended(
     here: Workspace, request: pytest.FixtureRequest
 ) -> None:
-    counted = Counted("first_steps", ("placed", "n"), sample=first_is_placed)
+    counted = SampleCounts("first_steps", ("placed", "n"), sample=first_is_placed)
     measure = Measure("first_step", "First step", counted, ratio_of, "first steps that placed")
     registry.add_measure("step_planning", measure)
     request.addfinalizer(lambda: registry.remove_measure("step_planning", "first_step"))
@@ -163,7 +163,7 @@ def test_scoring_again_counts_in_every_track(
     old, same, new, scored = folders
     assert not command("run", "suite.yaml", "--out", old, "--no-report")
     rescore(old, None, None, same)
-    counted = Counted("sampled", ("part", "whole"), sample=counts)
+    counted = SampleCounts("sampled", ("part", "whole"), sample=counts)
     registry.add_measure(track, Measure("part", "Part", counted, ratio_of, "a part"))
     request.addfinalizer(lambda: registry.remove_measure(track, "part"))
     assert not command("run", "suite.yaml", "--out", new, "--no-report")
@@ -180,7 +180,7 @@ def test_an_episode_that_goes_otherwise_is_not_counted(
 ) -> None:
     here.write_suite(tracks=["step_planning"], steps={"physics": "off"}, levels=[3])
     assert not command("run", "suite.yaml", "--out", here.out, "--no-report")
-    counted = Counted("first_steps", ("placed", "n"), sample=first_is_placed)
+    counted = SampleCounts("first_steps", ("placed", "n"), sample=first_is_placed)
     registry.add_measure("step_planning", Measure("first", "First", counted, ratio_of))
     request.addfinalizer(lambda: registry.remove_measure("step_planning", "first"))
     path = here.out / "records.jsonl"

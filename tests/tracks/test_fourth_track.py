@@ -17,7 +17,7 @@ from phyblock.cli.main import phyblock
 from phyblock.datasets import AssemblyTask
 from phyblock.models.base import Message, Request
 from phyblock.scoring.uncertainty import ratio_of
-from phyblock.tables.measures import Counted, Measure
+from phyblock.tables.measures import Measure, SampleCounts
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks import Opening, TrackKind
 from phyblock.tracks.opening import assembly_pictures
@@ -88,7 +88,7 @@ def count(item: AssemblyTask, said: Said) -> tuple[float, float, float]:
     return off, off == 0, 1
 
 
-COUNTS = Counted("blocks", ("off", "exact", "n"), sample=count)
+COUNTS = SampleCounts("blocks", ("off", "exact", "n"), sample=count)
 ERROR = Measure(
     "error", "Error", COUNTS, lambda sums: ratio_of(sums[..., [0, 2]]),
     "blocks too many or too few", unit="blocks", better="lower",

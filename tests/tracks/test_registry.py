@@ -16,12 +16,12 @@ from phyblock import registry
 from phyblock.errors import StoreError
 from phyblock.report import load_run, to_markdown, write_tables
 from phyblock.scoring.uncertainty import ratio_of
-from phyblock.tables.measures import Counted, Measure
+from phyblock.tables.measures import Measure, SampleCounts
 from phyblock.tracks.estimates import track_estimates, track_measures
 from phyblock.tracks.kind import kind_of
 from tests.report.factory import manifest, record, write_run
 
-SAMPLED = Counted("sampled", ("part", "whole"), sample=lambda _, __: (1, 2))
+SAMPLED = SampleCounts("sampled", ("part", "whole"), sample=lambda _, __: (1, 2))
 HALF = Measure("half", "Half", SAMPLED, ratio_of, "one of two")
 
 

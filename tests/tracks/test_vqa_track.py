@@ -24,7 +24,7 @@ from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.tracks import TemplatePrompt
 from phyblock.tracks.vqa.baselines import ChoiceSubject
-from phyblock.tracks.vqa.pictures import QuestionPictures, Shown
+from phyblock.tracks.vqa.pictures import QuestionPictures, ShownQuestion
 from phyblock.tracks.vqa.track import Vqa, VqaRules
 from tests.vqa_set import write_questions
 from tests.workspace import Workspace
@@ -297,7 +297,7 @@ def test_questions_keep_their_background_unless_a_suite_gives_one(
         style = replace(STYLE, background=drawn)
         bare = [replace(picture, background=None) for picture in asked.pictures]
         wanted = tuple(question_key(picture, style) for picture in bare)
-        assert pictures.keys(Shown(question, {})) == wanted
+        assert pictures.keys(ShownQuestion(question, {})) == wanted
 
 
 def test_judging_reads_scores_and_says_what_was_right(question_set: QuestionSet) -> None:

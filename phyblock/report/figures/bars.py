@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from phyblock.tables.track_report import Shown
+    from phyblock.tables.track_report import HeadlineColumn
 
 __all__ = ["main_measure", "measure_bars"]
 
@@ -70,7 +70,9 @@ def measure_bars(run: Run, *, track: str) -> Figure | None:
     return figure
 
 
-def _values(rows: pd.DataFrame, column: Shown, measure: Measure) -> dict[str, tuple[float, ...]]:
+def _values(
+    rows: pd.DataFrame, column: HeadlineColumn, measure: Measure
+) -> dict[str, tuple[float, ...]]:
     """By model, the value of a cell and the ends of its interval, in the measure's unit."""
     rows = rows[rows[CELL] == column.cell]
     if column.criterion:

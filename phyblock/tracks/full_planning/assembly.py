@@ -6,7 +6,7 @@ import pandas as pd
 
 from phyblock.tables.cells import METRICS, cell_scores, with_levels
 from phyblock.tables.design import OVERALL, Design
-from phyblock.tables.load import Run, once_per_run
+from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL
 from phyblock.tables.outcomes import FAILURES
 from phyblock.tracks.estimates import track_estimates
@@ -40,7 +40,7 @@ ASSEMBLY_COLUMNS = (
 """Columns of `assembly.csv`."""
 
 
-@once_per_run
+@made_once_copied
 def assembly_frame(run: Run) -> pd.DataFrame:
     """Every model, setting, matcher and level, in the suite's order, in `ASSEMBLY_COLUMNS`.
 

@@ -7,7 +7,7 @@ import pandas as pd
 from phyblock.scoring.uncertainty import f1_of, precision_of, recall_of
 from phyblock.tables.cells import cell_scores, with_levels
 from phyblock.tables.load import Run
-from phyblock.tables.measures import CELL, Cell, Counted, Measure
+from phyblock.tables.measures import CELL, Cell, Measure, SampleCounts
 from phyblock.tables.outcomes import WITHOUT_REPLY
 from phyblock.tables.text_table import level_name
 from phyblock.tracks.full_planning.baselines import PLAN_FLOORS
@@ -40,7 +40,7 @@ def _steps(run: Run) -> pd.DataFrame:
     return scores.assign(item=scores["scene"], replied=replied)
 
 
-_STEPS = Counted("steps", ("tp", "fp", "fn"), _steps)
+_STEPS = SampleCounts("steps", ("tp", "fp", "fn"), _steps)
 
 PLANNING_MEASURES = (
     Measure(

@@ -12,7 +12,7 @@ from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run
 from phyblock.tables.paper_numbers import HUMAN_ACCURACY, HUMAN_NOTE, published_table
 from phyblock.tables.showing import planning_words
-from phyblock.tables.track_report import PaperTable, Shown, TableMaker, TrackReport
+from phyblock.tables.track_report import HeadlineColumn, PaperTable, TableMaker, TrackReport
 from phyblock.tracks.full_planning.assembly import assembly_frame, table1_frame
 from phyblock.tracks.full_planning.errors import errors_frame
 from phyblock.tracks.full_planning.figures.errors import error_bars
@@ -52,12 +52,12 @@ __all__ = ["REPORT"]
 _MAIN = "Overall F1"
 
 
-def _headline(run: Run) -> tuple[Shown, ...]:
+def _headline(run: Run) -> tuple[HeadlineColumn, ...]:
     levels = [
-        Shown("f1", level, _MAIN if level == OVERALL else f"Level {level}", "")
+        HeadlineColumn("f1", level, _MAIN if level == OVERALL else f"Level {level}", "")
         for level in run.design.levels
     ]
-    sides = [Shown(name, OVERALL, name.capitalize()) for name in METRICS[:2]]
+    sides = [HeadlineColumn(name, OVERALL, name.capitalize()) for name in METRICS[:2]]
     return (*levels, *sides)
 
 

@@ -8,7 +8,7 @@ import pandas as pd
 from phyblock.scoring.uncertainty import Floats, f1_of, jackknife
 from phyblock.tables.cells import cell_scores, measured
 from phyblock.tables.intervals import CountCube, parents_of
-from phyblock.tables.load import Run, once_per_run
+from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.text_table import Column, TextTable, between, level_name, number
 from phyblock.tracks.full_planning.measures import NAME
 
@@ -17,7 +17,7 @@ __all__ = ["settings_frame", "settings_view"]
 _COLUMNS = ("model", "level", "f1_a", "f1_b", "difference", "lo", "hi", "n_scenes", "n_clusters")
 
 
-@once_per_run
+@made_once_copied
 def settings_frame(run: Run) -> pd.DataFrame:
     """One row a model and level: F1 in A and in B, B minus A with a 95 % interval; in [0, 1].
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.scoring import ERROR_TYPES
-from phyblock.tables.load import Run, once_per_run
+from phyblock.tables.load import Run, made_once_copied
 from phyblock.tracks.step_planning.rules import ENDINGS
 
 __all__ = [
@@ -39,7 +39,7 @@ _EPISODE_TYPES = {
 }
 
 
-@once_per_run
+@made_once_copied
 def episodes_frame(run: Run) -> pd.DataFrame:
     """One row an episode that tables count, in the order of the suite's models.
 

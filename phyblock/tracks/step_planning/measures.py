@@ -8,7 +8,7 @@ import pandas as pd
 
 from phyblock.scoring.uncertainty import f1_of, precision_of, ratio_of, recall_of
 from phyblock.tables.load import Run
-from phyblock.tables.measures import CELL, VARIANT, Counted, Measure
+from phyblock.tables.measures import CELL, SCORED_BY, Measure, SampleCounts
 from phyblock.tables.outcomes import WITHOUT_REPLY
 from phyblock.tables.track_report import WHOLE
 from phyblock.tracks.poses import POSE_MEASURES
@@ -37,7 +37,7 @@ def _episodes(run: Run) -> pd.DataFrame:
     episodes = episodes_frame(run)
     completed = (episodes["ending"] == "completed").astype("int64")
     return episodes.assign(
-        **dict.fromkeys(VARIANT, ""),
+        **dict.fromkeys(SCORED_BY, ""),
         **_about(episodes),
         completed=completed,
         episodes=1,
@@ -49,8 +49,8 @@ def _about(rows: pd.DataFrame) -> dict[str, Any]:
     return {CELL: WHOLE.name, "item": rows["scene"], "replied": replied}
 
 
-_MOVES = Counted("moves", ("tp", "fp", "fn"), _moves)
-_ENDS = Counted("episodes", ("completed", "episodes"), _episodes)
+_MOVES = SampleCounts("moves", ("tp", "fp", "fn"), _moves)
+_ENDS = SampleCounts("episodes", ("completed", "episodes"), _episodes)
 
 STEP_MEASURES = (
     Measure(

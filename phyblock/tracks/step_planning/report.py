@@ -11,8 +11,8 @@ from phyblock.tables.showing import planning_words
 from phyblock.tables.track_report import (
     WHOLE,
     EpisodeView,
+    HeadlineColumn,
     PaperTable,
-    Shown,
     TableMaker,
     TrackReport,
 )
@@ -44,11 +44,11 @@ from phyblock.tracks.step_planning.table3 import (
 __all__ = ["REPORT"]
 
 _COLUMNS = (
-    Shown("precision", WHOLE.name, "Precision", "placed"),
-    Shown("recall", WHOLE.name, "Recall", "placed"),
-    Shown("f1", WHOLE.name, "F1", "placed"),
-    Shown("f1", WHOLE.name, "F1 of attempts", "attempted"),
-    Shown("completion", WHOLE.name, "Completed"),
+    HeadlineColumn("precision", WHOLE.name, "Precision", "placed"),
+    HeadlineColumn("recall", WHOLE.name, "Recall", "placed"),
+    HeadlineColumn("f1", WHOLE.name, "F1", "placed"),
+    HeadlineColumn("f1", WHOLE.name, "F1 of attempts", "attempted"),
+    HeadlineColumn("completion", WHOLE.name, "Completed"),
 )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.domain import SUBTASKS
-from phyblock.tables.load import Run, once_per_run
+from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL
 from phyblock.tables.outcomes import FAILURES
 from phyblock.tracks.estimates import track_estimates
@@ -39,7 +39,7 @@ _COLUMNS = (
 )
 
 
-@once_per_run
+@made_once_copied
 def questions_frame(run: Run) -> pd.DataFrame:
     """Accuracies in [0, 1] by model and cell (`CELLS`), in the suite's order of models.
 

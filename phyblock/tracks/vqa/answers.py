@@ -9,7 +9,7 @@ import pandas as pd
 
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
 from phyblock.scoring import letter_rates
-from phyblock.tables.load import Run, once_per_run
+from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.outcomes import WITHOUT_REPLY
 from phyblock.tracks.vqa.spec import VqaSpec
 
@@ -45,7 +45,7 @@ def question_digest(run: Run) -> str | None:
     return run.manifest.tracks.get(_TRACK, {}).get("questions")
 
 
-@once_per_run
+@made_once_copied
 def questions_counted(run: Run) -> pd.DataFrame:
     """The questions behind accuracies: model, subtask, scene, question, seed, correct, n.
 

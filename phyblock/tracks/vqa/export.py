@@ -22,7 +22,7 @@ from phyblock.sim import PictureStyle
 from phyblock.tables.track_report import ItemExport
 from phyblock.tracks.opening import picture_folder, render_workers
 from phyblock.tracks.vqa.opening import open_questions, select_questions
-from phyblock.tracks.vqa.pictures import QuestionPictures, Shown
+from phyblock.tracks.vqa.pictures import QuestionPictures, ShownQuestion
 from phyblock.tracks.vqa.spec import BUILTIN_QUESTIONS
 
 __all__ = ["QUESTION_EXPORT", "export_questions"]
@@ -166,7 +166,7 @@ async def _drawn(
     for start in range(0, len(tasks), _AT_ONCE):
         some = tasks[start : start + _AT_ONCE]
         drawn = await asyncio.gather(
-            *(pictures.of(Shown(task.question, task.files)) for task in some)
+            *(pictures.of(ShownQuestion(task.question, task.files)) for task in some)
         )
         for task, images in zip(some, drawn, strict=True):
             yield task, images

@@ -10,7 +10,7 @@ from phyblock.domain import CATEGORIES, SUBTASKS
 from phyblock.scoring import chance
 from phyblock.scoring.uncertainty import ratio_of
 from phyblock.tables.load import Run
-from phyblock.tables.measures import CELL, VARIANT, Cell, Counted, Measure
+from phyblock.tables.measures import CELL, SCORED_BY, Cell, Measure, SampleCounts
 from phyblock.tables.outcomes import WITHOUT_REPLY
 from phyblock.tracks.vqa.answers import (
     OVERALL_CELL,
@@ -76,7 +76,7 @@ ALL_CELLS = _cells(SUBTASKS)
 def _answers(run: Run) -> pd.DataFrame:
     asked = questions_counted(run)
     return asked.assign(
-        **dict.fromkeys(VARIANT, ""),
+        **dict.fromkeys(SCORED_BY, ""),
         **{CELL: asked["subtask"], "item": asked["question"]},
         replied=True,
     )
@@ -96,7 +96,7 @@ def _single(run: Run) -> pd.DataFrame:
     parts = [scored_answers(run, model) for model in run.design.model_names]
     rows = pd.concat(parts) if parts else run.records.iloc[:0]
     return rows.assign(
-        **dict.fromkeys(VARIANT, ""),
+        **dict.fromkeys(SCORED_BY, ""),
         **{CELL: rows["subtask"], "item": rows["question"]},
         replied=~rows["outcome"].isin(WITHOUT_REPLY),
         correct=rows["given"].eq(rows["right"]).fillna(False).astype("int64"),
@@ -107,7 +107,7 @@ def _single(run: Run) -> pd.DataFrame:
 ACCURACY = Measure(
     "accuracy",
     "Accuracy",
-    Counted("answers", ("correct", "n"), _answers),
+    SampleCounts("answers", ("correct", "n"), _answers),
     ratio_of,
     "questions that were answered right; under circular evaluation in every rotation",
     over="questions",
@@ -117,7 +117,7 @@ ACCURACY = Measure(
 EACH_ROTATION = Measure(
     "each_rotation",
     "Each rotation",
-    Counted("rotations", ("correct", "n"), _single),
+    SampleCounts("rotations", ("correct", "n"), _single),
     ratio_of,
     "answers that were right, every rotation of a question counted for itself",
     over="answers",

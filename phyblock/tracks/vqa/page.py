@@ -16,7 +16,7 @@ from phyblock.tables.track_report import PageItems
 from phyblock.tracks.drawable import block_entry, rounded
 from phyblock.tracks.vqa.answers import question_digest, showing
 from phyblock.tracks.vqa.opening import open_questions
-from phyblock.tracks.vqa.pictures import QuestionPictures, Shown
+from phyblock.tracks.vqa.pictures import QuestionPictures, ShownQuestion
 from phyblock.tracks.vqa.record import ChoiceRecord
 from phyblock.tracks.vqa.track import asked
 
@@ -42,13 +42,13 @@ def question_items(run: Run, dataset: Dataset) -> PageItems:
     return PageItems(lambda record: _shown(record, by_id), _entry, pictures)
 
 
-def _shown(record: Record, questions: Mapping[str, QuestionTask]) -> Shown | None:
+def _shown(record: Record, questions: Mapping[str, QuestionTask]) -> ShownQuestion | None:
     if not isinstance(record, ChoiceRecord) or record.question.id not in questions:
         return None
     return asked(questions[record.question.id], record.question.rotation).shown
 
 
-def _entry(shown: Shown) -> dict[str, Any]:
+def _entry(shown: ShownQuestion) -> dict[str, Any]:
     return question_entry(shown.question)
 
 

@@ -19,7 +19,7 @@ from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.tracks.studio import Drawing, Studio, to_image
 from phyblock.words import Background
 
-__all__ = ["OptionsAs", "QuestionPictures", "Shown"]
+__all__ = ["OptionsAs", "QuestionPictures", "ShownQuestion"]
 
 OptionsAs = Literal["images", "letters"]
 SHEET = "options"
@@ -30,7 +30,7 @@ _MOST_CELL_PX = 1024
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownQuestion:
     """A question as it is shown, with the picture files, by label, that its data set brings."""
 
     question: Question
@@ -64,7 +64,7 @@ class QuestionPictures(Studio):
         self._style = style
         self._options_as = options_as
 
-    async def of(self, shown: Shown) -> tuple[Image, ...]:
+    async def of(self, shown: ShownQuestion) -> tuple[Image, ...]:
         """The pictures of one question as they are sent.
 
         Raises DataError when a file is missing or no picture, StoreError when the cache folder
@@ -75,7 +75,7 @@ class QuestionPictures(Studio):
         recent = self.recalled(name)
         return recent or self.remembered(name, await self.images(drawings))
 
-    def outline(self, shown: Shown) -> tuple[tuple[Image, ...], bool]:
+    def outline(self, shown: ShownQuestion) -> tuple[tuple[Image, ...], bool]:
         """The pictures as far as they are at hand, and whether all are; nothing is rendered."""
         drawings = self._drawings(shown)
         side = self._style.size_px
@@ -87,7 +87,7 @@ class QuestionPictures(Studio):
             Image(b"", image.label, *sheet) if image.label == SHEET else image for image in images
         ), False
 
-    def keys(self, shown: Shown) -> tuple[str, ...]:
+    def keys(self, shown: ShownQuestion) -> tuple[str, ...]:
         """What decides the pixels of a question's pictures."""
         return tuple(drawing.key for drawing in self._drawings(shown))
 
@@ -95,7 +95,7 @@ class QuestionPictures(Studio):
     def _cell_px(self) -> int:
         return min(self._style.size_px, _MOST_CELL_PX)
 
-    def _drawings(self, shown: Shown) -> tuple[Drawing, ...]:
+    def _drawings(self, shown: ShownQuestion) -> tuple[Drawing, ...]:
         drawings = [self._drawing(shown, label) for label in shown.labels]
         options = [drawing for drawing in drawings if drawing.label in LETTERS]
         if not options or self._options_as == "images":
@@ -108,7 +108,7 @@ class QuestionPictures(Studio):
         sheet = Drawing(SHEET, key, partial(_sheet, makes, letters, self._cell_px))
         return (*(drawing for drawing in drawings if drawing.label not in LETTERS), sheet)
 
-    def _drawing(self, shown: Shown, label: str) -> Drawing:
+    def _drawing(self, shown: ShownQuestion, label: str) -> Drawing:
         if label in shown.files:
             path = shown.files[label]
             key = hashlib.sha256(read_picture(path)).hexdigest()

@@ -9,7 +9,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.tables.load import Run
 from phyblock.tables.paper_numbers import HUMAN_ACCURACY, HUMAN_NOTE
 from phyblock.tables.showing import control_words
-from phyblock.tables.track_report import PaperTable, Shown, TableMaker, TrackReport
+from phyblock.tables.track_report import HeadlineColumn, PaperTable, TableMaker, TrackReport
 from phyblock.tracks.vqa.accuracy import questions_frame
 from phyblock.tracks.vqa.answers import OVERALL_CELL, letters_frame, question_digest, showing
 from phyblock.tracks.vqa.export import QUESTION_EXPORT
@@ -38,8 +38,8 @@ from phyblock.tracks.vqa.table2 import (
 __all__ = ["REPORT"]
 
 _COLUMNS = (
-    *(Shown(ACCURACY.name, name, CATEGORY_NAMES[name]) for name in CATEGORIES),
-    Shown(ACCURACY.name, OVERALL_CELL, "Overall"),
+    *(HeadlineColumn(ACCURACY.name, name, CATEGORY_NAMES[name]) for name in CATEGORIES),
+    HeadlineColumn(ACCURACY.name, OVERALL_CELL, "Overall"),
 )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
-from phyblock.tables.estimates import strata_of
+from phyblock.tables.estimates import pooled_in
 from phyblock.tables.headline import interval_frame, interval_view
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
@@ -179,8 +179,8 @@ def paper_table2_frame(run: Run) -> pd.DataFrame:
         return NOTHING
     table = interleaved(table2_frame(run), CELLS)
     cells = subtask_cells(run)
-    asked = {cell.name: strata_of(cell, cells) for cell in cells}
-    whole = {cell.name: strata_of(cell, ALL_CELLS) for cell in ALL_CELLS}
+    asked = {cell.name: pooled_in(cell, cells) for cell in cells}
+    whole = {cell.name: pooled_in(cell, ALL_CELLS) for cell in ALL_CELLS}
     # A mean over a part of what the paper averages is not the same number.
     partly = table["cell"].map(asked) != table["cell"].map(whole)
     table.loc[partly, ["ours", "difference"]] = np.nan

@@ -18,7 +18,7 @@ from phyblock.parsing import ParsedAnswer, parse_answer
 from phyblock.tracks.elsewhere import Elsewhere
 from phyblock.tracks.prompts import Prompt
 from phyblock.tracks.vqa.baselines import ChoiceSubject
-from phyblock.tracks.vqa.pictures import OptionsAs, QuestionPictures, Shown
+from phyblock.tracks.vqa.pictures import OptionsAs, QuestionPictures, ShownQuestion
 
 __all__ = ["AskedQuestion", "ChoiceJudgement", "Vqa", "VqaRules", "asked"]
 
@@ -41,7 +41,7 @@ class VqaRules:
 class AskedQuestion:
     """A question with its options in one order; `rotation` 0 is that of the data set."""
 
-    shown: Shown
+    shown: ShownQuestion
     rotation: int = 0
     is_one_of_many: bool = False
 
@@ -65,7 +65,7 @@ def asked(task: QuestionTask, rotation: int = 0, *, is_one_of_many: bool = False
     """A question with its options rotated."""
     n = len(task.question.options)
     files = {rotated_label(label, rotation, n): path for label, path in task.files.items()}
-    shown = Shown(rotated(task.question, rotation), files)
+    shown = ShownQuestion(rotated(task.question, rotation), files)
     return AskedQuestion(shown, rotation, is_one_of_many)
 
 
@@ -222,7 +222,7 @@ class Vqa:
         messages = prompt.messages(pictures, self.facts(item, pictures))
         return Request(item.key, seed, messages, params, prompt.version, self._about(item))
 
-    def _seen(self, item: AskedQuestion, seed: int) -> Shown:
+    def _seen(self, item: AskedQuestion, seed: int) -> ShownQuestion:
         """What a question is shown with: its own pictures, or those of another scene.
 
         Which other one depends on the question and the seed alone, so it is the same for all
@@ -240,7 +240,7 @@ def _sort_of(task: QuestionTask) -> tuple[object, ...]:
         (picture.label, *sorted(mark.letter for mark in picture.marks))
         for picture in task.question.pictures
     )
-    return (task.question.subtask, Shown(task.question, task.files).labels, *marks)
+    return (task.question.subtask, ShownQuestion(task.question, task.files).labels, *marks)
 
 
 def _digest(content: object) -> str:
