@@ -83,6 +83,8 @@ class ManifestQuestions(Line):
     """Its layout."""
     root: str
     """Where it was."""
+    version: Annotated[int, Field(ge=1)] = 1
+    """Its version; results on different versions are never mixed."""
 
 
 class Manifest(Line):

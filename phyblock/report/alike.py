@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import pandas as pd
 
 from phyblock.errors import Problem, SpecError
+from phyblock.records.manifest import ManifestDataset, ManifestQuestions
 from phyblock.tables.load import Run
 from phyblock.tracks.kind import kind_of
 
@@ -27,17 +29,20 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str) -> None:
 
 
 def _check_version(run: Run, first: Run) -> None:
-    """Scenes of two versions of a data set may share a name and nothing else."""
-    found, wanted = run.manifest.dataset, first.manifest.dataset
-    if found is None or wanted is None or found.name != wanted.name:
-        return
-    if found.version != wanted.version:
-        message = f"is of another version of {found.name} than {first.path}"
-        hint = "run the suite again on the newer version"
-        where, field = str(run.path), "dataset.version"
-        raise SpecError(
-            Problem(where, message, field, str(found.version), str(wanted.version), hint)
-        )
+    """Scenes and questions of two versions of a set may share a name and nothing else."""
+    for field in ("dataset", "questions"):
+        found, wanted = (getattr(one.manifest, field) for one in (run, first))
+        if found is None or wanted is None or _name(found) != _name(wanted):
+            continue
+        if found.version != wanted.version:
+            message = f"is of another version of {_name(found)} than {first.path}"
+            versions = str(found.version), str(wanted.version)
+            hint = "run the suite again on the newer version"
+            raise SpecError(Problem(str(run.path), message, f"{field}.version", *versions, hint))
+
+
+def _name(data: ManifestDataset | ManifestQuestions) -> str:
+    return data.name if isinstance(data, ManifestDataset) else Path(data.root).name
 
 
 def _check_scenes(run: Run, first: Run) -> None:

@@ -20,7 +20,8 @@ dependency graph or from physics, and derived again by `phyblock vqa verify`. Ma
     {made_by}
 
 which gives the same bytes with any number of processes. No picture is stored: each is a recipe
-(what differs from the scene, and from where it is seen) that is drawn when it is needed.
+(what differs from the scene, and from where it is seen) that is drawn when it is needed. The
+version of the set stands in `VERSION`: results on different versions are never mixed.
 
 ## How they were made
 

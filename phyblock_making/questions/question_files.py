@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from phyblock.datasets.version import VERSION_FILE
 from phyblock.domain.question import Question
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
@@ -19,6 +20,8 @@ __all__ = ["QUESTIONS_FILE", "check_place", "write_questions"]
 QUESTIONS_FILE = "questions.jsonl"
 _CARD_FILE = "CARD.md"
 _SUMS_FILE = "SHA256SUMS"
+SET_VERSION = 2
+"""Raised whenever questions of a name ask something else, so that no results are mixed."""
 
 
 def check_place(folder: Path, replace: bool) -> None:
@@ -29,7 +32,7 @@ def check_place(folder: Path, replace: bool) -> None:
         hint = "give another --out, or --replace"
         raise StoreError(Problem(str(folder), "holds questions already", hint=hint))
     if not (folder / QUESTIONS_FILE).exists():
-        others = [folder / name for name in (QUESTIONS_FILE, _CARD_FILE, _SUMS_FILE)]
+        others = [folder / name for name in (QUESTIONS_FILE, _CARD_FILE, VERSION_FILE, _SUMS_FILE)]
         check_free(others, "give another --out")
 
 
@@ -54,6 +57,7 @@ def write_questions(
             folder.name, scenes_name, questions, made_by, audits, attacks
         ).encode(),
         QUESTIONS_FILE: lines.encode(),
+        VERSION_FILE: f"{SET_VERSION}\n".encode(),
     }
     sums = "".join(f"{hashlib.sha256(d).hexdigest()}  {name}\n" for name, d in files.items())
     with writing(folder):

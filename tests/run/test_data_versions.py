@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from phyblock.datasets.version import UNNUMBERED, VERSION_FILE, read_version
 from phyblock.errors import DataError, SpecError
 from phyblock.records import read_manifest
+from phyblock.report.alike import check_alike
 from phyblock.report.compare import compare_runs
 from phyblock.tables.load import load_run
+from tests.report.factory import manifest, run_of
 from tests.workspace import Workspace
 
 
@@ -50,3 +52,12 @@ def test_runs_on_two_versions_are_not_mixed(tmp_path: Path) -> None:
     assert [data.version for data in versions if data is not None] == [1, 2]
     with pytest.raises(SpecError, match="is of another version of data"):
         compare_runs(load_run(work.out), load_run(newer), ["oracle"])
+
+
+def test_answers_to_two_versions_of_questions_are_not_mixed() -> None:
+    runs = [
+        run_of([], manifest(questions={"format": "builtin", "root": "/a/asked", "version": number}))
+        for number in (1, 2)
+    ]
+    with pytest.raises(SpecError, match=r"is of another version of asked than .*\n.*found: 2"):
+        check_alike(runs[1], runs[0], [], "vqa")

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from phyblock.datasets.version import read_version
 from phyblock.records import Manifest
 from phyblock.resources import bundled
 from phyblock.specs import LoadedSuite, SuiteSpec
@@ -24,7 +25,9 @@ def _questions(suite: SuiteSpec) -> tuple[str, tuple[str, ...], bool]:
 
 def _manifest(loaded: LoadedSuite) -> Mapping[str, Any]:
     spec = loaded.suite.section(VqaSpec)
-    return {"questions": {"format": spec.format, "root": str(loaded.folders[Vqa.name])}}
+    root = loaded.folders[Vqa.name]
+    questions = {"format": spec.format, "root": str(root), "version": read_version(root)}
+    return {"questions": questions}
 
 
 def _found_at(manifest: Manifest) -> str | None:
