@@ -1,4 +1,4 @@
-"""The contact sheets of docs/pictures.md, drawn anew.
+"""The contact sheets of README.md, docs/pictures.md and docs/scenes.md, drawn anew.
 
     python benchmarks/evidence/pictures.py [--data NAME] [--out FOLDER]
 
@@ -27,6 +27,7 @@ from phyblock.words import BACKGROUNDS
 OUT = Path(__file__).parents[2] / "docs" / "images" / "pictures"
 CELL_PX, CAPTION_PX, GAP_PX = 240, 24, 4
 PER_LEVEL = 8
+WALL_PX, WALL_COLUMNS, PER_WALL = 150, 10, 60
 Cell = tuple[str, bytes]
 """A caption and a PNG."""
 
@@ -61,6 +62,21 @@ def levels(tasks: Sequence[AssemblyTask]) -> dict[str, Image.Image]:
         cells = [(task.scene.id, goal_png(task.scene, style)) for task in chosen]
         sheets[f"level-{level}"] = sheet(cells, 4)
     return sheets
+
+
+def walls(tasks: Sequence[AssemblyTask]) -> dict[str, Image.Image]:
+    """Many scenes of each level, small and without captions, picked evenly."""
+    found, style = {}, PictureStyle(WALL_PX, "white")
+    for level in (1, 2, 3, 4):
+        chosen = spread([task for task in tasks if level in task.scene.levels], PER_WALL)
+        rows = -(-len(chosen) // WALL_COLUMNS)
+        wall = Image.new("RGB", (WALL_COLUMNS * WALL_PX, rows * WALL_PX), "white")
+        for place, task in enumerate(chosen):
+            row, column = divmod(place, WALL_COLUMNS)
+            data = goal_png(task.scene, style)
+            wall.paste(Image.open(io.BytesIO(data)), (column * WALL_PX, row * WALL_PX))
+        found[f"scenes-level-{level}"] = wall
+    return found
 
 
 def looks(scene: Scene) -> dict[str, Image.Image]:
@@ -104,6 +120,7 @@ def main() -> None:
     medium = [task for task in tasks if task.scene.level == 3][-4]
     sheets = {
         **levels(tasks),
+        **walls(tasks),
         **looks(large.scene),
         "composite": composite(medium),
         "filmstrip": filmstrip(medium.scene),

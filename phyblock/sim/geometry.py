@@ -28,6 +28,7 @@ Outline = NDArray[np.float64]
 _ARC_SEGMENTS, _FACETS = 10, 18
 _ROUND_ARC_SEGMENTS, _ROUND_FACETS = 36, 72
 _ARCH_HOLE_RADIUS_M = 0.0375
+_BOXES: tuple[BlockType, ...] = ("cube", "cuboid1", "cuboid2", "cuboid3")
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +125,10 @@ def _convex(outline: Outline, half_m: float, plane: tuple[int, int], axis: int) 
 def _prism(
     block_type: BlockType, arc_segments: int = _ARC_SEGMENTS, facets: int = _FACETS
 ) -> _Prism:
-    """A block with half circles of so many segments, and circles of so many facets."""
+    """A block with half circles of so many segments, and circles of so many facets.
+
+    Raises ValueError for a type that has no outline here.
+    """
     high = SHAPES[block_type].high_m
     if block_type == "arch":
         return _arch_prism(arc_segments)
@@ -137,6 +141,8 @@ def _prism(
         angles = np.radians(np.arange(facets) * (360 / facets))
         circle = high[0] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         return _convex(circle, high[2], (0, 1), 2)
+    if block_type not in _BOXES:
+        raise ValueError(f"{block_type} has no geometry")
     x, y, z = high
     return _convex(np.array([[x, y], [-x, y], [-x, -y], [x, -y]]), z, (0, 1), 2)
 

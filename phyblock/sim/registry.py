@@ -16,7 +16,14 @@ from phyblock.errors import InputError, PhyblockError, Problem
 from phyblock.sim.engine import PhysicsEngine
 from phyblock.sim.renderer import Renderer
 
-__all__ = ["DEFAULT_ENGINE", "ENGINES", "RENDERERS", "physics_engine", "renderer"]
+__all__ = [
+    "DEFAULT_ENGINE",
+    "ENGINES",
+    "RENDERERS",
+    "other_simulators",
+    "physics_engine",
+    "renderer",
+]
 
 DEFAULT_ENGINE = "pybullet"
 _DEFAULT_RENDERER = "raster"
@@ -54,6 +61,22 @@ def renderer() -> Renderer:
     if not isinstance(made, Renderer):
         raise InputError(Problem(variable, "names no renderer", found=word))
     return made
+
+
+def other_simulators() -> tuple[str, ...]:
+    """What is used instead of PyBullet or of our renderer, with its versions, as words for people.
+
+    Raises as `physics_engine` and `renderer` do.
+    """
+    used = (
+        ("the physics engine", physics_engine(), DEFAULT_ENGINE),
+        ("the renderer", renderer(), _DEFAULT_RENDERER),
+    )
+    return tuple(
+        f"{what} {one.name} ({', '.join(' '.join(pair) for pair in one.versions.items())})"
+        for what, one, usual in used
+        if one.name != usual
+    )
 
 
 @functools.cache

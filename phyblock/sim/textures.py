@@ -1,7 +1,7 @@
 """What stands behind the blocks: procedural floors, and the shadow that falls on them.
 
 The floor is the plane z = 0, colored by casting a ray through every pixel. It needs no image
-file, has no far edge, and costs less than drawing a textured plane in the software renderer.
+file, has no far edge, and needs no textures of the renderer.
 """
 
 from __future__ import annotations
@@ -34,7 +34,10 @@ SHADOW_STRENGTH: dict[Background, float] = {
 
 
 def floor(background: Background, camera: Camera, size_px: int) -> NDArray[np.float32]:
-    """Color of every pixel's floor, shape (size, size, 3), 0..255, before any shadow."""
+    """Color of every pixel's floor, shape (size, size, 3), 0..255, before any shadow.
+
+    Raises ValueError for a background that has no floor here.
+    """
     if background == "white":
         return np.full((size_px, size_px, 3), 255.0, dtype=np.float32)
     down = -camera.ray_component(2, size_px)
@@ -42,7 +45,9 @@ def floor(background: Background, camera: Camera, size_px: int) -> NDArray[np.fl
     distance = np.float32(camera.eye_m[2]) / np.where(below, down, np.float32(np.inf))
     if background in SURFACES:
         return _surface(background, camera, down, distance)
-    return _checkerboard(camera, below, distance)
+    if background == "checkerboard":
+        return _checkerboard(camera, below, distance)
+    raise ValueError(f"{background} has no floor")
 
 
 def _checkerboard(

@@ -15,8 +15,8 @@ import numpy as np
 
 from phyblock.domain.question import SUBTASKS, Question, Subtask
 from phyblock.scoring.uncertainty import Clusters, in_unit_range, jackknife, ratio_of
-from phyblock_making.attacks.cues import Floats
-from phyblock_making.attacks.observed import Observed, credit, kind_of
+from phyblock_making.attacks.cues import CUES, Floats
+from phyblock_making.attacks.observed import RULES, Observed, credit, kind_of
 from phyblock_making.attacks.probes import (
     Likes,
     boosted_cues,
@@ -25,7 +25,17 @@ from phyblock_making.attacks.probes import (
     unseen_text,
 )
 
-__all__ = ["ATTACKS", "Attack", "Attacked", "Rate", "Verdict", "all_attacks", "attack"]
+__all__ = [
+    "ATTACKS",
+    "Attack",
+    "Attacked",
+    "Rate",
+    "Verdict",
+    "all_attacks",
+    "attack",
+    "by_cue",
+    "by_rule",
+]
 
 Verdict = Literal["met", "over, in noise", "missed"]
 """At most the aim; above it, but the interval reaches down to it; or all of it above."""
@@ -102,30 +112,34 @@ class Attacked:
 _VERDICTS: tuple[Verdict, ...] = ("met", "over, in noise", "missed")
 
 
-def _by_cue(name: str) -> Likes:
+def by_cue(name: str) -> Likes:
+    """The numbers of one cue; raises ValueError for a name that no cue has."""
+    if name not in CUES:
+        raise ValueError(f"{name!r} is no cue; there are {', '.join(CUES)}")
     return lambda observed: [one.cues.get(name) for one in observed]
 
 
-def _by_rule(name: str) -> Likes:
+def by_rule(name: str) -> Likes:
+    """The likings by one rule; raises ValueError for a name that no rule has."""
+    if name not in RULES:
+        raise ValueError(f"{name!r} is no rule; there are {', '.join(RULES)}")
     return lambda observed: [one.rules.get(name) for one in observed]
 
 
 ATTACKS: tuple[Attack, ...] = (
-    Attack("area", "colored area of the option's picture", _by_cue("colored area")),
-    Attack("colors", "how far its colors are from the scene's", _by_cue("colors unlike the scene")),
-    Attack("change", "pixels that differ from the scene", _by_cue("unlike the scene")),
-    Attack("odd one out", "pixels that differ from other options", _by_cue("unlike the others")),
-    Attack("central", "the mark's distance from the middle of its block", _by_cue("off center")),
-    Attack(
-        "central and flat", "the same, on level faces first", _by_cue("off center or not level")
-    ),
+    Attack("area", "colored area of the option's picture", by_cue("colored area")),
+    Attack("colors", "how far its colors are from the scene's", by_cue("colors unlike the scene")),
+    Attack("change", "pixels that differ from the scene", by_cue("unlike the scene")),
+    Attack("odd one out", "pixels that differ from other options", by_cue("unlike the others")),
+    Attack("central", "the mark's distance from the middle of its block", by_cue("off center")),
+    Attack("central and flat", "the same, on level faces first", by_cue("off center or not level")),
     Attack("linear probe", "ridge regression on all cues, by folds", linear_cues),
     Attack("boosted probe", "gradient boosting on all cues, by folds", boosted_cues),
-    Attack("support", "what rests on X moves, nothing else", _by_rule("support"), _NAIVE, None),
+    Attack("support", "what rests on X moves, nothing else", by_rule("support"), _NAIVE, None),
     Attack(
         "sole support",
         "what rests on X and on nothing else moves",
-        _by_rule("sole support"),
+        by_rule("sole support"),
         *(_NAIVE, None),
     ),
 )

@@ -15,7 +15,7 @@ from phyblock.sim.render import COLOR_RGB, Shot
 from phyblock.sim.seeing import SEEN_PX, changed_pixels
 from phyblock_making.attacks.looks import Look, Spot
 
-__all__ = ["MARK_CUES", "PICTURE_CUES", "SCENE_CUES", "Cue", "Floats", "cues_of"]
+__all__ = ["CUES", "MARK_CUES", "PICTURE_CUES", "SCENE_CUES", "Cue", "Floats", "cues_of"]
 
 Floats = NDArray[np.float64]
 Cue = Callable[[Look], Sequence[float]]
@@ -190,6 +190,8 @@ MARK_CUES: Mapping[str, Cue] = {
     "from other marks": _of_marks(_from_others),
 }
 """Of options that are marks in the scene's picture."""
+CUES = (*PICTURE_CUES, *SCENE_CUES, *MARK_CUES)
+"""The names of all cues."""
 
 
 def _shows(shot: Shot) -> NDArray[np.bool_]:

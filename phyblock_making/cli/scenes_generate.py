@@ -12,7 +12,7 @@ from phyblock.cli.paths import UserPath
 from phyblock_making.auditing.given_away import MOST_SCENES, given_away_text
 from phyblock_making.cli.working import jobs_option, ray_option, seed_option, tracked
 from phyblock_making.scenes.scene_card import card
-from phyblock_making.scenes.scene_draft import Palette
+from phyblock_making.scenes.scene_draft import PALETTES, Palette
 from phyblock_making.scenes.scene_files import open_writer
 from phyblock_making.scenes.scene_production import Order, produce, shares
 from phyblock_making.workers import open_workers
@@ -21,7 +21,7 @@ __all__ = ["command"]
 
 _PALETTE_TEXT: dict[Palette, str] = {
     "kit": "the official kit's twelve pairs of type and color",
-    "full": "all forty pairs of eight types and five colors",
+    "full": f"all {len(PALETTES['full'])} pairs of type and color",
 }
 
 
@@ -55,7 +55,7 @@ def _levels(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int
     type=click.Choice(["kit", "full"]),
     default="kit",
     show_default=True,
-    help="The kit's twelve pairs of type and color, or all forty.",
+    help="The kit's twelve pairs of type and color, or all that there are.",
 )
 @jobs_option
 @ray_option

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from phyblock.sim.registry import other_simulators
 from phyblock.sim.stability import DEFAULT_TRIAL
 from phyblock.sim.steps import DEFAULT_REST
 from phyblock.sim.support import FIT_TOLERANCE_M
@@ -24,7 +25,7 @@ Version {version} (also in `VERSION`): results on different versions of a set ar
 
     {command}
 
-makes these files anew, byte for byte, with any number of processes.
+makes these files anew, byte for byte, with any number of processes{simulators}.
 
 **Base scenes** come from a grammar of motifs (`phyblock_making/scenes/`): columns, piers, decks,
 crowns and flanks make towers, gates, houses, bridges, arcades, walls, pyramids, stairs, courts,
@@ -113,6 +114,7 @@ def card(
         base=written.base,
         varied=written.count - written.base,
         command=command,
+        simulators="".join(f", by {one}" for one in other_simulators()),
         palette=palette_text,
         fit_mm=FIT_TOLERANCE_M * 1000,
         duration=DEFAULT_TRIAL.duration_s,

@@ -146,3 +146,9 @@ def _colored_part(path: Path) -> Mesh:
     number = {corner: index for index, corner in enumerate(used)}
     faces = [[number[corner] for corner in triangle] for triangle in triangles]
     return Mesh(np.array([vertices[corner] for corner in used]), np.array(faces))
+
+
+def test_a_type_without_an_outline_is_no_box(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(SHAPES, "pyramid", SHAPES["cube"])  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="pyramid has no geometry"):
+        solid_mesh("pyramid")  # type: ignore[arg-type]

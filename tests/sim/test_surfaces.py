@@ -27,6 +27,11 @@ def test_every_surface_is_a_background() -> None:
     assert set(SURFACES) < set(BACKGROUNDS)
 
 
+def test_a_background_without_a_floor_is_not_drawn_as_another() -> None:
+    with pytest.raises(ValueError, match="sand has no floor"):
+        floor("sand", frame(np.zeros((1, 3)), view_axes(45.0, 22.0), min_distance_m=0.5), 16)  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("surface", SURFACES)
 def test_a_surface_is_seamless(surface: Surface) -> None:
     """A step across the seam is no larger than steps elsewhere."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain import Question, Scene
-from phyblock_making.attacks.attacks import ATTACKS, Attack, all_attacks, attack
+from phyblock_making.attacks.attacks import ATTACKS, Attack, all_attacks, attack, by_cue, by_rule
 from phyblock_making.attacks.observed import Observed, credit
 from phyblock_making.attacks.probes import boosted_cues, linear_cues
 
@@ -88,6 +89,12 @@ def test_where_nothing_tells_an_attack_guesses(name: str) -> None:
     assert most < 0.36
     assert least < 0.36
     assert verdict in ("met", "over, in noise")
+
+
+@pytest.mark.parametrize("made", [by_cue, by_rule])
+def test_an_attack_by_a_name_that_is_not_there_is_refused(made: Callable[[str], object]) -> None:
+    with pytest.raises(ValueError, match="'typo' is no"):
+        made("typo")
 
 
 def test_an_order_counts_the_way_round_that_its_kind_asks_for() -> None:

@@ -13,10 +13,13 @@ from phyblock.domain import Scene
 from phyblock.errors import DataError, StoreError
 from phyblock.sim.visibility import hidden_blocks
 from phyblock_making.scenes import accept
+from phyblock_making.scenes.scene_card import card
 from phyblock_making.scenes.scene_files import SetWriter, open_writer, sums_text
 from phyblock_making.scenes.scene_production import Order, Share, produce, shares
 from phyblock_making.symmetry import canonical_form
 from phyblock_making.workers import open_workers
+from tests.sim.box_renderer import BOX_RENDERER
+from tests.sim.still_engine import STILL_ENGINE
 
 SMALL = Order(3, "kit", (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1)))
 
@@ -37,6 +40,21 @@ def write(folder: Path, scenes: list[Scene]) -> SetWriter:
 @pytest.fixture(scope="module")
 def scenes() -> list[Scene]:
     return made(SMALL)
+
+
+def test_a_card_names_other_simulators_and_says_nothing_of_the_usual_ones(
+    scenes: list[Scene], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = write(tmp_path / "set", scenes)
+    usual = card("few", written, "make", "kit")
+    assert "number of processes.\n" in usual
+    monkeypatch.setenv("PHYBLOCK_PHYSICS", STILL_ENGINE)
+    by_still = ", by the physics engine still (still 1)"
+    assert card("few", written, "make", "kit") == usual.replace(
+        "number of processes", f"number of processes{by_still}"
+    )
+    monkeypatch.setenv("PHYBLOCK_RENDERER", BOX_RENDERER)
+    assert f"processes{by_still}, by the renderer boxes (" in card("few", written, "make", "kit")
 
 
 def test_the_built_in_shares() -> None:
