@@ -31,8 +31,8 @@ from phyblock_making.poses import POSES
 from phyblock_making.questions.alike import ranked_as_drawn
 from phyblock_making.questions.annexes import with_annex
 from phyblock_making.questions.choices import pick, shuffled
-from phyblock_making.questions.goal_view import drawn_view
 from phyblock_making.questions.margins import group_of
+from phyblock_making.questions.picture_view import drawn_view
 from phyblock_making.questions.pictured_drafts import draft, only_index, picture_of
 from phyblock_making.questions.placing import lowered, surely_stays, verdict
 from phyblock_making.questions.question_draft import Draft, UnfairError

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import SHAPES, BlockType, Euler, orientation_class
 from phyblock.domain.scene import Block
 from phyblock.sim.support import bounds_m
-from phyblock_making.questions.goal_view import View, center_m, picture_axes
+from phyblock_making.questions.picture_view import View, center_m, picture_axes
 
 __all__ = [
     "height_m",

@@ -24,14 +24,14 @@ from phyblock.sim.seeing import Top, block_mark, is_apart, is_inside, seen, seen
 from phyblock_making.questions.alike import AREA, CHANGE, alike_wrong, ranked_as_drawn
 from phyblock_making.questions.annexes import with_annex
 from phyblock_making.questions.choices import shuffled
-from phyblock_making.questions.goal_view import (
+from phyblock_making.questions.margins import group_of, is_sure, resting_on
+from phyblock_making.questions.picture_view import (
     COUNTED,
     NAMED,
     are_seen,
     drawn_view,
     require_seen,
 )
-from phyblock_making.questions.margins import group_of, is_sure, resting_on
 from phyblock_making.questions.pictured_drafts import (
     draft,
     of_kind,

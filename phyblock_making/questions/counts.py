@@ -10,7 +10,7 @@ from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock_making.questions.choices import shuffled
-from phyblock_making.questions.goal_view import (
+from phyblock_making.questions.picture_view import (
     COUNTED,
     View,
     are_seen,

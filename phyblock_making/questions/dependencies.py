@@ -11,7 +11,7 @@ from phyblock.domain.scene import Scene
 from phyblock.sim.support import GROUND, support_graph
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import recolored
-from phyblock_making.questions.goal_view import (
+from phyblock_making.questions.picture_view import (
     NAMED,
     View,
     goal_picture,

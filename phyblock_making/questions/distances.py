@@ -12,19 +12,19 @@ from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import recolored
-from phyblock_making.questions.goal_view import (
-    NAMED,
-    View,
-    goal_picture,
-    require_seen,
-    shown_picture,
-)
 from phyblock_making.questions.lengths import (
     LENGTHS,
     PAIRED,
     along_and_across_m,
     grid_cm,
     require_joined,
+)
+from phyblock_making.questions.picture_view import (
+    NAMED,
+    View,
+    goal_picture,
+    require_seen,
+    shown_picture,
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import Feature, names, resolve_one

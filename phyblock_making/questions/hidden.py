@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from phyblock.domain.question import QuestionPicture
 from phyblock.sim.support import support_graph
-from phyblock_making.questions.goal_view import COUNTED, NAMED, shares
+from phyblock_making.questions.picture_view import COUNTED, NAMED, shares
 from phyblock_making.questions.question_draft import UnfairError
 
 __all__ = ["sure_blocks"]

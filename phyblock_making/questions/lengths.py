@@ -9,7 +9,7 @@ import numpy as np
 from phyblock.domain.scene import Block
 from phyblock.sim.support import bounds_m
 from phyblock_making.questions.block_measures import top_m
-from phyblock_making.questions.goal_view import center_m
+from phyblock_making.questions.picture_view import center_m
 from phyblock_making.questions.question_draft import UnfairError
 
 __all__ = ["LENGTHS", "PAIRED", "along_and_across_m", "grid_cm", "length_axis", "require_joined"]

@@ -20,8 +20,8 @@ from phyblock.sim.support import bounds_m
 from phyblock_making.questions.alike import AREA, alike_wrong
 from phyblock_making.questions.annexes import with_annex
 from phyblock_making.questions.choices import pick, shuffled
-from phyblock_making.questions.goal_view import COUNTED, View, are_seen, drawn_view
 from phyblock_making.questions.margins import group_of
+from phyblock_making.questions.picture_view import COUNTED, View, are_seen, drawn_view
 from phyblock_making.questions.pictured_drafts import draft, same_blocks, with_room
 from phyblock_making.questions.placing import lowered, surely_stays, verdict
 from phyblock_making.questions.question_draft import Draft, UnfairError

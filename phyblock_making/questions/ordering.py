@@ -21,7 +21,7 @@ from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Scene
 from phyblock.sim.seeing import seen
 from phyblock_making.questions.choices import pick
-from phyblock_making.questions.goal_view import COUNTED, are_seen, drawn_view, require_seen
+from phyblock_making.questions.picture_view import COUNTED, are_seen, drawn_view, require_seen
 from phyblock_making.questions.pictured_drafts import (
     are_told_apart,
     draft,

@@ -13,7 +13,7 @@ from phyblock.sim.support import bounds_m
 from phyblock_making.questions.block_measures import offset_m, top_m
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import recolored
-from phyblock_making.questions.goal_view import (
+from phyblock_making.questions.picture_view import (
     NAMED,
     View,
     center_m,

@@ -12,7 +12,7 @@ from phyblock.domain.scene import Block, Scene
 from phyblock_making.questions.block_measures import height_m
 from phyblock_making.questions.choices import shuffled
 from phyblock_making.questions.coloring import recolored
-from phyblock_making.questions.goal_view import (
+from phyblock_making.questions.picture_view import (
     NAMED,
     STUDIED,
     View,

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
-from phyblock_making.questions.goal_view import COUNTED, NAMED, SHAPED, SHAPED_AREA, STUDIED
+from phyblock_making.questions.picture_view import COUNTED, NAMED, SHAPED, SHAPED_AREA, STUDIED
 from phyblock_making.questions.shortcuts import SubtaskAudit
 
 __all__ = ["question_card"]

@@ -16,7 +16,7 @@ from phyblock.domain.blocks import COLORS, BlockType, Color
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block
 from phyblock.sim.support import bounds_m
-from phyblock_making.questions.goal_view import outermost, shows_profile
+from phyblock_making.questions.picture_view import outermost, shows_profile
 from phyblock_making.questions.question_draft import UnfairError
 
 __all__ = ["SHAPE_WORDS", "Feature", "names", "resolve", "resolve_one", "shape_word"]

@@ -22,7 +22,8 @@ from phyblock_making.questions.axis_turns import AXIS_TURNS, LONG_TYPES, axis_tu
 from phyblock_making.questions.block_measures import turned_about_vertical, vertical_turns_deg
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import with_own_colors
-from phyblock_making.questions.goal_view import (
+from phyblock_making.questions.loose_blocks import put_beside
+from phyblock_making.questions.picture_view import (
     NAMED,
     STUDIED,
     View,
@@ -31,7 +32,6 @@ from phyblock_making.questions.goal_view import (
     require_seen,
     shown_picture,
 )
-from phyblock_making.questions.loose_blocks import put_beside
 from phyblock_making.questions.pictured_drafts import only_index
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import resolve_one, shape_word

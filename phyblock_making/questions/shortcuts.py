@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block
 from phyblock.models.guesses import Guesses
-from phyblock_making.questions.goal_view import shares
 from phyblock_making.questions.letters import BALANCE
+from phyblock_making.questions.picture_view import shares
 from phyblock_making.questions.question_draft import UnfairError
 from phyblock_making.questions.referring import resolve
 

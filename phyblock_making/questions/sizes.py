@@ -12,7 +12,7 @@ from phyblock.domain.scene import Block, Scene
 from phyblock_making.questions.block_measures import height_m, length_m, volume_m3
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import with_own_colors
-from phyblock_making.questions.goal_view import (
+from phyblock_making.questions.picture_view import (
     STUDIED,
     View,
     goal_picture,

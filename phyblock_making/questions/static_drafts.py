@@ -12,7 +12,7 @@ import numpy as np
 from phyblock.domain.question import Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock_making.questions.choices import pick, shuffled
-from phyblock_making.questions.goal_view import View, drawn_view, shares
+from phyblock_making.questions.picture_view import View, drawn_view, shares
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import Feature, names
 from phyblock_making.questions.wording import fill, wording_ids

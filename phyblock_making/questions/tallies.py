@@ -13,7 +13,9 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.sim.support import GROUND, support_graph
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import recolored
-from phyblock_making.questions.goal_view import (
+from phyblock_making.questions.hidden import sure_blocks
+from phyblock_making.questions.layers import layers_of
+from phyblock_making.questions.picture_view import (
     COUNTED,
     NAMED,
     View,
@@ -22,8 +24,6 @@ from phyblock_making.questions.goal_view import (
     require_shapes_seen,
     shown_picture,
 )
-from phyblock_making.questions.hidden import sure_blocks
-from phyblock_making.questions.layers import layers_of
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.referring import names, resolve_one, shape_word
 from phyblock_making.questions.static_drafts import (

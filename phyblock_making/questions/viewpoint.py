@@ -23,7 +23,7 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.sim.seeing import seen, shown_pixels
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import recolored
-from phyblock_making.questions.goal_view import View, drawn_view
+from phyblock_making.questions.picture_view import View, drawn_view
 from phyblock_making.questions.pictured_drafts import (
     are_told_apart,
     draft,

@@ -19,9 +19,9 @@ from phyblock.errors import DataError, StoreError
 from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled
 from phyblock.words import BACKGROUNDS
-from phyblock_making.questions.goal_view import ELEVATIONS_DEG, NAMED
 from phyblock_making.questions.letters import BALANCE, even_letters
 from phyblock_making.questions.makers import MAKERS
+from phyblock_making.questions.picture_view import ELEVATIONS_DEG, NAMED
 from phyblock_making.questions.question_files import check_place, write_questions
 from phyblock_making.questions.question_production import PER_SUBTASK, make_questions
 from phyblock_making.questions.rederiving import problem_of
