@@ -75,7 +75,7 @@ class AffordanceMaker:
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    scenes_tried = 150
+    scenes_tried = 240
     drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
