@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
+from phyblock.sim.registry import other_simulators
 from phyblock_making.questions.picture_view import COUNTED, NAMED, SHAPED, SHAPED_AREA, STUDIED
 from phyblock_making.questions.shortcuts import SubtaskAudit
 
@@ -15,7 +16,7 @@ _TEXT = """# {name}
 
 {count} multiple-choice questions about {scenes} scenes of `{scenes_name}`, in {subtasks} subtasks
 (paper, section 3.3 and appendix A.4), each with an answer that is derived from geometry, from the
-dependency graph or from physics, and derived again by `phyblock vqa verify`. Made by
+dependency graph or from physics, and derived again by `phyblock vqa verify`. Made{simulators} by
 
     {made_by}
 
@@ -142,8 +143,7 @@ From `phyblock vqa audit`:
 
 Letters: the rarest and the most frequent. Majority and text only: accuracy of the most frequent
 answer and of a classifier of the texts, on questions about other base scenes than those they were
-told the answers of; both stay under chance where answers are even, because what was frequent among
-the others is then rare among those held out. Alike: questions with options that read alike.
+told the answers of. Alike: questions with options that read alike.
 Repeats: questions that ask what another asks. Named: blocks that words name, and the least that
 one of them shows of itself. Most: questions about the scene with most; base scenes: the scenes
 asked about are made from so many.
@@ -170,6 +170,7 @@ def question_card(
         scenes=len({question.scene.id for question in questions}),
         subtasks=sum(bool(asked) for asked in by_subtask.values()),
         made_by=made_by,
+        simulators="".join(f", with {one}," for one in other_simulators()),
         named=NAMED,
         studied=STUDIED,
         counted=COUNTED,
