@@ -20,7 +20,9 @@ def even_letters(count: int, rng: np.random.Generator) -> list[int]:
     Of few questions the share that is nearest to it. Exactly equal shares would give the letters
     of some questions away by those of the others.
     """
-    low, high = math.floor(BALANCE[0] * count), math.ceil(BALANCE[1] * count)
+    # Rounded, as 0.28 of 150 is a little more than 42 in floating point.
+    low, high = (round(share * count, 6) for share in BALANCE)
+    low, high = math.floor(low), math.ceil(high)
     while True:
         drawn = rng.integers(len(LETTERS), size=count)
         shares = np.bincount(drawn, minlength=len(LETTERS))
