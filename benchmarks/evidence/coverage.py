@@ -17,7 +17,8 @@ from collections import defaultdict
 import numpy as np
 from scipy.special import ndtr, ndtri, stdtr, stdtrit  # type: ignore[import-untyped]
 
-from phyblock.scoring.uncertainty import Clusters, Floats, Metric, f1_of, in_unit_range, jackknife
+from phyblock.scoring.ratios import Floats, Metric, f1_of
+from phyblock.scoring.uncertainty import Clusters, in_unit_range, jackknife
 from tests.scoring.worlds import World
 
 WORLDS = {

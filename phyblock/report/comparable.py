@@ -10,7 +10,7 @@ import pandas as pd
 
 from phyblock.errors import Problem, SpecError
 from phyblock.report.measure_table import headline_columns
-from phyblock.scoring.uncertainty import Floats, Metric
+from phyblock.scoring.ratios import Floats, Metric
 from phyblock.tables.design import Design
 from phyblock.tables.estimates import pooled_in, value_of_cells
 from phyblock.tables.headline import headline_rows

@@ -9,7 +9,6 @@ from phyblock.datasets import Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.records import Manifest
 from phyblock.run.data import open_dataset
-from phyblock.run.floors import floor_values
 from phyblock.run.manifest import make_manifest
 from phyblock.run.models import PlannedModel, plan_models, recorded_order
 from phyblock.run.samples import Sample
@@ -36,6 +35,9 @@ class RunPlan:
 
     def begun(self) -> Manifest:
         """The manifest of a run that begins, with what floors reach; it takes some seconds."""
+        # Tables are made of pandas, which `--help` and a run that goes on do without.
+        from phyblock.run.floors import floor_values
+
         floors = floor_values(self.manifest, self.suite, self.reopened)
         return self.manifest.model_copy(update={"floors": floors})
 

@@ -16,7 +16,6 @@ from phyblock.parsing import reader_version
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
 from phyblock.records.reading import read_records
 from phyblock.run.data import recorded_dataset
-from phyblock.run.floors import floor_values
 from phyblock.run.folder import check_place, run_folder
 from phyblock.run.records import judged
 from phyblock.run.reopen import reopen_tracks
@@ -64,6 +63,9 @@ def rescore(
     records = asyncio.run(_judged_again(folder, manifest, tracks))
     told = {"identity": identity, "suite": suite.model_dump(mode="json")}
     scored = manifest.model_copy(update=told)
+    # Tables are made of pandas, which `--help` and a run that goes on do without.
+    from phyblock.run.floors import floor_values
+
     floors = floor_values(scored, suite, reopened)
     _write(target, scored.model_copy(update={"floors": floors}), records)
     return target

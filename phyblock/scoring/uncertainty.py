@@ -14,7 +14,7 @@ Econometrics 38, 2023). docs/statistics.md has the simulation.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -22,29 +22,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtr, stdtrit  # type: ignore[import-untyped]
 
+from phyblock.scoring.ratios import Floats, Metric
+
 __all__ = [
     "CONFIDENCE",
     "POWER",
     "Clusters",
     "Estimate",
-    "Floats",
-    "Metric",
     "detectable",
-    "f1_of",
     "holm",
     "in_unit_range",
     "jackknife",
     "least_p",
-    "precision_of",
     "rank_ranges",
-    "ratio_of",
-    "recall_of",
 ]
-
-Floats = NDArray[np.float64]
-Metric = Callable[[Floats], Floats]
-"""From summed counts, shape (..., counts), to what is measured, shape (...); NaN where undefined.
-"""
 
 CONFIDENCE = 0.95
 POWER = 0.8
@@ -244,32 +235,3 @@ def rank_ranges(is_better: ArrayLike) -> NDArray[np.intp]:
     """
     known = np.asarray(is_better, dtype=bool)
     return np.stack([1 + known.sum(axis=0), len(known) - known.sum(axis=1)], axis=1)
-
-
-def precision_of(sums: Floats) -> Floats:
-    """TP / (TP + FP) of counts (..., [tp, fp, fn])."""
-    return ratio_of(np.stack([sums[..., 0], sums[..., 0] + sums[..., 1]], axis=-1))
-
-
-def recall_of(sums: Floats) -> Floats:
-    """TP / (TP + FN) of counts (..., [tp, fp, fn])."""
-    return ratio_of(np.stack([sums[..., 0], sums[..., 0] + sums[..., 2]], axis=-1))
-
-
-def f1_of(sums: Floats) -> Floats:
-    """2 TP / (2 TP + FP + FN) of counts (..., [tp, fp, fn])."""
-    twice = 2 * sums[..., 0]
-    return ratio_of(np.stack([twice, twice + sums[..., 1] + sums[..., 2]], axis=-1))
-
-
-def ratio_of(sums: Floats) -> Floats:
-    """Part / whole of counts (..., [part, whole]), as right answers of answers.
-
-    NaN for no whole, and for a part that is more than the whole, which is no share of it: the
-    paper's criterion `membership` counts repeated steps again. The mean of such ratios over the
-    axis before the last is a macro average.
-    """
-    part, whole = sums[..., 0], sums[..., 1]
-    out = np.full(part.shape, np.nan)
-    np.divide(part, whole, out=out, where=(whole > 0) & (part <= whole))
-    return out

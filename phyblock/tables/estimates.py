@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from phyblock.scoring.uncertainty import Floats, in_unit_range, jackknife
+from phyblock.scoring.ratios import Floats
+from phyblock.scoring.uncertainty import in_unit_range, jackknife
 from phyblock.tables.intervals import CountCube, parents_of
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Cell, Measure, SampleCounts

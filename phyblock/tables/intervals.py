@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.scoring.uncertainty import Clusters, Floats
+from phyblock.scoring.ratios import Floats
+from phyblock.scoring.uncertainty import Clusters
 from phyblock.tables.load import Run
 
 __all__ = ["CountCube", "parents_of"]

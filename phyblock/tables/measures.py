@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     import pandas as pd
 
-    from phyblock.scoring.uncertainty import Metric
+    from phyblock.scoring.ratios import Metric
     from phyblock.tables.load import Run
 
 __all__ = ["CELL", "SCORED_BY", "WAY", "Cell", "Measure", "SampleCounts", "way_name"]

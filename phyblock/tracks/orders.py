@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.scoring.uncertainty import f1_of
+from phyblock.scoring.ratios import f1_of
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
 from phyblock.tables.text_table import Column, TextTable, between, number

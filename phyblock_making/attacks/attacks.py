@@ -14,7 +14,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from phyblock.domain.question import SUBTASKS, Question, Subtask
-from phyblock.scoring.uncertainty import Clusters, in_unit_range, jackknife, ratio_of
+from phyblock.scoring.ratios import ratio_of
+from phyblock.scoring.uncertainty import Clusters, in_unit_range, jackknife
 from phyblock_making.attacks.cues import CUES, Floats
 from phyblock_making.attacks.observed import RULES, Observed, credit, kind_of
 from phyblock_making.attacks.probes import (

@@ -12,19 +12,15 @@ from hypothesis.extra import numpy as hnp
 from scipy import stats
 
 from phyblock.datasets import read_official
+from phyblock.scoring.ratios import Floats, f1_of, precision_of, ratio_of, recall_of
 from phyblock.scoring.uncertainty import (
     POWER,
     Clusters,
-    Floats,
     detectable,
-    f1_of,
     holm,
     in_unit_range,
     jackknife,
-    precision_of,
     rank_ranges,
-    ratio_of,
-    recall_of,
 )
 from tests.scoring.worlds import World
 

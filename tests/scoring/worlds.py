@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from phyblock.scoring.uncertainty import Clusters, Floats
+from phyblock.scoring.ratios import Floats
+from phyblock.scoring.uncertainty import Clusters
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from phyblock import registry
 from phyblock.cli.main import phyblock
 from phyblock.errors import StoreError
 from phyblock.run.rescore import rescore
-from phyblock.scoring.uncertainty import ratio_of
+from phyblock.scoring.ratios import ratio_of
 from phyblock.tables.measures import Measure, SampleCounts
 from tests.vqa_set import write_questions
 from tests.workspace import Workspace

@@ -16,7 +16,7 @@ from phyblock import registry
 from phyblock.cli.main import phyblock
 from phyblock.datasets import AssemblyTask
 from phyblock.models.base import Message, Request
-from phyblock.scoring.uncertainty import ratio_of
+from phyblock.scoring.ratios import ratio_of
 from phyblock.tables.measures import Measure, SampleCounts
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks import Opening, TrackKind

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from phyblock.scoring.uncertainty import f1_of, precision_of, recall_of
+from phyblock.scoring.ratios import f1_of, precision_of, recall_of
 from phyblock.tables.cells import cell_scores, with_levels
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Cell, Measure, SampleCounts

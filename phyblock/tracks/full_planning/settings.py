@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from phyblock.scoring.uncertainty import Floats, f1_of, jackknife
+from phyblock.scoring.ratios import Floats, f1_of
+from phyblock.scoring.uncertainty import jackknife
 from phyblock.tables.cells import cell_scores, measured
 from phyblock.tables.intervals import CountCube, parents_of
 from phyblock.tables.load import Run, made_once_copied

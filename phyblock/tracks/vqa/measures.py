@@ -8,7 +8,7 @@ import pandas as pd
 
 from phyblock.domain import CATEGORIES, SUBTASKS
 from phyblock.scoring import chance
-from phyblock.scoring.uncertainty import ratio_of
+from phyblock.scoring.ratios import ratio_of
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Cell, Measure, SampleCounts
 from phyblock.tables.outcomes import WITHOUT_REPLY
