@@ -101,6 +101,8 @@ class StoredMark(Line, extra="ignore"):
 
 _Whole = Annotated[Literal[True], Tag("true")]
 _Blocks = Annotated[tuple[StoredBlock, ...], Filled(MAX_BLOCKS)]
+# The blocks of several outcomes, so that all of their pictures are framed alike.
+_Framed = Annotated[tuple[StoredBlock, ...], Filled(4 * MAX_BLOCKS)]
 
 
 class StoredPicture(Line, extra="forbid"):
@@ -125,7 +127,7 @@ class StoredPicture(Line, extra="forbid"):
     marks: Annotated[tuple[StoredMark, ...], Filled(MAX_BLOCKS)] = ()
     """Places."""
     framed: Annotated[
-        _Whole | Annotated[_Blocks, Tag("")],
+        _Whole | Annotated[_Framed, Tag("")],
         Discriminator(lambda value: "true" if value is True else ""),
     ] = ()
     """What the camera is framed on: true, the whole scene; or these blocks. Left out: what is
