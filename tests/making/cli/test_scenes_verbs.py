@@ -115,7 +115,7 @@ def test_an_angle_that_is_no_number_is_refused(data: Path, tmp_path: Path, optio
 
 
 def test_the_facts_of_a_scene_fit_a_narrow_terminal() -> None:
-    told = scenes("show", "phyblock-400", "l4-007-street", columns=80)
+    told = scenes("show", "phyblock-400", "l4-010-street", columns=80)
     assert "semi_cylinder" in told
     assert max(map(len, told.splitlines()[1:])) <= 80
 

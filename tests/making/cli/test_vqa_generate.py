@@ -51,6 +51,7 @@ def test_questions_are_written_with_card_and_checksums(folder: Path) -> None:
     assert sorted(path.name for path in (folder / "q").iterdir()) == [
         "CARD.md",
         "SHA256SUMS",
+        "VERSION",
         QUESTION_LINES,
     ]
     found = questions_of(folder / "q")

@@ -146,7 +146,11 @@ def test_lines_read_back_as_the_questions(questions: list[Question], tmp_path: P
     read = [task.question for task in read_questions(tmp_path / "q", DATA).tasks]
     assert read == questions
     sums = (tmp_path / "q" / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
-    assert [line.split("  ")[1] for line in sums] == ["CARD.md", "questions.jsonl"]
+    assert [line.split("  ")[1] for line in sums] == [
+        "CARD.md",
+        "questions.jsonl",
+        "VERSION",
+    ]
     card = (tmp_path / "q" / "CARD.md").read_text(encoding="utf-8")
     assert f"| TC | type counting | {COUNT} |" in card
     with pytest.raises(StoreError, match="holds questions already"):
