@@ -5,14 +5,14 @@ from pathlib import Path
 import pytest
 
 from phyblock.errors import InputError, SimulationError
-from phyblock.sim.registry import renderer
+from phyblock.sim.registry import RENDERERS, renderer
 
 
 def test_ours_is_the_default_and_words_are_checked(monkeypatch) -> None:
     monkeypatch.delenv("PHYBLOCK_RENDERER", raising=False)
     assert renderer().name == "raster"
     monkeypatch.setenv("PHYBLOCK_RENDERER", "vulkan")
-    with pytest.raises(InputError, match="allowed: raster, or module:factory"):
+    with pytest.raises(InputError, match=f"allowed: {', '.join(RENDERERS)}, or module:factory"):
         renderer()
 
 
