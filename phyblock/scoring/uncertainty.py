@@ -133,8 +133,8 @@ def jackknife(
     return Estimate(value, se, value - wide, value + wide, p, behind)
 
 
-def in_unit_range(found: Estimate) -> Estimate:
-    """The same estimates of shares, with Wilson's interval in the place of Student's.
+def in_unit_range(found: Estimate, is_share: ArrayLike = True) -> Estimate:
+    """The same estimates, of which shares have Wilson's interval in the place of Student's.
 
     Of a share p with standard error s, its effective number of samples is p (1 - p) / s^2 (Kish),
     and where every unit agrees on 0 or on 1, so that s says nothing, the number of clusters; the
@@ -143,8 +143,10 @@ def in_unit_range(found: Estimate) -> Estimate:
     proportions in clustered surveys*, Journal of Survey Statistics and Methodology 3, 2015). It
     stays in [0, 1] and has a width at 0 and at 1 as well.
     """
-    share, behind = found.value, found.n_clusters.astype(np.float64)
-    known = ~np.isnan(found.se)
+    chosen = np.broadcast_to(np.asarray(is_share, dtype=bool), found.value.shape)
+    share = np.where(chosen, found.value, np.nan)
+    behind = found.n_clusters.astype(np.float64)
+    known = ~np.isnan(found.se) & chosen
     t = stdtrit(np.where(known & (behind > 1), behind - 1, np.nan), (1 + CONFIDENCE) / 2)
     at_end = (share <= 0) | (share >= 1)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -156,7 +158,7 @@ def in_unit_range(found: Estimate) -> Estimate:
     # Rounding leaves no share outside of its interval.
     lo, hi = np.minimum(centre - half, share), np.maximum(centre + half, share)
     lo, hi = np.maximum(lo, 0.0), np.minimum(hi, 1.0)
-    return replace(found, lo=np.where(known, lo, np.nan), hi=np.where(known, hi, np.nan))
+    return replace(found, lo=np.where(known, lo, found.lo), hi=np.where(known, hi, found.hi))
 
 
 def least_p(n_clusters: ArrayLike) -> Floats:

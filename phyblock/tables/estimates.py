@@ -161,9 +161,8 @@ def _of_group(
         all_values,
         n_clusters=np.repeat(usable[:, :, None], len(measures), axis=-1),
     )
-    is_share = np.array([measure.unit == "%" for measure in measures])
-    within = in_unit_range(found)
-    lo, hi = np.where(is_share, within.lo, found.lo), np.where(is_share, within.hi, found.hi)
+    is_share = np.array([measure.is_share for measure in measures])
+    within = in_unit_range(found, is_share)
     spread = _over_seeds(table, pool, counted, silent, all_values)
     members = np.array([[name in pooled_in(cell, cells) for name in pooled] for cell in cells])
     scenes = np.any(pool.present[:, :, None, :] & members, axis=-1).sum(axis=0)
@@ -180,8 +179,8 @@ def _of_group(
                         int(n[g][members[c]].sum()),
                         found.value[at],
                         *(values[at] for values in spread),
-                        lo[at],
-                        hi[at],
+                        within.lo[at],
+                        within.hi[at],
                         found.se[at],
                         int(scenes[g, c]),
                         int(behind[g, c]),

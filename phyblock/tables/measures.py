@@ -66,7 +66,7 @@ class Measure:
     defined. `heading` and `meaning` are for people; `unit` "%" stands for values in [0, 1] that
     tables show times 100. `over` names what is counted. `chance` says what guessing gives in a
     cell, `floors` names baselines that never see the goal. One that is not `in_tables` is in the
-    frame of estimates alone.
+    frame of estimates alone. One that `is_difference` of two shares may be below zero.
     """
 
     name: str
@@ -80,6 +80,12 @@ class Measure:
     chance: Callable[[Run, str], float] | None = None
     floors: tuple[str, ...] = ()
     in_tables: bool = True
+    is_difference: bool = False
+
+    @property
+    def is_share(self) -> bool:
+        """Whether values are parts of a whole, which bounds their intervals."""
+        return self.unit == "%" and not self.is_difference
 
     @property
     def best(self) -> float:

@@ -93,5 +93,6 @@ POSE_MEASURES = (
         "what is won by the place in the list: nothing, for a model that goes by the picture",
         better="lower",
         over="kinds",
+        is_difference=True,
     ),
 )

@@ -91,6 +91,16 @@ def test_the_interval_of_a_share_holds_it_and_stays_in_its_range(counts: np.ndar
         assert 0 <= found.lo <= found.value <= found.hi <= 1
 
 
+def test_a_difference_keeps_students_interval_beside_shares() -> None:
+    counts = np.stack(
+        [np.array([[2, 5], [1, 5], [0, 5]]), np.array([[-2, 5], [-1, 5], [-4, 5]])], 1
+    )
+    found = jackknife(counts, alone(3), mean_of)
+    bounded = in_unit_range(found, [True, False])
+    assert (bounded.lo[1], bounded.hi[1]) == (found.lo[1], found.hi[1])
+    assert 0 < bounded.lo[0] < bounded.value[0] < bounded.hi[0] < 1
+
+
 @given(st.integers(2, 300), st.booleans())
 def test_none_of_n_and_all_of_n_have_wilsons_interval(n: int, is_right: bool) -> None:
     found = in_unit_range(jackknife([[int(is_right), 1]] * n, alone(n), ratio_of))
