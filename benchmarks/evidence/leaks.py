@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +22,7 @@ from phyblock.domain.scene import Kind
 from phyblock.resources import bundled
 from phyblock.scoring import Goal, match_plan, micro
 from phyblock.words import SETTINGS
+from phyblock_making.auditing.tells import Part, Tells, find_tells
 
 Pick = Callable[[Sequence[int]], int]
 """One of the places at which a kind is listed."""
@@ -44,47 +44,28 @@ def listed(task: AssemblyTask) -> dict[Kind, list[int]]:
     return places
 
 
-def needed(task: AssemblyTask) -> set[int]:
-    """The places of the candidates that the goal needs."""
-    looks = {block.look for block in task.scene.blocks}
-    both = enumerate(task.candidates.candidates, 1)
-    return {place for place, candidate in both if candidate.look in looks}
-
-
-def print_places(tasks: Sequence[AssemblyTask]) -> None:
-    """How often each place is needed, of the scenes that have it."""
-    shares = []
-    most = max(len(task.candidates) for task in tasks)
-    for place in range(1, most + 1):
-        having = [place in needed(task) for task in tasks if len(task.candidates) >= place]
-        shares.append(f"{100 * np.mean(having):.0f}")
-    print(f"  needed by place 1 to {most} [%]: {' '.join(shares)}")
-
-
-def print_poses(tasks: Sequence[AssemblyTask]) -> None:
-    """How often the first of several poses of a needed kind is needed, and who is needed at all."""
-    first: list[bool] = []
-    chance: list[Fraction] = []
-    several: list[bool] = []
-    single: list[bool] = []
-    for task in tasks:
-        right = needed(task)
-        for places in listed(task).values():
-            is_needed = not right.isdisjoint(places)
-            (several if len(places) > 1 else single).append(is_needed)
-            if is_needed and len(places) > 1:
-                first.append(places[0] in right)
-                chance.append(Fraction(len(right.intersection(places)), len(places)))
+def print_tells(tells: Tells) -> None:
+    """How often each place is needed; the first of several poses; kinds in one and in several."""
+    shares = " ".join(f"{percent(part):.0f}" for part in tells.places.values())
+    print(f"  needed by place 1 to {len(tells.places)} [%]: {shares}")
+    first = tells.first_pose
     told = "no kind is in several poses"
-    if first:
+    if first.whole:
         told = (
-            f"first pose of a needed kind in several is needed: {100 * np.mean(first):.1f} % of "
-            f"{len(first)}, any pose {100 * float(sum(chance) / len(chance)):.1f} %"
+            f"first pose of a needed kind in several is needed: {percent(first):.1f} % of "
+            f"{first.whole}, any pose {100 * first.chance:.1f} %"
         )
     print(f"  {told}")
-    for name, kinds in (("several poses", several), ("one pose", single)):
-        if kinds:
-            print(f"  kinds in {name} needed: {100 * np.mean(kinds):.1f} % of {len(kinds)}")
+    for name, is_named in (("several poses", lambda n: n > 1), ("one pose", lambda n: n == 1)):
+        kinds = [part for poses, part in tells.kinds.items() if is_named(poses)]
+        of = Part(sum(part.part for part in kinds), sum(part.whole for part in kinds))
+        if of.whole:
+            print(f"  kinds in {name} needed: {percent(of):.1f} % of {of.whole}")
+
+
+def percent(part: Part) -> float:
+    """A share in percent, 0 of nothing."""
+    return 100 * (part.share or 0.0)
 
 
 def print_floors(tasks: Sequence[AssemblyTask], seed: int) -> None:
@@ -127,8 +108,7 @@ def main() -> None:
     for name in options.data:
         tasks = read(name)
         print(f"{name}: {len(tasks)} scenes")
-        print_places(tasks)
-        print_poses(tasks)
+        print_tells(find_tells((task.scene, task.candidates) for task in tasks))
         print_floors(tasks, options.seed)
 
 

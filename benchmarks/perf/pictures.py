@@ -24,13 +24,12 @@ from phyblock.domain import euler_deg_to_quat_xyzw
 from phyblock.resources import bundled
 from phyblock.sim import PictureStyle
 from phyblock.sim.camera import Camera
-from phyblock.sim.geometry import drawn_mesh, solid_mesh
+from phyblock.sim.geometry import solid_mesh
 from phyblock.sim.mesh import Mesh
 from phyblock.sim.pictures import drawn, goal_camera
-from phyblock.sim.pose import Pose
 from phyblock.sim.raster.renderer import NumpyRenderer
-from phyblock.sim.render import COLOR_RGB, DrawnBlock, light_direction, picture
-from phyblock.sim.renderer import Light, Prop
+from phyblock.sim.render import COLOR_RGB, DrawnBlock, light_direction, picture, props_of
+from phyblock.sim.renderer import Light
 
 OURS = NumpyRenderer()
 
@@ -85,17 +84,6 @@ class TinyRenderer:
     def close(self) -> None:
         """Take the stage down."""
         pybullet.disconnect(self._client)
-
-
-def props_of(blocks: Sequence[DrawnBlock]) -> list[Prop]:
-    return [
-        Prop(
-            drawn_mesh(block.type),
-            COLOR_RGB[block.color],
-            Pose(np.array(block.position_m), euler_deg_to_quat_xyzw(block.euler_deg)),
-        )
-        for block in blocks
-    ]
 
 
 def cpu_ms(work: Callable[[], Any]) -> float:

@@ -39,6 +39,7 @@ __all__ = [
     "Shot",
     "empty_ground",
     "picture",
+    "props_of",
     "segments",
     "shoot",
 ]
@@ -113,7 +114,7 @@ def shoot(
 def segments(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> NDArray[np.int64]:
     """The 0-based number of the block seen in each pixel, shape (size, size), -1 for none."""
     light = Light(np.array([0.0, 0.0, 1.0]), 1.0, 0.0)
-    return renderer().draw(_props(blocks), camera, light, size_px).prop
+    return renderer().draw(props_of(blocks), camera, light, size_px).prop
 
 
 def picture(
@@ -144,10 +145,11 @@ def _raster(
     blocks: Sequence[DrawnBlock], camera: Camera, size_px: int, drawn_by: Renderer | None
 ) -> Raster:
     light = Light(light_direction(camera), _AMBIENT, _DIFFUSE)
-    return (drawn_by or renderer()).draw(_props(blocks), camera, light, size_px)
+    return (drawn_by or renderer()).draw(props_of(blocks), camera, light, size_px)
 
 
-def _props(blocks: Sequence[DrawnBlock]) -> list[Prop]:
+def props_of(blocks: Sequence[DrawnBlock]) -> list[Prop]:
+    """Blocks as a renderer takes them."""
     return [
         Prop(
             drawn_mesh(block.type),

@@ -2,7 +2,9 @@
 
 `gold.csv` holds digests of texts and readings, never a text. All replies on which two of
 the former default, the present and the official parser differ are in it; the others were drawn at
-random. `held_out` were read after the rules had been written, before their readings were seen.
+random. `held_out` were read after the rules had been written, before the parser's readings were
+seen: it read 109 of 110 rightly. `seen` were read as the rules were written and checked beside what
+the parser reads, so that they hold what is read now rather than test it.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The two parsers on the official recordings: how often they part, and why.
 
-All differences were read by eye (`gold.csv`); the default read what the model meant.
+All differences are in `gold.csv`, which `test_plan_gold.py` says how it was read.
 """
 
 from __future__ import annotations

@@ -194,6 +194,25 @@ def test_holm_only_raises_and_keeps_the_order_and_the_least_is_bonferronis(p: np
     assert corrected.min() == pytest.approx(min(1, len(p) * p.min()))
 
 
+def influence(counts: Floats) -> Floats:
+    """How much each scene moves F1, by the derivative of the ratio."""
+    weights = np.stack([2 * counts[:, 0], counts @ [2, 1, 1]])
+    part, whole = weights.sum(axis=1)
+    return np.asarray((weights[0] - part / whole * weights[1]) / whole)
+
+
+def dyadic_se(moves: Floats, clusters: Clusters) -> float:
+    """The dyadic standard error (Aronow, Samii and Assenova 2015), written out."""
+    return float(np.sqrt(moves @ in_common(clusters) @ moves))
+
+
+def in_common(clusters: Clusters) -> np.ndarray:
+    """Which pairs of units have a base scene in common."""
+    members = np.zeros((len(clusters.members), clusters.size + 1))
+    np.put_along_axis(members, clusters.members, 1.0, axis=1)
+    return (members[:, :-1] @ members[:, :-1].T) > 0
+
+
 @pytest.fixture(scope="module")
 def official(official_dir: Path) -> tuple[dict[str, Floats], Clusters, Clusters]:
     """Counts of setting A by model, clusters by base scene, and every scene a cluster."""
@@ -215,7 +234,9 @@ def test_recorded_scenes_of_common_origin_widen_the_naive_standard_error(
     gpt_4o = counts["gpt-4o"]
     assert clusters.size == 150
     assert 100 * jackknife(gpt_4o, naive, f1_of).se == pytest.approx(1.3, abs=0.1)
-    assert 100 * jackknife(gpt_4o, clusters, f1_of).se == pytest.approx(2.2, abs=0.1)
+    found = float(jackknife(gpt_4o, clusters, f1_of).se)
+    assert 100 * found == pytest.approx(2.2, abs=0.1)
+    assert found == pytest.approx(dyadic_se(influence(gpt_4o), clusters), rel=0.03)
 
 
 def test_recorded_models_are_compared_in_pairs(
@@ -226,6 +247,8 @@ def test_recorded_models_are_compared_in_pairs(
     found = jackknife(pair, clusters, difference_of)
     assert 100 * found.value == pytest.approx(-0.5, abs=0.1)
     assert 100 * found.se == pytest.approx(1.5, abs=0.1)
+    moves = influence(pair[:, 0]) - influence(pair[:, 1])
+    assert float(found.se) == pytest.approx(dyadic_se(moves, clusters), rel=0.03)
     assert found.p > 0.5
 
 
