@@ -59,8 +59,11 @@ def test_keys_and_pictures_stay_off_the_disk(workspace: Workspace, transport: st
             name: {"id": f"hosted_vllm/{name}", "api_base": f"{url}/v1", **common}
             for name, url in urls.items()
         }
-        entries["named"] = {**entries["talks"], "api_key_env": "MY_SERVER_KEY"}
-        entries["short"] = {**entries["talks"], "api_key_env": "MY_SHORT_KEY"}
+        # Other limits, so that none is answered from another's cached replies and its key unused.
+        own_key = {"named": "MY_SERVER_KEY", "short": "MY_SHORT_KEY"}
+        for max_tokens, (name, key) in enumerate(own_key.items(), start=1000):
+            keyed = {"api_key_env": key, "max_tokens": max_tokens}
+            entries[name] = {**entries["talks"], **keyed}
         entries["openai"] = {**entries["talks"], "id": "openai/some-model"}
         workspace.write_yaml("models.yaml", entries)
         workspace.write_suite(models=list(entries), seeds=[0, 1])
