@@ -4,7 +4,7 @@
 
 CHECKOUT is a checkout of the official repository. The figures of the former default (`steps`,
 version 1) are the published ones: its code is gone. `--gold` names readings by eye, by digest of
-the reply; `--list` names every reply that is not read as a person reads it.
+the reply, of two readers; `--list` names every reply that is not read as the first reads it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ FORMER_F1 = {
     "Qwen2.5-VL-3B-Instruct": 21.23,
 }
 """F1 (A, `optimal`) by `steps`, version 1."""
-Readings = dict[str, tuple[int, ...]]
+Readings = dict[str, tuple[tuple[int, ...], tuple[int, ...]]]
+"""What the first reader reads in a reply, and what the second does, by digest."""
 
 
 @dataclass
@@ -48,6 +49,7 @@ class Tally:
     rules: Counter[str] = field(default_factory=Counter)
     problems: Counter[str] = field(default_factory=Counter)
     against_gold: Counter[str] = field(default_factory=Counter)
+    against_second: Counter[str] = field(default_factory=Counter)
     n_differ: int = 0
 
 
@@ -61,14 +63,17 @@ def main() -> None:
     gold = _gold(args.gold)
     tasks = {task.scene.id: task for task in read_official(args.checkout).tasks}
     total: Counter[str] = Counter()
+    second: Counter[str] = Counter()
     ranked: dict[str, dict[str, float]] = {}
     for model, folder in recorded_models(args.checkout).items():
         tally = Tally()
         for scene, text in _replies(folder):
             _add(tally, tasks[scene], text, gold, f"{model} {scene}" if args.list else "")
         total += tally.against_gold
+        second += tally.against_second
         ranked[model] = _print(model, tally)
     print(f"against {sum(total.values())} replies read by eye: {dict(total)}")
+    print(f"against the second reader: {dict(second)}")
     for parser in ("official", "steps", "as read by eye"):
         order = sorted(ranked, key=lambda model: -ranked[model][parser])
         print(f"ranking by {parser}: {', '.join(order)}")
@@ -76,7 +81,14 @@ def main() -> None:
 
 def _gold(path: Path) -> Readings:
     with path.open(encoding="utf-8", newline="") as file:
-        return {row["sha256"]: tuple(map(int, row["plan"].split())) for row in csv.DictReader(file)}
+        return {
+            row["sha256"]: (_numbers(row["plan"]), _numbers(row["second"]))
+            for row in csv.DictReader(file)
+        }
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    return tuple(map(int, text.split()))
 
 
 def _replies(folder: Path) -> Iterator[tuple[str, str]]:
@@ -88,8 +100,9 @@ def _add(tally: Tally, task: AssemblyTask, text: str, gold: Readings, name: str)
     """Count one reply. What no person read counts as the present parser reads it."""
     n = len(task.candidates)
     official, present = parse_plan(text, n, "official"), parse_plan(text, n)
-    reading = gold.get(hashlib.sha256(text.encode()).hexdigest())
-    read = present.plan if reading is None else Plan(tuple(i for i in reading if i <= n))
+    readings = gold.get(hashlib.sha256(text.encode()).hexdigest())
+    plans_read = [Plan(tuple(i for i in reading if i <= n)) for reading in readings or ()]
+    read = plans_read[0] if plans_read else present.plan
     goal = Goal(task.scene, task.candidates, "A")
     plans = {"official": official.plan, "steps": present.plan, "as read by eye": read}
     for parser, plan in plans.items():
@@ -98,8 +111,10 @@ def _add(tally: Tally, task: AssemblyTask, text: str, gold: Readings, name: str)
     tally.n_differ += official.plan != present.plan
     if present.problem:
         tally.problems[present.problem] += 1
-    if reading is not None:
+    if plans_read:
         verdict = _verdict(present, read)
+        agree = "as the first" if plans_read[1] == read else "otherwise"
+        tally.against_second[agree] += 1
         tally.against_gold[verdict] += 1
         if name and verdict != "right":
             print(f"    {name}: {list(present.plan.steps)}, by eye {list(read.steps)}")
