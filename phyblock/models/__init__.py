@@ -13,7 +13,7 @@ from phyblock.models.base import (
 )
 from phyblock.models.breaker import Breakers
 from phyblock.models.build import build_model
-from phyblock.models.cache import CacheStats, ReplyCache, reply_key
+from phyblock.models.cache import CacheStats, ReplyCache, former_key, reply_key
 from phyblock.models.config import Kind, ModelConfig, Price
 from phyblock.models.cost import (
     Budget,
@@ -60,6 +60,7 @@ __all__ = [
     "build_model",
     "cost_usd",
     "estimate",
+    "former_key",
     "most_usd",
     "price_of",
     "read_raw_reply",

@@ -1,7 +1,8 @@
 """The reply cache: content-addressed, in one SQLite file that processes may share.
 
-A reply is found again when everything that decided it is the same: model, server, parameters,
-messages with their pictures, seed and prompt version. Only whole answers are kept: no error, no
+A reply is found again when everything that decided it is the same: model, parameters, messages with
+their pictures, seed and prompt version. Where the model is served decides nothing: a server that
+comes up on another port is not asked everything again. Only whole answers are kept: no error, no
 empty, truncated or refused reply, no picture, no key.
 """
 
@@ -13,7 +14,7 @@ import json
 import re
 import sqlite3
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -27,7 +28,7 @@ from phyblock.models.payload import wire_params
 from phyblock.models.raw_replies import token_count
 from phyblock.words import Finish
 
-__all__ = ["CacheBusyError", "CacheStats", "ReplyCache", "reply_key"]
+__all__ = ["CacheBusyError", "CacheStats", "ReplyCache", "former_key", "reply_key"]
 
 SCHEMA = 1
 """Version of the file's layout and of what enters a key."""
@@ -68,9 +69,20 @@ class CacheStats:
 
 def reply_key(config: ModelConfig, request: Request) -> str:
     """Hex digest of everything that decides the reply."""
+    return _key(request, config, config.identity())
+
+
+def former_key(config: ModelConfig, request: Request) -> str | None:
+    """The key of the same request when addresses were a part of keys; None where there was none."""
+    if config.api_base is None:
+        return None
+    return _key(request, config, {**config.identity(), "api_base": config.api_base.rstrip("/")})
+
+
+def _key(request: Request, config: ModelConfig, identity: Mapping[str, object]) -> str:
     content = {
         "schema": SCHEMA,
-        "model": {**config.identity(), "params": wire_params(config, request)},
+        "model": {**identity, "params": wire_params(config, request)},
         "messages": [_message(message) for message in request.messages],
         "seed": request.seed,
         "prompt_version": request.prompt_version,

@@ -17,7 +17,7 @@ from phyblock.errors import (
 )
 from phyblock.models.base import Reply, Request
 from phyblock.models.breaker import Breaker, shows_outage
-from phyblock.models.cache import reply_key
+from phyblock.models.cache import former_key, reply_key
 from phyblock.models.config import ModelConfig, Price
 from phyblock.models.cost import Budget, Estimate, cost_usd, estimate, plausible
 from phyblock.models.events import EventKind, ModelEvent, Observer
@@ -88,10 +88,18 @@ class ChatModel:
         if cache is not None:
             key = reply_key(self._config, request)
             with self._parts.halt.giving_up():
-                kept = await cache.find(key)
+                kept = await self._kept(cache, key, request)
             if kept is not None:
                 return replace(kept, cost_usd=cost_usd(self._parts.price, kept.usage))
         return await self._ask_new(_Question(request, key, estimate(self._config, request)))
+
+    async def _kept(self, cache: SharedCache, key: str, request: Request) -> Reply | None:
+        """The reply under the key, or under that of former versions, moved to today's."""
+        kept = await cache.find(key)
+        former = former_key(self._config, request) if kept is None else None
+        if former is not None and (kept := await cache.find(former)) is not None:
+            await cache.keep(key, self._config.id, kept)
+        return kept
 
     async def aclose(self) -> None:
         """Release connections."""

@@ -28,6 +28,9 @@ DIRECT_PROVIDERS = ("openai", "hosted_vllm", "lm_studio")
 LARGEST_REPLY_BYTES = 32 * 1024 * 1024
 """Default limit of a reply's body [bytes]: a hundred times what the longest thoughts take."""
 
+OWN_SERVER = "a server of one's own"
+"""What stands for an address where it decides nothing but that it is no provider's."""
+
 _RENAMES_PARAMETERS = re.compile(r"o\d|gpt-5")
 
 
@@ -49,7 +52,8 @@ class ModelConfig:
     their OpenAI names; they win over a request's, and None there means "do not send". `rpm` and
     `tpm` are limits a minute, None for none. `price` None means litellm's price map is asked.
     `sends_seed`: `auto` sends seeds until the provider refuses, `always` takes a refusal as an
-    error, `never` sends none. `timeout_s` bounds a request from its first byte to the last of its
+    error, `never` sends none. `revision` tells apart models of one id, as other weights behind
+    another address. `timeout_s` bounds a request from its first byte to the last of its
     answer, `most_body_bytes` that answer's body, packed and unpacked.
 
     Raises SpecError for an `api_base` that is no address, or that holds a key or a password.
@@ -68,6 +72,7 @@ class ModelConfig:
     price: Price | None = None
     recording: Path | None = None
     sends_seed: SeedMode = "auto"
+    revision: str | None = None
     timeout_s: float = 600.0
     most_body_bytes: int = LARGEST_REPLY_BYTES
 
@@ -103,12 +108,16 @@ class ModelConfig:
         )
 
     def identity(self) -> dict[str, object]:
-        """The part that changes replies, JSON-able: not the limits, the price, the transport."""
-        return {
+        """The part that changes replies, JSON-able: not the limits, the price, the transport, nor
+        at which address a server of one's own is. That it is no provider's does count, or the
+        replies of a stand-in would pass for the provider's.
+        """
+        identity: dict[str, object] = {
             "kind": self.kind,
             "id": self.id,
-            "api_base": self.api_base.rstrip("/") if self.api_base else None,
+            "api_base": None if self.api_base is None else OWN_SERVER,
             "params": dict(self.params),
             "sends_seed": self.sends_seed != "never",
             "recording": str(self.recording) if self.recording else None,
         }
+        return identity if self.revision is None else {**identity, "revision": self.revision}

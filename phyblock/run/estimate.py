@@ -9,11 +9,13 @@ from pathlib import Path
 
 from phyblock.models import Estimate as CallEstimate
 from phyblock.models import (
+    ModelConfig,
     Price,
     ReplyCache,
     Request,
     Usage,
     cost_usd,
+    former_key,
     most_usd,
     price_of,
     reply_key,
@@ -121,11 +123,15 @@ def _add(
             row.done += 1
             continue
         for request, is_real, tokens in expected:
-            key = reply_key(config, replace(request, seed=sample.seed)) if is_real and cache else ""
-            if key and cache is not None and key in cache:
+            seeded = replace(request, seed=sample.seed)
+            if is_real and cache is not None and _is_kept(cache, config, seeded):
                 row.cached += 1
             else:
                 row.calls += 1
                 row.prompt_tokens += tokens.prompt_tokens
                 row.completion_tokens += tokens.completion_tokens
                 row.most_completion_tokens += tokens.most_completion_tokens
+
+
+def _is_kept(cache: ReplyCache, config: ModelConfig, request: Request) -> bool:
+    return reply_key(config, request) in cache or former_key(config, request) in cache

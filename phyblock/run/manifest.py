@@ -31,21 +31,20 @@ def make_manifest(
     limit: int | None,
 ) -> Manifest:
     """The manifest; `identity` digests what decides the results, so that only the same run goes
-    on in a folder. Limits, prices, tables and paths are no part of it.
+    on in a folder. Limits, prices, labels, tables, paths, and where and in which order models are
+    named and served are no part of it.
     """
     suite, data_version = loaded.suite, read_version(dataset.root)
     inputs: dict[str, Any] = {
         "format": FORMAT,
         "suite": suite.identity(),
-        "models": [
-            {"name": m.name, "published": m.published, "size_b": m.size_b, **_identity(m)}
-            for m in models
-        ],
+        "models": [{"name": m.name, **_identity(m)} for m in models],
         "dataset": _dataset(dataset, data_version),
         "tracks": {track.name: track.identity() for track in tracks},
         "limit": limit,
     }
-    decided = {**inputs, "readers": READER_VERSION}
+    by_name = sorted(inputs["models"], key=lambda model: str(model["name"]))
+    decided = {**inputs, "models": by_name, "readers": READER_VERSION}
     canonical = json.dumps(decided, sort_keys=True, separators=(",", ":"))
     scenes = [task.scene for task in dataset.tasks]
     fields = {
@@ -53,6 +52,10 @@ def make_manifest(
         "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         **inputs,
         "suite": suite.model_dump(mode="json"),
+        "models": [
+            {**decisive, "published": m.published, "size_b": m.size_b}
+            for decisive, m in zip(inputs["models"], models, strict=True)
+        ],
         "dataset": {
             **inputs["dataset"],
             "version": data_version,

@@ -112,6 +112,7 @@ def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfi
         tpm=spec.tpm,
         price=price,
         sends_seed=spec.seed,
+        revision=spec.revision,
         timeout_s=spec.timeout_s or suite.limits.timeout_s,
     )
 

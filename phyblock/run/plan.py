@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 from phyblock.datasets import Dataset
 from phyblock.errors import Problem, SpecError
@@ -110,8 +111,10 @@ def _nothing(loaded: LoadedSuite, dataset: Dataset, limit: int | None) -> Proble
 def _check_models(
     models: Sequence[PlannedModel], tracks: Sequence[AnyTrack], order: CandidateOrder
 ) -> None:
-    """Every model can answer what every track asks, and means the numbers that are shown."""
-    problems = []
+    """Every model can answer what every track asks, means the numbers that are shown, and is not
+    taken for another.
+    """
+    problems = _alike(models)
     for model in models:
         for track in tracks:
             where = f"model {model.name}"
@@ -129,3 +132,16 @@ def _check_models(
             problems.append(Problem(where, message, "models", allowed=", ".join(able)))
     if problems:
         raise SpecError(problems)
+
+
+def _alike(models: Sequence[PlannedModel]) -> list[Problem]:
+    """Models that replies could not be told apart by, though they are asked at two addresses."""
+    problems = []
+    for earlier, later in combinations(models, 2):
+        one, other = earlier.config, later.config
+        if one.identity() == other.identity() and one.api_base != other.api_base:
+            message = f"is {earlier.name} at another address: they would share their replies"
+            hint = "give one of them a revision, or run one alone"
+            where = f"model {later.name}"
+            problems.append(Problem(where, message, "api_base", other.api_base or "", hint=hint))
+    return problems

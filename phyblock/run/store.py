@@ -36,12 +36,14 @@ from phyblock.run.standing import Standing
 
 __all__ = ["RunStore", "holds_run"]
 
+_LABELS = ("published", "size_b")
 LineT = TypeVar("LineT", bound=Line)
 
 _HINT = "choose another folder with --out"
 _NOT_IDENTITY = (
     "suite.description",
     "suite.limits",
+    "suite.models",
     "suite.tables",
     "suite.dataset",
     "dataset.root",
@@ -171,7 +173,7 @@ def _changed(found: Manifest, wanted: Manifest) -> list[str]:
 
 def _parts(manifest: Manifest) -> Iterator[tuple[str, Any]]:
     """Dotted names and values of what a run is made of, digests of pictures left out."""
-    fields = manifest.fields()
+    fields = {**manifest.fields(), "models": _decisive(manifest)}
     for part in ("suite", "models", "dataset", "limit"):
         value = fields.get(part)
         if isinstance(value, dict):
@@ -180,3 +182,9 @@ def _parts(manifest: Manifest) -> Iterator[tuple[str, Any]]:
             yield part, value
     for track, about in manifest.tracks.items():
         yield from ((f"{track}.{k}", below) for k, below in about.items() if k != "pictures")
+
+
+def _decisive(manifest: Manifest) -> list[dict[str, Any]]:
+    """What decides the models' replies, in the order of their names."""
+    models = sorted(manifest.models, key=lambda model: model.name)
+    return [{k: v for k, v in m.fields().items() if k not in _LABELS} for m in models]

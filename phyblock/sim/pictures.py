@@ -16,7 +16,6 @@ from dataclasses import astuple, dataclass, replace
 from typing import get_args
 
 import numpy as np
-import PIL
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -27,6 +26,7 @@ from phyblock.errors import DataError, Problem
 from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
 from phyblock.sim.compose import GRID_COLUMNS, LABEL_STRIP, numbered_grid, side_by_side, to_png
 from phyblock.sim.exact import dot
+from phyblock.sim.library_pixels import library_pixels
 from phyblock.sim.registry import renderer
 from phyblock.sim.render import DrawnBlock, picture
 from phyblock.sim.renderer import Renderer
@@ -245,9 +245,9 @@ def drawn(scene: Scene) -> list[DrawnBlock]:
 
 
 def pixel_versions() -> dict[str, str]:
-    """The chosen renderer, and the version of each library that decides a picture's bytes."""
+    """The chosen renderer with its versions, and what the picture library draws."""
     drawn_by = renderer()
-    return {"renderer": drawn_by.name, **drawn_by.versions, "pillow": PIL.__version__}
+    return {"renderer": drawn_by.name, **drawn_by.versions, "pillow": library_pixels()}
 
 
 def _key(kind: str, style: PictureStyle, content: Iterable[object]) -> str:

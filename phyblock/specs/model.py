@@ -91,6 +91,11 @@ class ModelSpec(Section):
         description="Address of an OpenAI-compatible server (vLLM, Ollama, LM Studio), such as "
         "http://localhost:8000/v1.",
     )
+    revision: Annotated[str, Field(min_length=1, max_length=100)] | None = Field(
+        default=None,
+        description="Which weights answer, where the id does not say it. An address does not tell "
+        "models apart: one id on two servers is one model, unless revisions differ.",
+    )
     api_key_env: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] | None = Field(
         default=None,
         description="Name of the environment variable that holds the key, where it is not the "

@@ -188,13 +188,15 @@ class SuiteSpec(Section):
     def identity(self) -> dict[str, Any]:
         """What determines the results, as JSON-able data.
 
-        Leaves out description, limits and tables, sections of tracks that are not run, and paths
-        (of data and templates): a run stores the hashes of what stands there, which say more and
-        survive a move.
+        Leaves out description, limits and tables, sections of tracks that are not run, models and
+        paths (of data and templates): a run stores which models were run, and the hashes of what
+        stands at the paths, which say more and survive a move.
         """
         sections = {kind.section[0]: name for name, kind in known_tracks().items() if kind.section}
         idle = {key for key, track in sections.items() if track not in self.tracks}
-        spec = self.model_dump(mode="json", exclude={"description", "limits", "tables", *idle})
+        spec = self.model_dump(
+            mode="json", exclude={"description", "limits", "models", "tables", *idle}
+        )
         for section in ("dataset", *sections):
             spec.get(section, {}).pop("path", None)
         for part in (spec, *(spec[key] for key in sections if key in spec)):

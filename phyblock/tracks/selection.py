@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 
 from phyblock.datasets import AssemblyTask
 
-__all__ = ["select_tasks", "stratified"]
+__all__ = ["select_tasks", "spread", "stratified"]
 
 
 def select_tasks(
     tasks: Sequence[AssemblyTask], levels: Sequence[int], limit: int | None
 ) -> tuple[AssemblyTask, ...]:
-    """The tasks counted in any of `levels`, at most `limit` of them, in their order."""
+    """The tasks counted in any of `levels`, at most `limit` of them, in their order.
+
+    A higher limit keeps all that a lower one keeps.
+    """
     chosen = [task for task in tasks if set(task.scene.levels) & set(levels)]
     if limit is None or limit >= len(chosen):
         return tuple(chosen)
@@ -23,29 +27,34 @@ def select_tasks(
     kept: set[int] = set()
     for level, share in zip(sorted(by_level), shares, strict=True):
         positions = by_level[level]
-        kept.update(positions[i * len(positions) // share] for i in range(share))
+        kept.update(positions[i] for i in spread(len(positions), share))
     return tuple(task for position, task in enumerate(chosen) if position in kept)
 
 
-def stratified(sizes: Sequence[int], limit: int) -> list[int]:
-    """`limit` places shared among groups of the given sizes by largest remainder.
+def spread(size: int, share: int) -> list[int]:
+    """`share` of the positions 0 to `size` - 1, evenly spread; more hold all that fewer hold.
 
-    Every group gets at least one place where the limit allows; none gets more than its size.
+    They are taken at 0, 1/2, 1/4, 3/4, 1/8, ... of the size: the sequence of van der Corput (1935).
     """
-    total = sum(sizes)
-    if limit >= total:
-        return list(sizes)
-    exact = [limit * size / total for size in sizes]
-    shares = [int(share) for share in exact]
-    if limit >= len(sizes):
-        shares = [max(1, share) for share in shares]
-    while sum(shares) != limit:
-        step = 1 if sum(shares) < limit else -1
-        gaps = [step * (want - share) for want, share in zip(exact, shares, strict=True)]
-        open_to = [
-            i
-            for i, share in enumerate(shares)
-            if (share < sizes[i] if step > 0 else share > min(1, limit // len(sizes)))
-        ]
-        shares[max(open_to, key=lambda i: (gaps[i], -i))] += step
+    digits = max(1, (size - 1).bit_length())
+    parts = (int(f"{i:0{digits}b}"[::-1], 2) for i in range(2**digits))
+    order = dict.fromkeys(part * size // 2**digits for part in parts)
+    return sorted(list(order)[:share])
+
+
+def stratified(sizes: Sequence[int], limit: int) -> list[int]:
+    """`limit` places shared among groups of the given sizes; a higher limit takes from none.
+
+    Every group gets one place before any gets two; then each place goes to the group that has
+    least for its size (Webster's method, which is monotone in the number of places). None gets
+    more than its size.
+    """
+    places = sorted(
+        (rank > 0, Fraction(2 * rank + 1, size), group)
+        for group, size in enumerate(sizes)
+        for rank in range(size)
+    )
+    shares = [0] * len(sizes)
+    for _, _, group in places[:limit]:
+        shares[group] += 1
     return shares

@@ -68,7 +68,8 @@ def what_decides(config: ModelConfig, request: Request) -> object:
     sent = {**request.params, **config.params}
     return (
         config.id,
-        config.api_base,
+        config.api_base is None,
+        config.revision,
         config.sends_seed,
         sorted((k, type(v), v) for k, v in sent.items() if v is not None),
         [(m.role, [(type(p), getattr(p, "data", p)) for p in m.parts]) for m in request.messages],
@@ -93,8 +94,8 @@ USER = BASE.messages[1]
     "change",
     [
         lambda c, r: (replace(c, id="openai/n"), r),
-        lambda c, r: (replace(c, api_base="http://localhost:2/v1"), r),
         lambda c, r: (replace(c, api_base=None), r),
+        lambda c, r: (replace(c, revision="step 2000"), r),
         lambda c, r: (replace(c, params={"temperature": 0.1}), r),
         lambda c, r: (replace(c, params={"extra_body": {"top_k": 1}}), r),
         lambda c, r: (replace(c, sends_seed="never"), r),
@@ -127,7 +128,7 @@ def test_each_thing_that_changes_a_reply_changes_the_key(
         lambda c, r: (replace(c, name="other"), r),
         lambda c, r: (replace(c, transport="litellm", max_concurrency=1, rpm=5, tpm=7), r),
         lambda c, r: (replace(c, price=Price(1, 2), timeout_s=1.0, api_key_env="KEY"), r),
-        lambda c, r: (replace(c, api_base="http://localhost:1/v1/"), r),
+        lambda c, r: (replace(c, api_base="http://node17:2/v1"), r),
         lambda c, r: (c, replace(r, key="002")),
         lambda c, r: (replace(c, params={"temperature": 0.5}), r),
         lambda c, r: (replace(c, params={"top_k": None}), r),

@@ -175,7 +175,9 @@ def test_a_limit_keeps_some_of_every_level_and_is_a_run_of_its_own(copy: Workspa
 
 
 def test_what_does_not_change_results_does_not_make_another_run(copy: Workspace) -> None:
-    done = copy.run("--set", "limits.max_concurrency=1", "--set", "description=x")
+    copy.write_models("http://127.0.0.1:9", "alpha", size_b=7)
+    sets = ("--set", "limits.max_concurrency=1", "--set", "description=x")
+    done = copy.run(*sets, "--models", "oracle,random,alpha")
     assert (done.code, done.err) == (0, "")
     assert "All 45 samples are done" in done.out
 

@@ -1,10 +1,13 @@
-"""Addresses of servers that stand in the environment: part of what a reply is known by."""
+"""Addresses of servers: those in the environment count, and where a server is decides nothing."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from phyblock.models import ModelConfig, reply_key
+from phyblock.errors import ModelError
+from phyblock.models import ModelConfig, Reply, ReplyCache, former_key, reply_key
 from phyblock.run.models import to_config
 from phyblock.specs import ModelSpec, SuiteSpec
 from tests.models.factory import ask, make_model, make_request
@@ -12,6 +15,7 @@ from tests.servers.anthropic_messages import AnthropicMessages
 from tests.servers.chassis import LocalServer, Running
 from tests.servers.gemini_generate import GeminiGenerate
 from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import Workspace
 
 KEY = "sk-not-a-real-key-1234"
 WAYS: list[tuple[str, str, str, type[LocalServer]]] = [
@@ -45,7 +49,7 @@ def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(("variable", "model_id", "path", "server"), WAYS)
-def test_calls_go_to_the_address_and_keys_name_it(
+def test_calls_go_to_the_address_and_keys_say_that_there_is_one(
     monkeypatch: pytest.MonkeyPatch,
     variable: str,
     model_id: str,
@@ -56,13 +60,12 @@ def test_calls_go_to_the_address_and_keys_name_it(
     with Running(server()) as running:
         monkeypatch.setenv(variable, running.url + path)
         config = config_of(model_id)
-        assert config.identity()["api_base"] == running.url + path
         answers = ask(make_model(config), make_request("001"))
         assert running.server.ended == {"ok": 1}, answers
         keys.add(reply_key(config, make_request()))
         monkeypatch.setenv(variable, "http://127.0.0.1:9/v1")
         keys.add(reply_key(config_of(model_id), make_request()))
-    assert len(keys) == 3
+    assert len(keys) == 2
 
 
 def test_what_the_models_file_says_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -75,3 +78,53 @@ def test_what_the_models_file_says_comes_first(monkeypatch: pytest.MonkeyPatch) 
 def test_an_empty_variable_names_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_BASE_URL", "")
     assert config_of("openai/m").api_base is None
+
+
+def test_a_server_that_moved_is_asked_nothing_again(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as first:
+        workspace.write_models(first.url, "alpha")
+        workspace.write_suite(models=["alpha"], seeds=[0])
+        assert workspace.run().code == 0
+        assert first.server.ended["ok"] > 0
+    with Running(OpenAIChat()) as second:
+        workspace.write_models(second.url, "alpha")
+        again = workspace.run()
+        assert (again.code, second.server.ended) == (0, {}), again.err
+        workspace.out = workspace.root / "other"
+        anew = workspace.run("--no-report")
+        assert (anew.code, second.server.ended) == (0, {}), anew.err
+
+
+def test_replies_that_were_kept_by_their_address_are_found_and_move(workspace: Workspace) -> None:
+    config = config_of("hosted_vllm/m")
+    here = replace(config, api_base="http://127.0.0.1:9/v1/")
+    there = replace(config, api_base="http://127.0.0.1:10/v1")
+    kept = Reply("Step1: Move block with index 3")
+    former = former_key(here, make_request())
+    assert former is not None
+
+    path = workspace.root / "replies.sqlite"
+    with ReplyCache(path) as cache:
+        cache.put(former, config.id, kept)
+        lost, found, moved = (
+            ask(make_model(c, cache=cache), make_request())[0] for c in (there, here, there)
+        )
+    assert isinstance(lost, ModelError)
+    assert isinstance(found, Reply)
+    assert (found, found.text, found.cached) == (moved, kept.text, True)
+
+
+def test_one_model_at_two_addresses_is_named_before_anything_is_asked(workspace: Workspace) -> None:
+    entries = {
+        name: {"id": "hosted_vllm/m", "api_base": f"http://127.0.0.1:{port}/v1"}
+        for name, port in (("alpha", 9), ("beta", 10))
+    }
+    workspace.write_yaml("models.yaml", entries)
+    workspace.write_suite(models=["alpha", "beta"], seeds=[0])
+    refused = workspace.run()
+    assert refused.code == 2
+    assert "model beta: api_base: is alpha at another address" in refused.err
+    assert not workspace.out.exists()
+    entries["beta"]["revision"] = "step 2000"
+    workspace.write_yaml("models.yaml", entries)
+    assert workspace.run("--dry-run").code == 0

@@ -23,7 +23,7 @@ from phyblock.tracks.opening import (
     render_workers,
     template_prompt,
 )
-from phyblock.tracks.selection import stratified
+from phyblock.tracks.selection import spread, stratified
 from phyblock.tracks.vqa.pictures import QuestionPictures
 from phyblock.tracks.vqa.spec import VqaSpec
 from phyblock.tracks.vqa.track import Vqa, VqaRules
@@ -78,7 +78,7 @@ def select_questions(
     """The questions of these subtasks about scenes of these levels, in the order of the set.
 
     Of each subtask at most `per_subtask` are kept, and `limit` in all, shared over the subtasks;
-    those kept are spread evenly over the set.
+    those kept are spread evenly over the set, and a higher limit keeps them.
     """
     groups = [
         [task for task in tasks if task.question.subtask == name and _is_of(task, levels)]
@@ -91,9 +91,9 @@ def select_questions(
     ]
     shares = sizes if limit is None else stratified(sizes, limit)
     kept = {
-        group[place * len(group) // share].key
+        group[place].key
         for group, share in zip(groups, shares, strict=True)
-        for place in range(share)
+        for place in spread(len(group), share)
     }
     return tuple(task for task in tasks if task.key in kept)
 
