@@ -88,7 +88,8 @@ class ProgressView:
         elif isinstance(event, RunNotice):
             self._say(event.text)
         elif isinstance(event, ModelStopped):
-            self._tallies[event.model].notice = f"stopped: {event.reason}"
+            tally = self._tallies[event.model]
+            tally.is_stopped, tally.notice = True, f"stopped: {event.reason}"
             self._say(f"{one_line(event.model)} stopped: {event.reason}", style="red")
         elif isinstance(event, Stopping):
             self._status = self._stopping_text(event)
@@ -132,28 +133,32 @@ class ProgressView:
             self._say(f"{self._summary()}{self._failures()}")
 
     def _failures(self) -> str:
-        """Failures of all models, for a line of the log."""
+        """Failures of all models, and calls that were sent again, for a line of the log."""
         counts: Counter[str] = Counter()
         for tally in self._tallies.values():
             counts.update(tally.failures)
-        return f" · {failure_text(counts)}" if counts else ""
+        failed = f" · {failure_text(counts)}" if counts else ""
+        retries = sum(tally.retries for tally in self._tallies.values())
+        return f"{failed} · {retries:,} sent again" if retries else failed
 
     def _summary(self) -> str:
         done = sum(tally.done for tally in self._tallies.values())
-        total = sum(tally.expected for tally in self._tallies.values())
+        total = sum(tally.total for tally in self._tallies.values())
         fresh = sum(tally.fresh for tally in self._tallies.values())
-        elapsed = self._now() - self._started
+        elapsed_s = self._now() - self._started
         text = f"{done:,} of {total:,} samples"
-        if fresh and elapsed > 0:
-            rate = fresh / elapsed
-            text += f" · {rate:.1f} a second"
-            if done < total:
-                text += f" · {_duration((total - done) / rate)} left"
+        if fresh and elapsed_s > 0:
+            text += f" · {fresh / elapsed_s:.1f} a second"
+            # The slowest model decides; of one that has answered nothing no time is known.
+            left_s = [tally.left_s(elapsed_s) for tally in self._tallies.values()]
+            known_s = [seconds for seconds in left_s if seconds is not None]
+            if done < total and len(known_s) == len(left_s):
+                text += f" · {_duration(max(known_s))} left"
         return text
 
     def _panel(self) -> RenderableType:
         done = sum(tally.done for tally in self._tallies.values())
-        total = sum(tally.expected for tally in self._tallies.values()) or 1
+        total = sum(tally.total for tally in self._tallies.values()) or 1
         parts: list[RenderableType] = [
             # The bar alone would not end its line, and what follows would be cut off.
             Padding(ProgressBar(total=total, completed=done, width=None), 0),

@@ -20,9 +20,11 @@ from phyblock.cli.paths import NAME_OR_PATH, UserPath, models_file_option
 from phyblock.cli.progress import ProgressView
 from phyblock.cli.report import show_page
 from phyblock.cli.summary import print_summary
+from phyblock.errors import Problem, SpecError
+from phyblock.models import is_billed
 from phyblock.plain_text import one_line
 from phyblock.resources import bundled
-from phyblock.run.estimate import Estimate, estimate
+from phyblock.run.estimate import estimate
 from phyblock.run.execute import Cause, RunResult
 from phyblock.run.folder import run_folder
 from phyblock.run.plan import RunPlan, make_plan
@@ -58,7 +60,7 @@ _INTERRUPTED = 130
 @click.option("--dry-run", is_flag=True, help="Print calls, tokens and dollars; call nothing.")
 @click.option("--retry-failed", is_flag=True, help="Ask again where a request was rejected.")
 @click.option("--no-report", is_flag=True, help="Write tables alone, no figures and no page.")
-@click.option("--yes", is_flag=True, help="Do not ask before spending money.")
+@click.option("--yes", is_flag=True, help="Spend money without asking.")
 def command(
     suite: str,
     sets: tuple[str, ...],
@@ -89,7 +91,7 @@ def command(
         show_estimate(console, plan, estimate(plan, folder, use_cache=not no_cache))
         return 0
     check_ready(plan)
-    if not yes and sys.stdin.isatty() and not _agreed(console, plan, folder, not no_cache):
+    if not yes and not _agreed(console, plan, folder, use_cache=not no_cache):
         console.print("Nothing was asked.")
         return 1
     view = ProgressView(console, plan.suite.name)
@@ -125,17 +127,31 @@ async def _run(opened: Session, view: ProgressView) -> RunResult:
                     loop.remove_signal_handler(name)
 
 
-def _agreed(console: Console, plan: RunPlan, folder: Path, use_cache: bool) -> bool:
-    """Ask before money is spent; nothing is asked when nothing costs anything."""
+def _agreed(console: Console, plan: RunPlan, folder: Path, *, use_cache: bool) -> bool:
+    """Ask before money is spent; nothing is asked when nothing costs anything.
+
+    Where nobody can answer, a cost limit is the answer. Raises SpecError where there is none.
+    """
+    is_terminal = sys.stdin.isatty()
+    is_limited = plan.suite.limits.max_cost_usd is not None
+    billed = {model.name for model in plan.models if is_billed(model.config)}
+    if not is_terminal and (is_limited or not billed):
+        return True
     estimated = estimate(plan, folder, use_cache=use_cache)
-    if not any(_may_cost(row) for row in estimated):
+    costly = [row.model for row in estimated if row.may_cost]
+    if not costly:
+        return True
+    if is_terminal:
+        show_estimate(console, plan, estimated)
+        return click.confirm("Go on?", default=True)
+    if not billed & set(costly):
         return True
     show_estimate(console, plan, estimated)
-    return click.confirm("Go on?", default=True)
-
-
-def _may_cost(row: Estimate) -> bool:
-    return row.calls > 0 and (row.cost_usd is None or row.cost_usd > 0)
+    message = "would cost money, and there is no terminal to ask on"
+    hint = "agree with --yes, or set a limit: --set limits.max_cost_usd=5"
+    raise SpecError(
+        Problem(f"suite {plan.suite.name}", message, found=", ".join(costly), hint=hint)
+    )
 
 
 def _conclude(console: Console, folder: Path, result: RunResult, cost: str) -> int:

@@ -15,11 +15,17 @@ __all__ = ["Tally", "failure_text"]
 
 @dataclass
 class Tally:
-    """What a model's records add up to; `counts` are of the headline matcher and setting."""
+    """What a model's records add up to; `counts` are of the headline matcher and setting.
+
+    `fresh` samples were written by this command, `answered` ones of these by the model. One that is
+    `stopped` expects no more than is done.
+    """
 
     expected: int
     done: int = 0
     fresh: int = 0
+    answered: int = 0
+    is_stopped: bool = False
     counts: Counts = field(default_factory=Counts)
     tokens: int = 0
     cost_usd: float = 0.0
@@ -30,9 +36,10 @@ class Tally:
     notice: str = ""
 
     def add(self, sample: Summary, *, fresh: bool) -> None:
-        """Count one sample; `fresh` ones were written by this command."""
+        """Count one sample."""
         self.done += 1
         self.fresh += fresh
+        self.answered += fresh and sample.is_answered
         outcome = sample.outcome
         if outcome in FAILURES:
             self.failures[outcome] = self.failures.get(outcome, 0) + 1
@@ -44,6 +51,18 @@ class Tally:
         self.tokens += sample.tokens
         self.unpriced += sample.paid_usd is None
         self.cost_usd += sample.paid_usd or 0.0
+
+    @property
+    def total(self) -> int:
+        """Samples that this run can still come to."""
+        return self.done if self.is_stopped else self.expected
+
+    def left_s(self, elapsed_s: float) -> float | None:
+        """How long what is left takes at the rate of answers so far [s]; None without any."""
+        left = self.total - self.done
+        if not left:
+            return 0.0
+        return left * elapsed_s / self.answered if self.answered else None
 
     @property
     def cost_text(self) -> str:

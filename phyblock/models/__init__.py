@@ -20,6 +20,7 @@ from phyblock.models.cost import (
     Estimate,
     cost_usd,
     estimate,
+    is_billed,
     most_usd,
     price_of,
 )
@@ -61,6 +62,7 @@ __all__ = [
     "cost_usd",
     "estimate",
     "former_key",
+    "is_billed",
     "most_usd",
     "price_of",
     "read_raw_reply",

@@ -31,7 +31,8 @@ class Breaker:
 
     It opens after FAILURES_TO_OPEN failures in a row. They must be of two requests at least, so
     that one request which a server cannot survive is not taken for an outage. A probe that still
-    fails when the outage has lasted `policy.retry_for_s` ends it: nothing more is sent.
+    fails when the outage has lasted `policy.retry_for_s` ends it: nothing more is sent. So does the
+    `policy.max_connection_failures`-th failure in a row where the server has never answered.
     """
 
     def __init__(self, server: str, policy: RetryPolicy, tell: Tell = ignore_text) -> None:
@@ -46,6 +47,7 @@ class Breaker:
         self._probing = asyncio.Lock()
         self._nap: asyncio.Future[None] | None = None
         self._is_open = False
+        self._was_heard = False
         self._end: str | None = None
 
     @property
@@ -74,6 +76,7 @@ class Breaker:
             lasted_s = self._policy.clock.now() - self._began_s
             self._tell(f"{self._server} answers again after {lasted_s:.0f} s: going on")
         self._is_open = False
+        self._was_heard = True
         self._failures = 0
         self._requests.clear()
         if self._nap is not None:
@@ -137,6 +140,10 @@ class Breaker:
         lasted_s = now_s - self._began_s
         if self._policy.gives_up(error, self._probes, lasted_s):
             self._end = f"{self._server} could not be reached for {lasted_s:.0f} s: {error}"
+        # Failures of requests that were sent together before it opened say no more than one.
+        failures = FAILURES_TO_OPEN + self._probes
+        if not self._was_heard and failures >= self._policy.max_connection_failures:
+            self._end = f"{self._server} never answered, {failures} times in a row: {error}"
 
     def _plan_probe(self, error: RetryableError, now_s: float) -> None:
         """Wait longer with every probe, and as long as the server asks for."""

@@ -19,6 +19,7 @@ from typing import Any
 from phyblock.errors import BudgetReachedError, Problem, SpecError
 from phyblock.models.base import Image, Request, Usage
 from phyblock.models.config import ModelConfig, Price
+from phyblock.models.keys import KEYLESS
 from phyblock.models.payload import wire_params
 from phyblock.models.picture_tokens import picture_tokens
 
@@ -27,6 +28,7 @@ __all__ = [
     "Estimate",
     "cost_usd",
     "estimate",
+    "is_billed",
     "most_usd",
     "plausible",
     "price_of",
@@ -87,6 +89,16 @@ def require_price(config: ModelConfig) -> Price:
         message = "has no known price, so that max_cost_usd cannot be kept"
         raise SpecError(Problem(f"model {config.name}", message, "price", config.id, hint=hint))
     return price
+
+
+def is_billed(config: ModelConfig) -> bool:
+    """Whether somebody may be billed for calls: not where the price is 0, nor by a server of one's
+    own to which no price was given.
+    """
+    price = price_of(config)
+    if price is None:
+        return config.provider not in KEYLESS
+    return price != Price(0.0, 0.0)
 
 
 def cost_usd(price: Price | None, usage: Usage) -> float | None:

@@ -11,7 +11,15 @@ from phyblock.errors import Problem, SpecError, UnavailableError
 from phyblock.models.config import ModelConfig
 from phyblock.models.masks import hidden
 
-__all__ = ["KeyStatus", "api_key", "api_key_status", "hidden", "secrets_of", "server_address"]
+__all__ = [
+    "KEYLESS",
+    "KeyStatus",
+    "api_key",
+    "api_key_status",
+    "hidden",
+    "secrets_of",
+    "server_address",
+]
 
 _KEY_VARIABLES: Mapping[str, tuple[str, ...]] = {
     "cloudflare": ("CLOUDFLARE_API_KEY",),
@@ -34,7 +42,7 @@ _OWN_CREDENTIALS = (
 )
 """Providers that can sign in without an API key: litellm finds out by itself."""
 
-_KEYLESS = ("hosted_vllm", "lm_studio", "llamafile", "ollama", "ollama_chat")
+KEYLESS = ("hosted_vllm", "lm_studio", "llamafile", "ollama", "ollama_chat")
 """Local servers, which take a key but need none."""
 
 _ADDRESS_VARIABLES: Mapping[str, tuple[str, ...]] = {
@@ -143,7 +151,7 @@ def api_key_status(config: ModelConfig) -> KeyStatus:
         return KeyStatus((), is_set=False, is_needed=False)
     variables = _variables(config)
     is_needed = config.api_key_env is not None or not (
-        config.api_base or config.provider in _KEYLESS + _OWN_CREDENTIALS
+        config.api_base or config.provider in KEYLESS + _OWN_CREDENTIALS
     )
     found = _found(variables)
     fault = _fault(*found) if found is not None else ""

@@ -27,10 +27,14 @@ class RetryPolicy:
     The wait before attempt n + 1 is uniform between 0 and min(`max_wait_s`, `base_s` * 2^(n-1)),
     on top of the server's `Retry-After` (followed up to `max_retry_after_s`). Eight attempts leave
     one request in a million unanswered when 18 % of the requests fail.
+
+    A server that has not answered once is given up after `max_connection_failures` tries already:
+    its address is probably wrong.
     """
 
     attempts: int = 8
     retry_for_s: float = 300.0
+    max_connection_failures: int = 20
     base_s: float = 0.5
     max_wait_s: float = 60.0
     max_retry_after_s: float = 120.0

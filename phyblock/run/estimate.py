@@ -57,6 +57,11 @@ class Estimate:
         return cost_usd(self.price, Usage(self.prompt_tokens, self.completion_tokens))
 
     @property
+    def may_cost(self) -> bool:
+        """Whether money may be spent: calls are left, and not known to be free."""
+        return self.calls > 0 and (self.cost_usd is None or self.cost_usd > 0)
+
+    @property
     def most_usd(self) -> float | None:
         """Dollars if every reply were as long as it can be and no call had to be repeated."""
         if self.price is None:

@@ -89,7 +89,9 @@ class Session:
             budget = None
             if limits.max_cost_usd is not None:
                 budget = Budget(limits.max_cost_usd, self._store.standing.limit_usd)
-            policy = RetryPolicy(limits.max_attempts, limits.retry_for_s)
+            policy = RetryPolicy(
+                limits.max_attempts, limits.retry_for_s, limits.max_connection_failures
+            )
             breakers = Breakers(policy, self._tell)
             for model in plan.models:
                 self._models[model.name] = build_model(

@@ -150,6 +150,11 @@ class LimitsSpec(Section):
         description="Outage that is outlasted [s]: a sample is not given up sooner after its first "
         "failure, and a model whose server cannot be reached for longer is stopped.",
     )
+    max_connection_failures: Count = Field(
+        default=20,
+        description="Failures to reach a server, one after another, after which its models are "
+        "stopped where it has not answered once in this run.",
+    )
     timeout_s: TimeoutS = Field(default=300.0, description="Longest wait for one reply [s].")
     max_cost_usd: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] | None = Field(
         default=None,

@@ -129,6 +129,18 @@ def test_tables_may_be_read_by_whoever_may_read_the_records(suite: Workspace) ->
     assert not list(suite.out.rglob("*.part"))
 
 
+def test_nothing_is_spent_unasked_where_nobody_can_be_asked(suite: Workspace) -> None:
+    with Running(OpenAIChat()) as running:
+        suite.write_models(running.url, "alpha", price={"input": 1.0, "output": 1.0})
+        refused = suite.run("--models", "alpha")
+        assert (refused.code, running.server.requests) == (2, 0)
+        assert "would cost money, and there is no terminal to ask on" in refused.err
+        assert "5 calls, about $" in refused.out
+        assert not suite.out.exists()
+        limited = suite.run("--models", "alpha", "--set", "limits.max_cost_usd=1")
+        assert (limited.code, running.server.requests) == (0, 5), limited.err
+
+
 def test_yes_asks_no_person(suite: Workspace) -> None:
     with Running(OpenAIChat()) as running:
         suite.write_models(running.url, "alpha")

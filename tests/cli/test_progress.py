@@ -117,6 +117,32 @@ def test_a_log_counts_failures_and_ends_with_what_was_not_yet_said() -> None:
         (21.0, retry()),
     )
     assert lines[1].startswith("1 of 10 samples")
-    assert lines[1].endswith(" · 1 api error")
-    assert lines[-2].endswith(" · 3 api error")
+    assert lines[1].endswith(" · 1 api error · 1 sent again")
+    assert lines[-2].endswith(" · 3 api error · 3 sent again")
     assert lines[-1].startswith("alpha: asking again 2 times")
+
+
+def test_no_time_is_told_before_every_model_has_answered_and_stopped_samples_leave() -> None:
+    def done(model: str, outcome: str = "ok") -> SampleDone:
+        return SampleDone(known_records().validate_python(record(model=model, outcome=outcome)))
+
+    now_s = 0.0
+    screen = io.StringIO()
+    with ProgressView(Console(file=screen, width=160), "trial", lambda: now_s) as view:
+        view(RunStarted({"alpha": 100, "random": 100}, {"alpha": (), "random": ()}))
+        for at_s, event in (
+            (10.0, done("random")),
+            (20.0, done("alpha", outcome="api_error")),
+            (30.0, done("alpha")),
+            (31.0, ModelStopped("random", "HTTP 401: no")),
+            (40.0, done("alpha")),
+        ):
+            now_s = at_s
+            view(event)
+    lines = [line for line in screen.getvalue().splitlines() if "samples" in line]
+    assert [" left" in line for line in lines] == [False, False, True, True]
+    assert lines[2].startswith("3 of 200 samples")
+    # 99 of random at one in 30 s; 97 of alpha at two in 40 s, of 101 that can still come.
+    assert "49 min 30 s left" in lines[2]
+    assert lines[3].startswith("4 of 101 samples")
+    assert "32 min 20 s left" in lines[3]

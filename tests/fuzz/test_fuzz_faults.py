@@ -78,10 +78,18 @@ class Runner:
     def run(self, *args: str) -> Done:
         workspace = self.workspace
         if self._worker is None:
-            done = workspace.run(*args)
+            done = workspace.run("--yes", *args)
             ended = Ended(done.code, done.out, done.err)
         else:
-            command = ["run", "suite.yaml", "--out", str(workspace.out), "--no-report", *args]
+            command = [
+                "run",
+                "suite.yaml",
+                "--out",
+                str(workspace.out),
+                "--no-report",
+                "--yes",
+                *args,
+            ]
             ended = self._worker.phyblock(command, workspace.root, workspace.env, _LONGEST_S)
         after = take_tree(workspace.root)
         pictures = str((workspace.cache / "pictures").resolve())

@@ -80,7 +80,7 @@ def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace: Workspace
         assert running.server.requests == 0
         assert workspace.files() == before
 
-        assert workspace.run().code == 0
+        assert workspace.run("--yes").code == 0
         after = workspace.run("--dry-run")
         assert "0 calls, about $0.00" in after.out
 
@@ -124,7 +124,7 @@ def test_a_run_without_a_limit_counts_once_there_is_one(workspace: Workspace) ->
         workspace.write_suite(
             models=["alpha"], seeds=[0, 1, 2, 3], limits={**TWICE, "max_attempts": 1}
         )
-        assert workspace.run().code == 1
+        assert workspace.run("--yes").code == 1
         asked, answered = running.server.requests, running.server.ended["ok"]
         assert 0 < answered < asked == 20
         same = workspace.run("--set", f"limits.max_cost_usd={answered * CALL_USD}")
