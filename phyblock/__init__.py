@@ -12,13 +12,23 @@ if TYPE_CHECKING:
     from phyblock.report.notebook import LoadedRun as Run
     from phyblock.report.notebook import load_run
 
-__all__ = ["Run", "load_run"]
+    __version__: str
+
+__all__ = ["Run", "__version__", "load_run"]
 
 
 def __getattr__(name: str) -> object:
-    # pandas takes most of a second to import: only those who ask for it pay.
+    # What these need takes up to a second to import: only those who ask for it pay.
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("phyblock")
     if name in __all__:
         from phyblock.report import notebook
 
         return notebook.LoadedRun if name == "Run" else notebook.load_run
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

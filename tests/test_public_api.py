@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib.metadata import version
+
+import pytest
 
 import phyblock
 
 
-def test_public_names_are_these() -> None:
-    assert phyblock.__all__ == ["Run", "load_run"]
+def test_public_names_are_these_and_completion_finds_them() -> None:
+    assert phyblock.__all__ == ["Run", "__version__", "load_run"]
     assert all(getattr(phyblock, name).__doc__ for name in phyblock.__all__)
+    assert set(phyblock.__all__) <= set(dir(phyblock))
+    assert phyblock.__version__ == version("phyblock")
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        _ = phyblock.nothing
 
 
 def test_importing_phyblock_imports_nothing_heavy() -> None:
