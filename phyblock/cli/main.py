@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
+from collections import Counter
 
 import click
 
@@ -11,7 +13,7 @@ from phyblock.cli.verbs import Verbs
 from phyblock.errors import InputError, PhyblockError, Problem, StoreError, said
 from phyblock.plain_text import plain_lines
 
-__all__ = ["main"]
+__all__ = ["main", "show_problems"]
 
 _VERBS = {
     "run": "Run a suite, or go on where it stopped.",
@@ -52,6 +54,10 @@ def phyblock() -> None:
     """Test vision-language models on PhyBlock: 3D block assembly from pictures."""
 
 
+_LOOSE_END = re.compile(r"unexpected extra arguments? \(.*[]}]\)")
+"""What click says of a list or mapping that the shell took apart."""
+
+
 def main() -> None:
     """Run the command line; exit code 2 for bad input, 1 for a failure, 130 for Ctrl-C."""
     for stream in (sys.stdout, sys.stderr):
@@ -65,11 +71,13 @@ def main() -> None:
         sys.exit(0)
     except click.ClickException as error:
         error.show()
+        if _LOOSE_END.search(error.format_message()):
+            click.echo("Hint: quote values with spaces: --set 'seeds=[0, 1]'", err=True)
         sys.exit(2)
     except click.Abort:
         sys.exit(130)
     except InputError as error:
-        _complain(error)
+        show_problems(error)
         sys.exit(2)
     except PhyblockError as error:
         click.echo(plain_lines(f"error: {error}"), err=True)
@@ -81,7 +89,7 @@ def main() -> None:
     except OSError as error:
         _drop_output()
         where = "output" if error.filename is None else os.fsdecode(error.filename)
-        _complain(StoreError(Problem(where, f"cannot be used: {said(error)}")))
+        show_problems(StoreError(Problem(where, f"cannot be used: {said(error)}")))
         sys.exit(2)
     sys.exit(code if isinstance(code, int) else 0)
 
@@ -93,14 +101,30 @@ def _drop_output() -> None:
     os.close(nowhere)
 
 
-def _complain(error: InputError) -> None:
-    shown = error.problems[:_SHOWN]
-    for problem in shown:
+def show_problems(error: InputError) -> None:
+    """Show the problems, of those that are alike the first alone."""
+    alike = Counter(_kind(problem) for problem in error.problems)
+    shown: Counter[tuple[str, str]] = Counter()
+    for problem in error.problems:
+        kind = _kind(problem)
+        if shown.total() == _SHOWN or shown[kind] == _SHOWN_ALIKE:
+            continue
+        shown[kind] += 1
         click.echo(
             click.style("error: ", fg="red", bold=True) + plain_lines(str(problem)), err=True
         )
-    if len(error.problems) > len(shown):
-        click.echo(f"... and {len(error.problems) - len(shown)} more problems", err=True)
+        if shown[kind] == _SHOWN_ALIKE < alike[kind]:
+            more = f"... and {alike[kind] - _SHOWN_ALIKE:,} more like it"
+            click.echo(plain_lines(f"{more}: {': '.join(filter(None, kind))}"), err=True)
+    told = sum(alike[kind] if shown[kind] == _SHOWN_ALIKE else shown[kind] for kind in alike)
+    if len(error.problems) > told:
+        click.echo(f"... and {len(error.problems) - told:,} more problems", err=True)
+
+
+def _kind(problem: Problem) -> tuple[str, str]:
+    """What problems of many places have in common: the field, whatever its index, and the words."""
+    return re.sub(r"\[\d+\]", "[]", problem.field), problem.message
 
 
 _SHOWN = 25
+_SHOWN_ALIKE = 5

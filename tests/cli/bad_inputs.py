@@ -90,6 +90,7 @@ OPTIONS: tuple[Bad, ...] = (
     Bad("set-value", options("--set", "seeds=x"), ("--set seeds=x: seeds", 'found: "x"')),
     Bad("set-form", options("--set", "seeds"), ("--set seeds", "key=value")),
     Bad("set-yaml", options("--set", "seeds=[1"), ("--set seeds=[1",)),
+    Bad("set-unquoted", options("--set", "seeds=[0,", "1]"), ("1]", "quote values with spaces")),
     Bad("models", options("--models", "oracel"), ("--models", "found: oracel", "mean oracle?")),
     Bad("no-file", options("--models-file", "gone.yaml"), ("gone.yaml", "no such models file")),
     Bad("limit", options("--limit", "0"), ("--limit", "0 is not in the range")),

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from phyblock.cli.main import show_problems
+from phyblock.errors import InputError, Problem
 from tests.cli.bad_inputs import BAD, Bad
 from tests.cli.breakage import FAKE_KEY
 from tests.fork_server import ForkServer
@@ -70,3 +72,25 @@ def test_bad_input(copy: Workspace, bad: Bad, commands: ForkServer, tmp_path: Pa
     after = copy.files()
     assert {name: after.get(name) for name in before} == before
     assert all(name.startswith(bad.writes or ("/",)) for name in after.keys() - before.keys())
+
+
+def test_of_problems_that_are_alike_a_few_are_shown_and_all_are_counted(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    alike = [Problem(f"q.jsonl:{n}", "names no scene", f"scenes[{n}]") for n in range(40)]
+    others = [Problem("s.yaml:1", "is wrong", "seed"), Problem("s.yaml:2", "is wrong", "level")]
+    show_problems(InputError([*alike, *others]))
+    lines = capsys.readouterr().err.splitlines()
+    assert sum(line.startswith("error: q.jsonl") for line in lines) == 5
+    assert "... and 35 more like it: scenes[]: names no scene" in lines
+    assert [line for line in lines if "s.yaml" in line] == [
+        "error: s.yaml:1: seed: is wrong",
+        "error: s.yaml:2: level: is wrong",
+    ]
+
+
+def test_many_kinds_of_problems_are_cut_and_counted(capsys: pytest.CaptureFixture[str]) -> None:
+    show_problems(InputError([Problem("s.yaml", f"is wrong {n}") for n in range(60)]))
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 26
+    assert lines[-1] == "... and 35 more problems"
