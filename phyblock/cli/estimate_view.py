@@ -58,8 +58,8 @@ def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> 
     console.print(text, soft_wrap=True, markup=False)
     if calls:
         console.print(
-            "Tokens are estimates: 4 characters a token, pictures by OpenAI's rules, replies of "
-            "usual length; at most: each as long as it can be.",
+            "Tokens are estimates: 4 characters a token, pictures by their providers' rules, "
+            "replies of usual length; at most: each as long as it can be.",
             style="dim",
             soft_wrap=True,
         )

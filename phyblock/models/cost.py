@@ -51,9 +51,9 @@ _LEAST_EXPECTED_TOKENS = 1_000
 class Estimate:
     """Tokens of a call that was not made yet.
 
-    `prompt_tokens`: a token per four characters, and pictures by OpenAI's rules for detailed
-    pictures; `completion_tokens`: a usual reply, with thoughts where the model is told to think or
-    has room for them; `most_completion_tokens`: the longest possible.
+    `prompt_tokens`: a token per four characters, and pictures by their providers' rules;
+    `completion_tokens`: a usual reply, with thoughts where the model is told to think or has room
+    for them; `most_completion_tokens`: the longest possible.
     """
 
     prompt_tokens: int

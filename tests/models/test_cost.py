@@ -37,6 +37,7 @@ from phyblock.models import (
     price_of,
 )
 from phyblock.models.cost import plausible
+from phyblock.models.picture_tokens import picture_tokens
 from phyblock.tracks.full_planning.baselines import PlanSubject
 from tests.models.factory import CANDIDATES, SCENE, ask, make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
@@ -114,6 +115,23 @@ def test_pictures_are_counted_by_tiles(width: int, height: int, tokens: int) -> 
         ("openai/gpt-4.1-mini", 1024, 1024, 1659),
         ("openai/o4-mini", 2048, 2048, 2642),
         ("openai/gpt-4.1-nano", 64, 33, 10),
+        ("openai/gpt-5.6", 1024, 512, 615),
+        ("openai/gpt-5.6-luna", 1024, 1024, 1229),
+        ("openai/gpt-5-mini-2025-08-07", 1280, 720, 1104),
+        ("openai/gpt-5-2025-08-07", 1024, 512, 350),
+        ("openai/gpt-5", 1024, 512, 350),
+        ("openai/o3-2025-04-16", 1024, 512, 375),
+        ("anthropic/claude-3-7-sonnet-20250219", 1024, 512, 703),
+        ("anthropic/claude-3-7-sonnet-20250219", 3000, 3000, 1568),
+        ("bedrock/us.anthropic.claude-opus-4-7", 1024, 512, 703),
+        ("openrouter/anthropic/claude-opus-4-7", 2048, 1024, 2738),
+        ("anthropic/claude-sonnet-5-5", 1024, 512, 703),
+        ("gemini/gemini-2.0-flash", 384, 384, 258),
+        ("gemini/gemini-2.5-pro", 1024, 512, 516),
+        ("gemini/gemini-3.8-flash", 1024, 512, 1120),
+        ("xai/grok-4", 1024, 512, 1792),
+        ("hosted_vllm/Qwen/Qwen2.5-VL-7B-Instruct", 1024, 512, 705),
+        ("hosted_vllm/Qwen/Qwen3-VL-8B-Instruct", 1024, 512, 514),
     ],
 )
 def test_a_picture_counts_as_its_model_counts_it(
@@ -121,6 +139,17 @@ def test_a_picture_counts_as_its_model_counts_it(
 ) -> None:
     image = Image(b"", "goal", width, height)
     assert estimate(config(model_id), request_of(image)).prompt_tokens == tokens
+
+
+@given(
+    st.sampled_from(["gpt-4o", "gpt-5.6", "claude-opus-4-7", "claude-3", "gemini-2.5", "grok-4"]),
+    st.integers(1, 6000),
+    st.integers(1, 6000),
+)
+def test_every_picture_counts_and_none_without_bound(model: str, width: int, height: int) -> None:
+    tokens = picture_tokens(f"x/{model}", Image(b"", "goal", width, height))
+    assert 1 <= tokens <= 20_000
+    assert tokens == picture_tokens(f"x/{model}", Image(b"", "goal", height, width))
 
 
 @pytest.mark.parametrize(
