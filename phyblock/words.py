@@ -14,6 +14,8 @@ __all__ = [
     "MATCHERS",
     "PLAN_PARSERS",
     "SETTINGS",
+    "AnswerFormat",
+    "AskedAs",
     "Background",
     "CandidateOrder",
     "CandidateScale",
@@ -31,7 +33,7 @@ __all__ = [
     "PictureSource",
     "PlanParser",
     "Role",
-    "SeedMode",
+    "SendMode",
     "Setting",
     "TransportName",
 ]
@@ -56,6 +58,11 @@ MissingPolicy = Literal["count", "skip"]
 PlanParser = Literal["steps", "official"]
 """How plans are read out of replies."""
 PLAN_PARSERS: tuple[PlanParser, ...] = get_args(PlanParser)
+
+AnswerFormat = Literal["text", "json_schema"]
+"""In which form answers are asked for: in lines of text, or as JSON that follows a schema."""
+AskedAs = Literal["prompt", "response_format"]
+"""How JSON was asked for: in the prompt alone, or in the request's `response_format` as well."""
 
 Gating = Literal["aov", "layer"]
 """When a block can be placed: when all it rests on is, or when all lower layers are complete."""
@@ -83,4 +90,5 @@ Finish = Literal["stop", "length", "refusal", "unknown"]
 Outcome = Literal["ok", "parse_failure", "refusal", "truncated", "api_error", "missing"]
 """What became of a sample."""
 TransportName = Literal["auto", "litellm", "direct"]
-SeedMode = Literal["auto", "always", "never"]
+SendMode = Literal["auto", "always", "never"]
+"""Whether a field that not every provider takes is sent."""

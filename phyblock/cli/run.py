@@ -24,6 +24,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.models import is_billed
 from phyblock.plain_text import one_line
 from phyblock.resources import bundled
+from phyblock.run.asking import asking_remarks
 from phyblock.run.estimate import estimate
 from phyblock.run.execute import Cause, RunResult
 from phyblock.run.folder import run_folder
@@ -89,6 +90,9 @@ def command(
         run_folder(folder).check(() if dry_run else report.files_of(page=not no_report))
     if dry_run:
         show_estimate(console, plan, estimate(plan, folder, use_cache=not no_cache))
+    for remark in asking_remarks(loaded, plan):
+        console.print(remark, style="dim", markup=False, soft_wrap=True)
+    if dry_run:
         return 0
     check_ready(plan)
     if not yes and not _agreed(console, plan, folder, use_cache=not no_cache):

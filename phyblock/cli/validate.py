@@ -15,6 +15,7 @@ from phyblock.cli.paths import UserPath, models_file_option
 from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
 from phyblock.resources import bundled
+from phyblock.run.asking import asking_remarks
 from phyblock.run.plan import make_plan
 from phyblock.specs import load_models, load_suite, suite_model
 
@@ -40,21 +41,24 @@ def command(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | N
     problems: list[Problem] = []
     for path in files:
         try:
-            told = _check(path, sets, models_file)
+            told, *remarks = _check(path, sets, models_file)
         except InputError as error:
             problems += error.problems
         else:
             console.print(f"{shown_path(path)}: {told}", markup=False, soft_wrap=True)
+            for remark in remarks:
+                console.print(f"  {remark}", markup=False, soft_wrap=True)
     if problems:
         raise InputError(problems)
 
 
-def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> str:
+def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[str]:
+    """What a sound file is, and what else is to be said of it."""
     if os.path.isdir(path):
         is_builtin = os.path.lexists(path / SCENES_FILE)
-        return _about(read_builtin(path) if is_builtin else read_official(path))
+        return [_about(read_builtin(path) if is_builtin else read_official(path))]
     if path.name == SCENES_FILE:
-        return _about(read_builtin(path.parent))
+        return [_about(read_builtin(path.parent))]
     if not os.path.isfile(path):
         path = find_suite(str(path))
     if not _is_suite(path):
@@ -62,12 +66,13 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> str:
         if not known:
             allowed = "a suite, or a models file with name: provider/model lines"
             raise SpecError(Problem(str(path), "names nothing", allowed=allowed))
-        return f"models file, {counted(len(known), 'model')}"
+        return [f"models file, {counted(len(known), 'model')}"]
     loaded = load_suite(path, sets, data_dir=bundled("benchmarks", "data"))
     plan = make_plan(loaded, load_models(find_models_file(models_file, path)))
     calls = plan.samples_per_model
     models = counted(len(plan.models), "model")
-    return f"suite {plan.suite.name}, {models}, {counted(calls, 'sample')} a model"
+    told = f"suite {plan.suite.name}, {models}, {counted(calls, 'sample')} a model"
+    return [told, *asking_remarks(loaded, plan)]
 
 
 def _is_suite(path: Path) -> bool:

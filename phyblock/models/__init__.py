@@ -25,6 +25,7 @@ from phyblock.models.cost import (
     price_of,
 )
 from phyblock.models.events import ModelEvent, Observer, Tell
+from phyblock.models.formats import takes_format
 from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import KeyStatus, api_key_status, server_address
 from phyblock.models.limits import Gate
@@ -68,4 +69,5 @@ __all__ = [
     "read_raw_reply",
     "reply_key",
     "server_address",
+    "takes_format",
 ]

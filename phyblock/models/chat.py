@@ -21,6 +21,7 @@ from phyblock.models.cache import former_key, reply_key
 from phyblock.models.config import ModelConfig, Price
 from phyblock.models.cost import Budget, Estimate, cost_usd, estimate, plausible
 from phyblock.models.events import EventKind, ModelEvent, Observer
+from phyblock.models.formats import FORMAT_HINT, refuses_format
 from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import hidden
 from phyblock.models.limits import ModelLimiter, Slot
@@ -74,6 +75,7 @@ class ChatModel:
         self._config = config
         self._parts = parts
         self._takes_seed = config.sends_seed != "never"
+        self._took_format = False
         self._unavailable: UnavailableError | None = None
 
     async def ask(self, request: Request) -> Reply:
@@ -212,17 +214,33 @@ class ChatModel:
         seed = request.seed if self._takes_seed else None
         call = Call(request.messages, params, seed)
         try:
-            reply = await self._send_paid(call, question)
+            reply = await self._send_formed(call, question)
         except SeedRefusedError as refusal:
             question.sent -= not refusal.sent
             if self._config.sends_seed == "always":
                 raise UnavailableError("the provider takes no seed, and seed is `always`") from None
             call = replace(call, seed=None)
-            reply = await self._send_paid(call, question)
+            reply = await self._send_formed(call, question)
             if self._takes_seed:
                 self._takes_seed = False
                 self._tell("seed_unsupported", "takes no seed: seeds are independent repeats")
         return replace(reply, seed_sent=call.seed is not None)
+
+    async def _send_formed(self, call: Call, question: _Question) -> Reply:
+        """Send; a provider that refuses the format of the answer would refuse it every time.
+
+        One that has taken it once means something else, as where it repeats the whole request.
+        """
+        try:
+            reply = await self._send_paid(call, question)
+        except ModelError as error:
+            is_sent = "response_format" in call.params and not self._took_format
+            if not is_sent or not refuses_format(error):
+                raise
+            why = f"{error} ({FORMAT_HINT})"
+            raise UnavailableError(why, status=error.status, sent=error.sent) from None
+        self._took_format = True
+        return reply
 
     async def _send_paid(self, call: Call, question: _Question) -> Reply:
         """Send with the call's greatest cost reserved in the budget.

@@ -10,7 +10,7 @@ from typing import Literal
 
 from phyblock.addresses import address_fault
 from phyblock.errors import Problem, SpecError
-from phyblock.words import SeedMode, TransportName
+from phyblock.words import SendMode, TransportName
 
 __all__ = [
     "DIRECT_PROVIDERS",
@@ -53,7 +53,8 @@ class ModelConfig:
     `tpm` are limits a minute, None for none. `price` None means litellm's price map is asked.
     `sends_seed`: `auto` sends seeds until the provider refuses, `always` takes a refusal as an
     error, `never` sends none. `revision` tells apart models of one id, as other weights behind
-    another address. `timeout_s` bounds a request from its first byte to the last of its
+    another address. With `sends_format` a request's `response_format` is sent, without it the
+    prompt alone says the form. `timeout_s` bounds a request from its first byte to the last of its
     answer, `most_body_bytes` that answer's body, packed and unpacked.
 
     Raises SpecError for an `api_base` that is no address, or that holds a key or a password.
@@ -71,8 +72,9 @@ class ModelConfig:
     tpm: int | None = None
     price: Price | None = None
     recording: Path | None = None
-    sends_seed: SeedMode = "auto"
+    sends_seed: SendMode = "auto"
     revision: str | None = None
+    sends_format: bool = False
     timeout_s: float = 600.0
     most_body_bytes: int = LARGEST_REPLY_BYTES
 
@@ -110,7 +112,7 @@ class ModelConfig:
     def identity(self) -> dict[str, object]:
         """The part that changes replies, JSON-able: not the limits, the price, the transport, nor
         at which address a server of one's own is. That it is no provider's does count, or the
-        replies of a stand-in would pass for the provider's.
+        replies of a stand-in would pass for the provider's. What a model has not is not said.
         """
         identity: dict[str, object] = {
             "kind": self.kind,
@@ -120,4 +122,8 @@ class ModelConfig:
             "sends_seed": self.sends_seed != "never",
             "recording": str(self.recording) if self.recording else None,
         }
-        return identity if self.revision is None else {**identity, "revision": self.revision}
+        if self.revision is not None:
+            identity["revision"] = self.revision
+        if self.sends_format:
+            identity["response_format"] = True
+        return identity

@@ -29,6 +29,7 @@ __all__ = [
     "cost_usd",
     "estimate",
     "is_billed",
+    "map_entry",
     "most_usd",
     "plausible",
     "price_of",
@@ -72,7 +73,7 @@ def price_of(config: ModelConfig) -> Price | None:
         return Price(0.0, 0.0)
     if config.price is not None:
         return config.price
-    entry = _map_entry(config)
+    entry = map_entry(config)
     if "input_cost_per_token" not in entry or "output_cost_per_token" not in entry:
         return None
     return Price(
@@ -130,7 +131,7 @@ def estimate(config: ModelConfig, request: Request) -> Estimate:
     pictures = sum(picture_tokens(config.id, part) for part in parts if isinstance(part, Image))
     params = wire_params(config, request)
     given = params.get("max_completion_tokens", params.get("max_tokens"))
-    known = _map_entry(config).get("max_output_tokens")
+    known = map_entry(config).get("max_output_tokens")
     most = next((n for n in (given, known) if isinstance(n, int)), _LONGEST_REPLY_TOKENS)
     prompt = math.ceil(text / _CHARS_PER_TOKEN) + pictures
     thinks = params.get("reasoning_effort", "none") != "none" or (
@@ -173,8 +174,10 @@ def _price_map() -> dict[str, dict[str, Any]]:
     return entries
 
 
-def _map_entry(config: ModelConfig) -> dict[str, Any]:
-    """The map's entry by full id, or by bare name where the provider is the same."""
+def map_entry(config: ModelConfig) -> dict[str, Any]:
+    """What litellm's map says of a model, by full id, or by bare name where the provider is the
+    same; empty where it does not know it.
+    """
     entries = _price_map()
     if config.id in entries:
         return entries[config.id]

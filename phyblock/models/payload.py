@@ -69,8 +69,12 @@ def json_body(fields: Mapping[str, Any], messages: tuple[Message, ...]) -> bytes
 
 
 def wire_params(config: ModelConfig, request: Request) -> dict[str, Any]:
-    """Sampling parameters to send: the request's, overridden by the model's; None is not sent."""
+    """What to send beside the messages: the request's sampling parameters, overridden by the
+    model's, and the format of the answer where the model takes one; None is not sent.
+    """
     merged = {**request.params, **config.params}
+    if config.sends_format and request.response_format is not None:
+        merged["response_format"] = request.response_format
     return {name: value for name, value in merged.items() if value is not None}
 
 

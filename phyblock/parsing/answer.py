@@ -14,6 +14,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from phyblock.parsing.answer_form import FormProblem
 from phyblock.parsing.answer_order import OrderReader
 from phyblock.parsing.answer_patterns import (
     BOX,
@@ -56,11 +57,13 @@ __all__ = ["ParsedAnswer", "parse_answer"]
 class ParsedAnswer:
     """What was read out of a reply: one letter, or for ordering all letters in order.
 
-    `rule` names the rule that matched; both are None where nothing could be read.
+    `rule` names the rule that matched; both are None where nothing could be read. `problem` says
+    why where JSON was asked for and what came is none, or another.
     """
 
     letters: str | None
     rule: str | None
+    problem: FormProblem | None = None
 
 
 def parse_answer(text: str, options: Sequence[str], is_ordering: bool) -> ParsedAnswer:

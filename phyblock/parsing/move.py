@@ -15,12 +15,13 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from phyblock.parsing.answer_form import FormProblem
 from phyblock.parsing.statement import read_statement
 from phyblock.parsing.text_forms import answer_of
 
 __all__ = ["MOVE_PROBLEMS", "MOVE_RULES", "MoveProblem", "ParsedMove", "parse_move"]
 
-MoveProblem = Literal["empty", "no_move", "several_moves", "move_and_done"]
+MoveProblem = Literal["empty", "no_move", "several_moves", "move_and_done", FormProblem]
 MOVE_PROBLEMS: tuple[MoveProblem, ...] = get_args(MoveProblem)
 
 

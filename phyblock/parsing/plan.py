@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from phyblock.domain import Plan
+from phyblock.parsing.answer_form import FormProblem
 from phyblock.parsing.listing import Listing, listings
 from phyblock.parsing.plan_patterns import (
     AGAIN,
@@ -35,9 +36,11 @@ from phyblock.parsing.plan_rank import LAST, MOVES, rank_of
 from phyblock.parsing.text_forms import BACKWARD, answer_of
 from phyblock.words import PlanParser
 
-__all__ = ["PLAN_PROBLEMS", "ParsedPlan", "PlanProblem", "parse_plan"]
+__all__ = ["PLAN_PROBLEMS", "ParsedPlan", "PlanProblem", "kept_plan", "parse_plan"]
 
-PlanProblem = Literal["empty", "thoughts_only", "refusal", "catalogue", "two_plans", "no_plan"]
+PlanProblem = Literal[
+    "empty", "thoughts_only", "refusal", "catalogue", "two_plans", "no_plan", FormProblem
+]
 PLAN_PROBLEMS: tuple[PlanProblem, ...] = get_args(PlanProblem)
 
 
@@ -61,7 +64,11 @@ def parse_plan(text: str, n_candidates: int, parser: PlanParser = "steps") -> Pa
     read = _official(text) if parser == "official" else _steps(text)
     if isinstance(read, str):
         return ParsedPlan(Plan(), None, problem=read)
-    rule, numbers = read
+    return kept_plan(*read, n_candidates)
+
+
+def kept_plan(rule: str, numbers: Sequence[int], n_candidates: int) -> ParsedPlan:
+    """The plan that numbers read by a rule are; those that no candidate has are dropped."""
     kept = tuple(n for n in numbers if 1 <= n <= n_candidates)
     return ParsedPlan(Plan(kept), rule, tuple(n for n in numbers if not 1 <= n <= n_candidates))
 

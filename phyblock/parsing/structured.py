@@ -11,7 +11,18 @@ from typing import Any
 from phyblock.parsing.statement import MOST_AT_ONCE, chain, read_statement
 from phyblock.parsing.text_forms import BACKWARD, plain_line
 
-__all__ = ["Found", "find_json", "find_tables", "objects", "whole_number"]
+__all__ = [
+    "LONGEST_NUMBER",
+    "Fields",
+    "Found",
+    "find_json",
+    "find_tables",
+    "objects",
+    "whole_number",
+]
+
+LONGEST_NUMBER = 6
+"""Digits of a number that can be one of a block."""
 
 _MOST_VALUES = 100
 """JSON values that are tried, from the end: a reply that opens brackets for pages is still read."""
@@ -87,7 +98,7 @@ class Found:
     numbers: tuple[int, ...]
 
 
-class _Fields(list[tuple[str, Any]]):
+class Fields(list[tuple[str, Any]]):
     """The fields of a JSON object in order, keys that occur twice included."""
 
 
@@ -108,7 +119,7 @@ def find_json(text: str) -> list[Found]:
     """The plans and catalogues that stand in a text as JSON."""
     found = []
     for start, end, value in objects(text):
-        is_array = isinstance(value, list) and not isinstance(value, _Fields)
+        is_array = isinstance(value, list) and not isinstance(value, Fields)
         if is_array and not any(isinstance(item, (list, str)) for item in value):
             # An array of numbers is what its line says that it is.
             continue
@@ -140,7 +151,7 @@ def _decoded(piece: str) -> Any:
     usual = _TRAILING_COMMA.sub("", _COMMENT.sub("", piece))
     for way in (piece, usual, usual.replace("'", '"')):
         try:
-            return json.loads(way, object_pairs_hook=_Fields)
+            return json.loads(way, object_pairs_hook=Fields)
         except (ValueError, RecursionError):
             continue
     return None
@@ -148,7 +159,7 @@ def _decoded(piece: str) -> Any:
 
 def _read(value: Any, *, is_plan: bool) -> list[int]:
     """The blocks of a value; `is_plan`: a key said that it is one, so that numbers are blocks."""
-    if isinstance(value, _Fields):
+    if isinstance(value, Fields):
         return _object(value, is_plan=is_plan)
     if isinstance(value, list):
         return _items(value)
@@ -163,7 +174,7 @@ def _line(text: str) -> Sequence[int]:
     return chain(line)[0] or read_statement(line, is_item=True).numbers
 
 
-def _object(fields: _Fields, *, is_plan: bool) -> list[int]:
+def _object(fields: Fields, *, is_plan: bool) -> list[int]:
     if _is_step(fields):
         return _step(fields)
     found = _ordered(fields, is_plan=is_plan)
@@ -174,7 +185,7 @@ def _object(fields: _Fields, *, is_plan: bool) -> list[int]:
     return found[::-1] if is_reversed else found
 
 
-def _ordered(fields: _Fields, *, is_plan: bool) -> list[int]:
+def _ordered(fields: Fields, *, is_plan: bool) -> list[int]:
     """The blocks of an object of steps, layers or plans, in the order in which they stand."""
     steps = [(match, value) for key, value in fields if (match := _STEP_KEY.fullmatch(key.strip()))]
     plans = [value for key, value in fields if _PLAN_KEY.fullmatch(key.strip())]
@@ -207,7 +218,7 @@ def _tier(key: str) -> int | None:
 
 
 def _items(items: list[Any]) -> list[int]:
-    steps = [item for item in items if isinstance(item, _Fields)]
+    steps = [item for item in items if isinstance(item, Fields)]
     if steps and len(steps) == len(items) and all(_is_step(step) for step in steps):
         looks = all(any(_LOOKS_KEY.fullmatch(k) for k, _ in step) for step in steps)
         numbers = [n for step in steps for n in _step(step)]
@@ -221,27 +232,27 @@ def _items(items: list[Any]) -> list[int]:
     return [number for item in items for number in _read(item, is_plan=True)]
 
 
-def _is_step(fields: _Fields) -> bool:
+def _is_step(fields: Fields) -> bool:
     """Whether an object is one step: it has the number of a block, some, or an action."""
-    keys = {key.strip() for key, value in fields if not isinstance(value, _Fields)}
+    keys = {key.strip() for key, value in fields if not isinstance(value, Fields)}
     named = any(_INDEX_KEY.fullmatch(k) or _MANY_KEY.fullmatch(k) for k in keys)
     acts = any(_ACTION_KEY.fullmatch(k) for k in keys)
     placed = any(_PLACE_KEY.fullmatch(k) for k in keys)
-    alone = any(isinstance(v, (list, _Fields)) for k, v in fields if _PLAN_KEY.fullmatch(k.strip()))
+    alone = any(isinstance(v, (list, Fields)) for k, v in fields if _PLAN_KEY.fullmatch(k.strip()))
     return not alone and ((named and (placed or acts or _one(fields))) or (acts and placed))
 
 
-def _one(fields: _Fields) -> bool:
+def _one(fields: Fields) -> bool:
     return any(
-        _INDEX_KEY.fullmatch(k.strip()) and not isinstance(v, (list, _Fields)) for k, v in fields
+        _INDEX_KEY.fullmatch(k.strip()) and not isinstance(v, (list, Fields)) for k, v in fields
     )
 
 
-def _place(fields: _Fields) -> int | None:
+def _place(fields: Fields) -> int | None:
     return next((whole_number(v) for k, v in fields if _PLACE_KEY.fullmatch(k.strip())), None)
 
 
-def _step(fields: _Fields) -> list[int]:
+def _step(fields: Fields) -> list[int]:
     """The blocks of one step: by its index, else by a list of them, else by what it does."""
     found: list[int] = []
     for pattern in (_INDEX_KEY, _MANY_KEY, _ACTION_KEY):

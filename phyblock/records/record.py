@@ -13,7 +13,7 @@ from pydantic import Field
 
 from phyblock.records.line import Amount, Line, Whole
 from phyblock.records.reply import StoredError, StoredReply
-from phyblock.words import Outcome
+from phyblock.words import AskedAs, Outcome
 
 __all__ = [
     "AskedTurn",
@@ -134,6 +134,9 @@ class Record(Line):
     """Digest of the run that it belongs to; older records have none."""
     shown: ShownScene | None = None
     """How the scene was shown; null: as the file has it."""
+    asked: AskedAs | None = None
+    """How an answer in JSON was asked for: in the `prompt` alone, or in the request's
+    `response_format` too; null: a text was asked for, or nobody was asked."""
     counts: dict[str, tuple[Amount, ...]] = Field(default_factory=dict)
     """By name, what was counted for measures beside `scores`."""
 
@@ -235,3 +238,5 @@ class Recorded(Line):
     """The error."""
     shown: ShownScene | None = None
     """How the item was shown."""
+    asked: AskedAs | None = None
+    """How an answer in JSON was asked for."""

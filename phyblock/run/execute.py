@@ -171,7 +171,7 @@ class Executor:
 
     async def _one(self, planned: PlannedModel, sample: Sample) -> None:
         model = self._models[planned.name]
-        record = await self._samples.record(sample, model, planned.config.params)
+        record = await self._samples.record(sample, model, planned.config)
         await self._writer.put(record)
         self.result.settled += record.is_final
         self.result.failed += record.is_final and not record.is_answered

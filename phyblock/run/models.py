@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from phyblock.datasets import recorded_models
 from phyblock.datasets.published_names import match_published
 from phyblock.errors import Problem, SpecError
-from phyblock.models import ModelConfig, Price, server_address
+from phyblock.models import ModelConfig, Price, server_address, takes_format
 from phyblock.records import RECORDS, RecordedLines
 from phyblock.registry import baseline_names
 from phyblock.specs import (
@@ -20,9 +20,9 @@ from phyblock.specs import (
     did_you_mean,
     resolve_models,
 )
-from phyblock.words import CandidateOrder
+from phyblock.words import AnswerFormat, CandidateOrder
 
-__all__ = ["PlannedModel", "plan_models", "recorded_order", "to_config"]
+__all__ = ["PlannedModel", "plan_models", "recorded_format", "recorded_order", "to_config"]
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,12 @@ def recorded_order(folder: Path) -> CandidateOrder:
     return "shuffled"
 
 
+def recorded_format(folder: Path) -> AnswerFormat:
+    """The form in which a recorded model was asked to answer; raw replies are texts."""
+    lines = RecordedLines(folder / RECORDS) if (folder / RECORDS).is_file() else ()
+    return "json_schema" if any(record.asked for _, record in lines) else "text"
+
+
 def _check_known(names: Sequence[str], known: Sequence[str], message: str) -> None:
     problems = [
         Problem("--models", message, "", name, hint=did_you_mean(name, known))
@@ -99,7 +105,7 @@ def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfi
     params = spec.params(suite.sampling)
     if spec.extra_body:
         params["extra_body"] = spec.extra_body
-    return ModelConfig(
+    config = ModelConfig(
         name=name,
         kind="litellm",
         id=spec.id,
@@ -115,6 +121,22 @@ def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfi
         revision=spec.revision,
         timeout_s=spec.timeout_s or suite.limits.timeout_s,
     )
+    return replace(config, sends_format=_sends_format(config, spec, suite))
+
+
+def _sends_format(config: ModelConfig, spec: ModelSpec, suite: SuiteSpec) -> bool:
+    """Whether the JSON schema of answers is sent; SpecError for a model that says its own."""
+    mode = spec.response_format
+    if suite.answer_format == "text" or mode == "never":
+        return False
+    if mode == "auto" and not takes_format(config):
+        return False
+    if "response_format" in spec.extra_body:
+        message = "says its own response_format, where the suite asks for one"
+        hint = "take it out of extra_body, or set response_format: never to send it all the same"
+        field = "extra_body.response_format"
+        raise SpecError(Problem(f"model {config.name}", message, field, hint=hint))
+    return True
 
 
 def _replay(name: str, folder: Path) -> ModelConfig:

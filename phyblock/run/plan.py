@@ -11,12 +11,12 @@ from phyblock.errors import Problem, SpecError
 from phyblock.records import Manifest
 from phyblock.run.data import open_dataset
 from phyblock.run.manifest import make_manifest
-from phyblock.run.models import PlannedModel, plan_models, recorded_order
+from phyblock.run.models import PlannedModel, plan_models, recorded_format, recorded_order
 from phyblock.run.samples import Sample
 from phyblock.specs import LoadedSuite, ModelSpec, SuiteSpec
 from phyblock.tracks import AnyTrack, EpisodeTrack, Opening, kind_of, open_tracks
 from phyblock.tracks.selection import select_tasks
-from phyblock.words import CandidateOrder
+from phyblock.words import AnswerFormat, CandidateOrder
 
 __all__ = ["RunPlan", "make_plan"]
 
@@ -87,7 +87,7 @@ def make_plan(
     models = plan_models(loaded, known, only)
     asks = any(model.config.kind != "replay" for model in models)
     tracks = open_tracks(Opening(loaded, dataset, limit, asks), suite.tracks)
-    _check_models(models, tracks, suite.candidates.order)
+    _check_models(models, tracks, suite.candidates.order, suite.answer_format)
     tasks = select_tasks(dataset.tasks, suite.levels, limit)
     selected = replace(dataset, tasks=tasks)
     if not any(track.items for track in tracks):
@@ -109,10 +109,13 @@ def _nothing(loaded: LoadedSuite, dataset: Dataset, limit: int | None) -> Proble
 
 
 def _check_models(
-    models: Sequence[PlannedModel], tracks: Sequence[AnyTrack], order: CandidateOrder
+    models: Sequence[PlannedModel],
+    tracks: Sequence[AnyTrack],
+    order: CandidateOrder,
+    asked: AnswerFormat,
 ) -> None:
     """Every model can answer what every track asks, means the numbers that are shown, and is not
-    taken for another.
+    taken for another; a recording was asked in the form in which it is read.
     """
     problems = _alike(models)
     for model in models:
@@ -125,6 +128,9 @@ def _check_models(
             if recorded is not None and (found := recorded_order(recorded)) != order:
                 message = f"is a recording of candidates in the order {found}"
                 problems.append(Problem(where, message, "candidates.order", order, found))
+            if recorded is not None and (form := recorded_format(recorded)) != asked:
+                message = f"is a recording of answers that were asked for as {form}"
+                problems.append(Problem(where, message, "answer_format", asked, form))
             able = kind_of(track.name).baselines
             if model.config.kind != "baseline" or model.config.id in able:
                 continue

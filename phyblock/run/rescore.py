@@ -10,7 +10,7 @@ from pathlib import Path
 import yaml
 from pydantic import ValidationError
 
-from phyblock.errors import Problem, StoreError
+from phyblock.errors import Problem, SpecError, StoreError
 from phyblock.files import atomic_write, writing
 from phyblock.parsing import reader_version
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
@@ -40,9 +40,9 @@ def rescore(
     The new folder (`<run>/scores/<parser>-<matcher>` when `out` is None) holds a manifest and
     records like any run, so that tables and notebooks read it. Parser and matcher are those of
     plans. Of other tracks, what measures count of each sample is counted again; where nothing is,
-    their records are taken over as they are. `data` is where the data set is now,
-    if it has moved. Raises StoreError for a folder that is no run or cannot be written, DataError
-    when the data are not what the run was made on.
+    their records are taken over as they are. `data` is where the data set is now, if it has moved.
+    Raises SpecError for a parser that cannot read what was asked for, StoreError for a folder that
+    is no run or cannot be written, DataError when the data are not what the run was made on.
     """
     manifest = read_manifest(folder)
     suite = _suite(folder, manifest, parser, matcher)
@@ -117,11 +117,16 @@ def _suite(
         if matcher is not None:
             matchers = (matcher, *(name for name in matchers if name != matcher))
         scoring = suite.scoring.model_copy(update={"matchers": matchers})
-        return suite.model_copy(update={"scoring": scoring, "parser": parser or suite.parser})
+        changed = {"scoring": scoring, "parser": parser or suite.parser}
+        suite = suite.model_copy(update=changed)
     except ValidationError as error:
         hint = "run.yaml is written by `phyblock run` and is never edited"
         problem = Problem(str(folder / MANIFEST), "is missing or wrong", "suite", hint=hint)
         raise StoreError(problem) from error
+    if parser == "official" and suite.answer_format == "json_schema":
+        message = "asked for JSON, which the official expression does not read"
+        raise SpecError(Problem(str(folder), message, "--parser", parser, "steps"))
+    return suite
 
 
 def _write(folder: Path, manifest: Manifest, records: Sequence[Record]) -> None:

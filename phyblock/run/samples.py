@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
-from phyblock.models import Halt, Model, Reply, Request, Usage
+from phyblock.models import Halt, Model, ModelConfig, Reply, Request, Usage
 from phyblock.models.stored import reply_of, stored
 from phyblock.records import Record, SentPrompt, StoredReply, Turn
 from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, begun, judged
 from phyblock.run.writer import RecordWriter
 from phyblock.tracks import AnyTrack, Episode, EpisodeTrack, Item, SingleTrack, shown_item
+from phyblock.words import AskedAs
 
 __all__ = ["Sample", "SampleRunner"]
 
@@ -60,7 +61,7 @@ class SampleRunner:
         self._earlier = earlier
         self._run = run
 
-    async def record(self, sample: Sample, model: Model, params: Mapping[str, object]) -> Record:
+    async def record(self, sample: Sample, model: Model, config: ModelConfig) -> Record:
         """Ask, and say what came of it.
 
         Raises UnavailableError, BudgetReachedError and HaltedError as models do, and what making
@@ -68,22 +69,23 @@ class SampleRunner:
         """
         sample = sample.shown()
         if isinstance(sample.track, EpisodeTrack):
-            return await self._play(sample, sample.track, model, params)
-        return await self._ask(sample, sample.track, model, params)
+            return await self._play(sample, sample.track, model, config)
+        return await self._ask(sample, sample.track, model, config)
 
     async def _ask(
         self,
         sample: Sample,
         track: SingleTrack[Any],
         model: Model,
-        params: Mapping[str, object],
+        config: ModelConfig,
     ) -> Record:
         with self._halt.giving_up():
             request = await track.request(
-                sample.item, sample.seed, params, with_messages=model.needs_messages
+                sample.item, sample.seed, config.params, with_messages=model.needs_messages
             )
         answer = await _answer(model.ask(request))
-        fields = {**self._begin(sample, answer), "prompt": self._prompt(track, request)}
+        fields = self._begin(sample, answer) | _asked(config, request)
+        fields["prompt"] = self._prompt(track, request)
         judgement = track.judge(sample.item, answer.text if isinstance(answer, Reply) else None)
         return judged(fields, sample.item, judgement)
 
@@ -92,14 +94,18 @@ class SampleRunner:
         sample: Sample,
         track: EpisodeTrack[Any],
         model: Model,
-        params: Mapping[str, object],
+        config: ModelConfig,
     ) -> Record:
-        episode = track.start(sample.item, sample.seed, params, with_messages=model.needs_messages)
+        episode = track.start(
+            sample.item, sample.seed, config.params, with_messages=model.needs_messages
+        )
+        asked: dict[str, AskedAs] = {}
         earlier = [reply_of(line) for line in self._earlier.get(sample.id, ())]
         turns: list[dict[str, Any]] = []
         replies: list[Reply] = []
         answer: Reply | ModelError | None = None
         while (request := await self._next(episode)) is not None:
+            asked = _asked(config, request)
             turn = {"prompt": self._prompt(track, request)}
             if len(replies) < len(earlier):
                 answer = earlier[len(replies)]
@@ -116,22 +122,23 @@ class SampleRunner:
             replies.append(answer)
             episode.take(request, answer)
         failed = answer if isinstance(answer, ModelError) else None
-        return self._ended(sample, episode, turns, replies, failed)
+        fields = self._begin(sample, failed) | asked
+        return self._ended(fields, sample.item, episode, turns, replies)
 
     def _ended(
         self,
-        sample: Sample,
+        begun: Mapping[str, Any],
+        item: Item,
         episode: Episode,
         turns: Sequence[Mapping[str, Any]],
         replies: Sequence[Reply],
-        failed: ModelError | None,
     ) -> Record:
-        fields = self._begin(sample, failed)
+        fields = dict(begun)
         fields["reply"] = stored(_pooled(replies)) if replies else None
         fields["prompt"] = turns[0]["prompt"] if turns else None
         both = zip(turns, episode.fields()["turns"], strict=True)
         whole = [{"n": n, **turn, **more} for n, (turn, more) in enumerate(both, 1)]
-        return judged(fields, sample.item, episode, {"turns": whole})
+        return judged(fields, item, episode, {"turns": whole})
 
     async def _next(self, episode: Episode) -> Request | None:
         with self._halt.giving_up():
@@ -146,6 +153,13 @@ class SampleRunner:
         name, item = sample.track.name, sample.item
         fields = begun(sample.id, name, sample.model, item, sample.seed, answer)
         return {**fields, "run": self._run, **sample.track.about(item)}
+
+
+def _asked(config: ModelConfig, request: Request) -> dict[str, AskedAs]:
+    """What a record says of a request for JSON; nothing where none was made of anyone."""
+    if request.response_format is None or config.kind != "litellm":
+        return {}
+    return {"asked": "response_format" if config.sends_format else "prompt"}
 
 
 async def _answer(asked: Awaitable[Reply | None]) -> Reply | ModelError | None:

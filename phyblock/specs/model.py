@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, JsonValue, model_validator
 from phyblock.addresses import address_fault
 from phyblock.specs.fields import Count, MaxTokens, Section, Temperature, TimeoutS, TopP, refuse
 from phyblock.specs.sections import SamplingSpec
-from phyblock.words import SeedMode, TransportName
+from phyblock.words import SendMode, TransportName
 
 __all__ = ["ModelSpec", "PriceSpec"]
 
@@ -130,10 +130,16 @@ class ModelSpec(Section):
     price: PriceSpec | None = Field(
         default=None, description="Price; null: litellm's price map, or unknown."
     )
-    seed: SeedMode = Field(
+    seed: SendMode = Field(
         default="auto",
         description="auto: seeds are sent until the provider refuses one, then repeats are "
         "independent. always: a refused seed is an error. never: none is sent.",
+    )
+    response_format: SendMode = Field(
+        default="auto",
+        description="With answer_format: json_schema in the suite. auto: the schema is sent where "
+        "litellm knows the model to take one, and to OpenAI-compatible servers named by api_base. "
+        "always, never: whatever is known. The prompt says the form all the same.",
     )
     timeout_s: TimeoutS | None = Field(
         default=None, description="Longest wait for one reply [s]; null: the suite's."

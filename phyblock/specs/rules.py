@@ -40,6 +40,10 @@ def _unofficial(get: Get) -> bool:
     return bool(get("dataset.format") != "official")
 
 
+def _asks_json(get: Get) -> bool:
+    return bool(get("answer_format") == "json_schema")
+
+
 _SET_OFFICIAL = "set dataset.format to official and dataset.path to a checkout"
 
 RULES = (
@@ -60,6 +64,24 @@ RULES = (
         lambda get: get("prompt") == "official" and _unofficial(get),
         "the official prompt is read out of a checkout of the official repository",
         _SET_OFFICIAL + ", or use prompt: default",
+    ),
+    Rule(
+        ("answer_format", "prompt"),
+        lambda get: _asks_json(get) and get("prompt") == "official",
+        "the official prompt asks for lines of text",
+        "use prompt: default, or answer_format: text",
+    ),
+    Rule(
+        ("answer_format", "models"),
+        lambda get: _asks_json(get) and get("models") == "recorded",
+        "recorded replies were asked for in text",
+        "use answer_format: text, or list the models",
+    ),
+    Rule(
+        ("parser", "answer_format"),
+        lambda get: _asks_json(get) and get("parser") == "official",
+        "the official expression reads no JSON",
+        "use parser: steps, or answer_format: text",
     ),
     Rule(
         ("images.source", "dataset.format"),

@@ -38,6 +38,7 @@ from phyblock.specs.sections import (
     ScoringSpec,
 )
 from phyblock.words import (
+    AnswerFormat,
     PlanParser,
     Setting,
 )
@@ -144,6 +145,11 @@ class SuiteSpec(Section):
         description="default; official (read out of the official checkout); or the path of a .j2 "
         "template, relative to the suite file.",
     )
+    answer_format: AnswerFormat = Field(
+        default="text",
+        description="text: lines of text. json_schema: one JSON object, of which the prompt says "
+        "the schema; it is sent as response_format too where the provider takes one.",
+    )
     images: ImagesSpec = Field(
         default_factory=ImagesSpec, description="Which pictures a model is shown."
     )
@@ -190,13 +196,16 @@ class SuiteSpec(Section):
 
         Leaves out description, limits and tables, sections of tracks that are not run, models and
         paths (of data and templates): a run stores which models were run, and the hashes of what
-        stands at the paths, which say more and survive a move.
+        stands at the paths, which say more and survive a move. What is asked for in text says
+        nothing of the format, as suites did before there was another.
         """
         sections = {kind.section[0]: name for name, kind in known_tracks().items() if kind.section}
         idle = {key for key, track in sections.items() if track not in self.tracks}
         spec = self.model_dump(
             mode="json", exclude={"description", "limits", "models", "tables", *idle}
         )
+        if self.answer_format == "text":
+            del spec["answer_format"]
         for section in ("dataset", *sections):
             spec.get(section, {}).pop("path", None)
         for part in (spec, *(spec[key] for key in sections if key in spec)):

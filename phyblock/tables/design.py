@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 from phyblock.errors import Problem, StoreError
 from phyblock.registry import known_tracks, table_names
 from phyblock.tables.outcomes import WITHOUT_REPLY
-from phyblock.words import CandidateOrder, Criterion, MissingPolicy
+from phyblock.words import AnswerFormat, CandidateOrder, Criterion, MissingPolicy
 
 __all__ = ["OVERALL", "Design", "SectionT", "read_design", "read_section"]
 
@@ -46,6 +46,7 @@ class _Suite(_Part):
     settings: tuple[str, ...] = Field(min_length=1)
     seeds: tuple[int, ...] = Field(min_length=1)
     candidates: _Candidates = _Candidates()
+    answer_format: AnswerFormat = "text"
     scoring: _Scoring
     tables: tuple[str, ...] = Field(default_factory=table_names)
 

@@ -1,4 +1,6 @@
-"""What is unusual about how a run showed what it asked about, as captions say it."""
+"""What is unusual about how a run showed what it asked about, and in which form it asked, as
+captions say it.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +14,18 @@ __all__ = ["captioned", "control_words", "marked", "planning_words"]
 _CONTROLS = {"blind": "blind", "wrong_image": "pictures of another scene"}
 """What captions say of the controls that sections of tracks may set."""
 _ORDERS = {"shuffled": "candidates shuffled"}
+_FORMATS = {"json_schema": "answers asked for as JSON"}
 
 
 def control_words(run: Run, section: str) -> tuple[str, ...]:
-    """The controls that a track's section of the suite sets; older runs have no such section."""
+    """The controls that a track's section of the suite sets, and a form of answers other than text.
+
+    Older runs have no such section.
+    """
     held = run.manifest.suite.get(section) or {}
-    return tuple(words for name, words in _CONTROLS.items() if held.get(name))
+    form = _FORMATS.get(run.design.suite.answer_format)
+    controls = (words for name, words in _CONTROLS.items() if held.get(name))
+    return (*controls, *((form,) if form else ()))
 
 
 def planning_words(run: Run, section: str) -> tuple[str, ...]:

@@ -43,7 +43,8 @@ class TrackKind:
     type that the rules of its `baselines` take, with a random generator, to answer in the
     benchmark's own reply form. `section` is the key, model and description of the part of a suite
     that is its own. `template` is the bundled prompt, None where it has none, and `prompt_field`
-    where a suite names another. `own_data` gives the folder of data of its own as a suite says it,
+    where a suite names another; `json_template` is the one that asks for JSON, None where the track
+    asks for text alone. `own_data` gives the folder of data of its own as a suite says it,
     `manifest` what the manifest says beyond what all tracks have. `own_root` tells where a run
     found these data. With `rescored`, what its replies are worth depends on the suite's parser and
     matchers, and `phyblock score` judges them again even where no measure counts samples. With
@@ -59,6 +60,7 @@ class TrackKind:
     report: Callable[[], TrackReport]
     subject: type[object]
     template: Path | None = None
+    json_template: Path | None = None
     record: type[Record] | None = None
     prompt_field: tuple[str, ...] = ("prompt",)
     section: tuple[str, type[BaseModel], str] | None = None

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from phyblock.datasets import AssemblyTask
+from phyblock.errors import Problem, SpecError
 from phyblock.resources import cache_dir
 from phyblock.sim import PictureStyle
 from phyblock.specs import LoadedSuite, SuiteSpec
@@ -38,6 +39,13 @@ def open_tracks(opening: Opening, names: Sequence[str]) -> tuple[AnyTrack, ...]:
 
     Raises SpecError, DataError or PromptError with what is wrong.
     """
+    loaded = opening.loaded
+    if loaded.suite.answer_format == "json_schema":
+        lacking = [name for name in names if kind_of(name).json_template is None]
+        if lacking:
+            where, message = loaded.where("answer_format"), "cannot be asked for as JSON"
+            found, hint = f"track {', '.join(lacking)}", "use answer_format: text"
+            raise SpecError(Problem(where, message, "answer_format", found, hint=hint))
     return tuple(kind_of(name).open(opening) for name in names)
 
 
@@ -79,14 +87,15 @@ def task_showing(
 
 
 def template_prompt(loaded: LoadedSuite, name: str) -> TemplatePrompt:
-    """The prompt of a track: the suite's own template, else the bundled one.
+    """The prompt of a track: the suite's own template, else the bundled one for its format.
 
     Raises PromptError for a broken one.
     """
     path = loaded.templates.get(name)
     if path is not None:
         return TemplatePrompt(path, path.stem)
-    own = kind_of(name).template
+    kind = kind_of(name)
+    own = kind.template if loaded.suite.answer_format == "text" else kind.json_template
     assert own is not None, f"{name} has no prompt of its own"
     return TemplatePrompt(own, "default")
 

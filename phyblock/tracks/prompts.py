@@ -3,23 +3,49 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import jinja2
+import jinja2.meta
 
 from phyblock.bounded import read_text
 from phyblock.errors import Problem, PromptError, said
 from phyblock.models.base import Image, Message
+from phyblock.parsing import AnswerForm
 from phyblock.tracks.template_bounds import BoundedEnvironment, render_block
 
-__all__ = ["OfficialPrompt", "Prompt", "TemplatePrompt"]
+__all__ = [
+    "FORM_FACTS",
+    "OfficialPrompt",
+    "Prompt",
+    "TemplatePrompt",
+    "form_facts",
+    "response_format",
+]
+
+FORM_FACTS = ("answer_schema", "answer_example")
+"""The names by which templates say the JSON that is asked for."""
 
 _BLOCKS = ("system", "user")
 _LARGEST_BYTES = 256 * 1024
+
+
+def form_facts(form: AnswerForm[Any] | None) -> dict[str, object]:
+    """What templates may use of the form of the answer; None is a form of their own, in text."""
+    if form is None:
+        return {"answer_format": "text", **dict.fromkeys(FORM_FACTS)}
+    told = (json.dumps(form.schema), form.example)
+    return {"answer_format": "json_schema", **dict(zip(FORM_FACTS, told, strict=True))}
+
+
+def response_format(form: AnswerForm[Any] | None) -> Mapping[str, object] | None:
+    """What a request says of the form of the answer; nothing for text."""
+    return None if form is None else form.response_format
 
 
 class Prompt(Protocol):
@@ -79,6 +105,7 @@ class TemplatePrompt:
         except ValueError as error:
             raise PromptError(Problem(str(path), f"cannot be read: it {error}")) from error
         self.version = _digest(source)
+        self._source = source
         try:
             self._template = BoundedEnvironment().bounded_template(source)
         except jinja2.TemplateSyntaxError as error:
@@ -88,6 +115,12 @@ class TemplatePrompt:
             # Python compiles what Jinja makes of it, and has bounds of its own.
             raise PromptError(Problem(str(path), f"is not valid Jinja: {said(error)}")) from error
         self.require("user", "and, if wanted, a block system")
+
+    @property
+    def says_form(self) -> bool:
+        """Whether it uses a name that tells the JSON that is asked for."""
+        names = jinja2.meta.find_undeclared_variables(jinja2.Environment().parse(self._source))
+        return not names.isdisjoint(FORM_FACTS)
 
     def require(self, block: str, more: str) -> None:
         """Raise PromptError where the template lacks a block; `more` is told of what is allowed."""

@@ -31,6 +31,7 @@ TRACK = TrackKind(
     section=("full_planning", PlanningSpec, "How scenes are shown in the full_planning track."),
     record=PlanRecord,
     template=bundled("prompts", "full_planning.j2"),
+    json_template=bundled("prompts", "full_planning_json.j2"),
     counted=(POSE_COUNTS,),
     tables=("assembly", "table1", "errors"),
     rescored=True,

@@ -35,7 +35,8 @@ def _rules(suite: SuiteSpec) -> PlanningRules:
     """How a suite reads and scores plans."""
     level1 = suite.scoring.level1
     criterion = None if level1 == "aov" else level1
-    return PlanningRules(suite.parser, suite.settings, suite.scoring.matchers, criterion)
+    matchers, asked = suite.scoring.matchers, suite.answer_format
+    return PlanningRules(suite.parser, suite.settings, matchers, criterion, asked)
 
 
 def _prompt(loaded: LoadedSuite) -> Prompt:

@@ -12,14 +12,21 @@ from typing import Any
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
 from phyblock.models.base import Image, Request
-from phyblock.parsing import ParsedPlan, parse_plan, reader_version
+from phyblock.parsing import (
+    AnswerForm,
+    ParsedPlan,
+    parse_asked_plan,
+    parse_plan,
+    plan_form,
+    reader_version,
+)
 from phyblock.scoring import AssemblyScorer, Score
 from phyblock.tracks.full_planning.baselines import PlanSubject
 from phyblock.tracks.full_planning.guessing import BlindGuesses
 from phyblock.tracks.pictures import Pictures
-from phyblock.tracks.prompts import Prompt
+from phyblock.tracks.prompts import Prompt, form_facts, response_format
 from phyblock.tracks.showing import Showing, TaskShowing, file_plan, told_of
-from phyblock.words import Level1Criterion, Matcher, PlanParser, Setting
+from phyblock.words import AnswerFormat, Level1Criterion, Matcher, PlanParser, Setting
 
 __all__ = ["FullPlanning", "PlanJudgement", "PlanningRules"]
 
@@ -32,6 +39,18 @@ class PlanningRules:
     settings: tuple[Setting, ...]
     matchers: tuple[Matcher, ...]
     level1: Level1Criterion | None
+    answer_format: AnswerFormat = "text"
+
+    def form(self, item: AssemblyTask) -> AnswerForm[tuple[int, ...]] | None:
+        """The form in which a plan for a scene is asked for; None where that is text."""
+        return None if self.answer_format == "text" else plan_form(len(item.candidates))
+
+    def read(self, item: AssemblyTask, text: str) -> ParsedPlan:
+        """What a reply to a question about a scene says."""
+        n_candidates = len(item.candidates)
+        if self.answer_format == "json_schema":
+            return parse_asked_plan(text, n_candidates)
+        return parse_plan(text, n_candidates, self.parser)
 
 
 @dataclass(frozen=True)
@@ -142,8 +161,15 @@ class FullPlanning:
         pictures: tuple[Image, ...],
     ) -> Request:
         messages = prompt.messages(pictures, self.facts(item, pictures))
-        subject = self._subject(item)
-        return Request(item.key, seed, messages, params, prompt.version, subject)
+        return Request(
+            item.key,
+            seed,
+            messages,
+            params,
+            prompt.version,
+            self._subject(item),
+            response_format(self.rules.form(item)),
+        )
 
     def _subject(self, item: AssemblyTask) -> PlanSubject:
         guess = partial(self._guesses.plan, item)
@@ -156,15 +182,12 @@ class FullPlanning:
             "n_candidates": len(item.candidates),
             "is_blind": self._showing.how.blind,
             "candidate_scale": None if self._pictures is None else self._pictures.candidate_scale,
+            **form_facts(self.rules.form(item)),
         }
 
     def judge(self, item: AssemblyTask, text: str | None) -> PlanJudgement:
         """Read and score a reply; None, where there is no reply, is scored as an empty plan."""
-        parsed = (
-            ParsedPlan(Plan(), None)
-            if text is None
-            else parse_plan(text, len(item.candidates), self.rules.parser)
-        )
+        parsed = ParsedPlan(Plan(), None) if text is None else self.rules.read(item, text)
         key = (item.key, item.candidates)
         scorer = self._scorers.get(key)
         if scorer is None:

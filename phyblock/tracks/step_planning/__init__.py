@@ -32,6 +32,7 @@ TRACK = TrackKind(
     section=("steps", StepsSpec, "The rules of the step_planning track."),
     record=EpisodeRecord,
     template=bundled("prompts", "step_planning.j2"),
+    json_template=bundled("prompts", "step_planning_json.j2"),
     prompt_field=("steps", "prompt"),
     counted=(POSE_COUNTS,),
     tables=("table3", "endings", "progress"),

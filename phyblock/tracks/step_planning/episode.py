@@ -9,7 +9,7 @@ from typing import Any, get_args
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block, Plan
 from phyblock.models.base import Image, Message, Reply, Request
-from phyblock.parsing.move import MoveProblem, ParsedMove, parse_move
+from phyblock.parsing.move import MoveProblem, ParsedMove
 from phyblock.scoring import (
     ERROR_TYPES,
     Assembly,
@@ -19,6 +19,7 @@ from phyblock.scoring import (
     placed_counts,
 )
 from phyblock.sim.site import Settled
+from phyblock.tracks.prompts import response_format
 from phyblock.tracks.showing import file_plan
 from phyblock.tracks.step_planning.baselines import StepSubject
 from phyblock.tracks.step_planning.prompt import PastStep, StepOutcome
@@ -72,6 +73,7 @@ class StepEpisode:
         self._params = params
         self._rules = rules
         self._desk = desk
+        self._form = rules.form(len(task.candidates))
         self._assembly = Assembly(task.scene, task.candidates, rules.accepts, rules.gating)
         self._tally = Tally()
         self._past: list[PastStep] = []
@@ -107,11 +109,12 @@ class StepEpisode:
             self._params,
             self._desk.version,
             subject,
+            response_format(self._form),
         )
 
     def take(self, request: Request, reply: Reply) -> None:
         """Go on with the reply to the last request."""
-        parsed = parse_move(reply.text)
+        parsed = self._rules.read(reply.text, len(self._task.candidates))
         usage = reply.usage
         self._tally.tokens += (usage.prompt_tokens or 0) + (usage.completion_tokens or 0)
         self._tally.usd += reply.cost_usd or 0.0
@@ -188,7 +191,11 @@ class StepEpisode:
             turn["swapped"] = [list(pair) for pair in move.swapped]
         turn["outcome"] = outcome
         turn["world"] = list(self._assembly.vertices)
-        reply = text if samples == 1 else operation
+        reply = text
+        if samples > 1 and parsed.problem is None:
+            reply = self._rules.written(operation, len(self._task.candidates))
+        elif samples > 1:
+            reply = operation
         self._past.append(PastStep(operation, outcome, reply, self._seen))
         self._tally.count(parsed.move, is_placed=outcome == "placed")
         self._settled = outcome != "placed" or self._rules.physics == "off"

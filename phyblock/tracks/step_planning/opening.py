@@ -32,7 +32,8 @@ def open_step_planning(opening: Opening) -> StepPlanning:
     steps = suite.section(StepsSpec)
     shown = (steps.feedback, steps.history, steps.memory, steps.cot)
     template = template_prompt(loaded, StepPlanning.name)
-    prompt = StepPrompt(template, *shown, rules.gating, rules.accepts, steps.blind)
+    told = (rules.gating, rules.accepts, steps.blind, rules.form)
+    prompt = StepPrompt(template, *shown, *told)
     return StepPlanning(rules, prompt, assembly_pictures(suite), tasks, showing, pool)
 
 
@@ -47,4 +48,13 @@ def _rules(suite: SuiteSpec) -> StepRules:
         steps.max_episode_usd,
     )
     accepts = steps.setting or suite.settings[0]
-    return StepRules(accepts, suite.settings, steps.gating, steps.physics, steps.samples, limits)
+    return StepRules(
+        accepts,
+        suite.settings,
+        steps.gating,
+        steps.physics,
+        steps.samples,
+        limits,
+        suite.answer_format,
+        steps.cot,
+    )

@@ -6,14 +6,14 @@ always holds the goal and the candidates.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 from phyblock.models.base import Image, Message
-from phyblock.parsing.move import MoveProblem
+from phyblock.parsing import AnswerForm, MoveProblem, ParsedMove
 from phyblock.scoring import MoveOutcome
-from phyblock.tracks.prompts import TemplatePrompt
+from phyblock.tracks.prompts import TemplatePrompt, form_facts
 from phyblock.words import CandidateScale, Gating, Setting
 
 __all__ = ["FEEDBACKS", "Feedback", "History", "PastStep", "StepOutcome", "StepPrompt"]
@@ -29,6 +29,9 @@ _FORMAT: Mapping[str, str] = {
     "no_move": "no operation could be read",
     "several_moves": "more than one operation was given",
     "move_and_done": "more than one operation was given",
+    "broken_json": "the answer was no whole JSON object",
+    "wrong_json": "the answer was not the JSON that was asked for",
+    "several_json": "more than one operation was given",
 }
 _REASONS: Mapping[str, str] = {
     "shape_not_in_gt": "the goal has no block of this type and color",
@@ -68,7 +71,8 @@ class StepPrompt:
     """A template with its rules; `memory` is how many earlier steps are shown, None for all.
 
     By `gating` and the setting `accepts` a move succeeds, of which the model is told; with
-    `is_blind` it is not shown the goal.
+    `is_blind` it is not shown the goal. `form` is that of an answer with so many candidates, None
+    for text.
     """
 
     template: TemplatePrompt
@@ -79,6 +83,7 @@ class StepPrompt:
     gating: Gating = "aov"
     accepts: Setting = "A"
     is_blind: bool = False
+    form: Callable[[int], AnswerForm[ParsedMove] | None] = lambda _: None
 
     def __post_init__(self) -> None:
         """Raise PromptError where the template has no text for the turns of a conversation."""
@@ -108,6 +113,7 @@ class StepPrompt:
             "setting": self.accepts,
             "is_blind": self.is_blind,
             "n_hidden": hidden,
+            **form_facts(self.form(n_candidates)),
         }
         facts["answer"] = self.template.text("answer", facts)
         if self.history == "text":

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from phyblock.parsing.move import ParsedMove
-from phyblock.words import Gating, Physics, Setting
+from phyblock.parsing import AnswerForm, ParsedMove, move_form, parse_asked_move, parse_move
+from phyblock.words import AnswerFormat, Gating, Physics, Setting
 
 __all__ = ["ENDINGS", "Ending", "StepLimits", "StepRules", "Tally", "majority"]
 
@@ -51,6 +51,7 @@ class StepRules:
     """How episodes are played and scored.
 
     The simulator lets a move succeed under `accepts`; scores are counted under all `settings`.
+    Reasons are a part of the JSON that is asked for where `cot`.
     """
 
     accepts: Setting = "A"
@@ -59,6 +60,22 @@ class StepRules:
     physics: Physics = "off"
     samples: int = 1
     limits: StepLimits = StepLimits()
+    answer_format: AnswerFormat = "text"
+    cot: bool = True
+
+    def form(self, n_candidates: int) -> AnswerForm[ParsedMove] | None:
+        """The form in which an operation is asked for; None where that is text."""
+        return None if self.answer_format == "text" else move_form(n_candidates, reasons=self.cot)
+
+    def read(self, text: str, n_candidates: int) -> ParsedMove:
+        """What a reply says."""
+        form = self.form(n_candidates)
+        return parse_move(text) if form is None else parse_asked_move(text, form)
+
+    def written(self, operation: str, n_candidates: int) -> str:
+        """A reply that names an operation and nothing else, as it is shown in a conversation."""
+        form = self.form(n_candidates)
+        return operation if form is None else form.write(operation)
 
 
 @dataclass

@@ -25,6 +25,7 @@ from phyblock.sim.site import ONE_SETTING, Settled, settle, state_picture
 from phyblock.sim.stability import DEFAULT_TRIAL
 from phyblock.tracks.full_planning.guessing import BlindGuesses
 from phyblock.tracks.pictures import Pictures
+from phyblock.tracks.prompts import response_format
 from phyblock.tracks.showing import Showing, TaskShowing, told_of
 from phyblock.tracks.step_planning.baselines import StepSubject
 from phyblock.tracks.step_planning.episode import Desk, StepEpisode
@@ -142,7 +143,12 @@ class StepPlanning:
         (current,), is_current_real = pictures.outlined((drawing,), (side, side))
         messages = self._messages(self._sight, item, fixed, current, past)
         version = self._sight.prompt.template.version
-        request = replace(request, messages=messages, prompt_version=version)
+        request = replace(
+            request,
+            messages=messages,
+            prompt_version=version,
+            response_format=response_format(self.rules.form(len(item.candidates))),
+        )
         return request, is_real and is_fixed_real and is_current_real
 
     def _other_engine(self) -> dict[str, Any]:

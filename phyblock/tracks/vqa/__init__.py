@@ -52,6 +52,7 @@ TRACK = TrackKind(
     section=("vqa", VqaSpec, "The questions of the vqa track, and how they are shown."),
     record=ChoiceRecord,
     template=bundled("prompts", "vqa.j2"),
+    json_template=bundled("prompts", "vqa_json.j2"),
     prompt_field=("vqa", "prompt"),
     tables=("table2",),
     own_data=_questions,

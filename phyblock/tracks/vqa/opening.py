@@ -44,7 +44,8 @@ def open_vqa(opening: Opening) -> Vqa:
         found = ", ".join(sorted({task.question.subtask for task in questions.tasks}))
         message = "no question is of these subtasks and levels"
         raise SpecError(Problem(where, message, "vqa.subtasks", found=f"questions of {found}"))
-    rules = VqaRules(spec.options_as, spec.circular, spec.blind, spec.wrong_image)
+    shown = (spec.options_as, spec.circular, spec.blind, spec.wrong_image)
+    rules = VqaRules(*shown, suite.answer_format)
     if not opening.with_prompts:
         return Vqa(rules, questions, tasks)
     pictures = QuestionPictures(

@@ -22,6 +22,8 @@ class ChoiceParse(Line):
     """The rule that matched; null: nothing could be read."""
     letters: str | None = None
     """One letter, or for ordering all in order."""
+    problem: str | None = None
+    """Why no answer could be read in the JSON that was asked for."""
 
 
 class QuestionShown(Line):

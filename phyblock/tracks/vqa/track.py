@@ -14,11 +14,18 @@ from phyblock.domain import LETTERS, Question, Scene, is_picture_option
 from phyblock.domain.rotation import rotated, rotated_label
 from phyblock.models.base import Image, Request
 from phyblock.models.guesses import Guesses
-from phyblock.parsing import ParsedAnswer, parse_answer
+from phyblock.parsing import (
+    AnswerForm,
+    ParsedAnswer,
+    choice_form,
+    parse_answer,
+    parse_asked_answer,
+)
 from phyblock.tracks.elsewhere import Elsewhere
-from phyblock.tracks.prompts import Prompt
+from phyblock.tracks.prompts import Prompt, form_facts, response_format
 from phyblock.tracks.vqa.baselines import ChoiceSubject
 from phyblock.tracks.vqa.pictures import OptionsAs, QuestionPictures, ShownQuestion
+from phyblock.words import AnswerFormat
 
 __all__ = ["AskedQuestion", "ChoiceJudgement", "Vqa", "VqaRules", "asked"]
 
@@ -35,6 +42,18 @@ class VqaRules:
     circular: bool = False
     blind: bool = False
     wrong_image: bool = False
+    answer_format: AnswerFormat = "text"
+
+    def form(self, question: Question) -> AnswerForm[str] | None:
+        """The form in which an answer is asked for; None where that is text."""
+        if self.answer_format == "text":
+            return None
+        return choice_form(question.options, question.subtask == "OR")
+
+    def read(self, question: Question, text: str) -> ParsedAnswer:
+        """What a reply to a question says."""
+        parse = parse_answer if self.answer_format == "text" else parse_asked_answer
+        return parse(text, question.options, question.subtask == "OR")
 
 
 @dataclass(frozen=True)
@@ -84,8 +103,9 @@ class ChoiceJudgement:
     def fields(self) -> dict[str, Any]:
         """`parse`, `scores` (none: there are no steps) and `answer` of the record."""
         given = self.parsed.letters
+        problem = {"problem": self.parsed.problem} if self.parsed.problem else {}
         return {
-            "parse": {"rule": self.parsed.rule, "letters": given},
+            "parse": {"rule": self.parsed.rule, "letters": given, **problem},
             "scores": [],
             "answer": {"right": self.right, "given": given, "correct": given == self.right},
         }
@@ -193,6 +213,7 @@ class Vqa:
             "is_ordering": question.subtask == "OR",
             "pictures": [picture.label for picture in pictures],
             "is_blind": self.rules.blind,
+            **form_facts(self.rules.form(question)),
         }
 
     def judge(self, item: AskedQuestion, text: str | None) -> ChoiceJudgement:
@@ -200,7 +221,7 @@ class Vqa:
         question = item.question
         parsed = ParsedAnswer(None, None)
         if text is not None:
-            parsed = parse_answer(text, question.options, question.subtask == "OR")
+            parsed = self.rules.read(question, text)
         return ChoiceJudgement(parsed, question.answer_letters)
 
     def close(self) -> None:
@@ -220,7 +241,15 @@ class Vqa:
         pictures: tuple[Image, ...],
     ) -> Request:
         messages = prompt.messages(pictures, self.facts(item, pictures))
-        return Request(item.key, seed, messages, params, prompt.version, self._about(item))
+        return Request(
+            item.key,
+            seed,
+            messages,
+            params,
+            prompt.version,
+            self._about(item),
+            response_format(self.rules.form(item.question)),
+        )
 
     def _seen(self, item: AskedQuestion, seed: int) -> ShownQuestion:
         """What a question is shown with: its own pictures, or those of another scene.

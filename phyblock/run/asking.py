@@ -1,0 +1,42 @@
+"""How the models of a plan are asked for answers as JSON, in words for whoever starts the run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from phyblock.run.plan import RunPlan
+from phyblock.specs import LoadedSuite
+from phyblock.tracks.opening import template_prompt
+from phyblock.tracks.prompts import FORM_FACTS
+
+__all__ = ["asking_remarks"]
+
+
+def asking_remarks(loaded: LoadedSuite, plan: RunPlan) -> list[str]:
+    """Which models are sent the schema and which hear of it in the prompt alone, and templates of
+    one's own that do not say it; nothing where answers are asked for as text.
+    """
+    if loaded.suite.answer_format == "text":
+        return []
+    return [*_models(plan), *_templates(loaded)]
+
+
+def _models(plan: RunPlan) -> Iterator[str]:
+    configs = [model.config for model in plan.models if model.config.kind == "litellm"]
+    if sent := [config.name for config in configs if config.sends_format]:
+        yield f"the JSON schema of answers is sent to {', '.join(sent)}"
+    if others := [config.name for config in configs if not config.sends_format]:
+        yield (
+            f"the prompt alone asks for JSON of {', '.join(others)} "
+            "(response_format: always in the models file sends the schema)"
+        )
+
+
+def _templates(loaded: LoadedSuite) -> Iterator[str]:
+    for track, path in loaded.templates.items():
+        if not template_prompt(loaded, track).says_form:
+            names = " and ".join(FORM_FACTS)
+            yield (
+                f"{path.name}, the prompt of {track}, does not use {names}: unless it says the "
+                "form of the answer in words of its own, models are not told it"
+            )
