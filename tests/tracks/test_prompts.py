@@ -4,16 +4,26 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from phyblock.datasets import official_prompt, read_builtin, recorded_models
 from phyblock.errors import PromptError
 from phyblock.models.base import Image, Message
-from phyblock.parsing import parse_plan
+from phyblock.parsing import (
+    AnswerForm,
+    choice_form,
+    move_form,
+    parse_asked_move,
+    parse_asked_plan,
+    parse_plan,
+    plan_form,
+)
 from phyblock.resources import bundled
-from phyblock.tracks import OfficialPrompt, TemplatePrompt
+from phyblock.tracks import OfficialPrompt, TemplatePrompt, kinds
 from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
+from phyblock.tracks.prompts import form_facts
 from tests.workspace import Workspace
 
 GOAL = Image(b"goal", "goal", 8, 8)
@@ -118,6 +128,9 @@ def test_facts_hold_what_is_shown_alone(workspace: Workspace) -> None:
             "n_candidates": len(task.candidates),
             "candidate_scale": None,
             "is_blind": False,
+            "answer_format": "text",
+            "answer_schema": None,
+            "answer_example": None,
         }
 
 
@@ -135,3 +148,84 @@ def test_the_official_prompt_is_the_recorded_text_to_the_letter(official_checkou
     # Marks of the two pictures stand before the text, the goal's first.
     assert {raw["instruction"] for raw in recorded} == {"<IMG_CONTEXT>" * 2 + text}
     assert all("cand" not in raw["image"][0] and "cand" in raw["image"][1] for raw in recorded)
+
+
+def rendered(name: str, facts: dict[str, object]) -> str:
+    """The text of a bundled prompt."""
+    *_, user = TemplatePrompt(bundled("prompts", f"{name}.j2"), "default").messages((), facts)
+    return "\n".join(part for part in user.parts if isinstance(part, str))
+
+
+def both_ways(name: str, facts: dict[str, object], form: AnswerForm[Any]) -> tuple[str, str]:
+    """A bundled prompt that asks for text, and the one that asks for JSON."""
+    text, asked = (
+        rendered(f"{name}{ending}", {**facts, **form_facts(known)})
+        for ending, known in (("", None), ("_json", form))
+    )
+    assert form.example in asked
+    assert json.dumps(form.schema) in asked
+    return text, asked
+
+
+@pytest.mark.parametrize("labels", [("composite",), ("goal", "candidates"), ("candidates",)])
+@pytest.mark.parametrize("scale", ["common", "fit", None])
+def test_a_plan_is_asked_for_in_the_same_words_in_both_formats(
+    labels: tuple[str, ...], scale: str | None
+) -> None:
+    facts = {"pictures": list(labels), "n_candidates": 9, "candidate_scale": scale}
+    facts["is_blind"] = labels == ("candidates",)
+    text, asked = both_ways("full_planning", facts, plan_form(9))
+    head, mark, _ = text.partition("End your answer with the plan")
+    assert mark
+    assert asked.startswith(f"{head}Answer with one JSON object")
+    assert parse_asked_plan(asked, 9).rule is None
+
+
+@pytest.mark.parametrize("is_ordering", [True, False])
+@pytest.mark.parametrize("is_blind", [True, False])
+def test_a_question_is_asked_in_the_same_words_in_both_formats(
+    is_ordering: bool, is_blind: bool
+) -> None:
+    options = [{"letter": x, "text": f"text {x}", "is_picture": is_ordering} for x in "ABCD"]
+    facts: dict[str, object] = {"question": "Which?", "options": options, "letters": list("ABCD")}
+    facts |= {"is_ordering": is_ordering, "pictures": ["scene"], "is_blind": is_blind}
+    form = choice_form([f"text {x}" for x in "ABCD"], is_ordering)
+    text, asked = both_ways("vqa", facts, form)
+    head, mark, _ = text.partition(" Give a short reason")
+    assert mark
+    assert asked.startswith(f"{head} Answer with one JSON object")
+    reading = form.read(asked)
+    assert reading is None or reading.answer is None
+
+
+@pytest.mark.parametrize("cot", [True, False])
+@pytest.mark.parametrize("setting", ["A", "B"])
+def test_a_step_is_asked_for_in_the_same_words_in_both_formats(setting: str, cot: bool) -> None:
+    past = {"step": 1, "operation": "Move(2)", "told": "it worked"}
+    facts: dict[str, object] = {
+        "pictures": ["goal", "candidates", "current"], "n_candidates": 9, "candidate_scale": "fit",
+        "step": 3, "max_steps": 8, "setting": setting, "gating": "aov", "history": [past],
+        "n_hidden": 1, "told": "it worked", "cot": cot, "is_blind": False, "answer": "(answer)",
+    }  # fmt: skip
+    form = move_form(9, reasons=cot)
+    templates = [
+        TemplatePrompt(bundled("prompts", f"step_planning{ending}.j2"), "default")
+        for ending in ("", "_json")
+    ]
+    for block in ("system", "user", "turn"):
+        one, other = (template.text(block, facts) for template in templates)
+        assert one == other
+    facts |= form_facts(form)
+    asked = templates[1].text("answer", facts)
+    assert form.example in asked
+    assert json.dumps(form.schema) in asked
+    assert ("first think" in asked) == cot
+    assert parse_asked_move(asked, form).problem is not None
+
+
+def test_only_prompts_for_json_say_the_form() -> None:
+    for kind in kinds().values():
+        assert kind.template is not None
+        assert kind.json_template is not None
+        assert not TemplatePrompt(kind.template, "text").says_form
+        assert TemplatePrompt(kind.json_template, "json").says_form

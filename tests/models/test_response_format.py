@@ -1,0 +1,177 @@
+"""Asking for JSON: what arrives at servers, who is sent a schema, and how a refusal is told."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from aiohttp import web
+
+from phyblock.errors import ModelError, RefusedError, SampleError, UnavailableError
+from phyblock.models import ModelConfig, Reply, Request, reply_key, takes_format
+from phyblock.parsing import choice_form, move_form, parse_asked_plan, plan_form
+from phyblock.resources import bundled
+from phyblock.run.models import to_config
+from phyblock.specs import ModelSpec, SuiteSpec, load_models
+from tests.models.factory import ask, make_model, make_request, reply_of
+from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.servers.chassis import Running, Seen
+from tests.servers.openai_chat import OpenAIChat
+
+FORM = plan_form(16)
+
+
+@pytest.fixture(autouse=True)
+def _key(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+
+
+def asking(key: str = "017") -> Request:
+    return replace(make_request(key, 42), response_format=FORM.response_format)
+
+
+def arrived(route: str, request: Request, **fields: Any) -> Seen:
+    server = ROUTES[route].server()
+    with Running(server) as running:
+        reply_of(make_model(ROUTES[route].config(running.url, **fields)), request)
+    return server.seen[0]
+
+
+class Choosy(OpenAIChat):
+    """Plans in the schema that it is sent; refuses one after `takes` requests."""
+
+    def __init__(self, takes: int = 10**9, message: str = "") -> None:
+        super().__init__()
+        self.takes, self.message = takes, message
+
+    async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
+        if "response_format" in seen.params and self.requests > self.takes:
+            error = self.error(400, "policy" if "safety" in self.message else "", self.message)
+            return web.json_response(error, status=400)
+        return await super()._end(seen, ending, request)
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        body = super().reply(seen, ending)
+        asked = seen.params.get("response_format", {}).get("json_schema", {}).get("schema")
+        if asked is not None:
+            numbers = asked["properties"]["plan"]["items"]["enum"]
+            content = json.dumps({"reasoning": "Bottom up.", "plan": numbers[:3]})
+            body["choices"][0]["message"]["content"] = content
+        return body
+
+
+def test_the_schema_arrives_as_it_is_declared_and_the_reply_is_read() -> None:
+    server = Choosy()
+    with Running(server) as running:
+        config = ROUTES["direct"].config(running.url, sends_format=True)
+        reply = reply_of(make_model(config), asking())
+    assert server.seen[0].raw["response_format"] == {
+        "type": "json_schema",
+        "json_schema": {"name": "plan", "schema": FORM.schema, "strict": True},
+    }
+    parsed = parse_asked_plan(reply.text, 16)
+    assert (parsed.plan.steps, parsed.rule) == ((1, 2, 3), "json_schema")
+
+
+def test_nothing_but_the_field_is_sent_more_and_without_it_nothing_is_other_than_before() -> None:
+    plain = arrived("direct", make_request("017", 42)).raw
+    assert arrived("direct", asking()).raw == plain
+    whole = arrived("direct", asking(), sends_format=True).raw
+    assert {name: value for name, value in whole.items() if name != "response_format"} == plain
+
+
+def test_the_cache_tells_formats_apart_and_knows_texts_as_it_did() -> None:
+    config = ModelConfig("m", "litellm", "openai/m")
+    assert "response_format" not in config.identity()
+    keys = {
+        reply_key(replace(config, sends_format=sends), request)
+        for sends in (False, True)
+        for request in (
+            asking(),
+            replace(asking(), response_format=choice_form("ab", False).schema),
+        )
+    }
+    assert len(keys) == 3
+    # A model that is sent no schema was asked by its messages alone.
+    assert reply_key(config, asking()) == reply_key(config, make_request("017", 42))
+
+
+SPEAKING = (
+    "Invalid parameter: 'response_format' of type 'json_schema' is not supported with this model.",
+    "This model does not support structured outputs",
+    "json_schema is not supported by this backend: no grammar",
+)
+
+
+@pytest.mark.parametrize("message", SPEAKING)
+def test_a_provider_that_refuses_the_schema_is_left_with_the_setting_named(message: str) -> None:
+    answers = _answers(Choosy(0, message))
+    for answer in answers:
+        assert isinstance(answer, UnavailableError)
+        assert message in str(answer)
+        assert "set response_format: never for this model in the models file" in str(answer)
+
+
+def test_what_else_a_server_refuses_is_the_request_s_own() -> None:
+    policy = _answers(Choosy(0, "rejected by our safety system: response_format"))
+    assert {type(answer) for answer in policy} == {RefusedError}
+    other = _answers(Choosy(0, "Image too large"))
+    assert {type(answer) for answer in other} == {SampleError}
+    first, *later = _answers(Choosy(1, 'Bad request: {"response_format": {"type": "json_schema"}}'))
+    assert isinstance(first, Reply)
+    assert {type(answer) for answer in later} == {SampleError}
+
+
+def _answers(server: OpenAIChat) -> list[Reply | ModelError | None]:
+    with Running(server) as running:
+        config = ROUTES["direct"].config(running.url, sends_format=True, max_concurrency=1)
+        return ask(make_model(config), asking("001"), asking("002"), asking("003"))
+
+
+JSON_SUITE = SuiteSpec(name="s", models=("m",), answer_format="json_schema")
+
+
+@pytest.mark.parametrize(
+    ("fields", "sends"),
+    [
+        ({"id": "openai/gpt-4o-2024-08-06"}, True),
+        ({"id": "openai/gpt-4o-2024-08-06", "response_format": "never"}, False),
+        ({"id": "hosted_vllm/Qwen/Qwen3-VL-8B-Instruct", "api_base": "http://localhost:8000/v1"},
+         True),
+        ({"id": "openai/mine", "api_base": "http://localhost:8000/v1"}, True),
+        ({"id": "openai/mine"}, False),
+        ({"id": "dashscope/qwen-vl-max"}, False),
+        ({"id": "dashscope/qwen-vl-max", "response_format": "always"}, True),
+    ],
+)  # fmt: skip
+def test_who_is_sent_a_schema(fields: dict[str, str], sends: bool) -> None:
+    spec = ModelSpec.model_validate(fields)
+    assert to_config("m", spec, JSON_SUITE).sends_format is sends
+    assert not to_config("m", spec, SuiteSpec(name="s", models=("m",))).sends_format
+
+
+@pytest.mark.slow
+def test_litellm_is_believed_about_every_model_of_the_models_file() -> None:
+    import litellm
+
+    for name, spec in load_models(bundled("models.yaml")).items():
+        config = to_config(name, spec, JSON_SUITE)
+        if config.api_base is None:
+            assert takes_format(config) == litellm.supports_response_schema(config.id), name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", [plan_form(16), move_form(16), choice_form("abcd", True)])
+def test_litellm_hands_every_schema_on(form: Any) -> None:
+    request = replace(make_request("017", 42), response_format=form.response_format)
+    for route in ("openai", "vllm"):
+        assert arrived(route, request, sends_format=True).raw == (
+            arrived("direct", request, sends_format=True).raw
+        )
+    gemini = arrived("gemini", request, sends_format=True).params
+    assert gemini["response_mime_type"] == "application/json"
+    assert form.key in json.dumps(gemini["response_json_schema"])
+    claude = arrived("anthropic", request, sends_format=True).params
+    assert claude["tools"][0]["input_schema"]["properties"] == form.schema["properties"]
