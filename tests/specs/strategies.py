@@ -57,6 +57,7 @@ FIELDS: dict[str, st.SearchStrategy[Any]] = {
     "seeds": st.lists(st.integers(0, 2**31 - 1), min_size=1, max_size=4, unique=True),
     "prompt": st.just("default"),
     "parser": st.sampled_from(["steps", "official"]),
+    "answer_format": st.sampled_from(["text", "json_schema"]),
     "tables": st.lists(st.sampled_from(["assembly", "table1", "errors"]), unique=True),
     **{name: st.fixed_dictionaries({}, optional=fields) for name, fields in SECTIONS.items()},
 }
@@ -65,5 +66,7 @@ REQUIRED: dict[str, st.SearchStrategy[Any]] = {
     "models": st.lists(NAMES, min_size=1, max_size=4, unique=True),
 }
 
-SUITES = st.fixed_dictionaries(REQUIRED, optional=FIELDS)
+SUITES = st.fixed_dictionaries(REQUIRED, optional=FIELDS).map(
+    lambda raw: raw if raw.get("answer_format") != "json_schema" else {**raw, "parser": "steps"}
+)
 """Mappings that are valid suites with the built-in format."""

@@ -123,6 +123,16 @@ BAD = [
     ("name: s\ndataset: {format: official, path: data}\nmodels: [oracle]\n"
      "images: {source: dataset}\ncandidates: {order: shuffled}\n", "5:21", "candidates.order",
      "show the candidates in the order of the file", "", "images.source: render"),
+    (HEAD + "answer_format: json-schema\n", "3:16", "answer_format", "choices", "text, json_schema",
+     "json_schema?"),
+    (HEAD + "answer_format: json_schema\nparser: official\n", "4:9", "parser", "reads no JSON", "",
+     "parser: steps"),
+    ("name: s\ndataset: {format: official, path: data}\nmodels: recorded\n"
+     "answer_format: json_schema\n", "4:16", "answer_format", "were asked for in text", "",
+     "list the models"),
+    (HEAD + "dataset: {format: official, path: data}\nprompt: official\n"
+     "answer_format: json_schema\n", "5:16", "answer_format", "asks for lines of text", "",
+     "prompt: default"),
     (HEAD + "images: {source: dataset}\n", "3:18", "images.source", "official", "", "render"),
     (HEAD + "dataset: {format: official, path: .}\nscoring: {matchers: [optimal], level1: aov}\n"
      "levels: [2]\ntables: [published]\n", "4:21", "scoring.matchers", "paper matcher", "", "add"),

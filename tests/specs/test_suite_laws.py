@@ -56,6 +56,9 @@ def test_identity_is_json_and_holds_no_bounds(raw: dict[str, Any]) -> None:
     identity = spec.identity()
     assert json.loads(json.dumps(identity)) == identity
     assert not {"description", "limits", "models", "tables"} & set(identity)
+    # A suite that asks for text is the run that it was before there was another format.
+    assert identity.get("answer_format", "text") == spec.answer_format
+    assert ("answer_format" in identity) == (spec.answer_format != "text")
     kept = {k: v for k, v in raw.items() if k not in ("description", "limits", "tables")}
     assert SUITE_MODEL.model_validate(kept).identity() == identity
 

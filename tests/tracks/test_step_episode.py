@@ -120,6 +120,36 @@ def test_each_reply_has_its_outcome() -> None:
     assert len(requests) == len(fields["turns"]) == 10
 
 
+@given(
+    st.lists(st.sampled_from([*(f"Move({n})" for n in range(1, 7)), "Done"]), max_size=8),
+    st.sampled_from([1, 3]),
+)
+def test_an_episode_goes_the_same_way_in_json(operations: list[str], samples: int) -> None:
+    task = tower("red", "blue", "red")
+    rules = StepRules(limits=OPEN, samples=samples)
+    asked = replace(rules, answer_format="json_schema")
+    form = asked.form(len(task.candidates))
+    assert form is not None
+    told = [form.write(operation, "Move(2) comes later.") for operation in operations]
+    (one, _), (other, requests) = play(task, scripted(*operations), rules), play(
+        task, scripted(*told), asked
+    )  # fmt: skip
+    assert all(request.response_format == form.response_format for request in requests)
+    said = [turn.pop("parse") for turn in other["turns"]]
+    for fields in (one, other):
+        for turn in fields["turns"]:
+            turn.pop("parse", None)
+    assert one == other
+    assert {parse["rule"] for parse in said[: len(told)]} <= {"json_schema"}
+
+
+def test_json_that_is_no_operation_is_a_step_that_fails() -> None:
+    rules = StepRules(limits=OPEN, answer_format="json_schema")
+    told = ('{"operation": "Move(1)"', '{"operation": 1.5}', '{"operation": "Done"}')
+    fields, _ = play(tower("red", "blue"), scripted(*told), rules)
+    assert fields["outcomes"] == ["broken_json", "wrong_json", "done"]
+
+
 def test_an_episode_ends_with_done_and_what_is_missing_is_missed() -> None:
     fields, _ = play(tower("red", "blue"), scripted("Move(1)", "Done", "Move(3)"))
     assert (fields["ending"], fields["outcomes"]) == ("done", ["placed", "done"])

@@ -1,0 +1,145 @@
+"""Runs that ask for JSON, from the suite to the tables: all tracks, with a schema and without."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import Counter
+from typing import Any
+
+import pytest
+
+from phyblock.cli.main import phyblock
+from phyblock.errors import InputError
+from tests.servers.chassis import Running, Seen
+from tests.servers.openai_chat import OpenAIChat
+from tests.vqa_set import questions, write_questions
+from tests.workspace import Raw, Workspace
+
+TRACKS = ["full_planning", "step_planning", "vqa"]
+FORMAT = {"answer_format": "json_schema"}
+EXACT, BESIDE = "json_schema", "json_key"
+
+
+def schema_of(seen: Seen) -> Raw:
+    """The schema that a prompt ends with."""
+    schema: Raw = json.loads(str(seen.parts[-1]).splitlines()[-1])
+    return schema
+
+
+class Obedient(OpenAIChat):
+    """Answers in the schema of the prompt: alpha that alone, beta in a sentence."""
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        body = super().reply(seen, ending)
+        schema = schema_of(seen)
+        *_, key = schema["properties"]
+        told = schema["properties"][key]
+        many = told["type"] == "array"
+        value = told["items"]["enum"][:4] if many else told["enum"][0]
+        text = json.dumps({"reasoning": "Step1: Move block with index 9", key: value})
+        text = text if seen.model == "alpha" else f"Here it is: {text}"
+        body["choices"][0]["message"]["content"] = text
+        return body
+
+
+def call(*args: object) -> int:
+    return phyblock.main([str(arg) for arg in args], standalone_mode=False) or 0
+
+
+@pytest.fixture
+def asked(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> tuple[Workspace, list[Seen]]:
+    """A whole run of three tracks and three models, and what the server saw."""
+    monkeypatch.chdir(workspace.root)
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+    monkeypatch.setattr(sys, "argv", ["phyblock"])
+    write_questions(workspace.root / "questions", questions(subtasks=["SH", "OR"], per_subtask=1))
+    workspace.write_suite(
+        tracks=TRACKS,
+        models=["alpha", "beta", "random"],
+        vqa={"path": "./questions"},
+        steps={"physics": "off", "max_steps": 2},
+        **FORMAT,
+    )
+    server = Obedient()
+    with Running(server) as running:
+        base = {"api_base": f"{running.url}/v1"}
+        entries = {name: {"id": f"hosted_vllm/{name}", **base} for name in ("alpha", "beta")}
+        entries["beta"]["response_format"] = "never"
+        workspace.write_yaml("models.yaml", entries)
+        assert call("run", "suite.yaml", "--out", "out", "--no-report", "--limit", 2) == 0
+    return workspace, server.seen
+
+
+def rules(record: Raw) -> set[str | None]:
+    parses = [turn["parse"] for turn in record.get("turns", ())] or [record["parse"]]
+    return {parse["rule"] for parse in parses}
+
+
+def test_all_tracks_ask_and_read_by_the_schema(
+    asked: tuple[Workspace, list[Seen]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    workspace, seen = asked
+    for one in seen:
+        sent = one.params.get("response_format")
+        assert (sent is not None) == (one.model == "alpha")
+        assert sent is None or sent["json_schema"]["schema"] == schema_of(one)
+    records = workspace.records()
+    assert Counter(record["track"] for record in records) == dict.fromkeys(TRACKS, 6)
+    for record in records:
+        ways = {"alpha": ("response_format", EXACT), "beta": ("prompt", BESIDE)}
+        how, rule = ways.get(record["model"], (None, ""))
+        assert record.get("asked") == how
+        assert record["outcome"] == "ok"
+        # Baselines are asked nothing, and read as any text is.
+        assert (rules(record) == {rule}) == (how is not None)
+    plans = [r["parse"]["plan"] for r in records if r["track"] == "full_planning" and "asked" in r]
+    assert plans == [[1, 2, 3, 4]] * 4
+    for name in ("table1.md", "table2.md", "table3.md"):
+        assert "answers asked for as JSON" in workspace.tables()[name].decode()
+
+    # Under the other format it is another run; judged again it is the same.
+    capsys.readouterr()
+    with pytest.raises(InputError, match="another run"):
+        call("run", "suite.yaml", "--out", "out", "--limit", 2, "--set", "answer_format=text")
+    assert call("score", "out") == 0
+    again = workspace.records(workspace.out / "scores" / "steps-optimal")
+    judged = ("parse", "scores", "asked", "outcome", "turns", "answer")
+    for one, other in zip(records, again, strict=True):
+        assert [one.get(name) for name in judged] == [other.get(name) for name in judged]
+    with pytest.raises(InputError, match="asked for JSON"):
+        call("score", "out", "--parser", "official")
+
+    # A recording is read in the form in which it was asked for.
+    lines = [json.dumps(r) for r in records if r["track"] == "full_planning"]
+    (workspace.root / "recorded").mkdir()
+    (workspace.root / "recorded" / "records.jsonl").write_text("\n".join(lines) + "\n")
+    workspace.write_yaml("models.yaml", {"alpha": {"replay": "./recorded"}})
+    workspace.write_suite(models=["alpha"])
+    with pytest.raises(InputError, match="recording of answers that were asked for as json_schema"):
+        call("validate", "suite.yaml")
+    workspace.write_suite(models=["alpha"], **FORMAT)
+    replayed = workspace.root / "replayed"
+    assert call("run", "suite.yaml", "--out", replayed, "--no-report", "--limit", 2) == 0
+    assert {rule for r in workspace.records(replayed) for rule in rules(r)} == {EXACT}
+
+
+def test_what_is_asked_of_whom_is_said_before(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(workspace.root)
+    (workspace.root / "mine.j2").write_text("{% block user %}Build.{% endblock %}")
+    known = {"alpha": "openai/gpt-4o-2024-08-06", "beta": "dashscope/qwen-vl-max"}
+    workspace.write_yaml("models.yaml", known)
+    workspace.write_suite(models=[*known, "random"], prompt="mine.j2", **FORMAT)
+    assert call("validate", "suite.yaml") == 0
+    _, sent, alone, template = capsys.readouterr().out.splitlines()
+    assert "schema of answers is sent to alpha" in sent
+    assert "prompt alone asks for JSON of beta" in alone
+    assert "mine.j2, the prompt of full_planning, does not use answer_schema" in template
+    assert call("validate", "suite.yaml", "--set", "answer_format=text") == 0
+    assert len(capsys.readouterr().out.splitlines()) == 1
+    own = {"id": known["alpha"], "extra_body": {"response_format": {"type": "json_object"}}}
+    workspace.write_yaml("models.yaml", {**known, "alpha": own})
+    with pytest.raises(InputError, match="says its own response_format"):
+        call("validate", "suite.yaml")
