@@ -7,7 +7,9 @@ from phyblock.words import PlanParser
 __all__ = ["READER_VERSION", "reader_version"]
 
 READER_VERSION = 2
-"""Of the readers of plans, answers and moves; it goes up when any reply can be read otherwise."""
+"""Of the readers of plans, answers and moves, and of the forms in which JSON is asked for; it goes up
+when any reply can be read otherwise, or is asked for in another form.
+"""
 
 
 def reader_version(parser: PlanParser) -> int:

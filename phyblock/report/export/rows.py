@@ -53,6 +53,7 @@ def export_rows(run: Run) -> Iterator[dict[str, Any]]:
             **{name: getattr(reply, name, None) for name in _REPLY},
             **{name: getattr(reply and reply.usage, name, None) for name in _USAGE},
             "error": error and error.message,
+            "asked": record.asked,
             "rule": getattr(record.parse, "rule", None),
             "plan": None if plan is None else list(plan),
             **dict.fromkeys(track_columns()),
