@@ -15,6 +15,7 @@ import pytest
 from phyblock import registry
 from phyblock.cli.main import phyblock
 from phyblock.datasets import AssemblyTask
+from phyblock.errors import SpecError
 from phyblock.models.base import Message, Request
 from phyblock.scoring.ratios import ratio_of
 from phyblock.tables.measures import Measure, SampleCounts
@@ -125,6 +126,9 @@ def test_a_track_runs_from_yaml_to_the_report(
     run = ["run", "suite.yaml", "--out", "out"]
     with Running(Counter()) as running:
         workspace.write_models(running.url, "counter")
+        asked = [*run, "--set", "answer_format=json_schema"]
+        with pytest.raises(SpecError, match="cannot be asked for as JSON"):
+            phyblock.main(asked, standalone_mode=False)
         assert not phyblock.main(run, standalone_mode=False)
         whole = workspace.records()
         text = (workspace.out / "records.jsonl").read_text()
