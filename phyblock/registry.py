@@ -12,6 +12,8 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from pydantic import BaseModel
 
 __all__ = [
@@ -58,6 +60,14 @@ class TrackWords(Protocol):
     @property
     def about(self) -> str:
         """What it asks, for the documentation of suites."""
+
+    @property
+    def template(self) -> Path | None:
+        """The bundled prompt, None where it has none."""
+
+    @property
+    def json_template(self) -> Path | None:
+        """The bundled prompt that asks for JSON, None where it asks for text alone."""
 
     @property
     def section(self) -> tuple[str, type[BaseModel], str] | None:

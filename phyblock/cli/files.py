@@ -9,7 +9,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.resources import bundled
 from phyblock.specs import did_you_mean
 
-__all__ = ["bundled_suites", "find_models_file", "find_suite", "what_it_is"]
+__all__ = ["bundled_suites", "find_models_file", "find_suite", "prompt_dirs", "what_it_is"]
 
 
 def bundled_suites() -> list[str]:
@@ -53,8 +53,17 @@ def find_models_file(named: str | None, suite: Path | None) -> Path:
             return Path(named)
         message = what_it_is(Path(named)) or "there is no such models file"
         raise SpecError(Problem(named, message))
-    near = [] if suite is None else [suite.parent, suite.parent.parent]
-    for folder in (Path(), *near):
+    for folder in _near(suite):
         if os.path.isfile(folder / "models.yaml"):
             return folder / "models.yaml"
     return bundled("models.yaml")
+
+
+def prompt_dirs(suite: Path) -> list[Path]:
+    """Folders of prompts of one's own: where the models file is looked for, too."""
+    return [folder / "prompts" for folder in _near(suite)]
+
+
+def _near(suite: Path | None) -> list[Path]:
+    """Here, and near the suite."""
+    return [Path(), *([] if suite is None else [suite.parent, suite.parent.parent])]

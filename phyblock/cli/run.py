@@ -14,7 +14,7 @@ from rich.console import Console
 from phyblock import report
 from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.estimate_view import show_estimate
-from phyblock.cli.files import bundled_suites, find_models_file, find_suite
+from phyblock.cli.files import bundled_suites, find_models_file, find_suite, prompt_dirs
 from phyblock.cli.names import split_names
 from phyblock.cli.paths import NAME_OR_PATH, UserPath, models_file_option
 from phyblock.cli.progress import ProgressView
@@ -82,7 +82,8 @@ def command(
     """
     console = make_console()
     path = find_suite(suite)
-    loaded = load_suite(path, sets, data_dir=bundled("benchmarks", "data"))
+    data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
+    loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
     known = load_models(find_models_file(models_file, path))
     plan = make_plan(loaded, known, only=split_names(models), limit=limit)
     folder = out or Path("results") / plan.folder_name

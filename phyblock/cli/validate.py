@@ -10,7 +10,7 @@ import click
 
 from phyblock.bounded import read_bytes
 from phyblock.cli.console import counted, make_console, shown_path
-from phyblock.cli.files import find_models_file, find_suite
+from phyblock.cli.files import find_models_file, find_suite, prompt_dirs
 from phyblock.cli.paths import UserPath, models_file_option
 from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
@@ -61,13 +61,17 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[s
         return [_about(read_builtin(path.parent))]
     if not os.path.isfile(path):
         path = find_suite(str(path))
+    if path.suffix == ".j2":
+        hint = "name the suite that uses it: its prompts are rendered"
+        raise SpecError(Problem(str(path), "is a prompt, not a suite", hint=hint))
     if not _is_suite(path):
         known = load_models(path)
         if not known:
             allowed = "a suite, or a models file with name: provider/model lines"
             raise SpecError(Problem(str(path), "names nothing", allowed=allowed))
         return [f"models file, {counted(len(known), 'model')}"]
-    loaded = load_suite(path, sets, data_dir=bundled("benchmarks", "data"))
+    data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
+    loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
     plan = make_plan(loaded, load_models(find_models_file(models_file, path)))
     calls = plan.samples_per_model
     models = counted(len(plan.models), "model")

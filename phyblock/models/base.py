@@ -47,8 +47,8 @@ class Message:
 class Request:
     """One question to a model.
 
-    `key` names the question inside its track (a scene id for full planning) and is what a
-    recording is looked up by; `seed` is the sample's seed, which also tells repeats apart;
+    `key` names the question inside its `track` (a scene id for full planning): by both a recording
+    is looked up; `seed` is the sample's seed, which also tells repeats apart;
     `params` are sampling parameters by their OpenAI names; `prompt_version` hashes the template.
     `response_format` asks for an answer as JSON, as the OpenAI protocol does; None asks for text.
     `subject` is what the question is about, of the type that its track says: only the rules of
@@ -62,6 +62,7 @@ class Request:
     prompt_version: str
     subject: object
     response_format: Mapping[str, object] | None = None
+    track: str = ""
 
 
 @dataclass(frozen=True)

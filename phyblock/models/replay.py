@@ -52,7 +52,7 @@ class ReplayModel:
 
 
 class RunReplayModel:
-    """The replies in a run folder's records, matched by key and seed."""
+    """The replies in a run folder's records, matched by track, key and seed."""
 
     needs_messages = False
 
@@ -61,11 +61,12 @@ class RunReplayModel:
         self._records = _read_records(path, config.id or config.name)
 
     async def ask(self, request: Request) -> Reply | None:
-        """The reply recorded for the request's key and seed, or None.
+        """The reply recorded for the request's track, key and seed, or None.
 
         Raises SampleError or RefusedError where that is what was recorded.
         """
-        record = self._records.get((request.key, request.seed))
+        known, what = self._records, (request.key, request.seed)
+        record = known.get((request.track, *what)) or known.get(("", *what))
         if record is None:
             return None
         error = record.error
@@ -122,15 +123,15 @@ def _read_json(path: Path) -> object:
         raise DataError(Problem(where, f"is not JSON: {error}")) from error
 
 
-def _read_records(path: Path, model: str) -> dict[tuple[str, int], Recorded]:
-    """Records of one model by key and seed; the last one counts where a sample has several.
+def _read_records(path: Path, model: str) -> dict[tuple[str, str, int], Recorded]:
+    """Records of one model by track, key and seed; the last one counts where a sample has several.
 
     An unfinished last line, which a killed run leaves, is not there yet. A run of one model is
     that model's whatever its name.
     """
-    found: dict[str, dict[tuple[str, int], Recorded]] = {}
+    found: dict[str, dict[tuple[str, str, int], Recorded]] = {}
     for _, record in RecordedLines(path):
-        found.setdefault(record.model, {})[record.key, record.seed] = record
+        found.setdefault(record.model, {})[record.track, record.key, record.seed] = record
     if model in found:
         return found[model]
     if len(found) == 1:

@@ -232,6 +232,8 @@ class Recorded(Line):
     """The item that it was asked about."""
     seed: Whole
     """The repeat."""
+    track: str = ""
+    """The track that asked; records of older versions may not say it."""
     reply: StoredReply | None = None
     """The reply."""
     error: StoredError | None = None

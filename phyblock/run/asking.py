@@ -1,4 +1,4 @@
-"""How the models of a plan are asked for answers as JSON, in words for whoever starts the run."""
+"""How the models of a plan are asked, in words for whoever starts the run."""
 
 from __future__ import annotations
 
@@ -13,12 +13,15 @@ __all__ = ["asking_remarks"]
 
 
 def asking_remarks(loaded: LoadedSuite, plan: RunPlan) -> list[str]:
-    """Which models are sent the schema and which hear of it in the prompt alone, and templates of
-    one's own that do not say it; nothing where answers are asked for as text.
+    """Prompts of one's own; and where answers are asked for as JSON, which models are sent the
+    schema, which hear of it in the prompt alone, and which of these prompts do not say it.
     """
-    if loaded.suite.answer_format == "text":
+    if not any(model.config.kind == "litellm" for model in plan.models):
         return []
-    return [*_models(plan), *_templates(loaded)]
+    own = [f"prompt of {track}: {path}" for track, path in loaded.templates.items()]
+    if loaded.suite.answer_format == "text":
+        return own
+    return [*own, *_models(plan), *_templates(loaded)]
 
 
 def _models(plan: RunPlan) -> Iterator[str]:

@@ -92,6 +92,8 @@ def make_plan(
     selected = replace(dataset, tasks=tasks)
     if not any(track.items for track in tracks):
         raise SpecError(_nothing(loaded, dataset, limit))
+    if asks:
+        _check_prompts(tracks)
     manifest = make_manifest(loaded, models, selected, tracks, limit)
 
     def reopened(name: str, one: SuiteSpec) -> AnyTrack:
@@ -99,6 +101,13 @@ def make_plan(
         return kind_of(name).open(opening)
 
     return RunPlan(suite, models, selected, tracks, manifest, reopened)
+
+
+def _check_prompts(tracks: Sequence[AnyTrack]) -> None:
+    """Raise PromptError where a prompt cannot be said of the first item, before anything is."""
+    for track in tracks:
+        for item in track.items[:1]:
+            next(iter(track.outlines(item)), None)
 
 
 def _nothing(loaded: LoadedSuite, dataset: Dataset, limit: int | None) -> Problem:

@@ -83,6 +83,7 @@ class SampleRunner:
             request = await track.request(
                 sample.item, sample.seed, config.params, with_messages=model.needs_messages
             )
+        request = replace(request, track=track.name)
         answer = await _answer(model.ask(request))
         fields = self._begin(sample, answer) | _asked(config, request)
         fields["prompt"] = self._prompt(track, request)

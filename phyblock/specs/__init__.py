@@ -1,6 +1,6 @@
 """What a person may write in YAML: suites, models files and --set overrides."""
 
-from phyblock.specs.loading import LoadedSuite, load_suite, resolve_models
+from phyblock.specs.loading import LoadedSuite, load_suite, resolve_models, suite_tracks
 from phyblock.specs.model import ModelSpec, PriceSpec
 from phyblock.specs.models_file import load_models
 from phyblock.specs.schema import models_schema, suite_schema
@@ -33,4 +33,5 @@ __all__ = [
     "resolve_models",
     "suite_model",
     "suite_schema",
+    "suite_tracks",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import filecmp
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -28,7 +29,7 @@ from phyblock.specs.validation import MOST_HINTS, check, find_secrets, merge_pro
 from phyblock.specs.words import did_you_mean, show
 from phyblock.specs.yaml_source import FieldPath, YamlSource, dotted, read_yaml
 
-__all__ = ["LoadedSuite", "load_suite", "resolve_models"]
+__all__ = ["LoadedSuite", "load_suite", "resolve_models", "suite_tracks"]
 
 _BARE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
 
@@ -53,11 +54,19 @@ class LoadedSuite:
         return self.source.where(path)
 
 
-def load_suite(path: Path, overrides: Sequence[str] = (), *, data_dir: Path) -> LoadedSuite:
+def load_suite(
+    path: Path,
+    overrides: Sequence[str] = (),
+    *,
+    data_dir: Path,
+    prompt_dirs: Sequence[Path] = (),
+) -> LoadedSuite:
     """Read, override and validate a suite.
 
     `overrides` are "key=value" texts; `data_dir` is the folder of the bundled data sets, where
-    bare names are looked up. Raises SpecError with all that is wrong, in the order of the file.
+    bare names are looked up. A file in one of `prompt_dirs` that is called as a bundled prompt is
+    used in its place where the suite says `default`. Raises SpecError with all that is wrong, in
+    the order of the file.
     """
     source = read_yaml(path)
     apply_overrides(source, overrides)
@@ -70,7 +79,13 @@ def load_suite(path: Path, overrides: Sequence[str] = (), *, data_dir: Path) -> 
     found = merge_problems(source.problems, secrets, problems)
     if suite is None or found:
         raise SpecError(sort_problems(found))
-    return _locate(suite, path, source, data_dir)
+    return _locate(suite, path, source, data_dir, prompt_dirs)
+
+
+def suite_tracks(path: Path) -> tuple[str, ...]:
+    """The tracks of a suite that is known to be sound, whatever else it still needs to run."""
+    default = suite_model().model_fields["tracks"].get_default(call_default_factory=True)
+    return tuple(read_yaml(path).data.get("tracks", default))
 
 
 def resolve_models(
@@ -142,7 +157,13 @@ def _rule_place(source: YamlSource, reads: tuple[str, ...]) -> str:
     return source.where(written)
 
 
-def _locate(suite: SuiteSpec, path: Path, source: YamlSource, data_dir: Path) -> LoadedSuite:
+def _locate(
+    suite: SuiteSpec,
+    path: Path,
+    source: YamlSource,
+    data_dir: Path,
+    prompt_dirs: Sequence[Path],
+) -> LoadedSuite:
     finder = _Finder(path, source, data_dir)
     scenes = suite.dataset
     is_bundled = scenes.format == "builtin"
@@ -156,9 +177,23 @@ def _locate(suite: SuiteSpec, path: Path, source: YamlSource, data_dir: Path) ->
         prompt = read_dotted(suite, ".".join(kind.prompt_field))
         if prompt not in PROMPT_WORDS:
             templates[name] = finder.file(prompt, kind.prompt_field)
+        elif prompt == PROMPT_WORDS[0]:
+            in_text = suite.answer_format == "text"
+            bundled = kind.template if in_text else kind.json_template
+            templates[name] = _in_place_of(bundled, prompt_dirs)
     if dataset is None or finder.problems:
         raise SpecError(sort_problems(finder.problems))
     return LoadedSuite(suite, path, dataset, source, _there(folders), _there(templates))
+
+
+def _in_place_of(bundled: Path | None, folders: Sequence[Path]) -> Path | None:
+    """The first file of the same name in the folders, unless it is the same as the bundled one."""
+    if bundled is None:
+        return None
+    paths = (folder.absolute() / bundled.name for folder in folders)
+    own = next((path for path in paths if os.path.isfile(path)), None)
+    is_same = own is not None and filecmp.cmp(own, bundled, shallow=False)
+    return None if is_same else own
 
 
 def _there(paths: Mapping[str, Path | None]) -> dict[str, Path]:

@@ -12,11 +12,13 @@ from typing import Any, Protocol
 
 import jinja2
 import jinja2.meta
+import jinja2.nodes
 
 from phyblock.bounded import read_text
 from phyblock.errors import Problem, PromptError, said
 from phyblock.models.base import Image, Message
 from phyblock.parsing import AnswerForm
+from phyblock.specs import did_you_mean
 from phyblock.tracks.template_bounds import BoundedEnvironment, render_block
 
 __all__ = [
@@ -32,6 +34,8 @@ FORM_FACTS = ("answer_schema", "answer_example")
 """The names by which templates say the JSON that is asked for."""
 
 _BLOCKS = ("system", "user")
+_ALL_BLOCKS = (*_BLOCKS, "caption", "answer", "turn")
+"""Blocks of any track's template; another one would say its text to nobody."""
 _LARGEST_BYTES = 256 * 1024
 
 
@@ -92,7 +96,8 @@ class TemplatePrompt:
     before it.
 
     Raises PromptError, naming file and line, when the template cannot be read, is not valid,
-    has no user block, or uses a name that is not there.
+    has no user block or one that says nothing, has a block that nothing uses, or uses a name that
+    is not there.
     """
 
     def __init__(self, path: Path, name: str) -> None:
@@ -115,6 +120,7 @@ class TemplatePrompt:
             # Python compiles what Jinja makes of it, and has bounds of its own.
             raise PromptError(Problem(str(path), f"is not valid Jinja: {said(error)}")) from error
         self.require("user", "and, if wanted, a block system")
+        self._check_blocks(source)
 
     @property
     def says_form(self) -> bool:
@@ -130,11 +136,21 @@ class TemplatePrompt:
             problem = Problem(str(self._path), f"has no {block} block", "", found, allowed)
             raise PromptError(problem)
 
+    def _check_blocks(self, source: str) -> None:
+        """Raise PromptError for a block that no other is around and that nothing would say."""
+        for node in jinja2.Environment().parse(source).body:
+            if isinstance(node, jinja2.nodes.Block) and node.name not in _ALL_BLOCKS:
+                where, hint = f"{self._path}:{node.lineno}", did_you_mean(node.name, _ALL_BLOCKS)
+                allowed, message = ", ".join(_ALL_BLOCKS), "is a block that nothing uses"
+                raise PromptError(Problem(where, message, "", node.name, allowed, hint))
+
     def messages(
         self, pictures: Sequence[Image], facts: Mapping[str, object]
     ) -> tuple[Message, ...]:
         """A system message, when that block gives text, and a user message with the pictures."""
         texts = {name: self.text(name, facts) for name in _BLOCKS}
+        if not texts["user"]:
+            raise PromptError(Problem(str(self._path), "says nothing", "block user"))
         system = (Message("system", (texts["system"],)),) if texts["system"] else ()
         return (*system, Message("user", (*self._captioned(pictures, facts), texts["user"])))
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 
 from phyblock.errors import DataError, RefusedError, SampleError
 from phyblock.models import Gate, Model, ModelConfig, Reply, Usage, build_model
-from tests.models.factory import make_request
+from tests.models.factory import ask, make_request
 
 STEPS = "Step1: Move block with index 3"
 
@@ -99,6 +99,17 @@ def test_a_run_of_our_own_is_matched_by_model_key_and_seed(tmp_path: Path) -> No
     assert answer(model, "007", 3) is None
     assert answer(model, "008", 1) is None
     assert answer(model, "009", 1) is None
+
+
+def test_a_run_of_several_tracks_answers_each_with_its_own(tmp_path: Path) -> None:
+    (tmp_path / "records.jsonl").write_text(
+        record("m", "007", 1, track="full_planning", reply=asdict(Reply("a plan")))
+        + record("m", "007", 1, track="step_planning", reply=asdict(Reply("a move")))
+    )
+    asked = [replace(make_request("007", 1), track=name) for name in ("full_planning", "other")]
+    plan, nothing = ask(replay(tmp_path), *asked)
+    assert isinstance(plan, Reply)
+    assert (plan.text, nothing) == ("a plan", None)
 
 
 @pytest.mark.parametrize(("kind", "error"), [("sample", SampleError), ("refused", RefusedError)])

@@ -73,6 +73,12 @@ def test_the_version_follows_the_text_alone(tmp_path: Path) -> None:
         ("{% block user %}\n{{ goal }}\n{% endblock %}", ":2", "'goal' is undefined"),
         ("{% block user %}\n\n{{ 1 // 0 }}{% endblock %}", ":3", "division"),
         ("{% block user %}{{ pictures.__class__ }}{% endblock %}", ":1", "is unsafe"),
+        ("{% block user %}\n {% if 0 %}a{% endif %}\n{% endblock %}", "", "says nothing"),
+        (
+            "{% block sytem %}Be short.{% endblock %}\n{% block user %}a{% endblock %}",
+            ":1",
+            "is a block that nothing uses",
+        ),
     ],
 )
 def test_what_is_wrong_is_said_with_file_and_line(
@@ -83,6 +89,11 @@ def test_what_is_wrong_is_said_with_file_and_line(
     (problem,) = caught.value.problems
     assert problem.where == f"{tmp_path / 'mine.j2'}{where}"
     assert said in problem.message
+
+
+def test_a_block_inside_another_is_a_part_of_it(tmp_path: Path) -> None:
+    prompt = template(tmp_path, "{% block user %}a{% block mine %}b{% endblock %}{% endblock %}")
+    assert prompt.messages((), FACTS) == (Message("user", ("ab",)),)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,84 @@
+"""Prompts of one's own: found beside the suite, said, and rendered before anything is asked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from phyblock.resources import bundled
+from tests.servers.chassis import Running
+from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import Workspace
+
+
+@pytest.fixture
+def asked(workspace: Workspace) -> Workspace:
+    workspace.write_suite(models=["alpha"], seeds=[0])
+    (workspace.root / "prompts").mkdir()
+    return workspace
+
+
+def own_prompt(workspace: Workspace) -> Path:
+    path: Path = workspace.root / "prompts" / "full_planning.j2"
+    return path
+
+
+def test_a_prompt_beside_the_suite_is_used_and_said(asked: Workspace) -> None:
+    text = "{% block user %}Which of the {{ n_candidates }}?{% endblock %}"
+    own_prompt(asked).write_text(text, encoding="utf-8")
+    with Running(OpenAIChat()) as running:
+        asked.write_models(running.url, "alpha")
+        done = asked.run()
+        texts = {part for seen in running.server.seen for part in seen.parts if part[0] == "W"}
+    assert done.code == 0, done.err
+    assert "prompt of full_planning: " in done.out
+    assert "prompts/full_planning.j2" in done.out.replace("\n", "")
+    assert texts == {"Which of the 16?"}
+
+
+def test_a_copy_of_the_bundled_prompt_is_the_bundled_one(asked: Workspace) -> None:
+    asked.write_models("http://127.0.0.1:9", "alpha")
+    before = asked.run("--dry-run")
+    own_prompt(asked).write_bytes(bundled("prompts", "full_planning.j2").read_bytes())
+    assert asked.run("--dry-run") == before
+    assert "prompt of" not in before.out
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{% block user %}{{ wrong }}{% endblock %}", "'wrong' is undefined"),
+        ("{% block user %} {% endblock %}", "says nothing"),
+        ("{% block usr %}a{% endblock %}", "has no user block"),
+        ("{% block user %}a{% endblock %}{% block sytem %}b{% endblock %}", "mean system?"),
+    ],
+)
+@pytest.mark.parametrize("verb", ["validate", "run"])
+def test_a_prompt_is_rendered_before_anything_is_asked(
+    asked: Workspace, text: str, said: str, verb: str
+) -> None:
+    asked.write_models("http://127.0.0.1:9", "alpha")
+    own_prompt(asked).write_text(text, encoding="utf-8")
+    done = asked.phyblock(verb, "suite.yaml")
+    assert done.code == 2
+    assert "full_planning.j2" in done.err
+    assert said in done.err
+    assert not (asked.root / "results").exists()
+
+
+@pytest.mark.parametrize("suite", ["quick", "steps", "vqa"])
+def test_what_init_lays_out_is_sound_and_its_prompts_are_used(
+    workspace: Workspace, suite: str
+) -> None:
+    assert workspace.phyblock("init", "mine", "--suite", suite).code == 0
+    root = workspace.root / "mine"
+    workspace.write_yaml("mine/models.yaml", {"alpha": "openai/some-model"})
+    (prompt,) = (root / "prompts").glob("*.j2")
+    prompt.write_text(prompt.read_text() + "\n", encoding="utf-8")
+    told = workspace.phyblock(
+        *("run", f"mine/benchmarks/{suite}.yaml", "--models", "alpha", "--limit", "3"),
+        *("--dry-run", "--models-file", "mine/models.yaml"),
+    )
+    assert told.code == 0, told.err
+    assert f"prompts/{prompt.name}" in told.out.replace("\n", "")
