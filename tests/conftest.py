@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from tests.fork_server import end_fork_server
 from tests.workspace import Workspace
 
 OFFICIAL_MISSING = (
@@ -37,6 +39,12 @@ def official_dir() -> Path:
 def official_checkout(official_dir: Path) -> Path:
     """The (partial) checkout of the official repository."""
     return official_dir / "PhyBlock"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _no_process_is_left() -> Iterator[None]:
+    yield
+    end_fork_server()
 
 
 @pytest.fixture(scope="session")

@@ -1,98 +1,281 @@
-"""Many short commands, each in a process of its own that need not import anything again.
+"""Commands in processes of their own that need not import anything again.
 
-`python -m tests.fork_server` imports the command line once. For each line of JSON on stdin it
-forks; the child takes over folder, environment, limits and output files and calls `main` as the
-installed script does, the parent waits and prints the exit code.
+`python -m tests.fork_server FD` imports the command line, and what it imports only when it is
+needed, once. For each order at its socket it forks; the child takes over folder, environment,
+limits and open files and calls `main` as the installed script does. All of its children have the
+hash seed of the server: what is to be the same in every process is shown by processes that were
+started one by one.
 """
 
 from __future__ import annotations
 
+import atexit
+import functools
+import gc
 import importlib
 import json
 import os
 import pkgutil
+import resource
+import signal
+import socket
 import subprocess
 import sys
-from collections.abc import Mapping
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import IO, Any, NoReturn
 
-import phyblock.cli
-import phyblock_making.cli
-from tests.workspace import Done, small_files_only
+_ROOT = Path(__file__).parents[1]
+_ORDER_BYTES = 1 << 20
+_POLL_S = 0.01
+_NOT_WRITTEN = 120
+
+_PRELOADED = ("PIL.GifImagePlugin", "PIL.JpegPresets", "aiohttp", "matplotlib.backends.backend_agg",
+              "matplotlib.backends.backend_svg", "matplotlib.pyplot", "phyblock.report.html.write",
+              "phyblock.run.floors", "sqlite3", "yarl")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Done:
+    """How a command ended."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def errors(self) -> list[str]:
+        """The messages on stderr, one a problem."""
+        found: list[str] = []
+        for line in self.err.splitlines():
+            if line.startswith("error: "):
+                found.append(line)
+            elif found:
+                found[-1] += "\n" + line
+        return found
+
+
+def small_files_only(limit_bytes: int) -> Callable[[], None]:
+    """What a process does before anything else, so that it can write no larger file."""
+
+    def apply() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, limit_bytes))
+
+    return apply
 
 
 class ForkServer:
-    """The client's side; a context manager."""
+    """The client's side."""
 
-    def __enter__(self) -> ForkServer:
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "tests.fork_server"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            cwd=Path(__file__).parents[1],
-        )
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._orders, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._home = tempfile.TemporaryDirectory()
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "tests.fork_server", str(theirs.fileno())],
+                cwd=_ROOT,
+                env={
+                    "PATH": os.environ["PATH"],
+                    "HOME": self._home.name,
+                    "MPLCONFIGDIR": self._home.name,
+                },
+                stdin=subprocess.DEVNULL,
+                pass_fds=[theirs.fileno()],
+            )
+
+    def end(self) -> None:
+        self._orders.close()
+        self._process.wait()
+        self._home.cleanup()
+
+    def run(
+        self,
+        args: Sequence[str],
+        cwd: Path,
+        env: Mapping[str, str],
+        bytes_left: int | None = None,
+        timeout_s: float = 300,
+    ) -> Done:
+        """Run the command to its end."""
+        with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+            pid = self._fork(args, cwd, env, (out, err), bytes_left=bytes_left, leads=False)
+            code = self.wait(pid, timeout_s)
+            texts = []
+            for file in (out, err):
+                file.seek(0)
+                texts.append(file.read().decode())
+        return Done(code, *texts)
+
+    def start(self, args: Sequence[str], cwd: Path, env: Mapping[str, str]) -> Forked:
+        """Start the command and return at once; the process leads a group of its own."""
+        pipes = [os.pipe() for _ in range(2)]
+        reads = [os.fdopen(read, encoding="utf-8") for read, _ in pipes]
+        writes = [os.fdopen(write, "wb") for _, write in pipes]
+        pid = self._fork(args, cwd, env, writes, bytes_left=None, leads=True)
+        for file in writes:
+            file.close()
+        return Forked(self, pid, *reads)
+
+    def _fork(
+        self,
+        args: Sequence[str],
+        cwd: Path,
+        env: Mapping[str, str],
+        files: Sequence[IO[bytes]],
+        **options: Any,
+    ) -> int:
+        order = {"args": list(args), "cwd": str(cwd), "env": dict(env), **options}
+        return int(self._answer(order, [file.fileno() for file in files]))
+
+    def wait(self, pid: int, timeout_s: float) -> int:
+        """The exit code once the process has ended; kills it when that takes too long."""
+        end = time.monotonic() + timeout_s
+        while (code := self.poll(pid)) is None:
+            if time.monotonic() > end:
+                os.kill(pid, signal.SIGKILL)
+                raise subprocess.TimeoutExpired(["phyblock"], timeout_s)
+            time.sleep(_POLL_S)
+        return code
+
+    def poll(self, pid: int) -> int | None:
+        """The exit code, or None while the process runs; an order for each process to its end."""
+        answer = self._answer({"ended": pid})
+        return None if answer is None else int(answer)
+
+    def _answer(self, order: Mapping[str, Any], files: Sequence[int] = ()) -> Any:
+        with self._lock:
+            socket.send_fds(self._orders, [json.dumps(order).encode()], files)
+            return json.loads(self._orders.recv(_ORDER_BYTES))
+
+
+class Forked:
+    """A process that was started, as `subprocess.Popen` shows one."""
+
+    def __init__(self, server: ForkServer, pid: int, out: IO[str], err: IO[str]) -> None:
+        self._server = server
+        self.pid = pid
+        self.stdout, self.stderr = out, err
+        self.returncode: int | None = None
+
+    def __enter__(self) -> Forked:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._process.communicate()
+        self.wait()
+        self.stdout.close()
+        self.stderr.close()
 
-    def phyblock(
-        self,
-        args: list[str],
-        cwd: Path,
-        env: Mapping[str, str],
-        scratch: Path,
-        bytes_left: int | None,
-    ) -> Done:
-        """Run the command to its end; its output passes through files in `scratch`."""
-        out, err = scratch / "stdout", scratch / "stderr"
-        order = {
-            "args": args,
-            "cwd": str(cwd),
-            "env": dict(env),
-            "out": str(out),
-            "err": str(err),
-            "bytes_left": bytes_left,
-        }
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.write(json.dumps(order) + "\n")
-        self._process.stdin.flush()
-        code = int(self._process.stdout.readline())
-        return Done(code, out.read_text(encoding="utf-8"), err.read_text(encoding="utf-8"))
+    def poll(self) -> int | None:
+        if self.returncode is None:
+            self.returncode = self._server.poll(self.pid)
+        return self.returncode
+
+    def wait(self, timeout: float = 300) -> int:
+        if self.returncode is None:
+            self.returncode = self._server.wait(self.pid, timeout)
+        return self.returncode
+
+    def communicate(self, timeout: float = 300) -> tuple[str, str]:
+        """Wait for its end; what it wrote, which must fit into the pipes."""
+        self.wait(timeout)
+        with self.stdout, self.stderr:
+            return self.stdout.read(), self.stderr.read()
+
+    def send_signal(self, number: int) -> None:
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def kill(self) -> None:
+        self.send_signal(signal.SIGKILL)
 
 
-def serve() -> None:
+@functools.cache
+def fork_server() -> ForkServer:
+    """The one of this process; `end_fork_server` ends it."""
+    return ForkServer()
+
+
+def end_fork_server() -> None:
+    if fork_server.cache_info().currsize:
+        fork_server().end()
+        fork_server.cache_clear()
+
+
+def serve(orders: socket.socket) -> None:
+    import phyblock.cli
+    import phyblock_making.cli
+    from phyblock.models.litellm_call import _litellm
+
     for package in (phyblock.cli, phyblock_making.cli):
         for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
             importlib.import_module(module.name)
-    for line in sys.stdin:
-        pid = os.fork()
-        if pid == 0:
-            _become(json.loads(line))
-        _, status = os.waitpid(pid, 0)
-        print(os.waitstatus_to_exitcode(status), flush=True)
+    for name in _PRELOADED:
+        importlib.import_module(name)
+    _litellm()
+    gc.collect()
+    gc.freeze()
+    while True:
+        text, files, _, _ = socket.recv_fds(orders, _ORDER_BYTES, 2)
+        if not text:
+            return
+        order = json.loads(text)
+        if "ended" in order:
+            pid, status = os.waitpid(order["ended"], os.WNOHANG)
+            answer = os.waitstatus_to_exitcode(status) if pid else None
+        elif not (answer := os.fork()):
+            orders.close()
+            _become(order, files)
+        for file in files:
+            os.close(file)
+        orders.send(json.dumps(answer).encode())
 
 
-def _become(order: dict[str, object]) -> None:
-    """Never returns."""
-    for number, name in ((1, "out"), (2, "err")):
-        file = os.open(str(order[name]), os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+def _become(order: Mapping[str, Any], files: Sequence[int]) -> NoReturn:
+    for number, (name, file) in enumerate(zip(("stdout", "stderr"), files, strict=True), 1):
         os.dup2(file, number)
         os.close(file)
-    os.close(0)
-    os.open(os.devnull, os.O_RDONLY)
-    os.chdir(str(order["cwd"]))
+        old = getattr(sys, name)
+        # A stream remembers whether what it was opened on has a position.
+        new = open(number, "w", encoding=old.encoding, errors=old.errors, closefd=False)  # noqa: SIM115
+        new.reconfigure(line_buffering=name == "stderr")
+        setattr(sys, name, new)
+        setattr(sys, f"__{name}__", new)
+    if order["leads"]:
+        os.setsid()
+    os.chdir(order["cwd"])
     os.environ.clear()
-    os.environ.update(order["env"])  # type: ignore[arg-type]
+    os.environ.update(order["env"])
+    tempfile.tempdir = None
     if order["bytes_left"] is not None:
-        small_files_only(int(str(order["bytes_left"])))()
-    sys.argv = ["phyblock", *order["args"]]  # type: ignore[misc]
+        small_files_only(order["bytes_left"])()
+    sys.argv = ["phyblock", *order["args"]]
     from phyblock.cli.main import main
 
-    main()
+    try:
+        main()
+    except SystemExit as ending:
+        _exit(ending.code)
+    raise AssertionError("main always exits")
+
+
+def _exit(code: object) -> NoReturn:
+    """As the interpreter exits, but without taking every module apart, which takes longest."""
+    threading._shutdown()  # type: ignore[attr-defined]
+    atexit._run_exitfuncs()
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except OSError:
+        code = _NOT_WRITTEN
+    os._exit(code if isinstance(code, int) else int(code is not None))
 
 
 if __name__ == "__main__":
-    serve()
+    with socket.socket(fileno=int(sys.argv[1])) as ours:
+        serve(ours)

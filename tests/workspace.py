@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-import resource
-import signal
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import yaml
+
+from tests.fork_server import Done, Forked, fork_server
 
 Raw = dict[str, Any]
 
@@ -66,26 +65,6 @@ SCENES: tuple[Raw, ...] = (
     tower("t4", [3], ("orange", "green", "orange")),
     tower("t5", [4], ("blue", "blue", "red", "yellow")),
 )
-
-
-@dataclass(frozen=True)
-class Done:
-    """How a command ended."""
-
-    code: int
-    out: str
-    err: str
-
-    @property
-    def errors(self) -> list[str]:
-        """The messages on stderr, one a problem."""
-        found: list[str] = []
-        for line in self.err.splitlines():
-            if line.startswith("error: "):
-                found.append(line)
-            elif found:
-                found[-1] += "\n" + line
-        return found
 
 
 class Workspace:
@@ -146,18 +125,25 @@ class Workspace:
         self,
         *args: str | Path,
         env: Mapping[str, str] | None = None,
-        before: Callable[[], None] | None = None,
+        bytes_left: int | None = None,
+        fresh: bool = False,
     ) -> Done:
-        """Run the command to its end."""
+        """Run the command to its end.
+
+        Its process is forked from one that has imported everything, unless it is to be `fresh`:
+        one with a hash seed of its own, and with the interpreter's settings of `env`.
+        """
+        words, settings = [*map(str, args)], {**self.env, **(env or {})}
+        if not fresh:
+            return fork_server().run(words, self.root, settings, bytes_left)
         done = subprocess.run(
-            [*COMMAND, *map(str, args)],
+            [*COMMAND, *words],
             cwd=self.root,
-            env={**self.env, **(env or {})},
+            env=settings,
             capture_output=True,
             text=True,
             timeout=300,
             stdin=subprocess.DEVNULL,
-            preexec_fn=before,
         )
         return Done(done.returncode, done.stdout, done.stderr)
 
@@ -168,18 +154,10 @@ class Workspace:
         less = () if page else ("--no-report",)
         return self.phyblock("run", "suite.yaml", "--out", self.out, *less, *args, **options)
 
-    def start(self, *args: str | Path) -> subprocess.Popen[str]:
+    def start(self, *args: str | Path) -> Forked:
         """Start `run` and return at once; the process leads a group of its own."""
-        return subprocess.Popen(
-            [*COMMAND, "run", "suite.yaml", "--out", str(self.out), "--no-report", *map(str, args)],
-            cwd=self.root,
-            env=self.env,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
+        words = ["run", "suite.yaml", "--out", self.out, "--no-report", *args]
+        return fork_server().start([*map(str, words)], self.root, self.env)
 
     def records(self, folder: Path | None = None) -> list[Raw]:
         """The lines of a run's records, as they stand; the file is made with the first one."""
@@ -200,13 +178,3 @@ class Workspace:
             for path in sorted(self.root.rglob("*"))
             if path.is_file() and "pictures" not in path.parts
         }
-
-
-def small_files_only(limit_bytes: int) -> Callable[[], None]:
-    """For `before`: writes beyond the limit fail as on a full disk."""
-
-    def apply() -> None:
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, limit_bytes))
-
-    return apply

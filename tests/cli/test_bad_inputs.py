@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,6 @@ from phyblock.cli.main import show_problems
 from phyblock.errors import InputError, Problem
 from tests.cli.bad_inputs import BAD, Bad
 from tests.cli.breakage import FAKE_KEY
-from tests.fork_server import ForkServer
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace, tower
@@ -37,12 +35,6 @@ def finished(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Wo
     return made
 
 
-@pytest.fixture(scope="module")
-def commands() -> Iterator[ForkServer]:
-    with ForkServer() as server:
-        yield server
-
-
 @pytest.fixture
 def copy(finished: Workspace, tmp_path: Path) -> Workspace:
     root = tmp_path / "copy"
@@ -55,11 +47,10 @@ def copy(finished: Workspace, tmp_path: Path) -> Workspace:
 
 
 @pytest.mark.parametrize("bad", BAD, ids=[bad.name for bad in BAD])
-def test_bad_input(copy: Workspace, bad: Bad, commands: ForkServer, tmp_path: Path) -> None:
+def test_bad_input(copy: Workspace, bad: Bad) -> None:
     args = bad.prepare(copy)
     before = copy.files()
-    env = copy.env | dict(bad.env)
-    done = commands.phyblock(args, copy.root, env, tmp_path, bad.bytes_left)
+    done = copy.phyblock(*args, env=dict(bad.env), bytes_left=bad.bytes_left)
 
     assert done.code == 2, done.out + done.err
     assert "Traceback" not in done.err

@@ -59,7 +59,7 @@ def test_a_pipe_gets_whole_tables_without_escapes(suite: Workspace) -> None:
 
 
 def test_output_in_ascii_is_no_failure(suite: Workspace) -> None:
-    done = suite.run("--set", "seeds=[0,1]", env={"PYTHONIOENCODING": "ascii"})
+    done = suite.run("--set", "seeds=[0,1]", env={"PYTHONIOENCODING": "ascii"}, fresh=True)
     assert (done.code, done.err) == (0, "")
     assert "oracle" in done.out
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.workspace import Done, Workspace
+from tests.fork_server import Done
+from tests.workspace import Workspace
 
 ROUNDING = 0.06
 """Both numbers are rounded to a tenth [points]."""

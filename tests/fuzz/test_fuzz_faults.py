@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from tests.fork_server import Done
 from tests.fuzz.laws import Broken, broken_laws, take_tree
 from tests.fuzz.ledger import LedgerAgent, LedgerChat, asked_twice, kept_in, lost
 from tests.fuzz.sizes import FAULTS, SEED
@@ -16,7 +17,7 @@ from tests.fuzz.worker import Ended, Worker
 from tests.servers.chassis import Faults, Running
 from tests.servers.faults import WIRE_FAULTS
 from tests.vqa_set import questions, vqa_suite, write_questions
-from tests.workspace import SCENES, Done, Workspace
+from tests.workspace import SCENES, Workspace
 
 pytestmark = pytest.mark.fuzz
 

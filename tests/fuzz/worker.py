@@ -22,9 +22,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tests.fork_server import Done
 from tests.fuzz.deeds import Deed, watch_deeds
 from tests.fuzz.sabotage import SABOTAGES
-from tests.workspace import Done
 
 __all__ = ["LONGEST_S", "Ended", "Worker"]
 

@@ -16,7 +16,7 @@ import pytest
 from phyblock.models import ReplyCache
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import Workspace, small_files_only
+from tests.workspace import Workspace
 
 SAMPLES = 20
 AT_ONCE = 4
@@ -76,7 +76,7 @@ def test_a_disk_that_takes_neither_replies_nor_records_ends_the_run_after_few_ca
         prepare(workspace, running.url, AT_ONCE)
         assert workspace.run("--limit", "1", "--models", "random").code == 0
         workspace.out = workspace.root / "full"
-        done = workspace.run(before=small_files_only(20_000))
+        done = workspace.run(bytes_left=20_000)
         assert done.code == 2
         assert len(done.errors) == 1
         kept = len(workspace.records())

@@ -15,9 +15,10 @@ from phyblock.sim.site import state_picture
 from phyblock.tracks.step_planning.rules import StepRules
 from phyblock.tracks.step_planning.track import StepPlanning
 from phyblock.words import Physics
+from tests.fork_server import Done
 from tests.sim.box_renderer import BOX_RENDERER
 from tests.sim.still_engine import STILL_ENGINE
-from tests.workspace import Done, Raw, Workspace, candidates
+from tests.workspace import Raw, Workspace, candidates
 
 OTHERS = {
     "PHYBLOCK_RENDERER": BOX_RENDERER,

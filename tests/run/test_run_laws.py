@@ -49,7 +49,7 @@ def test_records_in_any_order_give_the_same_tables(copy: Workspace) -> None:
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
     random.Random(3).shuffle(lines)
     path.write_text("".join(lines), encoding="utf-8")
-    assert copy.phyblock("report", "out").code == 0
+    assert copy.phyblock("report", "out", fresh=True).code == 0
     assert copy.tables() == before
 
 
@@ -57,14 +57,14 @@ def test_tables_are_rebuilt_byte_for_byte(copy: Workspace) -> None:
     before = copy.tables()
     shutil.rmtree(copy.out / "tables")
     (copy.root / "data").rename(copy.root / "elsewhere")
-    done = copy.phyblock("report", "out")
+    done = copy.phyblock("report", "out", fresh=True)
     assert (done.code, done.err) == (0, "")
     assert copy.tables() == before
 
 
 def test_scoring_again_by_the_same_rules_changes_nothing(copy: Workspace) -> None:
     before = copy.files()
-    done = copy.phyblock("score", "out")
+    done = copy.phyblock("score", "out", fresh=True)
     assert (done.code, done.err) == (0, "")
     again = copy.out / "scores" / "steps-optimal"
     assert copy.records(again) == copy.records()
@@ -137,7 +137,7 @@ def test_a_cut_last_line_is_dropped_and_its_sample_run_again(copy: Workspace) ->
 
 
 def test_a_second_process_is_refused_and_the_first_goes_on(workspace: Workspace) -> None:
-    with Running(OpenAIChat(Faults(latency_s=6.0))) as running:
+    with Running(OpenAIChat(Faults(latency_s=3.0))) as running:
         workspace.write_models(running.url, "alpha")
         workspace.write_suite(models=["alpha"])
         with workspace.start() as first:

@@ -67,7 +67,10 @@ def test_keys_and_pictures_stay_off_the_disk(workspace: Workspace, transport: st
         entries["openai"] = {**entries["talks"], "id": "openai/some-model"}
         workspace.write_yaml("models.yaml", entries)
         workspace.write_suite(models=list(entries), seeds=[0, 1])
-        told = [workspace.run("--yes", env=KEYS), workspace.run("--dry-run", env=KEYS)]
+        told = [
+            workspace.run("--yes", env=KEYS, fresh=True),
+            workspace.run("--dry-run", env=KEYS),
+        ]
         told.append(workspace.phyblock("models", env=KEYS))
         told += [workspace.phyblock("models", "check", n, env=KEYS) for n in ("talks", "locked")]
     used = {seen.key for server in servers.values() for seen in server.seen}

@@ -19,10 +19,11 @@ from phyblock.domain import LETTERS, SUBTASKS, Question
 from phyblock.report import published_table
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
+from tests.fork_server import Done
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.vqa_set import questions, vqa_suite, write_questions
-from tests.workspace import Done, Raw, Workspace
+from tests.workspace import Raw, Workspace
 
 FEW = ["SH", "VP", "OR", "AD"]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import random
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -55,20 +56,23 @@ def test_known_counts_match_row_for_row(
     assert len(expected) >= 6250
 
 
+@pytest.mark.parametrize("share", [0.2, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("parser", PLAN_PARSERS)
 def test_optimal_is_never_below_paper_on_recorded_replies(
-    official_checkout: Path, tasks: dict[str, AssemblyTask], parser: PlanParser
+    official_checkout: Path, tasks: dict[str, AssemblyTask], parser: PlanParser, share: float
 ) -> None:
     goals = {
         (name, setting): Goal(task.scene, task.candidates, setting)
         for name, task in tasks.items()
         for setting in SETTINGS
     }
+    replies = reply_texts(official_checkout)
     plans: set[tuple[str, Plan]] = {
         (scene, parse_plan(text, len(tasks[scene].candidates), parser).plan)
-        for (_, scene), text in reply_texts(official_checkout).items()
+        for (_, scene), text in replies.items()
+        if random.Random(text).random() < share
     }
-    assert len(plans) > 1000
+    assert len(plans) > 1000 * share
     for scene, plan in plans:
         tp = {}
         for setting in SETTINGS:

@@ -14,6 +14,8 @@ from phyblock.words import SETTINGS
 
 ORDERS = 200
 BUNDLED = sorted((Path(__file__).parents[2] / "benchmarks" / "data").glob("*/scenes.jsonl"))
+EVERY = pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.slow)])
+"""Each fifth scene, of all levels; all scenes when there is time."""
 
 
 def assert_every_order_scores_1(task: AssemblyTask, rng: np.random.Generator) -> None:
@@ -28,14 +30,16 @@ def assert_every_order_scores_1(task: AssemblyTask, rng: np.random.Generator) ->
             assert match_plan(goal, plan, "optimal").counts.f1 == 1, (task.scene.id, order)
 
 
-def test_valid_orders_of_the_official_scenes_score_1(official_checkout: Path) -> None:
+@EVERY
+def test_valid_orders_of_the_official_scenes_score_1(official_checkout: Path, every: int) -> None:
     rng = np.random.default_rng(0)
-    for task in read_official(official_checkout).tasks:
+    for task in read_official(official_checkout).tasks[::every]:
         assert_every_order_scores_1(task, rng)
 
 
+@EVERY
 @pytest.mark.parametrize("path", BUNDLED, ids=lambda path: path.parent.name)
-def test_valid_orders_of_the_bundled_scenes_score_1(path: Path) -> None:
+def test_valid_orders_of_the_bundled_scenes_score_1(path: Path, every: int) -> None:
     rng = np.random.default_rng(0)
-    for task in read_builtin(path.parent).tasks:
+    for task in read_builtin(path.parent).tasks[::every]:
         assert_every_order_scores_1(task, rng)

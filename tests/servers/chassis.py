@@ -256,7 +256,7 @@ class Running:
 
 
 async def start(server: LocalServer, port: int) -> tuple[web.AppRunner, int]:
-    runner = web.AppRunner(server.app(), access_log=None, shutdown_timeout=0.5)
+    runner = web.AppRunner(server.app(), access_log=None, shutdown_timeout=0.1)
     await runner.setup()
     site = web.TCPSite(runner, "127.0.0.1", port, backlog=1024)
     await site.start()

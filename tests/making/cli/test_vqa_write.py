@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 
 from phyblock_making.questions.paraphrases import fault_of_form, texts_in
+from tests.fork_server import Done
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.vqa_set import write_questions
-from tests.workspace import Done, Raw, Workspace, tower
+from tests.workspace import Raw, Workspace, tower
 
 GOOD = "The {block}: what shape has it?"
 FLIPPED = "What shape does the {block} not have?"

@@ -81,8 +81,9 @@ def test_what_was_asked_for_comes_in_order(scenes: list[Scene]) -> None:
         assert names == sorted(names)
 
 
-def test_every_scene_is_accepted_again_with_the_long_trial(scenes: list[Scene]) -> None:
-    for scene in scenes:
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
+def test_every_scene_is_accepted_again_with_the_long_trial(scenes: list[Scene], every: int) -> None:
+    for scene in scenes[::every]:
         accept(scene)
         assert hidden_blocks(scene) == ()
 
