@@ -55,7 +55,9 @@ class Headline:
 
 
 _BELOW = "Below each value stands its 95 % interval, from leaving out each base scene in turn."
-_SEEDS = "Values pool {} seeds; mean ± standard deviation over single seeds stands last."
+_SEEDS = (
+    "Values pool {} seeds; mean ± standard deviation over single seeds stands below the main one."
+)
 _FLOOR = "The floor is the most that is reached without seeing the goal."
 
 
@@ -78,7 +80,10 @@ def _headline(run: Run, track: str) -> Headline:
         found = [values.get((name, heading)) for heading in headings]
         held = {} if name in own_floors else floors
         cells = [
-            *(_cell(value, held.get(head)) for value, head in zip(found, headings, strict=True)),
+            *(
+                _cell(value, held.get(head), seeds=place == main)
+                for place, (value, head) in enumerate(zip(found, headings, strict=True))
+            ),
             *([_plain(published.get(name), NO_VALUE)] if published else []),
         ]
         rows.append(Row(name, sort, tuple(cells), _strip(found[main])))
@@ -113,13 +118,13 @@ def _headline(run: Run, track: str) -> Headline:
     )
 
 
-def _cell(value: Value | None, floor: Floor | None) -> Cell:
+def _cell(value: Value | None, floor: Floor | None, *, seeds: bool) -> Cell:
     if value is None or math.isnan(value.value):
         return Cell(NO_VALUE)
     below = [] if math.isnan(value.lo) else [f"{number(value.lo)} to {number(value.hi)}"]
     if below and floor is not None and not floor.is_below(value.lo, value.hi):
         below[0] += ", not above the floor"
-    if not math.isnan(value.sd):
+    if seeds and not math.isnan(value.sd):
         below.append(f"seeds {spread(value.mean, value.sd)}")
     return Cell(number(value.value), value.value, tuple(below))
 

@@ -17,6 +17,12 @@ from phyblock.tables.track_report import (
     TrackReport,
 )
 from phyblock.tracks.orders import order_frame, order_in_terminal, order_view
+from phyblock.tracks.step_planning.episode_views import (
+    endings_in_terminal,
+    endings_view,
+    moves_view,
+    progress_view,
+)
 from phyblock.tracks.step_planning.episodes import (
     NAME,
     endings_frame,
@@ -27,12 +33,8 @@ from phyblock.tracks.step_planning.figure import progress_by_turn
 from phyblock.tracks.step_planning.film import episode_film, episode_table
 from phyblock.tracks.step_planning.measures import STEP_MEASURES
 from phyblock.tracks.step_planning.table3 import (
-    endings_in_terminal,
-    endings_view,
-    moves_view,
     paper_table3_frame,
     paper_table3_view,
-    progress_view,
     published_recall,
     step_intervals,
     step_intervals_view,
