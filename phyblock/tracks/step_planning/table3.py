@@ -52,7 +52,7 @@ _RECALL = "placed_recall"
 """What our numbers and the published ones both have: the blocks of the goal that stand."""
 _SHOWN = {
     "completion": ("completion", ""),
-    **{f"{way}_{metric}": (metric, way) for way in COUNTED for metric in METRICS},
+    **{f"{way}_{metric}": (metric, way) for way in reversed(COUNTED) for metric in METRICS},
 }
 """Measure and way of counting by column."""
 _LEADING = {"completion": "Completed", "attempted_f1": "F1 of attempts"}
@@ -135,8 +135,8 @@ def table3_frame(run: Run) -> pd.DataFrame:
     found = headline_rows(track_estimates(run, NAME), design)
     known = found.set_index(["measure", "criterion", "model"]).to_dict("index")
     ends = ("mean", "sd") if len(design.suite.seeds) > 1 else ()
-    wanted = [(name, "value") for name in _SHOWN]
-    wanted += [(name, end) for name in _LEADING for end in ("lo", "hi")]
+    wanted = [(name, end) for name in _LEADING for end in ("value", "lo", "hi")]
+    wanted += [(name, "value") for name in _SHOWN if name not in _LEADING]
     wanted += [(name, end) for name in _SHOWN for end in ends]
     endings: dict[str, Any] = {row["model"]: row for row in endings_frame(run).to_dict("records")}
     rows: list[dict[str, Any]] = []
