@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict, fields
 
 import pandas as pd
 
@@ -53,10 +54,11 @@ def headline_frame(track: str, run: Run) -> pd.DataFrame:
     """One row a model and column of the headline, in the unit of its measure."""
     values = headline_of(run, track)
     rows = [
-        {"model": model, "column": heading, "value": value.shown, "lo": value.lo, "hi": value.hi}
+        {"model": model, "column": heading, **asdict(value)}
         for (model, heading), value in values.items()
     ]
-    return pd.DataFrame(rows, columns=["model", "column", "value", "lo", "hi"])
+    names = [field.name for field in fields(Value)]
+    return pd.DataFrame(rows, columns=["model", "column", *names])
 
 
 def headline_view(track: str, table: pd.DataFrame, run: Run) -> TextTable:

@@ -73,7 +73,7 @@ class LoadedRun(Run):
         for track in self.design.suite.tracks:
             values, main = headline_of(self, track), main_heading(self, track)
             short = kind_of(track).report().short or track
-            for name, end in {short: "shown", f"{short}_lo": "lo", f"{short}_hi": "hi"}.items():
+            for name, end in {short: "value", f"{short}_lo": "lo", f"{short}_hi": "hi"}.items():
                 found = (values.get((model, main)) for model in table.index)
                 numbers = [math.nan if value is None else getattr(value, end) for value in found]
                 table[name] = pd.Series(numbers, table.index, dtype="float64")

@@ -2,30 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import pandas as pd
 
 from phyblock.tables.design import Design
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Measure
-from phyblock.tables.text_table import Column, TextTable, between, number
+from phyblock.tables.text_table import Column, TextTable, between, number, spread
 from phyblock.tables.track_report import HeadlineColumn
 
-__all__ = ["Value", "headline_rows", "headline_values", "interval_frame", "interval_view"]
+__all__ = [
+    "Value",
+    "headline_rows",
+    "headline_values",
+    "interval_frame",
+    "interval_view",
+    "narrower",
+    "seeds_notes",
+    "uncertainty_cells",
+    "uncertainty_columns",
+]
+
+_INTERVAL, _SEEDS = "95 % CI", "Seeds"
+_SEEDS_NOTE = "Seeds: mean ± standard deviation over the values of single seeds."
+_ENDS = ("lo", "hi", "mean", "sd")
 
 
 @dataclass(frozen=True)
 class Value:
     """An estimate as tables show it, in the unit of its measure (percent for shares).
 
-    `shown` is the mean over seeds where there are several, else the pooled value; `lo` and `hi`
-    are NaN where there is no interval.
+    `value` is of all samples, pooled over seeds; `mean` and `sd` are over the values of single
+    seeds, `sd` NaN where one alone has a value; `lo` and `hi` are NaN where there is no interval.
     """
 
-    shown: float
-    pooled: float
+    value: float
+    mean: float
     sd: float
     lo: float
     hi: float
@@ -46,7 +62,6 @@ def headline_values(
 ) -> Mapping[tuple[str, str], Value]:
     """Values by model and heading."""
     scale = {measure.name: measure.scale for measure in measures}
-    several = len(design.suite.seeds) > 1
     rows = headline_rows(found, design)
     values = {}
     for column in columns:
@@ -54,15 +69,35 @@ def headline_values(
         if column.criterion:
             mine = mine[mine["criterion"] == column.criterion]
         for row in mine.to_dict("records"):
-            numbers = {
-                name: scale[column.measure] * float(row[name])
-                for name in ("value", "mean", "sd", "lo", "hi")
-            }
-            shown = numbers["mean"] if several else numbers["value"]
-            values[str(row["model"]), column.heading] = Value(
-                shown, numbers["value"], numbers["sd"], numbers["lo"], numbers["hi"]
-            )
+            names = ("value", "mean", "sd", "lo", "hi")
+            numbers = (scale[column.measure] * float(row[name]) for name in names)
+            values[str(row["model"]), column.heading] = Value(*numbers)
     return values
+
+
+def uncertainty_columns(design: Design, group: str) -> tuple[Column, ...]:
+    """Columns for the interval of a value and, where there are several seeds, what they say."""
+    names = (_INTERVAL, _SEEDS) if len(design.suite.seeds) > 1 else (_INTERVAL,)
+    return tuple(Column(name, group) for name in names)
+
+
+def uncertainty_cells(row: Mapping[Hashable, Any], cell: str, design: Design) -> tuple[str, ...]:
+    """Texts of `uncertainty_columns` out of the columns `<cell>_lo`, `_hi`, `_mean` and `_sd`."""
+    lo, hi, mean, sd = (float(row.get(f"{cell}_{end}", math.nan)) for end in _ENDS)
+    return (between(lo, hi), spread(mean, sd))[: len(uncertainty_columns(design, ""))]
+
+
+def seeds_notes(design: Design) -> tuple[str, ...]:
+    """What a table says of several seeds; () for one."""
+    seeds = len(design.suite.seeds)
+    return (f"Values pool the samples of {seeds} seeds.", _SEEDS_NOTE) if seeds > 1 else ()
+
+
+def narrower(view: TextTable) -> tuple[TextTable, ...]:
+    """A table, then without what seeds say, then without intervals too."""
+    notes = tuple(note for note in view.notes if note != _SEEDS_NOTE)
+    pooled = replace(view.without([_SEEDS]), notes=notes)
+    return view, pooled, pooled.without([_INTERVAL])
 
 
 def interval_frame(

@@ -9,8 +9,10 @@ import numpy as np
 import pandas as pd
 
 from phyblock.scoring.ratios import f1_of
+from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
+from phyblock.tables.shares import shares_of
 from phyblock.tables.text_table import Column, TextTable, between, number
 from phyblock.tables.track_report import WHOLE
 from phyblock.tracks.estimates import counted_samples, track_estimates
@@ -18,7 +20,9 @@ from phyblock.tracks.poses import POSE_COUNTS, POSE_MEASURES
 
 __all__ = ["order_frame", "order_in_terminal", "order_view"]
 
-_SPREAD = ("f1", "f1_sd", "f1_least", "f1_most")
+_ENDS = {"value": "", "lo": "_lo", "hi": "_hi", "mean": "_mean", "sd": "_sd"}
+_SPREAD = ("f1_mean", "f1_sd", "f1_least", "f1_most")
+_SAME = {"_share": "", "_lo": "_lo", "_hi": "_hi"}
 _POSES = tuple(measure.name for measure in POSE_MEASURES)
 
 
@@ -26,70 +30,78 @@ def order_frame(track: str, criterion: str, matcher: str, run: Run) -> pd.DataFr
     """One row a model: what another order of the candidates changes; shares in [0, 1].
 
     `order` is that of the run; shuffled, each of the `seeds` is another one, and in the file's they
-    are repeats, to hold the others against. `f1` is the mean over seeds with `f1_sd` (ddof = 1),
-    `f1_least` and `f1_most`, of all scenes in the headline setting, counted by `criterion`.
-    `same_plan` is the share of `plan_pairs` (a scene with two seeds) in which the plan names the
-    same blocks in the same order. `pose_first` is the share of `pose_first_n` kinds that were named
-    in the right pose where that is listed first among several, `pose_later` of `pose_later_n` where
-    a wrong one is; `pose_gap` is their difference, with a 95 % interval. Empty where the run has
-    no samples of the track.
+    are repeats, to hold the others against. `f1` pools seeds; over single seeds it has `f1_mean`,
+    `f1_sd` (ddof = 1), `f1_least` and `f1_most`, of all scenes in the headline setting, counted by
+    `criterion`. `same_plan` is the share of `plan_pairs` (a scene with two seeds) in which the plan
+    names the same blocks in the same order. `pose_first` is the share of `pose_first_n` kinds that
+    were named in the right pose where that is listed first among several, `pose_later` of
+    `pose_later_n` where a wrong one is; `pose_gap` is their difference. `*_lo` and `*_hi` bound
+    95 % intervals. Empty where the run has no samples of the track.
     """
     design = run.design
     records = run.records[run.records["track"] == track]
-    spread = _over_seeds(run, track, criterion, matcher)
-    found = track_estimates(run, track)
-    poses = found[found[CELL] == WHOLE.name].set_index(["measure", "model"]).sort_index()
+    spread = _extremes(run, track, criterion, matcher)
+    found = headline_rows(track_estimates(run, track), design)
+    found = found[(found[CELL] == WHOLE.name) & found["criterion"].isin(["", criterion])]
+    known = found.set_index(["measure", "model"]).to_dict("index")
+    plans = _same_plans(records)
+    same = shares_of(run, plans, ("same",), whole="pairs").droplevel(CELL).to_dict("index")
+    pairs = plans.groupby("model")["pairs"].sum()
     named = counted_samples(run, track, POSE_COUNTS)
     counts = named[named[CELL] == WHOLE.name].groupby("model")[list(POSE_COUNTS.columns)].sum()
     rows = []
     for model in design.model_names if len(records) else ():
-        same, pairs = _same_plans(records[records["model"] == model])
         row: dict[str, Any] = {"model": model, "order": design.suite.candidates.order}
         row["seeds"] = len(design.suite.seeds)
-        row |= dict(zip(_SPREAD, spread.get(model, [np.nan] * len(_SPREAD)), strict=True))
-        row |= {"same_plan": same / pairs if pairs else np.nan, "plan_pairs": pairs}
+        estimate = known.get(("f1", model), {})
+        row |= {f"f1{name}": estimate.get(end, np.nan) for end, name in _ENDS.items()}
+        measured = not np.isnan(row["f1"])
+        row |= spread[model] if measured else dict.fromkeys(_SPREAD[2:], np.nan)
+        mine = same.get(model, {})
+        row |= {f"same_plan{name}": mine.get(f"same{end}", np.nan) for end, name in _SAME.items()}
+        row["plan_pairs"] = int(pairs.get(model, 0))
         for name in _POSES:
-            row[name] = poses["value"].get((name, model), np.nan)
-        for end in ("lo", "hi"):
-            row[f"pose_gap_{end}"] = poses[end].get((_POSES[-1], model), np.nan)
+            estimate = known.get((name, model), {})
+            ends = {end: _ENDS[end] for end in ("value", "lo", "hi")}
+            row |= {f"{name}{of}": estimate.get(end, np.nan) for end, of in ends.items()}
         for name in ("first_n", "later_n"):
             row[f"pose_{name}"] = int(counts[name].get(model, 0))
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def _over_seeds(run: Run, track: str, criterion: str, matcher: str) -> dict[str, list[float]]:
-    """Mean, standard deviation, least and greatest F1 of single seeds, by model."""
+def _extremes(run: Run, track: str, criterion: str, matcher: str) -> dict[str, dict[str, float]]:
+    """Least and greatest F1 of single seeds, by model."""
     scores = run.scores
     kept = (scores["track"] == track) & (scores["criterion"] == criterion)
     kept &= (scores["setting"] == run.design.setting) & (scores["matcher"] == matcher)
     kept &= ~scores["outcome"].isin(run.design.outcomes_left_out)
     sums = scores[kept].groupby(["model", "seed"])[["tp", "fp", "fn"]].sum()
     values = pd.Series(f1_of(sums.to_numpy(np.float64)), index=sums.index)
-    each = values.groupby(level="model")
-    table = each.agg(["mean", "std", "min", "max"])
-    return {str(model): [float(value) for value in row] for model, *row in table.itertuples()}
+    table = values.groupby(level="model").agg(["min", "max"])
+    names = _SPREAD[2:]
+    return {str(row[0]): dict(zip(names, row[1:], strict=True)) for row in table.itertuples()}
 
 
-def _same_plans(records: pd.DataFrame) -> tuple[int, int]:
-    """How many pairs of plans for one scene are the same, of how many."""
-    same = pairs = 0
+def _same_plans(records: pd.DataFrame) -> pd.DataFrame:
+    """How many pairs of plans are the `same`, of how many `pairs`: a row a model and scene."""
     read = records[records["rule"].notna() | records["ending"].notna()]
-    for _, plans in read.groupby("scene")["file_plan"]:
-        for one, other in combinations(plans, 2):
-            same += one == other
-            pairs += 1
-    return same, pairs
+    rows = []
+    for (model, scene), plans in read.groupby(["model", "scene"])["file_plan"]:
+        alike = [one == other for one, other in combinations(plans, 2)]
+        rows.append((model, scene, 0, True, sum(alike), len(alike)))
+    return pd.DataFrame(rows, columns=["model", "scene", "seed", "replied", "same", "pairs"])
 
 
 def order_view(table: pd.DataFrame, run: Run) -> TextTable:
     """A row a model out of `order_frame`, in percent."""
     columns = (
         Column("Model", is_text=True),
+        *(Column(name, "F1") for name in ("%", "95 % CI")),
         *(Column(name, "F1 over seeds") for name in ("mean", "sd", "least", "most")),
-        Column("Same plan"),
-        *(Column(name, "Right pose listed first") for name in ("%", "n")),
-        *(Column(name, "listed later") for name in ("%", "n")),
+        *(Column(name, "Same plan") for name in ("%", "95 % CI")),
+        *(Column(name, "Right pose listed first") for name in ("%", "95 % CI", "n")),
+        *(Column(name, "listed later") for name in ("%", "95 % CI", "n")),
         *(Column(name, "First less later") for name in ("%", "95 % CI")),
     )
     rows = tuple(_row(row) for row in table.to_dict("records"))
@@ -116,15 +128,25 @@ def order_view(table: pd.DataFrame, run: Run) -> TextTable:
 def _row(row: Any) -> tuple[str, ...]:
     return (
         row["model"],
-        *(number(100 * row[name]) for name in (*_SPREAD, "same_plan", "pose_first")),
+        *_with_interval(row, "f1"),
+        *(number(100 * row[name]) for name in _SPREAD),
+        *_with_interval(row, "same_plan"),
+        *_with_interval(row, "pose_first"),
         str(row["pose_first_n"]),
-        number(100 * row["pose_later"]),
+        *_with_interval(row, "pose_later"),
         str(row["pose_later_n"]),
-        number(100 * row["pose_gap"]),
-        between(100 * row["pose_gap_lo"], 100 * row["pose_gap_hi"], signed=True),
+        *_with_interval(row, "pose_gap", signed=True),
     )
 
 
+def _with_interval(row: Any, name: str, *, signed: bool = False) -> tuple[str, str]:
+    interval = between(100 * row[f"{name}_lo"], 100 * row[f"{name}_hi"], signed=signed)
+    return number(100 * row[name]), interval
+
+
 def order_in_terminal(view: TextTable, table: pd.DataFrame) -> tuple[TextTable, ...]:
-    """The table where candidates were shuffled; else it stands in the files alone."""
-    return (view,) if (table["order"] == "shuffled").any() else ()
+    """The table where candidates were shuffled, without intervals where it is too wide; else it
+    stands in the files alone.
+    """
+    is_shuffled = (table["order"] == "shuffled").any()
+    return (view, view.without(["95 % CI"])) if is_shuffled else ()

@@ -54,7 +54,7 @@ def test_a_pipe_gets_whole_tables_without_escapes(suite: Workspace) -> None:
     assert done.code == 0
     assert "\x1b" not in done.out
     heading = next(line for line in done.out.splitlines() if line.startswith(" Model"))
-    assert heading.split() == ["Model", *["Prec", "Rec", "F1"] * 5]
+    assert heading.split() == ["Model", *["Prec", "Rec", "F1"] * 5, "95", "%", "CI"]
     assert "Tables are in out/tables" in done.out
 
 

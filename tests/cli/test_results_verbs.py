@@ -33,7 +33,7 @@ def test_tables_print_all_or_one_in_any_form(folder: Path) -> None:
     for caption in ("Assembly planning", "95 % intervals", "setting A (with orientation)", "seeds"):
         assert caption in everything
     one = call("tables", folder, "--only", "table5", "--format", "md").output
-    assert one.startswith("**F1 over 2 seeds (%)")
+    assert one.startswith("**F1 as the paper's Table 5: means over 2 seeds (%)")
     assert r"\begin{tabular}" in call("tables", folder, "--only", "cost", "--format", "tex").output
     with pytest.raises(SpecError, match="no such table"):
         call("tables", folder, "--only", "table9")

@@ -28,7 +28,7 @@ def test_a_model_that_never_answered_has_no_value_and_a_note(tmp_path: Path) -> 
     ]
     lines = printed(tmp_path / "run", records, manifest(seeds=[0], missing="count"))
     (row, *_) = (line for line in lines if line.startswith("alpha"))
-    assert row.split() == ["alpha", *[NO_VALUE] * 15]
+    assert row.split() == ["alpha", *[NO_VALUE] * 16]
     assert "Counted as empty plans: alpha 5 of 5 (API errors)." in lines
 
 

@@ -14,7 +14,7 @@ from phyblock.scoring import ERROR_TYPES, Counts, micro
 from phyblock.tracks.full_planning.assembly import ASSEMBLY_COLUMNS, assembly_frame, table1_frame
 from phyblock.tracks.full_planning.errors import errors_frame
 from phyblock.tracks.full_planning.settings import settings_frame
-from phyblock.tracks.full_planning.views import table1_view
+from phyblock.tracks.full_planning.views import errors_view, table1_view
 from tests.report.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
 
 Records = list[dict[str, Any]]
@@ -274,7 +274,7 @@ def test_table1_is_the_headline_in_percent() -> None:
         f"{level}_{metric}"
         for level in ("level1", "level2", "level3", "level4", "overall")
         for metric in ("precision", "recall", "f1")
-    ]
+    ] + ["overall_f1_lo", "overall_f1_hi"]
     alpha = table.loc["alpha"]
     for level in ("level2", "overall"):
         assert alpha[f"{level}_precision"] == 25
@@ -283,13 +283,14 @@ def test_table1_is_the_headline_in_percent() -> None:
     assert table.loc["beta"].isna().all()
 
 
-def test_table1_of_several_seeds_has_means_and_deviations() -> None:
+def test_table1_of_several_seeds_pools_them_and_has_means_and_deviations_beside() -> None:
     records = [
         record(scene="001", seed=0, scores=[score(1, 1, 0)]),
         record(scene="001", seed=1, scores=[score(3, 1, 0)]),
     ]
     alpha = table1_frame(run_of(records, manifest())).set_index("model").loc["alpha"]
-    assert alpha["level2_precision"] == pytest.approx(62.5)
+    assert alpha["level2_precision"] == pytest.approx(100 * 4 / 6)
+    assert alpha["level2_precision_mean"] == pytest.approx(62.5)
     assert alpha["level2_precision_sd"] == pytest.approx(25 / math.sqrt(2))
     assert alpha["level2_recall_sd"] == 0
     assert math.isnan(alpha["level3_f1_sd"])
@@ -306,7 +307,7 @@ def test_error_types_add_up_to_the_wrong_steps(records: Records) -> None:
     assert np.allclose(errors.loc[wrong, shares].sum(axis=1), 1)
     assert errors.loc[~wrong, shares].isna().all(axis=None)
     assembly = assembly_frame(run)
-    for row in errors[errors["level"] != "1"].to_dict("records"):
+    for row in errors.to_dict("records"):
         same = cell(assembly, model=row["model"], level=row["level"])
         assert (row["n"], row["wrong_steps"]) == (same["n"], same["fp"])
 
@@ -318,11 +319,32 @@ def test_error_types_by_hand() -> None:
         record(scene="003", outcome="missing", scores=[score(0, 0, 4)]),
     ]
     table = errors_frame(run_of(records, manifest())).query("model == 'alpha'").set_index("level")
-    assert table.loc["1", list(ERROR_TYPES)].tolist() == [1, 0, 2, 1]
+    assert table.loc["2", list(ERROR_TYPES)].tolist() == [1, 0, 2, 1]
     assert table.loc["overall", list(ERROR_TYPES)].tolist() == [1, 4, 2, 1]
     assert table.loc["overall", "overflow_share"] == 0.5
     assert table.loc["overall", "n"] == 2
     assert table.loc["4", "n"] == 0
+    lo, share, hi = table.loc["overall", [f"overflow_{end}" for end in ("lo", "share", "hi")]]
+    assert 0 <= lo < share < hi <= 1
+
+
+@pytest.mark.parametrize(
+    ("level1", "levels", "wanted"),
+    [
+        ("selection", [1, 2], ["2", "overall"]),
+        ("aov", [1, 2], ["1", "2", "overall"]),
+        ("selection", [1], []),
+    ],
+)
+def test_a_level_that_asks_for_no_order_has_no_types_of_wrong_steps(
+    level1: str, levels: list[int], wanted: list[str]
+) -> None:
+    records = [record(scenes, scores=[score(1, 4, 0)]) for scenes in ("000", "004")]
+    run = run_of(records, manifest(models=["alpha"], level1=level1, levels=levels))
+    table = errors_frame(run)
+    assert table["level"].tolist() == wanted
+    (note,) = errors_view(table, run).notes
+    assert ("Level-1 asks for no order" in note) == (level1 == "selection")
 
 
 def test_settings_are_not_compared_where_a_model_has_no_reply() -> None:

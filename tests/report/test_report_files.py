@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -170,7 +171,8 @@ def test_csv_files_hold_numbers_and_empty_cells(tmp_path: Path) -> None:
     assert (beta["n"], beta["tp"], beta["precision"], beta["f1_sd"]) == ("0", "0", "", "")
     with (written.folder / "table1.csv").open(newline="") as file:
         table1 = {row["model"]: row for row in csv.DictReader(file)}
-    assert table1["alpha"]["level2_precision"] == "58.3"
+    assert table1["alpha"]["level2_precision"] == "60.0"
+    assert table1["alpha"]["level2_precision_mean"] == "58.3"
     assert table1["alpha"]["level2_precision_sd"] == "11.8"
     assert table1["beta"]["overall_f1"] == ""
 
@@ -181,7 +183,8 @@ def test_table1_says_how_it_was_made(tmp_path: Path) -> None:
     text = to_markdown(
         write_tables(write_run(tmp_path / "run", records, manifest())).views["table1"]
     )
-    assert "58.3 ± 11.8" in text
+    assert re.search(r"alpha +\|.* 60.0 \|", text)
+    assert "- Values pool the samples of 2 seeds." in text
     assert "- Setting A, matcher optimal, Level-1 by selection;" in text
     assert "- Scored of 10 samples: alpha 6, beta 0." in text
     assert "- alpha: seed unsupported: 2 independent repeats." in text

@@ -88,18 +88,18 @@ def test_only_questions_that_both_answered_count_and_means_are_of_what_was_asked
     assert empty["verdict"] == "nothing to compare"
 
 
-def test_episodes_are_compared_by_f1_of_blocks_placed() -> None:
+def test_episodes_are_compared_by_f1_of_attempts_and_of_blocks_placed() -> None:
     records = [episode("alpha", scene, 3) for scene in LEVELS]
     records += [episode("beta", scene, n % 2 + 1) for n, scene in enumerate(LEVELS)]
     run = run_of(records, facts("step_planning"))
     table = compare_models(run).table.set_index("part")
     values = step_intervals(run).set_index(["model", "cell"])["value"]
-    assert table.index.tolist() == ["attempted", "placed"]
+    assert table.index.tolist() == ["placed", "attempted"]
     for part in table.index:
         assert table.loc[part, "value_a"] == pytest.approx(values["alpha", part])
         assert table.loc[part, "value_b"] == pytest.approx(values["beta", part])
     three = run_of(records, facts("step_planning", models=("alpha", "beta", "gamma")))
-    assert set(compare_models(three).table["part"]) == {"placed"}
+    assert set(compare_models(three).table["part"]) == {"attempted"}
 
 
 def test_the_track_is_the_first_that_runs_share_or_the_one_named() -> None:

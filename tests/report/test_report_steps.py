@@ -89,9 +89,12 @@ def test_published_numbers_stand_beside(tmp_path: Path) -> None:
         ("other", "run"),
     ]
     printed = rows[1]
-    names = ("placed_precision", "placed_recall", "placed_f1")
-    assert tuple(printed[name] for name in names) == (90.1, 13.0, 22.8)
-    assert printed["attempted_f1"] != printed["attempted_f1"]
+    assert printed["placed_recall"] == 13.0
+    rates = set(printed) - {"model", "source", "published_name", "placed_recall"}
+    assert rates > {"placed_precision", "placed_f1", "attempted_f1", "completion"}
+    assert all(math.isnan(printed[name]) for name in rates)
+    notes = write_tables(tmp_path).views["table3"].notes
+    assert any("recall alone stands beside ours" in note for note in notes)
 
 
 def test_seeds_have_a_mean_and_a_spread(tmp_path: Path) -> None:
@@ -106,8 +109,12 @@ def test_seeds_have_a_mean_and_a_spread(tmp_path: Path) -> None:
     assert row["placed_recall"] == 75
     assert row["placed_recall_sd"] == pytest.approx(35.355, abs=1e-3)
     text = write_tables(tmp_path).views["table3"]
-    assert "75.0 ± 35.4" in text.rows[0]
-    assert "Mean ± standard deviation over 2 seeds." in text.notes
+    assert text.columns[1].group == "Completed"
+    assert text.columns[4].group == "F1 of attempts"
+    assert text.rows[0][1] == "50.0"
+    assert text.rows[0][3] == "50.0 ± 70.7"
+    assert "Values pool the samples of 2 seeds." in text.notes
+    assert (row["attempted_f1"], row["attempted_f1_mean"]) == pytest.approx((600 / 7, 250 / 3))
 
 
 def test_endings_split_the_episodes(folder: Path) -> None:
@@ -115,6 +122,7 @@ def test_endings_split_the_episodes(folder: Path) -> None:
     assert (alpha["completed"], alpha["done"], alpha["max_failures"]) == (1, 1, 0)
     assert (alpha["n"], alpha["expected"], alpha["steps"]) == (2, 2, 4)
     assert (alpha["steps_to_finish"], alpha["detour"]) == (5, 1.25)
+    assert 0 < alpha["completed_lo"] < alpha["completed_share"] == 0.5 < alpha["completed_hi"] < 1
     assert (beta["n"], beta["expected"], beta["max_failures"]) == (1, 2, 1)
 
 
@@ -124,6 +132,7 @@ def test_moves_split_the_steps(folder: Path) -> None:
     assert (alpha["steps"], alpha["placed"], alpha["overflow"], alpha["done"]) == (8, 6, 1, 1)
     assert (beta["overflow"], beta["unread"], beta["invalid"]) == (2, 2, 1)
     assert beta["unread_share"] == 0.4
+    assert 0 < alpha["placed_lo"] < alpha["placed_share"] == 0.75 < alpha["placed_hi"] <= 1
     assert len(episodes_frame(run)) == 3
 
 
@@ -139,6 +148,9 @@ def test_progress_is_a_curve_that_keeps_what_was_reached(folder: Path) -> None:
     assert alpha["step"].tolist() == [1, 2, 3, 4, 5]
     assert alpha["blocks"].tolist() == [0.25, 0.5, 0.625, 0.625, 0.75]
     assert alpha["under_way"].tolist() == [1, 1, 1, 0.5, 0.5]
+    assert (alpha["blocks_lo"] <= alpha["blocks"]).all()
+    assert (alpha["blocks"] <= alpha["blocks_hi"]).all()
+    assert (alpha["blocks_lo"] < alpha["blocks_hi"])[2:].all()
     assert table.loc[table["model"] == "beta", "blocks"].tolist() == [0] * 5
 
 
@@ -179,6 +191,8 @@ def test_a_model_without_any_reply_has_no_metrics(tmp_path: Path) -> None:
     alpha, beta = table3_frame(run).to_dict("records")
     assert alpha["placed_recall"] == 50
     assert math.isnan(beta["placed_recall"])
+    assert math.isnan(beta["completion"])
+    assert progress_frame(run)["model"].unique().tolist() == ["alpha"]
     assert set(step_intervals(run)["model"]) == {"alpha"}
     counts = step_scores_frame(run).set_index(["model", "setting", "criterion"])
     assert counts.loc[("beta", "A", "placed"), ["n", "fn"]].tolist() == [2, 8]

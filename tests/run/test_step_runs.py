@@ -62,7 +62,10 @@ def test_baselines_give_table_3(workspace: Workspace) -> None:
     done = workspace.run()
     assert (done.code, done.err) == (0, "")
     table = workspace.tables()["table3.csv"].decode().splitlines()
-    assert table[1].startswith("oracle,run,,100.0,100.0,100.0,100.0,100.0,100.0,100.0,1.0,5")
+    leading = "completion,completion_lo,completion_hi,attempted_f1,attempted_f1_lo,attempted_f1_hi"
+    assert table[0].startswith(f"model,source,published_name,{leading},attempted_precision,")
+    oracle = "oracle,run,,100.0,39.3,100.0,100.0,39.3,100.0,100.0,100.0,100.0,100.0,100.0,1.0,5"
+    assert table[1] == oracle
     assert [line.split(",")[0] for line in table] == ["model", "oracle", "random", "repeat"]
     endings = {r["model"]: set() for r in workspace.records()}  # type: ignore[var-annotated]
     for record in workspace.records():

@@ -13,9 +13,10 @@ from phyblock.records import PromptMessage, Record, StoredReply
 from phyblock.records import Score as StoredScore
 from phyblock.report.export.rows import newest_records, prompt_text
 from phyblock.run.prompts import read_prompts
-from phyblock.scoring import Counts, micro
+from phyblock.scoring import Counts
 from phyblock.tables.load import Run
-from phyblock.tracks.estimates import numbers_of, stored_counts
+from phyblock.tables.measures import SCORED_BY
+from phyblock.tracks.estimates import numbers_of, stored_counts, track_estimates, track_measures
 
 if TYPE_CHECKING:
     from inspect_ai.log import EvalLog, EvalMetric, EvalSample
@@ -50,9 +51,9 @@ def inspect_log(
 ) -> EvalLog:
     """The log of one track and model: a sample a record, its seed the epoch.
 
-    Scores are named SETTING-MATCHER-CRITERION and hold tp, fp, fn and f1; the metrics of the
-    log are micro averages over all samples that tables count. A question's score is `answer`: C or
-    I, with accuracy.
+    Scores are named SETTING-MATCHER-CRITERION and hold tp, fp, fn and f1. A question's score is
+    `answer`: C or I. The metrics of the log are the estimates of the tables, each of the last cell
+    (overall, where its criterion is counted there) that has it.
     """
     from inspect_ai.log import EvalConfig, EvalDataset, EvalLog, EvalResults, EvalSpec
 
@@ -61,7 +62,6 @@ def inspect_log(
     name = f"phyblock/{track}"
     digest = hashlib.sha256(f"{run.manifest.identity} {track} {model}".encode()).hexdigest()[:22]
     data = run.manifest.dataset
-    counted = [r for r in records if r.outcome not in run.design.outcomes_left_out]
     samples = [_sample(record, prompts, seeds) for record in records]
     keys = sorted({str(sample.id) for sample in samples})
     return EvalLog(
@@ -84,7 +84,7 @@ def inspect_log(
         results=EvalResults(
             total_samples=len(samples),
             completed_samples=sum(record.reply is not None for record in records),
-            scores=_results(counted),
+            scores=_results(run, track, model),
         ),
         samples=samples,
     )
@@ -173,33 +173,24 @@ def _scores(record: Record) -> dict[str, Score]:
     return found
 
 
-def _results(records: Sequence[Record]) -> list[Any]:
+def _results(run: Run, track: str, model: str) -> list[Any]:
     from inspect_ai.log import EvalScore
 
-    counts: dict[str, list[Counts]] = {}
-    for record in records:
-        for score in record.scores:
-            one = Counts(score.tp, score.fp, score.fn)
-            counts.setdefault(_name(score), []).append(one)
-    found = []
-    for name, all_counts in counts.items():
-        total = micro(all_counts)
-        metrics = {"f1": total.f1, "precision": total.precision, "recall": total.recall}
-        found.append(
-            EvalScore(
-                name=name,
-                scorer=name,
-                scored_samples=len(all_counts),
-                metrics=_metrics({k: v for k, v in metrics.items() if v is not None}),
-            )
-        )
-    answers = [record.is_correct for record in records if record.is_correct is not None]
-    if answers:
-        accuracy = _metrics({"accuracy": sum(answers) / len(answers)})
-        found.append(
-            EvalScore(name="answer", scorer="answer", scored_samples=len(answers), metrics=accuracy)
-        )
-    return found
+    found = track_estimates(run, track)
+    found = found[found["model"] == model]
+    last = found.drop_duplicates(["measure", *SCORED_BY], keep="last").dropna(subset=["value"])
+    counts = {measure.name: measure.counted.name for measure in track_measures(track)}
+    metrics: dict[str, dict[str, float]] = {}
+    sizes: dict[str, int] = {}
+    for row in last.to_dict("records"):
+        way = "-".join(row[name] for name in SCORED_BY if row[name])
+        name = way or counts[row["measure"]]
+        metrics.setdefault(name, {})[row["measure"]] = float(row["value"])
+        sizes[name] = max(sizes.get(name, 0), row["n"])
+    return [
+        EvalScore(name=name, scorer=name, scored_samples=sizes[name], metrics=_metrics(values))
+        for name, values in metrics.items()
+    ]
 
 
 def _metrics(values: Mapping[str, float]) -> dict[str, EvalMetric]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from phyblock.report.measure_table import headline_columns
+from phyblock.report.measure_table import headline_columns, main_heading
 from phyblock.tables.drawing import ACCENT, INK, MUTED, bare_axes, headed, new_figure
 from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
@@ -38,7 +38,8 @@ def main_measure(track: str) -> Measure:
 def measure_bars(run: Run, *, track: str) -> Figure | None:
     """A panel a cell, a bar a model with its 95 % interval; None where nothing was measured.
 
-    Models are ranked by the last cell. Cells that are parts of a mean are left out.
+    Models are ranked by the cell that stands for the track, else by the last. Cells that are parts
+    of a mean are left out.
     """
     measure = main_measure(track)
     columns = [c for c in headline_columns(run, track) if c.measure == measure.name]
@@ -47,9 +48,11 @@ def measure_bars(run: Run, *, track: str) -> Figure | None:
     found = found[found["measure"] == measure.name]
     drawn = [_values(found, column, measure) for column in columns]
     sign = -1 if measure.better == "higher" else 1
-    last = drawn[-1]
-    measured = (name for name in run.design.model_names if not np.isnan(last.get(name, _NONE)[0]))
-    models = sorted(measured, key=lambda name: (sign * last[name][0], name))
+    heading = main_heading(run, track)
+    leading = next((n for n, c in enumerate(columns) if c.heading == heading), len(columns) - 1)
+    main = drawn[leading]
+    measured = (name for name in run.design.model_names if not np.isnan(main.get(name, _NONE)[0]))
+    models = sorted(measured, key=lambda name: (sign * main[name][0], name))
     if not models:
         return None
     figure = new_figure(1.05 + _ROW_IN * len(models))
@@ -58,7 +61,7 @@ def measure_bars(run: Run, *, track: str) -> Figure | None:
     longest = 100.0 if measure.unit == "%" else np.nanmax([np.nanmax(v) for v in shown])
     unit = f" ({measure.unit})" if measure.unit else ""
     for ax, column, values in zip(axes, columns, shown, strict=True):
-        _bars(ax, values, longest, INK if column is columns[-1] else ACCENT)
+        _bars(ax, values, longest, INK if column is columns[leading] else ACCENT)
         ax.set(title=column.heading, xlabel=f"{measure.heading}{unit}")
         if measure.unit == "%":
             ax.set_xticks([0, 50, 100])

@@ -11,7 +11,7 @@ from phyblock.report.measure_table import headline_columns, headline_of, main_he
 from phyblock.tables.headline import Value
 from phyblock.tables.load import Run
 from phyblock.tables.showing import captioned
-from phyblock.tables.text_table import NO_VALUE, number
+from phyblock.tables.text_table import NO_VALUE, number, spread
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["Cell", "Headline", "Row", "headlines"]
@@ -21,11 +21,11 @@ Kind = Literal["model", "baseline", "reference"]
 
 @dataclass(frozen=True)
 class Cell:
-    """A number as shown, with what stands under it; `value` sorts, None where there is none."""
+    """A number as shown, with the lines under it; `value` sorts, None where there is none."""
 
     text: str
     value: float | None = None
-    below: str = ""
+    below: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,9 @@ class Headline:
 
 
 _BELOW = "Below each value stands its 95 % interval, from leaving out each base scene in turn."
-
+_SEEDS = (
+    "Values pool {} seeds; mean ± standard deviation over single seeds stands below the main one."
+)
 _FLOOR = "The floor is the most that is reached without seeing the goal."
 
 
@@ -78,7 +80,10 @@ def _headline(run: Run, track: str) -> Headline:
         found = [values.get((name, heading)) for heading in headings]
         held = {} if name in own_floors else floors
         cells = [
-            *(_cell(value, held.get(head)) for value, head in zip(found, headings, strict=True)),
+            *(
+                _cell(value, held.get(head), seeds=place == main)
+                for place, (value, head) in enumerate(zip(found, headings, strict=True))
+            ),
             *([_plain(published.get(name), NO_VALUE)] if published else []),
         ]
         rows.append(Row(name, sort, tuple(cells), _strip(found[main])))
@@ -94,7 +99,7 @@ def _headline(run: Run, track: str) -> Headline:
         rows.append(Row(name, "reference", (*cells, *([Cell("")] if published else []))))
     marked = {name: numbers.get(headings[main]) for name, numbers in references.items()}
     seeds = len(run.design.suite.seeds)
-    mean = (f"Mean of {seeds} seeds.",) if seeds > 1 else ()
+    mean = (_SEEDS.format(seeds),) if seeds > 1 else ()
     floor_note = (_FLOOR,) if floors else ()
     below = (_BELOW,) if any(cell.below for row in rows for cell in row.cells) else ()
     about = (report.reference_note,) if report.reference_note else ()
@@ -113,20 +118,22 @@ def _headline(run: Run, track: str) -> Headline:
     )
 
 
-def _cell(value: Value | None, floor: Floor | None) -> Cell:
-    if value is None or math.isnan(value.shown):
+def _cell(value: Value | None, floor: Floor | None, *, seeds: bool) -> Cell:
+    if value is None or math.isnan(value.value):
         return Cell(NO_VALUE)
-    below = "" if math.isnan(value.lo) else f"{number(value.lo)} to {number(value.hi)}"
+    below = [] if math.isnan(value.lo) else [f"{number(value.lo)} to {number(value.hi)}"]
     if below and floor is not None and not floor.is_below(value.lo, value.hi):
-        below += ", not above the floor"
-    return Cell(number(value.shown), value.shown, below)
+        below[0] += ", not above the floor"
+    if seeds and not math.isnan(value.sd):
+        below.append(f"seeds {spread(value.mean, value.sd)}")
+    return Cell(number(value.value), value.value, tuple(below))
 
 
 def _strip(value: Value | None) -> tuple[float, float, float] | None:
-    if value is None or math.isnan(value.shown):
+    if value is None or math.isnan(value.value):
         return None
-    ends = (value.shown, value.shown) if math.isnan(value.lo) else (value.lo, value.hi)
-    return (value.shown, *ends)
+    ends = (value.value, value.value) if math.isnan(value.lo) else (value.lo, value.hi)
+    return (value.value, *ends)
 
 
 def _plain(value: float | None, blank: str = "") -> Cell:

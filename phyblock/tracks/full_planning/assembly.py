@@ -116,19 +116,20 @@ def table1_frame(run: Run) -> pd.DataFrame:
     """The paper's Table 1: one row a model, in percent, unrounded, NaN where undefined.
 
     Columns are `model`, then for each level `level1_precision`, `level1_recall`, `level1_f1`, ...
-    to `overall_f1`, from the headline matcher and setting. With more than one seed the values are
-    means over seeds and `level1_precision_sd` etc. stand beside them.
+    to `overall_f1`, from the headline matcher and setting, pooled over seeds; then the ends
+    `overall_f1_lo` and `overall_f1_hi` of its interval. With more than one seed
+    `level1_precision_mean` and `level1_precision_sd` etc., over single seeds, follow.
     """
     design = run.design
-    kinds = ("_mean", "_sd") if len(design.suite.seeds) > 1 else ("",)
     cells = headline_cells(assembly_frame(run), design).set_index(["model", "level"])
+    shown = [(level, metric) for level in design.levels for metric in METRICS]
+    wanted = [(*of, "") for of in shown] + [(OVERALL, "f1", end) for end in ("_lo", "_hi")]
+    if len(design.suite.seeds) > 1:
+        wanted += [(*of, end) for of in shown for end in ("_mean", "_sd")]
     table = pd.DataFrame({"model": list(design.model_names)})
-    for level in design.levels:
-        for metric in METRICS:
-            for kind in kinds:
-                values = cells[f"{metric}{kind}"].xs(level, level="level")
-                name = level_column(level, metric) + ("_sd" if kind == "_sd" else "")
-                table[name] = 100 * table["model"].map(values)
+    for level, metric, end in wanted:
+        values = cells[f"{metric}{end}"].xs(level, level="level")
+        table[level_column(level, metric) + end] = 100 * table["model"].map(values)
     return table
 
 

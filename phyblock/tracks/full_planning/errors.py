@@ -6,35 +6,50 @@ import pandas as pd
 
 from phyblock.scoring import ERROR_TYPES
 from phyblock.tables.cells import with_levels
-from phyblock.tables.load import Run
-from phyblock.tracks.full_planning.measures import NAME
+from phyblock.tables.load import Run, made_once_copied
+from phyblock.tables.measures import CELL
+from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.tables.shares import shares_of
+from phyblock.tracks.full_planning.measures import NAME, level_cells
 
-__all__ = ["errors_frame"]
+__all__ = ["errors_frame", "levels_in_order"]
 
 
-def errors_frame(run: Run) -> pd.DataFrame:
-    """One row a model and level: n, wrong_steps, and each type's count and share.
+def levels_in_order(run: Run) -> tuple[str, ...]:
+    """Levels whose criterion goes by the order of steps: no other knows the four types.
 
-    Criterion `aov` at every level, headline matcher and setting. Shares are
-    of all wrong steps, in [0, 1], NaN where no step was wrong.
+    Level 1 by its own criterion is left out: the scenes that it shares with level 2 would only be
+    counted again, by an order that it does not ask for.
     """
-    design = run.design
+    return tuple(level for level in run.design.levels if run.design.criterion(level) == "aov")
+
+
+@made_once_copied
+def errors_frame(run: Run) -> pd.DataFrame:
+    """One row a model and level of `levels_in_order`: n, wrong_steps, each type's count and share.
+
+    Headline matcher and setting. Shares are of all wrong steps, in [0, 1], NaN where no step was
+    wrong; `<type>_lo` and `<type>_hi` bound their 95 % intervals.
+    """
+    design, levels = run.design, levels_in_order(run)
     scores = run.scores[
         (run.scores["track"] == NAME)
         & (run.scores["criterion"] == "aov")
         & (run.scores["setting"] == design.setting)
         & (run.scores["matcher"] == design.matcher)
         & ~run.scores["outcome"].isin(design.outcomes_left_out)
-    ][["sample", "model", *ERROR_TYPES]]
-    groups = with_levels(scores, run).groupby(["model", "level"])
+    ][["sample", "model", "scene", "seed", "outcome", *ERROR_TYPES]]
+    rows = with_levels(scores, run)
+    groups = rows.groupby(["model", "level"])
     counts = groups[list(ERROR_TYPES)].sum()
     counts.insert(0, "n", groups.size())
-    cells = [(model, level) for model in design.model_names for level in design.levels]
+    cells = [(model, level) for model in design.model_names for level in levels]
     table = pd.DataFrame(cells, columns=["model", "level"]).join(counts, on=["model", "level"])
     columns = ["n", *ERROR_TYPES]
     table[columns] = table[columns].fillna(0).astype("int64")
     table.insert(3, "wrong_steps", table[list(ERROR_TYPES)].sum(axis=1))
-    wrong = table["wrong_steps"].where(table["wrong_steps"] > 0)
-    for name in ERROR_TYPES:
-        table[f"{name}_share"] = table[name] / wrong
-    return table
+    rows = rows.rename(columns={"level": CELL})
+    rows["replied"] = ~rows["outcome"].isin(WITHOUT_REPLY)
+    of_level = [cell for cell in level_cells(run) if cell.name in levels]
+    shares = shares_of(run, rows, ERROR_TYPES, of_level)
+    return table.join(shares.rename_axis(["model", "level"]), on=["model", "level"])

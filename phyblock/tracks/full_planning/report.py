@@ -10,7 +10,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.tables.cells import METRICS
 from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run
-from phyblock.tables.paper_numbers import HUMAN_ACCURACY, HUMAN_NOTE, published_table
+from phyblock.tables.paper_numbers import HUMAN_NOTE, published_table
 from phyblock.tables.showing import planning_words
 from phyblock.tables.track_report import HeadlineColumn, PaperTable, TableMaker, TrackReport
 from phyblock.tracks.full_planning.assembly import assembly_frame, table1_frame
@@ -69,8 +69,7 @@ def _references(run: Run) -> Mapping[str, Mapping[str, float]]:
         column.heading: float(values.get((column.cell, column.measure), float("nan")))
         for column in _headline(run)
     }
-    human = {_MAIN: HUMAN_ACCURACY}
-    return {"Random, published": random, "Human experts, published": human}
+    return {"Random, published": random}
 
 
 def _published(run: Run) -> Mapping[str, float]:

@@ -58,10 +58,13 @@ def table5_view(table: pd.DataFrame, run: Run) -> TextTable:
         cells = [(row[f"{name}_mean"], row[f"{name}_sd"]) for name in names]
         rows.append((row["model"], *(_with_spread(mean, sd) for mean, sd in cells)))
     return TextTable(
-        f"F1 over {len(design.suite.seeds)} seeds (%)",
+        f"F1 as the paper's Table 5: means over {len(design.suite.seeds)} seeds (%)",
         (Column("Model", is_text=True), *(Column(level_name(level)) for level in design.levels)),
         tuple(rows),
-        (f"Setting {design.setting}, matcher {design.matcher}; mean ± standard deviation.",),
+        (
+            f"Setting {design.setting}, matcher {design.matcher}; mean ± standard deviation over "
+            "single seeds. All other tables pool the seeds.",
+        ),
     )
 
 
@@ -176,5 +179,8 @@ def paper_table5_view(table: pd.DataFrame, run: Run) -> TextTable:
             for name in ("Paper", "Ours", "Diff")
         ),
     )
-    note = f"Ours: setting {run.design.setting}, matcher {run.design.matcher}; sd with ddof = 1."
+    note = (
+        f"Ours: setting {run.design.setting}, matcher {run.design.matcher}. Both: means over "
+        "single seeds, sd with ddof = 1; all other tables pool the seeds."
+    )
     return TextTable("Our numbers beside the paper's Table 5 (%)", columns, tuple(rows), (note,))

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+from itertools import product
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
@@ -10,17 +14,21 @@ from phyblock.scoring.uncertainty import jackknife
 from phyblock.tables.cells import cell_scores, measured
 from phyblock.tables.intervals import CountCube, parents_of
 from phyblock.tables.load import Run, made_once_copied
+from phyblock.tables.measures import CELL
 from phyblock.tables.text_table import Column, TextTable, between, level_name, number
+from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.full_planning.measures import NAME
 
 __all__ = ["settings_frame", "settings_view"]
 
-_COLUMNS = ("model", "level", "f1_a", "f1_b", "difference", "lo", "hi", "n_scenes", "n_clusters")
+_ENDS = {"value": "", "lo": "_lo", "hi": "_hi"}
+_F1 = tuple(f"f1_{setting}{end}" for setting in "ab" for end in _ENDS.values())
+_COLUMNS = ("model", "level", *_F1, "difference", "lo", "hi", "n_scenes", "n_clusters")
 
 
 @made_once_copied
 def settings_frame(run: Run) -> pd.DataFrame:
-    """One row a model and level: F1 in A and in B, B minus A with a 95 % interval; in [0, 1].
+    """One row a model and level: F1 in A and in B, B minus A, all with 95 % intervals; in [0, 1].
 
     Headline matcher, the criterion of each level. Paired: a reply is scored
     under both. Empty where the run has one setting.
@@ -47,8 +55,11 @@ def settings_frame(run: Run) -> pd.DataFrame:
             n_clusters=np.repeat(n_clusters[:, None], 3, axis=1),
         )
         part = pd.DataFrame({"model": models, "level": level})
-        part["f1_a"], part["f1_b"], part["difference"] = found.value.T
+        part["difference"] = found.value[:, 2]
         part["lo"], part["hi"] = found.lo[:, 2], found.hi[:, 2]
+        f1 = _estimates(run, level, matcher)
+        for name, (setting, end) in zip(_F1, product("AB", _ENDS), strict=True):
+            part[name] = [f1[model, setting][end] for model in models]
         part["n_scenes"] = cube.present[:, both[:, 0]].sum(axis=0)
         part["n_clusters"] = n_clusters
         parts.append(part)
@@ -61,6 +72,14 @@ def settings_frame(run: Run) -> pd.DataFrame:
     sizes = ["n_scenes", "n_clusters"]
     table[sizes] = table[sizes].fillna(0).astype("int64")
     return table
+
+
+def _estimates(run: Run, level: str, matcher: str) -> dict[Hashable, Any]:
+    """F1 of a level by model and setting."""
+    found = track_estimates(run, NAME)
+    found = found[(found["measure"] == "f1") & (found[CELL] == level)]
+    mine = found[found["matcher"] == matcher].set_index(["model", "setting"])
+    return dict(mine[list(_ENDS)].astype("float64").to_dict("index"))
 
 
 def _counts(run: Run, level: str) -> CountCube:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
 from dataclasses import replace
 
 import pandas as pd
@@ -10,17 +9,12 @@ import pandas as pd
 from phyblock.scoring import ERROR_TYPES, ErrorType
 from phyblock.tables.cells import METRIC_NAMES, METRICS, SIDE_METRICS
 from phyblock.tables.design import OVERALL, Design
+from phyblock.tables.headline import narrower, seeds_notes, uncertainty_cells, uncertainty_columns
 from phyblock.tables.load import Run
-from phyblock.tables.text_table import (
-    NO_VALUE,
-    SPREAD,
-    Column,
-    TextTable,
-    level_name,
-    number,
-    spread,
-)
+from phyblock.tables.shares import share_texts
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, level_name, number
 from phyblock.tracks.full_planning.assembly import assembly_frame, headline_cells, level_column
+from phyblock.tracks.full_planning.errors import levels_in_order
 from phyblock.tracks.full_planning.published import (
     PUBLISHED_LEVELS,
     PUBLISHED_SETTING,
@@ -44,7 +38,8 @@ ERROR_NAMES: dict[ErrorType, str] = {
     "incorrect_orientation": "Incorrect orientation",
     "dependency_not_met": "Dependency not met",
 }
-_SPREAD_NOTE = "Mean ± standard deviation"
+_COUNTED = ("Plans", "Wrong steps")
+_OF_TYPE = ("n", "%", "95 % CI")
 _LABELS_NOTE = (
     "Prec, Rec, F1 are labeled by what they are. The paper prints its model rows as precision, "
     "recall, F1 under the header “Rec, Prec, F1”; only its Random row is as that header says."
@@ -60,27 +55,27 @@ def table1_view(table: pd.DataFrame, run: Run) -> TextTable:
         for level in design.levels
         for metric in METRICS
     ]
-    rows = [
-        (row["model"], *(_percent(row, cell) for cell in cells)) for row in table.to_dict("records")
-    ]
+    rows = tuple(
+        (
+            row["model"],
+            *(number(row[cell]) for cell in cells),
+            *uncertainty_cells(row, cells[-1], design),
+        )
+        for row in table.to_dict("records")
+    )
     return TextTable(
         f"Assembly planning (%){design.of_suite}",
-        (_MODEL, *columns),
-        tuple(rows),
+        (_MODEL, *columns, *uncertainty_columns(design, level_name(OVERALL))),
+        rows,
         (_how(design), *_table1_notes(run), _LABELS_NOTE),
     )
-
-
-def _percent(row: Mapping[Hashable, float], cell: str) -> str:
-    return spread(row[cell], row[f"{cell}_sd"]) if f"{cell}_sd" in row else number(row[cell])
 
 
 def _table1_notes(run: Run) -> list[str]:
     cells = headline_cells(assembly_frame(run), run.design)
     overall = cells[cells["level"] == OVERALL]
-    seeds = len(run.design.suite.seeds)
     short = overall[overall["n"] < overall["expected"]]
-    notes = [f"{_SPREAD_NOTE} over {seeds} seeds."] if seeds > 1 else []
+    notes = [*seeds_notes(run.design)]
     if len(short):
         counts = zip(short["model"], short["n"], strict=True)
         listed = ", ".join(f"{model} {n}" for model, n in counts)
@@ -120,30 +115,28 @@ def _how(design: Design) -> str:
 
 
 def errors_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """Error types out of `errors_frame`: a count and a share (%) a type."""
-    design = run.design
-    pairs = [Column(kind, ERROR_NAMES[name]) for name in ERROR_TYPES for kind in ("n", "%")]
+    """Error types out of `errors_frame`: a count, a share (%) and its interval a type."""
+    design, levels = run.design, levels_in_order(run)
+    columns = [Column(kind, ERROR_NAMES[name]) for name in ERROR_TYPES for kind in _OF_TYPE]
     rows = [
         (
-            row["model"] if row["level"] == design.levels[0] else "",
+            row["model"] if row["level"] == levels[0] else "",
             level_name(row["level"]),
             str(row["n"]),
             str(row["wrong_steps"]),
-            *(
-                cell
-                for name in ERROR_TYPES
-                for cell in (str(row[name]), number(100 * row[f"{name}_share"]))
-            ),
+            *(cell for name in ERROR_TYPES for cell in (str(row[name]), *share_texts(row, name))),
         )
         for row in table.to_dict("records")
     ]
+    is_apart = 1 in design.suite.levels and "1" not in levels
+    why = f"; {level_name('1')} asks for no order and has no such types" if is_apart else ""
     return TextTable(
         f"Wrong steps by type{design.of_suite}",
-        (_MODEL, Column("Level", is_text=True), Column("Plans"), Column("Wrong steps"), *pairs),
+        (_MODEL, Column("Level", is_text=True), *map(Column, _COUNTED), *columns),
         tuple(rows),
         (
-            f"Setting {design.setting}, matcher {design.matcher}, every level by aov; "
-            "shares are of all wrong steps.",
+            f"Setting {design.setting}, matcher {design.matcher}, by aov{why}. Shares are of all "
+            "wrong steps; intervals: base scenes left out in turn.",
         ),
     )
 
@@ -192,30 +185,34 @@ def published_view(table: pd.DataFrame, run: Run) -> TextTable:
 
 def _difference_notes(table: pd.DataFrame, design: Design) -> list[str]:
     matchers = "/".join(sorted(set(table["matcher"]) - {""})) or NO_VALUE
+    seeds = len(design.suite.seeds)
+    pooled = f", pooled over {seeds} seeds" if seeds > 1 else ""
     level1 = f", Level-1 by {design.suite.scoring.level1}" if 1 in design.suite.levels else ""
     return [
         *comparison_notes(table, design),
-        f"Ours: setting {PUBLISHED_SETTING}, matcher {matchers}{level1}.",
+        f"Ours: setting {PUBLISHED_SETTING}, matcher {matchers}{level1}; micro averages{pooled}. "
+        "Published: micro averages of one run.",
         "The last column has the largest absolute difference of each model.",
     ]
 
 
 def table1_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
-    """All of Table 1, else F1 alone, else F1 without its spread."""
+    """All of Table 1, else F1 alone, else without what seeds say and intervals."""
     # The last note is about the labels of the columns that are left out.
     note = "F1 alone, to fit; precision and recall are in tables/table1.md."
     short = replace(view.without(SIDE_METRICS), notes=(note, *view.notes[:-1]))
-    bare = tuple(tuple(cell.partition(SPREAD)[0] for cell in row) for row in short.rows)
-    notes = tuple(note.replace(_SPREAD_NOTE, "Mean") for note in short.notes)
-    return view, short, replace(short, rows=bare, notes=notes)
+    return view, *narrower(short)
 
 
 def errors_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
-    """The rows over all levels, each with its model's name; shares alone where space is short."""
+    """The rows over all levels, each with its model's name; where space is short, without
+    intervals, then shares alone.
+    """
     rows, model = [], ""
     for row in view.rows:
         model = row[0] or model
         if row[1] == level_name(OVERALL):
             rows.append((model, *row[1:]))
     whole = replace(view, rows=tuple(rows)).without(("Level", "n"))
-    return whole, whole.without(("Plans", "Wrong steps"))
+    bare = whole.without(_OF_TYPE[2:])
+    return whole, whole.without(_COUNTED), bare, bare.without(_COUNTED)

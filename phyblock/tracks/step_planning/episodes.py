@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,9 @@ import pandas as pd
 
 from phyblock.scoring import ERROR_TYPES
 from phyblock.tables.load import Run, made_once_copied
+from phyblock.tables.measures import CELL
+from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.tables.shares import shares_of
 from phyblock.tracks.step_planning.rules import ENDINGS
 
 __all__ = [
@@ -57,12 +61,14 @@ def episodes_frame(run: Run) -> pd.DataFrame:
 def endings_frame(run: Run) -> pd.DataFrame:
     """One row a model: episodes by how they ended, and how long they took.
 
-    `n` episodes of `expected`; a count for each of `ENDINGS`; `completion` the share that
-    completed its goal; `steps` the mean number of steps; `steps_to_finish` the mean of those that
-    completed, and `detour` their steps over the fewest possible, which is the number of blocks:
-    sums first, NaN where none completed.
+    `n` episodes of `expected`; a count and a share with the ends of its 95 % interval, in [0, 1],
+    for each of `ENDINGS`; `steps` the mean number of steps; `steps_to_finish` the mean of those
+    that completed, and `detour` their steps over the fewest possible, which is the number of
+    blocks: sums first, NaN where none completed. A model without any reply has no shares.
     """
     episodes = episodes_frame(run)
+    ended = {name: (episodes["ending"] == name).astype("int64") for name in ENDINGS}
+    shares = _shares(run, episodes.assign(**ended), ENDINGS)
     rows = []
     for model in run.design.model_names:
         mine = episodes[episodes["model"] == model]
@@ -71,29 +77,38 @@ def endings_frame(run: Run) -> pd.DataFrame:
         row: dict[str, Any] = {"model": model, "n": len(mine)}
         row["expected"] = run.design.samples(NAME)
         row |= {name: counts[name] for name in ENDINGS}
-        row["completion"] = len(whole) / len(mine) if len(mine) else np.nan
         row["steps"] = mine["steps"].mean()
         row["steps_to_finish"] = whole["steps"].mean()
         fewest = whole["n_blocks"].sum()
         row["detour"] = whole["steps"].sum() / fewest if fewest else np.nan
         rows.append(row)
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows).join(shares, on="model")
 
 
 def moves_frame(run: Run) -> pd.DataFrame:
-    """One row a model: `steps` in all, and a count and a share in [0, 1] of `STEP_OUTCOMES`."""
+    """One row a model: `steps` in all, and a count of each of `STEP_OUTCOMES` and its share of
+    them, with the ends of its 95 % interval, in [0, 1].
+    """
     episodes = episodes_frame(run)
+    counted = [Counter(map(_named, outcomes)) for outcomes in episodes["outcomes"]]
+    parts = {name: [counts[name] for counts in counted] for name in STEP_OUTCOMES}
+    shares = _shares(run, episodes.assign(**parts), STEP_OUTCOMES)
     rows = []
     for model in run.design.model_names:
         mine = episodes.loc[episodes["model"] == model, "outcomes"]
         counts = Counter(_named(outcome) for outcomes in mine for outcome in outcomes)
         steps = counts.total()
         row: dict[str, Any] = {"model": model, "episodes": len(mine), "steps": steps}
-        for name in STEP_OUTCOMES:
-            row[name] = counts[name]
-            row[f"{name}_share"] = counts[name] / steps if steps else np.nan
-        rows.append(row)
-    return pd.DataFrame(rows)
+        rows.append(row | {name: counts[name] for name in STEP_OUTCOMES})
+    return pd.DataFrame(rows).join(shares, on="model")
+
+
+def _shares(
+    run: Run, episodes: pd.DataFrame, parts: Sequence[str], whole: str | None = None
+) -> pd.DataFrame:
+    """See `shares_of`; by model."""
+    replied = ~episodes["outcome"].isin(WITHOUT_REPLY)
+    return shares_of(run, episodes.assign(replied=replied), parts, whole=whole).droplevel(CELL)
 
 
 def progress_frame(run: Run) -> pd.DataFrame:
@@ -101,25 +116,34 @@ def progress_frame(run: Run) -> pd.DataFrame:
 
     `blocks` is the mean share of a goal's blocks that are placed after `step` steps, an episode
     that has ended keeping what it had; `under_way` the share of episodes that have not ended
-    before that step. Steps go as far as the longest episode of any model.
+    before that step; `*_lo` and `*_hi` bound their 95 % intervals. Steps go as far as the longest
+    episode of any model. A model without any reply has no rows.
     """
     episodes = episodes_frame(run)
-    longest = int(episodes["steps"].max()) if len(episodes) else 0
-    rows = []
-    for model in run.design.model_names:
-        mine = episodes[episodes["model"] == model]
-        if not len(mine):
-            continue
-        reached = np.array(
-            [_padded(progress, longest) for progress in mine["progress"]], dtype=np.float64
-        ).reshape(len(mine), longest)
-        shares = reached / mine["n_blocks"].to_numpy()[:, None]
-        steps = mine["steps"].to_numpy()
-        rows += [
-            (model, step, shares[:, step - 1].mean(), (steps >= step).mean())
-            for step in range(1, longest + 1)
-        ]
-    return pd.DataFrame(rows, columns=["model", "step", "blocks", "under_way"])
+    steps = range(1, 1 + (int(episodes["steps"].max()) if len(episodes) else 0))
+    reached = [_padded(progress, len(steps)) for progress in episodes["progress"]]
+    blocks = np.array(reached, dtype=np.float64).reshape(len(episodes), len(steps))
+    curves = {
+        "blocks": blocks / episodes["n_blocks"].to_numpy()[:, None],
+        "under_way": episodes["steps"].to_numpy()[:, None] >= np.array(steps),
+    }
+    parts = []
+    for curve, counts in curves.items():
+        names = [str(step) for step in steps]
+        counted = pd.DataFrame(counts, columns=names, index=episodes.index, dtype="float64")
+        rows = pd.concat([episodes.assign(episodes=1), counted], axis=1)
+        shares = _shares(run, rows, names, "episodes")
+        table = pd.DataFrame(
+            {
+                f"{curve}{end}": shares[[f"{name}_{kind}" for name in names]].to_numpy().ravel()
+                for end, kind in {"": "share", "_lo": "lo", "_hi": "hi"}.items()
+            },
+            index=pd.MultiIndex.from_product([shares.index, steps], names=["model", "step"]),
+        )
+        parts.append(table)
+    known = pd.concat(parts, axis=1).dropna(subset=["blocks"])
+    models = set(known.index.get_level_values("model"))
+    return known.loc[[name for name in run.design.model_names if name in models]].reset_index()
 
 
 def _padded(progress: tuple[int, ...], length: int) -> list[int]:

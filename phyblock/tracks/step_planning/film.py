@@ -9,8 +9,8 @@ from phyblock.domain import Block
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.site import settle
 from phyblock.tables.text_table import Column, TextTable
+from phyblock.tracks.step_planning.episode_views import ENDING_NAMES
 from phyblock.tracks.step_planning.record import EpisodeRecord, EpisodeTurn
-from phyblock.tracks.step_planning.table3 import ENDING_NAMES
 
 __all__ = ["episode_film", "episode_table"]
 

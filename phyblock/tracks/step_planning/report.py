@@ -17,6 +17,12 @@ from phyblock.tables.track_report import (
     TrackReport,
 )
 from phyblock.tracks.orders import order_frame, order_in_terminal, order_view
+from phyblock.tracks.step_planning.episode_views import (
+    endings_in_terminal,
+    endings_view,
+    moves_view,
+    progress_view,
+)
 from phyblock.tracks.step_planning.episodes import (
     NAME,
     endings_frame,
@@ -27,46 +33,43 @@ from phyblock.tracks.step_planning.figure import progress_by_turn
 from phyblock.tracks.step_planning.film import episode_film, episode_table
 from phyblock.tracks.step_planning.measures import STEP_MEASURES
 from phyblock.tracks.step_planning.table3 import (
-    endings_view,
-    episodes_in_terminal,
-    moves_view,
     paper_table3_frame,
     paper_table3_view,
-    progress_view,
-    published_scores,
+    published_recall,
     step_intervals,
     step_intervals_view,
     step_scores_frame,
     table3_frame,
+    table3_in_terminal,
     table3_view,
 )
 
 __all__ = ["REPORT"]
 
+_MAIN, _RECALL = "F1 of attempts", "Recall"
 _COLUMNS = (
-    HeadlineColumn("precision", WHOLE.name, "Precision", "placed"),
-    HeadlineColumn("recall", WHOLE.name, "Recall", "placed"),
-    HeadlineColumn("f1", WHOLE.name, "F1", "placed"),
-    HeadlineColumn("f1", WHOLE.name, "F1 of attempts", "attempted"),
     HeadlineColumn("completion", WHOLE.name, "Completed"),
+    HeadlineColumn("f1", WHOLE.name, _MAIN, "attempted"),
+    HeadlineColumn("precision", WHOLE.name, "Precision of attempts", "attempted"),
+    HeadlineColumn("recall", WHOLE.name, _RECALL, "placed"),
+    HeadlineColumn("f1", WHOLE.name, "F1 of placed blocks", "placed"),
 )
 
 
 def _references(run: Run) -> Mapping[str, Mapping[str, float]]:
-    printed = {name: published_scores(name) for name in run.design.published.values()}
-    headings = {f"{column.criterion}_{column.measure}": column.heading for column in _COLUMNS}
+    printed = {name: published_recall(name) for name in run.design.published.values()}
     return {
-        f"{name}, published": {headings[cell]: value for cell, value in cells.items()}
-        for name, cells in printed.items()
-        if cells
+        f"{name}, published": {_RECALL: value}
+        for name, value in printed.items()
+        if value is not None
     }
 
 
 def _notes(run: Run) -> Sequence[str]:
     return (
-        f"Percent, setting {run.design.setting}. Precision, recall and F1 are of the blocks that "
-        "were placed, as in the paper's Table 3; F1 of attempts counts every move that placed "
-        "nothing as wrong; completed are episodes that placed the whole goal.",
+        f"Percent, setting {run.design.setting}. Completed are episodes that placed the whole "
+        "goal; F1 and precision of attempts count every move that placed nothing as wrong; recall "
+        "is of the goal's blocks; F1 of placed blocks leaves out what placed nothing.",
     )
 
 
@@ -81,15 +84,15 @@ def _check_alike(run: Run, first: Run, _: Sequence[str]) -> None:
 REPORT = TrackReport(
     measures=STEP_MEASURES,
     headline=lambda _: _COLUMNS,
-    main="F1",
+    main=_MAIN,
     short="steps_f1",
     references=_references,
     notes=_notes,
     tables={
-        "table3": TableMaker(table3_frame, table3_view, in_terminal=episodes_in_terminal),
+        "table3": TableMaker(table3_frame, table3_view, in_terminal=table3_in_terminal),
         "step_intervals": TableMaker(step_intervals, step_intervals_view, "table3"),
         "step_scores": TableMaker(step_scores_frame, None, "table3"),
-        "endings": TableMaker(endings_frame, endings_view, in_terminal=episodes_in_terminal),
+        "endings": TableMaker(endings_frame, endings_view, in_terminal=endings_in_terminal),
         "moves": TableMaker(moves_frame, moves_view, "endings"),
         "progress": TableMaker(progress_frame, progress_view),
         "step_orders": TableMaker(

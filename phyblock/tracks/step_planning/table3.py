@@ -8,8 +8,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.tables.cells import METRIC_NAMES, METRICS, SIDE_METRICS
-from phyblock.tables.headline import interval_frame, interval_view
+from phyblock.tables.cells import METRIC_NAMES, METRICS
+from phyblock.tables.headline import (
+    headline_rows,
+    interval_frame,
+    interval_view,
+    narrower,
+    seeds_notes,
+    uncertainty_cells,
+    uncertainty_columns,
+)
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
 from phyblock.tables.paper_numbers import (
@@ -17,66 +25,60 @@ from phyblock.tables.paper_numbers import (
     OURS,
     PUBLISHED,
     beside_view,
-    cell_text,
     interleaved,
     published_table,
     row_name,
 )
-from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
+from phyblock.tables.text_table import Column, TextTable, number
 from phyblock.tracks.estimates import track_estimates
-from phyblock.tracks.step_planning.episodes import STEP_OUTCOMES, endings_frame
+from phyblock.tracks.step_planning.episodes import endings_frame
 from phyblock.tracks.step_planning.measures import COUNTED, NAME, is_asked
-from phyblock.tracks.step_planning.rules import ENDINGS
 from phyblock.tracks.step_planning.spec import StepsSpec
 
 __all__ = [
-    "ENDING_NAMES",
-    "endings_view",
-    "episodes_in_terminal",
-    "moves_view",
     "paper_table3_frame",
     "paper_table3_view",
-    "progress_view",
-    "published_scores",
+    "published_recall",
     "step_intervals",
     "step_intervals_view",
     "step_scores_frame",
     "table3_frame",
+    "table3_in_terminal",
     "table3_view",
 ]
 
 _MODEL = Column("Model", is_text=True)
-_GROUPS = {"placed": "Placed blocks", "attempted": "All attempted moves"}
-ENDING_NAMES = {
-    "completed": "Completed",
-    "done": "Said Done",
-    "collapsed": "Collapsed",
-    "max_steps": "Step limit",
-    "max_failures": "Failures in a row",
-    "max_repeats": "Repeats",
-    "max_tokens": "Token limit",
-    "max_cost": "Cost limit",
-    "unanswered": "Unanswered",
+_RECALL = "placed_recall"
+"""What our numbers and the published ones both have: the blocks of the goal that stand."""
+_SHOWN = {
+    "completion": ("completion", ""),
+    **{f"{way}_{metric}": (metric, way) for way in reversed(COUNTED) for metric in METRICS},
 }
-"""What people read in the place of each ending."""
-_OUTCOMES = {
-    "placed": "Placed",
-    "shape_not_in_gt": "Shape not in GT",
-    "overflow": "Overflow",
-    "incorrect_orientation": "Incorrect orientation",
-    "dependency_not_met": "Dependency not met",
-    "invalid": "No candidate",
-    "unread": "Unread",
-    "done": "Done",
+"""Measure and way of counting by column."""
+_LEADING = {"completion": "Completed", "attempted_f1": "F1 of attempts"}
+_FURTHER = {
+    "attempted_precision": Column("Prec", "Attempts"),
+    _RECALL: Column("Rec", "Goal blocks"),
+    "placed_precision": Column("Prec", "Placed blocks"),
+    "placed_f1": Column("F1", "Placed blocks"),
 }
-_CURVE = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 30, 44)
+_CONSTRUCTION = (
+    " The simulator goes by the same setting and places no wrong one: precision of placed blocks "
+    "is 100 by construction, but for collapses, and tells no model from another."
+)
+_PUBLISHED_NOTE = (
+    "Of the published numbers, of the paper's own scenes, recall alone stands beside ours: it is "
+    "of the goal's blocks, whatever was tried. Precision, and F1 with it, depend on which wrong "
+    "blocks a simulator lets stand, which the paper does not say; ours are no like numbers."
+)
 
 
 def step_scores_frame(run: Run) -> pd.DataFrame:
     """One row a model, setting and way of counting: n, tp, fp, fn, micro averages in [0, 1].
 
-    `*_mean` and `*_sd` (ddof = 1) are taken over the micro averages of single seeds. A model
-    without any reply has counts, if the suite counts empty plans, but no metrics.
+    `*_lo` and `*_hi` bound 95 % intervals; `*_mean` and `*_sd` (ddof = 1) are taken over the micro
+    averages of single seeds. A model without any reply has counts, if the suite counts empty plans,
+    but no metrics.
     """
     scores = run.scores[
         (run.scores["track"] == NAME) & ~run.scores["outcome"].isin(run.design.outcomes_left_out)
@@ -94,16 +96,11 @@ def step_scores_frame(run: Run) -> pd.DataFrame:
     frame = frame.join(groups.size().rename("n"), on=keys).join(groups[counts[1:]].sum(), on=keys)
     frame[counts] = frame[counts].fillna(0).astype("int64")
     found = track_estimates(run, NAME)
-    parts = {
-        (metric, kind): found[found["measure"] == metric].set_index(keys)[kind].astype("float64")
-        for metric in METRICS
-        for kind in ("value", "mean", "sd")
-    }
-    for metric in METRICS:
-        frame = frame.join(parts[metric, "value"].rename(metric), on=keys)
-    for metric in METRICS:
-        for kind in ("mean", "sd"):
-            frame = frame.join(parts[metric, kind].rename(f"{metric}_{kind}"), on=keys)
+    for ends in (("value",), ("lo", "hi"), ("mean", "sd")):
+        for metric in METRICS:
+            mine = found[found["measure"] == metric].set_index(keys)[list(ends)].astype("float64")
+            names = {end: metric if end == "value" else f"{metric}_{end}" for end in ends}
+            frame = frame.join(mine.rename(columns=names), on=keys)
     return frame
 
 
@@ -128,64 +125,64 @@ def step_intervals_view(table: pd.DataFrame, run: Run) -> TextTable:
 def table3_frame(run: Run) -> pd.DataFrame:
     """The paper's Table 3 [%], unrounded: one row a model, and one as published where it has one.
 
-    `placed_*` are over the blocks in the world, as the published numbers are taken to be;
-    `attempted_*` over every attempted move, our stricter figure; `completion` and `detour` as in
-    `endings_frame`, `completion` in percent. Under the headline setting; with more than one seed
-    means over seeds, and `*_sd` beside them.
+    `completion` is the share of episodes that placed the whole goal; `attempted_*` are over every
+    attempted move, `placed_*` over the blocks in the world; `completion` and `attempted_f1` have
+    the ends `*_lo` and `*_hi` of an interval; `detour` as in `endings_frame`. Under the headline
+    setting, pooled over seeds; with more than one seed `*_mean` and `*_sd` over single seeds.
+    Published rows have the recall alone.
     """
     design = run.design
-    several = len(design.suite.seeds) > 1
-    scores: dict[tuple[str, str], Any] = {
-        (row["model"], row["criterion"]): row
-        for row in step_scores_frame(run).to_dict("records")
-        if row["setting"] == design.setting
-    }
+    found = headline_rows(track_estimates(run, NAME), design)
+    known = found.set_index(["measure", "criterion", "model"]).to_dict("index")
+    ends = ("mean", "sd") if len(design.suite.seeds) > 1 else ()
+    wanted = [(name, end) for name in _LEADING for end in ("value", "lo", "hi")]
+    wanted += [(name, "value") for name in _SHOWN if name not in _LEADING]
+    wanted += [(name, end) for name in _SHOWN for end in ends]
     endings: dict[str, Any] = {row["model"]: row for row in endings_frame(run).to_dict("records")}
-    kinds = {"": "_mean", "_sd": "_sd"} if several else {"": ""}
     rows: list[dict[str, Any]] = []
     for model in design.model_names:
         row: dict[str, Any] = {"model": model, "source": OURS, "published_name": ""}
-        for criterion in COUNTED:
-            cells = scores[(model, criterion)]
-            row |= {
-                f"{criterion}_{metric}{ending}": 100 * cells[f"{metric}{kind}"]
-                for metric in METRICS
-                for ending, kind in kinds.items()
-            }
-        ended = endings[model]
-        row |= {"completion": 100 * ended["completion"], "detour": ended["detour"], "n": ended["n"]}
-        rows.append(row)
-        if printed := published_scores(design.published.get(model, "")):
+        for name, end in wanted:
+            value = known.get((*_SHOWN[name], model), {}).get(end, np.nan)
+            row[name if end == "value" else f"{name}_{end}"] = 100 * value
+        rows.append(row | {name: endings[model][name] for name in ("detour", "n")})
+        recall = published_recall(design.published.get(model, ""))
+        if recall is not None:
             about = {"model": model, "source": PUBLISHED}
-            rows.append({**about, "published_name": design.published[model], **printed})
+            rows.append({**about, "published_name": design.published[model], _RECALL: recall})
     return pd.DataFrame(rows)
 
 
-def published_scores(model: str) -> dict[str, float]:
-    """What Table 3 prints for a model [%], by `placed_<metric>`; empty where it has no row."""
-    table = published_table(3)
-    rows = table[table["model"] == model]
-    return {f"placed_{m}": float(v) for m, v in zip(rows["metric"], rows["value"], strict=True)}
+def published_recall(model: str) -> float | None:
+    """The recall that Table 3 prints for a model [%], None where it has no row."""
+    printed = published_table(3).set_index(["model", "metric"])["value"].to_dict()
+    return printed.get((model, "recall"))
 
 
 def table3_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """Table 3 in the paper's layout out of `table3_frame`, and what more an episode tells."""
+    """Out of `table3_frame`: completed goals and F1 of attempts first."""
+    design = run.design
     columns = [
-        Column(METRIC_NAMES[m], _GROUPS[criterion]) for criterion in COUNTED for m in METRICS
+        column
+        for group in _LEADING.values()
+        for column in (Column("%", group), *uncertainty_columns(design, group))
     ]
-    cells = [f"{criterion}_{metric}" for criterion in COUNTED for metric in METRICS]
     rows = tuple(
         (
             row_name(row),
-            *(cell_text(row, cell) for cell in cells),
-            number(row["completion"]),
+            *(
+                text
+                for name in _LEADING
+                for text in (number(row[name]), *uncertainty_cells(row, name, design))
+            ),
+            *(number(row[name]) for name in _FURTHER),
             number(row["detour"], 2),
         )
         for row in table.to_dict("records")
     )
     return TextTable(
         f"Step-by-step planning (%){run.design.of_suite}",
-        (_MODEL, *columns, Column("Completed"), Column("Steps / fewest")),
+        (_MODEL, *columns, *_FURTHER.values(), Column("Steps / fewest")),
         rows,
         tuple(_notes(table, run)),
     )
@@ -193,20 +190,19 @@ def table3_view(table: pd.DataFrame, run: Run) -> TextTable:
 
 def _notes(table: pd.DataFrame, run: Run) -> list[str]:
     steps = run.section("steps", StepsSpec)
-    seeds = len(run.design.suite.seeds)
     accepts = steps.setting or run.design.setting
     notes = [
         f"Scored in setting {run.design.setting}. The simulator goes by setting {accepts}, gating "
         f"{steps.gating}, physics {steps.physics}; feedback {steps.feedback}, "
         f"history as {steps.history}. Micro averages.",
-        "Placed blocks: those in the world; one is wrong when the goal has no such block left in "
-        "this setting, or when it fell. A simulator that goes by the same setting places no wrong "
-        "one, so precision is then below 100 by collapses alone. The paper does not say how its "
-        "simulator or its precision worked.",
-        "All attempted moves: moves that placed nothing are wrong as well.",
+        "Completed: episodes that placed the whole goal. Attempts: all moves; those that placed "
+        "nothing are wrong. Placed blocks: those in the world; one is wrong when the goal has no "
+        "such block left in this setting, or when it fell."
+        + (_CONSTRUCTION if accepts == run.design.setting else ""),
+        *seeds_notes(run.design),
     ]
-    if seeds > 1:
-        notes.append(f"Mean ± standard deviation over {seeds} seeds.")
+    if (table["source"] == PUBLISHED).any():
+        notes.append(_PUBLISHED_NOTE)
     ours = table[table["source"] == OURS]
     expected = run.design.samples(NAME)
     short = [
@@ -217,82 +213,19 @@ def _notes(table: pd.DataFrame, run: Run) -> list[str]:
     return notes
 
 
-def endings_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """How episodes ended, out of `endings_frame`; ways in which none ended are left out."""
-    ways = [name for name in ENDINGS if table[name].sum() or name in ("completed", "done")]
-    columns = [Column(ENDING_NAMES[name]) for name in ways]
-    rows = tuple(
-        (
-            row["model"],
-            str(row["n"]),
-            *(_share(row[name], row["n"]) for name in ways),
-            number(row["steps"]),
-            number(row["detour"], 2),
-        )
-        for row in table.to_dict("records")
-    )
-    return TextTable(
-        f"How episodes ended (%){run.design.of_suite}",
-        (_MODEL, Column("Episodes"), *columns, Column("Steps"), Column("Steps / fewest")),
-        rows,
-        ("Steps is the mean over all episodes; Steps / fewest is over those completed.",),
-    )
-
-
-def moves_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """What became of steps, out of `moves_frame`."""
-    rows = tuple(
-        (
-            row["model"],
-            str(row["steps"]),
-            *(number(100 * row[f"{name}_share"]) for name in STEP_OUTCOMES),
-        )
-        for row in table.to_dict("records")
-    )
-    columns = [Column(_OUTCOMES[name]) for name in STEP_OUTCOMES]
-    return TextTable(
-        f"What became of steps (%){run.design.of_suite}",
-        (_MODEL, Column("Steps"), *columns),
-        rows,
-        ("Shares of all steps. Unread: no single operation could be read in the reply.",),
-    )
-
-
-def progress_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """The curve out of `progress_frame`, at some steps."""
-    longest = int(table["step"].max()) if len(table) else 0
-    shown = [step for step in _CURVE if step <= longest]
-    curves = table.set_index(["model", "step"])["blocks"].to_dict()
-    rows = tuple(
-        (model, *(number(100 * curves.get((model, step), np.nan)) for step in shown))
-        for model in run.design.model_names
-    )
-    return TextTable(
-        f"Blocks of the goal that are placed after so many steps (%){run.design.of_suite}",
-        (_MODEL, *(Column(str(step)) for step in shown)),
-        rows,
-        ("Mean over episodes; one that has ended keeps what it had. Every step: progress.csv.",),
-    )
-
-
-def _share(count: int, whole: int) -> str:
-    return number(100 * count / whole) if whole else NO_VALUE
-
-
 def paper_table3_frame(run: Run) -> pd.DataFrame:
-    """Precision, recall and F1 of step planning beside the paper's Table 3."""
-    cells = [f"placed_{metric}" for metric in METRICS]
-    return interleaved(table3_frame(run), cells) if is_asked(run) else NOTHING
+    """Recall of step planning beside the paper's Table 3; see the note of its view."""
+    return interleaved(table3_frame(run), [_RECALL]) if is_asked(run) else NOTHING
 
 
 def paper_table3_view(table: pd.DataFrame, run: Run) -> TextTable:
     """Out of `paper_table3_frame`."""
-    note = f"Setting {run.design.setting}; precision is over the blocks that were placed."
-    names = {f"placed_{metric}": name for metric, name in METRIC_NAMES.items()}
+    note = f"Setting {run.design.setting}. {_PUBLISHED_NOTE}"
+    names = {_RECALL: METRIC_NAMES["recall"]}
     return beside_view(table, run, number_in_paper=3, names=names, note=note)
 
 
-def episodes_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
-    """A table of episodes without its notes, and without side metrics where it is too wide."""
+def table3_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
+    """Table 3 without its notes; where it is too wide, without what says less, bit by bit."""
     whole = replace(view, notes=())
-    return whole, whole.without(SIDE_METRICS)
+    return whole, *narrower(whole.without(("Prec", "F1")))

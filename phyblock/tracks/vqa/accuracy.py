@@ -31,6 +31,8 @@ _COLUMNS = (
     *FAILURES,
     "correct",
     "accuracy",
+    "accuracy_lo",
+    "accuracy_hi",
     "each_rotation",
     "seeds",
     "accuracy_mean",
@@ -48,8 +50,9 @@ def questions_frame(run: Run) -> pd.DataFrame:
     share of them, or under circular evaluation the share of questions of which every rotation was
     answered right, while `each_rotation` is then the share over single rotations. Of a category
     and overall it is the unweighted mean over the parts that were asked, NaN unless each of these
-    has a value. `*_mean` and `*_sd` (ddof = 1) are taken over seeds, `chance` is what uniform
-    guessing would give. Where a model said nothing at all in a subtask, nothing was measured: NaN.
+    has a value. `*_lo` and `*_hi` bound a 95 % interval, `*_mean` and `*_sd` (ddof = 1) are taken
+    over seeds, `chance` is what uniform guessing would give. Where a model
+    said nothing at all in a subtask, nothing was measured: NaN.
     """
     found = track_estimates(run, NAME).set_index(["measure", "model", CELL])
     known = found.to_dict("index")
@@ -73,6 +76,8 @@ def questions_frame(run: Run) -> pd.DataFrame:
                     **{failure: int((mine["outcome"] == failure).sum()) for failure in FAILURES},
                     "correct": int((here["given"] == here["right"]).sum()),
                     "accuracy": value,
+                    "accuracy_lo": estimate.get("lo", np.nan),
+                    "accuracy_hi": estimate.get("hi", np.nan),
                     "each_rotation": np.nan if np.isnan(value) else single.get("value", np.nan),
                     "seeds": estimate.get("seeds", 0),
                     "accuracy_mean": estimate.get("mean", np.nan),

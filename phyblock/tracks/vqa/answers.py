@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
 import pandas as pd
 
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
 from phyblock.scoring import letter_rates
 from phyblock.tables.load import Run, made_once_copied
+from phyblock.tables.measures import CELL
 from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.tables.shares import shares_of
 from phyblock.tracks.vqa.spec import VqaSpec
 
 __all__ = [
@@ -27,6 +26,7 @@ __all__ = [
 ]
 
 _TRACK = "vqa"
+_RIGHT_GIVEN = ("right", "given")
 OVERALL_CELL = "overall"
 CELLS: tuple[str, ...] = (
     *(name for category, subtasks in CATEGORIES.items() for name in (*subtasks, category)),
@@ -72,21 +72,25 @@ def letters_frame(run: Run) -> pd.DataFrame:
     """How often each letter was right and was given [%], by model, without ordering.
 
     `n` answers were scored; `unread` of them (all failures) have no letter. Columns `right_a`,
-    `given_a` to `given_d`.
+    `given_a` to `given_d`, the latter with `*_lo` and `*_hi`, the ends of 95 % intervals. A model
+    without any reply has no rates.
     """
-    rows = []
+    rows, counted = [], []
     for model in run.design.model_names:
         answers = scored_answers(run, model)
         rates = letter_rates(zip(answers["right"], answers["given"], strict=True))
-        row: dict[str, Any] = {"model": model, "n": rates.n}
-        row["unread"] = rates.n - sum(rates.given.values())
-        for letter in LETTERS:
-            for kind, counts in (("right", rates.right), ("given", rates.given)):
-                share = 100 * counts[letter] / rates.n if rates.n else np.nan
-                row[f"{kind}_{letter.lower()}"] = share
-        rows.append(row)
-    names = [f"{kind}_{letter.lower()}" for letter in LETTERS for kind in ("right", "given")]
-    return pd.DataFrame(rows, columns=["model", "n", "unread", *names])
+        unread = rates.n - sum(rates.given.values())
+        rows.append({"model": model, "n": rates.n, "unread": unread})
+        counted.append(answers[answers["right"].str.len() == 1])
+    named = {f"{kind}_{letter.lower()}": letter for letter in LETTERS for kind in _RIGHT_GIVEN}
+    answers = pd.concat(counted)
+    letters = {name: (answers[name[:5]] == letter).astype(int) for name, letter in named.items()}
+    replied = ~answers["outcome"].isin(WITHOUT_REPLY)
+    samples = answers[["model", "scene", "seed"]].assign(**letters, replied=replied, n=1)
+    shares = 100 * shares_of(run, samples, list(named), whole="n").droplevel(CELL)
+    columns = {f"{name}_share": name for name in named}
+    columns |= {f"{n}_{end}": f"{n}_{end}" for n in named for end in ("lo", "hi") if n[0] == "g"}
+    return pd.DataFrame(rows).join(shares[list(columns)].rename(columns=columns), on="model")
 
 
 def subtasks_of(cell: str) -> tuple[str, ...]:

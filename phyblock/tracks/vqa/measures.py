@@ -107,7 +107,7 @@ def _single(run: Run) -> pd.DataFrame:
 ACCURACY = Measure(
     "accuracy",
     "Accuracy",
-    SampleCounts("answers", ("correct", "n"), _answers),
+    SampleCounts("answer", ("correct", "n"), _answers),
     ratio_of,
     "questions that were answered right; under circular evaluation in every rotation",
     over="questions",

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from phyblock.domain import CATEGORIES, SUBTASK_NAMES
 from phyblock.errors import Problem, SpecError
 from phyblock.tables.load import Run
-from phyblock.tables.paper_numbers import HUMAN_ACCURACY, HUMAN_NOTE
+from phyblock.tables.paper_numbers import HUMAN_NOTE
 from phyblock.tables.showing import control_words
 from phyblock.tables.track_report import HeadlineColumn, PaperTable, TableMaker, TrackReport
 from phyblock.tracks.vqa.accuracy import questions_frame
@@ -45,10 +45,7 @@ _COLUMNS = (
 
 def _references(_: Run) -> Mapping[str, Mapping[str, float]]:
     printed = published_cells("Random")
-    return {
-        "Random, published": {column.heading: printed[column.cell] for column in _COLUMNS},
-        "Human experts, published": {_COLUMNS[-1].heading: HUMAN_ACCURACY},
-    }
+    return {"Random, published": {column.heading: printed[column.cell] for column in _COLUMNS}}
 
 
 def _notes(_: Run) -> Sequence[str]:

@@ -10,7 +10,14 @@ import pandas as pd
 
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
 from phyblock.tables.estimates import pooled_in
-from phyblock.tables.headline import interval_frame, interval_view
+from phyblock.tables.headline import (
+    interval_frame,
+    interval_view,
+    narrower,
+    seeds_notes,
+    uncertainty_cells,
+    uncertainty_columns,
+)
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
 from phyblock.tables.paper_numbers import (
@@ -18,12 +25,11 @@ from phyblock.tables.paper_numbers import (
     OURS,
     PUBLISHED,
     beside_view,
-    cell_text,
     interleaved,
     published_table,
     row_name,
 )
-from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, between, number
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.vqa.accuracy import questions_frame
 from phyblock.tracks.vqa.answers import CELLS, OVERALL_CELL, showing
@@ -58,26 +64,27 @@ _AVERAGES_NOTE = (
 def table2_frame(run: Run) -> pd.DataFrame:
     """The paper's Table 2 [%], unrounded: one row a model, and one as published where it has one.
 
-    Columns are `model`, `source` (run or published), `published_name`, then `CELLS`. With more
-    than one seed the values are means over seeds and `<cell>_sd` stand behind all of them.
+    Columns are `model`, `source` (run or published), `published_name`, then `CELLS`, pooled over
+    seeds, `overall_lo` and `overall_hi`, the ends of an interval, and, with more than one seed,
+    `<cell>_mean` and `<cell>_sd` over single seeds.
     """
     design = run.design
     frame = questions_frame(run)
-    several = len(design.suite.seeds) > 1
-    kinds = {"": "accuracy_mean", "_sd": "accuracy_sd"} if several else {"": "accuracy"}
+    wanted = [*((cell, "") for cell in CELLS), (OVERALL_CELL, "_lo"), (OVERALL_CELL, "_hi")]
+    if len(design.suite.seeds) > 1:
+        wanted += [(cell, end) for cell in CELLS for end in ("_mean", "_sd")]
     rows: list[dict[str, Any]] = []
     for model in design.model_names:
-        mine = frame[frame["model"] == model].set_index("cell")
+        mine = frame[frame["model"] == model].set_index("cell").to_dict("index")
         row: dict[str, Any] = {"model": model, "source": OURS, "published_name": ""}
-        for ending, name in kinds.items():
-            row |= {f"{cell}{ending}": 100 * value for cell, value in mine[name].items()}
+        row |= {f"{cell}{end}": 100 * mine[cell][f"accuracy{end}"] for cell, end in wanted}
         rows.append(row)
         printed = published_cells(design.published.get(model, ""))
         if printed:
             about = {"model": model, "source": PUBLISHED}
             rows.append({**about, "published_name": design.published[model], **printed})
-    names = [f"{cell}_sd" for cell in CELLS] if several else []
-    return pd.DataFrame(rows, columns=["model", "source", "published_name", *CELLS, *names])
+    names = [f"{cell}{end}" for cell, end in wanted]
+    return pd.DataFrame(rows, columns=["model", "source", "published_name", *names])
 
 
 def published_cells(model: str) -> dict[str, float]:
@@ -97,12 +104,16 @@ def table2_view(table: pd.DataFrame, run: Run) -> TextTable:
         for name in (*subtasks, category)
     ]
     rows = tuple(
-        (row_name(row), *(cell_text(row, cell) for cell in CELLS))
+        (
+            row_name(row),
+            *(number(row[cell]) for cell in CELLS),
+            *uncertainty_cells(row, OVERALL_CELL, run.design),
+        )
         for row in table.to_dict("records")
     )
     return TextTable(
         f"Physical-understanding VQA (%){run.design.of_suite}",
-        (_MODEL, *columns, Column("Avg", "Overall")),
+        (_MODEL, *columns, Column("Avg", "Overall"), *uncertainty_columns(run.design, "Overall")),
         rows,
         tuple(_notes(table, run)),
     )
@@ -110,10 +121,23 @@ def table2_view(table: pd.DataFrame, run: Run) -> TextTable:
 
 def letters_view(table: pd.DataFrame, _: Run) -> TextTable:
     """Rates of letters out of `letters_frame`."""
-    columns = [Column(kind, letter) for letter in LETTERS for kind in ("right", "given")]
-    names = [f"{kind}_{letter.lower()}" for letter in LETTERS for kind in ("right", "given")]
+    kinds = ("right", "given", "95 % CI")
+    columns = [Column(kind, letter) for letter in LETTERS for kind in kinds]
     rows = tuple(
-        (row["model"], str(row["n"]), str(row["unread"]), *(number(row[name]) for name in names))
+        (
+            row["model"],
+            str(row["n"]),
+            str(row["unread"]),
+            *(
+                text
+                for name in map(str.lower, LETTERS)
+                for text in (
+                    number(row[f"right_{name}"]),
+                    number(row[f"given_{name}"]),
+                    between(row[f"given_{name}_lo"], row[f"given_{name}_hi"]),
+                )
+            ),
+        )
         for row in table.to_dict("records")
     )
     return TextTable(
@@ -138,8 +162,7 @@ def _notes(table: pd.DataFrame, run: Run) -> list[str]:
         notes.append("Blind: no picture was sent.")
     if shown.wrong_image:
         notes.append("The pictures shown are those of a question about another scene.")
-    if len(design.suite.seeds) > 1:
-        notes.append(f"Mean ± standard deviation over {len(design.suite.seeds)} seeds.")
+    notes += seeds_notes(design)
     notes.append(_counts_note(whole))
     unread = whole[whole["parse_failure"] > 0]
     if len(unread):
@@ -222,6 +245,6 @@ def table2_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...
     ]
     notes = view.notes[:-1]
     whole = replace(view.with_columns(asked), notes=notes)
-    means = [n for n, column in enumerate(whole.columns) if column.name in ("Model", "Avg")]
+    subtasks = [column.name for column in whole.columns if column.name in SUBTASKS]
     note = "Averages alone, to fit; every subtask is in tables/table2.md."
-    return whole, replace(whole.with_columns(means), notes=(note, *notes))
+    return whole, *narrower(replace(whole.without(subtasks), notes=(note, *notes)))
