@@ -2,13 +2,10 @@
 
 from phyblock.scoring.assembly import AssemblyScorer, Score
 from phyblock.scoring.choices import LetterRates, chance, letter_rates
-from phyblock.scoring.error_types import ERROR_TYPES, ErrorType, count_errors, step_errors
+from phyblock.scoring.error_types import ERROR_TYPES, ErrorType, count_errors
+from phyblock.scoring.goal import Goal
 from phyblock.scoring.level1 import level1_counts
-from phyblock.scoring.match import (
-    Goal,
-    Match,
-    match_plan,
-)
+from phyblock.scoring.match import Match, match_plan, step_errors
 from phyblock.scoring.metrics import Counts, micro
 from phyblock.scoring.steps import (
     MOVE_OUTCOMES,

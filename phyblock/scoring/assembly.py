@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from phyblock.domain import CandidateSet, Plan, Scene
-from phyblock.scoring.error_types import ErrorType, count_errors, step_errors
+from phyblock.scoring.error_types import ErrorType, count_errors
+from phyblock.scoring.goal import Goal
 from phyblock.scoring.level1 import level1_counts
-from phyblock.scoring.match import Goal, match_plan
+from phyblock.scoring.match import match_plan, step_errors
 from phyblock.scoring.metrics import Counts
 from phyblock.words import Criterion, Level1Criterion, Matcher, Setting
 
@@ -37,7 +38,6 @@ class AssemblyScorer:
 
     def __init__(self, scene: Scene, candidates: CandidateSet, settings: Sequence[Setting]) -> None:
         self._scene = scene
-        self._candidates = candidates
         self._goals = {setting: Goal(scene, candidates, setting) for setting in settings}
 
     def score(
@@ -56,7 +56,7 @@ class AssemblyScorer:
 
     def _aov(self, goal: Goal, plan: Plan, setting: Setting, matcher: Matcher) -> Score:
         match = match_plan(goal, plan, matcher)
-        errors = step_errors(self._scene, self._candidates, goal, plan, match)
+        errors = step_errors(goal, plan, match)
         return Score(
             "aov", setting, match.counts, matcher, count_errors(errors), match.vertices, errors
         )

@@ -16,7 +16,7 @@ from typing import Literal
 
 from phyblock.domain import CandidateSet, Scene
 from phyblock.scoring.error_types import ERROR_TYPES, ErrorType, error_type
-from phyblock.scoring.match import Goal
+from phyblock.scoring.goal import Goal
 from phyblock.scoring.metrics import Counts
 from phyblock.words import Gating, Setting
 
@@ -89,10 +89,6 @@ class Assembly:
         self._above = _blocks_above(self._goal)
         carried = _carried(self._goal)
         self._roles = [(b.look, carried[v]) for v, b in enumerate(scene.blocks)]
-        self._of_kind = {
-            index: sum(1 << v for v, block in enumerate(scene.blocks) if block.kind == one.kind)
-            for index, one in enumerate(candidates.candidates, 1)
-        }
 
     @property
     def is_complete(self) -> bool:
@@ -126,8 +122,8 @@ class Assembly:
             mask | 1 << vertex for mask in self._frontier for vertex in self._choices(index, mask)
         }
         if not reached:
-            equal = sum(1 << v for v in self._goal.equal_to[index])
-            return Move(error_type(self._of_kind[index], equal, self.placed))
+            goal = self._goal
+            return Move(error_type(goal.of_kind[index], goal.equal[index], self.placed))
         before = self.placed
         self._frontier = reached
         self.chosen.append(index)
