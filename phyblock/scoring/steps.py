@@ -86,7 +86,7 @@ class Assembly:
         self.chosen: list[int] = []
         self._goal = Goal(gated(scene, gating), candidates, setting)
         self._frontier = {0}
-        self._above = _blocks_above(self._goal)
+        self._above = tuple(mask.bit_count() - 1 for mask in self._goal.above)
         carried = _carried(self._goal)
         self._roles = [(b.look, carried[v]) for v, b in enumerate(scene.blocks)]
 
@@ -194,22 +194,6 @@ def _carried(goal: Goal) -> tuple[int, ...]:
     """For each vertex, the bit mask of those that directly wait for it."""
     needed, n = goal.graph.needed_masks, len(goal.graph)
     return tuple(sum((needed[w] >> v & 1) << w for w in range(n)) for v in range(n))
-
-
-def _blocks_above(goal: Goal) -> tuple[int, ...]:
-    """For each vertex, how many others wait for it, directly or not."""
-    n = len(goal.graph)
-    needed = list(goal.graph.needed_masks)
-    for _ in range(n):
-        needed = [mask | _union(needed[v] for v in _bits(mask)) for mask in needed]
-    return tuple(sum(mask >> v & 1 for mask in needed) for v in range(n))
-
-
-def _union(masks: Iterator[int]) -> int:
-    union = 0
-    for mask in masks:
-        union |= mask
-    return union
 
 
 def _bits(mask: int) -> Iterator[int]:

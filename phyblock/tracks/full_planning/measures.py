@@ -1,11 +1,18 @@
-"""What full planning measures: precision, recall and F1 of steps, by level (paper section 4.1)."""
+"""What full planning measures of a plan: its steps, the whole of it, and what became of the goal's
+blocks; by level (paper section 4.1).
+"""
 
 from __future__ import annotations
 
+from functools import partial
+
+import numpy as np
 import pandas as pd
 
-from phyblock.scoring.ratios import f1_of, precision_of, recall_of
+from phyblock.scoring import BLOCK_OUTCOMES, BlockOutcome
+from phyblock.scoring.ratios import Floats, f1_of, precision_of, ratio_of, recall_of
 from phyblock.tables.cells import cell_scores, with_levels
+from phyblock.tables.flat import BLOCK_COLUMNS
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Cell, Measure, SampleCounts
 from phyblock.tables.outcomes import WITHOUT_REPLY
@@ -13,7 +20,17 @@ from phyblock.tables.text_table import level_name
 from phyblock.tracks.full_planning.baselines import PLAN_FLOORS
 from phyblock.tracks.poses import POSE_MEASURES
 
-__all__ = ["NAME", "PLANNING_MEASURES", "in_levels", "is_asked", "level_cells"]
+__all__ = [
+    "BLOCK_COUNTS",
+    "BLOCK_NAMES",
+    "NAME",
+    "PLANNING_MEASURES",
+    "SUPPORT_MISSING",
+    "block_measure",
+    "in_levels",
+    "is_asked",
+    "level_cells",
+]
 
 NAME = "full_planning"
 
@@ -40,7 +57,70 @@ def _steps(run: Run) -> pd.DataFrame:
     return scores.assign(item=scores["scene"], replied=replied)
 
 
+def _plans(run: Run) -> pd.DataFrame:
+    """Under `membership` steps count over again, so that no plan has a value of its own."""
+    rows = _steps(run)
+    rows = rows[rows["criterion"] != "membership"]
+    f1 = f1_of(rows[["tp", "fp", "fn"]].to_numpy(np.float64))
+    return rows.assign(whole=(rows["fp"] == 0) & (rows["fn"] == 0), f1=f1, plans=1)
+
+
+def _in_order(run: Run) -> pd.DataFrame:
+    """Plans whose order counts; those that an earlier version scored are left out."""
+    rows = _steps(run)
+    rows = rows[(rows["criterion"] == "aov") & rows["kept"].notna()]
+    blocks, steps = rows["tp"] + rows["fn"], rows["tp"] + rows["fp"]
+    distance = 1 - 2 * rows["kept"].astype("float64") / (blocks + steps)
+    return rows.assign(blocks=blocks, distance=distance, plans=1)
+
+
 _STEPS = SampleCounts("steps", ("tp", "fp", "fn"), _steps)
+_PLANS = SampleCounts("plans", ("whole", "f1", "plans"), _plans)
+_DISTANCES = SampleCounts("distances", ("distance", "plans"), _in_order)
+BLOCK_COUNTS = SampleCounts("blocks", (*BLOCK_COLUMNS.values(), "blocks"), _in_order)
+
+BLOCK_NAMES: dict[BlockOutcome, str] = {
+    "placed": "Placed",
+    "left_out": "Left out",
+    "wrong_kind": "Wrong kind",
+    "wrong_orientation": "Wrong orientation",
+    "support_not_named": "Support never named",
+    "support_turned": "Support turned wrongly",
+    "support_both": "Supports of both sorts",
+    "order": "Order",
+}
+_BLOCK_MEANINGS: dict[BlockOutcome, str] = {
+    "placed": "blocks placed",
+    "left_out": "blocks for which a plan has no step left",
+    "wrong_kind": "blocks in whose place a plan names a kind not needed, or not so often",
+    "wrong_orientation": "blocks named in another pose",
+    "support_not_named": "blocks named that rest on one that was never named",
+    "support_turned": "blocks named that rest on one that was named in another pose",
+    "support_both": "blocks named that rest on one of each sort",
+    "order": "blocks that another order of a plan's steps would place",
+}
+_SUPPORTS: tuple[BlockOutcome, ...] = ("support_not_named", "support_turned", "support_both")
+
+
+def block_measure(outcome: BlockOutcome) -> str:
+    """Name of the measure of an outcome: its share of the goals' blocks."""
+    return BLOCK_COLUMNS[outcome]
+
+
+def _share(outcomes: tuple[BlockOutcome, ...], sums: Floats) -> Floats:
+    parts = sums[..., [BLOCK_OUTCOMES.index(outcome) for outcome in outcomes]].sum(axis=-1)
+    return ratio_of(np.stack([parts, sums[..., -1]], axis=-1))
+
+
+def _plan_share(column: int, sums: Floats) -> Floats:
+    return ratio_of(sums[..., [column, 2]])
+
+
+SUPPORT_MISSING = Measure(
+    "blocks_support", "Support missing", BLOCK_COUNTS, partial(_share, _SUPPORTS),
+    "blocks named that rest on one that was not, or in another pose", better="lower",
+    over="blocks", in_tables=False,
+)  # fmt: skip
 
 PLANNING_MEASURES = (
     Measure(
@@ -49,5 +129,27 @@ PLANNING_MEASURES = (
     ),
     Measure("precision", "Precision", _STEPS, precision_of, "right steps of those proposed"),
     Measure("recall", "Recall", _STEPS, recall_of, "blocks of the goal that a right step placed"),
+    Measure(
+        "success", "Whole plans", _PLANS, partial(_plan_share, 0),
+        "plans that place every block, by right steps alone", over="plans",
+    ),
+    Measure(
+        "macro_f1", "Macro F1", _PLANS, partial(_plan_share, 1),
+        "mean F1 of single plans, 0 for an empty one", over="plans",
+    ),
+    Measure(
+        "distance", "Distance to a valid order", _DISTANCES, ratio_of,
+        "fewest steps to leave out and blocks to put in until a plan is a valid order, of steps "
+        "and blocks together; mean over plans", better="lower", over="plans",
+    ),
+    *(
+        Measure(
+            block_measure(outcome), BLOCK_NAMES[outcome], BLOCK_COUNTS,
+            partial(_share, (outcome,)), _BLOCK_MEANINGS[outcome], over="blocks",
+            better="higher" if outcome == "placed" else "lower", in_tables=False,
+        )
+        for outcome in BLOCK_OUTCOMES
+    ),
+    SUPPORT_MISSING,
     *POSE_MEASURES,
 )  # fmt: skip
