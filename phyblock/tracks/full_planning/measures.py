@@ -50,34 +50,35 @@ def in_levels(rows: pd.DataFrame, run: Run) -> pd.DataFrame:
     return with_levels(rows, run).rename(columns={"level": CELL})
 
 
-def _steps(run: Run) -> pd.DataFrame:
+def _scored(run: Run) -> pd.DataFrame:
     scores = cell_scores(run)
     scores = scores[scores["track"] == NAME].rename(columns={"level": CELL})
     replied = ~scores["outcome"].isin(WITHOUT_REPLY)
     return scores.assign(item=scores["scene"], replied=replied)
 
 
-def _plans(run: Run) -> pd.DataFrame:
+def _steps(run: Run) -> pd.DataFrame:
     """Under `membership` steps count over again, so that no plan has a value of its own."""
-    rows = _steps(run)
-    rows = rows[rows["criterion"] != "membership"]
-    f1 = f1_of(rows[["tp", "fp", "fn"]].to_numpy(np.float64))
-    return rows.assign(whole=(rows["fp"] == 0) & (rows["fn"] == 0), f1=f1, plans=1)
+    rows = _scored(run)
+    alone = rows["criterion"] != "membership"
+    whole = alone & (rows["fp"] == 0) & (rows["fn"] == 0)
+    f1 = np.nan_to_num(f1_of(rows[["tp", "fp", "fn"]].to_numpy(np.float64)))
+    return rows.assign(whole=whole.astype("int64"), f1=alone * f1, plans=alone.astype("int64"))
 
 
 def _in_order(run: Run) -> pd.DataFrame:
     """Plans whose order counts; those that an earlier version scored are left out."""
-    rows = _steps(run)
+    rows = _scored(run)
     rows = rows[(rows["criterion"] == "aov") & rows["kept"].notna()]
     blocks, steps = rows["tp"] + rows["fn"], rows["tp"] + rows["fp"]
     distance = 1 - 2 * rows["kept"].astype("float64") / (blocks + steps)
     return rows.assign(blocks=blocks, distance=distance, plans=1)
 
 
-_STEPS = SampleCounts("steps", ("tp", "fp", "fn"), _steps)
-_PLANS = SampleCounts("plans", ("whole", "f1", "plans"), _plans)
-_DISTANCES = SampleCounts("distances", ("distance", "plans"), _in_order)
-BLOCK_COUNTS = SampleCounts("blocks", (*BLOCK_COLUMNS.values(), "blocks"), _in_order)
+_STEPS = SampleCounts("steps", ("tp", "fp", "fn", "whole", "f1", "plans"), _steps)
+BLOCK_COUNTS = SampleCounts(
+    "blocks", (*BLOCK_COLUMNS.values(), "blocks", "distance", "plans"), _in_order
+)
 
 BLOCK_NAMES: dict[BlockOutcome, str] = {
     "placed": "Placed",
@@ -109,11 +110,13 @@ def block_measure(outcome: BlockOutcome) -> str:
 
 def _share(outcomes: tuple[BlockOutcome, ...], sums: Floats) -> Floats:
     parts = sums[..., [BLOCK_OUTCOMES.index(outcome) for outcome in outcomes]].sum(axis=-1)
-    return ratio_of(np.stack([parts, sums[..., -1]], axis=-1))
+    return ratio_of(np.stack([parts, sums[..., len(BLOCK_OUTCOMES)]], axis=-1))
 
 
-def _plan_share(column: int, sums: Floats) -> Floats:
-    return ratio_of(sums[..., [column, 2]])
+def _mean(counted: SampleCounts, column: str, sums: Floats) -> Floats:
+    """Mean over plans of what was summed in a column."""
+    columns = counted.columns
+    return ratio_of(sums[..., [columns.index(column), columns.index("plans")]])
 
 
 SUPPORT_MISSING = Measure(
@@ -130,15 +133,16 @@ PLANNING_MEASURES = (
     Measure("precision", "Precision", _STEPS, precision_of, "right steps of those proposed"),
     Measure("recall", "Recall", _STEPS, recall_of, "blocks of the goal that a right step placed"),
     Measure(
-        "success", "Whole plans", _PLANS, partial(_plan_share, 0),
+        "success", "Whole plans", _STEPS, partial(_mean, _STEPS, "whole"),
         "plans that place every block, by right steps alone", over="plans",
     ),
     Measure(
-        "macro_f1", "Macro F1", _PLANS, partial(_plan_share, 1),
+        "macro_f1", "Macro F1", _STEPS, partial(_mean, _STEPS, "f1"),
         "mean F1 of single plans, 0 for an empty one", over="plans",
     ),
     Measure(
-        "distance", "Distance to a valid order", _DISTANCES, ratio_of,
+        "distance", "Distance to a valid order", BLOCK_COUNTS,
+        partial(_mean, BLOCK_COUNTS, "distance"),
         "fewest steps to leave out and blocks to put in until a plan is a valid order, of steps "
         "and blocks together; mean over plans", better="lower", over="plans",
     ),
