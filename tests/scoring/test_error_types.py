@@ -90,8 +90,23 @@ def test_the_four_types() -> None:
     )  # fmt: skip
 
 
+@st.composite
+def carriers(draw: st.DrawFn) -> Case:
+    """Equal cubes that carry blocks of few kinds: what the plan names depends on which it takes."""
+    position = (0.0, 0.0, 0.0)
+    n_cubes = draw(st.integers(2, 3))
+    blocks = [Block(n + 1, "cube", "red", position, FLAT, (), 1) for n in range(n_cubes)]
+    tops = [("arch", "red", FLAT), ("arch", "red", TURNED), ("arch", "blue", FLAT)]
+    for cube in range(n_cubes):
+        for top in draw(st.lists(st.sampled_from(tops), min_size=1, max_size=2)):
+            blocks.append(Block(len(blocks) + 1, *top[:2], position, top[2], (cube + 1,), 2))
+    candidates = CandidateSet((Candidate("cube", "red", FLAT), *(Candidate(*top) for top in tops)))
+    tail = draw(st.lists(st.integers(1, len(candidates)), min_size=3, max_size=7))
+    return Case(Scene("s", (3,), tuple(blocks), ("s",)), candidates, Plan((1, *tail)))
+
+
 @pytest.mark.parametrize("setting", SETTINGS)
-@given(case=cases(max_blocks=7, max_steps=10), data=st.data())
+@given(case=st.one_of(cases(max_blocks=7, max_steps=10), carriers()), data=st.data())
 def test_file_order_of_blocks_changes_no_type_under_optimal(
     setting: Setting, case: Case, data: st.DataObject
 ) -> None:
