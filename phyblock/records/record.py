@@ -73,6 +73,10 @@ class Score(Line):
     """The goal block, from 0, that each step placed, or null."""
     why: tuple[str | None, ...] | None = None
     """The error type of each wrong step, null for right ones."""
+    blocks: dict[str, Whole] | None = None
+    """Goal blocks by what became of them, where the criterion tells them apart."""
+    kept: Whole | None = None
+    """Steps that the nearest valid order keeps."""
 
 
 class AskedTurn(Line):

@@ -1,15 +1,14 @@
-"""Pure scoring: plans against AOV graphs, error types, counts and micro averages."""
+"""Pure scoring: plans against AOV graphs, errors, losses, counts and micro averages."""
 
 from phyblock.scoring.assembly import AssemblyScorer, Score
 from phyblock.scoring.choices import LetterRates, chance, letter_rates
-from phyblock.scoring.error_types import ERROR_TYPES, ErrorType, count_errors, step_errors
+from phyblock.scoring.error_types import ERROR_TYPES, ErrorType, count_errors
+from phyblock.scoring.goal import Goal
 from phyblock.scoring.level1 import level1_counts
-from phyblock.scoring.match import (
-    Goal,
-    Match,
-    match_plan,
-)
+from phyblock.scoring.losses import BLOCK_OUTCOMES, BlockOutcome, block_outcomes
+from phyblock.scoring.match import Match, match_plan, step_errors
 from phyblock.scoring.metrics import Counts, micro
+from phyblock.scoring.nearest import steps_kept
 from phyblock.scoring.steps import (
     MOVE_OUTCOMES,
     Assembly,
@@ -21,10 +20,12 @@ from phyblock.scoring.steps import (
 )
 
 __all__ = [
+    "BLOCK_OUTCOMES",
     "ERROR_TYPES",
     "MOVE_OUTCOMES",
     "Assembly",
     "AssemblyScorer",
+    "BlockOutcome",
     "Counts",
     "ErrorType",
     "Goal",
@@ -34,6 +35,7 @@ __all__ = [
     "MoveOutcome",
     "Score",
     "attempted_counts",
+    "block_outcomes",
     "chance",
     "count_errors",
     "gated",
@@ -43,4 +45,5 @@ __all__ = [
     "micro",
     "placed_counts",
     "step_errors",
+    "steps_kept",
 ]

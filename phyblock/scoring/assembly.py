@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from phyblock.domain import CandidateSet, Plan, Scene
-from phyblock.scoring.error_types import ErrorType, count_errors, step_errors
+from phyblock.scoring.error_types import ErrorType, count_errors
+from phyblock.scoring.goal import Goal
 from phyblock.scoring.level1 import level1_counts
-from phyblock.scoring.match import Goal, match_plan
+from phyblock.scoring.losses import BlockOutcome, block_outcomes
+from phyblock.scoring.match import match_plan, step_errors
 from phyblock.scoring.metrics import Counts
+from phyblock.scoring.nearest import steps_kept
 from phyblock.words import Criterion, Level1Criterion, Matcher, Setting
 
 __all__ = ["AssemblyScorer", "Score"]
@@ -19,8 +22,9 @@ __all__ = ["AssemblyScorer", "Score"]
 class Score:
     """Counts of one plan under one criterion and setting.
 
-    `matcher`, `errors` (wrong steps by type), `vertices` (the goal vertex each step placed) and
-    `step_errors` belong to criterion `aov` and are None for the Level-1 criteria.
+    `matcher`, `errors` (wrong steps by type), `vertices` (the goal vertex each step placed),
+    `step_errors`, `blocks` (goal blocks by what became of them) and `kept` (steps that the nearest
+    valid order keeps) belong to criterion `aov` and are None for the Level-1 criteria.
     """
 
     criterion: Criterion
@@ -30,6 +34,8 @@ class Score:
     errors: dict[ErrorType, int] | None = None
     vertices: tuple[int | None, ...] | None = None
     step_errors: tuple[ErrorType | None, ...] | None = None
+    blocks: dict[BlockOutcome, int] | None = None
+    kept: int | None = None
 
 
 class AssemblyScorer:
@@ -37,7 +43,6 @@ class AssemblyScorer:
 
     def __init__(self, scene: Scene, candidates: CandidateSet, settings: Sequence[Setting]) -> None:
         self._scene = scene
-        self._candidates = candidates
         self._goals = {setting: Goal(scene, candidates, setting) for setting in settings}
 
     def score(
@@ -49,14 +54,20 @@ class AssemblyScorer:
         """
         scores: list[Score] = []
         for setting, goal in self._goals.items():
-            scores += [self._aov(goal, plan, setting, matcher) for matcher in matchers]
+            scores += _aov(goal, plan, setting, matchers) if matchers else ()
             if level1 is not None and 1 in self._scene.levels:
                 scores.append(Score(level1, setting, level1_counts(goal, plan, level1)))
         return tuple(scores)
 
-    def _aov(self, goal: Goal, plan: Plan, setting: Setting, matcher: Matcher) -> Score:
-        match = match_plan(goal, plan, matcher)
-        errors = step_errors(self._scene, self._candidates, goal, plan, match)
-        return Score(
-            "aov", setting, match.counts, matcher, count_errors(errors), match.vertices, errors
+
+def _aov(goal: Goal, plan: Plan, setting: Setting, matchers: Sequence[Matcher]) -> Iterator[Score]:
+    matches = [match_plan(goal, plan, matcher) for matcher in matchers]
+    placed = [match.counts.tp for match in matches]
+    kept = steps_kept(goal, plan, max(placed))
+    outcomes = block_outcomes(goal, plan, placed)
+    for matcher, match, blocks in zip(matchers, matches, outcomes, strict=True):
+        why = step_errors(goal, plan, match)
+        errors = count_errors(why)
+        yield Score(
+            "aov", setting, match.counts, matcher, errors, match.vertices, why, blocks, kept
         )

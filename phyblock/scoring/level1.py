@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 
 from phyblock.domain import Plan
-from phyblock.scoring.match import Goal
+from phyblock.scoring.goal import Goal
 from phyblock.scoring.metrics import Counts
 from phyblock.words import Level1Criterion
 

@@ -6,14 +6,15 @@ the candidate under the setting: type, colour and orientation in A, type and col
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-from phyblock.domain import AOVGraph, CandidateSet, Plan, Scene
+from phyblock.domain import Plan
+from phyblock.scoring.error_types import ErrorType, error_type
+from phyblock.scoring.goal import Goal
 from phyblock.scoring.metrics import Counts
-from phyblock.words import Matcher, Setting
+from phyblock.words import Matcher
 
-__all__ = ["Goal", "Match", "match_plan"]
+__all__ = ["Match", "match_plan", "step_errors"]
 
 
 @dataclass(frozen=True)
@@ -35,42 +36,14 @@ class Match:
         return Counts(tp, len(self.vertices) - tp, self.n_blocks - tp)
 
 
-class Goal:
-    """A scene and its candidate set prepared for matching under one setting.
-
-    `equal_to[i]` holds the goal vertices, in file order, that equal candidate i (1-based).
-    """
-
-    def __init__(self, scene: Scene, candidates: CandidateSet, setting: Setting) -> None:
-        attribute = "look" if setting == "A" else "kind"
-        self.graph: AOVGraph = scene.graph
-        self.equal_to: dict[int, tuple[int, ...]] = {
-            index: tuple(
-                vertex
-                for vertex, block in enumerate(scene.blocks)
-                if getattr(block, attribute) == getattr(candidate, attribute)
-            )
-            for index, candidate in enumerate(candidates.candidates, 1)
-        }
-        self._twins = _twins(self.graph)
-
-    def choices(self, index: int, placed: int) -> list[int]:
-        """Ready goal vertices, in file order, that candidate `index` could be placed as."""
-        return [v for v in self.equal_to[index] if self.graph.is_ready(v, placed)]
-
-    def distinct(self, vertices: Sequence[int]) -> list[int]:
-        """The first of each group of vertices that unlock the same blocks."""
-        if len(vertices) < 2:
-            return list(vertices)
-        return list({self._twins[v]: v for v in reversed(vertices)}.values())
-
-
 def match_plan(goal: Goal, plan: Plan, matcher: Matcher) -> Match:
     """Match `plan` step by step; raises KeyError for a step that is no candidate.
 
     `paper` is Algorithm 1 of the paper: each step takes the first ready equal block in file
     order. `optimal` takes the same steps but chooses among interchangeable ready blocks so that
     the number of true positives over the whole plan is greatest, so every valid order scores 1.
+    Of the choices with as many, it takes those under which the fewest steps are `overflow`, and of
+    these the fewest `incorrect_orientation`: the file order of blocks changes no count.
     """
     find = _first_choices if matcher == "paper" else _best_choices
     vertices = find(goal, plan)
@@ -79,6 +52,14 @@ def match_plan(goal: Goal, plan: Plan, matcher: Matcher) -> Match:
         masks.append(placed)
         placed |= 0 if vertex is None else 1 << vertex
     return Match(tuple(vertices), tuple(masks), len(goal.graph))
+
+
+def step_errors(goal: Goal, plan: Plan, match: Match) -> tuple[ErrorType | None, ...]:
+    """For each step, why it is wrong (see `ERROR_TYPES`), or None for a true positive."""
+    return tuple(
+        error_type(goal.of_kind[index], goal.equal[index], placed) if vertex is None else None
+        for index, vertex, placed in zip(plan.steps, match.vertices, match.placed, strict=True)
+    )
 
 
 def _first_choices(goal: Goal, plan: Plan) -> list[int | None]:
@@ -95,32 +76,35 @@ def _best_choices(goal: Goal, plan: Plan) -> list[int | None]:
     """Search over the frontier of sets of placed vertices that some choice can reach.
 
     A step with a ready match never gains by being skipped, and a set's size is its number of true
-    positives, so keeping one way into each distinct set is enough.
+    positives, so the way into each distinct set that costs least is enough.
     """
-    frontier: dict[int, int | None] = {0: None}
+    cost_of: dict[ErrorType, int] = {
+        "shape_not_in_gt": 0,
+        "overflow": len(plan) + 1,
+        "incorrect_orientation": 1,
+        "dependency_not_met": 0,
+    }
+    frontier = {0: 0}
     history: list[dict[int, int | None]] = []
     for index in plan.steps:
-        reached: dict[int, int | None] = {}
-        for placed in frontier:
+        costs: dict[int, int] = {}
+        taken: dict[int, int | None] = {}
+        for placed, cost in frontier.items():
             choices = goal.distinct(goal.choices(index, placed))
             if not choices:
-                reached.setdefault(placed, None)
+                more = cost + cost_of[error_type(goal.of_kind[index], goal.equal[index], placed)]
+                if more < costs.get(placed, more + 1):
+                    costs[placed], taken[placed] = more, None
             for vertex in choices:
-                reached.setdefault(placed | 1 << vertex, vertex)
-        frontier = reached
-        history.append(reached)
-    best = max(frontier, key=lambda mask: mask.bit_count())
+                reached = placed | 1 << vertex
+                if cost < costs.get(reached, cost + 1):
+                    costs[reached], taken[reached] = cost, vertex
+        frontier = costs
+        history.append(taken)
+    best = min(frontier, key=lambda mask: (-mask.bit_count(), frontier[mask]))
     vertices: list[int | None] = []
-    for reached in reversed(history):
-        taken = reached[best]
-        vertices.append(taken)
-        best &= ~(1 << taken) if taken is not None else ~0
+    for taken in reversed(history):
+        chosen = taken[best]
+        vertices.append(chosen)
+        best &= ~(1 << chosen) if chosen is not None else ~0
     return vertices[::-1]
-
-
-def _twins(graph: AOVGraph) -> tuple[tuple[int, ...], ...]:
-    """For each vertex, the vertices that directly depend on it: equal blocks with the same ones
-    are interchangeable once both are ready.
-    """
-    n = len(graph)
-    return tuple(tuple(w for w in range(n) if v in graph.depends_on[w]) for v in range(n))

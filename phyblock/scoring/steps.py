@@ -16,7 +16,7 @@ from typing import Literal
 
 from phyblock.domain import CandidateSet, Scene
 from phyblock.scoring.error_types import ERROR_TYPES, ErrorType, error_type
-from phyblock.scoring.match import Goal
+from phyblock.scoring.goal import Goal
 from phyblock.scoring.metrics import Counts
 from phyblock.words import Gating, Setting
 
@@ -86,13 +86,9 @@ class Assembly:
         self.chosen: list[int] = []
         self._goal = Goal(gated(scene, gating), candidates, setting)
         self._frontier = {0}
-        self._above = _blocks_above(self._goal)
+        self._above = tuple(mask.bit_count() - 1 for mask in self._goal.above)
         carried = _carried(self._goal)
         self._roles = [(b.look, carried[v]) for v, b in enumerate(scene.blocks)]
-        self._of_kind = {
-            index: sum(1 << v for v, block in enumerate(scene.blocks) if block.kind == one.kind)
-            for index, one in enumerate(candidates.candidates, 1)
-        }
 
     @property
     def is_complete(self) -> bool:
@@ -126,8 +122,8 @@ class Assembly:
             mask | 1 << vertex for mask in self._frontier for vertex in self._choices(index, mask)
         }
         if not reached:
-            equal = sum(1 << v for v in self._goal.equal_to[index])
-            return Move(error_type(self._of_kind[index], equal, self.placed))
+            goal = self._goal
+            return Move(error_type(goal.of_kind[index], goal.equal[index], self.placed))
         before = self.placed
         self._frontier = reached
         self.chosen.append(index)
@@ -198,22 +194,6 @@ def _carried(goal: Goal) -> tuple[int, ...]:
     """For each vertex, the bit mask of those that directly wait for it."""
     needed, n = goal.graph.needed_masks, len(goal.graph)
     return tuple(sum((needed[w] >> v & 1) << w for w in range(n)) for v in range(n))
-
-
-def _blocks_above(goal: Goal) -> tuple[int, ...]:
-    """For each vertex, how many others wait for it, directly or not."""
-    n = len(goal.graph)
-    needed = list(goal.graph.needed_masks)
-    for _ in range(n):
-        needed = [mask | _union(needed[v] for v in _bits(mask)) for mask in needed]
-    return tuple(sum(mask >> v & 1 for mask in needed) for v in range(n))
-
-
-def _union(masks: Iterator[int]) -> int:
-    union = 0
-    for mask in masks:
-        union |= mask
-    return union
 
 
 def _bits(mask: int) -> Iterator[int]:

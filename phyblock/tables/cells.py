@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.tables.design import OVERALL
+from phyblock.tables.flat import BLOCK_COLUMNS
 from phyblock.tables.load import Run, made_once
 from phyblock.tables.outcomes import WITHOUT_REPLY
 
@@ -28,7 +29,7 @@ SIDE_METRICS = ("Prec", "Rec")
 """Headings that narrow tables do without."""
 _COLUMNS = (
     *("track", "model", "scene", "seed", "outcome", "criterion", "matcher", "setting"),
-    *("tp", "fp", "fn"),
+    *("tp", "fp", "fn", *BLOCK_COLUMNS.values(), "kept"),
 )
 """Those of scores that cells need."""
 

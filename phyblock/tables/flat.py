@@ -15,9 +15,12 @@ import pandas as pd
 
 from phyblock.records import Record, Score
 from phyblock.records.known import record_types
-from phyblock.scoring import ERROR_TYPES
+from phyblock.scoring import BLOCK_OUTCOMES, ERROR_TYPES
 
-__all__ = ["Flattened"]
+__all__ = ["BLOCK_COLUMNS", "Flattened"]
+
+BLOCK_COLUMNS = {name: f"blocks_{name}" for name in BLOCK_OUTCOMES}
+"""Columns of scores that say what became of the goal's blocks."""
 
 _TEXTS = ("text", "reasoning")
 """Columns that may be long."""
@@ -72,13 +75,15 @@ _SCORE_TYPES: dict[str, str] = {
     "fp": "int64",
     "fn": "int64",
     **dict.fromkeys(ERROR_TYPES, "Int64"),
+    **dict.fromkeys(BLOCK_COLUMNS.values(), "Int64"),
+    "kept": "Int64",
 }
 
 _OF_SAMPLE = ("sample", "track", "model", "scene", "seed", "outcome")
 """Columns of scores that are those of the record."""
 _REPLY = ("finish", "cost_usd", "latency_s", "provider_model", "attempts", "cached", "seed_sent")
 _USAGE = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
-_COUNTS = ("tp", "fp", "fn", *ERROR_TYPES)
+_COUNTS = ("tp", "fp", "fn", *ERROR_TYPES, *BLOCK_COLUMNS.values(), "kept")
 _LABELS = ("criterion", "matcher", "setting")
 _UNKNOWN = -(2**62)
 """Stands for a count that there is not."""
@@ -158,8 +163,13 @@ class Flattened:
             _LABELS, (score.criterion, score.matcher or "", score.setting), strict=True
         ):
             self._labels[name].append(self._share(label))
-        errors = score.errors or {}
-        found = (score.tp, score.fp, score.fn, *(errors.get(n, _UNKNOWN) for n in ERROR_TYPES))
+        errors, blocks = score.errors or {}, score.blocks or {}
+        found = (
+            *(score.tp, score.fp, score.fn),
+            *(errors.get(name, _UNKNOWN) for name in ERROR_TYPES),
+            *(blocks.get(name, _UNKNOWN) for name in BLOCK_OUTCOMES),
+            _UNKNOWN if score.kept is None else score.kept,
+        )
         for name, count in zip(_COUNTS, found, strict=True):
             self._counts[name].append(count)
 

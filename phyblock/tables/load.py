@@ -32,8 +32,9 @@ class Run:
     `records` has one row a sample: track, model, scene, levels, parents, n_blocks, seed, outcome,
     the reply's text, tokens, cost_usd, latency_s and so on, error, prompt, parsed plan. `scores`
     has one row a sample, criterion, matcher ("" where a criterion knows none) and setting with the
-    counts tp, fp, fn and the four error types (missing where there are none). `is_cut` says
-    that the last line was cut off by a kill and therefore ignored.
+    counts tp, fp, fn, the four error types, what became of the goal's blocks and the steps that
+    the nearest valid order keeps (missing where there are none). `is_cut` says that the last line
+    was cut off by a kill and therefore ignored.
     """
 
     path: Path

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from phyblock.records import Manifest
 from phyblock.records.known import known_records
 from phyblock.report import Run, read_design
-from phyblock.scoring import ERROR_TYPES
+from phyblock.scoring import BLOCK_OUTCOMES, ERROR_TYPES
 from phyblock.tables.load import Frames, frames_of
 from phyblock.tables.outcomes import OUTCOMES
 
@@ -64,6 +64,7 @@ def score(
     errors: tuple[int, int, int, int] | None = None,
 ) -> dict[str, Any]:
     counts = errors or (fp, 0, 0, 0)
+    blocks = {**dict.fromkeys(BLOCK_OUTCOMES, 0), "placed": tp, "left_out": fn}
     return {
         "criterion": criterion,
         "matcher": matcher if criterion == "aov" else None,
@@ -72,6 +73,8 @@ def score(
         "fp": fp,
         "fn": fn,
         "errors": dict(zip(ERROR_TYPES, counts, strict=True)) if criterion == "aov" else None,
+        "blocks": blocks if criterion == "aov" else None,
+        "kept": tp if criterion == "aov" else None,
     }
 
 

@@ -18,7 +18,8 @@ from phyblock.tracks.vqa.figure import accuracy_by_subtask, vqa_heat_map
 from tests.report.factory import LEVELS, manifest, record, run_of, score, write_run
 
 matplotlib = pytest.importorskip("matplotlib", reason="matplotlib is not installed")
-PLANNING = {"f1-levels", "f1-radar", "settings", "error-types", "f1-size", "f1-cost", "scenes"}
+PLANNING = {"f1-levels", "f1-radar", "settings", "losses", "error-types", "f1-size", "f1-cost"}
+PLANNING |= {"scenes"}
 
 
 def planned(model: str, tp: int) -> list[dict[str, Any]]:

@@ -125,9 +125,9 @@ def records_of(model: str) -> list[dict[str, Any]]:
 def test_all_tables_are_written(tmp_path: Path) -> None:
     facts = manifest(models=[("alpha", "GPT-4o"), "beta"])
     written = write_tables(write_run(tmp_path / "run", records_of("alpha"), facts))
-    viewed = ["table1", "intervals", "table5", "settings", "errors", "orders", "published"]
-    viewed += ["coverage", "cost"]
-    assert list(written.frames) == ["assembly", *viewed[:7], "estimates", *viewed[7:]]
+    viewed = ["table1", "intervals", "table5", "settings", "errors", "losses", "orders"]
+    viewed += ["published", "measures", "coverage", "cost"]
+    assert list(written.frames) == ["assembly", *viewed[:8], "estimates", *viewed[8:]]
     assert list(written.views) == viewed
     assert {file.name for file in written.folder.iterdir()} == {
         *(f"{name}.csv" for name in written.frames),

@@ -107,5 +107,9 @@ def _prompt(
     return {"template": prompt.template, "n": prompts.get(prompt.messages), "images": images}
 
 
+_COUNTED = ("errors", "blocks", "kept")
+"""Numbers of a score that stand in tables alone."""
+
+
 def _score(score: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in score.items() if name != "errors"}
+    return {name: value for name, value in score.items() if name not in _COUNTED}

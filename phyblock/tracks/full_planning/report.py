@@ -17,7 +17,9 @@ from phyblock.tracks.full_planning.assembly import assembly_frame, table1_frame
 from phyblock.tracks.full_planning.errors import errors_frame
 from phyblock.tracks.full_planning.figures.errors import error_bars
 from phyblock.tracks.full_planning.figures.levels import f1_radar, settings_dots
+from phyblock.tracks.full_planning.figures.losses import loss_bars
 from phyblock.tracks.full_planning.figures.scatter import f1_by_cost, f1_by_size
+from phyblock.tracks.full_planning.losses import losses_frame, losses_view
 from phyblock.tracks.full_planning.measures import (
     NAME,
     PLANNING_MEASURES,
@@ -124,6 +126,7 @@ REPORT = TrackReport(
         "table5": TableMaker(table5_frame, table5_view, "table1"),
         "settings": TableMaker(settings_frame, settings_view, "table1"),
         "errors": TableMaker(errors_frame, errors_view, in_terminal=errors_in_terminal),
+        "losses": TableMaker(losses_frame, losses_view, "errors"),
         "orders": TableMaker(_orders, order_view, "table1", in_terminal=order_in_terminal),
         "published": TableMaker(published_frame, published_view, lines=published_lines),
     },
@@ -131,6 +134,7 @@ REPORT = TrackReport(
     figures={
         "f1-radar": f1_radar,
         "settings": settings_dots,
+        "losses": loss_bars,
         "error-types": error_bars,
         "f1-size": f1_by_size,
         "f1-cost": f1_by_cost,
@@ -139,6 +143,7 @@ REPORT = TrackReport(
         "f1-levels": "F1 by level",
         "f1-radar": "F1 by level, as in the paper",
         "settings": "Setting A against setting B",
+        "losses": "What became of the goals' blocks",
         "error-types": "Wrong steps by type",
         "f1-size": "F1 by model size",
         "f1-cost": "F1 by cost",

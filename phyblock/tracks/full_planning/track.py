@@ -214,4 +214,6 @@ def _score(score: Score) -> dict[str, Any]:
         "errors": score.errors,
         "placed": None if score.vertices is None else list(score.vertices),
         "why": None if score.step_errors is None else list(score.step_errors),
+        "blocks": score.blocks,
+        "kept": score.kept,
     }

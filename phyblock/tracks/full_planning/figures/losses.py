@@ -1,0 +1,73 @@
+"""What became of the goals' blocks: stacked bars, one a model."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from phyblock.scoring import BLOCK_OUTCOMES, BlockOutcome
+from phyblock.tables.design import OVERALL
+from phyblock.tables.drawing import COLORS, PALE, bare_axes, headed, new_figure
+from phyblock.tables.load import Run
+from phyblock.tracks.full_planning.figures.levels import how_measured, ranked
+from phyblock.tracks.full_planning.losses import losses_frame
+from phyblock.tracks.full_planning.measures import BLOCK_NAMES
+from phyblock.tracks.full_planning.seeds import intervals_table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["loss_bars"]
+
+_LOOKS: dict[BlockOutcome, tuple[str, str]] = {
+    "placed": (COLORS[0], "white"),
+    "left_out": (PALE, "black"),
+    "wrong_kind": (COLORS[1], "white"),
+    "wrong_orientation": (COLORS[4], "black"),
+    "support_not_named": ("#005c43", "white"),
+    "support_turned": (COLORS[2], "black"),
+    "support_both": ("#8fd6bf", "black"),
+    "order": (COLORS[3], "black"),
+}
+"""Color of a part and of the number in it; the three of missing supports are of one hue."""
+_LEAST_LABEL = 4.0
+
+
+def loss_bars(run: Run) -> Figure | None:
+    """Shares of the outcomes of goal blocks in all levels; None where no plan's are known."""
+    table = losses_frame(run)
+    table = table[(table["level"] == OVERALL) & table["value"].notna()]
+    if table.empty:
+        return None
+    shares = table.pivot(index="model", columns="outcome", values="value")
+    models = [model for model in ranked(intervals_table(run), "f1") if model in shares.index]
+    figure = new_figure(1.75 + 0.28 * len(models))
+    ax = figure.subplots()
+    places, start = np.arange(len(models)), np.zeros(len(models))
+    for outcome in BLOCK_OUTCOMES:
+        color, ink = _LOOKS[outcome]
+        widths = shares.loc[models, outcome].to_numpy(float)
+        ax.barh(
+            places,
+            widths,
+            left=start,
+            height=0.7,
+            color=color,
+            edgecolor="white",
+            linewidth=0.8,
+            label=BLOCK_NAMES[outcome],
+        )
+        for place, width in enumerate(widths):
+            if width >= _LEAST_LABEL:
+                middle = start[place] + width / 2
+                ax.text(
+                    middle, place, f"{width:.0f}", ha="center", va="center", color=ink, fontsize=7
+                )
+        start = start + widths
+    ax.set(xlim=(0, 100), xlabel="Share of the goals' blocks (%)", ylim=(len(models) - 0.4, -0.6))
+    ax.set_yticks(places, models)
+    bare_axes([ax])
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    headed(figure, "What became of the goals' blocks", f"{how_measured(run.design)}; all levels")
+    return figure

@@ -1,0 +1,225 @@
+"""What became of every goal block, and how near a plan is to a valid order."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.scoring import (
+    BLOCK_OUTCOMES,
+    BlockOutcome,
+    Goal,
+    block_outcomes,
+    level1_counts,
+    match_plan,
+    steps_kept,
+)
+from phyblock.words import SETTINGS, Setting
+from tests.domain.graphs import acyclic
+from tests.scoring.cases import Case, cases, equal
+
+each_setting = pytest.mark.parametrize("setting", SETTINGS)
+FLAT, TURNED = (0.0, 0.0, 0.0), (0.0, 0.0, 90.0)
+
+
+def outcomes(case: Case, setting: Setting) -> dict[BlockOutcome, int]:
+    goal = Goal(case.scene, case.candidates, setting)
+    (counted,) = block_outcomes(goal, case.plan, [match_plan(goal, case.plan, "optimal").counts.tp])
+    return counted
+
+
+def kept(case: Case, setting: Setting) -> int:
+    return steps_kept(Goal(case.scene, case.candidates, setting), case.plan)
+
+
+def closed(case: Case) -> Iterator[frozenset[int]]:
+    """Every set of orders of blocks that can stand, each on all that it depends on."""
+    n = len(case.scene)
+    for mask in range(1 << n):
+        chosen = [block for v, block in enumerate(case.scene.blocks) if mask >> v & 1]
+        orders = frozenset(block.order for block in chosen)
+        if all(orders.issuperset(block.depend) for block in chosen):
+            yield orders
+
+
+def standing(case: Case, setting: Setting, spare: Counter[object]) -> int:
+    """The most blocks that steps stand for one to one in a set that can stand, in which so many
+    more of a kind may be.
+    """
+    blocks = {block.order: block for block in case.scene.blocks}
+    most = 0
+    for orders in closed(case):
+        left, more = list(case.plan.steps), Counter(spare)
+        count = 0
+        for block in (blocks[order] for order in orders):
+            step = next((i for i in left if equal(block, case.candidates[i], setting)), None)
+            if step is None:
+                more[block.kind] -= 1
+            else:
+                left.remove(step)
+                count += 1
+        if min(more.values(), default=0) >= 0:
+            most = max(most, count)
+    return most
+
+
+@each_setting
+@given(case=cases())
+def test_blocks_lost_are_what_each_kinder_reading_of_the_plan_wins(
+    setting: Setting, case: Case
+) -> None:
+    counted = outcomes(case, setting)
+    assert tuple(sorted(counted)) == tuple(sorted(BLOCK_OUTCOMES))
+    assert min(counted.values()) >= 0
+    n, steps = len(case.scene), len(case.plan)
+    assert sum(counted.values()) == n
+    goals = {name: Goal(case.scene, case.candidates, name) for name in SETTINGS}
+    named = {name: level1_counts(goal, case.plan, "selection").tp for name, goal in goals.items()}
+    assert counted["left_out"] == n - min(n, steps)
+    assert counted["left_out"] + counted["wrong_kind"] == n - named["B"]
+    assert counted["wrong_orientation"] == named["B"] - named[setting]
+    assert counted["order"] + counted["placed"] == standing(case, setting, Counter())
+
+
+@each_setting
+@given(case=cases(max_blocks=5))
+def test_missing_supports_have_the_cause_that_would_mend_them(setting: Setting, case: Case) -> None:
+    counted = outcomes(case, setting)
+    blocks = Counter(block.kind for block in case.scene.blocks)
+    steps = Counter(case.candidates[index].kind for index in case.plan.steps)
+    looks = Counter(block.look for block in case.scene.blocks)
+    exact: Counter[object] = Counter()
+    for look, times in Counter(case.candidates[i].look for i in case.plan.steps).items():
+        exact[look[:2]] += min(times, looks[look])
+    named = Counter({kind: min(n, steps[kind]) for kind, n in blocks.items()})
+    turned = named - exact if setting == "A" else Counter()
+    stand = standing(case, setting, Counter())
+    assert counted["support_turned"] == standing(case, setting, Counter(turned)) - stand
+    by_absent = standing(case, setting, Counter(blocks - named)) - stand
+    assert counted["support_not_named"] <= by_absent
+    assert counted["support_both"] == 0 or counted["support_not_named"] == by_absent
+
+
+@st.composite
+def distinct_cases(draw: st.DrawFn) -> Case:
+    """Goals of blocks of which no two are of a kind; each can be named as it is, or turned."""
+    edges = draw(acyclic(5).filter(bool))
+    kinds = [(shape, color) for shape in ("arch", "cuboid3") for color in ("red", "blue", "green")]
+    blocks = tuple(
+        Block(v + 1, *kinds[v], FLAT, FLAT, tuple(sorted(w + 1 for w in needed)), 1)
+        for v, needed in enumerate(edges)
+    )
+    poses = [Candidate(*kind, pose) for kind in kinds for pose in (FLAT, TURNED)]
+    steps = draw(st.lists(st.integers(1, len(poses)), max_size=8))
+    return Case(Scene("s", (3,), blocks, ("s",)), CandidateSet(tuple(poses)), Plan(tuple(steps)))
+
+
+@given(case=distinct_cases())
+def test_where_no_two_blocks_are_of_a_kind_each_has_the_outcome_that_its_own_story_gives(
+    case: Case,
+) -> None:
+    named = {case.candidates[index].look for index in case.plan.steps}
+    kinds = {look[:2] for look in named}
+    blocks = {block.order: block for block in case.scene.blocks}
+
+    def below(order: int) -> set[int]:
+        return {order}.union(*(below(other) for other in blocks[order].depend))
+
+    goal = Goal(case.scene, case.candidates, "A")
+    placed = set(match_plan(goal, case.plan, "optimal").vertices)
+    counted: Counter[str] = Counter()
+    for vertex, block in enumerate(case.scene.blocks):
+        under = [blocks[order] for order in below(block.order) - {block.order}]
+        is_absent = any(other.kind not in kinds for other in under)
+        is_turned = any(other.look not in named and other.kind in kinds for other in under)
+        if vertex in placed:
+            counted["placed"] += 1
+        elif block.kind not in kinds:
+            counted["not named"] += 1
+        elif block.look not in named:
+            counted["wrong_orientation"] += 1
+        elif is_absent or is_turned:
+            cause = "both" if is_absent and is_turned else "turned" if is_turned else "not_named"
+            counted[f"support_{cause}"] += 1
+        else:
+            counted["order"] += 1
+    found = Counter(outcomes(case, "A"))
+    found["not named"] = found.pop("left_out") + found.pop("wrong_kind")
+    assert +found == counted
+
+
+@each_setting
+@given(case=cases(max_blocks=8), seed=st.integers(0, 2**32 - 1))
+def test_a_valid_order_places_all_and_an_empty_plan_leaves_all_out(
+    setting: Setting, case: Case, seed: int
+) -> None:
+    scene = case.scene
+    looks = {
+        block.look: Candidate(block.type, block.color, block.euler_deg) for block in scene.blocks
+    }
+    candidates = CandidateSet(tuple(looks.values()))
+    order = scene.graph.random_order(np.random.default_rng(seed))
+    steps = tuple(list(looks).index(scene.blocks[v].look) + 1 for v in order)
+    right = Case(scene, candidates, Plan(steps))
+    assert +Counter(outcomes(right, setting)) == {"placed": len(scene)}
+    assert kept(right, setting) == len(scene)
+    empty = replace(right, plan=Plan())
+    assert +Counter(outcomes(empty, setting)) == {"left_out": len(scene)}
+    assert kept(empty, setting) == 0
+
+
+@each_setting
+@given(case=cases(max_blocks=7, max_steps=10), data=st.data())
+def test_file_order_and_numbering_change_neither(
+    setting: Setting, case: Case, data: st.DataObject
+) -> None:
+    blocks = tuple(data.draw(st.permutations(case.scene.blocks)))
+    order = data.draw(st.permutations(range(len(case.candidates))))
+    renumbered = CandidateSet(tuple(case.candidates.candidates[i] for i in order))
+    steps = tuple(order.index(index - 1) + 1 for index in case.plan.steps)
+    shuffled = Case(replace(case.scene, blocks=blocks), renumbered, Plan(steps))
+    assert outcomes(shuffled, setting) == outcomes(case, setting)
+    assert kept(shuffled, setting) == kept(case, setting)
+
+
+def common(plan: tuple[int, ...], case: Case, order: tuple[int, ...], setting: Setting) -> int:
+    """Length of the longest common subsequence of a plan and an order of blocks."""
+    row = [0] * (len(order) + 1)
+    for step in plan:
+        before, row = row, [0]
+        for n, vertex in enumerate(order):
+            fits = equal(case.scene.blocks[vertex], case.candidates[step], setting)
+            row.append(max(before[n] + 1 if fits else 0, before[n + 1], row[n]))
+    return row[-1]
+
+
+@each_setting
+@given(case=cases(max_blocks=5, max_steps=7))
+def test_steps_kept_are_those_common_with_the_nearest_of_all_valid_orders(
+    setting: Setting, case: Case
+) -> None:
+    graph = case.scene.graph
+    orders = filter(graph.is_valid, permutations(range(len(graph))))
+    most = max(common(case.plan.steps, case, order, setting) for order in orders)
+    assert kept(case, setting) == most
+    placed = match_plan(Goal(case.scene, case.candidates, setting), case.plan, "optimal").counts.tp
+    goal = Goal(case.scene, case.candidates, setting)
+    assert placed <= most == steps_kept(goal, case.plan, placed)
+    assert most <= level1_counts(goal, case.plan, "selection").tp
+
+
+def test_a_step_that_is_no_candidate_is_refused() -> None:
+    scene = Scene("s", (3,), (Block(1, "arch", "red", FLAT, FLAT, (), 1),), ("s",))
+    goal = Goal(scene, CandidateSet((Candidate("arch", "red", FLAT),)), "A")
+    with pytest.raises(KeyError):
+        block_outcomes(goal, Plan((2,)), [0])
+    with pytest.raises(KeyError):
+        steps_kept(goal, Plan((2,)))
