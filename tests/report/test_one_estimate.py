@@ -36,6 +36,8 @@ from tests.report.factory import LEVELS, laws, manifest, record, record_lists, r
 
 METRICS = {"Prec": "precision", "Rec": "recall", "F1": "f1"}
 CRITERIA = {"1": "selection"}
+WAYS = (("A", "optimal", "aov"), ("A", "", "selection"), ("", "", ""))
+"""Headline ways, but those of episodes, which are named where they are meant."""
 Key = tuple[str, ...]
 Shown = tuple[str, Key, float | str]
 """Where a number is shown, what it is (as `Estimates` finds it), and what is shown [%]."""
@@ -52,13 +54,12 @@ class Estimates:
 
     def of(self, key: Key, end: str = "value") -> float:
         model, measure, cell, *way = key
-        row = self.rows.get((model, measure, cell, *(way or plan_way(measure, cell))))
-        return math.nan if row is None else 100 * row[end]
+        rows = [self.rows.get((model, measure, cell, *one)) for one in ([way] if way else WAYS)]
+        known = [row for row in rows if row is not None]
+        return 100 * known[0][end] if known else math.nan
 
 
-def plan_way(measure: str, cell: str) -> tuple[str, str, str]:
-    if measure not in METRICS.values():
-        return "", "", ""
+def plan_way(cell: str) -> tuple[str, str, str]:
     criterion = CRITERIA.get(cell, "aov")
     return "A", "optimal" if criterion == "aov" else "", criterion
 
@@ -103,7 +104,7 @@ def of_plans(run: Run) -> Iterator[Shown]:
         for metric in METRICS.values():
             yield "assembly", (row["model"], metric, row["level"], *way), 100 * row[metric]
     for row in settings_frame(run).to_dict("records"):
-        _, matcher, criterion = plan_way("f1", row["level"])
+        _, matcher, criterion = plan_way(row["level"])
         for setting in "AB":
             key = (row["model"], "f1", row["level"], setting, matcher, criterion)
             yield "settings", key, 100 * row[f"f1_{setting.lower()}"]
@@ -143,7 +144,8 @@ def of_headlines(run: Run) -> Iterator[Shown]:
         way = (row["setting"], row["matcher"], row["criterion"])
         yield "floors", (row["model"], row["measure"], row["cell"], *way), 100 * row["value"]
     for row in measures_frame(run).to_dict("records"):
-        yield "measures", (row["model"], row["measure"], row["cell"]), row["value"]
+        value = row["value"] if row["unit"] == "%" else 100 * row["value"]
+        yield "measures", (row["model"], row["measure"], row["cell"]), value
 
 
 @settings(laws, max_examples=4)
@@ -299,7 +301,7 @@ def of_dots(run: Run, figure: matplotlib.figure.Figure) -> Iterator[Shown]:
     for ax, level in zip(figure.axes, run.design.levels, strict=True):
         for setting, line in zip("AB", ax.lines, strict=True):
             for name, value in zip(names, line.get_xdata(), strict=True):
-                way = (setting, *plan_way("f1", level)[1:])
+                way = (setting, *plan_way(level)[1:])
                 yield "settings figure", (name, "f1", level, *way), float(value)
 
 
