@@ -50,7 +50,7 @@ ENGINES: Mapping[str, KnownEngine] = {
     REFERENCE_ENGINE: KnownEngine(
         "phyblock.sim.bullet.physics:BulletEngine",
         "pybullet",
-        "PyBullet has wheels for Python 3.10 and 3.11",
+        "PyBullet has wheels for Python 3.10 and 3.11 on Linux, x86-64",
     ),
     "mujoco": KnownEngine(
         "phyblock.sim.mujoco.physics:MujocoEngine",
