@@ -5,9 +5,11 @@
 Both engines must be installed (Python 3.11, `pip install -e '.[mujoco]'`). Every 20th scene and
 question is tried, or with `--all` each of them. A scene is let go as it is, after every step of
 random valid orders, and without each of its blocks, as strict step planning lets it go: a verdict
-is whether all blocks stand, and of what falls, both engines may name the same blocks or not, as
-who is dragged along is a matter of millimeters. A question's answer is derived again from its
-scene, as `phyblock vqa verify` does: it is found again, or it is not.
+is whether all blocks stand. A question's answer is derived again from its scene, as `phyblock vqa
+verify` does, which wants four settings of the engine to agree: it is found again, it is not sure
+in this engine, or another answer is. `same` counts equal verdicts, `opposite` those of which one
+says no where the other says yes (a question that is not sure says neither), `detail` those that
+are equal to the last block that falls.
 """
 
 from __future__ import annotations
@@ -29,24 +31,29 @@ from phyblock_making.questions.rederiving import problem_of
 
 DYNAMIC = "dynamic_reasoning"
 """The category of questions whose answers physics decides."""
-WIDTHS = (34, 7, 12, 12, 8, 8)
+HEADINGS = ("stands, or answer found again", "tried", "same", "opposite", "detail")
+WIDTHS = (31, 7, 10, 10, 8, 10, 8)
 
 
 @dataclass
 class Agreement:
-    """How many were tried, in how many each engine says yes, and in how many they say the same."""
+    """How many were tried, in how many each engine says yes, and how far they agree."""
 
     tried: int = 0
     yes: tuple[int, ...] = (0, 0)
     same: int = 0
-    same_blocks: int = 0
+    opposite: int = 0
+    detail: int = 0
 
-    def add(self, verdicts: Sequence[bool], is_same_in_detail: bool) -> None:
-        """Count one that was tried."""
+    def add(self, verdicts: Sequence[bool | None], is_same_in_detail: bool) -> bool:
+        """Count one that was tried; whether the engines agree on it."""
         self.tried += 1
-        self.yes = tuple(n + verdict for n, verdict in zip(self.yes, verdicts, strict=True))
-        self.same += len(set(verdicts)) == 1
-        self.same_blocks += is_same_in_detail
+        self.yes = tuple(n + bool(one) for n, one in zip(self.yes, verdicts, strict=True))
+        is_same = len(set(verdicts)) == 1
+        self.same += is_same
+        self.opposite += {True, False} <= set(verdicts)
+        self.detail += is_same_in_detail
+        return is_same
 
 
 def states(
@@ -63,6 +70,11 @@ def states(
     for taken in scene.blocks:
         blocks = tuple(block for block in scene.blocks if block is not taken)
         yield "scenes without a block", f"{scene.id} without {taken.order}", blocks
+
+
+def is_found(problem: str | None) -> bool | None:
+    """Whether the answer was found again; None where none was sure."""
+    return None if problem is not None and not problem.startswith("the answer is") else not problem
 
 
 def row(*cells: object) -> str:
@@ -101,8 +113,8 @@ def main() -> None:
                 fallen.append(settle(blocks).fallen)
                 seconds[engine] += time.process_time() - begun
             stands = [not one for one in fallen]
-            table.setdefault(what, Agreement()).add(stands, len(set(fallen)) == 1)
-            if args.list and len(set(stands)) > 1:
+            one = table.setdefault(what, Agreement())
+            if not one.add(stands, len(set(fallen)) == 1) and args.list:
                 print(f"{name}: {dict(zip(engines, fallen, strict=True))}")
     dynamic = [task.question for task in tasks if task.question.category == DYNAMIC]
     for question in dynamic[::every]:
@@ -110,20 +122,21 @@ def main() -> None:
         for engine in engines:
             os.environ[PHYSICS_VARIABLE] = engine
             problems.append(problem_of(question))
-        found = [problem is None for problem in problems]
-        what = f"questions, {question.subtask}"
-        table.setdefault(what, Agreement()).add(found, len(set(problems)) == 1)
-        if args.list and len(set(found)) > 1:
+        one = table.setdefault(f"questions, {question.subtask}", Agreement())
+        if not one.add([*map(is_found, problems)], len(set(problems)) == 1) and args.list:
             print(f"{question.id}: {dict(zip(engines, problems, strict=True))}")
 
     names = []
     for engine in engines:
         os.environ[PHYSICS_VARIABLE] = engine
         names.append(told_engine())
-    print(f"{names[0]} and {names[1]}; CPU s of scenes: {seconds}")
-    print(row("stands, or answer found again", "tried", *engines, "same", "blocks"))
+    took = ", ".join(
+        f"{name} {took_s:.0f}" for name, took_s in zip(names, seconds.values(), strict=True)
+    )
+    print(f"CPU seconds for the scenes: {took}")
+    print(row(*HEADINGS[:2], *engines, *HEADINGS[2:]))
     for what, one in table.items():
-        print(row(what, one.tried, *one.yes, one.same, one.same_blocks))
+        print(row(what, one.tried, *one.yes, one.same, one.opposite, one.detail))
 
 
 if __name__ == "__main__":
