@@ -222,7 +222,7 @@ def test_an_engine_that_is_not_installed_is_refused_with_where_to_get_it(
         physics_engine()
 
 
-@pytest.mark.parametrize("name", ENGINES)
+@pytest.mark.parametrize("name", installed_engines())
 def test_the_engine_that_is_there_is_used(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     library = ENGINES[name].library
     monkeypatch.setattr(

@@ -12,8 +12,11 @@ __all__ = ["load", "version"]
 
 @functools.cache
 def version() -> str:
-    """Version of the installed MuJoCo, without importing it."""
-    return importlib.metadata.version("mujoco-core")
+    """Version of the installed MuJoCo, without importing it; some builds are not in two parts."""
+    try:
+        return importlib.metadata.version("mujoco-core")
+    except importlib.metadata.PackageNotFoundError:
+        return importlib.metadata.version("mujoco")
 
 
 @functools.cache
