@@ -117,7 +117,7 @@ def _ray(jobs: int, address: str) -> Iterator[Workers]:
 def _answers(address: str) -> bool:
     """Whether something listens at HOST:PORT; Ray itself would wait for minutes."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
-    if not (host and port.isdigit()):
+    if not (host and port.isdecimal()):
         return False
     try:
         socket.create_connection((host, int(port)), _RAY_PATIENCE_S).close()

@@ -117,6 +117,9 @@ class Manifest(Line):
     floors: dict[str, dict[str, dict[str, float]]] = Field(default_factory=dict)
     """By track and baseline that never sees the goal, what it reaches on these scenes, in [0, 1]:
     by measure, cell, setting, matcher and criterion."""
+    engine: str | None = None
+    """The physics engine that blocks are let go in, with its version; null where nothing of the run
+    depends on one, and in runs from before there was a choice (PyBullet)."""
     versions: dict[str, str] = Field(default_factory=dict)
     """Of Python and of libraries."""
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import platform
 from collections.abc import Sequence
 from datetime import datetime, timezone
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from phyblock.datasets import Dataset
@@ -20,7 +21,8 @@ from phyblock.tracks import AnyTrack, kind_of
 
 __all__ = ["make_manifest"]
 
-_LIBRARIES = ("phyblock", "litellm", "pybullet", "numpy", "pillow", "jinja2")
+_LIBRARIES = ("phyblock", "litellm", "pybullet", "mujoco-core", "numpy", "pillow", "jinja2")
+"""Of the physics engines, one or both may be there."""
 
 
 def make_manifest(
@@ -71,7 +73,7 @@ def make_manifest(
         "versions": {
             "python": platform.python_version(),
             "readers": str(READER_VERSION),
-            **{n: version(n) for n in _LIBRARIES},
+            **_versions(),
         },
     }
     return Manifest.model_validate(fields)
@@ -92,6 +94,14 @@ def _identity(model: PlannedModel) -> dict[str, object]:
     for path in sorted((*folder.glob("*.json"), *folder.glob("records.jsonl"))):
         digest.update(f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
     return {**model.config.identity(), "recording": digest.hexdigest()}
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in _LIBRARIES:
+        with contextlib.suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
 
 
 def _of_tracks(loaded: LoadedSuite) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from phyblock.run.data import CHANGED
 from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.specs.yaml_source import YamlSource
 from phyblock.tracks import AnyTrack, kind_of
+from phyblock.tracks.base import ENGINE
 from phyblock.tracks.kind import Opening
 from phyblock.tracks.opening import open_tracks
 
@@ -28,7 +29,7 @@ def reopen_tracks(
     """The tracks of these names, known to ask what the run in `folder` asked.
 
     `dataset` is the run's. Raises DataError for other data of a track than those that the run was
-    made on, or another simulator.
+    made on.
     """
     path = folder / MANIFEST
     folders = {
@@ -44,10 +45,10 @@ def reopen_tracks(
 
 
 def _check_alike(name: str, track: AnyTrack, manifest: Manifest, root: Path) -> None:
-    """Raise DataError where a track asks something else, or in another simulator."""
+    """Raise DataError where a track asks something else; the engine decided what is recorded."""
     told = manifest.tracks.get(name, {})
     for key, value in track.identity().items():
         # Prompts and pictures are left out by a track that asks nobody.
-        if value is not None and value != told.get(key):
+        if key != ENGINE and value is not None and value != told.get(key):
             field, was = f"tracks.{name}.{key}", str(told.get(key))
             raise DataError(Problem(str(root), CHANGED, field, str(value), was))

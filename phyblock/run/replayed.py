@@ -25,14 +25,14 @@ async def counted_again(
     was, now = record.fields(), again.fields()
     changed = [name for name in was if name != "counts" and was[name] != now.get(name)]
     if changed:
-        message = "goes otherwise than it did, in another version or another simulator"
+        message = "goes otherwise than it did, in another version"
         raise StoreError(Problem(where, message, changed[0], record.sample))
     return record.model_copy(update={"counts": again.counts})
 
 
 async def _played(track: EpisodeTrack[Item], item: Item, record: Record) -> Episode:
     """The episode that the replies of a record make, to where it ends or they do."""
-    episode = track.start(item, record.seed, {}, with_messages=False)
+    episode = track.again(item, record)
     for turn in record.asked_turns:
         request = await episode.request()
         if request is None:

@@ -33,6 +33,8 @@ from phyblock.run.appending import AppendFile
 from phyblock.run.folder import LOCK, check_place, run_folder
 from phyblock.run.prompts import PromptFile
 from phyblock.run.standing import Standing
+from phyblock.sim.registry import PHYSICS_VARIABLE, REFERENCE_ENGINE
+from phyblock.tracks.base import ENGINE
 
 __all__ = ["RunStore", "holds_run"]
 
@@ -157,15 +159,32 @@ def holds_run(folder: Path, manifest: Manifest) -> bool:
         return False
     names = _changed(found, manifest)
     changed = f"different: {', '.join(names) or 'how pictures are drawn'}"
-    made, now = (one.dataset.version if one.dataset else 1 for one in (found, manifest))
-    hint = _HINT if made == now else f"its data are version {made}, these version {now}; {_HINT}"
+    hint = "; ".join((*_reasons(found, manifest), _HINT))
     raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=hint))
+
+
+def _reasons(found: Manifest, wanted: Manifest) -> Iterator[str]:
+    """What makes two runs of manifests that a user wrote in the same words."""
+    made, now = (one.dataset.version if one.dataset else 1 for one in (found, wanted))
+    if made != now:
+        yield f"its data are version {made}, these version {now}"
+    engines = [
+        {track: about.get(ENGINE) for track, about in one.tracks.items()} for one in (found, wanted)
+    ]
+    if engines[0] != engines[1] and engines[0].keys() == engines[1].keys():
+        was, is_now = (one.engine or REFERENCE_ENGINE for one in (found, wanted))
+        yield f"its blocks are let go in {was}, here in {is_now} ({PHYSICS_VARIABLE} chooses)"
 
 
 def _changed(found: Manifest, wanted: Manifest) -> list[str]:
     """Dotted names of the parts in which two manifests differ and that make them two runs."""
     old, new = dict(_parts(found)), dict(_parts(wanted))
-    names = [name for name in new if name not in _NOT_IDENTITY and old.get(name) != new[name]]
+    tracks = {name for name in old if name.partition(".")[0] in wanted.tracks}
+    names = [
+        name
+        for name in (*new, *sorted(tracks - new.keys()))
+        if name not in _NOT_IDENTITY and old.get(name) != new.get(name)
+    ]
     # Other scenes of the same data have other digests, too.
     chosen = {"suite.levels", "limit"} & set(names)
     return [name for name in names if not (chosen and name.endswith("sha256"))]

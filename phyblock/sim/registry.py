@@ -1,7 +1,8 @@
 """The names of all physics engines and renderers, and which of them are used.
 
 `PHYBLOCK_PHYSICS` and `PHYBLOCK_RENDERER` choose by name; processes that are started inherit the
-choice. Either may also be `module:factory`, for an implementation that is not part of phyblock.
+choice. Unless one is chosen, blocks are let go in PyBullet where it is installed, in MuJoCo
+elsewhere. Either may also be `module:factory`, for an implementation that is not part of phyblock.
 Nothing is imported before it is chosen.
 """
 
@@ -11,42 +12,89 @@ import functools
 import importlib
 import os
 from collections.abc import Mapping
+from importlib.util import find_spec
+from typing import NamedTuple
 
 from phyblock.errors import InputError, PhyblockError, Problem
 from phyblock.sim.engine import PhysicsEngine
 from phyblock.sim.renderer import Renderer
 
 __all__ = [
-    "DEFAULT_ENGINE",
     "ENGINES",
+    "PHYSICS_VARIABLE",
+    "REFERENCE_ENGINE",
     "RENDERERS",
+    "KnownEngine",
+    "installed_engines",
     "other_simulators",
     "physics_engine",
     "renderer",
+    "told_engine",
 ]
 
-DEFAULT_ENGINE = "pybullet"
+PHYSICS_VARIABLE = "PHYBLOCK_PHYSICS"
+REFERENCE_ENGINE = "pybullet"
+"""The engine that the built-in data were made with, and what is meant where none is named."""
 _DEFAULT_RENDERER = "raster"
 
-ENGINES: Mapping[str, str] = {"pybullet": "phyblock.sim.bullet.physics:BulletEngine"}
-"""Where the factory of each physics engine is."""
+
+class KnownEngine(NamedTuple):
+    """Where an engine's factory is, the module of its library, and where that can be had."""
+
+    path: str
+    library: str
+    hint: str
+
+
+ENGINES: Mapping[str, KnownEngine] = {
+    REFERENCE_ENGINE: KnownEngine(
+        "phyblock.sim.bullet.physics:BulletEngine",
+        "pybullet",
+        "PyBullet has wheels for Python 3.10 and 3.11 on Linux, x86-64",
+    ),
+    "mujoco": KnownEngine(
+        "phyblock.sim.mujoco.physics:MujocoEngine",
+        "mujoco",
+        "pip install 'phyblock[mujoco]', for Python 3.11 and newer",
+    ),
+}
+"""The physics engines, the one that is taken first where several are installed before others."""
 RENDERERS: Mapping[str, str] = {
     "raster": "phyblock.sim.raster.renderer:NumpyRenderer",
 }
 """Where the factory of each renderer is."""
 
 
-def physics_engine() -> PhysicsEngine:
-    """The engine that `PHYBLOCK_PHYSICS` names, or PyBullet; one object for a whole process.
+def installed_engines() -> tuple[str, ...]:
+    """Names of the engines whose libraries are installed, which are not imported."""
+    return tuple(name for name, engine in ENGINES.items() if find_spec(engine.library) is not None)
 
-    Raises InputError for a name that is not known.
+
+def physics_engine() -> PhysicsEngine:
+    """The engine that `PHYBLOCK_PHYSICS` names, or the first one that is installed; one object for
+    a whole process.
+
+    Raises InputError for a name that is not known, and where the engine is not installed.
     """
-    variable = "PHYBLOCK_PHYSICS"
-    word = os.environ.get(variable, DEFAULT_ENGINE)
-    made = _make(variable, word, ENGINES.get(word, word), ", ".join(ENGINES))
+    variable = PHYSICS_VARIABLE
+    usual = next(iter(installed_engines()), REFERENCE_ENGINE)
+    word = os.environ.get(variable, usual)
+    known = ENGINES.get(word)
+    if known is not None and find_spec(known.library) is None:
+        raise InputError(Problem(variable, "is not installed", found=word, hint=known.hint))
+    path = word if known is None else known.path
+    made = _make(variable, word, path, ", ".join(ENGINES))
     if not isinstance(made, PhysicsEngine):
         raise InputError(Problem(variable, "names no physics engine", found=word))
     return made
+
+
+def told_engine() -> str:
+    """The engine in use with the versions of its libraries, as records and manifests name it.
+
+    Raises as `physics_engine` does.
+    """
+    return _told(physics_engine())
 
 
 def renderer() -> Renderer:
@@ -69,14 +117,17 @@ def other_simulators() -> tuple[str, ...]:
     Raises as `physics_engine` and `renderer` do.
     """
     used = (
-        ("the physics engine", physics_engine(), DEFAULT_ENGINE),
+        ("the physics engine", physics_engine(), REFERENCE_ENGINE),
         ("the renderer", renderer(), _DEFAULT_RENDERER),
     )
-    return tuple(
-        f"{what} {one.name} ({', '.join(' '.join(pair) for pair in one.versions.items())})"
-        for what, one, usual in used
-        if one.name != usual
-    )
+    return tuple(f"{what} {_told(one)}" for what, one, usual in used if one.name != usual)
+
+
+def _told(simulator: PhysicsEngine | Renderer) -> str:
+    name, versions = simulator.name, simulator.versions
+    if list(versions) == [name]:
+        return f"{name} {versions[name]}"
+    return f"{name} ({', '.join(' '.join(pair) for pair in versions.items())})"
 
 
 @functools.cache

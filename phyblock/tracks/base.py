@@ -10,8 +10,10 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from phyblock.domain import Scene
 from phyblock.models.base import Reply, Request
+from phyblock.records import Record
 
 __all__ = [
+    "ENGINE",
     "AnyTrack",
     "Episode",
     "EpisodeTrack",
@@ -22,6 +24,12 @@ __all__ = [
     "Track",
     "shown_item",
 ]
+
+
+ENGINE = "physics"
+"""Key in a track's identity of the physics engine that decides its results, where there is one and
+it is not the engine of reference. What it decided stands in the records.
+"""
 
 
 class Item(Protocol):
@@ -141,6 +149,12 @@ class EpisodeTrack(Track[ItemT], Protocol[ItemT]):
         self, item: ItemT, seed: int, params: Mapping[str, object], *, with_messages: bool
     ) -> Episode:
         """An episode that has not begun."""
+
+    def again(self, item: ItemT, record: Record) -> Episode:
+        """The episode of a record before its first reply, to be judged anew.
+
+        What replies alone do not decide, as what fell, is taken from the record.
+        """
 
 
 AnyTrack = SingleTrack[Any] | EpisodeTrack[Any]

@@ -10,7 +10,7 @@ import pytest
 from phyblock.cli.main import phyblock as group
 
 VERBS = tuple(group.list_commands(None))  # type: ignore[arg-type]
-HEAVY = ("litellm", "pybullet", "pandas", "aiohttp", "matplotlib", "phyblock_making")
+HEAVY = ("litellm", "pybullet", "mujoco", "pandas", "aiohttp", "matplotlib", "phyblock_making")
 SCRIPT = """
 import atexit, sys
 sys.argv = ["phyblock", *sys.argv[1:]]

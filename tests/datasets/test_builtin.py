@@ -187,7 +187,7 @@ BROKEN_TEXTS: dict[str, tuple[bytes, str, str]] = {
     # name: bytes, what stands after the file name in `where`, words of the message
     "empty file": (b"", "", "holds no scenes"),
     "blank line": (b"\n", ":1:1", "not valid JSON"),
-    "not JSON": (b'{"id": "s1",}', ":1:13", "not valid JSON"),
+    "not JSON": (b'{"id": "s1" 7}', ":1:13", "not valid JSON"),
     "cut off": (b'{"id": "s1", "levels": [', ":1:25", "not valid JSON"),
     "two objects on a line": (b"{} {}", ":1:4", "not valid JSON"),
     "a list": (b"[]", ":1", "not an object"),

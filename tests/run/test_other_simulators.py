@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from pathlib import Path
 
 import pytest
 import yaml
 
+from phyblock.cli.main import phyblock
 from phyblock.datasets import read_builtin
+from phyblock.errors import SpecError
+from phyblock.report.compare import compare_runs
+from phyblock.run.rescore import rescore
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
 from phyblock.sim.question_pictures import question_png
+from phyblock.sim.registry import installed_engines, physics_engine, told_engine
 from phyblock.sim.site import state_picture
+from phyblock.tables.load import load_run
 from phyblock.tracks.step_planning.rules import StepRules
 from phyblock.tracks.step_planning.track import StepPlanning
 from phyblock.words import Physics
@@ -104,11 +111,42 @@ def test_steps_let_blocks_go_in_the_other_engine_and_go_on_with_it_alone(
     assert first["current"] == digest(question_png(empty, STYLE))
 
     before = workspace.files()
+    usual = physics_engine().name
     for variable in ("PHYBLOCK_RENDERER", "PHYBLOCK_PHYSICS"):
         rest = {name: value for name, value in OTHERS.items() if name != variable}
         done = run(workspace, "steps", *strict, env=rest)
         assert (done.code, "holds another run" in done.err) == (2, True), variable
+        told = f"its blocks are let go in still 1, here in {usual}"
+        assert (told in done.err) == (variable == "PHYBLOCK_PHYSICS")
     assert workspace.files() == before
+
+
+def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What fell is read from the records, whichever engine is here now."""
+    monkeypatch.chdir(workspace.root)
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+    workspace.write_scenes(unsteady_scene())
+    usual_name = told_engine()
+    suite = ("--models", "oracle", *SMALL, *DATA, "--set", "steps.physics=strict")
+    usual, still = workspace.root / "usual", workspace.root / "still"
+    endings = {}
+    for out, word in ((usual, None), (still, STILL_ENGINE)):
+        if word is not None:
+            monkeypatch.setenv("PHYBLOCK_PHYSICS", word)
+        phyblock.main(["run", "steps", "--out", str(out), *suite], standalone_mode=False)
+        manifest = yaml.safe_load((out / "run.yaml").read_bytes())
+        (record,) = map(json.loads, (out / "records.jsonl").read_text().splitlines())
+        assert record["engine"] == manifest["engine"]
+        endings[manifest["engine"]] = record["ending"]
+    assert endings == {usual_name: "collapsed", "still 1": "completed"}
+
+    scored = rescore(usual, None, None, None)
+    assert (scored / "records.jsonl").read_text() == (usual / "records.jsonl").read_text()
+    runs = [load_run(out, texts=False) for out in (usual, still)]
+    with pytest.raises(SpecError, match="in another physics engine"):
+        compare_runs(*runs, ())
 
 
 def test_an_unknown_engine_is_refused_before_anything_is_made(workspace: Workspace) -> None:
@@ -116,13 +154,18 @@ def test_an_unknown_engine_is_refused_before_anything_is_made(workspace: Workspa
     assert done.code == 2
     assert done.errors == [
         "error: PHYBLOCK_PHYSICS: is not known\n    found: bullet\n"
-        "    allowed: pybullet, or module:factory"
+        "    allowed: pybullet, mujoco, or module:factory"
     ]
     assert not workspace.out.exists()
 
 
 @pytest.mark.parametrize("physics", ["off", "settle", "strict"])
-def test_a_step_run_in_pybullet_is_told_as_it_always_was(physics: Physics) -> None:
+def test_a_step_run_in_pybullet_is_told_as_it_always_was(
+    physics: Physics, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """So that runs from before there was a choice of engines go on."""
+    if physics != "off" and "pybullet" not in installed_engines():
+        pytest.skip("PyBullet is not installed")
+    monkeypatch.setenv("PHYBLOCK_PHYSICS", "pybullet")
     track = StepPlanning(StepRules(physics=physics))
     assert track.identity() == {"prompt": None, "pictures": None}

@@ -34,19 +34,26 @@ def test_a_block_takes_along_what_stands_on_it() -> None:
 
 
 def test_what_ends_otherwise_in_another_setting_is_not_told() -> None:
-    """A cube pushed off another falls in each setting, and lies turned otherwise in each."""
-    stack = [cube(1, 0.0), cube(2, 0.0, layer=2)]
-    push = Push(2, (1.0, 0.0))
+    """The top of a tower falls in each setting, and comes to lie elsewhere in some."""
+    stack = [cube(order, 0.0, layer=order) for order in range(1, 5)]
+    push = Push(4, (1.0, 0.0))
     alone = [after(stack, push, settings=[setting]) for setting in OUTCOME_SETTINGS]
-    assert all(outcome.is_clear and outcome.moved == (2,) for outcome in alone)
-    assert all(outcome.settled[1].position_m[2] < 2 * HALF_M for outcome in alone)
+    assert all(outcome.is_clear and outcome.moved == (4,) for outcome in alone)
+    assert all(outcome.settled[3].position_m[2] < 2 * HALF_M for outcome in alone)
     assert not after(stack, push).is_clear
 
 
 def test_a_block_that_is_held_back_is_not_told() -> None:
-    """A wall in the way lets it go only a part of the distance."""
+    """A wall in the way lets it go only a part of the distance; a heavier one, in any engine."""
+    push, setting = Push(1, (1.0, 0.0)), OUTCOME_SETTINGS[3]
     row = [cube(order, 2 * HALF_M * order) for order in range(1, 4)]
-    wall = [cube(order, 2 * HALF_M * 4, layer=order - 3) for order in range(4, 12)]
-    setting = OUTCOME_SETTINGS[3]
-    assert after([*row, *wall], settings=[setting]).moved == ()
-    assert not after([*row, *wall], Push(1, (1.0, 0.0)), settings=[setting]).is_clear
+    clear = []
+    for height in (8, 12):
+        wall = [cube(order, 2 * HALF_M * 4, layer=order - 3) for order in range(4, 4 + height)]
+        assert after([*row, *wall], settings=[setting]).moved == ()
+        outcome = after([*row, *wall], push, settings=[setting])
+        clear.append(outcome.is_clear)
+        if outcome.is_clear:
+            gone_m = outcome.settled[0].position_m[0] - row[0].position_m[0]
+            assert gone_m == pytest.approx(push.distance_m, abs=0.005)
+    assert not clear[-1]

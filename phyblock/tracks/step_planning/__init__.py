@@ -1,6 +1,11 @@
 """Step planning: one operation at a time, with the assembly in view (paper section 4.1)."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from phyblock.resources import bundled
+from phyblock.sim.registry import told_engine
+from phyblock.specs import LoadedSuite
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.kind import TrackKind
 from phyblock.tracks.poses import POSE_COUNTS
@@ -11,6 +16,11 @@ from phyblock.tracks.step_planning.spec import StepsSpec
 from phyblock.tracks.step_planning.track import StepPlanning
 
 __all__ = ["TRACK"]
+
+
+def _manifest(loaded: LoadedSuite) -> Mapping[str, Any]:
+    is_off = loaded.suite.section(StepsSpec).physics == "off"
+    return {} if is_off else {"engine": told_engine()}
 
 
 def _report() -> TrackReport:
@@ -28,6 +38,7 @@ TRACK = TrackKind(
     report=_report,
     subject=StepSubject,
     baselines=STEP_RULES,
+    manifest=_manifest,
     plays=True,
     section=("steps", StepsSpec, "The rules of the step_planning track."),
     record=EpisodeRecord,

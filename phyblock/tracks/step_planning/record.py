@@ -59,6 +59,9 @@ class EpisodeRecord(Record):
     """The most steps that the episode can take."""
     setting: str = ""
     """The setting under which a move succeeds."""
+    engine: str | None = None
+    """The physics engine that blocks were let go in, with its version; null where none were, and
+    in records from before there was a choice (PyBullet)."""
     ending: Ending = "unanswered"
     """How it ended."""
     outcomes: tuple[StepOutcome, ...] = ()

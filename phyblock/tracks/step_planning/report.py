@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 from phyblock.errors import Problem, SpecError
+from phyblock.sim.registry import PHYSICS_VARIABLE, REFERENCE_ENGINE
 from phyblock.tables.load import Run
 from phyblock.tables.showing import planning_words
 from phyblock.tables.track_report import (
@@ -16,6 +17,7 @@ from phyblock.tables.track_report import (
     TableMaker,
     TrackReport,
 )
+from phyblock.tracks.base import ENGINE
 from phyblock.tracks.orders import order_frame, order_in_terminal, order_view
 from phyblock.tracks.step_planning.episode_views import (
     endings_in_terminal,
@@ -79,6 +81,12 @@ def _check_alike(run: Run, first: Run, _: Sequence[str]) -> None:
         hint = "phyblock score reads stored replies again under other rules"
         message = f"was not scored as {first.path} was, by {wanted}"
         raise SpecError(Problem(str(run.path), message, "settings", ", ".join(settings), hint=hint))
+    engine, other = (one.manifest.tracks.get(NAME, {}).get(ENGINE) for one in (run, first))
+    if engine != other:
+        found, wanted = (one.manifest.engine or REFERENCE_ENGINE for one in (run, first))
+        message = f"let blocks go in another physics engine than {first.path}"
+        hint = f"run one of them again with {PHYSICS_VARIABLE}"
+        raise SpecError(Problem(str(run.path), message, "engine", found, wanted, hint))
 
 
 REPORT = TrackReport(

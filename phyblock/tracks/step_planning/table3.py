@@ -30,6 +30,7 @@ from phyblock.tables.paper_numbers import (
     row_name,
 )
 from phyblock.tables.text_table import Column, TextTable, number
+from phyblock.tracks.base import ENGINE
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.step_planning.episodes import endings_frame
 from phyblock.tracks.step_planning.measures import COUNTED, NAME, is_asked
@@ -188,12 +189,18 @@ def table3_view(table: pd.DataFrame, run: Run) -> TextTable:
     )
 
 
+def _other_engine(run: Run) -> str:
+    """The engine, where it is not that of reference."""
+    is_other = ENGINE in run.manifest.tracks.get(NAME, {})
+    return f" in {run.manifest.engine}" if is_other and run.manifest.engine else ""
+
+
 def _notes(table: pd.DataFrame, run: Run) -> list[str]:
     steps = run.section("steps", StepsSpec)
     accepts = steps.setting or run.design.setting
     notes = [
         f"Scored in setting {run.design.setting}. The simulator goes by setting {accepts}, gating "
-        f"{steps.gating}, physics {steps.physics}; feedback {steps.feedback}, "
+        f"{steps.gating}, physics {steps.physics}{_other_engine(run)}; feedback {steps.feedback}, "
         f"history as {steps.history}. Micro averages.",
         "Completed: episodes that placed the whole goal. Attempts: all moves; those that placed "
         "nothing are wrong. Placed blocks: those in the world; one is wrong when the goal has no "

@@ -18,11 +18,13 @@ from typing import Any
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block
 from phyblock.models.base import Image, Message, Request
+from phyblock.records import Record
 from phyblock.scoring import Assembly
 from phyblock.sim.question_pictures import question_key, question_png
-from phyblock.sim.registry import DEFAULT_ENGINE, physics_engine
+from phyblock.sim.registry import REFERENCE_ENGINE, physics_engine, told_engine
 from phyblock.sim.site import ONE_SETTING, Settled, settle, state_picture
 from phyblock.sim.stability import DEFAULT_TRIAL
+from phyblock.tracks.base import ENGINE
 from phyblock.tracks.full_planning.guessing import BlindGuesses
 from phyblock.tracks.pictures import Pictures
 from phyblock.tracks.prompts import response_format
@@ -30,6 +32,7 @@ from phyblock.tracks.showing import Showing, TaskShowing, told_of
 from phyblock.tracks.step_planning.baselines import StepSubject
 from phyblock.tracks.step_planning.episode import Desk, StepEpisode
 from phyblock.tracks.step_planning.prompt import PastStep, StepPrompt
+from phyblock.tracks.step_planning.record import EpisodeRecord
 from phyblock.tracks.step_planning.rules import StepRules
 from phyblock.tracks.studio import Drawing
 
@@ -81,8 +84,12 @@ class StepPlanning:
         return self._showing.of(item, seed)
 
     def about(self, item: AssemblyTask) -> dict[str, Any]:
-        """The most steps that an episode of it can take, and how the scene is shown."""
-        return {"max_steps": self.rules.limits.max_steps(len(item.scene)), **told_of(item)}
+        """The most steps that an episode of it can take, the physics engine, where there is one,
+        and how the scene is shown.
+        """
+        engine = {} if self.rules.physics == "off" else {"engine": told_engine()}
+        most = self.rules.limits.max_steps(len(item.scene))
+        return {"max_steps": most, **engine, **told_of(item)}
 
     def identity(self) -> dict[str, Any]:
         """Name and version of the prompt, a digest of all that decides the pictures, and the
@@ -108,6 +115,20 @@ class StepPlanning:
             version = self._sight.prompt.template.version
             desk = replace(desk, write=partial(self._write, self._sight, item), version=version)
         return StepEpisode(item, seed, params, self.rules, desk)
+
+    def again(self, item: AssemblyTask, record: Record) -> StepEpisode:
+        """The episode of a record before its first reply; what falls is what fell then."""
+        fell = {
+            tuple(item.scene.blocks[vertex] for vertex in turn.world): turn.fallen
+            for turn in (record.steps if isinstance(record, EpisodeRecord) else ())
+            if turn.outcome == "placed"
+        }
+
+        async def settle_again(blocks: Sequence[Block]) -> Settled:
+            state = tuple(blocks)
+            return Settled(fell.get(state, ()), state)
+
+        return StepEpisode(item, record.seed, {}, self.rules, Desk(settle_again))
 
     def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
         """As many requests as an episode can have, made without rendering.
@@ -154,9 +175,9 @@ class StepPlanning:
     def _other_engine(self) -> dict[str, Any]:
         # Runs made before there was a choice name none, and are to go on with PyBullet.
         engine = None if self.rules.physics == "off" else physics_engine()
-        if engine is None or engine.name == DEFAULT_ENGINE:
+        if engine is None or engine.name == REFERENCE_ENGINE:
             return {}
-        return {"physics": {"engine": engine.name, **engine.versions}}
+        return {ENGINE: {"engine": engine.name, **engine.versions}}
 
     async def _write(
         self,

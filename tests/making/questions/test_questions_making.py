@@ -83,9 +83,10 @@ def test_what_depends_on_the_view_is_told_for_the_view(questions: list[Question]
     """Seen from the other side, in front is behind and left is right."""
     corners = [q for q in questions if q.wording.startswith("rp-corner")]
     turned = [_from_behind(question) for question in corners]
-    assert all("the answer is" in (problem_of(q) or "the answer is") for q in turned)
-    assert corners
-    assert not any(problem_of(question) is None for question in turned)
+    problems = [problem_of(question) for question in turned]
+    assert None not in problems
+    # Seen from behind, some can no longer be answered surely.
+    assert any("the answer is" in str(problem) for problem in problems)
 
 
 def _from_behind(question: Question) -> Question:

@@ -49,7 +49,7 @@ def test_a_card_names_other_simulators_and_says_nothing_of_the_usual_ones(
     usual = card("few", written, "make", "kit")
     assert "number of processes.\n" in usual
     monkeypatch.setenv("PHYBLOCK_PHYSICS", STILL_ENGINE)
-    by_still = ", by the physics engine still (still 1)"
+    by_still = ", by the physics engine still 1"
     assert card("few", written, "make", "kit") == usual.replace(
         "number of processes", f"number of processes{by_still}"
     )

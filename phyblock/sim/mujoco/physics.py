@@ -1,0 +1,264 @@
+"""MuJoCo as a physics engine, where PyBullet has no wheels.
+
+The measured conditions for block structures to stand as they do in PyBullet: four substeps in
+each time step; contacts stiff enough not to creep, but not so stiff that they burst where facets
+meet edge to edge; the elliptic cone of friction; collision pieces moved inward by a hair, so that
+blocks side by side do not touch. The center of mass and the inertia are those of the true solid.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.domain.blocks import SHAPES, BlockType, quat_xyzw_to_matrix
+from phyblock.errors import SimulationError
+from phyblock.sim.engine import FLOOR, Contact, Physics, Velocity
+from phyblock.sim.geometry import collision_pieces, solid_mesh
+from phyblock.sim.mujoco.library import load, version
+from phyblock.sim.pose import Pose
+
+__all__ = ["MujocoEngine", "MujocoSimulation"]
+
+_SUBSTEPS = 4
+_CONTACT_STEPS = 5.0
+"""Time constant of contacts in substeps; with 2, facets that meet edge to edge burst apart."""
+_FRICTION_STIFFNESS = 10.0
+"""How much stiffer friction is than what keeps blocks apart; with less of it blocks creep."""
+_INSET_M = 0.00002
+"""How far collision pieces are moved inward."""
+_KEPT = 256
+
+Floats = NDArray[np.float64]
+
+
+class MujocoEngine:
+    """Opens simulations, each with data of its own."""
+
+    name = "mujoco"
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """MuJoCo's."""
+        return {"mujoco": version()}
+
+    @contextlib.contextmanager
+    def open(self, physics: Physics) -> Iterator[MujocoSimulation]:
+        """Open a floor without blocks."""
+        yield MujocoSimulation(load(), physics)
+
+
+@dataclass
+class _Body:
+    """A block; `place` (7,) is its position [m] and quaternion w x y z.
+
+    `motion` (6,) is the velocity of its frame's origin in the world [m/s] and its spin in its own
+    frame [rad/s]. Both are views into the data of a simulation that is under way.
+    """
+
+    type: BlockType
+    place: Floats
+    motion: Floats
+
+    @property
+    def rotation(self) -> Floats:
+        """Body to world, shape (3, 3)."""
+        return quat_xyzw_to_matrix(np.roll(self.place[3:], -1))
+
+    @property
+    def center_m(self) -> Floats:
+        """From its frame's origin to its center of mass, in the world, shape (3,) [m]."""
+        center: Floats = self.rotation @ np.array(SHAPES[self.type].center_of_mass_m)
+        return center
+
+
+@dataclass(frozen=True, eq=False)
+class _Saved:
+    """A state of the data that it is of, and what touched then."""
+
+    data: Any
+    state: Floats
+    contacts: tuple[Contact, ...]
+
+
+class MujocoSimulation:
+    """Blocks on a plane, as `Simulation`.
+
+    A model in MuJoCo holds the blocks that it was made with, so that another is begun when a block
+    came or went; it takes over where blocks are and how they move.
+    """
+
+    def __init__(self, mujoco: ModuleType, physics: Physics) -> None:
+        self._mujoco = mujoco
+        self._physics = physics
+        self._bodies: dict[int, _Body] = {}
+        self._model: Any = None
+        self._data: Any = None
+        self._contacts: tuple[Contact, ...] | None = ()
+
+    def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
+        """Put a block at a pose, at rest."""
+        self._interrupt()
+        place = np.concatenate([pose.position_m, np.roll(pose.quat_xyzw, 1)])
+        self._bodies[number] = _Body(block_type, place, np.zeros(6))
+
+    def remove(self, number: int) -> None:
+        """Take a block out."""
+        self._interrupt()
+        del self._bodies[number]
+
+    def step(self, n: int) -> None:
+        """Simulate `n` time steps.
+
+        Raises SimulationError when MuJoCo gives up.
+        """
+        if n < 1:
+            return
+        self._begin()
+        self._mujoco.mj_step(self._model, self._data, _SUBSTEPS * n)
+        self._contacts = None
+        if any(warning.number for warning in self._data.warning):
+            raise SimulationError("MuJoCo found no way on: forces or contacts beyond all bounds")
+
+    def pose(self, number: int) -> Pose:
+        """Where a block is now."""
+        place = self._bodies[number].place
+        return Pose(place[:3].copy(), np.roll(place[3:], -1))
+
+    def velocity(self, number: int) -> Velocity:
+        """How a block moves now."""
+        body = self._bodies[number]
+        spin = body.rotation @ body.motion[3:]
+        linear = body.motion[:3] + np.cross(spin, body.center_m)
+        return Velocity(_vector(linear), _vector(spin))
+
+    def set_velocity(self, number: int, velocity: Velocity) -> None:
+        """Make a block move this way from now on."""
+        body, spin = self._bodies[number], np.array(velocity.angular_rad_s)
+        body.motion[:3] = velocity.linear_m_s - np.cross(spin, body.center_m)
+        body.motion[3:] = body.rotation.T @ spin
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """Where bodies touched in the last time step."""
+        if self._contacts is None:
+            self._contacts = tuple(sorted(self._found()))
+        return self._contacts
+
+    def save(self) -> object:
+        """Everything that decides what happens next."""
+        self._begin()
+        what = self._mujoco.mjtState.mjSTATE_INTEGRATION
+        state = np.empty(self._mujoco.mj_stateSize(self._model, what))
+        self._mujoco.mj_getState(self._model, self._data, state, what)
+        return _Saved(self._data, state, self.contacts())
+
+    def restore(self, saved: object) -> None:
+        """Bring back what was saved; SimulationError when other blocks are there now."""
+        if not isinstance(saved, _Saved) or saved.data is not self._data:
+            raise SimulationError("what was saved is of other blocks than are there now")
+        what = self._mujoco.mjtState.mjSTATE_INTEGRATION
+        self._mujoco.mj_setState(self._model, self._data, saved.state, what)
+        self._contacts = saved.contacts
+
+    def _interrupt(self) -> None:
+        """Let go of the data, as other blocks are to come or go."""
+        self._contacts = self.contacts()
+        for body in self._bodies.values():
+            body.place, body.motion = body.place.copy(), body.motion.copy()
+        self._model = self._data = None
+
+    def _begin(self) -> None:
+        """Make data with the blocks that are there, unless it is under way."""
+        if self._data is not None:
+            return
+        types = tuple(body.type for body in self._bodies.values())
+        self._model = _model(types, self._physics)
+        self._data = self._mujoco.MjData(self._model)
+        places, motions = self._data.qpos.reshape(-1, 7), self._data.qvel.reshape(-1, 6)
+        for place, motion, body in zip(places, motions, self._bodies.values(), strict=True):
+            place[:], motion[:] = body.place, body.motion
+            body.place, body.motion = place, motion
+
+    def _found(self) -> Iterator[Contact]:
+        """The contacts of the last substep."""
+        numbers = (FLOOR, *self._bodies)
+        bodies = self._model.geom_bodyid
+        for point in self._data.contact:
+            first, second = (numbers[bodies[geom]] for geom in point.geom)
+            normal = point.frame[:3]
+            if second < first:
+                first, second, normal = second, first, -normal
+            insets = 1 if first == FLOOR else 2
+            yield Contact(first, second, _vector(normal), float(point.dist) - insets * _INSET_M)
+
+
+def _vector(values: Floats) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+@functools.lru_cache(maxsize=_KEPT)
+def _model(types: tuple[BlockType, ...], physics: Physics) -> Any:
+    """A model of blocks of these types on a floor; where they are is no part of it."""
+    mujoco = load()
+    spec = mujoco.MjSpec()
+    option = spec.option
+    option.timestep = physics.time_step_s / _SUBSTEPS
+    option.gravity = physics.gravity_m_s2
+    option.iterations = physics.iterations
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio = _FRICTION_STIFFNESS
+    # MuJoCo would put everything back to where it began, and go on.
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    surface = {
+        "friction": [physics.friction, 0.0, 0.0],
+        "condim": 3,
+        "solref": [_CONTACT_STEPS * option.timestep, 1.0],
+    }
+    plane = mujoco.mjtGeom.mjGEOM_PLANE
+    spec.worldbody.add_geom(type=plane, size=[1.0, 1.0, 1.0], **surface)
+    for block_type in dict.fromkeys(types):
+        if _half_sides_m(block_type) is None:
+            for number, piece in enumerate(collision_pieces(block_type, _INSET_M)):
+                name = f"{block_type}{number}"
+                spec.add_mesh(name=name, uservert=piece.vertices_m.ravel())
+    for block_type in types:
+        mass_kg = physics.mass_kg(block_type)
+        body = spec.worldbody.add_body(
+            mass=mass_kg,
+            ipos=SHAPES[block_type].center_of_mass_m,
+            inertia=np.diag(solid_mesh(block_type).inertia_m2) * mass_kg,
+            explicitinertial=True,
+        )
+        body.add_freejoint()
+        for shape in _shapes(mujoco, block_type):
+            body.add_geom(**shape, **surface)
+    return spec.compile()
+
+
+def _shapes(mujoco: ModuleType, block_type: BlockType) -> Iterator[dict[str, Any]]:
+    """What a block collides with, as arguments of its geoms."""
+    half_m = _half_sides_m(block_type)
+    if half_m is not None:
+        box = mujoco.mjtGeom.mjGEOM_BOX
+        yield {"type": box, "size": [side - _INSET_M for side in half_m]}
+        return
+    for number in range(len(collision_pieces(block_type))):
+        yield {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": f"{block_type}{number}"}
+
+
+@functools.cache
+def _half_sides_m(block_type: BlockType) -> list[float] | None:
+    """Half the sides of a block that is a box about its origin [m]; None for another."""
+    corners = solid_mesh(block_type).vertices_m
+    half: list[float] = corners.max(axis=0).tolist()
+    box = set(product(*((-side, side) for side in half)))
+    return half if set(map(tuple, corners.tolist())) == box else None
