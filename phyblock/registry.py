@@ -90,6 +90,10 @@ class TrackWords(Protocol):
         """Where a suite names its prompt, as a path of keys."""
 
     @property
+    def varies(self) -> tuple[str, ...]:
+        """Factors of a suite's section `vary` that change what it asks."""
+
+    @property
     def record(self) -> type[Any] | None:
         """The model of its records; None for one that adds nothing to them."""
 

@@ -36,6 +36,7 @@ __all__ = [
     "SendMode",
     "Setting",
     "TransportName",
+    "View",
 ]
 
 Setting = Literal["A", "B"]
@@ -82,6 +83,9 @@ PictureLayout = Literal["composite", "separate"]
 CandidateOrder = Literal["file", "shuffled"]
 """In which order candidates are numbered and shown."""
 CandidateScale = Literal["common", "fit"]
+
+View = Literal["oblique", "front", "side", "top"]
+"""Where a scene is seen from: from a corner, along an axis, or from above."""
 
 Role = Literal["system", "user", "assistant"]
 """Who speaks in a chat message."""

@@ -26,7 +26,8 @@ def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> 
     items = [_counted(len(track.items), kind_of(track.name).item) for track in plan.tracks]
     caption = (
         f"{plan.suite.name}: {', '.join(items)} of {plan.dataset.name}, "
-        f"{_counted(len(plan.suite.seeds), 'seed')}, {_counted(len(plan.models), 'model')}"
+        f"{_counted(len(plan.suite.seeds), 'seed')}{_ways(plan)}, "
+        f"{_counted(len(plan.models), 'model')}"
     )
     cells = tuple(
         (
@@ -63,6 +64,12 @@ def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> 
             style="dim",
             soft_wrap=True,
         )
+
+
+def _ways(plan: RunPlan) -> str:
+    """How many ways of asking there are, where there are several."""
+    n = len(plan.variants)
+    return f", {n:,} ways of asking" if n > 1 else ""
 
 
 def _counted(number: int, word: str) -> str:

@@ -34,6 +34,7 @@ class Belonging:
     models: Collection[str]
     seeds: Collection[int]
     prompts: Mapping[str, str | None]
+    variants: Mapping[str, Mapping[str, Mapping[str, Any]]] = field(default_factory=dict)
     samples: Collection[str] | None = None
     _pictures: dict[tuple[str, str, int], tuple[str, ...]] = field(default_factory=dict)
 
@@ -47,6 +48,7 @@ class Belonging:
             [model.name for model in manifest.models],
             suite.get("seeds") or (),
             {track: _version(about) for track, about in manifest.tracks.items()},
+            manifest.variants,
             samples,
         )
 
@@ -74,7 +76,9 @@ class Belonging:
             ("seed", record.seed, self.seeds),
         ):
             yield name, value, _listed(known), not known or value in known
-        begin, end = f"{record.track}/{record.model}/", f"/s{record.seed}"
+        variant = record.way.key
+        begin = f"{record.track}/{record.model}/"
+        end = f"/s{record.seed}/{variant}" if variant else f"/s{record.seed}"
         named = f"{begin}{record.item}{end}"
         # An older record without a key may name a question, which only its id tells.
         is_alike = record.sample.startswith(begin) and record.sample.endswith(end)
@@ -82,7 +86,8 @@ class Belonging:
         yield "sample", record.sample, named, is_named
         yield self._sample(record.sample)
         if record.prompt is not None:
-            wanted = self.prompts.get(record.track)
+            told = self.variants.get(record.way.shown.key, {}).get(record.track)
+            wanted = self.prompts.get(record.track) if told is None else _version(told)
             found = record.prompt.version
             yield "prompt.version", found, str(wanted), wanted in (None, found)
         if not record.run:

@@ -104,6 +104,8 @@ class Manifest(Line):
     """The data set."""
     tracks: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """By track, digests of what decides its results: prompt, pictures, questions."""
+    variants: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)
+    """By way of asking, as records name it, and track, the same digests; empty: there is one."""
     limit: int | None = None
     """Items at most of each track."""
     questions: ManifestQuestions | None = None

@@ -13,6 +13,7 @@ from pydantic import Field
 
 from phyblock.records.line import Amount, Line, Whole
 from phyblock.records.reply import StoredError, StoredReply
+from phyblock.variants import Variant
 from phyblock.words import AskedAs, Outcome
 
 __all__ = [
@@ -103,7 +104,7 @@ class Record(Line):
     """A sample's stored outcome."""
 
     sample: str
-    """`track/model/key/s<seed>`, unique in the run."""
+    """`track/model/key/s<seed>`, and `/` with its `variant` where it has one; unique in the run."""
     track: str
     """The track that asked."""
     model: str
@@ -141,6 +142,8 @@ class Record(Line):
     asked: AskedAs | None = None
     """How an answer in JSON was asked for: in the `prompt` alone, or in the request's
     `response_format` too; null: a text was asked for, or nobody was asked."""
+    variant: dict[str, str] = Field(default_factory=dict)
+    """Factors in which the way of asking differs from the run's reference, with their levels."""
     counts: dict[str, tuple[Amount, ...]] = Field(default_factory=dict)
     """By name, what was counted for measures beside `scores`."""
 
@@ -183,6 +186,11 @@ class Record(Line):
     def asked_turns(self) -> tuple[AskedTurn, ...]:
         """The requests of an episode; none for what is asked once."""
         return ()
+
+    @property
+    def way(self) -> Variant:
+        """The way of asking."""
+        return Variant(tuple(self.variant.items()))
 
     @property
     def item(self) -> str:

@@ -21,7 +21,7 @@ from phyblock.tracks.kind import kind_of, kinds
 
 __all__ = ["Comparable", "Part", "comparable", "comparable_tracks"]
 
-_KEYS = ["scene", "item", "seed"]
+_KEYS = ["scene", "item", "seed", "variant"]
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Comparable:
         return tuple(cell.name for cell in self.cells if cell.name in members)
 
     def samples(self, run: Run, part: Part, design: Design) -> dict[str, pd.DataFrame]:
-        """Counts of a part by model, a row by scene, item and seed, with its pooled cell."""
+        """Counts of a part by model, by scene, item, seed and variant, with its pooled cell."""
         pooled = self.pooled(part)
         rows = counted_samples(replace(run, design=design), self.track, self.measure.counted)
         rows = headline_rows(rows[rows[CELL].isin(pooled)], design)
@@ -72,15 +72,16 @@ class Comparable:
 
         Behind the columns of each pooled cell stands how many samples it has.
         """
+        return np.stack([self.counts_of(pd.DataFrame(both[name]), part) for name in "ab"], axis=1)
+
+    def counts_of(self, samples: pd.DataFrame, part: Part) -> Floats:
+        """Counts of samples of one model, in the form of `counts` without its second axis."""
         columns = list(self.measure.counted.columns)
-        n_pooled = len(self.pooled(part))
-        counts = np.zeros((len(both), 2, n_pooled, len(columns) + 1))
-        rows = np.arange(len(both))
-        for side, name in enumerate("ab"):
-            pooled_cell = both[name, "pooled_cell"].to_numpy(np.intp)
-            counts[rows, side, pooled_cell, :-1] = both[name][columns].to_numpy(np.float64)
-            counts[rows, side, pooled_cell, -1] = 1
-        return counts.reshape(len(both), 2, -1)
+        counts = np.zeros((len(samples), len(self.pooled(part)), len(columns) + 1))
+        rows, pooled_cell = np.arange(len(samples)), samples["pooled_cell"].to_numpy(np.intp)
+        counts[rows, pooled_cell, :-1] = samples[columns].to_numpy(np.float64)
+        counts[rows, pooled_cell, -1] = 1
+        return counts.reshape(len(samples), -1)
 
     def n_counts(self, part: Part) -> int:
         """Length of the last axis of `counts`."""

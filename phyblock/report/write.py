@@ -16,6 +16,19 @@ from phyblock.report.measure_table import (
     measures_frame,
     measures_view,
 )
+from phyblock.report.sensitivity import (
+    components_frame,
+    levels_frame,
+    pairs_frame,
+    ranks_frame,
+)
+from phyblock.report.sensitivity_view import (
+    components_view,
+    in_terminal,
+    levels_view,
+    ranks_lines,
+    ranks_view,
+)
 from phyblock.run.folder import run_folder
 from phyblock.tables.cost import cost_frame, cost_view
 from phyblock.tables.coverage import coverage_frame, coverage_in_terminal, coverage_view
@@ -23,7 +36,7 @@ from phyblock.tables.csv_text import to_csv
 from phyblock.tables.latex import to_latex
 from phyblock.tables.load import Run, load_run
 from phyblock.tables.markdown import to_markdown
-from phyblock.tables.showing import marked
+from phyblock.tables.showing import marked, varied_words
 from phyblock.tables.text_table import TextTable
 from phyblock.tables.track_report import TableMaker
 from phyblock.tracks.estimates import all_estimates
@@ -92,6 +105,12 @@ _OF_ANY_TRACK = {
     _ESTIMATES: TableMaker(all_estimates),
     "measures": TableMaker(measures_frame, measures_view, _ESTIMATES),
     "floors": TableMaker(floors_frame, floors_view, _ESTIMATES, lines=floor_lines),
+    "sensitivity": TableMaker(
+        components_frame, components_view, _ESTIMATES, in_terminal=in_terminal
+    ),
+    "sensitivity_levels": TableMaker(levels_frame, levels_view, _ESTIMATES),
+    "sensitivity_ranks": TableMaker(ranks_frame, ranks_view, _ESTIMATES, lines=ranks_lines),
+    "sensitivity_pairs": TableMaker(pairs_frame, None, _ESTIMATES),
     "coverage": TableMaker(coverage_frame, coverage_view, in_terminal=coverage_in_terminal),
     "cost": TableMaker(cost_frame, cost_view, "coverage"),
 }
@@ -104,7 +123,7 @@ def table_makers(run: Run) -> dict[str, TableMaker]:
     for track in run.design.suite.tracks:
         report = kind_of(track).report()
         own = report.tables or {track: _headline_maker(track)}
-        words = report.showing(run)
+        words = (*report.showing(run), *varied_words(run))
         makers |= {name: replace(one, view=_marked(one, words)) for name, one in own.items()}
     return makers | _OF_ANY_TRACK
 

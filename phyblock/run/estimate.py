@@ -28,6 +28,7 @@ from phyblock.run.plan import RunPlan
 from phyblock.run.samples import Sample
 from phyblock.run.store import holds_run
 from phyblock.tracks import AnyTrack, Item, shown_item
+from phyblock.variants import Variant
 
 __all__ = ["Estimate", "estimate"]
 
@@ -79,13 +80,26 @@ def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
             Estimate(m.name, m.config.kind, plan.samples_per_model, price_of(m.config))
             for m in plan.models
         ]
-        for track in plan.tracks:
-            for item in track.items:
-                for seeds, outlines in _outlines(track, item, plan.suite.seeds):
-                    for model, row in zip(plan.models, rows, strict=True):
-                        samples = [Sample(track, model.name, item, seed) for seed in seeds]
-                        _add(row, model, samples, outlines, settled, cache)
+        for tracks, variants in _alike(plan):
+            for track in tracks:
+                for item in track.items:
+                    for seeds, outlines in _outlines(track, item, plan.suite.seeds):
+                        for model, row in zip(plan.models, rows, strict=True):
+                            samples = [
+                                Sample(track, model.name, item, seed, variant)
+                                for seed in seeds
+                                for variant in variants
+                            ]
+                            _add(row, model, samples, outlines, settled, cache)
     return rows
+
+
+def _alike(plan: RunPlan) -> Iterator[tuple[Sequence[AnyTrack], Sequence[Variant]]]:
+    """The ways of asking that send the same, with their tracks."""
+    shown: dict[Variant, list[Variant]] = {}
+    for variant in plan.variants:
+        shown.setdefault(variant.shown, []).append(variant)
+    yield from ((plan.variants[first], alike) for first, alike in shown.items())
 
 
 def _outlines(
@@ -128,8 +142,8 @@ def _add(
             row.done += 1
             continue
         for request, is_real, tokens in expected:
-            seeded = replace(request, seed=sample.seed)
-            if is_real and cache is not None and _is_kept(cache, config, seeded):
+            sent = sample.asking(replace(request, seed=sample.seed))
+            if is_real and cache is not None and _is_kept(cache, config, sent):
                 row.cached += 1
             else:
                 row.calls += 1

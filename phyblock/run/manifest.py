@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import json
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -18,6 +18,7 @@ from phyblock.records import FORMAT, Manifest
 from phyblock.run.models import PlannedModel
 from phyblock.specs import LoadedSuite
 from phyblock.tracks import AnyTrack, kind_of
+from phyblock.variants import Variant
 
 __all__ = ["make_manifest"]
 
@@ -29,13 +30,14 @@ def make_manifest(
     loaded: LoadedSuite,
     models: Sequence[PlannedModel],
     dataset: Dataset,
-    tracks: Sequence[AnyTrack],
+    variants: Mapping[Variant, Sequence[AnyTrack]],
     limit: int | None,
 ) -> Manifest:
     """The manifest; `identity` digests what decides the results, so that only the same run goes
     on in a folder. Limits, prices, labels, tables, paths, and where and in which order models are
-    named and served are no part of it.
+    named and served are no part of it. `variants` has the tracks of every way of asking.
     """
+    tracks = variants[Variant()]
     suite, data_version = loaded.suite, read_version(dataset.root)
     inputs: dict[str, Any] = {
         "format": FORMAT,
@@ -45,6 +47,12 @@ def make_manifest(
         "tracks": {track.name: track.identity() for track in tracks},
         "limit": limit,
     }
+    if suite.vary.factors:
+        inputs["variants"] = {
+            variant.key: {track.name: track.identity() for track in of_variant}
+            for variant, of_variant in variants.items()
+            if variant == variant.shown
+        }
     by_name = sorted(inputs["models"], key=lambda model: str(model["name"]))
     decided = {**inputs, "models": by_name, "readers": READER_VERSION}
     canonical = json.dumps(decided, sort_keys=True, separators=(",", ":"))

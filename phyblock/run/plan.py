@@ -16,7 +16,7 @@ from phyblock.run.samples import Sample
 from phyblock.specs import LoadedSuite, ModelSpec, SuiteSpec
 from phyblock.tracks import AnyTrack, EpisodeTrack, Opening, kind_of, open_tracks
 from phyblock.tracks.selection import select_tasks
-from phyblock.words import AnswerFormat, CandidateOrder
+from phyblock.variants import Variant
 
 __all__ = ["RunPlan", "make_plan"]
 
@@ -24,15 +24,21 @@ __all__ = ["RunPlan", "make_plan"]
 @dataclass(frozen=True)
 class RunPlan:
     """Everything a run needs; `manifest` is what `run.yaml` holds, but for what floors reach;
+    `tracks` are those of the reference, `variants` all ways of asking with the tracks of each;
     `reopened` opens a track under a suite, without prompts.
     """
 
     suite: SuiteSpec
     models: tuple[PlannedModel, ...]
     dataset: Dataset
-    tracks: tuple[AnyTrack, ...]
+    variants: Mapping[Variant, tuple[AnyTrack, ...]]
     manifest: Manifest
     reopened: Callable[[str, SuiteSpec], AnyTrack]
+
+    @property
+    def tracks(self) -> tuple[AnyTrack, ...]:
+        """The tracks as the reference asks."""
+        return next(iter(self.variants.values()))
 
     def begun(self) -> Manifest:
         """The manifest of a run that begins, with what floors reach; it takes some seconds."""
@@ -44,8 +50,9 @@ class RunPlan:
 
     @property
     def samples_per_model(self) -> int:
-        """Number of items of all tracks times number of seeds."""
-        return sum(len(track.items) for track in self.tracks) * len(self.suite.seeds)
+        """Number of items of all tracks times seeds times ways of asking."""
+        repeats = len(self.suite.seeds) * len(self.variants)
+        return sum(len(track.items) for track in self.tracks) * repeats
 
     @property
     def has_episodes(self) -> bool:
@@ -62,11 +69,20 @@ class RunPlan:
         return frozenset(sample.id for m in self.models for sample in self.samples(m.name))
 
     def samples(self, model: str) -> Iterator[Sample]:
-        """All samples of a model: seed by seed, in each the tracks in the suite's order."""
+        """All samples of a model: seed by seed, in each the ways of asking, in each of these the
+        tracks in the suite's order.
+        """
         for seed in self.suite.seeds:
-            for track in self.tracks:
-                for item in track.items:
-                    yield Sample(track, model, item, seed)
+            for variant, tracks in self.variants.items():
+                for track in tracks:
+                    for item in track.items:
+                        yield Sample(track, model, item, seed, variant)
+
+    def close(self) -> None:
+        """Release what tracks hold."""
+        for tracks in self.variants.values():
+            for track in tracks:
+                track.close()
 
 
 def make_plan(
@@ -78,29 +94,44 @@ def make_plan(
 ) -> RunPlan:
     """Resolve a suite against the known models.
 
-    `only` names models to run in place of the suite's; `limit` keeps that many items of each
-    track: scenes spread over levels, questions over subtasks. Raises SpecError, DataError or
-    PromptError with all that is wrong.
+    `only` names models to run in place of the suite's; `limit`, else that of the suite, keeps
+    that many items of each track: scenes spread over levels, questions over subtasks. Raises
+    SpecError, DataError or PromptError with all that is wrong.
     """
     suite = loaded.suite
+    limit = suite.limit if limit is None else limit
     dataset = open_dataset(suite.dataset.format, loaded.dataset_path)
     models = plan_models(loaded, known, only)
     asks = any(model.config.kind != "replay" for model in models)
-    tracks = open_tracks(Opening(loaded, dataset, limit, asks), suite.tracks)
-    _check_models(models, tracks, suite.candidates.order, suite.answer_format)
+    variants = _variants(Opening(loaded, dataset, limit, asks))
+    tracks = variants[Variant()]
+    _check_models(models, tracks, suite)
     tasks = select_tasks(dataset.tasks, suite.levels, limit)
     selected = replace(dataset, tasks=tasks)
     if not any(track.items for track in tracks):
         raise SpecError(_nothing(loaded, dataset, limit))
     if asks:
-        _check_prompts(tracks)
-    manifest = make_manifest(loaded, models, selected, tracks, limit)
+        for of_variant in variants.values():
+            _check_prompts(of_variant)
+    manifest = make_manifest(loaded, models, selected, variants, limit)
 
     def reopened(name: str, one: SuiteSpec) -> AnyTrack:
         opening = Opening(replace(loaded, suite=one), dataset, limit, with_prompts=False)
         return kind_of(name).open(opening)
 
-    return RunPlan(suite, models, selected, tracks, manifest, reopened)
+    return RunPlan(suite, models, selected, variants, manifest, reopened)
+
+
+def _variants(opening: Opening) -> dict[Variant, tuple[AnyTrack, ...]]:
+    """All ways of asking, each with its tracks; repeats share them."""
+    names = opening.loaded.suite.tracks
+    opened: dict[Variant, tuple[AnyTrack, ...]] = {}
+    for variant in opening.loaded.suite.vary.variants:
+        if variant.shown not in opened:
+            loaded = opening.loaded.at(variant)
+            opened[variant.shown] = open_tracks(replace(opening, loaded=loaded), names)
+        opened[variant] = opened[variant.shown]
+    return opened
 
 
 def _check_prompts(tracks: Sequence[AnyTrack]) -> None:
@@ -118,16 +149,19 @@ def _nothing(loaded: LoadedSuite, dataset: Dataset, limit: int | None) -> Proble
 
 
 def _check_models(
-    models: Sequence[PlannedModel],
-    tracks: Sequence[AnyTrack],
-    order: CandidateOrder,
-    asked: AnswerFormat,
+    models: Sequence[PlannedModel], tracks: Sequence[AnyTrack], suite: SuiteSpec
 ) -> None:
     """Every model can answer what every track asks, means the numbers that are shown, and is not
     taken for another; a recording was asked in the form in which it is read.
     """
     problems = _alike(models)
+    order, asked = suite.candidates.order, suite.answer_format
     for model in models:
+        if model.config.kind == "replay" and suite.vary.factors:
+            message = "is a recording, which was asked in one way"
+            found = ", ".join(suite.vary.factors)
+            problems.append(Problem(f"model {model.name}", message, "vary", found))
+            continue
         for track in tracks:
             where = f"model {model.name}"
             if model.config.kind == "replay" and isinstance(track, EpisodeTrack):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import yaml
@@ -23,6 +23,7 @@ from phyblock.run.replayed import counted_again
 from phyblock.specs import SuiteSpec, suite_model
 from phyblock.tracks import AnyTrack, EpisodeTrack, kind_of, shown_item
 from phyblock.tracks.counting import counts_samples
+from phyblock.variants import Variant
 from phyblock.words import Matcher, PlanParser
 
 __all__ = ["rescore"]
@@ -59,7 +60,10 @@ def rescore(
     def reopened(name: str, one: SuiteSpec) -> AnyTrack:
         return reopen_tracks(folder, manifest, one, [name], dataset)[name]
 
-    tracks = reopen_tracks(folder, manifest, suite, names, dataset)
+    tracks = {
+        variant.key: reopen_tracks(folder, manifest, suite.at(variant), names, dataset)
+        for variant in dict.fromkeys(variant.shown for variant in suite.vary.variants)
+    }
     records = asyncio.run(_judged_again(folder, manifest, tracks))
     told = {"identity": identity, "suite": suite.model_dump(mode="json")}
     scored = manifest.model_copy(update=told)
@@ -72,14 +76,15 @@ def rescore(
 
 
 async def _judged_again(
-    folder: Path, manifest: Manifest, tracks: Mapping[str, AnyTrack]
+    folder: Path, manifest: Manifest, variants: Mapping[str, Mapping[str, AnyTrack]]
 ) -> list[Record]:
-    """The records of a run, those of `tracks` judged anew."""
+    """The records of a run, those of the tracks of `variants` judged anew."""
     where = str(folder / RECORDS)
+    tracks = variants[""]
     items = {(name, item.key): item for name, track in tracks.items() for item in track.items}
     records: list[Record] = []
     for record in read_records(folder, manifest):
-        track = tracks.get(record.track)
+        track = variants[_variant(record, variants, where).shown.key].get(record.track)
         if track is None:
             records.append(record)
             continue
@@ -94,6 +99,15 @@ async def _judged_again(
         judgement = track.judge(item, None if record.reply is None else record.reply.text)
         records.append(judged(record.as_given(), item, judgement))
     return records
+
+
+def _variant(record: Record, known: Collection[str], where: str) -> Variant:
+    """The way of asking of a record; StoreError for one that the run has not."""
+    variant = record.way
+    if variant.shown.key not in known:
+        message, hint = "was asked in no way of the run", "restore the file from a copy"
+        raise StoreError(Problem(where, message, "variant", variant.key, hint=hint))
+    return variant
 
 
 def _check_target(target: Path, identity: str) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Awaitable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
@@ -14,26 +15,39 @@ from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, begun, judged
 from phyblock.run.writer import RecordWriter
 from phyblock.tracks import AnyTrack, Episode, EpisodeTrack, Item, SingleTrack, shown_item
+from phyblock.variants import Variant
 from phyblock.words import AskedAs
 
 __all__ = ["Sample", "SampleRunner"]
 
 _N = TypeVar("_N", int, float)
+_SEEDS = 2**31
+"""Providers take no larger ones."""
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One item of a track, asked of one model with one seed."""
+    """One item of a track, asked of one model with one seed; `track` asks as the variant does."""
 
     track: AnyTrack
     model: str
     item: Item
     seed: int
+    variant: Variant = field(default_factory=Variant)
 
     @property
     def id(self) -> str:
         """Its name inside the run."""
-        return f"{self.track.name}/{self.model}/{self.item.key}/s{self.seed}"
+        whole = f"{self.track.name}/{self.model}/{self.item.key}/s{self.seed}"
+        return f"{whole}/{self.variant.key}" if self.variant.key else whole
+
+    def asking(self, request: Request) -> Request:
+        """The request as it is sent: a repeat has another seed, and so is asked anew."""
+        repeat = self.variant.repeat
+        if repeat == 1:
+            return request
+        digest = hashlib.sha256(f"repeat|{request.seed}|{repeat}".encode()).digest()
+        return replace(request, seed=int.from_bytes(digest[:8], "big") % _SEEDS)
 
     def shown(self) -> Sample:
         """The sample with its item as its seed shows it."""
@@ -83,7 +97,7 @@ class SampleRunner:
             request = await track.request(
                 sample.item, sample.seed, config.params, with_messages=model.needs_messages
             )
-        request = replace(request, track=track.name)
+        request = sample.asking(replace(request, track=track.name))
         answer = await _answer(model.ask(request))
         fields = self._begin(sample, answer) | _asked(config, request)
         fields["prompt"] = self._prompt(track, request)
@@ -105,7 +119,8 @@ class SampleRunner:
         turns: list[dict[str, Any]] = []
         replies: list[Reply] = []
         answer: Reply | ModelError | None = None
-        while (request := await self._next(episode)) is not None:
+        while (wanted := await self._next(episode)) is not None:
+            request = sample.asking(wanted)
             asked = _asked(config, request)
             turn = {"prompt": self._prompt(track, request)}
             if len(replies) < len(earlier):
@@ -153,6 +168,8 @@ class SampleRunner:
     def _begin(self, sample: Sample, answer: Reply | ModelError | None) -> dict[str, Any]:
         name, item = sample.track.name, sample.item
         fields = begun(sample.id, name, sample.model, item, sample.seed, answer)
+        if sample.variant.levels:
+            fields["variant"] = dict(sample.variant.levels)
         return {**fields, "run": self._run, **sample.track.about(item)}
 
 

@@ -151,8 +151,7 @@ class Session:
     async def _close(self) -> None:
         for model in self._models.values():
             await model.aclose()
-        for track in self._plan.tracks:
-            track.close()
+        self._plan.close()
         if self._cache is not None:
             await self._cache.aclose()
         if self._store is not None:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.sim.exact import dot, rounded, turned
+from phyblock.words import View
 
 __all__ = ["FIELD_OF_VIEW_DEG", "FULL_WINDOW", "VIEWS", "Camera", "Window", "frame", "view_axes"]
 
@@ -31,7 +32,7 @@ _NEARER = 0.9
 _LEAST_DEPTH_M = 0.05
 """What is drawn and not framed is not nearer to the camera than this."""
 
-VIEWS: dict[str, tuple[float, float]] = {
+VIEWS: dict[View, tuple[float, float]] = {
     "oblique": (45.0, 22.0),
     "front": (0.0, 18.0),
     "side": (90.0, 18.0),

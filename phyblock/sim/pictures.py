@@ -30,7 +30,7 @@ from phyblock.sim.library_pixels import library_pixels
 from phyblock.sim.registry import renderer
 from phyblock.sim.render import DrawnBlock, picture
 from phyblock.sim.renderer import Renderer
-from phyblock.words import BACKGROUNDS, Background, CandidateScale
+from phyblock.words import BACKGROUNDS, Background, CandidateScale, View
 
 __all__ = [
     "LARGEST_PX",
@@ -100,7 +100,7 @@ class PictureStyle:
 
     @classmethod
     def from_view(
-        cls, view: str, size_px: int = 512, background: Background = "checkerboard"
+        cls, view: View, size_px: int = 512, background: Background = "checkerboard"
     ) -> PictureStyle:
         """The style of a named view (front, side, top, oblique); ValueError for another name."""
         if view not in VIEWS:

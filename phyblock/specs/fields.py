@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 from typing_extensions import Self
 
@@ -30,9 +38,24 @@ ItemT = TypeVar("ItemT", bound=Hashable)
 
 
 class Section(BaseModel):
-    """Base of all that is written in YAML: no unknown keys, no changes after reading."""
+    """Base of all that is written in YAML: no unknown keys, no changes after reading.
+
+    Fields in `later` came after runs were made without them: they are written out only where they
+    say something, so that these runs stay the same.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+    later: ClassVar[tuple[str, ...]] = ()
+
+    @model_serializer(mode="wrap")
+    def _without_later(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        fields = type(self).model_fields
+        silent = {
+            name
+            for name in self.later
+            if getattr(self, name) == fields[name].get_default(call_default_factory=True)
+        }
+        return {name: value for name, value in write(self).items() if name not in silent}
 
 
 def refuse(message: str, **context: Any) -> PydanticCustomError:

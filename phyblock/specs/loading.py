@@ -6,7 +6,7 @@ import filecmp
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +17,19 @@ from phyblock.registry import baseline_names, known_track
 from phyblock.specs.model import ModelSpec
 from phyblock.specs.overrides import apply_overrides
 from phyblock.specs.paths import expand, sort_problems
+from phyblock.specs.prompt import PROMPT_WORDS
 from phyblock.specs.rules import broken_rules, read_dotted
 from phyblock.specs.suite import (
     BUILTIN_DATASET,
-    PROMPT_WORDS,
     RECORDED,
     SuiteSpec,
     suite_model,
 )
 from phyblock.specs.validation import MOST_HINTS, check, find_secrets, merge_problems
+from phyblock.specs.vary_check import vary_problems
 from phyblock.specs.words import did_you_mean, show
 from phyblock.specs.yaml_source import FieldPath, YamlSource, dotted, read_yaml
+from phyblock.variants import Variant
 
 __all__ = ["LoadedSuite", "load_suite", "resolve_models", "suite_tracks"]
 
@@ -39,7 +41,9 @@ class LoadedSuite:
     """A suite and the file it was read from.
 
     `dataset_path` is the absolute folder of the data set; by track, `folders` are those of data of
-    its own, and `templates` the absolute paths of prompts that are files.
+    its own, and `templates` the absolute paths of prompts that are files. Where prompts
+    vary, `suite` and `templates` are those of the reference, and `prompts` has the paths of all by
+    their texts.
     """
 
     suite: SuiteSpec
@@ -48,6 +52,15 @@ class LoadedSuite:
     source: YamlSource = field(repr=False, compare=False)
     folders: Mapping[str, Path] = field(default_factory=dict)
     templates: Mapping[str, Path] = field(default_factory=dict)
+    prompts: Mapping[str, Path] = field(default_factory=dict)
+
+    def at(self, variant: Variant) -> LoadedSuite:
+        """The suite as a variant asks."""
+        suite = self.suite.at(variant)
+        texts = {name: _prompt(suite, name) for name in suite.tracks}
+        known = {name: self.prompts[text] for name, text in texts.items() if text in self.prompts}
+        templates = known if "prompt" in suite.vary.factors else self.templates
+        return replace(self, suite=suite, templates=templates)
 
     def where(self, *path: str | int) -> str:
         """Place ("file:line:col" or "--set ...") of a field, for errors found later."""
@@ -77,9 +90,12 @@ def load_suite(
     if suite is None and isinstance(source.data, dict):
         problems += _broken_rules(source, problems)
     found = merge_problems(source.problems, secrets, problems)
+    if suite is not None:
+        found += vary_problems(suite, source)
     if suite is None or found:
         raise SpecError(sort_problems(found))
-    return _locate(suite, path, source, data_dir, prompt_dirs)
+    # What varies has the values of the reference, wherever one value alone is asked for.
+    return _locate(suite.at(Variant()), path, source, data_dir, prompt_dirs)
 
 
 def suite_tracks(path: Path) -> tuple[str, ...]:
@@ -174,16 +190,30 @@ def _locate(
         kind = known_track(name)
         if (own := kind.data_folder(suite)) is not None:
             folders[name] = finder.data(*own)
-        prompt = read_dotted(suite, ".".join(kind.prompt_field))
-        if prompt not in PROMPT_WORDS:
+        prompt = _prompt(suite, name)
+        if "prompt" not in suite.vary.factors and prompt not in PROMPT_WORDS:
             templates[name] = finder.file(prompt, kind.prompt_field)
-        elif prompt == PROMPT_WORDS[0]:
+        elif prompt == PROMPT_WORDS[0] or "default" in suite.vary.prompt:
             in_text = suite.answer_format == "text"
             bundled = kind.template if in_text else kind.json_template
             templates[name] = _in_place_of(bundled, prompt_dirs)
+    prompts = {
+        text: finder.file(text, ("vary", "prompt", place))
+        for place, text in enumerate(suite.vary.prompt)
+        if text not in PROMPT_WORDS
+    }
+    if "default" in suite.vary.prompt:
+        (own,) = templates.values()
+        prompts |= {"default": own}
     if dataset is None or finder.problems:
         raise SpecError(sort_problems(finder.problems))
-    return LoadedSuite(suite, path, dataset, source, _there(folders), _there(templates))
+    found = map(_there, (folders, templates, prompts))
+    return LoadedSuite(suite, path, dataset, source, *found).at(Variant())
+
+
+def _prompt(suite: SuiteSpec, track: str) -> str:
+    """What a suite names as the prompt of a track."""
+    return str(read_dotted(suite, ".".join(known_track(track).prompt_field)))
 
 
 def _in_place_of(bundled: Path | None, folders: Sequence[Path]) -> Path | None:

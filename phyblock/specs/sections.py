@@ -5,7 +5,7 @@ The descriptions below become the JSON Schema's, which an editor shows beside ea
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import AfterValidator, Field
 
@@ -30,6 +30,7 @@ from phyblock.words import (
     PictureLayout,
     PictureName,
     PictureSource,
+    View,
 )
 
 __all__ = [
@@ -63,6 +64,8 @@ class DatasetSpec(Section):
 class ImagesSpec(Section):
     """Which pictures a model is shown."""
 
+    later: ClassVar[tuple[str, ...]] = ("view",)
+
     source: PictureSource = Field(
         default="render",
         description="render: drawn from the scene. dataset: the official composites, or "
@@ -86,6 +89,11 @@ class ImagesSpec(Section):
     )
     size_px: Annotated[int, Field(strict=True, ge=128, le=2048)] = Field(
         default=512, description="Edge of a rendered picture [pixels]."
+    )
+    view: View = Field(
+        default="oblique",
+        description="Where rendered scenes and candidates are seen from; questions have views of "
+        "their own.",
     )
     background: Background | None = Field(
         default=None,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -22,12 +22,14 @@ from pydantic import (
 
 from phyblock.registry import PUBLISHED_TABLE, known_tracks, table_names
 from phyblock.specs.fields import (
+    Count,
     ModelName,
     Section,
     Unique,
     UniqueSome,
     refuse,
 )
+from phyblock.specs.prompt import PROMPT_WORDS, Prompt
 from phyblock.specs.rules import broken_rules, read_dotted
 from phyblock.specs.sections import (
     CandidatesSpec,
@@ -37,6 +39,8 @@ from phyblock.specs.sections import (
     SamplingSpec,
     ScoringSpec,
 )
+from phyblock.specs.vary import FACTORS, VarySpec, with_values
+from phyblock.variants import Variant
 from phyblock.words import (
     AnswerFormat,
     PlanParser,
@@ -56,7 +60,6 @@ RECORDED = "recorded"
 """The word that stands for every folder of recorded replies."""
 BUILTIN_DATASET = "phyblock-400"
 """The bundled data set that is used when a suite names none."""
-PROMPT_WORDS = ("default", "official")
 
 
 def _check_whole(level: object) -> object:
@@ -87,23 +90,6 @@ TrackName = Annotated[str, AfterValidator(lambda name: _one_of(name, tuple(known
 TableName = Annotated[str, AfterValidator(lambda name: _one_of(name, table_names()))]
 
 
-def _check_prompt(prompt: str) -> str:
-    if prompt in PROMPT_WORDS or prompt.endswith(".j2"):
-        return prompt
-    raise refuse(
-        "is neither a known prompt nor a template",
-        allowed="default, official, or the path of a .j2 file",
-        words=PROMPT_WORDS,
-    )
-
-
-Prompt = Annotated[
-    str,
-    AfterValidator(_check_prompt),
-    Field(json_schema_extra={"pattern": r"^(default|official|.*\.j2)$"}),
-]
-
-
 def _models_tag(value: object) -> str:
     return "word" if isinstance(value, str) else "list"
 
@@ -130,6 +116,11 @@ class SuiteSpec(Section):
     )
     dataset: DatasetSpec = Field(default_factory=DatasetSpec, description="Which scenes are run.")
     levels: UniqueSome[Level] = Field(default=(1, 2, 3, 4), description="Difficulty levels.")
+    limit: Count | None = Field(
+        default=None,
+        description="Items of each track at most, spread over levels or subtasks; null: all. "
+        "--limit says another number.",
+    )
     settings: UniqueSome[Setting] = Field(
         default=("A", "B"),
         description="A compares type, color and orientation, B type and color. One call is "
@@ -170,11 +161,17 @@ class SuiteSpec(Section):
         default_factory=LimitsSpec,
         description="Bounds of a run; they change how fast results come, not what they are.",
     )
+    vary: VarySpec = Field(
+        default_factory=VarySpec,
+        description="Ways of asking that are crossed, to tell how much each of them moves a model.",
+    )
     tables: Unique[TableName] = Field(
         default_factory=default_tables,
         description="Tables to write, as far as they belong to a track of the suite; published "
         "compares with the paper's numbers.",
     )
+
+    later: ClassVar[tuple[str, ...]] = ("limit", "vary")
 
     @model_validator(mode="after")
     def _check_rules(self) -> SuiteSpec:
@@ -190,6 +187,22 @@ class SuiteSpec(Section):
         if found is None:
             raise LookupError(f"the suite has no section of {model.__name__}")
         return found
+
+    def at(self, variant: Variant) -> SuiteSpec:
+        """The suite as a variant asks, its other factors at their reference."""
+        levels = {name: self.vary.names(name)[0] for name in self.vary.factors}
+        values: dict[tuple[str, ...], Any] = {}
+        for factor, level in {**levels, **dict(variant.levels)}.items():
+            value = self.vary.value(factor, level)
+            values |= dict.fromkeys(self.fields_of(factor), value)
+        return with_values(self, values)
+
+    def fields_of(self, factor: str) -> tuple[tuple[str, ...], ...]:
+        """The paths of the fields that a factor gives values to; none for repeats."""
+        if factor == "prompt":
+            return tuple(known_tracks()[name].prompt_field for name in self.tracks)
+        path = FACTORS[factor]
+        return () if path is None else (path,)
 
     def identity(self) -> dict[str, Any]:
         """What determines the results, as JSON-able data.
@@ -211,6 +224,8 @@ class SuiteSpec(Section):
         for part in (spec, *(spec[key] for key in sections if key in spec)):
             if part.get("prompt", PROMPT_WORDS[0]) not in PROMPT_WORDS:
                 part["prompt"] = "template"
+        if "prompt" in spec.get("vary", {}):
+            spec["vary"]["prompt"] = list(self.vary.names("prompt"))
         return spec
 
 

@@ -28,7 +28,7 @@ METRIC_NAMES = dict(zip(METRICS, ("Prec", "Rec", "F1"), strict=True))
 SIDE_METRICS = ("Prec", "Rec")
 """Headings that narrow tables do without."""
 _COLUMNS = (
-    *("track", "model", "scene", "seed", "outcome", "criterion", "matcher", "setting"),
+    *("track", "model", "scene", "seed", "variant", "outcome", "criterion", "matcher", "setting"),
     *("tp", "fp", "fn", *BLOCK_COLUMNS.values(), "kept"),
 )
 """Those of scores that cells need."""

@@ -1,4 +1,4 @@
-"""What a run was meant to be: models x scenes x seeds, settings, matchers, criteria."""
+"""What a run was meant to be: models x scenes x seeds x variants, settings, matchers."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from phyblock.errors import Problem, StoreError
 from phyblock.registry import known_tracks, table_names
+from phyblock.specs.vary import VarySpec
 from phyblock.tables.outcomes import WITHOUT_REPLY
 from phyblock.words import AnswerFormat, CandidateOrder, Criterion, MissingPolicy
 
@@ -48,6 +49,7 @@ class _Suite(_Part):
     candidates: _Candidates = _Candidates()
     answer_format: AnswerFormat = "text"
     scoring: _Scoring
+    vary: VarySpec = VarySpec()
     tables: tuple[str, ...] = Field(default_factory=table_names)
 
 
@@ -96,7 +98,12 @@ class Design(_Part):
 
     def samples(self, track: str) -> int:
         """Samples that a complete run holds of one model in a track."""
-        return self.items.get(track, 0) * len(self.suite.seeds)
+        return self.items.get(track, 0) * self.repeats
+
+    @property
+    def repeats(self) -> int:
+        """How often a model is asked about each item: with every seed, in every way."""
+        return len(self.suite.seeds) * self.suite.vary.n_variants
 
     @property
     def levels(self) -> tuple[str, ...]:
@@ -136,7 +143,7 @@ class Design(_Part):
     def expected(self, level: str) -> int:
         """Samples that a complete run holds of one model at a level."""
         scenes = self.scenes if level == OVERALL else self.scenes_by_level.get(int(level), 0)
-        return scenes * len(self.suite.seeds)
+        return scenes * self.repeats
 
 
 def read_design(manifest: Mapping[str, Any], where: str = "run.yaml") -> Design:

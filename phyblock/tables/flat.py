@@ -35,6 +35,7 @@ _RECORD_TYPES: dict[str, str] = {
     "parents": "object",
     "n_blocks": "Int64",
     "seed": "int64",
+    "variant": "object",
     "outcome": "object",
     "text": "object",
     "reasoning": "object",
@@ -67,6 +68,7 @@ _SCORE_TYPES: dict[str, str] = {
     "model": "object",
     "scene": "object",
     "seed": "int64",
+    "variant": "object",
     "outcome": "object",
     "criterion": "object",
     "matcher": "object",
@@ -79,7 +81,7 @@ _SCORE_TYPES: dict[str, str] = {
     "kept": "Int64",
 }
 
-_OF_SAMPLE = ("sample", "track", "model", "scene", "seed", "outcome")
+_OF_SAMPLE = ("sample", "track", "model", "scene", "seed", "variant", "outcome")
 """Columns of scores that are those of the record."""
 _REPLY = ("finish", "cost_usd", "latency_s", "provider_model", "attempts", "cached", "seed_sent")
 _USAGE = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
@@ -192,6 +194,7 @@ def _row(record: Record) -> dict[str, Any]:
     reply, error, prompt = record.reply, record.error, record.prompt
     return {
         **{name: getattr(record, name) for name in _OF_SAMPLE},
+        "variant": record.way.key,
         **{name: getattr(record, name) for name in ("item", "levels", "parents", "n_blocks")},
         **{name: getattr(reply, name, None) for name in (*_TEXTS, *_REPLY)},
         **{name: getattr(reply and reply.usage, name, None) for name in _USAGE},

@@ -44,10 +44,10 @@ class SampleCounts:
     """Counts of samples, from which one or several measures are made.
 
     `frame` makes them out of a run: a row a sample, way of counting it and cell that it is pooled
-    in, with the columns `model`, `scene`, `item`, `seed`, those of `SCORED_BY`, `CELL`, `replied`
-    (whether the model said anything), and one of each name in `columns`. Samples that the run
-    leaves out have no row. Instead of it, `sample` counts one sample when its reply is judged: it
-    is given the item that was asked about and the track's judgement of the reply (or the episode
+    in, with the columns `model`, `scene`, `item`, `seed`, `variant`, those of `SCORED_BY`, `CELL`,
+    `replied` (whether the model said anything), and one of each name in `columns`. Samples that the
+    run leaves out have no row. Instead of it, `sample` counts one sample when its reply is judged:
+    it is given the item that was asked about and the track's judgement of the reply (or the episode
     that was played), and its numbers, one of each name in `columns`, are kept in the record. Where
     it returns None, the sample is not counted.
     """

@@ -9,7 +9,7 @@ from dataclasses import replace
 from phyblock.tables.load import Run
 from phyblock.tables.text_table import TextTable
 
-__all__ = ["captioned", "control_words", "marked", "planning_words"]
+__all__ = ["captioned", "control_words", "marked", "planning_words", "varied_words"]
 
 _CONTROLS = {"blind": "blind", "wrong_image": "pictures of another scene"}
 """What captions say of the controls that sections of tracks may set."""
@@ -28,9 +28,16 @@ def control_words(run: Run, section: str) -> tuple[str, ...]:
     return (*controls, *((form,) if form else ()))
 
 
+def varied_words(run: Run) -> tuple[str, ...]:
+    """In how many ways each item was asked, where there are several."""
+    n = run.design.suite.vary.n_variants
+    return (f"asked in {n:,} ways",) if n > 1 else ()
+
+
 def planning_words(run: Run, section: str) -> tuple[str, ...]:
     """What is unusual about how scenes were shown."""
-    order = _ORDERS.get(run.design.suite.candidates.order)
+    suite = run.design.suite
+    order = None if "candidate_order" in suite.vary.factors else _ORDERS.get(suite.candidates.order)
     return (*((order,) if order else ()), *control_words(run, section))
 
 

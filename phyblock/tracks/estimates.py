@@ -107,7 +107,7 @@ def counted_samples(run: Run, track: str, counted: SampleCounts) -> pd.DataFrame
         index=rows.index,
         dtype="float64",
     )
-    kept = rows[["sample", "model", "scene", "seed", "item"]].assign(
+    kept = rows[["sample", "model", "scene", "seed", "variant", "item"]].assign(
         **dict.fromkeys(SCORED_BY, ""), replied=~rows["outcome"].isin(WITHOUT_REPLY)
     )
     return kind_of(track).report().in_cells(pd.concat([kept, numbers], axis=1), run)

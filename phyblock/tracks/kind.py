@@ -16,6 +16,7 @@ from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tables.measures import SampleCounts
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.base import AnyTrack
+from phyblock.tracks.studio import Workshop, render_workers
 
 __all__ = ["Opening", "TrackKind", "kind_of", "kinds"]
 
@@ -24,13 +25,15 @@ __all__ = ["Opening", "TrackKind", "kind_of", "kinds"]
 class Opening:
     """What a track is opened with; without `with_prompts` nothing is asked of anyone.
 
-    `limit` is how many items the user wants at most, None for all.
+    `limit` is how many items the user wants at most, None for all; `shop` is where pictures of all
+    tracks are drawn.
     """
 
     loaded: LoadedSuite
     dataset: Dataset
     limit: int | None
     with_prompts: bool
+    shop: Workshop = field(default_factory=lambda: Workshop(render_workers()))
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,7 @@ class TrackKind:
     matchers, and `phyblock score` judges them again even where no measure counts samples. With
     `plays`, samples are episodes of several turns. `record` is the model of its records, where it
     adds something to them. `counted` is what its measures count of every sample as it is judged.
+    `varies` names the factors of a suite's `vary` that change what it asks.
     """
 
     name: str
@@ -72,6 +76,7 @@ class TrackKind:
     own_root: Callable[[Manifest], str | None] = lambda _: None
     rescored: bool = False
     counted: tuple[SampleCounts, ...] = ()
+    varies: tuple[str, ...] = ("repeats",)
 
     def data_folder(self, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:
         """The folder of its own data: text, path of keys, whether it may be a bundled set."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from phyblock.datasets import AssemblyTask
@@ -18,6 +18,7 @@ from phyblock.tracks.kind import Opening, kind_of
 from phyblock.tracks.pictures import PicturePolicy, Pictures
 from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.tracks.showing import Showing, TaskShowing
+from phyblock.tracks.studio import Workshop, render_workers
 from phyblock.words import BACKGROUNDS
 
 __all__ = [
@@ -26,12 +27,9 @@ __all__ = [
     "picture_folder",
     "picture_policy",
     "picture_style",
-    "render_workers",
     "task_showing",
     "template_prompt",
 ]
-
-_RENDER_WORKERS = 4
 
 
 def open_tracks(opening: Opening, names: Sequence[str]) -> tuple[AnyTrack, ...]:
@@ -57,7 +55,8 @@ def picture_folder() -> Path:
 def picture_style(images: ImagesSpec) -> PictureStyle:
     """How a suite wants pictures drawn."""
     ground = images.background or BACKGROUNDS[0]
-    return PictureStyle(images.size_px, ground, candidate_scale=images.candidate_scale)
+    seen = PictureStyle.from_view(images.view, images.size_px, ground)
+    return replace(seen, candidate_scale=images.candidate_scale)
 
 
 def picture_policy(images: ImagesSpec) -> PicturePolicy:
@@ -65,9 +64,11 @@ def picture_policy(images: ImagesSpec) -> PicturePolicy:
     return PicturePolicy(images.source, images.layout, images.order, picture_style(images))
 
 
-def assembly_pictures(suite: SuiteSpec) -> Pictures:
-    """Pictures of goals and candidates as a suite wants them."""
-    return Pictures(picture_folder(), picture_policy(suite.images), render_workers())
+def assembly_pictures(suite: SuiteSpec, shop: Workshop | None = None) -> Pictures:
+    """Pictures of goals and candidates as a suite wants them, drawn in a shop of their own or this
+    one.
+    """
+    return Pictures(picture_folder(), picture_policy(suite.images), shop or render_workers())
 
 
 def task_showing(
@@ -98,8 +99,3 @@ def template_prompt(loaded: LoadedSuite, name: str) -> TemplatePrompt:
     own = kind.template if loaded.suite.answer_format == "text" else kind.json_template
     assert own is not None, f"{name} has no prompt of its own"
     return TemplatePrompt(own, "default")
-
-
-def render_workers() -> int:
-    """How many processes draw pictures."""
-    return min(_RENDER_WORKERS, os.cpu_count() or 1)

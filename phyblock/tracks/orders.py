@@ -23,14 +23,19 @@ __all__ = ["order_frame", "order_in_terminal", "order_view"]
 _ENDS = {"value": "", "lo": "_lo", "hi": "_hi", "mean": "_mean", "sd": "_sd"}
 _SPREAD = ("f1_mean", "f1_sd", "f1_least", "f1_most")
 _SAME = {"_share": "", "_lo": "_lo", "_hi": "_hi"}
+_HOW = {
+    "shuffled": "Each seed draws another order of the candidates.",
+    "file": "Candidates stand in the order of the file with every seed.",
+    "varied": "The order of the candidates is varied; plans are compared within a way of asking.",
+}
 _POSES = tuple(measure.name for measure in POSE_MEASURES)
 
 
 def order_frame(track: str, criterion: str, matcher: str, run: Run) -> pd.DataFrame:
     """One row a model: what another order of the candidates changes; shares in [0, 1].
 
-    `order` is that of the run; shuffled, each of the `seeds` is another one, and in the file's they
-    are repeats, to hold the others against. `f1` pools seeds; over single seeds it has `f1_mean`,
+    `order` is that of the run (or `varied`); shuffled, each of the `seeds` is another one, and in the file's
+    they are repeats, to hold the others against. `f1` pools seeds; over single seeds it has `f1_mean`,
     `f1_sd` (ddof = 1), `f1_least` and `f1_most`, of all scenes in the headline setting, counted by
     `criterion`. `same_plan` is the share of `plan_pairs` (a scene with two seeds) in which the plan
     names the same blocks in the same order. `pose_first` is the share of `pose_first_n` kinds that
@@ -51,7 +56,7 @@ def order_frame(track: str, criterion: str, matcher: str, run: Run) -> pd.DataFr
     counts = named[named[CELL] == WHOLE.name].groupby("model")[list(POSE_COUNTS.columns)].sum()
     rows = []
     for model in design.model_names if len(records) else ():
-        row: dict[str, Any] = {"model": model, "order": design.suite.candidates.order}
+        row: dict[str, Any] = {"model": model, "order": _order(run)}
         row["seeds"] = len(design.suite.seeds)
         estimate = known.get(("f1", model), {})
         row |= {f"f1{name}": estimate.get(end, np.nan) for end, name in _ENDS.items()}
@@ -68,6 +73,12 @@ def order_frame(track: str, criterion: str, matcher: str, run: Run) -> pd.DataFr
             row[f"pose_{name}"] = int(counts[name].get(model, 0))
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def _order(run: Run) -> str:
+    """The order of the candidates, `varied` where ways of asking differ in it."""
+    suite = run.design.suite
+    return "varied" if "candidate_order" in suite.vary.factors else suite.candidates.order
 
 
 def _extremes(run: Run, track: str, criterion: str, matcher: str) -> dict[str, dict[str, float]]:
@@ -87,7 +98,7 @@ def _same_plans(records: pd.DataFrame) -> pd.DataFrame:
     """How many pairs of plans are the `same`, of how many `pairs`: a row a model and scene."""
     read = records[records["rule"].notna() | records["ending"].notna()]
     rows = []
-    for (model, scene), plans in read.groupby(["model", "scene"])["file_plan"]:
+    for (model, scene, _), plans in read.groupby(["model", "scene", "variant"])["file_plan"]:
         alike = [one == other for one, other in combinations(plans, 2)]
         rows.append((model, scene, 0, True, sum(alike), len(alike)))
     return pd.DataFrame(rows, columns=["model", "scene", "seed", "replied", "same", "pairs"])
@@ -105,12 +116,7 @@ def order_view(table: pd.DataFrame, run: Run) -> TextTable:
         *(Column(name, "First less later") for name in ("%", "95 % CI")),
     )
     rows = tuple(_row(row) for row in table.to_dict("records"))
-    is_shuffled = run.design.suite.candidates.order == "shuffled"
-    how = (
-        "Each seed draws another order of the candidates."
-        if is_shuffled
-        else "Candidates stand in the order of the file with every seed."
-    )
+    how = _HOW[_order(run)]
     suite = f", suite {run.design.suite.name}" if run.design.suite.name else ""
     return TextTable(
         f"What the order of the candidates changes (%){suite}",

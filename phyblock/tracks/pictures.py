@@ -23,7 +23,7 @@ from phyblock.sim import (
 )
 from phyblock.sim.compose import to_png
 from phyblock.tracks.showing import ShownTask
-from phyblock.tracks.studio import Drawing, Studio, to_image
+from phyblock.tracks.studio import Drawing, Studio, Workshop, to_image
 from phyblock.words import CandidateScale, PictureLayout, PictureName, PictureSource
 
 __all__ = ["PicturePolicy", "Pictures"]
@@ -46,8 +46,8 @@ class PicturePolicy:
 class Pictures(Studio):
     """The pictures of assembly tasks under one policy."""
 
-    def __init__(self, folder: Path, policy: PicturePolicy, workers: int) -> None:
-        super().__init__(folder, workers)
+    def __init__(self, folder: Path, policy: PicturePolicy, shop: Workshop | int) -> None:
+        super().__init__(folder, shop)
         self.policy = policy
 
     @property

@@ -22,9 +22,10 @@ from phyblock.files import atomic_write, writing
 from phyblock.models.base import Image
 from phyblock.picture_files import LARGEST_PICTURE_BYTES, picture_size
 
-__all__ = ["Drawing", "Studio", "to_image"]
+__all__ = ["Drawing", "Studio", "Workshop", "render_workers", "to_image"]
 
 _Result = TypeVar("_Result")
+_RENDER_WORKERS = 4
 _KEPT = 128
 """Samples whose pictures stay in memory: more than are under way at once."""
 
@@ -41,32 +42,62 @@ class Drawing:
     make: Callable[[], bytes]
 
 
+class Workshop:
+    """What studios may share: `workers` processes, which start with the first work that there is,
+    and the pictures that are being made or were used last.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self.making: dict[Path, asyncio.Task[bytes]] = {}
+        self.recent: OrderedDict[tuple[Studio, str], tuple[Image, ...]] = OrderedDict()
+        self._workers = workers
+        self._pool: ProcessPoolExecutor | None = None
+
+    async def work_out(self, work: Callable[[], _Result]) -> _Result:
+        """What `work`, a `partial` of a function of a module, gives in a worker process."""
+        if self._pool is None:
+            self._pool = ProcessPoolExecutor(
+                self._workers, get_context("spawn"), initializer=_start_worker
+            )
+        try:
+            with _workers_without_interrupts():
+                done = asyncio.get_running_loop().run_in_executor(self._pool, work)
+            return await done
+        except BrokenProcessPool as error:
+            raise SimulationError("a process that draws pictures was killed") from error
+
+    def close(self) -> None:
+        """Stop the worker processes."""
+        if self._pool is not None:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+            self._pool = None
+
+
 class Studio:
     """Makes pictures once and keeps them in `folder` by content.
 
-    `workers` processes render; they start with the first picture that is not in the cache.
+    `shop` is where the work is done, by so many processes of its own where it is a number.
     `rendered` counts the files made in this object's lifetime.
     """
 
-    def __init__(self, folder: Path, workers: int) -> None:
+    def __init__(self, folder: Path, shop: Workshop | int) -> None:
         self.rendered = 0
         self._folder = folder
-        self._workers = workers
-        self._pool: ProcessPoolExecutor | None = None
-        self._making: dict[str, asyncio.Task[bytes]] = {}
-        self._recent: OrderedDict[str, tuple[Image, ...]] = OrderedDict()
+        self._shop = Workshop(shop) if isinstance(shop, int) else shop
 
     def recalled(self, name: str) -> tuple[Image, ...] | None:
         """Pictures that are still in memory under a name."""
-        if name in self._recent:
-            self._recent.move_to_end(name)
-        return self._recent.get(name)
+        recent = self._shop.recent
+        if (self, name) in recent:
+            recent.move_to_end((self, name))
+        return recent.get((self, name))
 
     def remembered(self, name: str, images: tuple[Image, ...]) -> tuple[Image, ...]:
         """The pictures, now in memory under a name; those unused for longest make room."""
-        self._recent[name] = images
-        if len(self._recent) > _KEPT:
-            self._recent.popitem(last=False)
+        recent = self._shop.recent
+        recent[self, name] = images
+        if len(recent) > _KEPT:
+            recent.popitem(last=False)
         return images
 
     async def images(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
@@ -103,11 +134,12 @@ class Studio:
         path = self._path(drawing.key)
         if (kept := self.kept(drawing)) is not None:
             return kept
-        if drawing.key not in self._making:
-            self._making[drawing.key] = asyncio.create_task(self._draw(path, drawing))
-            self._making[drawing.key].add_done_callback(_take_note)
+        making = self._shop.making
+        if path not in making:
+            making[path] = asyncio.create_task(self._draw(path, drawing))
+            making[path].add_done_callback(_take_note)
         # Shielded: others may wait for the same picture when one waiter is cancelled.
-        return to_image(await asyncio.shield(self._making[drawing.key]), drawing.label)
+        return to_image(await asyncio.shield(making[path]), drawing.label)
 
     async def _draw(self, path: Path, drawing: Drawing) -> bytes:
         try:
@@ -117,30 +149,19 @@ class Studio:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 atomic_write(path, data)
         finally:
-            del self._making[drawing.key]
+            del self._shop.making[path]
         return data
 
     async def work_out(self, work: Callable[[], _Result]) -> _Result:
         """What `work`, a `partial` of a function of a module, gives in a worker process."""
-        if self._pool is None:
-            self._pool = ProcessPoolExecutor(
-                self._workers, get_context("spawn"), initializer=_start_worker
-            )
-        try:
-            with _workers_without_interrupts():
-                done = asyncio.get_running_loop().run_in_executor(self._pool, work)
-            return await done
-        except BrokenProcessPool as error:
-            raise SimulationError("a process that draws pictures was killed") from error
+        return await self._shop.work_out(work)
 
     def _path(self, key: str) -> Path:
         return self._folder / key[:2] / f"{key}.png"
 
     def close(self) -> None:
         """Stop the worker processes."""
-        if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
-            self._pool = None
+        self._shop.close()
 
 
 @contextlib.contextmanager
@@ -157,6 +178,11 @@ def _take_note(drawn: asyncio.Task[bytes]) -> None:
     # Where all who waited were cancelled, nobody asks for the failure, and asyncio would print it.
     if not drawn.cancelled():
         drawn.exception()
+
+
+def render_workers() -> int:
+    """How many processes draw pictures."""
+    return min(_RENDER_WORKERS, os.cpu_count() or 1)
 
 
 def to_image(data: bytes, label: str) -> Image:

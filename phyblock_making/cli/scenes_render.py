@@ -120,8 +120,10 @@ def _styles(
     """Every style asked for, by its part of the file names."""
     styles = {}
     floors: tuple[Background, ...] = tuple(b for b in BACKGROUNDS if background in (b, "all"))
-    for name in VIEWS if view == "all" else (view,):
-        around, above = VIEWS[name]
+    for named, (around, above) in VIEWS.items():
+        if view not in (named, "all"):
+            continue
+        name: str = named
         if azimuth is not None or elevation is not None:
             around = around if azimuth is None else azimuth
             above = above if elevation is None else elevation

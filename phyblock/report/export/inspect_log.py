@@ -114,6 +114,7 @@ def _sample(
         "outcome",
         "parse",
         "question",
+        "variant",
         "turns",
         "ending",
         "progress",
@@ -122,7 +123,7 @@ def _sample(
     about = {name: fields[name] for name in kept if name in fields}
     return EvalSample(
         # The key tells rotations of one question apart; older records have none.
-        id=record.item,
+        id="/".join(filter(None, (record.item, record.way.key))),
         epoch=list(seeds).index(record.seed) + 1 if record.seed in seeds else 1,
         input=text,
         target=record.target,

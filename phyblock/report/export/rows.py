@@ -43,6 +43,7 @@ def export_rows(run: Run) -> Iterator[dict[str, Any]]:
         plan = getattr(record.parse, "plan", None)
         yield {
             **{name: getattr(record, name) for name in _SAMPLE},
+            **({"variant": record.way.key} if run.design.suite.vary.factors else {}),
             "levels": list(record.levels),
             "parents": list(record.parents),
             "n_blocks": record.n_blocks,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from phyblock.report.figures.bars import main_measure, measure_bars
 from phyblock.report.figures.data import dataset_levels
+from phyblock.report.figures.sensitivity import moved_dots
 from phyblock.run.folder import run_folder
 from phyblock.tables.drawing import png_bytes, styled, svg_bytes
 from phyblock.tables.load import Run
@@ -31,11 +32,17 @@ def _makers(run: Run) -> dict[str, Callable[[Run], Figure | None]]:
     for track in run.design.suite.tracks:
         makers[_bars_name(track)] = partial(measure_bars, track=track)
         makers |= kind_of(track).report().figures
+        if run.design.suite.vary.factors:
+            makers[_moved_name(track)] = partial(moved_dots, track=track)
     return {**makers, _SCENES: dataset_levels}
 
 
 def _bars_name(track: str) -> str:
     return kind_of(track).report().bars or f"{track.replace('_', '-')}-{main_measure(track).name}"
+
+
+def _moved_name(track: str) -> str:
+    return f"sensitivity-{track.replace('_', '-')}"
 
 
 def figure_names(run: Run) -> tuple[str, ...]:
@@ -50,6 +57,7 @@ def figure_titles(run: Run) -> dict[str, str]:
         report = kind_of(track).report()
         titles[_bars_name(track)] = f"{kind_of(track).title}: {main_measure(track).heading}"
         titles |= report.figure_titles
+        titles[_moved_name(track)] = f"{kind_of(track).title}: what the way of asking changes"
     return titles
 
 
@@ -82,7 +90,7 @@ def figure_files(names: Sequence[str] = ()) -> tuple[str, ...]:
     known = [
         name
         for kind in kinds().values()
-        for name in (_bars_name(kind.name), *kind.report().figures)
+        for name in (_bars_name(kind.name), *kind.report().figures, _moved_name(kind.name))
     ]
     return tuple(
         f"{_FOLDER}/{name}.{ending}" for name in names or (*known, _SCENES) for ending in _FORMS

@@ -10,7 +10,7 @@ from phyblock.report.floors import Floor, floors_run, headline_floors
 from phyblock.report.measure_table import headline_columns, headline_of, main_heading
 from phyblock.tables.headline import Value
 from phyblock.tables.load import Run
-from phyblock.tables.showing import captioned
+from phyblock.tables.showing import captioned, varied_words
 from phyblock.tables.text_table import NO_VALUE, number, spread
 from phyblock.tracks.kind import kind_of
 
@@ -104,7 +104,7 @@ def _headline(run: Run, track: str) -> Headline:
     below = (_BELOW,) if any(cell.below for row in rows for cell in row.cells) else ()
     about = (report.reference_note,) if report.reference_note else ()
     return Headline(
-        captioned(kind.title, report.showing(run)),
+        captioned(kind.title, (*report.showing(run), *varied_words(run))),
         (*headings, *(["Published"] if published else [])),
         tuple(rows),
         (" ".join((*report.notes(run), *about, *mean, *floor_note, *below)),),

@@ -79,10 +79,10 @@ class SampleIndex:
         self._design = design
         self._scenes, self._items = _Names(), _Names()
         self._tracks, self._models, self._outcomes = _Names(), _Names(), _Names()
-        self._subtasks = _Names()
+        self._subtasks, self._variants = _Names(), _Names()
         self._seeds: set[int] = set()
         self._about: dict[str, list[Any]] = {"scene": [], "levels": [], "subtask": []}
-        names = ("track", "model", "item", "seed", "outcome", "correct")
+        names = ("track", "model", "item", "seed", "variant", "outcome", "correct")
         self._rows: dict[str, list[Any]] = {name: [] for name in names}
         self._scores: dict[str, dict[str, list[int | None]]] = {
             setting: {name: [] for name in ("tp", "fp", "fn", "wrong")}
@@ -110,6 +110,7 @@ class SampleIndex:
             "model": self._models.number(record.model),
             "item": self._items.number(item),
             "seed": record.seed,
+            "variant": self._variants.number(record.way.key),
             "outcome": self._outcomes.number(record.outcome),
             "correct": None if record.is_correct is None else int(record.is_correct),
         }
@@ -147,6 +148,7 @@ class SampleIndex:
             "subtasks": self._subtasks.values,
             "scenes": self.scenes,
             "seeds": sorted(self._seeds),
+            "variants": self._variants.values,
             "settings": list(self._scores),
             "matcher": self._design.matcher,
             "error_types": list(ERROR_TYPES),

@@ -17,6 +17,7 @@ __all__ = ["items_shown", "pack_prompts", "pack_samples", "pictures_sent"]
 _IN_INDEX = frozenset(
     {
         *("sample", "track", "model", "key", "scene", "levels", "parents", "n_blocks", "seed"),
+        *("variant",),
         *("outcome", "run"),
     }
 )

@@ -12,6 +12,7 @@ from phyblock.datasets import AssemblyTask
 from phyblock.files import atomic_write
 from phyblock.models import Image
 from phyblock.resources import cache_dir
+from phyblock.sim import PictureStyle
 from phyblock.tables.track_report import PageItems
 from phyblock.tracks import PicturePolicy, Pictures
 
@@ -28,29 +29,28 @@ class PictureShelf:
     into the cache; on a file system where that is not possible they are copied, up to 256 MiB.
     """
 
-    def __init__(self, folder: Path, earlier: Path, policy: PicturePolicy) -> None:
-        """Put pictures, drawn as `policy` says, into `folder` unless `earlier` holds them."""
+    def __init__(self, folder: Path, earlier: Path) -> None:
+        """Put pictures into `folder` unless `earlier` holds them."""
         self.names: dict[str, str] = {}
         self._folder = folder
         self._earlier = earlier
         self._cache = cache_dir() / "pictures"
-        self._policy = policy
         self._room = _MOST_COPIED_BYTES
 
-    def add_scenes(self, tasks: Iterable[AssemblyTask]) -> None:
-        """Keep goals and candidates of tasks as they were shown; raises OSError where the disk
-        refuses.
+    def add_scenes(self, tasks: Iterable[AssemblyTask], policy: PicturePolicy) -> None:
+        """Keep goals and candidates of tasks as they were shown, drawn as `policy` says; raises
+        OSError where the disk refuses.
         """
-        pictures = Pictures(self._cache, self._policy, 1)
-        is_drawn = self._policy.source == "render"
+        pictures = Pictures(self._cache, policy, 1)
+        is_drawn = policy.source == "render"
         for task in tasks:
             found, are_real = pictures.outline(task)
             if are_real:
                 self._keep(found, pictures.keys(task) if is_drawn else ())
 
-    def add_items(self, items: PageItems, asked: Iterable[Any]) -> None:
+    def add_items(self, items: PageItems, asked: Iterable[Any], style: PictureStyle) -> None:
         """Keep the pictures of what was asked about; raises OSError where the disk refuses."""
-        pictures = items.pictures(self._cache, self._policy.style)
+        pictures = items.pictures(self._cache, style)
         for shown in asked:
             found, are_real = pictures.outline(shown)
             if are_real:

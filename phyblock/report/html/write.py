@@ -21,10 +21,10 @@ from phyblock.report.html.pack import Pack, write_script
 from phyblock.report.html.page import Figure, render_page
 from phyblock.report.html.samples import items_shown, pack_prompts, pack_samples, pictures_sent
 from phyblock.report.html.sent import PictureShelf
+from phyblock.report.html.shown import images_of
 from phyblock.report.html.sources import Sources, open_sources
 from phyblock.report.write import TablesWritten
 from phyblock.run.folder import run_folder
-from phyblock.specs.sections import ImagesSpec
 from phyblock.tables.load import Run
 from phyblock.tracks.drawable import kit, scene_entry
 from phyblock.tracks.kind import kind_of
@@ -124,12 +124,14 @@ def _keep_pictures(
     """Addresses of the pictures at hand as seen from the page, by digest."""
     place = f"{_FOLDER}/{_PICTURES}/"
     with out.making(place) as new:
-        policy = picture_policy(run.section("images", ImagesSpec))
-        shelf = PictureShelf(new, out.path / place, policy)
-        if sources.tasks:
-            shelf.add_scenes(_scenes(run, sources.tasks))
-        for track, items in sources.items.items():
-            shelf.add_items(items, [shown for item, shown in asked.items() if item.track == track])
+        shelf = PictureShelf(new, out.path / place)
+        for images in images_of(run):
+            policy = picture_policy(images)
+            if sources.tasks:
+                shelf.add_scenes(_scenes(run, sources.tasks), policy)
+            for track, items in sources.items.items():
+                shown = [one for item, one in asked.items() if item.track == track]
+                shelf.add_items(items, shown, policy.style)
     return {digest: f"{place}{name}" for digest, name in shelf.names.items()}
 
 

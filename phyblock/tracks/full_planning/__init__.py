@@ -35,4 +35,5 @@ TRACK = TrackKind(
     counted=(POSE_COUNTS,),
     tables=("assembly", "table1", "errors"),
     rescored=True,
+    varies=("prompt", "background", "view", "candidate_order", "layout", "repeats"),
 )

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
 from phyblock.tracks.full_planning.goal_blind import goal_blind_plans
 from phyblock.tracks.showing import Showing, ShownTask, TaskShowing
-from phyblock.words import Setting
+from phyblock.words import CandidateOrder, Setting
 
 __all__ = ["BlindGuesses"]
 
@@ -23,21 +24,27 @@ class BlindGuesses:
     def __init__(
         self, showing: TaskShowing, pool: Sequence[AssemblyTask], setting: Setting
     ) -> None:
-        # A goal is not learned from, whichever is shown.
-        self._showing = TaskShowing(Showing(showing.how.order))
+        self._order = showing.how.order
         self._pool = pool
         self._setting = setting
         self._plans: dict[int, dict[str, Plan]] = {}
 
     def plan(self, task: AssemblyTask) -> Plan:
         """The plan for a task of the pool as it is shown, in the numbers that are shown."""
-        is_shuffled = self._showing.how.order == "shuffled"
+        is_shuffled = self._order == "shuffled"
         seed = task.seed if is_shuffled and isinstance(task, ShownTask) else 0
         if seed not in self._plans:
-            shown = [self._showing.of(one, seed) for one in self._pool]
-            self._plans[seed] = goal_blind_plans(
-                [one.scene for one in shown],
-                {one.key: one.candidates for one in shown},
-                self._setting,
-            )
+            self._plans[seed] = _learned(tuple(self._pool), self._order, seed, self._setting)
         return self._plans[seed][task.key]
+
+
+@functools.lru_cache(maxsize=8)
+def _learned(
+    pool: tuple[AssemblyTask, ...], order: CandidateOrder, seed: int, setting: Setting
+) -> dict[str, Plan]:
+    """Plans for all of `pool` by name; ways of asking that show the same order share them."""
+    # A goal is not learned from, whichever is shown.
+    showing = TaskShowing(Showing(order))
+    shown = [showing.of(one, seed) for one in pool]
+    candidates = {one.key: one.candidates for one in shown}
+    return goal_blind_plans([one.scene for one in shown], candidates, setting)

@@ -27,7 +27,7 @@ def open_full_planning(opening: Opening) -> FullPlanning:
         return FullPlanning(_rules(suite), items=tasks, showing=showing, pool=pool)
     if suite.images.source == "dataset":
         _check_composites(opening.dataset, tasks)
-    pictures = assembly_pictures(suite)
+    pictures = assembly_pictures(suite, opening.shop)
     return FullPlanning(_rules(suite), _prompt(opening.loaded), pictures, tasks, showing, pool)
 
 

@@ -47,4 +47,5 @@ TRACK = TrackKind(
     prompt_field=("steps", "prompt"),
     counted=(POSE_COUNTS,),
     tables=("table3", "endings", "progress"),
+    varies=("prompt", "background", "view", "candidate_order", "layout", "repeats"),
 )

@@ -33,6 +33,7 @@ _EPISODE_TYPES = {
     "model": "object",
     "scene": "object",
     "seed": "int64",
+    "variant": "object",
     "n_blocks": "int64",
     "outcome": "object",
     "ending": "object",

@@ -34,7 +34,7 @@ def open_step_planning(opening: Opening) -> StepPlanning:
     template = template_prompt(loaded, StepPlanning.name)
     told = (rules.gating, rules.accepts, steps.blind, rules.form)
     prompt = StepPrompt(template, *shown, *told)
-    return StepPlanning(rules, prompt, assembly_pictures(suite), tasks, showing, pool)
+    return StepPlanning(rules, prompt, assembly_pictures(suite, opening.shop), tasks, showing, pool)
 
 
 def _rules(suite: SuiteSpec) -> StepRules:

@@ -58,4 +58,5 @@ TRACK = TrackKind(
     own_data=_questions,
     manifest=_manifest,
     own_root=_found_at,
+    varies=("prompt", "background", "repeats"),
 )

@@ -47,13 +47,14 @@ def question_digest(run: Run) -> str | None:
 
 @made_once_copied
 def questions_counted(run: Run) -> pd.DataFrame:
-    """The questions behind accuracies: model, subtask, scene, question, seed, correct, n.
+    """The questions behind accuracies: model, subtask, scene, question, seed, variant, correct,
+    n.
 
-    One row a model, question and seed, `correct` 0 or 1, `n` 1; with rotations it is right only if
-    each of them is. Subtasks in which a model said nothing are left out.
+    One row a model, question, seed and variant, `correct` 0 or 1, `n` 1; with rotations it is
+    right only if each of them is. Subtasks in which a model said nothing are left out.
     """
     records = run.records[run.records["track"] == _TRACK]
-    keys = ["model", "subtask", "scene", "question", "seed"]
+    keys = ["model", "subtask", "scene", "question", "seed", "variant"]
     rows = records[keys].assign(
         correct=records["given"].eq(records["right"]).fillna(False).astype("int64"),
         left_out=records["outcome"].isin(run.design.outcomes_left_out),
@@ -112,11 +113,14 @@ def scored_answers(run: Run, model: str) -> pd.DataFrame:
     left_out = samples["outcome"].isin(run.design.outcomes_left_out)
     if not left_out.any():
         return samples
-    names = pd.Series(list(zip(samples["question"], samples["seed"], strict=True)), samples.index)
+    names = pd.Series(
+        list(zip(*(samples[name] for name in ("question", "seed", "variant")), strict=True)),
+        samples.index,
+    )
     return samples[~names.isin(set(names[left_out]))]
 
 
 def expected_answers(run: Run) -> dict[str, int]:
     """Samples of each subtask that a complete run holds of one model."""
     told = run.manifest.tracks.get(_TRACK, {}).get("by_subtask", {})
-    return {name: count * len(run.design.suite.seeds) for name, count in told.items()}
+    return {name: count * run.design.repeats for name, count in told.items()}

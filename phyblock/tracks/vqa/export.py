@@ -20,7 +20,8 @@ from phyblock.folders import OutFolder
 from phyblock.models.base import Image
 from phyblock.sim import PictureStyle
 from phyblock.tables.track_report import ItemExport
-from phyblock.tracks.opening import picture_folder, render_workers
+from phyblock.tracks.opening import picture_folder
+from phyblock.tracks.studio import render_workers
 from phyblock.tracks.vqa.opening import open_questions, select_questions
 from phyblock.tracks.vqa.pictures import QuestionPictures, ShownQuestion
 from phyblock.tracks.vqa.spec import BUILTIN_QUESTIONS

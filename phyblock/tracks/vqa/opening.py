@@ -20,7 +20,6 @@ from phyblock.tracks.kind import Opening
 from phyblock.tracks.opening import (
     picture_folder,
     picture_style,
-    render_workers,
     template_prompt,
 )
 from phyblock.tracks.selection import spread, stratified
@@ -52,7 +51,7 @@ def open_vqa(opening: Opening) -> Vqa:
         picture_folder(),
         picture_style(suite.images),
         spec.options_as,
-        render_workers(),
+        opening.shop,
         suite.images.background,
     )
     return Vqa(rules, questions, tasks, template_prompt(loaded, Vqa.name), pictures)

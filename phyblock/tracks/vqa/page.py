@@ -36,7 +36,8 @@ def question_items(run: Run, dataset: Dataset) -> PageItems:
     by_id = {task.question.id: task for task in questions.tasks}
 
     def pictures(folder: Path, style: PictureStyle) -> QuestionPictures:
-        ground = run.manifest.suite["images"]["background"]
+        # Null is each question's own, which no style can say.
+        ground = run.manifest.suite["images"]["background"] and style.background
         return QuestionPictures(folder, style, shown.options_as, 1, ground)
 
     return PageItems(lambda record: _shown(record, by_id), _entry, pictures)

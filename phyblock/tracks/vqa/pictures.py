@@ -16,7 +16,7 @@ from phyblock.picture_files import read_picture
 from phyblock.sim import PictureStyle
 from phyblock.sim.lettered import LETTERED_VERSION, lettered_sheet_png, sheet_size_px
 from phyblock.sim.question_pictures import question_key, question_png
-from phyblock.tracks.studio import Drawing, Studio, to_image
+from phyblock.tracks.studio import Drawing, Studio, Workshop, to_image
 from phyblock.words import Background
 
 __all__ = ["OptionsAs", "QuestionPictures", "ShownQuestion"]
@@ -56,10 +56,10 @@ class QuestionPictures(Studio):
         folder: Path,
         style: PictureStyle,
         options_as: OptionsAs,
-        workers: int,
+        shop: Workshop | int,
         background: Background | None = None,
     ) -> None:
-        super().__init__(folder, workers)
+        super().__init__(folder, shop)
         self._background = background
         self._style = style
         self._options_as = options_as

@@ -67,13 +67,14 @@
     return opened;
   }
 
-  /** Models that have a sample of the same item and seed, as [row, name]. */
+  /** Models that have a sample of the same item and seed, asked the same way, as [row, name]. */
   function rivals(sample) {
     const { rows } = Data.index;
     const found = [];
     for (const by of [-1, 1]) {
       for (let row = sample.row + by; rows.item[row] === sample.item; row += by) {
-        if (rows.seed[row] === sample.seed) found.push([row, Data.index.models[rows.model[row]]]);
+        const alike = rows.seed[row] === sample.seed && rows.variant[row] === rows.variant[sample.row];
+        if (alike) found.push([row, Data.index.models[rows.model[row]]]);
       }
     }
     return found.sort((a, b) => rows.model[a[0]] - rows.model[b[0]]);
@@ -89,7 +90,7 @@
     other.disabled = !open.length;
     const beside = open.find(([, name]) => name === wanted);
     title.replaceChildren(el("span", { class: "title-key" }, sample.key),
-      el("span", { class: "muted" }, `${sample.model}${Data.index.seeds.length > 1 ? ` · seed ${sample.seed}` : ""}`));
+      el("span", { class: "muted" }, sample.asked));
     const address = new URLSearchParams({ s: sample.id, ...(beside ? { with: wanted } : {}) });
     history.replaceState(null, "", `#samples?${address}`);
     document.getElementById("workspace").dataset.detail = "shown";

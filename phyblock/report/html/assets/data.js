@@ -80,7 +80,10 @@ const Data = (() => {
       sceneNumber: items.scene[item], question: items.question[item], subtask: items.subtask[item],
       seed: rows.seed[row], outcome: index.outcomes[rows.outcome[row]], correct: rows.correct[row],
     };
-    found.id = `${found.track}/${found.model}/${found.key}/s${found.seed}`;
+    found.variant = index.variants[rows.variant[row]];
+    found.id = `${found.track}/${found.model}/${found.key}/s${found.seed}${found.variant && `/${found.variant}`}`;
+    const said = [index.seeds.length > 1 && `seed ${found.seed}`, found.variant];
+    found.asked = [found.model, ...said.filter(Boolean)].join(" · ");
     return found;
   }
 

@@ -76,6 +76,7 @@ const List = (() => {
       select("outcome", "Outcome", of(index.outcomes, Words.named)),
       hasScores && select("error", "Error type", of(index.error_types, Words.named)),
       index.seeds.length > 1 && select("seed", "Seed", index.seeds.map((seed) => [seed, `Seed ${seed}`])),
+      index.variants.length > 1 && select("variant", "Asked", of(index.variants, (name) => name || "As the reference")),
       hasScores && index.settings.length > 1 && settingField(),
       sortField(),
     ];
@@ -137,6 +138,7 @@ const List = (() => {
     if (filters.level !== undefined && !items.levels[item].includes(filters.level)) return false;
     if (filters.outcome !== undefined && columns.outcome[row] !== filters.outcome) return false;
     if (filters.seed !== undefined && columns.seed[row] !== filters.seed) return false;
+    if (filters.variant !== undefined && columns.variant[row] !== filters.variant) return false;
     if (filters.subtask !== undefined && items.subtask[item] !== filters.subtask) return false;
     if (filters.answer !== undefined && columns.correct[row] !== filters.answer) return false;
     if (filters.error !== undefined) {
@@ -193,8 +195,7 @@ const List = (() => {
     },
     el("span", { class: "row-name" }, sample.key),
     mark(sample),
-    el("span", { class: "row-model" },
-      sample.model + (Data.index.seeds.length > 1 ? ` · seed ${sample.seed}` : "")));
+    el("span", { class: "row-model" }, sample.asked));
     made.style.top = `${place * ROW_PX}px`;
     return made;
   }

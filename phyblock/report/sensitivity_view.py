@@ -1,0 +1,166 @@
+"""The tables of what the way of asking changes, as people read them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from phyblock.report.comparable import comparable
+from phyblock.report.compare_view import p_text
+from phyblock.report.sensitivity import ITEMS
+from phyblock.scoring.uncertainty import CONFIDENCE
+from phyblock.tables.load import Run
+from phyblock.tables.text_table import Column, TextTable, between, number
+from phyblock.tracks.kind import kind_of
+from phyblock.variants import REPEAT
+
+__all__ = [
+    "components_view",
+    "factor_name",
+    "in_terminal",
+    "levels_view",
+    "ranks_lines",
+    "ranks_view",
+]
+
+_NAMES = {REPEAT: "asked again", ITEMS: "between items"}
+_MODEL = Column("Model", is_text=True)
+_FACTOR = Column("Factor", is_text=True)
+_LEVEL = Column("Level", is_text=True)
+
+
+def factor_name(factor: str) -> str:
+    """What people read in the place of a factor's name."""
+    return _NAMES.get(factor, factor.replace("_", " "))
+
+
+def components_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Standard deviations with intervals out of `components_frame`, a row a model and factor."""
+    rows = [
+        (
+            row["model"],
+            *_track(row, run),
+            factor_name(row["factor"]),
+            *(
+                text
+                for name in ("shift", "single")
+                for text in (number(row[name]), between(row[f"{name}_lo"], row[f"{name}_hi"]))
+            ),
+        )
+        for row in table.to_dict("records")
+    ]
+    pairs = [
+        Column(n, group) for group in ("Shift of all", "Single items") for n in ("SD", "95 % CI")
+    ]
+    sizes = table.groupby("track", sort=False)[["n_items", "n_clusters"]].max()
+    notes = [
+        f"{what}, {size['n_items']} items of {size['n_clusters']} base scenes."
+        for what, (_, size) in zip(_what(run, list(sizes.index)), sizes.iterrows(), strict=True)
+    ]
+    notes += [
+        "Shift: standard deviation of the means of a factor's levels. Single items: of one item's "
+        "score over levels, beyond the shift and noise; asked again: of one question repeated.",
+    ]
+    if table.loc[~table["factor"].isin([REPEAT, ITEMS]), "single"].isna().any():
+        notes.append("One factor alone without repeats cannot be told from noise in single items.")
+    return TextTable(
+        f"What the way of asking changes{run.design.of_suite}",
+        (_MODEL, *_track_column(run), _FACTOR, *pairs),
+        tuple(rows),
+        tuple(notes),
+    )
+
+
+def levels_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Values by level out of `levels_frame`, each beside its difference to the first level."""
+    rows = [
+        (
+            row["model"],
+            *_track(row, run),
+            factor_name(row["factor"]),
+            row["level"],
+            number(row["value"]),
+            str(int(row["rank"])),
+            number(row["difference"], signed=True),
+            between(row["lo"], row["hi"], signed=True),
+            p_text(row["p_holm"]),
+            number(row["detectable"]),
+        )
+        for row in table.to_dict("records")
+    ]
+    names = ("Value", "Rank", "Difference", "95 % CI", "p (Holm)", "Detectable")
+    return TextTable(
+        f"Every level{run.design.of_suite}, beside the first of its factor",
+        (_MODEL, *_track_column(run), _FACTOR, _LEVEL, *map(Column, names)),
+        tuple(rows),
+        (
+            *(f"{what}." for what in _what(run, list(table["track"].unique()))),
+            "Detectable: the difference that a single test finds in four of five cases.",
+        ),
+    )
+
+
+def ranks_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """What becomes of the ranking of models out of `ranks_frame`, a row a level."""
+    rows = [
+        (
+            *_track(row, run),
+            factor_name(row["factor"]),
+            row["level"],
+            number(row["tau"], 2),
+            f"{row['flips']} of {row['pairs']}",
+            str(row["sure"]),
+            number(row["detectable"]),
+        )
+        for row in table.to_dict("records")
+    ]
+    names = ("Kendall's tau", "Pairs that flip", "beyond noise", "Detectable")
+    return TextTable(
+        f"Does the ranking survive{run.design.of_suite}?",
+        (*_track_column(run), _FACTOR, _LEVEL, *map(Column, names)),
+        tuple(rows),
+        (
+            "Against the first level of each factor. Beyond noise: the change of the pair's "
+            f"difference is found at {1 - CONFIDENCE:.0%}, corrected for all pairs and levels.",
+            "Detectable: the change of a difference that the test of a pair finds in four of five "
+            "cases, the median of pairs.",
+        ),
+    )
+
+
+def ranks_lines(table: pd.DataFrame, _: Run) -> Sequence[str]:
+    """What the terminal says of the ranking."""
+    if not len(table):
+        return ()
+    flips, sure, pairs = (int(table[name].sum()) for name in ("flips", "sure", "pairs"))
+    least = number(float(table["tau"].min()), 2)
+    verdict = f"{sure} of them beyond noise" if sure else "none beyond noise"
+    return (
+        f"Ranking over ways of asking: Kendall's tau at least {least}; "
+        f"{flips} of {pairs} pairs of models flip, {verdict}.",
+    )
+
+
+def in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
+    """The whole table."""
+    return (view,)
+
+
+def _what(run: Run, tracks: Sequence[str]) -> list[str]:
+    """What is measured in each track."""
+    measures = [comparable(run, track).measure for track in tracks]
+    return [
+        f"{kind_of(track).title}: {measure.heading}"
+        + (f" ({measure.unit})" if measure.unit else "")
+        for track, measure in zip(tracks, measures, strict=True)
+    ]
+
+
+def _track_column(run: Run) -> tuple[Column, ...]:
+    return (Column("Track", is_text=True),) if len(run.design.suite.tracks) > 1 else ()
+
+
+def _track(row: dict[str, object] | object, run: Run) -> tuple[str, ...]:
+    assert isinstance(row, dict)
+    return (str(row["track"]).replace("_", " "),) if len(run.design.suite.tracks) > 1 else ()
