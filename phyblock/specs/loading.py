@@ -203,8 +203,7 @@ def _locate(
         if text not in PROMPT_WORDS
     }
     if "default" in suite.vary.prompt:
-        (own,) = templates.values()
-        prompts |= {"default": own}
+        prompts |= {"default": next(iter(templates.values()), None)}
     if dataset is None or finder.problems:
         raise SpecError(sort_problems(finder.problems))
     found = map(_there, (folders, templates, prompts))

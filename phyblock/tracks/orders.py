@@ -34,8 +34,9 @@ _POSES = tuple(measure.name for measure in POSE_MEASURES)
 def order_frame(track: str, criterion: str, matcher: str, run: Run) -> pd.DataFrame:
     """One row a model: what another order of the candidates changes; shares in [0, 1].
 
-    `order` is that of the run (or `varied`); shuffled, each of the `seeds` is another one, and in the file's
-    they are repeats, to hold the others against. `f1` pools seeds; over single seeds it has `f1_mean`,
+    `order` is that of the run (or `varied`); shuffled, each of the `seeds` is another one, and in
+    the file's they are repeats, to hold the others against. `f1` pools seeds; over single seeds it
+    has `f1_mean`,
     `f1_sd` (ddof = 1), `f1_least` and `f1_most`, of all scenes in the headline setting, counted by
     `criterion`. `same_plan` is the share of `plan_pairs` (a scene with two seeds) in which the plan
     names the same blocks in the same order. `pose_first` is the share of `pose_first_n` kinds that
