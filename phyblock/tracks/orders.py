@@ -36,13 +36,12 @@ def order_frame(track: str, criterion: str, matcher: str, run: Run) -> pd.DataFr
 
     `order` is that of the run (or `varied`); shuffled, each of the `seeds` is another one, and in
     the file's they are repeats, to hold the others against. `f1` pools seeds; over single seeds it
-    has `f1_mean`,
-    `f1_sd` (ddof = 1), `f1_least` and `f1_most`, of all scenes in the headline setting, counted by
-    `criterion`. `same_plan` is the share of `plan_pairs` (a scene with two seeds) in which the plan
-    names the same blocks in the same order. `pose_first` is the share of `pose_first_n` kinds that
-    were named in the right pose where that is listed first among several, `pose_later` of
-    `pose_later_n` where a wrong one is; `pose_gap` is their difference. `*_lo` and `*_hi` bound
-    95 % intervals. Empty where the run has no samples of the track.
+    has `f1_mean`, `f1_sd` (ddof = 1), `f1_least` and `f1_most`; of all scenes in the headline
+    setting, counted by `criterion`. `same_plan` is the share of `plan_pairs` (a scene with two
+    seeds) in which the plan names the same blocks in the same order. `pose_first` is the share of
+    `pose_first_n` kinds that were named in the right pose where that is listed first among several,
+    `pose_later` of `pose_later_n` where a wrong one is; `pose_gap` is their difference. `*_lo` and
+    `*_hi` bound 95 % intervals. Empty where the run has no samples of the track.
     """
     design = run.design
     records = run.records[run.records["track"] == track]
