@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
+from datetime import date, timedelta
+from importlib.metadata import version
 
 import click
+from rich.console import Console
 
 from phyblock.cli.console import counted, make_console, plain_table, shown_path
 from phyblock.cli.files import find_models_file
 from phyblock.cli.paths import models_file_option
 from phyblock.errors import ModelError, Problem, SpecError
-from phyblock.models import ModelConfig, api_key_status, price_of
+from phyblock.models import ModelConfig, api_key_status, ends_on, is_unlisted, price_of
 from phyblock.registry import baseline_names
 from phyblock.report import NO_VALUE
 from phyblock.run.check import check_model
@@ -19,20 +23,29 @@ from phyblock.specs import ModelSpec, SuiteSpec, did_you_mean, load_models
 
 __all__ = ["command"]
 
+_SOON_DAYS = 180
 _WIDE = 130
 """Characters from which kinds and prices fit beside names, ids and keys."""
 
 
 @click.group("models", invoke_without_command=True)
 @models_file_option
+@click.option(
+    "--retiring",
+    is_flag=True,
+    help=f"List those alone that their providers end within {_SOON_DAYS} days, or have ended.",
+)
 @click.pass_context
-def command(ctx: click.Context, models_file: str | None) -> None:
+def command(ctx: click.Context, models_file: str | None, retiring: bool) -> None:
     """List the models that suites may name; `check NAME` makes one tiny call."""
     path = find_models_file(models_file, None)
     ctx.obj = load_models(path)
     if ctx.invoked_subcommand is not None:
         return
     console = make_console()
+    if retiring:
+        _show_retiring(console, [_config(name, ctx.obj) for name in ctx.obj])
+        return
     names = [*baseline_names(), *ctx.obj]
     rows = [_row(name, _config(name, ctx.obj)) for name in names]
     if console.width < _WIDE:
@@ -76,6 +89,23 @@ def check(known: dict[str, ModelSpec], name: str) -> int:
     )
     console.print(told, markup=False, soft_wrap=True)
     return 0
+
+
+def _show_retiring(console: Console, configs: Sequence[ModelConfig]) -> None:
+    soon = date.today() + timedelta(days=_SOON_DAYS)
+    dated = sorted((day, c.name, c.id) for c in configs if (day := ends_on(c)) is not None)
+    rows = [(name, model_id, day.isoformat()) for day, name, model_id in dated if day <= soon]
+    rows += [(c.name, c.id, "not listed") for c in configs if is_unlisted(c)]
+    if not rows:
+        console.print(f"No model here is known to end within {_SOON_DAYS} days.")
+        return
+    console.print(plain_table(("model", "id", "ends"), rows, numbers=0))
+    console.print(
+        f"By litellm {version('litellm')}, which may be behind. Not listed: retired already, or "
+        "newer than it.",
+        style="dim",
+        soft_wrap=True,
+    )
 
 
 def _config(name: str, known: dict[str, ModelSpec]) -> ModelConfig:

@@ -30,6 +30,7 @@ from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import KeyStatus, api_key_status, server_address
 from phyblock.models.limits import Gate
 from phyblock.models.raw_replies import RawReply, read_raw_reply
+from phyblock.models.retirement import ends_on, is_unlisted
 from phyblock.models.retry import RetryPolicy
 from phyblock.models.shared_cache import SharedCache
 
@@ -61,9 +62,11 @@ __all__ = [
     "api_key_status",
     "build_model",
     "cost_usd",
+    "ends_on",
     "estimate",
     "former_key",
     "is_billed",
+    "is_unlisted",
     "most_usd",
     "price_of",
     "read_raw_reply",
