@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
@@ -21,6 +21,7 @@ from PIL import Image
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import MAX_CANDIDATES, Block
 from phyblock.env.scenes import read_tasks
+from phyblock.env.state import LARGEST, MOST_BLOCKS, TRAITS, candidate_rows, goal_rows
 from phyblock.errors import DataError, Problem
 from phyblock.scoring import Assembly
 from phyblock.sim import PictureStyle, candidates_png
@@ -44,8 +45,9 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
     """Builds one scene an episode, block by block.
 
     Observations are pictures (`current`, `goal`, `candidates`: RGB, shape (size, size, 3), uint8)
-    or, with `observe="state"`, numbers alone (`placed`: how many blocks were placed as each
-    candidate, shape (16,), uint8; `left`: the share of steps that is left, shape (1,), float32).
+    or, with `observe="state"`, numbers alone (`goal` and `candidates`: a row a block, float32, see
+    `phyblock.env.state`; `placed`: how many blocks were placed as each candidate, shape (16,),
+    uint8; `left`: the share of steps that is left, shape (1,), float32).
     The episode terminates with Done, with the goal complete, and under `physics="strict"` with a
     collapse; it is truncated after `max_steps` steps (None: twice the number of blocks) or
     `max_failures` failed moves in a row (None: no bound).
@@ -58,6 +60,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
         data: str | Path | Sequence[AssemblyTask] = "phyblock-400",
         scene: str | None = None,
         *,
+        levels: Collection[int] | None = None,
         setting: Setting = "A",
         gating: Gating = "aov",
         physics: Physics = "settle",
@@ -68,7 +71,8 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
         max_failures: int | None = None,
         render_mode: str | None = None,
     ) -> None:
-        """`data` is a data set (see `read_tasks`) or tasks; `scene` plays that one alone.
+        """`data` is a data set (see `read_tasks`) or tasks; `levels` plays scenes of these alone
+        (None: of all), `scene` that one.
 
         Raises DataError for a data set or scene that is not there, ValueError for an option that
         is not among those allowed, a limit below 1, or no tasks at all.
@@ -76,8 +80,11 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
         _check_options(setting=setting, gating=gating, physics=physics, observe=observe)
         _check_limits(max_steps=max_steps, max_failures=max_failures)
         tasks = read_tasks(data) if isinstance(data, str | Path) else tuple(data)
+        if levels is not None:
+            tasks = tuple(task for task in tasks if set(task.scene.levels) & set(levels))
         if not tasks:
-            raise ValueError("data holds no tasks")
+            of_levels = "" if levels is None else f" of levels {sorted(levels)}"
+            raise ValueError(f"data holds no tasks{of_levels}")
         self._tasks = {task.scene.id: task for task in tasks}
         self._scene = None if scene is None else self._find(scene).scene.id
         self._setting: Setting = setting
@@ -140,6 +147,12 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
         """The actions that would place a block now: what an oracle knows."""
         return self._assembly.right_moves()
 
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Which actions mean something in this scene, shape (17,): Done, and its candidates."""
+        mask = np.zeros(MAX_CANDIDATES + 1, dtype=np.bool_)
+        mask[: len(self._task.candidates) + 1] = True
+        return mask
+
     def _begin(self, task: AssemblyTask) -> None:
         self._assembly = Assembly(task.scene, task.candidates, self._setting, self._gating)
         self._steps = self._failures = 0
@@ -179,6 +192,8 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
             placed = np.bincount(self._assembly.chosen, minlength=MAX_CANDIDATES + 1)[1:]
             left = 1 - self._steps / self._most_steps
             return {
+                "goal": goal_rows(self._task.scene.blocks),
+                "candidates": candidate_rows(self._task.candidates.candidates),
                 "placed": placed.astype(np.uint8),
                 "left": np.array([max(0.0, left)], dtype=np.float32),
             }
@@ -261,6 +276,8 @@ def _space(observe: str, size_px: int) -> spaces.Dict[Any]:
     if observe == "state":
         return spaces.Dict(
             {
+                "goal": spaces.Box(-LARGEST, LARGEST, (MOST_BLOCKS, TRAITS), np.float32),
+                "candidates": spaces.Box(-LARGEST, LARGEST, (MAX_CANDIDATES, TRAITS), np.float32),
                 "placed": spaces.Box(0, _MOST_OF_A_KIND, (MAX_CANDIDATES,), np.uint8),
                 "left": spaces.Box(0.0, 1.0, (1,), np.float32),
             }

@@ -14,7 +14,7 @@ from gymnasium.utils.env_checker import check_env
 
 import phyblock.env
 from phyblock.datasets import AssemblyTask, read_builtin
-from phyblock.domain import Block, Candidate, CandidateSet, Scene
+from phyblock.domain import BLOCK_TYPES, COLORS, Block, Candidate, CandidateSet, Scene
 from phyblock.env import DONE, PhyBlockEnv, read_tasks
 from phyblock.errors import DataError
 from phyblock.words import SETTINGS, Setting
@@ -84,6 +84,29 @@ def test_the_same_seed_gives_the_same_episodes() -> None:
 def test_every_observation_lies_in_its_space() -> None:
     env = PhyBlockEnv(SOME, observe="state", max_steps=5)
     assert all(seen[0] in env.observation_space for seen in rollout(env, 3, 60))
+
+
+def test_a_state_holds_the_goal_and_the_candidates() -> None:
+    env = PhyBlockEnv(SOME, observe="state")
+    for task in SOME:
+        observation, _ = env.reset(options={"scene": task.scene.id})
+        goal, candidates = observation["goal"], observation["candidates"]
+        assert goal[:, 0].sum() == len(task.scene)
+        assert candidates[:, 0].sum() == len(task.candidates)
+        for row, block in zip(goal, task.scene.blocks, strict=False):
+            assert (BLOCK_TYPES[int(row[1])], COLORS[int(row[2])]) == (block.type, block.color)
+            assert row[3:6] == pytest.approx(block.euler_deg, abs=1e-3)
+            assert row[6:] == pytest.approx(block.position_m, abs=1e-5)
+        assert env.action_masks().sum() == 1 + len(task.candidates)
+    env.close()
+
+
+def test_levels_choose_the_scenes() -> None:
+    for level in (1, 4):
+        env = PhyBlockEnv("phyblock-400", levels=(level,), observe="state", physics="off")
+        drawn = {env.reset(seed=seed)[1]["scene"] for seed in range(8)}
+        tasks = {task.scene.id: task for task in read_tasks("phyblock-400")}
+        assert all(level in tasks[name].scene.levels for name in drawn)
 
 
 def test_a_random_agent_ends_within_the_limits() -> None:
@@ -198,6 +221,7 @@ def test_an_invalid_candidate_is_told() -> None:
         ({"max_steps": 0}, "max_steps is 0"),
         ({"max_failures": -1}, "max_failures is -1"),
         ({"data": ()}, "no tasks"),
+        ({"levels": (9,)}, r"no tasks of levels \[9\]"),
     ],
 )
 def test_an_option_that_is_not_allowed_is_said(options: dict[str, Any], message: str) -> None:
