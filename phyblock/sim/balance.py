@@ -2,9 +2,10 @@
 
 Blocks stand when forces in their contacts can bear every weight: each force inside the cone of
 friction, all forces and moments of a block in balance. That is a set of linear equations in
-forces that only push, solved by non-negative least squares (Lawson and Hanson, 1974), with each
-cone as a pyramid of four edges. Where such forces exist, rigid bodies may stand; where none exist,
-they cannot. `surely_stands` and `surely_falls` ask so with every weight moved by `MARGIN_M` to
+forces that only push, solved by non-negative least squares (Lawson and Hanson, 1974) or, where that
+finds no end, by linear programming, with each cone as a pyramid of four edges. Where such forces
+exist, rigid bodies may stand; where none exist, they cannot. `surely_stands` and `surely_falls` ask
+so with every weight moved by `MARGIN_M` to
 one side after another, so that no verdict hangs on an edge that a weight is nearly over.
 """
 
@@ -18,10 +19,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls  # type: ignore[import-untyped]
+from scipy import sparse  # type: ignore[import-untyped]
+from scipy.optimize import linprog, nnls  # type: ignore[import-untyped]
 
 from phyblock.domain.blocks import FRICTION, SHAPES, BlockType, euler_deg_to_matrix
 from phyblock.domain.scene import Block
+from phyblock.errors import PhyblockError
 from phyblock.sim.convex import contact_corners_m, cross, separating_axes
 from phyblock.sim.geometry import ConvexPiece
 from phyblock.sim.support import CONTACT_TOLERANCE_M, bounds_m, boxes_near, pieces_of
@@ -87,9 +90,27 @@ def _bears(forces: NDArray[np.float64], weights: NDArray[np.float64]) -> bool:
         return not weights.size
     try:
         _, residual = nnls(forces, weights)
-    except RuntimeError:  # It found no end, as with sets that are far from any balance.
-        return False
+    except RuntimeError:  # It found no end, which says nothing of whether there is a balance.
+        residual = _least_residual(forces, weights)
     return bool(residual < _TOLERANCE)
+
+
+def _least_residual(forces: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
+    """The least sum of what is left of all weights, by linear programming, which always ends.
+
+    Raises PhyblockError where it does not.
+    """
+    rows, count = forces.shape
+    left_over = sparse.identity(rows)
+    found = linprog(
+        np.concatenate([np.zeros(count), np.ones(2 * rows)]),
+        A_eq=sparse.hstack([sparse.csr_matrix(forces), left_over, -left_over]),
+        b_eq=weights,
+        method="highs",
+    )
+    if found.status != 0:
+        raise PhyblockError(f"statics of {rows // 6} blocks are not decided: {found.message}")
+    return float(found.fun)
 
 
 def _weights(

@@ -1,4 +1,4 @@
-"""What attacks reach on a set, for its data card, beside the first version of phyblock-vqa."""
+"""What attacks reach on a set, for its data card, beside earlier versions of phyblock-vqa."""
 
 from __future__ import annotations
 
@@ -27,17 +27,34 @@ VERSION_1: Mapping[str, Mapping[str, int]] = {
     },
 }
 """What each attack reached [%] on the questions that came before there were attacks."""
+VERSION_2: Mapping[str, Mapping[str, int]] = {
+    "area": {"VP": 26, "CF": 39, "PD": 19, "OR": 4},
+    "colors": {"VP": 28, "CF": 24, "PD": 27},
+    "change": {"VP": 26, "CF": 25, "PD": 30},
+    "odd one out": {"VP": 27, "CF": 64, "PD": 33, "OR": 0},
+    "central": {"CF": 41, "AD": 40},
+    "central and flat": {"CF": 42, "AD": 40},
+    "linear probe": {"VP": 27, "CF": 78, "PD": 49, "OR": 4, "AD": 48},
+    "boosted probe": {"VP": 25, "CF": 71, "PD": 45, "OR": 8, "AD": 58},
+    "support": {"CF": 36},
+    "sole support": {"CF": 46},
+    "text, within the set": {
+        **{"": 26, "SH": 26, "CO": 26, "SI": 20, "NU": 28, "RP": 30, "AP": 25, "RD": 23, "RR": 29},
+        **{"OC": 26, "LC": 31, "TC": 37, "VP": 28, "CF": 25, "PD": 29, "AD": 32},
+    },
+}
+"""The same on the second version, which was held against them."""
 _CUTS_1 = "59 in 47 questions, 47 of them to be seen"
 
 _TEXT = """
 ## Attacks
 
 From `phyblock vqa audit`; docs/vqa.md says what each goes by. Accuracy [%] of the better of both
-ways to read an attack, with a 95 % interval; the last column is what it reached on the first
-version of `phyblock-vqa`.
+ways to read an attack, with a 95 % interval; the last columns are what it reached on earlier
+versions of `phyblock-vqa`.
 
-| attack | subtask | n | chance | reached | 95 % | aim | aim is | version 1 |
-|---|---|---|---|---|---|---|---|---|
+| attack | subtask | n | chance | reached | 95 % | aim | aim is | version 1 | version 2 |
+|---|---|---|---|---|---|---|---|---|---|
 {rows}
 
 Pictures with a block before the camera's near plane or beyond its far one: {cuts} (version 1:
@@ -65,6 +82,6 @@ def _row(one: Attacked) -> str:
     cells = [
         *(one.attack.name, one.subtask or "all", one.n, f"{100 * one.chance:.0f}"),
         *(f"{100 * rate.value:.0f}", interval, f"{100 * aim:.0f}", one.verdict),
-        VERSION_1.get(one.attack.name, {}).get(one.subtask, ""),
+        *(old.get(one.attack.name, {}).get(one.subtask, "") for old in (VERSION_1, VERSION_2)),
     ]
     return f"| {' | '.join(map(str, cells))} |"

@@ -7,24 +7,21 @@ what rests on nothing else. Neither needs physics: no lever, no weight that held
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from phyblock.domain.question import LETTERS, Question, QuestionPicture
+from phyblock.domain.question import LETTERS, Question
 from phyblock.domain.scene import Block
 from phyblock.sim.support import support_graph
 from phyblock_making.attacks.cues import Floats
-from phyblock_making.questions.counterfactual import OUTCOME_TEXTS, marked_order
-from phyblock_making.questions.pictured_drafts import moved_between, option_pictures, picture_of
-from phyblock_making.questions.question_draft import UnfairError
+from phyblock_making.questions.colored_outcomes import colored_orders
+from phyblock_making.questions.counterfactual import OUTCOME_TEXTS
+from phyblock_making.questions.pictured_drafts import option_pictures, picture_of
 
 __all__ = ["naive_likings", "resting_on", "resting_only_on"]
 
 Falls = Callable[[Sequence[Block], int], frozenset[int]]
 """Orders of the blocks that a rule says move when one of some blocks is taken away."""
-
-_UNTOLD = -1000.0
 
 
 def naive_likings(question: Question, falls: Falls) -> Floats | None:
@@ -39,14 +36,12 @@ def naive_likings(question: Question, falls: Falls) -> Floats | None:
     shown = picture_of(question, "scene")
     moved = falls(shown.blocks, removed)
     if any(picture.label in LETTERS for picture in question.pictures):
-        told = [_told(question, shown, picture) for picture in option_pictures(question)]
-        expected = {("gone", removed), *(("moved", order) for order in moved)}
-        return np.array([_UNTOLD if t is None else -len(t ^ expected) for t in told], dtype=float)
+        slots = question.evidence["slots"]
+        told = [colored_orders(one, shown, removed, slots) for one in option_pictures(question)]
+        return np.array([-len(one ^ moved) for one in told], dtype=float)
     if set(question.options) == set(OUTCOME_TEXTS):
         right = OUTCOME_TEXTS[min(len(moved), len(OUTCOME_TEXTS) - 1)]
         return np.array([float(option == right) for option in question.options])
-    if {mark.letter for mark in shown.marks} >= set(LETTERS):
-        return np.array([float(marked_order(shown, letter) in moved) for letter in LETTERS])
     return None
 
 
@@ -66,14 +61,3 @@ def resting_only_on(blocks: Sequence[Block], order: int) -> frozenset[int]:
     for _ in blocks:
         above |= {one for one, below in rests_on.items() if below and below <= above}
     return frozenset(above - {order})
-
-
-def _told(
-    question: Question, shown: QuestionPicture, option: QuestionPicture
-) -> set[tuple[str, int]] | None:
-    """What an option shows as gone and as moved; None where that is hard to tell."""
-    try:
-        gone, moved = moved_between(replace(question.scene, blocks=shown.blocks), option)
-    except UnfairError:
-        return None
-    return {*(("gone", order) for order in gone), *(("moved", order) for order in moved)}

@@ -28,9 +28,9 @@ from phyblock.sim.seeing import Top, is_apart, is_inside, mark_pixel, seen, seen
 from phyblock.sim.steps import groups
 from phyblock.sim.support import bounds_m
 from phyblock_making.poses import POSES
-from phyblock_making.questions.alike import ranked_as_drawn
 from phyblock_making.questions.annexes import with_annex
 from phyblock_making.questions.choices import pick, shuffled
+from phyblock_making.questions.four_alike import four_alike
 from phyblock_making.questions.margins import group_of
 from phyblock_making.questions.picture_view import drawn_view
 from phyblock_making.questions.pictured_drafts import draft, only_index, picture_of
@@ -43,13 +43,13 @@ __all__ = ["AffordanceMaker"]
 _ANNEXED = 0.5
 _BLOCKS_TRIED = 3
 _PLACES_TRIED = 90
-_ENOUGH, _MOST_OF_A_SORT = 4, 10
+_ENOUGH, _MOST_FALLING, _MOST_STAYING = 4, 14, 8
 _STEP_PX = 5
 _FLAT_RISE = 0.99
 _SHIFTS_M = ((0.005, 0.0), (-0.005, 0.0), (0.0, 0.005), (0.0, -0.005))
 _OFF_CENTER_M = 0.001
 _APART_PX = 15.0
-_RIGHTS_TRIED = 12
+_FOURS_TRIED = 3
 
 
 def _balanced() -> list[tuple[BlockType, Euler]]:
@@ -75,7 +75,7 @@ class AffordanceMaker:
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    scenes_tried = 240
+    scenes_tried = 180
     drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -93,7 +93,10 @@ class AffordanceMaker:
             if places:
                 alone = QuestionPicture(BLOCK_LABEL, (block,), view)
                 facts = {"block": block.type, "euler": list(block.euler_deg)}
-                yield draft(scene, rng, "ad-place", places, [plain, alone], block.type, facts=facts)
+                marks = [Mark("A", top.position_m) for top in places]
+                looks = tuple(_looks(plain, top) for top in places)
+                made = draft(scene, rng, "ad-place", marks, [plain, alone], "", facts=facts)
+                yield replace(made, looks=looks)
                 return
 
     def rederive(self, question: Question) -> tuple[int, ...]:
@@ -130,7 +133,7 @@ def _drawn_block(blocks: Sequence[Block], rng: np.random.Generator) -> Block:
 
 def _places(
     plain: QuestionPicture, block: Block, tops: Sequence[Top], rng: np.random.Generator
-) -> list[Mark]:
+) -> list[Top]:
     """The right place and three wrong ones, apart in the picture; none where there are too few."""
     found: dict[bool, list[Top]] = {True: [], False: []}
     for top in tops[:_PLACES_TRIED]:
@@ -139,38 +142,45 @@ def _places(
             continue
         put = lowered(block, plain.blocks, *top.position_m[:2])
         likely = is_balanced(group_of((*plain.blocks, put), put.order))
-        if len(found[likely]) == _MOST_OF_A_SORT:
+        if len(found[likely]) == (_MOST_STAYING if likely else _MOST_FALLING):
             continue
         stays = _by_statics(plain.blocks, block, top)
         if stays is not None:
             found[stays].append(top)
     if len(found[False]) < _ENOUGH:
         return []
-    central = int(rng.integers(len(LETTERS)))
-    for right in found[True][:_RIGHTS_TRIED]:
-        together = [right, *found[False]]
-        marks = [Mark("A", top.position_m) for top in together]
-        apart = np.array([[is_apart(plain, a, [b], _APART_PX) for b in marks] for a in marks])
-        measures = np.array([_looks(plain, top) for top in together])
-        chosen = [marks[i] for i in (0, *ranked_as_drawn(measures, apart, rng, {0: central}))]
-        if len(chosen) == len(LETTERS) and _are_sure(plain, block, chosen):
-            return chosen
+    together = [*found[True], *found[False]]
+    marks = [Mark("A", top.position_m) for top in together]
+    apart = np.array([[is_apart(plain, a, [b], _APART_PX) for b in marks] for a in marks])
+    measures = np.array([_looks(plain, top) for top in together])
+    for _ in range(_FOURS_TRIED):
+        four = four_alike(measures, apart, rng, rights=len(found[True]))
+        if four.chosen and _are_sure(plain, block, [marks[i] for i in four.chosen]):
+            return [together[i] for i in four.chosen]
     return []
 
 
 def _looks(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
-    """How central a place is on its block, how much room is round it, how high, how far out."""
+    """How central a place is on its block, how much room is round it, how high, how far out.
+
+    In the world and in the picture, with how much of its block shows.
+    """
     shot = seen(plain)
     row, column = mark_pixel(plain, top.position_m)
-    others = np.argwhere(shot.block != shot.block[row, column])
-    room_px = np.linalg.norm(others - (row, column), axis=1).min()
+    under = shot.block == shot.block[row, column]
+    room_px = np.linalg.norm(np.argwhere(~under) - (row, column), axis=1).min()
     middle = np.mean([bounds_m(block).mean(axis=0) for block in plain.blocks], axis=0)
+    rows, columns = np.nonzero(shot.block >= 0)
     x, y, z = top.position_m
     return (
         20 * top.off_center_m,
         float(room_px) / 10,
         10 * z,
         3 * float(np.hypot(x - middle[0], y - middle[1])),
+        (row - float(rows.mean())) / 30,
+        (column - float(columns.mean())) / 30,
+        abs(column - float(columns.mean())) / 30,
+        5 * float(under.sum() / len(rows)),
     )
 
 

@@ -21,15 +21,15 @@ from phyblock.sim.render import Shot
 from phyblock.sim.seeing import changed_pixels, differing_pixels, is_inside, seen
 from phyblock_making.questions.pictured_drafts import LEAST_PIXELS
 
-__all__ = ["AREA", "CHANGE", "alike_wrong", "looks", "ranked_as_drawn"]
+__all__ = ["AREA", "alike_wrong", "looks", "ranked_as_drawn"]
 
 _WRONG = 3
 _MOST_POOL = 11
 _MOST_OFF = 1.0
 """How many ranks the right option may be off, on average over the measures."""
 _EQUAL = 0.02
-AREA, CHANGE = 0, 5
-"""Places of two of the measures: how much is colored, how much changed."""
+AREA = 0
+"""Place of the measure how much is colored."""
 _HELD_OFF = 0.5
 
 
@@ -42,7 +42,7 @@ def alike_wrong(
 ) -> list[QuestionPicture]:
     """Three of the pool, told apart from one another and the rest, or none.
 
-    `held` gives ranks that hold exactly, by measure: `AREA` or `CHANGE`.
+    `held` gives ranks that hold exactly, by measure: `AREA`.
     """
     whole = [one for one in (right, *pool) if is_inside(one)][: 1 + _MOST_POOL]
     if not whole or whole[0] is not right:

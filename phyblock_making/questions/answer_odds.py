@@ -1,4 +1,4 @@
-"""What texts alone tell of answers, and which drafts to keep so that they tell nothing.
+"""What texts, or looks, alone tell of answers, and which drafts to keep so that they tell nothing.
 
 In any pool of drafts some words are right more often than others: an arch lies on top, a count is
 rarely the largest number offered. Evening out what was taken would hide that from a reader of one
@@ -7,7 +7,8 @@ instead. A conditional logit (McFadden 1974) tells how likely each option of a d
 from the texts, learned from drafts about other scenes, and a draft whose options have the
 probabilities p is kept with probability min(p) / p[right]. Among those kept that have the same
 texts each option is right equally often, whatever it says (rejection sampling), and what is right
-in one question tells nothing of the next.
+in one question tells nothing of the next. Of options that are places the same is done by measures
+of where they are.
 """
 
 from __future__ import annotations
@@ -36,12 +37,19 @@ class Texts:
     """What a reader without pictures sees of a draft; the right option stands first.
 
     `group` is equal for drafts about scenes that share parts, `kind` for those that ask the same.
+    `looks` are measures of options that are no texts, as many of each.
     """
 
     group: str
     kind: str
     question: str
     options: tuple[str, ...]
+    looks: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def tells(self) -> bool:
+        """Whether there is anything to go by."""
+        return bool(self.options or self.looks)
 
 
 @dataclass(frozen=True)
@@ -65,13 +73,13 @@ class _Table:
 
 
 def keeping_odds(texts: Sequence[Texts]) -> list[float]:
-    """For each draft, with which probability it is kept; 1 for those whose options are no texts."""
-    groups = sorted({one.group for one in texts if one.options})
+    """For each draft, with which probability it is kept; 1 where there is nothing to go by."""
+    groups = sorted({one.group for one in texts if one.tells})
     half_of = {group: place % 2 for place, group in enumerate(groups)}
     odds = [1.0] * len(texts)
     for half in (0, 1):
-        known = [one for one in texts if one.options and half_of[one.group] != half]
-        mine = [i for i, one in enumerate(texts) if one.options and half_of[one.group] == half]
+        known = [one for one in texts if one.tells and half_of[one.group] != half]
+        mine = [i for i, one in enumerate(texts) if one.tells and half_of[one.group] == half]
         if known and mine:
             for i, kept in zip(mine, _judged(known, [texts[i] for i in mine]), strict=True):
                 odds[i] = kept
@@ -106,7 +114,18 @@ def _table(texts: Sequence[Texts], names: dict[str, int], grows: bool) -> _Table
 
 
 def _features(one: Texts) -> Iterator[Mapping[str, float]]:
-    """Of each option, as they are and for its kind, with the others it stands beside."""
+    """Of each option, as they are and for its kind, with the others it stands beside.
+
+    Of looks, how far each measure is from the mean of the options, in standard deviations.
+    """
+    if one.looks:
+        values = np.array(one.looks)
+        spread = values.std(axis=0)
+        for steps in (values - values.mean(axis=0)) / np.where(spread > 0, spread, 1.0):
+            yield {f"{one.kind}: {i}": step for i, step in enumerate(steps)} | {
+                f"{one.kind}: off {i}": abs(step) for i, step in enumerate(steps)
+            }
+        return
     together = " / ".join(sorted(one.options))
     for option, features in zip(one.options, text_features(one.question, one.options), strict=True):
         own = {f"{one.kind}: {name}": value for name, value in features.items()}

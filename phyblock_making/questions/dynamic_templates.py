@@ -15,8 +15,9 @@ _BUILD = (
     " picture shows the blocks of one team in {color}, and those of the others in {other}. Nothing"
     " was ever put in place from below. Order the pictures from the first team to the last.",
     "A structure was put together from four subassemblies, one after the other. In every picture"
-    " one of them is {color} and the rest of the finished structure {other}. Which order of the"
-    " pictures is possible if every block needs what it rests on to be there already?",
+    " one of them is {color} and the rest of the finished structure {other}. In which order,"
+    " from the first to the last, were they put together if every block needs what it rests on to"
+    " be there already?",
     "Each picture marks in {color} the blocks that were added on one of four days; blocks of the"
     " other days are {other}. Blocks were only ever set down on what already stood. Sort the"
     " pictures from the first day to the last.",
@@ -25,7 +26,8 @@ _BUILD = (
     " {other}. Give the earliest stage first.",
     "Building this structure took four steps. What one step added is {color} in one of the"
     " pictures, and everything else, earlier or later, is {other}. Put the pictures in the order of"
-    " the steps, remembering that a block goes in after all those that carry it.",
+    " the steps, the first step first, remembering that a block goes in after all those that carry"
+    " it.",
 )
 _APART = (
     "The four pictures show the same structure before it is taken apart in four stages. In each"
@@ -37,7 +39,7 @@ _APART = (
     " another. Order the pictures from the first team to the last.",
     "This structure is cleared in four steps. What one step clears is {color} in one of the"
     " pictures, and everything else, cleared earlier or later, is {other}. Blocks that carry"
-    " others have to wait. Put the pictures in the order of the steps.",
+    " others have to wait. Put the pictures in the order of the steps, the first step first.",
     "Each picture marks in {color} the blocks that are taken down on one of four days; blocks of"
     " the other days are {other}. Only blocks that carry nothing are ever taken. Sort the pictures"
     " from the first day to the last.",
@@ -45,8 +47,8 @@ _APART = (
     " if a block has to stay as long as anything rests on it? All that is not of the stage shown is"
     " {other}. Give the part that goes first, first.",
     "A structure is divided into four subassemblies that are taken away one after the other. In"
-    " every picture one of them is {color} and the rest {other}. Which order of the pictures is"
-    " possible if nothing may be removed from below what it carries?",
+    " every picture one of them is {color} and the rest {other}. In which order, from the"
+    " first to the last, are they taken away if nothing may be removed from below what it carries?",
 )
 _COUNT = (
     "What happens to the other blocks if the block marked X is removed?",
@@ -55,31 +57,25 @@ _COUNT = (
     "The block marked X disappears. How many other blocks move or fall?",
     "Imagine the same scene without the block marked X, everything else let go where it is now."
     " What follows?",
-    "Somebody lifts the block marked X away without touching the others. What do they do?",
-)
-_WHICH = (
-    "If the block marked X is removed, at which of the marked places A to D does the block there"
+    "Somebody lifts the block marked X away without touching the others. How many of the others"
     " move or fall?",
-    "Suppose the block marked X is taken out. Exactly one of the blocks at the places A, B, C and D"
-    " does not stay where it is. At which place?",
-    "The block marked X is taken away. Which of the marked places A to D is on a block that moves"
-    " or falls?",
-    "Three of the blocks marked A to D stay where they are when the block marked X is taken away."
-    " Where is the one that does not?",
-    "Which mark, A, B, C or D, is on a block that needs the block marked X in order to stay where"
-    " it is?",
 )
-_GONE = (
-    "What is likely to happen if the block marked X is taken away? Choose the picture that shows"
-    " the scene after everything has come to rest.",
-    "How will the scene change if the block marked X is removed? Which picture shows it once it has"
-    " come to rest?",
-    "Suppose the block marked X is taken out. Which of the four pictures shows the result?",
-    "Which picture shows what follows the removal of the block marked X?",
-    "The block marked X is gone in all four pictures. Which of them shows what its removal alone"
-    " leads to?",
-    "Nothing but the block marked X is touched, and it is taken away. What does the scene look like"
-    " then, once nothing moves any more?",
+_COLORED = (
+    "The block marked X in the first picture is taken away. Each of the other four pictures shows"
+    " the structure before that, with X in {taken}, every block that will move or fall in {color},"
+    " and every block that will stay in {other}. Which picture colors them rightly?",
+    "What follows if the block marked X is removed? Four pictures color the same structure: X"
+    " itself is {taken}, {color} are the blocks said to move or fall, {other} those said to stay"
+    " where they are. Which one is right?",
+    "Suppose the block marked X is taken out and everything else is let go. In which of the four"
+    " pictures, where X is {taken}, are just those blocks {color} that do not stay where they are,"
+    " and all the others {other}?",
+    "Four people guess what the removal of the block marked X leads to. Each has colored X"
+    " {taken}, what moves or falls {color}, and what stays in place {other}. Whose picture is"
+    " right?",
+    "The block marked X, {taken} in the pictures of the options, disappears. Choose the picture in"
+    " which {color} marks all blocks that then move or fall, and {other} all that stay. A picture"
+    " without {color} says that nothing moves.",
 )
 _NEXT = (
     "The first picture shows an unfinished structure. Which of the four pictures can be the next"
@@ -129,13 +125,12 @@ _STAYS = (
     " turned as shown, its middle over the mark, and released at the first touch.",
 )
 _TARGET = " The small target of a mark lies on the block that is meant."
-_MARKED_STEMS = ("cf-count", "cf-which", "cf-picture", "pd-push")
+_MARKED_STEMS = ("cf-count", "cf-color", "pd-push")
 _STEMS: Mapping[str, tuple[str, ...]] = {
     "or-build": _BUILD,
     "or-apart": _APART,
     "cf-count": _COUNT,
-    "cf-which": _WHICH,
-    "cf-picture": _GONE,
+    "cf-color": _COLORED,
     "pd-next": _NEXT,
     "pd-push": _PUSHED,
     "ad-place": _STAYS,

@@ -7,10 +7,11 @@ from collections.abc import Collection, Mapping, Sequence
 
 from phyblock.domain.scene import Block
 from phyblock.sim.balance import surely_falls, surely_stands
+from phyblock.sim.outcomes import Outcome, after_removal
 from phyblock.sim.steps import groups
 from phyblock.sim.support import support_graph
 
-__all__ = ["group_of", "is_sure", "resting_on"]
+__all__ = ["group_of", "is_sure", "resting_on", "sure_removal"]
 
 
 def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> frozenset[int]:
@@ -50,3 +51,14 @@ def is_sure(left: Sequence[Block], moved: Collection[int]) -> bool:
     return all(surely_stands(group) for group in groups(still)) and all(
         surely_falls([*still, *lot]) for lot in falling
     )
+
+
+def sure_removal(blocks: Sequence[Block], order: int) -> Outcome | None:
+    """What surely follows a removal; None where settings or statics leave a doubt."""
+    group = group_of(blocks, order)
+    if not surely_stands(group):
+        return None
+    outcome = after_removal(blocks, order)
+    near = [block for block in group if block.order != order]
+    is_near = set(outcome.moved) <= {block.order for block in near}
+    return outcome if outcome.is_clear and is_near and is_sure(near, outcome.moved) else None

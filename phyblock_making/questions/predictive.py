@@ -9,7 +9,7 @@ import numpy as np
 
 from phyblock.domain.question import Question, Subtask
 from phyblock.domain.scene import Scene
-from phyblock_making.questions.counterfactual import TAKEN, marked_order
+from phyblock_making.questions.marked_blocks import TAKEN, marked_order
 from phyblock_making.questions.next_steps import can_follow, next_drafts
 from phyblock_making.questions.pictured_drafts import (
     of_kind,

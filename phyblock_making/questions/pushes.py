@@ -21,8 +21,8 @@ from phyblock.sim.seeing import block_mark, seen, shown_pixels
 from phyblock.sim.steps import groups
 from phyblock.sim.support import bounds_m, boxes_near
 from phyblock_making.questions.choices import shuffled
-from phyblock_making.questions.counterfactual import TAKEN
 from phyblock_making.questions.margins import group_of, is_sure
+from phyblock_making.questions.marked_blocks import TAKEN
 from phyblock_making.questions.pictured_drafts import (
     are_told_apart,
     draft,

@@ -49,7 +49,7 @@ types in five colors, for these subtasks:
   drawn for it;
 * size, relative rotation: the blocks that are compared have colors that no other block has.
 
-Other subtasks may recolor single blocks in pictures that are wrong options. `colors` in a line
+Other subtasks may recolor blocks in pictures that are options. `colors` in a line
 holds the blocks whose color differs from the stored scene.
 
 ## What was refused, and the rules that came of it
@@ -93,8 +93,11 @@ What was unfair became a rule for all:
 * of removals four in ten follow the rule that what rests on a block falls with it; in the others a
   support is one too many, or a weight holds what it stands on. Planks with weights or a column are
   added for them (`add`), on structures of which some upper blocks may be left out (`without`);
-* pictures of removals all lack the right block; in all of them everything is at rest and nothing
-  hangs free; that nothing else moved is right in about one of four;
+* pictures of removals say by colors what moves: all show one structure, before the removal. Wrong
+  are lots of one to three blocks with all that rests on them; three are taken so that the right
+  one's ranks among the four in eleven measures (how much is colored and where, how far from the
+  block that is taken away, how well it fits either rule of support) and in how unlike the others it
+  is are about those of any lot among any four;
 * every picture of a push is what really follows one of four pushes close by, and which one is asked
   about is drawn; it goes as far as the text says in every setting, and came down or did not in all;
 * blocks are pushed by a length that is no multiple of the grid of the structures;
@@ -103,9 +106,12 @@ What was unfair became a rule for all:
   area, and about its ranks in seven other measures of pixels, are drawn;
 * stages of building are colored in pictures of the whole structure, so that none is larger for
   being early; a cut in four is refused where number, area or height of the blocks sorts it;
-* places for a block are all on flat faces, with the right one's rank in distance from the middle of
-  its block drawn; they hold, or do not, also 5 mm off in four directions, and blocks without a
-  clear middle are not put down;
+* places for a block are all on flat faces; one that holds and three that do not are taken so that
+  the right one's ranks in eight measures (distance from the middle of its block, room round it,
+  height, where it is, how much shows of its block) are about those of any place; they hold, or do
+  not, also 5 mm off in four directions, and blocks without a clear middle are not put down;
+* of places chance leaves out drafts, too, until these measures tell nothing of
+  what is right (rejection sampling as for texts);
 * an arch, a triangular prism, a half cylinder or a cylinder is called that, and its shape asked
   for, only where its profile is turned to the viewer by 15 degrees: from behind an arch looks like
   a box;
@@ -116,6 +122,7 @@ What was unfair became a rule for all:
 * options of viewpoints are one structure with two changes (mirrored, two colors exchanged, a block
   shifted) each made or not, with equal blocks and colors; the true one is drawn evenly, and the
   nearest histogram of visible colors is right for one of the four;
+* options of viewpoints differ in a tenth of what shows of the blocks at least;
 * pictures that are options differ in 220 of 256 x 256 pixels at least, and cut nothing off.
 
 ## What is in it

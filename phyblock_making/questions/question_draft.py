@@ -32,7 +32,8 @@ class Draft:
     of answer: production takes as even a share of kinds as the scenes allow, and of values where
     the options are no texts. `evidence` is
     what JSON can hold, and names no letters: they are dealt later; `evidence["slots"]` holds what
-    the template was filled with.
+    the template was filled with. `looks` are measures of options that are no texts, by which a
+    reader might guess: drafts are left out until these tell nothing.
     """
 
     scene: Scene
@@ -42,6 +43,7 @@ class Draft:
     wording: str
     value: str
     kind: str = ""
+    looks: tuple[tuple[float, ...], ...] = ()
     evidence: Mapping[str, Any] = field(default_factory=dict)
 
 

@@ -46,8 +46,15 @@ def make_questions(
 
     Drafts of a scene depend on seed, subtask and scene alone; what is taken of them, and which
     letter is right, on seed and subtask. `report` hears of every scene that was asked, and of
-    how many there are to ask. Raises DataError when the scenes give too few.
+    how many there are to ask. Raises DataError that names every subtask of which the scenes give
+    too few: at once where they are too few for so many, else when all have been asked.
     """
+    most = {
+        subtask: len(_tried(subtask, scenes, seed)) * MAKERS[subtask].drafts_a_scene
+        for subtask in wanted
+    }
+    short = {subtask: most[subtask] for subtask, count in wanted.items() if most[subtask] < count}
+    _check_enough(short, wanted)
     for subtask, count in wanted.items():
         pool: list[Pooled] = []
         tasks = [(subtask, seed, scene) for scene in _tried(subtask, scenes, seed)]
@@ -57,9 +64,23 @@ def make_questions(
         rng = _rng(seed, subtask, "choice")
         taken = select(pool, count, rng)
         if len(taken) < count:
-            message = f"the scenes give no more than {len(taken)} of {count} questions"
-            raise DataError(Problem(subtask, message, hint="ask for fewer, or give more scenes"))
-        yield from _dealt(subtask, taken, rng)
+            short[subtask] = len(taken)
+        if not short:
+            yield from _dealt(subtask, taken, rng)
+    _check_enough(short, wanted)
+
+
+def _check_enough(short: Mapping[Subtask, int], wanted: Mapping[Subtask, int]) -> None:
+    """Raise DataError that names the subtasks of which there are too few, if any, and how many."""
+    hint = "ask for fewer, or give more scenes"
+    problems = [
+        Problem(
+            subtask, f"the scenes give no more than {n} of {wanted[subtask]} questions", hint=hint
+        )
+        for subtask, n in short.items()
+    ]
+    if problems:
+        raise DataError(problems)
 
 
 def tidy_picture(picture: QuestionPicture) -> QuestionPicture:

@@ -26,7 +26,7 @@ _LOOKED_AT = 100
 _SPREAD = 20
 """So many times the drafts that are wanted of a sort are looked at, where the pool has them,"""
 _SPARE = 2
-"""and so many times the drafts that are wanted are kept at the least."""
+"""and so many times the drafts that are wanted are kept at the least, where options are texts."""
 _WEIGHTS = {"kind": 6.0, "wording": 2.0, "options": 0.2, "value": 4.0, "scene": 3.0, "level": 0.3}
 
 
@@ -51,7 +51,7 @@ class Pooled:
         """What a reader without pictures sees."""
         scene = self.draft.scene
         group = (scene.parents or (scene.id,))[0]
-        return Texts(group, self.draft.kind, self.draft.text, self.option_texts)
+        return Texts(group, self.draft.kind, self.draft.text, self.option_texts, self.draft.looks)
 
 
 def select(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list[Pooled]:
@@ -91,7 +91,8 @@ def _kept(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list[
     """The drafts that chance leaves; more likely ones as well where they would be too few."""
     odds = np.array(keeping_odds([one.texts for one in pool]))
     rank = rng.random(len(pool)) / np.maximum(odds, 1e-9)
-    least = float(np.sort(rank)[: _SPARE * count][-1]) if len(pool) else 0.0
+    spare = _SPARE if any(one.option_texts for one in pool) else 1
+    least = float(np.sort(rank)[: spare * count][-1]) if len(pool) else 0.0
     return [one for one, place in zip(pool, rank, strict=True) if place <= max(1.0, least)]
 
 

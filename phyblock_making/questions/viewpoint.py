@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.sim.seeing import seen, shown_pixels
+from phyblock.sim.seeing import least_difference, seen, shown_pixels
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import recolored
 from phyblock_making.questions.picture_view import View, drawn_view
@@ -50,6 +50,8 @@ _LEAST_SHOWN = 100
 """Pixels of 256 x 256 that both views show of blocks that exchange their colors."""
 _SHOWN_IN_FRONT = 0.8
 """The least share of all blocks of which the front view shows something."""
+_LEAST_SHARE = 0.1
+"""In so much of what shows of the blocks any two options differ: less is easily overlooked."""
 _SIDE_PIXELS = 500
 """Whole pictures are compared by side, not structures that are nearly alike."""
 
@@ -118,7 +120,7 @@ def _match(
         if not family or _hits(family, first, second) != 1.0:
             continue
         shown, options = ([one.seen_from(view) for one in family] for view in (first, second))
-        if are_told_apart(shown) and are_told_apart(options):
+        if are_told_apart(shown) and are_told_apart(options) and _differ_at_a_glance(options):
             right = int(rng.integers(len(family)))
             order = [right, *(i for i in range(len(family)) if i != right)]
             slots = {"side_words": side} if side else {}
@@ -193,12 +195,19 @@ def _side(scene: Scene, rng: np.random.Generator, front: View, side: str) -> Ite
     pixels = _pixels(base, front).values()
     if sum(n > 0 for n in pixels) < _SHOWN_IN_FRONT * len(pixels):
         return
-    if are_told_apart([shown, *options], least=_SIDE_PIXELS):
+    if are_told_apart([shown, *options], least=_SIDE_PIXELS) and _differ_at_a_glance(options):
         if rng.random() < 0.5:
             # The mirror image is shown: what it looks like from a side is the other side mirrored.
             shown, options = base.mirrored().seen_from(front), options[::-1]
         facts = {"changes": "mirror"}
         yield draft(scene, rng, "vp-side", options, [shown], side, {"side_words": side}, facts)
+
+
+def _differ_at_a_glance(options: Sequence[QuestionPicture]) -> bool:
+    """Whether any two of the options differ in at least `_LEAST_SHARE` of what shows of blocks."""
+    shots = [seen(option) for option in options]
+    area = max(int((shot.block >= 0).sum()) for shot in shots)
+    return least_difference(shots) >= _LEAST_SHARE * area
 
 
 def _opposite(side: str) -> str:

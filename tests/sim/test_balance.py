@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import nnls  # type: ignore[import-untyped]
 
 from phyblock.datasets import read_builtin
 from phyblock.resources import bundled
+from phyblock.sim import balance
 from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
 from phyblock.sim.steps import groups
 from tests.sim.structures import block, counterweighted_beam, tower, turned
@@ -51,6 +54,21 @@ def test_a_weight_that_holds_a_plank_is_needed() -> None:
 def test_a_block_in_the_air_is_not_borne() -> None:
     assert surely_falls([*tower(1), block(2, "cube", (0, 0, 0.08))])
     assert is_balanced([])
+
+
+@pytest.mark.parametrize("offset_m", [-0.04, -0.021, 0.0, 0.019, 0.033])
+def test_where_least_squares_find_no_end_the_verdict_is_the_same(
+    offset_m: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A solver that is cut short must not make blocks fall that stand, or stand that fall."""
+    pair = [*tower(2), block(3, "cuboid3", (offset_m, 0, 0.1125), (0, 0, 30))]
+
+    def verdicts() -> tuple[bool, ...]:
+        return is_balanced(pair), surely_stands(pair), surely_falls(pair)
+
+    before = verdicts()
+    monkeypatch.setattr(balance, "nnls", functools.partial(nnls, maxiter=1))
+    assert verdicts() == before
 
 
 @pytest.mark.parametrize(("friction", "stays"), [(0.9, False), (1.1, True)])

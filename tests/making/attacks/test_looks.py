@@ -10,6 +10,7 @@ import pytest
 
 from phyblock.datasets import read_builtin, read_questions
 from phyblock.domain import Question, QuestionPicture
+from phyblock.domain.blocks import Color
 from phyblock.domain.rotation import rotated
 from phyblock.domain.scene import Block
 from phyblock.sim import question_pictures
@@ -96,7 +97,7 @@ def removal(asked: dict[str, Question], options: tuple[str, ...], *others: objec
         QuestionPicture(letter, tuple(blocks), (45.0, 22.0))  # type: ignore[arg-type]
         for letter, blocks in zip("ABCD", others, strict=False)
     )
-    facts = {"removed": 1}
+    facts = {"removed": 1, "slots": {"color": "red", "other": "yellow", "taken": "blue"}}
     return replace(
         asked["CF"], scene=scene, options=options, pictures=(shown, *pictures), evidence=facts
     )
@@ -109,13 +110,14 @@ def test_a_rule_picks_the_text_and_the_picture_that_say_what_it_says(
     assert naive_likings(told, resting_on).tolist() == [0, 1, 0, 0]  # type: ignore[union-attr]
     assert naive_likings(told, resting_only_on).tolist() == [0, 0, 0, 1]  # type: ignore[union-attr]
     blocks = bridge()
-    rest = [block for block in blocks if block.order != 1]
-    fallen = [
-        replace(b, position_m=(b.position_m[0], 0.2, b.position_m[2])) if b.order in (3, 4) else b
-        for b in rest
-    ]
+
+    def colored(*moved: int) -> list[Block]:
+        colors: list[Color] = ["blue" if b.order == 1 else "red" if b.order in moved else "yellow"
+                               for b in blocks]  # fmt: skip
+        return [replace(b, color=color) for b, color in zip(blocks, colors, strict=True)]
+
     images = tuple(f"<img{place}>" for place in range(1, 5))
-    shown = removal(asked, images, blocks, rest, fallen, blocks[:2])
+    shown = removal(asked, images, colored(2, 5), colored(), colored(3, 4), colored(4))
     likings = naive_likings(shown, resting_on)
     assert likings is not None
     assert likings.argmax() == 2

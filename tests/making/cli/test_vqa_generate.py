@@ -61,7 +61,7 @@ def test_questions_are_written_with_card_and_checksums(folder: Path) -> None:
     card = (folder / "q" / "CARD.md").read_text(encoding="utf-8")
     assert f"phyblock vqa generate --data {folder}" in card
     assert f"scenes of `{folder.name}`" in card
-    assert re.search(r"\| text, within the set \| CO \| 4 \| 25 \| \d+ \| .* \| 49 \|", card)
+    assert re.search(r"\| text, within the set \| CO \| 4 \| 25 \| \d+ \| .* \| 49 \| 26 \|", card)
 
 
 def test_a_folder_is_not_written_over_unasked(folder: Path) -> None:

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock_making.questions.alike import ranked_as_drawn
+from phyblock_making.questions.four_alike import four_alike
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -52,3 +53,31 @@ def test_a_right_option_that_is_extreme_in_the_pool_is_less_so_among_four() -> N
     shares = np.bincount(ranks, minlength=4) / len(ranks)
     assert len(ranks) > 200
     assert shares.max() < 0.42
+
+
+@given(seed=seeds, rights=st.integers(1, 4))
+def test_four_are_a_right_one_and_three_wrong_ones_all_apart(seed: int, rights: int) -> None:
+    rng, measures = drawn(seed)
+    apart = rng.random((len(measures),) * 2) < 0.7
+    apart &= apart.T
+    four = four_alike(measures, apart, rng, rights=rights)
+    if four.chosen:
+        right, *wrong = four.chosen
+        assert right < rights <= min(wrong)
+        assert all(apart[a, b] for a in four.chosen for b in four.chosen if a < b)
+        ranks = [sum(measures[i, m] < measures[right, m] for i in wrong) for m in range(4)]
+        assert np.abs(np.array(four.ranks) - ranks).max() <= 0.5
+
+
+def test_a_right_one_that_stands_out_in_the_pool_has_any_rank_among_four() -> None:
+    """It would be the most of four in 47 cases of a hundred."""
+    ranks = []
+    for seed in range(300):
+        rng, measures = drawn(seed, n=16)
+        measures[:4, 0] = np.abs(measures[:4, 0])
+        four = four_alike(measures, everywhere(16), rng, rights=4)
+        if four.chosen:
+            ranks.append(round(four.ranks[0]))
+    shares = np.bincount(ranks, minlength=4) / len(ranks)
+    assert len(ranks) > 250
+    assert shares.max() < 0.39

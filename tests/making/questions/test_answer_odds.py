@@ -52,3 +52,23 @@ def test_drafts_that_tell_nothing_are_kept_and_so_are_options_that_are_no_texts(
     assert np.mean(keeping_odds(even)) > 0.7
     assert keeping_odds([Texts("s", "k", "Which picture?", ())] * 5) == [1.0] * 5
     assert keeping_odds([]) == []
+
+
+@pytest.mark.parametrize("is_middle", [False, True])
+def test_of_the_drafts_kept_no_look_is_right_more_often(is_middle: bool) -> None:
+    """By the most of a measure, or by what is nearest to the others."""
+    rng, seen = np.random.default_rng(4), []
+    for number in range(1500):
+        looks = rng.normal(size=(4, 2))
+        off = -np.abs(looks[:, 1] - looks[:, 1].mean()) if is_middle else looks[:, 1]
+        right = int(np.argmax(1.5 * off + rng.gumbel(size=4)))
+        order = [right, *(i for i in range(4) if i != right)]
+        rows = tuple(tuple(row) for row in looks[order].tolist())
+        seen.append(
+            (Texts(f"s{number % 60}", "k", "Which?", (), rows), int(off[right] == off.max()))
+        )
+    odds = keeping_odds([texts for texts, _ in seen])
+    kept = [most for (_, most), odd in zip(seen, odds, strict=True) if rng.random() < odd]
+    assert np.mean([most for _, most in seen]) > 0.4
+    assert len(kept) > 200
+    assert abs(np.mean(kept) - 0.25) < 0.08

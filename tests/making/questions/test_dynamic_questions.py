@@ -9,6 +9,7 @@ import pytest
 
 from phyblock.datasets import read_builtin
 from phyblock.domain import LETTERS, Question, Subtask
+from phyblock.domain.blocks import COLORS
 from phyblock.domain.scene import Scene
 from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled
@@ -24,7 +25,7 @@ DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
 SCENES: dict[str, Scene] = {task.scene.id: task.scene for task in DATA.tasks}
 ASKED: dict[Subtask, tuple[str, ...]] = {
     "VP": ("l1-008-table", "l2-018-monument", "l2-016-car", "l1-003-gate"),
-    "CF": ("l1-003-gate", "l2-018-monument", "l2-051-recolored", "l2-062-recolored"),
+    "CF": ("l1-003-gate", "l2-063-recolored", "l2-051-recolored"),
     "PD": ("l2-016-car", "l2-042-recolored"),
     "OR": ("l3-011-stair", "l3-022-slide"),
 }
@@ -81,7 +82,7 @@ def test_pictures_of_stages_show_the_same_blocks(questions: list[Question]) -> N
 
 def test_nothing_hangs_free_in_a_picture_of_what_follows(questions: list[Question]) -> None:
     for question in questions:
-        if question.evidence["kind"] in ("cf-picture", "pd-push", "pd-next"):
+        if question.evidence["kind"] in ("cf-color", "pd-push", "pd-next"):
             for picture in question.pictures:
                 assert find_gaps(picture.blocks, HANGS_M) == ()
 
@@ -90,6 +91,36 @@ def test_texts_of_outcomes_are_always_all_offered(questions: list[Question]) -> 
     for question in questions:
         if question.evidence["kind"] == "cf-count":
             assert sorted(question.options) == sorted(OUTCOME_TEXTS)
+
+
+@pytest.fixture(scope="module")
+def colored(questions: list[Question]) -> list[Question]:
+    """Those about removals whose options are colored."""
+    return [question for question in questions if question.evidence["kind"] == "cf-color"]
+
+
+def test_options_in_colors_show_one_structure(colored: list[Question]) -> None:
+    """Nothing is missing or moved in any of them."""
+    assert colored
+    for question in colored:
+        places = {
+            tuple((b.order, b.position_m, b.euler_deg) for b in picture.blocks)
+            for picture in question.pictures
+        }
+        assert len(places) == 1
+        assert len({tuple(b.color for b in one.blocks) for one in question.pictures}) == 5
+
+
+def test_a_color_that_no_text_names_is_found_out(colored: list[Question]) -> None:
+    question = colored[0]
+    unnamed = next(color for color in COLORS if color not in question.evidence["slots"].values())
+    first = question.pictures[1]
+    block = next(b for b in first.blocks if b.order != question.evidence["removed"])
+    strange = replace(block, color=unnamed)
+    blocks = tuple(strange if one is block else one for one in first.blocks)
+    pictures = (question.pictures[0], replace(first, blocks=blocks), *question.pictures[2:])
+    found = problem_of(replace(question, pictures=pictures))
+    assert found == "picture A shows other colors than the text names"
 
 
 def test_a_changed_picture_is_found_out(questions: list[Question]) -> None:

@@ -171,9 +171,16 @@ def test_the_processes_change_nothing_and_the_seed_does() -> None:
     assert lines(1, 1) == lines(1, 2) != lines(2, 1)
 
 
-def test_too_few_scenes_are_told() -> None:
-    with pytest.raises(DataError, match="OC: the scenes give no more than"):
-        made(SCENES[:1], ("OC",))
+def test_too_few_scenes_are_told_for_all_subtasks_at_once() -> None:
+    """Before any is drafted, where no scene could give so many; else when all were drafted."""
+    with pytest.raises(DataError) as told:
+        made(SCENES[:1], ("OC", "OR", "AD"))
+    assert [problem.where for problem in told.value.problems] == ["OR", "AD"]
+    with pytest.raises(DataError, match="OC: the scenes give no more than") as told:
+        made(SCENES[:1], ("OC", "CO", "NU"))
+    short = [problem.where for problem in told.value.problems]
+    assert "OC" in short
+    assert len(short) > 1
 
 
 def test_colors_are_drawn_where_the_kit_would_tell(questions: list[Question]) -> None:

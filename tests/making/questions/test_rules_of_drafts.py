@@ -14,6 +14,7 @@ from phyblock.datasets import read_builtin
 from phyblock.domain import Block, BlockType, Color, QuestionPicture, Scene
 from phyblock.domain.blocks import Euler
 from phyblock.resources import bundled
+from phyblock.sim.seeing import least_difference, seen
 from phyblock.sim.support import find_overlaps, support_graph
 from phyblock_making.poses import POSES
 from phyblock_making.questions.axis_turns import AXIS_TURNS, LONG_TYPES, axis_turns, tipped_over
@@ -136,6 +137,9 @@ def test_options_of_viewpoints_have_the_same_blocks_in_the_same_colors(
     for draft in viewpoints:
         options = [option for option in draft.options if isinstance(option, QuestionPicture)]
         assert len({_contents(option) for option in options}) == 1
+        shots = [seen(option) for option in options]
+        area = max((shot.block >= 0).sum() for shot in shots)
+        assert least_difference(shots) >= 0.1 * area
         forms = Counter(repr(turned_form(option.blocks)) for option in options)
         assert len(forms) == (4 if draft.kind == "vp-match" else len(forms))
         shown = turned_form(draft.pictures[0].blocks)
