@@ -30,7 +30,7 @@ def questions(tmp_path_factory: pytest.TempPathFactory) -> QuestionSet:
 
 @pytest.fixture
 def pictures(pictures_dir: Path) -> Iterator[QuestionPictures]:
-    made = QuestionPictures(pictures_dir, PictureStyle(size_px=128), "images", workers=1)
+    made = QuestionPictures(pictures_dir, PictureStyle(size_px=128), "images", shop=1)
     yield made
     made.close()
 

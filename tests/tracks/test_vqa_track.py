@@ -42,7 +42,7 @@ def question_set(tmp_path_factory: pytest.TempPathFactory) -> QuestionSet:
 def track_of(
     found: QuestionSet, folder: Path, rules: VqaRules, tasks: Sequence[QuestionTask] | None = None
 ) -> Vqa:
-    pictures = QuestionPictures(folder, STYLE, rules.options_as, workers=1)
+    pictures = QuestionPictures(folder, STYLE, rules.options_as, shop=1)
     prompt = TemplatePrompt(bundled("prompts", "vqa.j2"), "default")
     return Vqa(rules, found, found.tasks if tasks is None else tasks, prompt, pictures)
 
