@@ -68,7 +68,7 @@ def test_a_request_holds_the_question_and_the_seed(task: AssemblyTask, tmp_path:
     path = tmp_path / "mine.j2"
     path.write_text("{% block user %}{{ pictures | join }}{% endblock %}", encoding="utf-8")
     policy = PicturePolicy("render", "separate", ("candidates", "goal"), PictureStyle(size_px=128))
-    pictures = Pictures(tmp_path / "cache", policy, workers=1)
+    pictures = Pictures(tmp_path / "cache", policy, shop=1)
     prompt = TemplatePrompt(path, "mine.j2")
     track = FullPlanning(RULES, prompt, pictures)
     try:

@@ -38,7 +38,7 @@ def draw(
     async def ask(pictures: Pictures) -> list[tuple[Image, ...]]:
         return list(await asyncio.gather(*(pictures.of(task) for task in tasks)))
 
-    pictures = Pictures(folder, policy, workers=1)
+    pictures = Pictures(folder, policy, shop=1)
     try:
         return asyncio.run(ask(pictures)), pictures.rendered
     finally:
@@ -97,7 +97,7 @@ def test_an_outline_draws_nothing_and_has_the_real_sizes(
     tasks: tuple[AssemblyTask, ...], tmp_path: Path
 ) -> None:
     for policy in (COMPOSITE, GOAL_FIRST):
-        pictures = Pictures(tmp_path / policy.layout, policy, workers=1)
+        pictures = Pictures(tmp_path / policy.layout, policy, shop=1)
         outlined, real = pictures.outline(tasks[0])
         assert not real
         assert {picture.data for picture in outlined} == {b""}
@@ -170,7 +170,7 @@ def test_a_data_set_without_the_picture_is_refused(
 def test_what_is_no_picture_in_the_cache_is_drawn_anew(
     tasks: tuple[AssemblyTask, ...], tmp_path: Path, size: tuple[int, int]
 ) -> None:
-    pictures = Pictures(tmp_path, COMPOSITE, workers=1)
+    pictures = Pictures(tmp_path, COMPOSITE, shop=1)
     (key,) = pictures.keys(tasks[0])
     (tmp_path / key[:2]).mkdir()
     (tmp_path / key[:2] / f"{key}.png").write_bytes(png_header(*size))

@@ -151,7 +151,7 @@ def test_pictures_follow_what_is_shown(
     tasks: tuple[AssemblyTask, ...], layout: Any, pictures_dir: Path
 ) -> None:
     policy = PicturePolicy("render", layout, ("goal", "candidates"), STYLE)
-    pictures = Pictures(pictures_dir, policy, workers=1)
+    pictures = Pictures(pictures_dir, policy, shop=1)
     try:
         plain = sent(pictures, tasks[0])
         blind = TaskShowing(Showing("shuffled", blind=True)).of(tasks[0], 1)
@@ -182,8 +182,8 @@ def test_pictures_of_the_data_set_can_leave_out_or_exchange_the_goal(
     assert isinstance(wrong, ShownTask)
     assert wrong.goal is not None
     policy = PicturePolicy("dataset", "separate", ("goal", "candidates"), STYLE)
-    apart = Pictures(tmp_path, policy, workers=1)
-    joined = Pictures(tmp_path, replace(policy, layout="composite"), workers=1)
+    apart = Pictures(tmp_path, policy, shop=1)
+    joined = Pictures(tmp_path, replace(policy, layout="composite"), shop=1)
     goal, grid = sent(apart, task)
     assert sent(apart, blind) == sent(joined, blind) == (grid,)
     assert sent(apart, wrong) == (sent(apart, wrong.goal)[0], grid)
