@@ -24,7 +24,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.models import is_billed
 from phyblock.plain_text import one_line
 from phyblock.resources import bundled
-from phyblock.run.asking import asking_remarks
+from phyblock.run.asking import asking_remarks, choice_remarks
 from phyblock.run.estimate import estimate
 from phyblock.run.execute import Cause, RunResult
 from phyblock.run.folder import run_folder
@@ -52,6 +52,12 @@ _INTERRUPTED = 130
     "--limit", type=click.IntRange(min=1), metavar="N", help="Run N scenes, spread over levels."
 )
 @click.option(
+    "--informative",
+    type=UserPath(),
+    metavar="RUN",
+    help="With --limit: the scenes that tell the models of the folder RUN apart best.",
+)
+@click.option(
     "--out",
     type=UserPath(),
     help="Folder of the run. [default: results/SUITE-DIGEST]",
@@ -67,6 +73,7 @@ def command(
     sets: tuple[str, ...],
     models: str | None,
     limit: int | None,
+    informative: Path | None,
     out: Path | None,
     models_file: str | None,
     no_cache: bool,
@@ -85,13 +92,14 @@ def command(
     data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
     loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
     known = load_models(find_models_file(models_file, path))
-    plan = make_plan(loaded, known, only=split_names(models), limit=limit)
+    only = split_names(models)
+    plan = make_plan(loaded, known, only=only, limit=limit, informative=informative)
     folder = out or Path("results") / plan.folder_name
     if holds_run(folder, plan.manifest):
         run_folder(folder).check(() if dry_run else report.files_of(page=not no_report))
     if dry_run:
         show_estimate(console, plan, estimate(plan, folder, use_cache=not no_cache))
-    for remark in asking_remarks(loaded, plan):
+    for remark in (*choice_remarks(plan), *asking_remarks(loaded, plan)):
         console.print(remark, style="dim", markup=False, soft_wrap=True)
     if dry_run:
         return 0

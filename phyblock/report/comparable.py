@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from phyblock.errors import Problem, SpecError
-from phyblock.report.measure_table import headline_columns
 from phyblock.scoring.ratios import Floats, Metric
 from phyblock.tables.design import Design
 from phyblock.tables.estimates import pooled_in, value_of_cells
@@ -17,6 +16,7 @@ from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Cell, Measure
 from phyblock.tracks.estimates import counted_samples, track_measures
+from phyblock.tracks.headline import headline_columns
 from phyblock.tracks.kind import kind_of, kinds
 
 __all__ = ["Comparable", "Part", "comparable", "comparable_tracks"]

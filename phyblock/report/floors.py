@@ -12,12 +12,13 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from phyblock.report.measure_table import headline_columns, main_heading
+from phyblock.report.measure_table import main_heading
 from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Measure, way_name
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
 from phyblock.tracks.estimates import track_estimates, track_measures
+from phyblock.tracks.headline import headline_columns
 from phyblock.tracks.kind import kind_of
 
 __all__ = [

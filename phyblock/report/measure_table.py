@@ -11,12 +11,11 @@ from phyblock.tables.headline import Value, headline_rows, headline_values
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
 from phyblock.tables.text_table import Column, TextTable, between, number
-from phyblock.tables.track_report import HeadlineColumn
 from phyblock.tracks.estimates import samples_lacking, track_estimates, track_measures
+from phyblock.tracks.headline import headline_columns, main_column
 from phyblock.tracks.kind import kind_of
 
 __all__ = [
-    "headline_columns",
     "headline_frame",
     "headline_of",
     "headline_view",
@@ -28,20 +27,9 @@ __all__ = [
 _NUMBERS = ("value", "lo", "hi", "se", "mean", "sd")
 
 
-def headline_columns(run: Run, track: str) -> tuple[HeadlineColumn, ...]:
-    """The columns of a track's headline: those it chooses, else its first measure in every cell."""
-    report = kind_of(track).report()
-    if report.headline is not None:
-        return report.headline(run)
-    (first, *_) = report.measures
-    return tuple(HeadlineColumn(first.name, cell.name, cell.heading) for cell in report.cells(run))
-
-
 def main_heading(run: Run, track: str) -> str:
     """Heading of the column that models are ranked by."""
-    headings = [column.heading for column in headline_columns(run, track)]
-    main = kind_of(track).report().main
-    return main if main in headings else headings[-1]
+    return main_column(run, track).heading
 
 
 def headline_of(run: Run, track: str) -> dict[tuple[str, str], Value]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from phyblock.run.plan import RunPlan
@@ -9,7 +10,7 @@ from phyblock.specs import LoadedSuite
 from phyblock.tracks.opening import template_prompt
 from phyblock.tracks.prompts import FORM_FACTS
 
-__all__ = ["asking_remarks"]
+__all__ = ["asking_remarks", "choice_remarks"]
 
 
 def asking_remarks(loaded: LoadedSuite, plan: RunPlan) -> list[str]:
@@ -22,6 +23,21 @@ def asking_remarks(loaded: LoadedSuite, plan: RunPlan) -> list[str]:
     if loaded.suite.answer_format == "text":
         return own
     return [*own, *_models(plan), *_templates(loaded)]
+
+
+def choice_remarks(plan: RunPlan) -> list[str]:
+    """How scenes were chosen that are not evenly spread, and what of the ranks of models they keep."""
+    chosen = plan.manifest.chosen
+    if chosen is None:
+        return []
+    pairs = math.comb(len(chosen.models), 2)
+    return [
+        f"{len(chosen.scenes)} of {chosen.of} scenes, those that tell the {len(chosen.models)} "
+        f"models of run {chosen.run} apart best ({chosen.measure} of {chosen.track}); cross-"
+        f"validated over its {pairs} pairs of models, such scenes rank them as all do with "
+        f"Kendall's tau {chosen.tau:.2f} (evenly spread scenes: {chosen.tau_even:.2f}). Values are "
+        "of these scenes alone and estimate no others"
+    ]
 
 
 def _models(plan: RunPlan) -> Iterator[str]:

@@ -12,7 +12,7 @@ from phyblock.records import MANIFEST, Manifest
 from phyblock.resources import bundled_sets
 from phyblock.tracks.selection import select_tasks
 
-__all__ = ["CHANGED", "open_dataset", "recorded_dataset"]
+__all__ = ["CHANGED", "asked_about", "open_dataset", "recorded_dataset"]
 
 CHANGED = "is not the data set that the run was made on, or it was changed since"
 _HINT = "name the folder where it is now with --data"
@@ -44,7 +44,13 @@ def recorded_dataset(
     if not root.is_dir():
         raise DataError(Problem(str(root), "the data set of the run is not there", hint=_HINT))
     dataset = open_dataset(recorded.format, root)
-    chosen = replace(dataset, tasks=select_tasks(dataset.tasks, levels, manifest.limit)).sha256
-    if chosen != recorded.sha256:
-        raise DataError(Problem(str(root), CHANGED, "sha256", chosen, recorded.sha256, _HINT))
+    digest = asked_about(manifest, levels, dataset).sha256
+    if digest != recorded.sha256:
+        raise DataError(Problem(str(root), CHANGED, "sha256", digest, recorded.sha256, _HINT))
     return dataset
+
+
+def asked_about(manifest: Manifest, levels: Sequence[int], dataset: Dataset) -> Dataset:
+    """What of a data set a run asks about, whose suite has these levels."""
+    tasks = select_tasks(dataset.tasks, levels, manifest.limit, manifest.scenes_chosen)
+    return replace(dataset, tasks=tasks)

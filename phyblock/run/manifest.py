@@ -15,6 +15,7 @@ from phyblock.datasets import Dataset
 from phyblock.datasets.version import UNNUMBERED, read_version
 from phyblock.parsing import READER_VERSION
 from phyblock.records import FORMAT, Manifest
+from phyblock.records.manifest import ManifestChoice
 from phyblock.run.models import PlannedModel
 from phyblock.specs import LoadedSuite
 from phyblock.tracks import AnyTrack, kind_of
@@ -32,10 +33,12 @@ def make_manifest(
     dataset: Dataset,
     variants: Mapping[Variant, Sequence[AnyTrack]],
     limit: int | None,
+    chosen: ManifestChoice | None = None,
 ) -> Manifest:
     """The manifest; `identity` digests what decides the results, so that only the same run goes
     on in a folder. Limits, prices, labels, tables, paths, and where and in which order models are
-    named and served are no part of it. `variants` has the tracks of every way of asking.
+    named and served are no part of it; nor is how scenes were chosen, only which. `variants` has
+    the tracks of every way of asking.
     """
     tracks = variants[Variant()]
     suite, data_version = loaded.suite, read_version(dataset.root)
@@ -61,6 +64,7 @@ def make_manifest(
         "identity": hashlib.sha256(canonical.encode()).hexdigest(),
         "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         **inputs,
+        **({} if chosen is None else {"chosen": chosen.fields()}),
         "suite": suite.model_dump(mode="json"),
         "models": [
             {**decisive, "published": m.published, "size_b": m.size_b}

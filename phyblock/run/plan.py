@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from pathlib import Path
 
 from phyblock.datasets import Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.records import Manifest
+from phyblock.records.manifest import ManifestChoice
 from phyblock.run.data import open_dataset
 from phyblock.run.manifest import make_manifest
 from phyblock.run.models import PlannedModel, plan_models, recorded_format, recorded_order
@@ -91,32 +93,38 @@ def make_plan(
     *,
     only: Sequence[str] = (),
     limit: int | None = None,
+    informative: Path | None = None,
 ) -> RunPlan:
     """Resolve a suite against the known models.
 
     `only` names models to run in place of the suite's; `limit`, else that of the suite, keeps
-    that many items of each track: scenes spread over levels, questions over subtasks. Raises
-    SpecError, DataError or PromptError with all that is wrong.
+    that many items of each track: scenes spread over levels, questions over subtasks; of
+    `informative`, the folder of a run, the scenes that tell its models apart best. Raises
+    SpecError, DataError, StoreError or PromptError with all that is wrong.
     """
     suite = loaded.suite
     limit = suite.limit if limit is None else limit
     dataset = open_dataset(suite.dataset.format, loaded.dataset_path)
     models = plan_models(loaded, known, only)
     asks = any(model.config.kind != "replay" for model in models)
-    variants = _variants(Opening(loaded, dataset, limit, asks))
+    chosen = None if informative is None else _informative(informative, loaded, dataset, limit)
+    named = None if chosen is None else frozenset(chosen.scenes)
+    variants = _variants(Opening(loaded, dataset, limit, asks, named))
     tracks = variants[Variant()]
     _check_models(models, tracks, suite)
-    tasks = select_tasks(dataset.tasks, suite.levels, limit)
+    if named is not None:
+        _check_named(tracks, named)
+    tasks = select_tasks(dataset.tasks, suite.levels, limit, named)
     selected = replace(dataset, tasks=tasks)
     if not any(track.items for track in tracks):
         raise SpecError(_nothing(loaded, dataset, limit))
     if asks:
         for of_variant in variants.values():
             _check_prompts(of_variant)
-    manifest = make_manifest(loaded, models, selected, variants, limit)
+    manifest = make_manifest(loaded, models, selected, variants, limit, chosen)
 
     def reopened(name: str, one: SuiteSpec) -> AnyTrack:
-        opening = Opening(replace(loaded, suite=one), dataset, limit, with_prompts=False)
+        opening = Opening(replace(loaded, suite=one), dataset, limit, False, named)
         return kind_of(name).open(opening)
 
     return RunPlan(suite, models, selected, variants, manifest, reopened)
@@ -139,6 +147,23 @@ def _check_prompts(tracks: Sequence[AnyTrack]) -> None:
     for track in tracks:
         for item in track.items[:1]:
             next(iter(track.outlines(item)), None)
+
+
+def _informative(
+    folder: Path, loaded: LoadedSuite, dataset: Dataset, limit: int | None
+) -> ManifestChoice:
+    # Tables are made of pandas, which other runs do without until something was asked.
+    from phyblock.run.informative import choose_informative
+
+    return choose_informative(folder, dataset, loaded.suite.levels, limit)
+
+
+def _check_named(tracks: Sequence[AnyTrack], named: Collection[str]) -> None:
+    """Raise SpecError for tracks whose items are not scenes."""
+    others = [t.name for t in tracks if any(item.key not in named for item in t.items)]
+    if others:
+        message, hint = "asks about no whole scenes, which alone can be chosen", "leave it out"
+        raise SpecError(Problem("--informative", message, "tracks", ", ".join(others), hint=hint))
 
 
 def _nothing(loaded: LoadedSuite, dataset: Dataset, limit: int | None) -> Problem:

@@ -37,7 +37,8 @@ def reopen_tracks(
     }
     source = YamlSource(str(path))
     loaded = LoadedSuite(suite, path, dataset.root, source, folders)
-    opening = Opening(loaded, dataset, manifest.limit, with_prompts=False)
+    named = manifest.scenes_chosen
+    opening = Opening(loaded, dataset, manifest.limit, with_prompts=False, named=named)
     tracks = {track.name: track for track in open_tracks(opening, tuple(names))}
     for name, track in tracks.items():
         _check_alike(name, track, manifest, folders.get(name, dataset.root))

@@ -2,44 +2,82 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Collection, Sequence
 from fractions import Fraction
 
 from phyblock.datasets import AssemblyTask
 
-__all__ = ["select_tasks", "spread", "stratified"]
+__all__ = ["evenly", "highest", "select_tasks", "spread", "stratified"]
 
 
 def select_tasks(
-    tasks: Sequence[AssemblyTask], levels: Sequence[int], limit: int | None
+    tasks: Sequence[AssemblyTask],
+    levels: Sequence[int],
+    limit: int | None,
+    named: Collection[str] | None = None,
 ) -> tuple[AssemblyTask, ...]:
     """The tasks counted in any of `levels`, at most `limit` of them, in their order.
 
-    A higher limit keeps all that a lower one keeps.
+    They are evenly spread, and a higher limit keeps all that a lower one keeps; where scenes are
+    `named`, it is these instead.
     """
     chosen = [task for task in tasks if set(task.scene.levels) & set(levels)]
+    if named is not None:
+        return tuple(task for task in chosen if task.key in named)
     if limit is None or limit >= len(chosen):
         return tuple(chosen)
-    by_level: dict[int, list[int]] = {}
-    for position, task in enumerate(chosen):
-        by_level.setdefault(task.scene.level, []).append(position)
-    shares = stratified([len(by_level[level]) for level in sorted(by_level)], limit)
-    kept: set[int] = set()
-    for level, share in zip(sorted(by_level), shares, strict=True):
-        positions = by_level[level]
-        kept.update(positions[i] for i in spread(len(positions), share))
+    kept = set(evenly([task.scene.level for task in chosen], limit))
     return tuple(task for position, task in enumerate(chosen) if position in kept)
 
 
+def evenly(strata: Sequence[int], limit: int) -> list[int]:
+    """`limit` positions, shared among the strata and evenly spread in each; see `stratified`."""
+    return _shared(strata, limit, lambda members: [members[i] for i in _spread_out(len(members))])
+
+
+def highest(strata: Sequence[int], values: Sequence[float], limit: int) -> list[int]:
+    """`limit` positions, shared among the strata, in each those of the highest values.
+
+    NaN comes last; of equal values the earlier position comes first.
+    """
+
+    def worth(position: int) -> tuple[bool, float]:
+        value = values[position]
+        return (True, 0.0) if math.isnan(value) else (False, -value)
+
+    return _shared(strata, limit, lambda members: sorted(members, key=worth))
+
+
+def _shared(
+    strata: Sequence[int], limit: int, ordered: Callable[[list[int]], Sequence[int]]
+) -> list[int]:
+    """The first positions of each stratum as they are `ordered`, as many as its share."""
+    members: dict[int, list[int]] = {}
+    for position, stratum in enumerate(strata):
+        members.setdefault(stratum, []).append(position)
+    names = sorted(members)
+    shares = stratified([len(members[name]) for name in names], limit)
+    return sorted(
+        position
+        for name, share in zip(names, shares, strict=True)
+        for position in ordered(members[name])[:share]
+    )
+
+
 def spread(size: int, share: int) -> list[int]:
-    """`share` of the positions 0 to `size` - 1, evenly spread; more hold all that fewer hold.
+    """`share` of the positions 0 to `size` - 1, evenly spread; more hold all that fewer hold."""
+    return sorted(_spread_out(size)[:share])
+
+
+def _spread_out(size: int) -> list[int]:
+    """The positions 0 to `size` - 1 in an order in which any first few are evenly spread.
 
     They are taken at 0, 1/2, 1/4, 3/4, 1/8, ... of the size: the sequence of van der Corput (1935).
     """
     digits = max(1, (size - 1).bit_length())
     parts = (int(f"{i:0{digits}b}"[::-1], 2) for i in range(2**digits))
-    order = dict.fromkeys(part * size // 2**digits for part in parts)
-    return sorted(list(order)[:share])
+    return list(dict.fromkeys(part * size // 2**digits for part in parts))
 
 
 def stratified(sizes: Sequence[int], limit: int) -> list[int]:

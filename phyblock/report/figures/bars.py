@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from phyblock.report.measure_table import headline_columns, main_heading
+from phyblock.report.measure_table import main_heading
 from phyblock.tables.drawing import ACCENT, INK, MUTED, bare_axes, headed, new_figure
 from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Measure
 from phyblock.tracks.estimates import track_estimates
+from phyblock.tracks.headline import headline_columns
 from phyblock.tracks.kind import kind_of
 
 if TYPE_CHECKING:

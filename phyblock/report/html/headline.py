@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from phyblock.report.floors import Floor, floors_run, headline_floors
-from phyblock.report.measure_table import headline_columns, headline_of, main_heading
+from phyblock.report.measure_table import headline_of, main_heading
 from phyblock.tables.headline import Value
 from phyblock.tables.load import Run
 from phyblock.tables.showing import captioned, varied_words
 from phyblock.tables.text_table import NO_VALUE, number, spread
+from phyblock.tracks.headline import headline_columns
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["Cell", "Headline", "Row", "headlines"]

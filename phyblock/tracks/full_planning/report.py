@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import pandas as pd
 
@@ -48,6 +49,7 @@ from phyblock.tracks.full_planning.views import (
     table1_view,
 )
 from phyblock.tracks.orders import order_frame, order_in_terminal, order_view
+from phyblock.tracks.scenes import scenes_frame, scenes_view
 
 __all__ = ["REPORT"]
 
@@ -128,6 +130,7 @@ REPORT = TrackReport(
         "errors": TableMaker(errors_frame, errors_view, in_terminal=errors_in_terminal),
         "losses": TableMaker(losses_frame, losses_view, "errors"),
         "orders": TableMaker(_orders, order_view, "table1", in_terminal=order_in_terminal),
+        "scenes": TableMaker(partial(scenes_frame, NAME), scenes_view, "table1"),
         "published": TableMaker(published_frame, published_view, lines=published_lines),
     },
     bars="f1-levels",

@@ -18,7 +18,7 @@ __all__ = ["open_step_planning"]
 def open_step_planning(opening: Opening) -> StepPlanning:
     """The track; SpecError, DataError or PromptError with what is wrong."""
     loaded, suite = opening.loaded, opening.loaded.suite
-    tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit)
+    tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit, opening.named)
     rules = _rules(suite)
     pool = opening.dataset.tasks
     showing = task_showing(suite, StepsSpec, "steps", tasks, pool)

@@ -19,6 +19,7 @@ from phyblock.tables.track_report import (
 )
 from phyblock.tracks.base import ENGINE
 from phyblock.tracks.orders import order_frame, order_in_terminal, order_view
+from phyblock.tracks.scenes import scenes_frame, scenes_view
 from phyblock.tracks.step_planning.episode_views import (
     endings_in_terminal,
     endings_view,
@@ -109,6 +110,7 @@ REPORT = TrackReport(
             "table3",
             in_terminal=order_in_terminal,
         ),
+        "step_scenes": TableMaker(partial(scenes_frame, NAME), scenes_view, "table3"),
     },
     figures={"step-progress": progress_by_turn},
     figure_titles={"step-progress": "Blocks placed, turn by turn"},
