@@ -5,7 +5,8 @@
 CHECKOUT is a checkout of the official repository. F1 in setting A, matcher `optimal`, parser
 `steps`. Kendall's tau-a of the models' ranks on the subset and on all 400 scenes, and on the scenes
 that are not in it. Informative scenes are chosen with the scores of all models but the two that are
-compared; evenly spread and random ones (the same number of each level) with none.
+compared; evenly spread and random ones (the same number of each level) with none. "From halves":
+the mean over random halves of the scenes, from which alone either is chosen.
 """
 
 from __future__ import annotations
@@ -58,6 +59,25 @@ def drawn(levels: list[int], limit: int, rng: np.random.Generator) -> list[int]:
     return sorted(int(place) for part in parts for place in part)
 
 
+def from_halves(
+    levels: list[int], counts: Floats, size: int, halves: int, rng: np.random.Generator
+) -> tuple[float, float]:
+    """Mean tau with all scenes of informative and of random ones out of random halves."""
+    taus = []
+    for _ in range(halves):
+        half = drawn(levels, len(levels) // 2, rng)
+        of_half = [levels[place] for place in half]
+
+        def choose(some: Floats, half: list[int] = half, of_half: list[int] = of_half) -> list[int]:
+            return [half[i] for i in most_informative(f1_of, of_half, size, some[:, half])]
+
+        random = [half[i] for i in drawn(of_half, size, rng)]
+        kept = pairs_kept_by_choice(counts, f1_of, choose), pairs_kept(counts, f1_of, random)
+        taus.append([one.mean() for one in kept])
+    informative, spread = np.mean(taus, axis=0)
+    return float(informative), float(spread)
+
+
 def main() -> None:
     """Read the arguments and print what scenes are worth, then a line a size of subset."""
     arguments = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -78,7 +98,9 @@ def main() -> None:
     for name, groups, audit in (("level", levels, 7), ("number of blocks", n_blocks, 16)):
         share = 100 * explained(means, groups)
         print(f"  {name} explains {share:.1f} % of the variance of scenes' F1 (audit: {audit})")
-    print("tau with all scenes (with the scenes that are left); F1 of all models on the subset less")
+    print(
+        "tau with all scenes (with the scenes that are left); F1 of all models on the subset less"
+    )
     print("on all, mean over models, in points")
     print(f"{'':6} {'informative':>14} {'evenly spread':>14} {'random':>14}  random ones as good")
     whole = 100 * f1_of(counts.sum(axis=1)).mean()
@@ -101,7 +123,9 @@ def main() -> None:
             100 * f1_of(counts[:, list(chosen)].sum(axis=1)).mean() - whole
             for chosen in (choose(counts), even)
         ]
-        print(f"F1 {shifts[0]:+.1f}, evenly spread {shifts[1]:+.1f}")
+        print(f"F1 {shifts[0]:+.1f}, evenly spread {shifts[1]:+.1f}", end="; ")
+        best, random_best = from_halves(levels, counts, size, given.draws // 10, rng)
+        print(f"from halves {best:.2f}, random {random_best:.2f}")
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ def asking_remarks(loaded: LoadedSuite, plan: RunPlan) -> list[str]:
 
 
 def choice_remarks(plan: RunPlan) -> list[str]:
-    """How scenes were chosen that are not evenly spread, and what of the ranks of models they keep."""
+    """How scenes were chosen that are not evenly spread, and which ranks of models they keep."""
     chosen = plan.manifest.chosen
     if chosen is None:
         return []
