@@ -158,6 +158,6 @@ def _notes(table: pd.DataFrame) -> list[str]:
         "Of the variance of scenes' means, "
         + ", ".join(f"{word} explains {number(parts[name])} %" for name, word in _GROUPS.items())
         + ".",
-        "scenes.csv has all scenes; phyblock run --limit N --informative RUN takes those that "
+        "The CSV file has all scenes; phyblock run --limit N --informative RUN takes those that "
         "discriminate best.",
     ]
