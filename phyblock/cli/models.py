@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import date, timedelta
 from importlib.metadata import version
 
 import click
 from rich.console import Console
 
+from phyblock.addresses import host_of
 from phyblock.cli.console import counted, make_console, plain_table, shown_path
 from phyblock.cli.files import find_models_file
 from phyblock.cli.paths import models_file_option
 from phyblock.errors import ModelError, Problem, SpecError
-from phyblock.models import ModelConfig, api_key_status, ends_on, is_unlisted, price_of
+from phyblock.models import (
+    ModelConfig,
+    Reply,
+    addresses_of,
+    api_key_status,
+    ends_on,
+    is_unlisted,
+    price_of,
+)
 from phyblock.registry import baseline_names
 from phyblock.report import NO_VALUE
 from phyblock.run.check import check_model
@@ -63,7 +72,7 @@ def command(ctx: click.Context, models_file: str | None, retiring: bool) -> None
 @click.argument("name")
 @click.pass_obj
 def check(known: dict[str, ModelSpec], name: str) -> int:
-    """Make one tiny call to the model NAME and say what came back."""
+    """Make one tiny call to the model NAME, to each of its servers, and say what came back."""
     names = [*baseline_names(), *known]
     if name not in names:
         hint = did_you_mean(name, names) or "list them: phyblock models"
@@ -73,22 +82,37 @@ def check(known: dict[str, ModelSpec], name: str) -> int:
     if config.kind != "litellm":
         console.print(f"{name} is a {config.kind}: it makes no calls.", markup=False)
         return 0
-    try:
-        reply = asyncio.run(check_model(config))
-    except ModelError as error:
-        console.print(f"{name} does not answer:", style="red", end=" ")
-        console.print(str(error))
-        return 1
-    if not reply.text.strip():
-        console.print(f"{name} answered with nothing (it ended by: {reply.finish})", style="red")
-        return 1
+    code = 0
+    for server, one in _servers(name, config):
+        try:
+            reply = asyncio.run(check_model(one))
+        except ModelError as error:
+            console.print(f"{server} does not answer:", style="red", end=" ")
+            console.print(str(error))
+            code = 1
+            continue
+        if reply.text.strip():
+            console.print(_answered(server, reply), markup=False, soft_wrap=True)
+        else:
+            nothing = f"{server} answered with nothing (it ended by: {reply.finish})"
+            console.print(nothing, style="red")
+            code = 1
+    return code
+
+
+def _servers(name: str, config: ModelConfig) -> Iterator[tuple[str, ModelConfig]]:
+    """Each server of a model by what it is called, and the model as it serves it."""
+    addresses = addresses_of(config)
+    for address in addresses:
+        is_alone = address is None or len(addresses) == 1
+        yield name if is_alone else f"{name} at {host_of(address or '')}", config.at(address)
+
+
+def _answered(server: str, reply: Reply) -> str:
     tokens = f"{reply.usage.prompt_tokens or '?'} + {reply.usage.completion_tokens or '?'} tokens"
     cost = "cost unknown" if reply.cost_usd is None else f"${reply.cost_usd:.6f}"
-    told = (
-        f"{name} answers: {reply.text.strip()[:80]!r} in {reply.latency_s:.1f} s, {tokens}, {cost}"
-    )
-    console.print(told, markup=False, soft_wrap=True)
-    return 0
+    said = reply.text.strip()[:80]
+    return f"{server} answers: {said!r} in {reply.latency_s:.1f} s, {tokens}, {cost}"
 
 
 def _show_retiring(console: Console, configs: Sequence[ModelConfig]) -> None:

@@ -3,6 +3,7 @@
 Importing this package imports neither litellm nor aiohttp: the first call through one of them does.
 """
 
+from phyblock.models.address_file import addresses_of
 from phyblock.models.base import (
     Image,
     Message,
@@ -59,6 +60,7 @@ __all__ = [
     "SharedCache",
     "Tell",
     "Usage",
+    "addresses_of",
     "api_key_status",
     "build_model",
     "cost_usd",

@@ -1,5 +1,5 @@
 """A breaker for each server: while it cannot be reached, one request at a time finds out whether
-it can again, and all others wait.
+it can again, and all others go elsewhere or wait.
 
 What a server says itself, an error 500 or a 429 too, shows that it is there. No connection, a lost
 one, or a gateway that finds nothing behind it (502, 503, 504) shows that it is not. An answer that
@@ -11,14 +11,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import re
-from collections.abc import AsyncIterator, Callable, Hashable
+from collections.abc import Awaitable, Callable, Hashable, Iterator
 
-from phyblock.errors import ModelError, RetryableError, UnavailableError
+from phyblock.errors import ModelError, RetryableError
 from phyblock.models.config import ModelConfig
 from phyblock.models.events import Tell, ignore_text
 from phyblock.models.retry import RetryPolicy, backoff_s
 
-__all__ = ["Breaker", "Breakers", "server_of", "shows_outage"]
+__all__ = ["Breaker", "Breakers", "Changes", "server_of", "shows_outage"]
 
 FAILURES_TO_OPEN = 5
 _REQUESTS_TO_OPEN = 2
@@ -26,61 +26,101 @@ _LONGEST_PROBE_WAIT_S = 15.0
 _GATEWAY = (502, 503, 504)
 
 
+class Changes:
+    """Wakes all that wait for a server, whenever one is heard of or a probe has ended; asyncio, one
+    loop.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: set[asyncio.Future[None]] = set()
+
+    def tell(self) -> None:
+        """Wake all that wait."""
+        for change in self._waiting:
+            if not change.done():
+                change.set_result(None)
+
+    async def wait(self, nap: Awaitable[None] | None = None) -> None:
+        """Wait for the next change, at most until the nap is over."""
+        change = asyncio.get_running_loop().create_future()
+        waits = {change} if nap is None else {change, asyncio.ensure_future(nap)}
+        self._waiting.add(change)
+        try:
+            await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._waiting.discard(change)
+            for wait in waits:
+                wait.cancel()
+
+
 class Breaker:
     """Open while its server cannot be reached; shared by all models and samples of the server.
 
     It opens after FAILURES_TO_OPEN failures in a row. They must be of two requests at least, so
     that one request which a server cannot survive is not taken for an outage. A probe that still
-    fails when the outage has lasted `policy.retry_for_s` ends it: nothing more is sent. So does the
-    `policy.max_connection_failures`-th failure in a row where the server has never answered.
+    fails when the outage has lasted `policy.retry_for_s` gives the server up: it is probed only as
+    long as others of the model answer. So does the `policy.max_connection_failures`-th failure in a
+    row where the server has never answered. `changes` wakes those that wait.
     """
 
-    def __init__(self, server: str, policy: RetryPolicy, tell: Tell = ignore_text) -> None:
-        self._server = server
+    def __init__(
+        self,
+        server: str,
+        policy: RetryPolicy,
+        tell: Tell = ignore_text,
+        changes: Changes | None = None,
+    ) -> None:
+        self.server = server
         self._policy = policy
         self._tell = tell
+        self._changes = changes or Changes()
         self._failures = 0
         self._requests: set[Hashable] = set()
         self._began_s = 0.0
         self._probes = 0
         self._probe_at_s = 0.0
-        self._probing = asyncio.Lock()
-        self._nap: asyncio.Future[None] | None = None
+        self._is_probed = False
         self._is_open = False
         self._was_heard = False
         self._end: str | None = None
 
     @property
     def is_open(self) -> bool:
-        """Whether requests wait."""
+        """Whether nothing but a probe is sent."""
         return self._is_open
 
-    @contextlib.asynccontextmanager
-    async def passing(self) -> AsyncIterator[bool]:
-        """Wait until a request may be sent; yields whether it is the one that probes.
+    @property
+    def probe_in_s(self) -> float | None:
+        """Seconds until the next probe may be sent; None while one is under way."""
+        if self._is_probed:
+            return None
+        return max(0.0, self._probe_at_s - self._policy.clock.now())
 
-        Raises UnavailableError once the outage has lasted too long.
-        """
-        async with contextlib.AsyncExitStack() as stack:
-            if self._is_open:
-                await stack.enter_async_context(self._probing)
-                await self._wait_to_probe()
-            is_probe = self._is_open
-            if not is_probe:
-                await stack.aclose()
-            yield is_probe
+    @property
+    def end(self) -> str | None:
+        """Why the server is given up; None while it is not."""
+        return self._end if self._is_open else None
+
+    @contextlib.contextmanager
+    def probing(self) -> Iterator[None]:
+        """Be the one that probes."""
+        self._is_probed = True
+        try:
+            yield
+        finally:
+            self._is_probed = False
+            self._changes.tell()
 
     def heard(self) -> None:
         """The server answered, whatever it said: all that wait go on at once."""
         if self._is_open:
             lasted_s = self._policy.clock.now() - self._began_s
-            self._tell(f"{self._server} answers again after {lasted_s:.0f} s: going on")
+            self._tell(f"{self.server} answers again after {lasted_s:.0f} s: going on")
         self._is_open = False
         self._was_heard = True
         self._failures = 0
         self._requests.clear()
-        if self._nap is not None:
-            self._nap.cancel()
+        self._changes.tell()
 
     def failed(self, error: ModelError, request: Hashable, *, is_probe: bool) -> None:
         """An attempt for `request` failed; counts it where the server was not reached.
@@ -106,12 +146,7 @@ class Breaker:
             self._end = None
             self._probes = 0
             self._plan_probe(error, now_s)
-            self._tell(f"{self._server} cannot be reached, trying now and then: {error}")
-
-    def raise_if_ended(self) -> None:
-        """Raise UnavailableError when the outage has lasted so long that nothing more is sent."""
-        if self._is_open and self._end is not None:
-            raise UnavailableError(self._end, sent="no")
+            self._tell(f"{self.server} cannot be reached, trying now and then: {error}")
 
     def _is_new_outage(self) -> bool:
         return (
@@ -120,30 +155,16 @@ class Breaker:
             and len(self._requests) >= _REQUESTS_TO_OPEN
         )
 
-    async def _wait_to_probe(self) -> None:
-        """Wait for the time of the next probe, or until the server is heard of; whoever holds
-        `_probing` is the only one here.
-        """
-        self.raise_if_ended()
-        clock = self._policy.clock
-        while self._is_open and (wait_s := self._probe_at_s - clock.now()) > 0:
-            self._nap = asyncio.ensure_future(clock.sleep(wait_s))
-            try:
-                await asyncio.wait({self._nap})
-            finally:
-                self._nap.cancel()
-                self._nap = None
-
     def _probe_failed(self, error: RetryableError, now_s: float) -> None:
         self._probes += 1
         self._plan_probe(error, now_s)
         lasted_s = now_s - self._began_s
         if self._policy.gives_up(error, self._probes, lasted_s):
-            self._end = f"{self._server} could not be reached for {lasted_s:.0f} s: {error}"
+            self._end = f"{self.server} could not be reached for {lasted_s:.0f} s: {error}"
         # Failures of requests that were sent together before it opened say no more than one.
         failures = FAILURES_TO_OPEN + self._probes
         if not self._was_heard and failures >= self._policy.max_connection_failures:
-            self._end = f"{self._server} never answered, {failures} times in a row: {error}"
+            self._end = f"{self.server} never answered, {failures} times in a row: {error}"
 
     def _plan_probe(self, error: RetryableError, now_s: float) -> None:
         """Wait longer with every probe, and as long as the server asks for."""
@@ -159,14 +180,19 @@ def shows_outage(error: ModelError) -> bool:
 
 
 class Breakers:
-    """The breakers of a run, by server."""
+    """The breakers of a run, by server; `changes` is told by all of them."""
 
     def __init__(self, policy: RetryPolicy, tell: Tell = ignore_text) -> None:
-        self._make: Callable[[str], Breaker] = lambda server: Breaker(server, policy, tell)
+        self.clock = policy.clock
+        self.changes = Changes()
+        self.tell = tell
+        self._make: Callable[[str], Breaker] = lambda server: Breaker(
+            server, policy, tell, self.changes
+        )
         self._known: dict[str, Breaker] = {}
 
     def of(self, config: ModelConfig) -> Breaker:
-        """The breaker of a model's server."""
+        """The breaker of the server at a model's one address."""
         server = server_of(config)
         if server not in self._known:
             self._known[server] = self._make(server)

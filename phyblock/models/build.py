@@ -16,6 +16,7 @@ from phyblock.models.keys import secrets_of
 from phyblock.models.limits import Gate, ModelLimiter
 from phyblock.models.litellm_call import LitellmTransport
 from phyblock.models.replay import open_replay
+from phyblock.models.replicas import Replicas
 from phyblock.models.retry import RetryPolicy
 from phyblock.models.shared_cache import SharedCache
 from phyblock.models.transport import Transport
@@ -38,7 +39,7 @@ def build_model(
 
     `overall` bounds what all models of a run have under way together, `breakers` are those of their
     servers, `halt` ends their waits. Raises SpecError for an unknown baseline or a model without a
-    price under a budget, DataError for missing recordings.
+    price under a budget or a list of servers that cannot be used, DataError for missing recordings.
     """
     if config.kind == "baseline":
         return BaselineModel(config)
@@ -47,13 +48,13 @@ def build_model(
     _check(config)
     secrets = secrets_of(config)
     policy = policy or RetryPolicy()
-    transport: Transport = (
-        DirectTransport(config, secrets) if config.is_direct else LitellmTransport(config, secrets)
-    )
+
+    def transport(at: ModelConfig) -> Transport:
+        return DirectTransport(at, secrets) if at.is_direct else LitellmTransport(at, secrets)
+
     parts = ChatParts(
-        transport=transport,
+        replicas=Replicas(config, transport, breakers or Breakers(policy)),
         limiter=ModelLimiter(config.max_concurrency, overall, config.rpm, config.tpm),
-        breaker=(breakers or Breakers(policy)).of(config),
         cache=cache,
         budget=budget,
         price=price_of(config) if budget is None else require_price(config),

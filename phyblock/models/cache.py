@@ -73,10 +73,12 @@ def reply_key(config: ModelConfig, request: Request) -> str:
 
 
 def former_key(config: ModelConfig, request: Request) -> str | None:
-    """The key of the same request when addresses were a part of keys; None where there was none."""
-    if config.api_base is None:
+    """The key of the same request when addresses were a part of keys, and each model had one (the
+    first of several); None where there was none.
+    """
+    if not config.addresses:
         return None
-    return _key(request, config, {**config.identity(), "api_base": config.api_base.rstrip("/")})
+    return _key(request, config, {**config.identity(), "api_base": config.addresses[0].rstrip("/")})
 
 
 def _key(request: Request, config: ModelConfig, identity: Mapping[str, object]) -> str:

@@ -1,5 +1,5 @@
 """A model behind a network: the cache, then retries; for each attempt those who ask the same,
-the breaker, limits, budget, transport.
+a server that can be reached, limits, budget, transport.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from phyblock.errors import (
     UnavailableError,
 )
 from phyblock.models.base import Reply, Request
-from phyblock.models.breaker import Breaker, shows_outage
+from phyblock.models.breaker import shows_outage
 from phyblock.models.cache import former_key, reply_key
 from phyblock.models.config import ModelConfig, Price
 from phyblock.models.cost import Budget, Estimate, cost_usd, estimate, plausible
@@ -26,9 +26,10 @@ from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import hidden
 from phyblock.models.limits import ModelLimiter, Slot
 from phyblock.models.payload import wire_params
+from phyblock.models.replicas import Replica, Replicas
 from phyblock.models.retry import RetryPolicy, is_success, with_retries
 from phyblock.models.shared_cache import SharedCache, Turn
-from phyblock.models.transport import Call, SeedRefusedError, Transport
+from phyblock.models.transport import Call, SeedRefusedError
 
 __all__ = ["ChatModel", "ChatParts"]
 
@@ -37,9 +38,8 @@ __all__ = ["ChatModel", "ChatParts"]
 class ChatParts:
     """What a chat model is put together from; `secrets` are what no stored text may hold."""
 
-    transport: Transport
+    replicas: Replicas
     limiter: ModelLimiter
-    breaker: Breaker
     cache: SharedCache | None
     budget: Budget | None
     price: Price | None
@@ -52,7 +52,8 @@ class ChatParts:
 @dataclass
 class _Question:
     """A request with its key in the cache and its expected size, how often it was sent, what that
-    cost, its last failure, its reply. `by_force`: another asks the same and takes too long.
+    cost, its last failure and the server that failed, its reply. `by_force`: another asks the same
+    and takes too long.
     """
 
     request: Request
@@ -61,6 +62,7 @@ class _Question:
     sent: int = 0
     billed_usd: float | None = None
     failure: RetryableError | None = None
+    failed_at: Replica | None = None
     reply: Reply | None = None
     by_force: bool = False
 
@@ -105,7 +107,7 @@ class ChatModel:
 
     async def aclose(self) -> None:
         """Release connections."""
-        await self._parts.transport.aclose()
+        await self._parts.replicas.aclose()
 
     async def _ask_new(self, question: _Question) -> Reply:
         """Send until answered; whatever ends it, what was billed is told.
@@ -143,22 +145,21 @@ class ChatModel:
                 return self._found(kept, question)
             async with AsyncExitStack() as stack:
                 with self._parts.halt.giving_up():
-                    is_probe = await stack.enter_async_context(self._parts.breaker.passing())
+                    probed = await stack.enter_async_context(self._parts.replicas.passing())
                     slot = await stack.enter_async_context(self._slot(question))
                     turn = await stack.enter_async_context(self._asking(question))
                 if turn.reply is not None:
                     return self._found(turn.reply, question)
-                if not turn.is_ours or (self._parts.breaker.is_open and not is_probe):
+                if not turn.is_ours:
                     continue
                 if self._unavailable is not None:
                     raise UnavailableError(str(self._unavailable), status=self._unavailable.status)
-                try:
-                    reply = await self._send_watched(question, slot, is_probe=is_probe)
-                except RetryableError as error:
-                    # It is the server that fails then, and not this request.
-                    if self._parts.breaker.is_open and shows_outage(error):
-                        continue
-                    raise
+                replica = self._parts.replicas.choose(probed, question.failed_at)
+                if replica is None:
+                    continue
+                reply = await self._send_watched(question, slot, replica, probed is replica)
+                if reply is None:
+                    continue
                 question.reply = reply
                 slot.succeeded(_total(reply))
                 if self._parts.cache is not None:
@@ -184,26 +185,36 @@ class ChatModel:
             return nullcontext(Turn(is_ours=True))
         return cache.asking(question.key, by_force=question.by_force)
 
-    async def _send_watched(self, question: _Question, slot: Slot, *, is_probe: bool) -> Reply:
-        """Send, and tell the limits and the breaker what came of it."""
-        breaker = self._parts.breaker
+    async def _send_watched(
+        self, question: _Question, slot: Slot, replica: Replica, is_probe: bool
+    ) -> Reply | None:
+        """Send, and tell the limits and the breaker what came of it; None where it is the server
+        that failed, and not this request.
+        """
+        breaker, replicas = replica.breaker, self._parts.replicas
         try:
-            reply = await self._send_seeded(question)
+            with replica.asked():
+                reply = await self._send_seeded(question, replica)
         except ModelError as error:
             sender = (self.name, question.request.key, question.request.seed)
             breaker.failed(error, sender, is_probe=is_probe)
             if isinstance(error, UnavailableError):
+                if replicas.leave_out(replica, error):
+                    return None
                 self._stop(error)
             elif isinstance(error, RetryableError):
                 question.failure = error
+                question.failed_at = replica
                 if error.status == 429 and slot.rate_limited():
                     self._tell("slow_down", str(error), limit=self._parts.limiter.width, status=429)
-                breaker.raise_if_ended()
+                replicas.raise_if_none_left()
+                if breaker.is_open and shows_outage(error):
+                    return None
             raise
         breaker.heard()
         return self._finished(reply, question)
 
-    async def _send_seeded(self, question: _Question) -> Reply:
+    async def _send_seeded(self, question: _Question, replica: Replica) -> Reply:
         """Send with the seed, or without where the provider is known or found to take none.
 
         That an error speaks of a seed proves nothing, as some repeat the whole request: only a
@@ -214,25 +225,25 @@ class ChatModel:
         seed = request.seed if self._takes_seed else None
         call = Call(request.messages, params, seed)
         try:
-            reply = await self._send_formed(call, question)
+            reply = await self._send_formed(call, question, replica)
         except SeedRefusedError as refusal:
             question.sent -= not refusal.sent
             if self._config.sends_seed == "always":
                 raise UnavailableError("the provider takes no seed, and seed is `always`") from None
             call = replace(call, seed=None)
-            reply = await self._send_formed(call, question)
+            reply = await self._send_formed(call, question, replica)
             if self._takes_seed:
                 self._takes_seed = False
                 self._tell("seed_unsupported", "takes no seed: seeds are independent repeats")
         return replace(reply, seed_sent=call.seed is not None)
 
-    async def _send_formed(self, call: Call, question: _Question) -> Reply:
+    async def _send_formed(self, call: Call, question: _Question, replica: Replica) -> Reply:
         """Send; a provider that refuses the format of the answer would refuse it every time.
 
         One that has taken it once means something else, as where it repeats the whole request.
         """
         try:
-            reply = await self._send_paid(call, question)
+            reply = await self._send_paid(call, question, replica)
         except ModelError as error:
             is_sent = "response_format" in call.params and not self._took_format
             if not is_sent or not refuses_format(error):
@@ -242,7 +253,7 @@ class ChatModel:
         self._took_format = True
         return reply
 
-    async def _send_paid(self, call: Call, question: _Question) -> Reply:
+    async def _send_paid(self, call: Call, question: _Question, replica: Replica) -> Reply:
         """Send with the call's greatest cost reserved in the budget.
 
         A failure that may have been billed counts in full; a model that is found unable before
@@ -251,7 +262,7 @@ class ChatModel:
         budget, price = self._parts.budget, self._parts.price
         if budget is None or price is None:
             question.sent += 1
-            return _counted(await self._parts.transport.send(call), question)
+            return _counted(await replica.transport.send(call), question)
         held: int | None = None
         spent_usd: float | None = 0.0
         try:
@@ -261,7 +272,7 @@ class ChatModel:
                 )
             spent_usd = None
             question.sent += 1
-            reply = _counted(await self._parts.transport.send(call), question)
+            reply = _counted(await replica.transport.send(call), question)
             spent_usd = cost_usd(price, reply.usage)
             budget.learn(self.name, question.expected, reply.usage)
             return reply

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -47,7 +47,9 @@ class ModelConfig:
     """One model.
 
     `name` is what the tables show; `id` the litellm id (`openai/gpt-4o-2024-08-06`), a baseline's
-    name, or the model to read out of a recorded run. `api_key_env` names the environment variable
+    name, or the model to read out of a recorded run. It is served at `api_base`, or at each of
+    `api_bases`, or at each address in `api_base_file`; where none of them is given, at its
+    provider's. `api_key_env` names the environment variable
     that holds the key; None means the provider's usual one. `params` are sampling parameters by
     their OpenAI names; they win over a request's, and None there means "do not send". `rpm` and
     `tpm` are limits a minute, None for none. `price` None means litellm's price map is asked.
@@ -57,13 +59,15 @@ class ModelConfig:
     prompt alone says the form. `timeout_s` bounds a request from its first byte to the last of its
     answer, `most_body_bytes` that answer's body, packed and unpacked.
 
-    Raises SpecError for an `api_base` that is no address, or that holds a key or a password.
+    Raises SpecError for an address that is none, or that holds a key or a password.
     """
 
     name: str
     kind: Kind
     id: str = ""
     api_base: str | None = None
+    api_bases: tuple[str, ...] = ()
+    api_base_file: Path | None = None
     api_key_env: str | None = None
     transport: TransportName = "auto"
     params: Mapping[str, object] = field(default_factory=dict)
@@ -79,10 +83,25 @@ class ModelConfig:
     most_body_bytes: int = LARGEST_REPLY_BYTES
 
     def __post_init__(self) -> None:
-        fault = address_fault(self.api_base) if self.api_base is not None else None
-        if fault is not None:
-            where = f"model {self.name}"
-            raise SpecError(Problem(where, fault.message, "api_base", hint=fault.hint))
+        for address in self.addresses:
+            fault = address_fault(address)
+            if fault is not None:
+                where = f"model {self.name}"
+                raise SpecError(Problem(where, fault.message, "api_base", hint=fault.hint))
+
+    @property
+    def addresses(self) -> tuple[str, ...]:
+        """The addresses that are known without reading a file; none is the provider's."""
+        return self.api_bases if self.api_base is None else (self.api_base,)
+
+    @property
+    def has_address(self) -> bool:
+        """Whether it is served elsewhere than at its provider's address."""
+        return bool(self.addresses) or self.api_base_file is not None
+
+    def at(self, address: str | None) -> ModelConfig:
+        """The model as one of its servers serves it."""
+        return replace(self, api_base=address, api_bases=(), api_base_file=None)
 
     @property
     def provider(self) -> str:
@@ -104,7 +123,7 @@ class ModelConfig:
         if self.transport != "auto":
             return self.transport == "direct"
         return (
-            self.api_base is not None
+            self.has_address
             and self.provider in DIRECT_PROVIDERS
             and _RENAMES_PARAMETERS.match(self.provider_model) is None
         )
@@ -117,7 +136,7 @@ class ModelConfig:
         identity: dict[str, object] = {
             "kind": self.kind,
             "id": self.id,
-            "api_base": None if self.api_base is None else OWN_SERVER,
+            "api_base": OWN_SERVER if self.has_address else None,
             "params": dict(self.params),
             "sends_seed": self.sends_seed != "never",
             "recording": str(self.recording) if self.recording else None,

@@ -30,7 +30,7 @@ def takes_format(config: ModelConfig) -> bool:
     Servers of one's own that speak the OpenAI protocol (vLLM, SGLang, llama.cpp, LM Studio, Ollama)
     do; of all others litellm's map of models is believed.
     """
-    if config.provider in DIRECT_PROVIDERS and config.api_base is not None:
+    if config.provider in DIRECT_PROVIDERS and config.has_address:
         return True
     is_whole = config.provider in _WHOLE_PROVIDERS
     return is_whole or bool(map_entry(config).get("supports_response_schema"))

@@ -151,7 +151,7 @@ def api_key_status(config: ModelConfig) -> KeyStatus:
         return KeyStatus((), is_set=False, is_needed=False)
     variables = _variables(config)
     is_needed = config.api_key_env is not None or not (
-        config.api_base or config.provider in KEYLESS + _OWN_CREDENTIALS
+        config.has_address or config.provider in KEYLESS + _OWN_CREDENTIALS
     )
     found = _found(variables)
     fault = _fault(*found) if found is not None else ""

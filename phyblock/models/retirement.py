@@ -22,5 +22,5 @@ def ends_on(config: ModelConfig) -> date | None:
 
 def is_unlisted(config: ModelConfig) -> bool:
     """Whether a provider's model is not in the map: retired already, or newer than the map."""
-    is_hosted = config.kind == "litellm" and config.api_base is None
+    is_hosted = config.kind == "litellm" and not config.has_address
     return is_hosted and config.provider not in KEYLESS and not map_entry(config)

@@ -105,11 +105,16 @@ def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfi
     params = spec.params(suite.sampling)
     if spec.extra_body:
         params["extra_body"] = spec.extra_body
+    api_bases = spec.api_base if isinstance(spec.api_base, tuple) else ()
+    api_base = spec.api_base if isinstance(spec.api_base, str) else None
+    has_address = spec.api_base is not None or spec.api_base_file is not None
     config = ModelConfig(
         name=name,
         kind="litellm",
         id=spec.id,
-        api_base=spec.api_base or server_address(spec.id),
+        api_base=api_base if has_address else server_address(spec.id),
+        api_bases=api_bases,
+        api_base_file=None if spec.api_base_file is None else Path(spec.api_base_file),
         api_key_env=spec.api_key_env,
         transport=spec.transport,
         params=params,

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from phyblock.datasets import Dataset
 from phyblock.errors import Problem, SpecError
+from phyblock.models import ModelConfig
 from phyblock.records import Manifest
 from phyblock.records.manifest import ManifestChoice
 from phyblock.run.data import open_dataset
@@ -209,13 +210,20 @@ def _check_models(
 
 
 def _alike(models: Sequence[PlannedModel]) -> list[Problem]:
-    """Models that replies could not be told apart by, though they are asked at two addresses."""
+    """Models that replies could not be told apart by, though they are asked at other addresses."""
     problems = []
     for earlier, later in combinations(models, 2):
         one, other = earlier.config, later.config
-        if one.identity() == other.identity() and one.api_base != other.api_base:
+        if one.identity() == other.identity() and _served_at(one) != _served_at(other):
             message = f"is {earlier.name} at another address: they would share their replies"
             hint = "give one of them a revision, or run one alone"
             where = f"model {later.name}"
-            problems.append(Problem(where, message, "api_base", other.api_base or "", hint=hint))
+            found = ", ".join(sorted(_served_at(other)))
+            problems.append(Problem(where, message, "api_base", found, hint=hint))
     return problems
+
+
+def _served_at(config: ModelConfig) -> frozenset[str]:
+    """The addresses of a model, or the file that lists them: what it lists may change."""
+    file = config.api_base_file
+    return frozenset(config.addresses if file is None else (str(file),))

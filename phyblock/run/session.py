@@ -15,6 +15,7 @@ from phyblock.models import (
     ModelEvent,
     RetryPolicy,
     SharedCache,
+    addresses_of,
     api_key_status,
     build_model,
 )
@@ -31,10 +32,16 @@ SERVERS = ("hosted_vllm", "lm_studio", "llamafile")
 
 
 def check_ready(plan: RunPlan) -> None:
-    """Raise SpecError naming every model whose key or address is not set."""
-    problems = []
+    """Raise SpecError naming every model whose key or address is not set, and every line of a list
+    of addresses that cannot be used.
+    """
+    problems: list[Problem] = []
     for model in plan.models:
-        if model.config.provider in SERVERS and model.config.api_base is None:
+        try:
+            addresses_of(model.config)
+        except SpecError as error:
+            problems += error.problems
+        if model.config.provider in SERVERS and not model.config.has_address:
             message = "is behind a server of your own: it needs an address"
             hint = "api_base: http://localhost:8000/v1 in the models file"
             problems.append(

@@ -5,10 +5,19 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, JsonValue, model_validator
+from pydantic import AfterValidator, Discriminator, Field, JsonValue, Tag, model_validator
 
 from phyblock.addresses import address_fault
-from phyblock.specs.fields import Count, MaxTokens, Section, Temperature, TimeoutS, TopP, refuse
+from phyblock.specs.fields import (
+    Count,
+    MaxTokens,
+    Section,
+    Temperature,
+    TimeoutS,
+    TopP,
+    UniqueSome,
+    refuse,
+)
 from phyblock.specs.sections import SamplingSpec
 from phyblock.words import SendMode, TransportName
 
@@ -45,6 +54,16 @@ def _check_api_base(url: str) -> str:
     )
 
 
+Address = Annotated[
+    str, AfterValidator(_check_api_base), Field(json_schema_extra={"pattern": "^https?://"})
+]
+Addresses = Annotated[
+    Annotated[Address, Tag("one")] | Annotated[UniqueSome[Address], Tag("list")],
+    Discriminator(lambda value: "list" if isinstance(value, list | tuple) else "one"),
+]
+"""One address, or several of servers that all serve the same model."""
+
+
 def _check_finite(body: dict[str, JsonValue]) -> dict[str, JsonValue]:
     stack: list[tuple[tuple[str | int, ...], JsonValue]] = [((), body)]
     while stack:
@@ -79,17 +98,16 @@ class ModelSpec(Section):
         Annotated[str, AfterValidator(_check_id), Field(json_schema_extra={"pattern": _ID_PATTERN})]
         | None
     ) = Field(default=None, description="litellm id with its provider: openai/gpt-4o-2024-08-06.")
-    api_base: (
-        Annotated[
-            str,
-            AfterValidator(_check_api_base),
-            Field(json_schema_extra={"pattern": "^https?://"}),
-        ]
-        | None
-    ) = Field(
+    api_base: Addresses | None = Field(
         default=None,
         description="Address of an OpenAI-compatible server (vLLM, Ollama, LM Studio), such as "
-        "http://localhost:8000/v1.",
+        "http://localhost:8000/v1; a list where several serve the same model. The one with the "
+        "least to do is asked, one that is gone is left out and tried again.",
+    )
+    api_base_file: Annotated[str, Field(min_length=1)] | None = Field(
+        default=None,
+        description="File that lists such addresses, one a line, in place of api_base; relative "
+        "to this file, and read again while a run goes on.",
     )
     revision: Annotated[str, Field(min_length=1, max_length=100)] | None = Field(
         default=None,
@@ -163,6 +181,9 @@ class ModelSpec(Section):
                 raise refuse(
                     "needs an id (or a replay folder)", hint="for example id: openai/gpt-4o"
                 )
+            if self.api_base is not None and self.api_base_file is not None:
+                message = "says where the model is served, which api_base says too"
+                raise refuse(message, at=("api_base_file",), key=True, hint="keep one of them")
             self._check_direct(self.id)
             return self
         for key in sorted(self.model_fields_set - _WITH_REPLAY):
@@ -178,7 +199,8 @@ class ModelSpec(Section):
     def _check_direct(self, model_id: str) -> None:
         """Without an address, a direct call would take the provider's key to OpenAI."""
         provider = model_id.partition("/")[0]
-        if self.transport == "direct" and self.api_base is None and provider != "openai":
+        has_address = self.api_base is not None or self.api_base_file is not None
+        if self.transport == "direct" and not has_address and provider != "openai":
             raise refuse(
                 f"needs the address of the server that speaks for {provider}",
                 at=("transport",),

@@ -25,7 +25,8 @@ _NAME = TypeAdapter(ModelName)
 def load_models(path: Path) -> dict[str, ModelSpec]:
     """Read a models file: each name maps to a litellm id or to a mapping.
 
-    Replay folders come out absolute. Raises SpecError with all that is wrong.
+    Paths of replay folders and of lists of servers come out absolute. Raises SpecError with all
+    that is wrong.
     """
     source = read_yaml(path)
     data = {} if source.data is None else source.data
@@ -59,13 +60,16 @@ def _read_entry(
     spec, found = check(ModelSpec, {"id": entry} if isinstance(entry, str) else entry, source,
                         (name,), hints)  # fmt: skip
     problems += found
-    if spec is not None and spec.replay is not None:
+    for field in ("replay", "api_base_file"):
+        path = None if spec is None else getattr(spec, field)
+        if spec is None or path is None:
+            continue
         try:
-            folder = expand(spec.replay, Path(source.label).parent)
+            absolute = expand(path, Path(source.label).parent)
         except ValueError as error:
-            where = source.where((name, "replay"))
-            return None, [*problems, Problem(where, str(error), f"{name}.replay", spec.replay)]
-        spec = spec.model_copy(update={"replay": str(folder)})
+            where = source.where((name, field))
+            return None, [*problems, Problem(where, str(error), f"{name}.{field}", path)]
+        spec = spec.model_copy(update={field: str(absolute)})
     return spec, problems
 
 

@@ -52,7 +52,10 @@ _QUOTA = math.ceil(FAULTS / len(_CELLS))
 
 def prepare(workspace: Workspace, url: str, track: str, transport: str, seeds: list[int]) -> None:
     write_questions(workspace.root / "questions", questions(SCENES, 4, ("SH", "OR", "VP")))
-    workspace.write_models(url, "alpha", transport=transport, price={"input": 1, "output": 1})
+    fields: dict[str, Any] = {"transport": transport, "price": {"input": 1, "output": 1}}
+    if transport == "direct":  # by two addresses, so that what fails at one is asked at the other
+        fields["api_base"] = [f"{one}/v1" for one in (url, url.replace("127.0.0.1", "localhost"))]
+    workspace.write_models(url, "alpha", **fields)
     workspace.write_suite(
         **{
             "images": {"size_px": 128},

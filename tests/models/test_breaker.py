@@ -22,6 +22,7 @@ from phyblock.models import Breakers, Gate, Halt, HaltedError, ModelConfig, Repl
 from phyblock.models.breaker import FAILURES_TO_OPEN, Breaker, server_of
 from phyblock.models.chat import ChatModel, ChatParts
 from phyblock.models.limits import ModelLimiter
+from phyblock.models.replicas import Replicas
 from phyblock.models.transport import Call
 from tests.models.factory import ask, make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
@@ -62,9 +63,8 @@ def chat(
 ) -> ChatModel:
     config = ModelConfig("m", "litellm", "openai/m", api_base="http://gone:1/v1")
     parts = ChatParts(
-        transport=transport,
+        replicas=Replicas(config, lambda _: transport, breakers),
         limiter=ModelLimiter(width, Gate(width), clock=time.clock),
-        breaker=breakers.of(config),
         cache=None,
         budget=None,
         price=None,
@@ -74,6 +74,14 @@ def chat(
         halt=halt,
     )
     return ChatModel(config, parts)
+
+
+def at_a_breaker(time: FakeTime, policy: RetryPolicy) -> tuple[Breaker, Replicas]:
+    """A breaker, and the one server behind it."""
+    config = ModelConfig("m", "litellm", "openai/m", api_base="http://gone:1/v1")
+    breakers = Breakers(policy)
+    replicas = Replicas(config, lambda _: Outage(time, 0.0, 0.0, 0.0), breakers)
+    return breakers.of(config), replicas
 
 
 def ask_through(
@@ -162,7 +170,7 @@ def test_the_next_probe_waits_as_long_as_the_server_asks(
     async def main() -> None:
         time = FakeTime()
         policy = RetryPolicy(clock=time.clock)
-        breaker = Breaker("s", policy)
+        breaker, replicas = at_a_breaker(time, policy)
         error = RetryableError("overloaded", status=503, retry_after_s=asked_s)
         for number in range(FAILURES_TO_OPEN):
             breaker.failed(error, number, is_probe=False)
@@ -171,11 +179,11 @@ def test_the_next_probe_waits_as_long_as_the_server_asks(
             for _ in range(probes + 1):
                 failed_s = time.now_s
                 try:
-                    async with breaker.passing() as is_probe:
+                    async with replicas.passing() as probed:
                         least_s = min(asked_s or 0.0, policy.max_retry_after_s)
                         waited_s = time.now_s - failed_s
                         assert least_s - 1e-6 <= waited_s <= max(15.0, least_s) + 1e-6
-                        breaker.failed(error, "probe", is_probe=is_probe)
+                        breaker.failed(error, "probe", is_probe=probed is not None)
                 except UnavailableError:
                     return
 
@@ -287,15 +295,15 @@ def test_an_answer_between_failures_keeps_it_closed() -> None:
 def test_one_request_at_a_time_probes() -> None:
     async def main() -> None:
         time = FakeTime()
-        breaker = Breaker("s", RetryPolicy(clock=time.clock))
+        breaker, replicas = at_a_breaker(time, RetryPolicy(clock=time.clock))
         for number in range(FAILURES_TO_OPEN):
             breaker.failed(REFUSED, number, is_probe=False)
         inside = 0
 
         async def request(number: int) -> None:
             nonlocal inside
-            async with breaker.passing() as is_probe:
-                if is_probe:
+            async with replicas.passing() as probed:
+                if probed is not None:
                     inside += 1
                     assert inside == 1
                     await time.sleep(3.0)
@@ -314,13 +322,14 @@ def test_one_request_at_a_time_probes() -> None:
 def test_a_late_answer_wakes_the_one_that_waits_to_probe() -> None:
     async def main() -> None:
         time = FakeTime()
-        breaker = Breaker("s", RetryPolicy(base_s=1000.0, max_wait_s=1000.0, clock=time.clock))
+        policy = RetryPolicy(base_s=1000.0, max_wait_s=1000.0, clock=time.clock)
+        breaker, replicas = at_a_breaker(time, policy)
         for number in range(FAILURES_TO_OPEN):
             breaker.failed(REFUSED, number, is_probe=False)
 
         async def request() -> None:
-            async with breaker.passing() as is_probe:
-                assert not is_probe
+            async with replicas.passing() as probed:
+                assert probed is None
 
         waiting = [asyncio.create_task(request()) for _ in range(3)]
         for _ in range(10):

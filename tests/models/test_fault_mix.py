@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from contextlib import ExitStack
+from dataclasses import replace
+
 import pytest
 
 from phyblock.models import Reply, RetryPolicy
@@ -17,8 +21,10 @@ def _key(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
 
 
-def finish_all(route: str, samples: int, policy: RetryPolicy, size: int) -> None:
-    server = ROUTES[route].server(ISSUE_MIX)
+def finish_all(
+    route: str, samples: int, policy: RetryPolicy, size: int, *, replicas: int = 1
+) -> None:
+    servers = [ROUTES[route].server(replace(ISSUE_MIX, seed=seed)) for seed in range(replicas)]
     requests = [
         make_request(
             f"{n:04}",
@@ -27,17 +33,21 @@ def finish_all(route: str, samples: int, policy: RetryPolicy, size: int) -> None
         )
         for n in range(samples)
     ]
-    with Running(server) as running:
-        config = ROUTES[route].config(running.url, max_concurrency=64, sends_seed="never")
+    with ExitStack() as stack:
+        urls = [stack.enter_context(Running(server)).url for server in servers]
+        config = ROUTES[route].config(urls[0], max_concurrency=64, sends_seed="never")
+        bases = tuple(url + ROUTES[route].path for url in urls)
+        config = replace(config, api_base=None, api_bases=bases)
         answers = ask(make_model(config, policy=policy), *requests)
     replies = [answer for answer in answers if isinstance(answer, Reply)]
     assert len(replies) == samples, [a for a in answers if not isinstance(a, Reply)]
-    faults = sum(server.ended[name] for name in FAULTS)
+    ended: Counter[str] = sum((server.ended for server in servers), Counter())
+    faults = sum(ended[name] for name in FAULTS)
     assert faults > 0.08 * samples
-    assert server.ended["ok"] == samples
-    assert server.requests == samples + faults
-    assert sum(reply.attempts for reply in replies) == server.requests
-    answered = {seen.parts: seen.reply_text for seen in server.seen}
+    assert ended["ok"] == samples
+    assert sum(ended.values()) == samples + faults
+    assert sum(reply.attempts for reply in replies) == sum(ended.values())
+    answered = {seen.parts: seen.reply_text for server in servers for seen in server.seen}
     assert len(answered) == samples
     for request, reply in zip(requests, replies, strict=True):
         assert reply.text == answered[as_seen(request)]
@@ -54,7 +64,14 @@ def test_all_samples_finish_with_one_request_a_success_and_one_a_fault(route: st
     finish_all(route, 300 if route in SHOWN else 120, QUICK, size=2_000)
 
 
+def test_all_samples_finish_over_four_replicas() -> None:
+    finish_all("direct", 300, QUICK, size=2_000, replicas=4)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("route", ROUTES)
-def test_a_thousand_large_pictures_finish_with_the_default_settings(route: str) -> None:
-    finish_all(route, 1000, RetryPolicy(), size=75_000)
+@pytest.mark.parametrize("replicas", [1, 4])
+def test_a_thousand_large_pictures_finish_with_the_default_settings(
+    route: str, replicas: int
+) -> None:
+    finish_all(route, 1000, RetryPolicy(), size=75_000, replicas=replicas)

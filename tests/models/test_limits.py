@@ -15,7 +15,7 @@ from tests.models.factory import run
 
 
 class FakeTime:
-    """Time that stands still while anything can run, then jumps to the next sleeper."""
+    """Time that stands still while anything can run, then jumps to the next that still sleeps."""
 
     def __init__(self) -> None:
         self.now_s = 0.0
@@ -35,9 +35,12 @@ class FakeTime:
         while not all(task.done() for task in tasks):
             for _ in range(50):
                 await asyncio.sleep(0)
-            if self._sleepers:
-                self.now_s, _, wake = heapq.heappop(self._sleepers)
-                wake.set_result(None)
+            while self._sleepers:
+                wakes_s, _, wake = heapq.heappop(self._sleepers)
+                if not wake.done():
+                    self.now_s = wakes_s
+                    wake.set_result(None)
+                    break
         for task in tasks:
             task.result()
 

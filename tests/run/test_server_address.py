@@ -87,12 +87,43 @@ def test_a_server_that_moved_is_asked_nothing_again(workspace: Workspace) -> Non
         assert workspace.run().code == 0
         assert first.server.ended["ok"] > 0
     with Running(OpenAIChat()) as second:
-        workspace.write_models(second.url, "alpha")
+        several = [f"{url}/v1" for url in (first.url, second.url)]
+        served = {"id": "hosted_vllm/alpha", "api_base": several}
+        workspace.write_yaml("models.yaml", {"alpha": served})
         again = workspace.run()
         assert (again.code, second.server.ended) == (0, {}), again.err
         workspace.out = workspace.root / "other"
+        (workspace.root / "hosts.txt").write_text(f"{several[1]}\n", encoding="utf-8")
+        served = {"id": "hosted_vllm/alpha", "api_base_file": "hosts.txt"}
+        workspace.write_yaml("models.yaml", {"alpha": served})
         anew = workspace.run("--no-report")
         assert (anew.code, second.server.ended) == (0, {}), anew.err
+
+
+def test_a_list_of_servers_that_cannot_be_used_ends_the_run_before_it_begins(
+    workspace: Workspace,
+) -> None:
+    entry = {"id": "hosted_vllm/m", "api_base_file": "hosts.txt"}
+    workspace.write_yaml("models.yaml", {"alpha": entry})
+    workspace.write_suite(models=["alpha"], seeds=[0])
+    missing = workspace.run()
+    (workspace.root / "hosts.txt").write_text("localhost:8000\n", encoding="utf-8")
+    wrong = workspace.run()
+    assert (missing.code, wrong.code) == (2, 2)
+    assert "hosts.txt: api_base_file: cannot be read: No such file" in missing.err
+    assert "hosts.txt:1: api_base_file: is not the address of a server" in wrong.err
+    assert not workspace.out.exists()
+
+
+def test_a_check_asks_every_server(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as server:
+        bases = [f"{server.url}/v1", "http://127.0.0.1:9/v1"]
+        workspace.write_yaml("models.yaml", {"m": {"id": "hosted_vllm/m", "api_base": bases}})
+        models_file = workspace.root / "models.yaml"
+        checked = workspace.phyblock("models", "--models-file", models_file, "check", "m")
+    assert checked.code == 1
+    assert f"m at 127.0.0.1:{server.port} answers: " in checked.out
+    assert "m at 127.0.0.1:9 does not answer: " in checked.out
 
 
 def test_replies_that_were_kept_by_their_address_are_found_and_move(workspace: Workspace) -> None:

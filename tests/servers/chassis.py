@@ -15,6 +15,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterable
+from contextlib import AbstractAsyncContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -106,12 +107,21 @@ class Seen:
 class LocalServer(ABC):
     """One provider's protocol; `ended` counts requests by how they ended.
 
-    `elsewhere` is where redirects to another host lead.
+    `elsewhere` is where redirects to another host lead. At most `width` requests are looked at
+    together; None is no bound.
     """
 
     def __init__(
-        self, faults: Faults | None = None, *, keep: bool = True, elsewhere: str = ELSEWHERE
+        self,
+        faults: Faults | None = None,
+        *,
+        keep: bool = True,
+        elsewhere: str = ELSEWHERE,
+        width: int | None = None,
     ) -> None:
+        self._gate: AbstractAsyncContextManager[None] = (
+            nullcontext() if width is None else asyncio.Semaphore(width)
+        )
         self.faults = faults or Faults()
         self.keep = keep
         self.elsewhere = elsewhere
@@ -161,6 +171,10 @@ class LocalServer(ABC):
         return web.json_response(self.stats())
 
     async def handle(self, request: web.Request) -> web.StreamResponse:
+        async with self._gate:
+            return await self._handle(request)
+
+    async def _handle(self, request: web.Request) -> web.StreamResponse:
         self.at_once += 1
         self.most_at_once = max(self.most_at_once, self.at_once)
         try:
@@ -278,6 +292,7 @@ def main(kind: type[LocalServer]) -> None:
     parser.add_argument("--others", default="", metavar="NAME[,NAME...]", help="names of faults")
     parser.add_argument("--others-share", type=float, default=0.0, metavar="SHARE")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--one-at-a-time", action="store_true", help="other requests wait")
     parser.add_argument("--elsewhere", default=ELSEWHERE, help="where redirects lead")
     given = parser.parse_args()
     others = [name for name in given.others.split(",") if name]
@@ -295,7 +310,9 @@ def main(kind: type[LocalServer]) -> None:
     )
 
     async def serve() -> None:
-        _, port = await start(kind(faults, keep=False, elsewhere=given.elsewhere), given.port)
+        width = 1 if given.one_at_a_time else None
+        server = kind(faults, keep=False, elsewhere=given.elsewhere, width=width)
+        _, port = await start(server, given.port)
         print(port, flush=True)
         await asyncio.Event().wait()
 

@@ -75,10 +75,17 @@ def test_an_empty_file_holds_no_models(tmp_path: Path) -> None:
     assert load(tmp_path, "# none yet\n") == {}
 
 
-def test_a_replay_folder_is_relative_to_the_file(tmp_path: Path) -> None:
+def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
     spec = load(tmp_path, "old: {replay: replies/old, published: GPT-4o}\n")["old"]
     assert spec.replay == str(tmp_path / "replies" / "old")
     assert spec.id is None
+    spec = load(tmp_path, "m: {id: a/b, api_base_file: hosts.txt, transport: direct}\n")["m"]
+    assert spec.api_base_file == str(tmp_path / "hosts.txt")
+
+
+def test_several_addresses_are_a_list(tmp_path: Path) -> None:
+    spec = load(tmp_path, "m: {id: a/b, api_base: [http://h:1/v1, http://h:2/v1]}\n")["m"]
+    assert spec.api_base == ("http://h:1/v1", "http://h:2/v1")
 
 
 # text, line:col, field, part of the message, part of allowed, part of the hint
@@ -100,6 +107,14 @@ BAD = [
     ("m: {id: a/b, transport: drect}\n", "1:25", "m.transport", "choices", "", "mean direct?"),
     ("m: {id: a/b, reasoning_effort: hgh}\n", "1:32", "m.reasoning_effort", "", "low", "high?"),
     ("m: {id: a/b, api_base: localhost}\n", "1:24", "m.api_base", "address", "http://", "8000"),
+    ("m: {id: a/b, api_base: []}\n", "1:24", "m.api_base", "is empty", "at least one", ""),
+    ("m: {id: a/b, api_base: 5}\n", "1:24", "m.api_base", "wrong type", "text", ""),
+    ("m: {id: a/b, api_base: [http://h, 5]}\n", "1:35", "m.api_base[1]", "wrong type", "text", ""),
+    ("m: {id: a/b, api_base: [http://h, h]}\n", "1:35", "m.api_base[1]", "address", "http://", ""),
+    ("m: {id: a/b, api_base: [http://h, http://h]}\n", "1:35", "m.api_base[1]", "twice", "", "one"),
+    ("m: {id: a/b, api_base: http://h, api_base_file: x}\n", "1:34", "m.api_base_file", "", "", ""),
+    ("m: {id: a/b, api_base_file: $PHYBLOCK_NO/x}\n", "1:29", "m.api_base_file", "not set", "", ""),
+    ("m: {replay: x, api_base: [http://h]}\n", "1:16", "m.api_base", "no meaning", "", ""),
     ("m: {id: xai/g, transport: direct}\n", "1:27", "m.transport", "address", "api_base", "add"),
     ("m: {id: a/b, price: 5}\n", "1:21", "m.price", "wrong type", "a mapping", ""),
     ("m: {id: a/b, price: {input: 1}}\n", "1:14", "m.price.output", "is missing", "", "add"),

@@ -1,0 +1,158 @@
+"""The servers of one model: the one with the least to do is asked, one that is gone is left out and
+tried now and then.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass
+
+from phyblock.errors import UnavailableError
+from phyblock.models.address_file import LOOK_EVERY_S, AddressFile, addresses_of
+from phyblock.models.breaker import Breaker, Breakers
+from phyblock.models.config import ModelConfig
+from phyblock.models.transport import Transport
+
+__all__ = ["Replica", "Replicas"]
+
+
+@dataclass(eq=False)
+class Replica:
+    """A server of the model, how many requests it has now and was ever sent, and why it is no use:
+    what it said that it would say to every request.
+    """
+
+    transport: Transport
+    breaker: Breaker
+    under_way: int = 0
+    sent: int = 0
+    refusal: UnavailableError | None = None
+
+    @contextlib.contextmanager
+    def asked(self) -> Iterator[None]:
+        """Count a request while it is under way."""
+        self.under_way += 1
+        self.sent += 1
+        try:
+            yield
+        finally:
+            self.under_way -= 1
+
+
+class Replicas:
+    """Chooses among the servers of a model; asyncio, one loop.
+
+    `transport` makes what sends to the one address of a configuration. Raises SpecError for a list
+    in a file that cannot be used; once begun, the last good list holds.
+    """
+
+    def __init__(
+        self,
+        config: ModelConfig,
+        transport: Callable[[ModelConfig], Transport],
+        breakers: Breakers,
+    ) -> None:
+        self._config = config
+        self._transport = transport
+        self._breakers = breakers
+        self._file: AddressFile | None = None
+        self._known: dict[str | None, Replica] = {}
+        self._listed: list[Replica] = []
+        if config.api_base_file is not None:
+            self._file = AddressFile(config.api_base_file, breakers.clock, breakers.tell)
+        self._list(addresses_of(config) if self._file is None else self._file.addresses)
+
+    @contextlib.asynccontextmanager
+    async def passing(self) -> AsyncIterator[Replica | None]:
+        """Wait until a request may be sent; yields the server that it shall probe, or None.
+
+        Raises UnavailableError where none is left.
+        """
+        while True:
+            self._look_at_file()
+            self.raise_if_none_left()
+            probed = self._due()
+            if probed is not None or self.choose() is not None:
+                break
+            await self._wait()
+        if probed is None:
+            yield None
+        else:
+            with probed.breaker.probing():
+                yield probed
+
+    def choose(
+        self, probed: Replica | None = None, failed: Replica | None = None
+    ) -> Replica | None:
+        """The server to probe if it is still listed, else the one that answers and has the fewest
+        requests; the one that failed last only where there is no other. None where all are gone.
+        """
+        self._look_at_file()
+        usable = self._usable()
+        if probed in usable:
+            return probed
+        closed = (replica for replica in usable if not replica.breaker.is_open)
+        return min(closed, key=lambda one: (one is failed, one.under_way, one.sent), default=None)
+
+    def leave_out(self, replica: Replica, refusal: UnavailableError) -> bool:
+        """Ask a server no more that refuses whatever it is asked; whether others are left."""
+        is_new = replica.refusal is None
+        replica.refusal = refusal
+        is_left = bool(self._usable())
+        if is_new and is_left:
+            server = replica.breaker.server
+            self._breakers.tell(f"{server} is left out of {self._config.name}: {refusal}")
+        return is_left
+
+    def raise_if_none_left(self) -> None:
+        """Raise UnavailableError where every server refuses, or was away for too long."""
+        usable = self._usable()
+        if not usable:
+            refusal = self._listed[-1].refusal
+            assert refusal is not None, "a list is never empty"
+            raise UnavailableError(str(refusal), status=refusal.status)
+        ends = [replica.breaker.end for replica in usable]
+        if None not in ends:
+            more = f" (so it is with all {len(ends)} servers)" if len(ends) > 1 else ""
+            raise UnavailableError(f"{ends[-1]}{more}", sent="no")
+
+    async def aclose(self) -> None:
+        """Release the connections to all servers."""
+        for replica in self._known.values():
+            await replica.transport.aclose()
+
+    def _usable(self) -> list[Replica]:
+        return [replica for replica in self._listed if replica.refusal is None]
+
+    def _due(self) -> Replica | None:
+        """A server that is gone and may be tried again now."""
+        away = (replica for replica in self._usable() if replica.breaker.is_open)
+        return next((one for one in away if one.breaker.probe_in_s == 0.0), None)
+
+    async def _wait(self) -> None:
+        """Wait until a server is heard of, may be probed, or may be listed anew."""
+        waits_s = [replica.breaker.probe_in_s for replica in self._usable()]
+        waits_s.append(None if self._file is None else LOOK_EVERY_S)
+        known_s = [wait_s for wait_s in waits_s if wait_s is not None]
+        nap = self._breakers.clock.sleep(min(known_s)) if known_s else None
+        await self._breakers.changes.wait(nap)
+
+    def _look_at_file(self) -> None:
+        if self._file is not None and self._file.has_changed():
+            self._list(self._file.addresses)
+            count = len(self._listed)
+            self._breakers.tell(f"{self._config.name} now has {count} server{'s' * (count > 1)}")
+
+    def _list(self, addresses: tuple[str | None, ...]) -> None:
+        """Take these servers for the list; one that was listed before has another chance."""
+        before = self._listed
+        self._listed = []
+        for address in addresses:
+            if address not in self._known:
+                config = self._config.at(address)
+                self._known[address] = Replica(self._transport(config), self._breakers.of(config))
+            replica = self._known[address]
+            if replica not in before:
+                replica.refusal = None
+            self._listed.append(replica)
