@@ -39,7 +39,8 @@ def command(folder: Path, suite: str) -> None:
     Files that are already there are never written over.
     """
     file_name = f"{suite}.yaml"
-    templates = [kind_of(name).template for name in suite_tracks(find_suite(suite))]
+    tracks = [kind_of(name) for name in suite_tracks(find_suite(suite))]
+    templates = [own for kind in tracks for own in (kind.template, kind.json_template)]
     prompts = [("prompts", template.name) for template in templates if template is not None]
     names = (*_FILES, ("benchmarks", file_name), *prompts)
     files = [folder.joinpath(*parts) for parts in names]
@@ -54,7 +55,8 @@ def command(folder: Path, suite: str) -> None:
     console.print(
         f"\nNext: cd {shlex.quote(shown_path(folder))} && phyblock run benchmarks/{file_name}\n"
         "Add a model with one line in models.yaml, then name it under models in the suite.\n"
-        "What you change under prompts/ is used by every run from here.",
+        "What you change under prompts/ is used by every run from here (NAME_json.j2 where a suite "
+        "asks for JSON).",
         markup=False,
         soft_wrap=True,
     )

@@ -132,6 +132,8 @@ class Breaker:
         is_slow_probe = is_probe and error.sent == "maybe" and isinstance(error, RetryableError)
         if is_answer or is_slow_probe:
             self.heard()
+        # A gateway that finds nothing behind it is there: its address is right.
+        self._was_heard = self._was_heard or error.status is not None
         if not shows_outage(error):
             return
         assert isinstance(error, RetryableError)

@@ -94,11 +94,11 @@ def require_price(config: ModelConfig) -> Price:
 
 def is_billed(config: ModelConfig) -> bool:
     """Whether somebody may be billed for calls: not where the price is 0, nor by a server of one's
-    own to which no price was given.
+    own to which no price and no key was given.
     """
     price = price_of(config)
     if price is None:
-        return config.provider not in KEYLESS
+        return config.provider not in KEYLESS or config.api_key_env is not None
     return price != Price(0.0, 0.0)
 
 

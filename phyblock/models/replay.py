@@ -127,10 +127,12 @@ def _read_records(path: Path, model: str) -> dict[tuple[str, str, int], Recorded
     """Records of one model by track, key and seed; the last one counts where a sample has several.
 
     An unfinished last line, which a killed run leaves, is not there yet. A run of one model is
-    that model's whatever its name.
+    that model's whatever its name. Of a varied run the reference alone counts.
     """
     found: dict[str, dict[tuple[str, str, int], Recorded]] = {}
     for _, record in RecordedLines(path):
+        if record.variant:
+            continue
         found.setdefault(record.model, {})[record.track, record.key, record.seed] = record
     if model in found:
         return found[model]

@@ -250,6 +250,8 @@ class Recorded(Line):
     """The reply."""
     error: StoredError | None = None
     """The error."""
+    variant: dict[str, str] = Field(default_factory=dict)
+    """In what a varied run asked otherwise than its reference."""
     shown: ShownScene | None = None
     """How the item was shown."""
     asked: AskedAs | None = None

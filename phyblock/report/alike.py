@@ -22,6 +22,7 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str) -> None:
     the same.
     """
     _check_version(run, first)
+    _check_variants(run, first)
     check = kind_of(track).report().check_alike
     if check is not None:
         check(run, first, cells)
@@ -39,6 +40,16 @@ def _check_version(run: Run, first: Run) -> None:
             versions = str(found.version), str(wanted.version)
             hint = "run the suite again on the newer version"
             raise SpecError(Problem(str(run.path), message, f"{field}.version", *versions, hint))
+
+
+def _check_variants(run: Run, first: Run) -> None:
+    """What a run varies is told from its reference: two that vary otherwise mean other things."""
+    found, wanted = (one.design.suite.vary for one in (run, first))
+    if found != wanted:
+        message = f"asks in other ways than {first.path}"
+        said, allowed = (", ".join(vary.factors) or "nothing" for vary in (found, wanted))
+        hint = "compare runs that vary the same, in the same order"
+        raise SpecError(Problem(str(run.path), message, "vary", said, allowed, hint))
 
 
 def _name(data: ManifestDataset | ManifestQuestions) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 
 from phyblock.run.plan import RunPlan
 from phyblock.specs import LoadedSuite
@@ -19,10 +20,13 @@ def asking_remarks(loaded: LoadedSuite, plan: RunPlan) -> list[str]:
     """
     if not any(model.config.kind == "litellm" for model in plan.models):
         return []
-    own = [f"prompt of {track}: {path}" for track, path in loaded.templates.items()]
+    asked = {variant.shown: loaded.at(variant.shown) for variant in plan.variants}
+    used = {(track, path): one for one in asked.values() for track, path in one.templates.items()}
+    own = [f"prompt of {track}: {path}" for track, path in used]
     if loaded.suite.answer_format == "text":
         return own
-    return [*own, *_models(plan), *_templates(loaded)]
+    unsaid = [_unsaid(track, path) for (track, path), one in used.items() if not _says(track, one)]
+    return [*own, *_models(plan), *unsaid]
 
 
 def choice_remarks(plan: RunPlan) -> list[str]:
@@ -51,11 +55,13 @@ def _models(plan: RunPlan) -> Iterator[str]:
         )
 
 
-def _templates(loaded: LoadedSuite) -> Iterator[str]:
-    for track, path in loaded.templates.items():
-        if not template_prompt(loaded, track).says_form:
-            names = " and ".join(FORM_FACTS)
-            yield (
-                f"{path.name}, the prompt of {track}, does not use {names}: unless it says the "
-                "form of the answer in words of its own, models are not told it"
-            )
+def _says(track: str, loaded: LoadedSuite) -> bool:
+    return template_prompt(loaded, track).says_form
+
+
+def _unsaid(track: str, path: Path) -> str:
+    names = " and ".join(FORM_FACTS)
+    return (
+        f"{path.name}, the prompt of {track}, does not use {names}: unless it says the form of the "
+        "answer in words of its own, models are not told it"
+    )

@@ -40,9 +40,12 @@ def floor_values(
     """What the floors of `COMPUTED_FLOORS` reach on a run, for every measure that names them.
 
     `reopened` opens a track under a suite, without prompts. Floors learn under each setting of
-    the suite; the best value counts.
+    the suite; the best value counts. Where the order of the candidates varies there is none: what a
+    floor reaches hangs on it, and values of models pool all orders.
     """
     found: FloorValues = {}
+    if "candidate_order" in suite.vary.factors:
+        return found
     for name in suite.tracks:
         named = {floor for measure in track_measures(name) for floor in measure.floors}
         floors = [floor for floor in COMPUTED_FLOORS if floor in named]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from phyblock.datasets import recorded_models
 from phyblock.datasets.published_names import match_published
 from phyblock.errors import Problem, SpecError
 from phyblock.models import ModelConfig, Price, server_address, takes_format
-from phyblock.records import RECORDS, RecordedLines
+from phyblock.records import RECORDS, Recorded, RecordedLines
 from phyblock.registry import baseline_names
 from phyblock.specs import (
     RECORDED,
@@ -64,8 +64,7 @@ def recorded_order(folder: Path) -> CandidateOrder:
 
     A run of our own says so in its records; raw replies name numbers of the file.
     """
-    lines = RecordedLines(folder / RECORDS) if (folder / RECORDS).is_file() else ()
-    shown = next((record.shown for _, record in lines if record.shown), None)
+    shown = next((record.shown for record in _recorded(folder) if record.shown), None)
     if shown is None or list(shown.order) == sorted(shown.order):
         return "file"
     return "shuffled"
@@ -73,8 +72,13 @@ def recorded_order(folder: Path) -> CandidateOrder:
 
 def recorded_format(folder: Path) -> AnswerFormat:
     """The form in which a recorded model was asked to answer; raw replies are texts."""
-    lines = RecordedLines(folder / RECORDS) if (folder / RECORDS).is_file() else ()
-    return "json_schema" if any(record.asked for _, record in lines) else "text"
+    return "json_schema" if any(record.asked for record in _recorded(folder)) else "text"
+
+
+def _recorded(folder: Path) -> Iterator[Recorded]:
+    """The records of a run that can be replayed: of a varied one those of its reference."""
+    if (folder / RECORDS).is_file():
+        yield from (record for _, record in RecordedLines(folder / RECORDS) if not record.variant)
 
 
 def _check_known(names: Sequence[str], known: Sequence[str], message: str) -> None:

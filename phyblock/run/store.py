@@ -44,6 +44,7 @@ LineT = TypeVar("LineT", bound=Line)
 _HINT = "choose another folder with --out"
 _NOT_IDENTITY = (
     "suite.description",
+    "suite.limit",
     "suite.limits",
     "suite.models",
     "suite.tables",
@@ -158,7 +159,7 @@ def holds_run(folder: Path, manifest: Manifest) -> bool:
     if all(next(iter(lines), None) is None for lines in paid):
         return False
     names = _changed(found, manifest)
-    changed = f"different: {', '.join(names) or 'how pictures are drawn'}"
+    changed = f"different: {', '.join(names) or 'how phyblock asks, draws or reads'}"
     hint = "; ".join((*_reasons(found, manifest), _HINT))
     raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=hint))
 
@@ -183,7 +184,10 @@ def _changed(found: Manifest, wanted: Manifest) -> list[str]:
     names = [
         name
         for name in (*new, *sorted(tracks - new.keys()))
-        if name not in _NOT_IDENTITY and old.get(name) != new.get(name)
+        # What an older version did not know of a suite, it did not do otherwise.
+        if name not in _NOT_IDENTITY
+        and (name in old or not name.startswith("suite."))
+        and old.get(name) != new.get(name)
     ]
     # Other scenes of the same data have other digests, too.
     chosen = {"suite.levels", "limit"} & set(names)

@@ -207,15 +207,15 @@ class SuiteSpec(Section):
     def identity(self) -> dict[str, Any]:
         """What determines the results, as JSON-able data.
 
-        Leaves out description, limits and tables, sections of tracks that are not run, models and
-        paths (of data and templates): a run stores which models were run, and the hashes of what
-        stands at the paths, which say more and survive a move. What is asked for in text says
-        nothing of the format, as suites did before there was another.
+        Leaves out description, limits and tables, sections of tracks that are not run, models,
+        limit and paths (of data and templates): a run stores which models were run, about which
+        items, and the hashes of what stands at the paths, which say more and survive a move. What
+        is asked for in text says nothing of the format, as suites did before there was another.
         """
         sections = {kind.section[0]: name for name, kind in known_tracks().items() if kind.section}
         idle = {key for key, track in sections.items() if track not in self.tracks}
         spec = self.model_dump(
-            mode="json", exclude={"description", "limits", "models", "tables", *idle}
+            mode="json", exclude={"description", "limit", "limits", "models", "tables", *idle}
         )
         if self.answer_format == "text":
             del spec["answer_format"]

@@ -112,6 +112,17 @@ def test_a_run_of_several_tracks_answers_each_with_its_own(tmp_path: Path) -> No
     assert (plan.text, nothing) == ("a plan", None)
 
 
+def test_of_a_varied_run_the_reference_answers(tmp_path: Path) -> None:
+    varied = {"candidate_order": "shuffled", "repeats": "2"}
+    (tmp_path / "records.jsonl").write_text(
+        record("m", "007", 1, reply=asdict(Reply("asked plainly")))
+        + record("m", "007", 1, variant=varied, reply=asdict(Reply("asked otherwise")))
+    )
+    found = answer(replay(tmp_path), "007", 1)
+    assert found is not None
+    assert found.text == "asked plainly"
+
+
 @pytest.mark.parametrize(("kind", "error"), [("sample", SampleError), ("refused", RefusedError)])
 def test_a_recorded_error_is_raised_again(
     tmp_path: Path, kind: str, error: type[SampleError]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block
 from phyblock.sim.film import FilmStep, Tone
-from phyblock.sim.registry import told_engine
+from phyblock.sim.registry import REFERENCE_ENGINE, told_engine
 from phyblock.sim.site import settle
 from phyblock.tables.text_table import Column, TextTable
 from phyblock.tracks.step_planning.episode_views import ENDING_NAMES
@@ -61,8 +61,10 @@ def episode_film(record: EpisodeRecord, task: AssemblyTask) -> Iterator[FilmStep
     by = ""
     if record.ending == "collapsed":
         blocks = settle(blocks).blocks
-        if record.engine is not None and record.engine != told_engine():
-            by = f" (falls in {told_engine()}, not {record.engine})"
+        # Older records say no engine, and no version of it.
+        engine, now = record.engine or REFERENCE_ENGINE, told_engine()
+        if engine not in (now, now.partition(" ")[0]):
+            by = f" (falls in {now}, not {engine})"
     tone = "good" if record.ending == "completed" else "bad"
     placed = record.progress[-1] if record.progress else 0
     caption = f"{_ending(record)}: {placed} of {record.n_blocks} blocks{by}"

@@ -85,8 +85,9 @@ def test_what_depends_on_the_view_is_told_for_the_view(questions: list[Question]
     turned = [_from_behind(question) for question in corners]
     problems = [problem_of(question) for question in turned]
     assert None not in problems
-    # Seen from behind, some can no longer be answered surely.
-    assert any("the answer is" in str(problem) for problem in problems)
+    # Seen from behind, some can no longer be answered surely; most have another answer.
+    others = ["the answer is" in str(problem) for problem in problems]
+    assert sum(others) > len(others) / 2
 
 
 def _from_behind(question: Question) -> Question:
