@@ -23,6 +23,7 @@ __all__ = [
     "added_measures",
     "baseline_names",
     "baseline_rules",
+    "has_additions",
     "known_track",
     "known_tracks",
     "register_track",
@@ -147,6 +148,11 @@ def remove_measure(track: str, name: str) -> None:
 def added_measures(track: str) -> tuple[Any, ...]:
     """Measures that were added to a track, in the order in which they came."""
     return _measures.get(track, ())
+
+
+def has_additions() -> bool:
+    """Whether tracks or measures were added to the built-in ones."""
+    return bool(_registered) or any(_measures.values())
 
 
 def table_names() -> tuple[str, ...]:

@@ -47,7 +47,7 @@ def phyblock(suite: Path, out: Path, env: dict[str, str], *extra: str) -> Cost:
     """`phyblock run` of the suite into a folder of its own."""
     command = [sys.executable, "-m", "phyblock", "run", str(suite), "--out", str(out)]
     models = ["--models-file", str(suite.with_name("models.yaml"))]
-    return run_measured([*command, *models, "--limit", "20", *extra], env)
+    return run_measured([*command, *models, "--limit", "20", "--yes", *extra], env)
 
 
 def show(name: str, cost: Cost, ideal_s: float, loops: dict[str, Cost]) -> None:

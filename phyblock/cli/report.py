@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
-from rich.console import Console
 
 from phyblock import report
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
 from phyblock.cli.summary import print_summary
+from phyblock.report.inputs import inputs_digest
+from phyblock.report.made import PAGE, TABLES, note_made, still_made
+from phyblock.report.terminal import terminal_of
 
-__all__ = ["command", "show_page", "show_tables"]
+__all__ = ["command", "show_made", "show_tables"]
 
 
 @click.command("report")
@@ -29,12 +32,28 @@ def command(run: Path, data: Path | None) -> None:
 
 def show_tables(folder: Path, data: Path | None = None) -> None:
     """Write tables and page of a run folder, and print what matters of the tables."""
+    _show(folder, None, data, page=True, anew=True)
+
+
+def show_made(folder: Path, tables: Sequence[str], *, page: bool) -> None:
+    """As `show_tables` for these tables, but nothing is made anew that did not change."""
+    _show(folder, tables, None, page=page, anew=False)
+
+
+def _show(
+    folder: Path, tables: Sequence[str] | None, data: Path | None, *, page: bool, anew: bool
+) -> None:
     console = make_console()
-    written = report.write_tables(folder)
-    print_summary(console, written)
-    show_page(console, report.write_report(written, data))
-
-
-def show_page(console: Console, page: Path) -> None:
-    """Say where the page is."""
-    console.print(f"The report is {shown_path(page)}", soft_wrap=True, markup=False)
+    inputs = inputs_digest(folder, tables)
+    made = None if anew else still_made(folder, inputs, page=page)
+    if made is not None:
+        print_summary(console, made.terminal, folder / TABLES)
+    else:
+        written = report.write_tables(folder, tables)
+        terminal = terminal_of(written)
+        print_summary(console, terminal, written.folder)
+        paged = report.write_page(written, data) if page else None
+        # Drawn from data elsewhere, it is not what a run makes of its own.
+        note_made(folder, None if data else inputs, terminal, written.files, paged)
+    if page:
+        console.print(f"The report is {shown_path(folder / PAGE)}", soft_wrap=True, markup=False)

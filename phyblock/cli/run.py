@@ -11,18 +11,17 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from phyblock import report
 from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.estimate_view import show_estimate
 from phyblock.cli.files import bundled_suites, find_models_file, find_suite, prompt_dirs
 from phyblock.cli.names import split_names
 from phyblock.cli.paths import NAME_OR_PATH, UserPath, models_file_option
 from phyblock.cli.progress import ProgressView
-from phyblock.cli.report import show_page
-from phyblock.cli.summary import print_summary
+from phyblock.cli.report import show_made
 from phyblock.errors import Problem, SpecError
 from phyblock.models import is_billed
 from phyblock.plain_text import one_line
+from phyblock.report.made import names_to_write
 from phyblock.resources import bundled
 from phyblock.run.asking import asking_remarks, choice_remarks
 from phyblock.run.estimate import estimate
@@ -96,7 +95,8 @@ def command(
     plan = make_plan(loaded, known, only=only, limit=limit, informative=informative)
     folder = out or Path("results") / plan.folder_name
     if holds_run(folder, plan.manifest):
-        run_folder(folder).check(() if dry_run else report.files_of(page=not no_report))
+        names = () if dry_run else names_to_write(folder, page=not no_report)
+        run_folder(folder).check(names)
     if dry_run:
         show_estimate(console, plan, estimate(plan, folder, use_cache=not no_cache))
     for remark in (*choice_remarks(plan), *asking_remarks(loaded, plan)):
@@ -110,10 +110,7 @@ def command(
     view = ProgressView(console, plan.suite.name)
     session = Session(plan, folder, view, use_cache=not no_cache, retry_failed=retry_failed)
     result = asyncio.run(_run(session, view))
-    written = report.write_tables(folder, plan.suite.tables)
-    print_summary(console, written)
-    if not no_report:
-        show_page(console, report.write_report(written))
+    show_made(folder, plan.suite.tables, page=not no_report)
     return _conclude(console, folder, result, view.cost_text)
 
 

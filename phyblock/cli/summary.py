@@ -2,40 +2,32 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from rich.console import Console
 
-from phyblock import report
 from phyblock.cli.console import print_view, shown_path
 from phyblock.cli.layout import width_of
 from phyblock.plain_text import one_line
-
-if TYPE_CHECKING:
-    from phyblock.report import TablesWritten, TextTable
+from phyblock.report import TextTable
+from phyblock.report.terminal import Failure, Terminal
 
 __all__ = ["print_summary"]
 
 _FAILURES_SHOWN = 8
 
 
-def print_summary(console: Console, written: TablesWritten) -> None:
-    """Print of each table that was written what its maker has for the terminal, and what was not
-    answered and why.
+def print_summary(console: Console, terminal: Terminal, tables: Path) -> None:
+    """Print of each table what it has for the terminal, what was not answered and why, and in
+    which folder the tables are.
     """
-    makers = report.table_makers(written.run)
-    known = {name: makers[name] for name in makers if name in written.frames}
-    for name, maker in known.items():
-        if maker.in_terminal is not None:
-            forms = maker.in_terminal(written.views[name], written.frames[name])
-            _print_fitting(console, forms)
-    _print_failures(console, written)
-    for name, maker in known.items():
-        if maker.lines is not None:
-            _print_lines(console, maker.lines(written.frames[name], written.run))
-    console.print(f"Tables are in {shown_path(written.folder)}", soft_wrap=True, markup=False)
+    for forms in terminal.tables:
+        _print_fitting(console, forms)
+    _print_failures(console, terminal.failures)
+    for lines in terminal.lines:
+        _print_lines(console, lines)
+    console.print(f"Tables are in {shown_path(tables)}", soft_wrap=True, markup=False)
 
 
 def _print_fitting(console: Console, forms: Sequence[TextTable]) -> None:
@@ -52,16 +44,15 @@ def _print_lines(console: Console, lines: Sequence[str]) -> None:
     console.print()
 
 
-def _print_failures(console: Console, written: TablesWritten) -> None:
+def _print_failures(console: Console, failures: Sequence[Failure]) -> None:
     """What providers said where a call failed, the most frequent first."""
-    failed = written.run.records.dropna(subset=["error_message"])
-    said = Counter(zip(failed["model"], failed["error_message"], strict=True))
-    if not said:
+    if not failures:
         return
     console.print("Failed calls", style="bold")
-    for (model, message), times in said.most_common(_FAILURES_SHOWN):
-        told = one_line(f"{model}: {message}")
-        console.print(f"{times:>6,} x {told}", soft_wrap=True)
-    if len(said) > _FAILURES_SHOWN:
-        console.print(f"       and {len(said) - _FAILURES_SHOWN} other messages", markup=False)
+    for failure in failures[:_FAILURES_SHOWN]:
+        text = one_line(f"{failure.model}: {failure.message}")
+        console.print(f"{failure.times:>6,} x {text}", soft_wrap=True)
+    if len(failures) > _FAILURES_SHOWN:
+        others = f"       and {len(failures) - _FAILURES_SHOWN} other messages"
+        console.print(others, markup=False)
     console.print()

@@ -12,7 +12,7 @@ from phyblock.tables.text_table import NO_VALUE, Column, TextTable
 
 if TYPE_CHECKING:
     from phyblock.report.files import files_of
-    from phyblock.report.html import write_report
+    from phyblock.report.html import write_page, write_report
     from phyblock.report.write import TablesWritten, table_makers, write_tables
     from phyblock.tables.coverage import coverage_frame
     from phyblock.tables.design import Design, read_design
@@ -36,6 +36,7 @@ __all__ = [
     "table_makers",
     "to_latex",
     "to_markdown",
+    "write_page",
     "write_report",
     "write_tables",
 ]
@@ -52,6 +53,7 @@ _HOMES = {
     "published_table": "tables.paper_numbers",
     "TablesWritten": "report.write",
     "table_makers": "report.write",
+    "write_page": "report.html",
     "write_report": "report.html",
     "write_tables": "report.write",
 }

@@ -10,6 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from phyblock.report.floors import floor_lines, floors_frame, floors_view
+from phyblock.report.made import TABLES
 from phyblock.report.measure_table import (
     headline_frame,
     headline_view,
@@ -51,7 +52,7 @@ __all__ = [
     "write_tables",
 ]
 
-_FOLDER = "tables"
+_FOLDER = TABLES
 _FORMS = ("csv", "md", "tex")
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +20,11 @@ from phyblock.records.manifest import ManifestModel
 from phyblock.run.records import begun, judged
 from phyblock.specs import SuiteSpec
 from phyblock.tables.design import read_design
+from phyblock.tables.estimates import estimate_frame
 from phyblock.tables.load import Run, frames_of
 from phyblock.tables.measures import WAY, way_name
 from phyblock.tracks import AnyTrack, SingleTrack, kind_of, shown_item
-from phyblock.tracks.estimates import track_estimates, track_measures
+from phyblock.tracks.estimates import counted_samples, track_measures
 
 __all__ = ["COMPUTED_FLOORS", "FloorValues", "floor_values"]
 
@@ -86,9 +88,9 @@ def _estimates(
     facts = manifest.model_copy(update={"models": models})
     design = read_design(facts.fields())
     run = Run(Path(MANIFEST), facts, design, *frames_of(records, design, texts=False))
-    measures = [measure.name for measure in track_measures(track) if measure.floors]
-    rows = track_estimates(run, track)
-    columns = ["model", *WAY, "value"]
-    for row in rows.loc[rows["measure"].isin(measures), columns].to_dict("records"):
+    measures = [measure for measure in track_measures(track) if measure.floors]
+    counts = partial(counted_samples, run, track)
+    rows = estimate_frame(run, measures, kind_of(track).report().cells(run), counts)
+    for row in rows[["model", *WAY, "value"]].to_dict("records"):
         if not math.isnan(row["value"]):
             yield str(row["model"]), way_name(row), float(row["value"])

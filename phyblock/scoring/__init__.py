@@ -6,7 +6,7 @@ from phyblock.scoring.error_types import ERROR_TYPES, ErrorType, count_errors
 from phyblock.scoring.goal import Goal
 from phyblock.scoring.level1 import level1_counts
 from phyblock.scoring.losses import BLOCK_OUTCOMES, BlockOutcome, block_outcomes
-from phyblock.scoring.match import Match, match_plan, step_errors
+from phyblock.scoring.match import Match, match_plan, most_placed, step_errors
 from phyblock.scoring.metrics import Counts, micro
 from phyblock.scoring.nearest import steps_kept
 from phyblock.scoring.steps import (
@@ -43,6 +43,7 @@ __all__ = [
     "level1_counts",
     "match_plan",
     "micro",
+    "most_placed",
     "placed_counts",
     "step_errors",
     "steps_kept",

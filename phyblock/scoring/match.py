@@ -14,7 +14,7 @@ from phyblock.scoring.goal import Goal
 from phyblock.scoring.metrics import Counts
 from phyblock.words import Matcher
 
-__all__ = ["Match", "match_plan", "step_errors"]
+__all__ = ["Match", "match_plan", "most_placed", "step_errors"]
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,21 @@ def match_plan(goal: Goal, plan: Plan, matcher: Matcher) -> Match:
         masks.append(placed)
         placed |= 0 if vertex is None else 1 << vertex
     return Match(tuple(vertices), tuple(masks), len(goal.graph))
+
+
+def most_placed(goal: Goal, plan: Plan) -> int:
+    """How many steps of a plan are true positives to the `optimal` matcher, which is quicker to
+    tell than which; raises as `match_plan`.
+    """
+    frontier = {0}
+    for index in plan.steps:
+        if goal.equal[index]:
+            reached: set[int] = set()
+            for placed in frontier:
+                choices = goal.distinct(goal.choices(index, placed))
+                reached.update([placed | 1 << vertex for vertex in choices] or [placed])
+            frontier = reached
+    return max(mask.bit_count() for mask in frontier)
 
 
 def step_errors(goal: Goal, plan: Plan, match: Match) -> tuple[ErrorType | None, ...]:

@@ -11,12 +11,14 @@ from rich.console import Console
 
 from phyblock.cli.summary import print_summary
 from phyblock.report import NO_VALUE, write_tables
+from phyblock.report.terminal import terminal_of
 from tests.report.factory import manifest, record, score, write_run
 
 
 def printed(folder: Path, records: list[dict[str, Any]], facts: dict[str, Any]) -> list[str]:
     console = Console(file=io.StringIO(), width=160)
-    print_summary(console, write_tables(write_run(folder, records, facts)))
+    written = write_tables(write_run(folder, records, facts))
+    print_summary(console, terminal_of(written), written.folder)
     assert isinstance(console.file, io.StringIO)
     return [line.strip() for line in console.file.getvalue().splitlines()]
 

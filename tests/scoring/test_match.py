@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring import Counts, Goal, Match, match_plan
+from phyblock.scoring import Counts, Goal, Match, match_plan, most_placed
 from phyblock.words import MATCHERS, SETTINGS, Matcher, Setting
 from tests.scoring.cases import Case, cases, choices, greatest_tp, greedy_tp
 
@@ -29,7 +29,9 @@ def counted(case: Case, setting: Setting, matcher: Matcher = "optimal") -> Count
 @each_setting
 @given(case=cases())
 def test_optimal_is_the_best_of_all_sequences_of_choices(setting: Setting, case: Case) -> None:
-    assert counted(case, setting).tp == greatest_tp(case, setting)
+    greatest = greatest_tp(case, setting)
+    assert counted(case, setting).tp == greatest
+    assert most_placed(Goal(case.scene, case.candidates, setting), case.plan) == greatest
 
 
 @each_setting

@@ -4,6 +4,12 @@ Beside the page lies a folder of scripts that hold the records in chunks; the pa
 shows, when it shows it (docs/report.md).
 """
 
-from phyblock.report.html.write import REPORT_FILE, page_files, write_report
+from phyblock.report.html.write import (
+    REPORT_FILE,
+    PageWritten,
+    page_files,
+    write_page,
+    write_report,
+)
 
-__all__ = ["REPORT_FILE", "page_files", "write_report"]
+__all__ = ["REPORT_FILE", "PageWritten", "page_files", "write_page", "write_report"]

@@ -23,7 +23,8 @@ _MOST_COPIED_BYTES = 256 * 2**20
 
 
 class PictureShelf:
-    """A folder of pictures named by digest; `names` are those that are there.
+    """A folder of pictures named by digest; `names` are those that are there, `is_whole` says
+    whether all are.
 
     Nothing is rendered: a picture that is not in the cache is left out. Pictures are hard links
     into the cache; on a file system where that is not possible they are copied, up to 256 MiB.
@@ -32,6 +33,7 @@ class PictureShelf:
     def __init__(self, folder: Path, earlier: Path) -> None:
         """Put pictures into `folder` unless `earlier` holds them."""
         self.names: dict[str, str] = {}
+        self.is_whole = True
         self._folder = folder
         self._earlier = earlier
         self._cache = cache_dir() / "pictures"
@@ -45,6 +47,7 @@ class PictureShelf:
         is_drawn = policy.source == "render"
         for task in tasks:
             found, are_real = pictures.outline(task)
+            self.is_whole &= are_real
             if are_real:
                 self._keep(found, pictures.keys(task) if is_drawn else ())
 
@@ -53,6 +56,7 @@ class PictureShelf:
         pictures = items.pictures(self._cache, style)
         for shown in asked:
             found, are_real = pictures.outline(shown)
+            self.is_whole &= are_real
             if are_real:
                 self._keep(found, pictures.keys(shown))
 
@@ -68,6 +72,8 @@ class PictureShelf:
                 or self._put(path, image.data, source)
             ):
                 self.names[image.sha256] = name
+            else:
+                self.is_whole = False
 
     def _put(self, path: Path, data: bytes, source: Path | None) -> bool:
         """Link or copy a picture; False where it would have to be copied and there is no room."""

@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from phyblock.report.html.samples import items_shown, pack_prompts, pack_samples
 from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.shown import images_of
 from phyblock.report.html.sources import Sources, open_sources
+from phyblock.report.made import PAGE
 from phyblock.report.write import TablesWritten
 from phyblock.run.folder import run_folder
 from phyblock.tables.load import Run
@@ -31,9 +33,9 @@ from phyblock.tracks.kind import kind_of
 from phyblock.tracks.opening import picture_policy
 from phyblock.tracks.showing import in_order
 
-__all__ = ["REPORT_FILE", "page_files", "write_report"]
+__all__ = ["REPORT_FILE", "PageWritten", "page_files", "write_page", "write_report"]
 
-REPORT_FILE = "report.html"
+REPORT_FILE = PAGE
 _FOLDER = "report"
 _PICTURES = "pictures"
 _CHUNK_BYTES = 2**20
@@ -43,10 +45,30 @@ _NOT_SHOWN = ("table1",)
 """Tables that a headline table replaces."""
 
 
+@dataclass(frozen=True)
+class PageWritten:
+    """The page, all `files` of it and of figures, and the `pictures` that were sent, beside it.
+
+    `is_whole` says that nothing was lacking that a later writing might find.
+    """
+
+    path: Path
+    files: tuple[Path, ...]
+    pictures: tuple[Path, ...]
+    is_whole: bool
+
+
 def write_report(
     written: TablesWritten, data: Path | None = None, figures: Sequence[str] = ()
 ) -> Path:
-    """Write figures, `report.html` and `report/` of a run whose tables were; the page's path.
+    """Write figures and page as `write_page` does; the page's path."""
+    return write_page(written, data, figures).path
+
+
+def write_page(
+    written: TablesWritten, data: Path | None = None, figures: Sequence[str] = ()
+) -> PageWritten:
+    """Write figures, `report.html` and `report/` of a run whose tables were.
 
     Goals, candidates and assemblies are drawn by the page from the scenes: `data` is where the
     data set is now, if it has moved; where it cannot be read, the page says so and shows the rest.
@@ -64,13 +86,16 @@ def write_report(
         own = f"{_FOLDER}/{build}/"
         out.claim([REPORT_FILE])
         with out.making(own) as new:
-            _write_data(run, sources, out, new, build)
+            pictures, is_whole = _write_data(run, sources, out, new, build)
+            scripts = [run.path / own / script.name for script in new.iterdir()]
             page = _page(written, drawn, build)
         (path,) = out.write({REPORT_FILE: page})
         # A page of an earlier build that is still open says that it was written again.
         lasting = (own, f"{_FOLDER}/{_PICTURES}/")
         out.remove(name for name in out.names(f"{_FOLDER}/") if not name.startswith(lasting))
-    return path
+    kept = tuple(run.path / address for address in pictures.values())
+    whole = is_whole and not sources.lacking
+    return PageWritten(path, (*drawn, *scripts, path), kept, whole)
 
 
 def page_files() -> tuple[str, ...]:
@@ -88,14 +113,18 @@ def _build(run: Run, sources: Sources) -> str:
     return digest.hexdigest()[:12]
 
 
-def _write_data(run: Run, sources: Sources, out: OutFolder, new: Path, build: str) -> None:
+def _write_data(
+    run: Run, sources: Sources, out: OutFolder, new: Path, build: str
+) -> tuple[dict[str, str], bool]:
+    """Write the scripts; the pictures as `_keep_pictures` says."""
     kinds = ("records", "scenes", "questions", "prompts")
     packs = {kind: Pack(new, kind, build) for kind in kinds}
     places = read_places(run.path, run.design)
     asked = items_shown(run.path, places, sources.items)
-    pictures = {}
+    pictures: dict[str, str] = {}
+    is_whole = True
     if pictures_sent(run.path, places):
-        pictures = _keep_pictures(run, sources, asked, out)
+        pictures, is_whole = _keep_pictures(run, sources, asked, out)
     prompts = pack_prompts(run.path, packs["prompts"])
     index = SampleIndex(run.design)
     pack_samples(run.path, places, index, packs["records"], prompts, pictures)
@@ -116,12 +145,13 @@ def _write_data(run: Run, sources: Sources, out: OutFolder, new: Path, build: st
         "subtask_names": _part_names(run),
     }
     write_script(new, "index", build, content)
+    return pictures, is_whole
 
 
 def _keep_pictures(
     run: Run, sources: Sources, asked: Mapping[Item, Any], out: OutFolder
-) -> dict[str, str]:
-    """Addresses of the pictures at hand as seen from the page, by digest."""
+) -> tuple[dict[str, str], bool]:
+    """Addresses of the pictures at hand as seen from the page, by digest; whether all are."""
     place = f"{_FOLDER}/{_PICTURES}/"
     with out.making(place) as new:
         shelf = PictureShelf(new, out.path / place)
@@ -132,7 +162,7 @@ def _keep_pictures(
             for track, items in sources.items.items():
                 shown = [one for item, one in asked.items() if item.track == track]
                 shelf.add_items(items, shown, policy.style)
-    return {digest: f"{place}{name}" for digest, name in shelf.names.items()}
+    return {digest: f"{place}{name}" for digest, name in shelf.names.items()}, shelf.is_whole
 
 
 def _part_names(run: Run) -> dict[str, str]:

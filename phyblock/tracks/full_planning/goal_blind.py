@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain import CandidateSet, Plan, Scene
-from phyblock.scoring import Goal, match_plan
+from phyblock.scoring import most_placed
 from phyblock.tracks.full_planning.lessons import Lesson, left_out, lessons, related
 from phyblock.tracks.full_planning.offered import Unit
 from phyblock.words import Setting
@@ -24,6 +26,7 @@ from phyblock.words import Setting
 __all__ = ["CONSTANT", "FREQUENCIES", "MOST_COPIES", "Learner", "goal_blind_plans"]
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 Learner = Callable[[Sequence[Lesson], Sequence[Sequence[int]]], list[Floats]]
 """From all lessons, and for each the places of those that it must not be learned from, for each
 lesson the chances that the goal has at least 1, 2, ... of each unit, shape (units, MOST_COPIES).
@@ -35,7 +38,7 @@ _DIGITS = 9
 """Sums of which a part was taken away again are known so well."""
 _PRIOR = 4.0
 """So many units of the overall frequency are mixed into every row of a table."""
-_ORDERS: tuple[Callable[[float, int, int], tuple[float, ...]], ...] = (
+_ORDERS: tuple[Callable[[Floats, Ints, Ints], tuple[NDArray[Any], ...]], ...] = (
     lambda height, copy, number: (height, copy, number),
     lambda height, copy, number: (copy, height, number),
     lambda _, copy, number: (copy, number),
@@ -59,7 +62,7 @@ def goal_blind_plans(
     """
     known, kin = lessons(scenes, candidates, setting), related(scenes)
     ways = list(_ways(known, kin, FREQUENCIES if learners is None else learners, repeats))
-    return _best(known, kin, ways, setting)
+    return _best(known, kin, ways)
 
 
 def _ways(
@@ -69,50 +72,66 @@ def _ways(
     repeats: bool,
 ) -> Iterator[list[Plan]]:
     """Plans for all lessons, made in one way after another."""
-    heights = _heights(known, kin)
+    heights, offers = _heights(known, kin), [_Offer.of(lesson) for lesson in known]
     for learner in learners:
         chances = learner(known, kin)
         for least, order, again in product(_THRESHOLDS, _ORDERS, {False, repeats}):
             yield [
-                _plan(lesson, chance, height, least, order, again)
-                for lesson, chance, height in zip(known, chances, heights, strict=True)
+                _plan(offer, chance, height, least, order, again)
+                for offer, chance, height in zip(offers, chances, heights, strict=True)
             ]
 
 
+@dataclass(frozen=True)
+class _Offer:
+    """By unit and copy, shape (units, MOST_COPIES): the candidate that the copy is named by, and
+    whether it is one of its own.
+    """
+
+    numbers: Ints
+    is_first: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, lesson: Lesson) -> _Offer:
+        """What a lesson offers."""
+        held = [unit.numbers for unit in lesson.units]
+        numbers = [[of[copy % len(of)] for copy in range(MOST_COPIES)] for of in held]
+        first = np.arange(MOST_COPIES) < np.array([[len(of)] for of in held])
+        return cls(np.array(numbers, dtype=np.intp), first)
+
+
 def _plan(
-    lesson: Lesson,
+    offer: _Offer,
     chances: Floats,
     heights: Floats,
     least: float,
-    order: Callable[[float, int, int], tuple[float, ...]],
+    order: Callable[[Floats, Ints, Ints], tuple[NDArray[Any], ...]],
     again: bool,
 ) -> Plan:
     """What is at least so likely; every candidate once where `least` is 0, what is likeliest
     where nothing is likely enough.
     """
-    least = min(least, float(chances[:, 0].max()))
-    named: list[tuple[tuple[float, ...], int]] = []
-    for at, copy in zip(*np.nonzero(chances >= least), strict=True):
-        numbers = lesson.units[at].numbers
-        if copy < len(numbers) or (again and least > 0):
-            number = numbers[copy % len(numbers)]
-            named.append((order(float(heights[at]), int(copy), number), number))
-    return Plan(tuple(number for _, number in sorted(named)))
+    least = min(least, chances[:, 0].max())
+    likely = chances >= least
+    at, copy = np.nonzero(likely if again and least > 0 else likely & offer.is_first)
+    numbers = offer.numbers[at, copy]
+    keys = order(heights[at], copy, numbers)
+    # The last key is the one that lexsort goes by first.
+    return Plan(tuple(numbers[np.lexsort(keys[::-1])].tolist()))
 
 
 def _best(
     known: Sequence[Lesson],
     kin: Sequence[Sequence[int]],
     ways: Sequence[Sequence[Plan]],
-    setting: Setting,
 ) -> dict[str, Plan]:
     """For each lesson the plan made in the way that scores best on the unrelated ones."""
 
     @functools.cache
     def score(place: int, plan: Plan) -> tuple[int, int]:
-        goal = Goal(known[place].scene, known[place].candidates, setting)
-        counts = match_plan(goal, plan, "optimal").counts
-        return counts.tp, counts.fp + counts.fn
+        goal = known[place].goal
+        tp = most_placed(goal, plan)
+        return tp, len(plan) + len(goal.graph) - 2 * tp
 
     counts = np.array(
         [[score(place, plan) for place, plan in enumerate(way)] for way in ways], dtype=np.int64

@@ -30,6 +30,7 @@ class Lesson:
 
     scene: Scene
     candidates: CandidateSet
+    goal: Goal
     units: tuple[Unit, ...]
     counts: tuple[int, ...]
     heights: tuple[float, ...]
@@ -50,7 +51,7 @@ def lessons(
         equal = [goal.equal_to[unit.place] for unit in offered]
         heights = tuple(_height(scene, vertices) for vertices in equal)
         counts = tuple(len(vertices) for vertices in equal)
-        found.append(Lesson(scene, candidates[scene.id], offered, counts, heights))
+        found.append(Lesson(scene, candidates[scene.id], goal, offered, counts, heights))
     return found
 
 
