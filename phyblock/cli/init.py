@@ -39,9 +39,13 @@ def command(folder: Path, suite: str) -> None:
     Files that are already there are never written over.
     """
     file_name = f"{suite}.yaml"
-    tracks = [kind_of(name) for name in suite_tracks(find_suite(suite))]
-    templates = [own for kind in tracks for own in (kind.template, kind.json_template)]
-    prompts = [("prompts", template.name) for template in templates if template is not None]
+    templates = [kind_of(name).template for name in suite_tracks(find_suite(suite))]
+    stems = [template.stem for template in templates if template is not None]
+    prompts = [
+        ("prompts", path.name)
+        for stem in stems
+        for path in sorted(bundled("prompts").glob(f"{stem}*.j2"))
+    ]
     names = (*_FILES, ("benchmarks", file_name), *prompts)
     files = [folder.joinpath(*parts) for parts in names]
     check_free(files, "choose another folder")

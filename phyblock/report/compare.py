@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -18,6 +18,8 @@ from phyblock.scoring.ratios import Floats
 from phyblock.scoring.uncertainty import Clusters, jackknife
 from phyblock.tables.intervals import parents_of
 from phyblock.tables.load import Run
+from phyblock.tables.showing import varied_words
+from phyblock.tracks.kind import kind_of
 
 __all__ = ["Comparison", "Side", "compare", "compare_models", "compare_runs"]
 
@@ -173,8 +175,16 @@ def compare(
         ranks(table, what.measure),
         what.measure.heading,
         what.measure.unit,
-        what.how,
+        " ".join([what.how, *_asked(runs, what.track)]),
     )
+
+
+def _asked(runs: Sequence[Run], track: str) -> Iterator[str]:
+    """What is unusual about how each run asked, where there is anything."""
+    for run in runs:
+        words = (*kind_of(track).report().showing(run), *varied_words(run))
+        if words:
+            yield f"Run {run.path.name}: {', '.join(words)}."
 
 
 @dataclass(frozen=True, eq=False)

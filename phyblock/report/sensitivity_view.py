@@ -138,7 +138,7 @@ def ranks_lines(table: pd.DataFrame, _: Run) -> Sequence[str]:
     verdict = f"{sure} of them beyond noise" if sure else "none beyond noise"
     return (
         f"Ranking over ways of asking: Kendall's tau at least {least}; "
-        f"{flips} of {pairs} pairs of models flip, {verdict}.",
+        f"{flips} of {pairs} comparisons flip (a pair of models at another level), {verdict}.",
     )
 
 

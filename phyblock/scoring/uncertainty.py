@@ -173,11 +173,14 @@ def detectable(se: ArrayLike, n_clusters: ArrayLike, level: float) -> Floats:
     """The difference that a test at `level` finds in `POWER` of cases, in the unit of `se`.
 
     Bloom, *Minimum detectable effects*, Evaluation Review 19, 1995: the sum of the two quantiles
-    of Student's t, times the standard error. NaN with fewer than two clusters.
+    of Student's t, times the standard error. NaN with fewer than two clusters, and where no sample
+    differs: a standard error of 0 says nothing about what could be found.
     """
     behind = np.asarray(n_clusters, dtype=np.float64)
     df = np.where(behind > 1, behind - 1.0, np.nan)
-    return np.asarray((stdtrit(df, 1 - level / 2) + stdtrit(df, POWER)) * np.asarray(se))
+    error = np.asarray(se, dtype=np.float64)
+    found = (stdtrit(df, 1 - level / 2) + stdtrit(df, POWER)) * error
+    return np.where(error > 0, found, np.nan)
 
 
 def _in_common(

@@ -204,6 +204,7 @@ def _locate(
     }
     if "default" in suite.vary.prompt:
         prompts |= {"default": next(iter(templates.values()), None)}
+    finder.check_twice(prompts, ("vary", "prompt"))
     if dataset is None or finder.problems:
         raise SpecError(sort_problems(finder.problems))
     found = map(_there, (folders, templates, prompts))
@@ -259,6 +260,17 @@ class _Finder:
         if found is not None and not os.path.isfile(found):
             self._complain(at, "no such file", str(found))
         return found
+
+    def check_twice(self, files: Mapping[str, Path | None], at: FieldPath) -> None:
+        """Complain of names that mean a file that another means already."""
+        first: dict[str, str] = {}
+        for text, path in files.items():
+            if path is not None and os.path.isfile(path):
+                known = first.setdefault(os.path.realpath(path), text)
+                if known != text:
+                    message = f"is the same file as {known}: this level would change nothing"
+                    hint = "name the other one in another way, or move it out of prompts/"
+                    self._complain(at, message, show(text), hint=hint)
 
     def _expand(self, text: str, at: FieldPath) -> Path | None:
         base = Path.cwd() if self._source.is_overridden(at) else self._path.parent

@@ -67,14 +67,27 @@ def test_a_prompt_is_rendered_before_anything_is_asked(
     assert not (asked.root / "results").exists()
 
 
-@pytest.mark.parametrize("suite", ["quick", "steps", "vqa"])
+def test_one_template_twice_is_no_factor(asked: Workspace) -> None:
+    asked.write_models("http://127.0.0.1:9", "alpha")
+    text = "{% block user %}Which of the {{ n_candidates }}?{% endblock %}"
+    own_prompt(asked).write_text(text, encoding="utf-8")
+    own = "prompts/full_planning.j2"
+    asked.write_suite(models=["alpha"], seeds=[0], vary={"prompt": ["default", own]})
+    done = asked.phyblock("validate", "suite.yaml")
+    assert done.code == 2
+    assert "is the same file as" in done.err
+
+
+@pytest.mark.parametrize("suite", ["quick", "steps", "vqa", "sensitivity"])
 def test_what_init_lays_out_is_sound_and_its_prompts_are_used(
     workspace: Workspace, suite: str
 ) -> None:
     assert workspace.phyblock("init", "mine", "--suite", suite).code == 0
     root = workspace.root / "mine"
     workspace.write_yaml("mine/models.yaml", {"alpha": "openai/some-model"})
-    (prompt,) = (root / "prompts").glob("*.j2")
+    prompts = sorted((root / "prompts").glob("*.j2"))
+    prompt = prompts[0]
+    assert prompt.with_name(f"{prompt.stem}_json.j2") in prompts
     prompt.write_text(prompt.read_text() + "\n", encoding="utf-8")
     told = workspace.phyblock(
         *("run", f"mine/benchmarks/{suite}.yaml", "--models", "alpha", "--limit", "3"),
