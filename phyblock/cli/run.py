@@ -21,9 +21,10 @@ from phyblock.cli.report import show_made
 from phyblock.errors import Problem, SpecError
 from phyblock.models import is_billed
 from phyblock.plain_text import one_line
+from phyblock.records import read_manifest
 from phyblock.report.made import names_to_write
 from phyblock.resources import bundled
-from phyblock.run.asking import asking_remarks, choice_remarks
+from phyblock.run.asking import asking_remarks, choice_remarks, moved_remarks
 from phyblock.run.estimate import estimate
 from phyblock.run.execute import Cause, RunResult
 from phyblock.run.folder import run_folder
@@ -94,12 +95,14 @@ def command(
     only = split_names(models)
     plan = make_plan(loaded, known, only=only, limit=limit, informative=informative)
     folder = out or Path("results") / plan.folder_name
+    moved: list[str] = []
     if holds_run(folder, plan.manifest):
+        moved = moved_remarks(read_manifest(folder), plan)
         names = () if dry_run else names_to_write(folder, page=not no_report)
         run_folder(folder).check(names)
     if dry_run:
         show_estimate(console, plan, estimate(plan, folder, use_cache=not no_cache))
-    for remark in (*choice_remarks(plan), *asking_remarks(loaded, plan)):
+    for remark in (*moved, *choice_remarks(plan), *asking_remarks(loaded, plan)):
         console.print(remark, style="dim", markup=False, soft_wrap=True)
     if dry_run:
         return 0

@@ -58,6 +58,8 @@ class ManifestModel(Line):
     """What the paper calls it."""
     size_b: float | None = None
     """Its size [billion parameters]."""
+    served_at: tuple[str, ...] = ()
+    """Addresses of the servers of one's own at which it was asked when the run began."""
     kind: str = ""
     """`litellm`: asked over the network; `replay`: a recording; `baseline`: a rule."""
 

@@ -6,12 +6,13 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+from phyblock.records import Manifest
 from phyblock.run.plan import RunPlan
 from phyblock.specs import LoadedSuite
 from phyblock.tracks.opening import template_prompt
 from phyblock.tracks.prompts import FORM_FACTS
 
-__all__ = ["asking_remarks", "choice_remarks"]
+__all__ = ["asking_remarks", "choice_remarks", "moved_remarks"]
 
 
 def asking_remarks(loaded: LoadedSuite, plan: RunPlan) -> list[str]:
@@ -27,6 +28,19 @@ def asking_remarks(loaded: LoadedSuite, plan: RunPlan) -> list[str]:
         return own
     unsaid = [_unsaid(track, path) for (track, path), one in used.items() if not _says(track, one)]
     return [*own, *_models(plan), *unsaid]
+
+
+def moved_remarks(begun: Manifest, plan: RunPlan) -> list[str]:
+    """Which models are served elsewhere than when the run began: its replies still stand."""
+    before = {model.name: model.served_at for model in begun.models}
+    return [
+        f"{model.name} was asked at {', '.join(before[model.name])} and is now at "
+        f"{', '.join(model.config.addresses)}: taken to be the same weights (other ones need "
+        "another revision in the models file)"
+        for model in plan.models
+        if before.get(model.name) and model.config.addresses
+        if set(before[model.name]).isdisjoint(model.config.addresses)
+    ]
 
 
 def choice_remarks(plan: RunPlan) -> list[str]:

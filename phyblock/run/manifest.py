@@ -67,7 +67,7 @@ def make_manifest(
         **({} if chosen is None else {"chosen": chosen.fields()}),
         "suite": suite.model_dump(mode="json"),
         "models": [
-            {**decisive, "published": m.published, "size_b": m.size_b}
+            {**decisive, "published": m.published, "size_b": m.size_b, **_place(m)}
             for decisive, m in zip(inputs["models"], models, strict=True)
         ],
         "dataset": {
@@ -95,6 +95,12 @@ def _dataset(dataset: Dataset, data_version: int) -> dict[str, object]:
     """What of the data decides the results; runs from before versions were counted say none."""
     known: dict[str, object] = {"name": dataset.name, "sha256": dataset.sha256}
     return known if data_version == UNNUMBERED else {**known, "version": data_version}
+
+
+def _place(model: PlannedModel) -> dict[str, object]:
+    """Where a model is served, which decides nothing."""
+    addresses = model.config.addresses
+    return {"served_at": addresses} if addresses else {}
 
 
 def _identity(model: PlannedModel) -> dict[str, object]:

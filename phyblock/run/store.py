@@ -38,7 +38,7 @@ from phyblock.tracks.base import ENGINE
 
 __all__ = ["RunStore", "holds_run"]
 
-_LABELS = ("published", "size_b")
+_LABELS = ("published", "served_at", "size_b")
 LineT = TypeVar("LineT", bound=Line)
 
 _HINT = "choose another folder with --out"
