@@ -143,6 +143,6 @@ def test_a_key_that_no_header_can_carry_is_named_before_anything_is_sent(
         assert "MY_KEY holds a line break" in done.err
         assert SECRET not in done.err
         assert running.server.requests == 0
-        done = workspace.run(env={"MY_KEY": f" {SECRET}\r\n"})
+        done = workspace.run("--yes", env={"MY_KEY": f" {SECRET}\r\n"})
     assert (done.code, done.err) == (0, "")
     assert {seen.key for seen in running.server.seen} == {SECRET}

@@ -34,8 +34,10 @@ FORM_FACTS = ("answer_schema", "answer_example")
 """The names by which templates say the JSON that is asked for."""
 
 _BLOCKS = ("system", "user")
-_ALL_BLOCKS = (*_BLOCKS, "caption", "answer", "turn")
-"""Blocks of any track's template; another one would say its text to nobody."""
+_ALL_BLOCKS = (*_BLOCKS, "caption", "answer", "turn", "check")
+"""Blocks that some template has (`check` that of `vqa write`); another would say its text to
+nobody.
+"""
 _LARGEST_BYTES = 256 * 1024
 
 
@@ -171,7 +173,8 @@ class TemplatePrompt:
             return render_block(self._template, block, dict(facts)).strip()
         except Exception as error:
             # A template is a program: what it computes can fail in any way.
-            known = "names that are there: " + ", ".join(sorted(facts))
+            is_name = isinstance(error, jinja2.UndefinedError)
+            known = "names that are there: " + ", ".join(sorted(facts)) if is_name else ""
             message = f"cannot be rendered: {said(error)}"
             where = f"{self._path}:{self._line_of(error)}"
             raise PromptError(Problem(where, message, f"block {block}", "", known)) from error
