@@ -35,9 +35,7 @@ FORM_FACTS = ("answer_schema", "answer_example")
 
 _BLOCKS = ("system", "user")
 _ALL_BLOCKS = (*_BLOCKS, "caption", "answer", "turn", "check")
-"""Blocks that some template has (`check` that of `vqa write`); another would say its text to
-nobody.
-"""
+"""Blocks that bundled templates have; another would say its text to nobody."""
 _LARGEST_BYTES = 256 * 1024
 
 
