@@ -17,7 +17,7 @@ from phyblock.parsing import READER_VERSION
 from phyblock.records import FORMAT, Manifest
 from phyblock.records.manifest import ManifestChoice
 from phyblock.run.models import PlannedModel
-from phyblock.specs import LoadedSuite
+from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tracks import AnyTrack, kind_of
 from phyblock.variants import Variant
 
@@ -40,28 +40,11 @@ def make_manifest(
     named and served are no part of it; nor is how scenes were chosen, only which. `variants` has
     the tracks of every way of asking.
     """
-    tracks = variants[Variant()]
     suite, data_version = loaded.suite, read_version(dataset.root)
-    inputs: dict[str, Any] = {
-        "format": FORMAT,
-        "suite": suite.identity(),
-        "models": [{"name": m.name, **_identity(m)} for m in models],
-        "dataset": _dataset(dataset, data_version),
-        "tracks": {track.name: track.identity() for track in tracks},
-        "limit": limit,
-    }
-    if suite.vary.factors:
-        inputs["variants"] = {
-            variant.key: {track.name: track.identity() for track in of_variant}
-            for variant, of_variant in variants.items()
-            if variant == variant.shown
-        }
-    by_name = sorted(inputs["models"], key=lambda model: str(model["name"]))
-    decided = {**inputs, "models": by_name, "readers": READER_VERSION}
-    canonical = json.dumps(decided, sort_keys=True, separators=(",", ":"))
+    inputs = _inputs(suite, models, _dataset(dataset, data_version), variants, limit)
     scenes = [task.scene for task in dataset.tasks]
     fields = {
-        "identity": hashlib.sha256(canonical.encode()).hexdigest(),
+        "identity": _digest(inputs),
         "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         **inputs,
         **({} if chosen is None else {"chosen": chosen.fields()}),
@@ -77,7 +60,7 @@ def make_manifest(
             "root": str(dataset.root),
         },
         **_of_tracks(loaded),
-        "items": {track.name: len(track.items) for track in tracks},
+        "items": {track.name: len(track.items) for track in variants[Variant()]},
         "scenes": len(scenes),
         "scenes_by_level": {
             level: sum(level in scene.levels for scene in scenes) for level in suite.levels
@@ -89,6 +72,39 @@ def make_manifest(
         },
     }
     return Manifest.model_validate(fields)
+
+
+def _inputs(
+    suite: SuiteSpec,
+    models: Sequence[PlannedModel],
+    data: Mapping[str, object],
+    variants: Mapping[Variant, Sequence[AnyTrack]],
+    limit: int | None,
+) -> dict[str, Any]:
+    """What decides the results."""
+    inputs: dict[str, Any] = {
+        "format": FORMAT,
+        "suite": suite.identity(),
+        "models": [{"name": m.name, **_identity(m)} for m in models],
+        "dataset": data,
+        "tracks": {track.name: track.identity() for track in variants[Variant()]},
+        "limit": limit,
+    }
+    if suite.vary.factors:
+        inputs["variants"] = {
+            variant.key: {track.name: track.identity() for track in of_variant}
+            for variant, of_variant in variants.items()
+            if variant == variant.shown
+        }
+    return inputs
+
+
+def _digest(inputs: Mapping[str, Any]) -> str:
+    """Hex digest of the inputs, whatever the order of the models."""
+    by_name = sorted(inputs["models"], key=lambda model: str(model["name"]))
+    decided = {**inputs, "models": by_name, "readers": READER_VERSION}
+    canonical = json.dumps(decided, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(canonical.encode()).hexdigest()
 
 
 def _dataset(dataset: Dataset, data_version: int) -> dict[str, object]:
