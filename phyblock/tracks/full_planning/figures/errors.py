@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from phyblock.scoring import ERROR_TYPES
 from phyblock.tables.design import OVERALL
 from phyblock.tables.drawing import COLORS, MUTED, bare_axes, headed, new_figure
 from phyblock.tables.load import Run
 from phyblock.tracks.full_planning.errors import errors_frame
 from phyblock.tracks.full_planning.figures.levels import how_measured, ranked
+from phyblock.tracks.full_planning.figures.stacked import Part, stack
 from phyblock.tracks.full_planning.seeds import intervals_table
 from phyblock.tracks.full_planning.views import ERROR_NAMES
 
@@ -35,32 +34,15 @@ def error_bars(run: Run) -> Figure | None:
     table = table.sort_values("model", key=lambda names: names.map(order), kind="stable")
     figure = new_figure(1.35 + 0.26 * len(table))
     ax = figure.subplots()
-    places = np.arange(len(table))
-    start = np.zeros(len(table))
-    for name, color, ink in zip(ERROR_TYPES, _COLORS, _INKS, strict=True):
-        shares = 100 * table[f"{name}_share"].to_numpy(float)
-        ax.barh(
-            places,
-            shares,
-            left=start,
-            height=0.66,
-            color=color,
-            edgecolor="white",
-            linewidth=0.8,
-            label=ERROR_NAMES[name],
-        )
-        for place, share in enumerate(shares):
-            if share >= _LEAST_LABEL:
-                middle = start[place] + share / 2
-                ax.text(
-                    middle, place, f"{share:.0f}", ha="center", va="center", color=ink, fontsize=7
-                )
-        start = start + shares
+    parts = (
+        Part(ERROR_NAMES[name], 100 * table[f"{name}_share"].to_numpy(float), color, ink)
+        for name, color, ink in zip(ERROR_TYPES, _COLORS, _INKS, strict=True)
+    )
+    stack(ax, list(table["model"]), parts, 0.66, _LEAST_LABEL)
     for place, wrong in enumerate(table["wrong_steps"]):
         ax.text(101.5, place, f"{wrong:,}", va="center", color=MUTED, fontsize=7)
     ax.text(101.5, -0.72, "wrong steps", va="bottom", color=MUTED, fontsize=7)
     ax.set(xlim=(0, 100), xlabel="Share of wrong steps (%)", ylim=(len(table) - 0.4, -0.7))
-    ax.set_yticks(places, list(table["model"]))
     bare_axes([ax])
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     headed(figure, "Why steps were wrong", f"{how_measured(run.design)}; all levels")

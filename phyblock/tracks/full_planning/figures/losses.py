@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from phyblock.scoring import BLOCK_OUTCOMES, BlockOutcome
 from phyblock.tables.design import OVERALL
 from phyblock.tables.drawing import COLORS, PALE, bare_axes, headed, new_figure
 from phyblock.tables.load import Run
 from phyblock.tracks.full_planning.figures.levels import how_measured, ranked
+from phyblock.tracks.full_planning.figures.stacked import Part, stack
 from phyblock.tracks.full_planning.losses import losses_frame
 from phyblock.tracks.full_planning.measures import BLOCK_NAMES
 from phyblock.tracks.full_planning.seeds import intervals_table
@@ -44,29 +43,12 @@ def loss_bars(run: Run) -> Figure | None:
     models = [model for model in ranked(intervals_table(run), "f1") if model in shares.index]
     figure = new_figure(1.75 + 0.28 * len(models))
     ax = figure.subplots()
-    places, start = np.arange(len(models)), np.zeros(len(models))
-    for outcome in BLOCK_OUTCOMES:
-        color, ink = _LOOKS[outcome]
-        widths = shares.loc[models, outcome].to_numpy(float)
-        ax.barh(
-            places,
-            widths,
-            left=start,
-            height=0.7,
-            color=color,
-            edgecolor="white",
-            linewidth=0.8,
-            label=BLOCK_NAMES[outcome],
-        )
-        for place, width in enumerate(widths):
-            if width >= _LEAST_LABEL:
-                middle = start[place] + width / 2
-                ax.text(
-                    middle, place, f"{width:.0f}", ha="center", va="center", color=ink, fontsize=7
-                )
-        start = start + widths
+    parts = (
+        Part(BLOCK_NAMES[outcome], shares.loc[models, outcome].to_numpy(float), *_LOOKS[outcome])
+        for outcome in BLOCK_OUTCOMES
+    )
+    stack(ax, models, parts, 0.7, _LEAST_LABEL)
     ax.set(xlim=(0, 100), xlabel="Share of the goals' blocks (%)", ylim=(len(models) - 0.4, -0.6))
-    ax.set_yticks(places, models)
     bare_axes([ax])
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     headed(figure, "What became of the goals' blocks", f"{how_measured(run.design)}; all levels")

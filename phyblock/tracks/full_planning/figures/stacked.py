@@ -1,0 +1,47 @@
+"""Shares that make up a whole, as bars in one line a model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["Part", "stack"]
+
+
+class Part(NamedTuple):
+    """A part of the whole: its name, its share of each model [%], and how it looks."""
+
+    name: str
+    shares: NDArray[np.float64]
+    color: str
+    ink: str
+
+
+def stack(
+    ax: Axes, models: Sequence[str], parts: Iterable[Part], height: float, least_label: float
+) -> None:
+    """Draw the parts one after another, the numbers in those of `least_label` [%] and more."""
+    places, start = np.arange(len(models)), np.zeros(len(models))
+    for part in parts:
+        ax.barh(
+            places,
+            part.shares,
+            left=start,
+            height=height,
+            color=part.color,
+            edgecolor="white",
+            linewidth=0.8,
+            label=part.name,
+        )
+        for place, share in enumerate(part.shares):
+            if share >= least_label:
+                middle, text = start[place] + share / 2, f"{share:.0f}"
+                ax.text(middle, place, text, ha="center", va="center", color=part.ink, fontsize=7)
+        start = start + part.shares
+    ax.set_yticks(places, models)
