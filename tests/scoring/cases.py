@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hypothesis import strategies as st
 
@@ -96,3 +96,12 @@ def greatest_tp(case: Case, setting: Setting) -> int:
         return max([best(step + 1, placed), *taken])
 
     return best(0, frozenset())
+
+
+def renumbered(case: Case, data: st.DataObject) -> Case:
+    """The same case with its blocks and candidates in a drawn order, and the plan to match."""
+    blocks = tuple(data.draw(st.permutations(case.scene.blocks)))
+    order = data.draw(st.permutations(range(len(case.candidates))))
+    candidates = CandidateSet(tuple(case.candidates.candidates[i] for i in order))
+    steps = tuple(order.index(index - 1) + 1 for index in case.plan.steps)
+    return Case(replace(case.scene, blocks=blocks), candidates, Plan(steps))

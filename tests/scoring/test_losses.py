@@ -24,7 +24,7 @@ from phyblock.scoring import (
 )
 from phyblock.words import SETTINGS, Setting
 from tests.domain.graphs import acyclic
-from tests.scoring.cases import Case, cases, equal
+from tests.scoring.cases import Case, cases, equal, renumbered
 
 each_setting = pytest.mark.parametrize("setting", SETTINGS)
 FLAT, TURNED = (0.0, 0.0, 0.0), (0.0, 0.0, 90.0)
@@ -181,11 +181,7 @@ def test_a_valid_order_places_all_and_an_empty_plan_leaves_all_out(
 def test_file_order_and_numbering_change_neither(
     setting: Setting, case: Case, data: st.DataObject
 ) -> None:
-    blocks = tuple(data.draw(st.permutations(case.scene.blocks)))
-    order = data.draw(st.permutations(range(len(case.candidates))))
-    renumbered = CandidateSet(tuple(case.candidates.candidates[i] for i in order))
-    steps = tuple(order.index(index - 1) + 1 for index in case.plan.steps)
-    shuffled = Case(replace(case.scene, blocks=blocks), renumbered, Plan(steps))
+    shuffled = renumbered(case, data)
     assert outcomes(shuffled, setting) == outcomes(case, setting)
     assert kept(shuffled, setting) == kept(case, setting)
 

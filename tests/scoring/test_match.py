@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring import Counts, Goal, Match, match_plan, most_placed
 from phyblock.words import MATCHERS, SETTINGS, Matcher, Setting
-from tests.scoring.cases import Case, cases, choices, greatest_tp, greedy_tp
+from tests.scoring.cases import Case, cases, choices, greatest_tp, greedy_tp, renumbered
 
 each_setting = pytest.mark.parametrize("setting", SETTINGS)
 each_matcher = pytest.mark.parametrize("matcher", MATCHERS)
@@ -150,11 +150,7 @@ def test_a_step_that_fails_can_be_left_out(setting: Setting, matcher: Matcher, c
 def test_optimal_does_not_depend_on_file_order_or_numbering(
     setting: Setting, case: Case, data: st.DataObject
 ) -> None:
-    blocks = tuple(data.draw(st.permutations(case.scene.blocks)))
-    order = data.draw(st.permutations(range(len(case.candidates))))
-    renumbered = CandidateSet(tuple(case.candidates.candidates[i] for i in order))
-    steps = tuple(order.index(index - 1) + 1 for index in case.plan.steps)
-    shuffled = Case(replace(case.scene, blocks=blocks), renumbered, Plan(steps))
+    shuffled = renumbered(case, data)
     assert counted(shuffled, setting) == counted(case, setting)
 
 
