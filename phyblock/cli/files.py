@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import os
+import shlex
 from pathlib import Path
 
 from phyblock.errors import Problem, SpecError
 from phyblock.resources import bundled
-from phyblock.specs import did_you_mean
+from phyblock.specs import ModelSpec, did_you_mean, load_models
 
-__all__ = ["bundled_suites", "find_models_file", "find_suite", "prompt_dirs", "what_it_is"]
+__all__ = [
+    "bundled_suites",
+    "find_models_file",
+    "find_suite",
+    "load_known",
+    "prompt_dirs",
+    "what_it_is",
+]
 
 
 def bundled_suites() -> list[str]:
@@ -57,6 +65,32 @@ def find_models_file(named: str | None, suite: Path | None) -> Path:
         if os.path.isfile(folder / "models.yaml"):
             return folder / "models.yaml"
     return bundled("models.yaml")
+
+
+def load_known(named: str | None, suite: Path) -> dict[str, ModelSpec]:
+    """The models that a suite may name when it is run.
+
+    A models file that merely lies near a suite came with it, so it may not say what is run here.
+    Raises SpecError for one that does, and as `find_models_file` and `load_models` do.
+    """
+    path = find_models_file(named, suite)
+    known = load_models(path)
+    is_own = named is not None or path.parent == Path()
+    problems = [
+        Problem(
+            str(path),
+            "names a command, which only a models file of your own may do",
+            f"{name}.api_base_command",
+            shlex.join(spec.api_base_command),
+            "models.yaml in the folder where you are, or a file given with --models-file",
+            hint=f"if you trust it, give it: --models-file {shlex.quote(str(path))}",
+        )
+        for name, spec in known.items()
+        if spec.api_base_command is not None and not is_own
+    ]
+    if problems:
+        raise SpecError(problems)
+    return known
 
 
 def prompt_dirs(suite: Path) -> list[Path]:

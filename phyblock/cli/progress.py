@@ -98,6 +98,10 @@ class ProgressView:
 
     def _take_note(self, event: ModelNotice) -> None:
         tally = self._tallies[event.model]
+        if event.kind == "concurrency":
+            tally.at_once = event.limit
+            tally.most_at_once = max(tally.most_at_once, event.limit)
+            return
         tally.retries += event.kind == "retry"
         tally.notice = event.text
         # Where it ends for a model, another event says so.
@@ -117,6 +121,16 @@ class ProgressView:
         spent = sum(tally.cost_usd for tally in self._tallies.values())
         unknown = any(tally.unpriced for tally in self._tallies.values())
         return f"${spent:,.2f}" + (" and replies whose cost is not known" if unknown else "")
+
+    @property
+    def concurrency_text(self) -> str:
+        """How many calls were under way at once where that was found out; "" where it was said."""
+        return "; ".join(
+            f"{one_line(name)} had up to {tally.at_once} calls at once in the end, "
+            f"{tally.most_at_once} at most"
+            for name, tally in self._tallies.items()
+            if tally.at_once
+        )
 
     def _stopping_text(self, event: Stopping) -> str:
         if not event.in_flight:
@@ -154,7 +168,8 @@ class ProgressView:
             known_s = [seconds for seconds in left_s if seconds is not None]
             if done < total and len(known_s) == len(left_s):
                 text += f" · {_duration(max(known_s))} left"
-        return text
+        at_once = sum(tally.at_once for tally in self._tallies.values() if tally.total > tally.done)
+        return f"{text} · up to {at_once} calls at once" if at_once else text
 
     def _panel(self) -> RenderableType:
         done = sum(tally.done for tally in self._tallies.values())

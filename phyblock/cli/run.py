@@ -13,7 +13,7 @@ from rich.console import Console
 
 from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.estimate_view import show_estimate
-from phyblock.cli.files import bundled_suites, find_models_file, find_suite, prompt_dirs
+from phyblock.cli.files import bundled_suites, find_suite, load_known, prompt_dirs
 from phyblock.cli.names import split_names
 from phyblock.cli.paths import NAME_OR_PATH, UserPath, models_file_option
 from phyblock.cli.progress import ProgressView
@@ -31,7 +31,7 @@ from phyblock.run.folder import run_folder
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.session import Session, check_ready
 from phyblock.run.store import holds_run
-from phyblock.specs import load_models, load_suite
+from phyblock.specs import load_suite
 
 __all__ = ["command"]
 
@@ -91,7 +91,7 @@ def command(
     path = find_suite(suite)
     data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
     loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
-    known = load_models(find_models_file(models_file, path))
+    known = load_known(models_file, path)
     only = split_names(models)
     plan = make_plan(loaded, known, only=only, limit=limit, informative=informative)
     folder = out or Path("results") / plan.folder_name
@@ -114,7 +114,7 @@ def command(
     session = Session(plan, folder, view, use_cache=not no_cache, retry_failed=retry_failed)
     result = asyncio.run(_run(session, view))
     show_made(folder, plan.suite.tables, page=not no_report)
-    return _conclude(console, folder, result, view.cost_text)
+    return _conclude(console, folder, result, view)
 
 
 async def _run(opened: Session, view: ProgressView) -> RunResult:
@@ -167,7 +167,7 @@ def _agreed(console: Console, plan: RunPlan, folder: Path, *, use_cache: bool) -
     )
 
 
-def _conclude(console: Console, folder: Path, result: RunResult, cost: str) -> int:
+def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:
     where = shown_path(folder)
     for name, reason in result.stopped.items():
         console.print(f"{one_line(name)} was stopped:", style="red", end=" ")
@@ -182,9 +182,11 @@ def _conclude(console: Console, folder: Path, result: RunResult, cost: str) -> i
     cause = result.stop.cause if result.stop else None
     reason = f" ({result.stop.reason})" if result.stop else ""
     console.print(
-        f"{done}{reason}. Cost so far: {cost}. The run is in {where}",
+        f"{done}{reason}. Cost so far: {view.cost_text}. The run is in {where}",
         soft_wrap=True,
     )
+    if view.concurrency_text:
+        console.print(view.concurrency_text, soft_wrap=True, markup=False)
     if result.failed:
         rejected = (
             f"{counted(result.failed, 'request')} rejected for good; when the cause is mended,"

@@ -3,7 +3,7 @@
 Importing this package imports neither litellm nor aiohttp: the first call through one of them does.
 """
 
-from phyblock.models.address_file import addresses_of
+from phyblock.models.address_list import addresses_of
 from phyblock.models.base import (
     Image,
     Message,

@@ -7,15 +7,14 @@ from pathlib import Path
 from phyblock.addresses import AddressFault, address_fault
 from phyblock.bounded import read_text
 from phyblock.errors import Problem, SpecError
-from phyblock.models.config import ModelConfig
 from phyblock.models.events import Tell
 from phyblock.models.limits import Clock
 
-__all__ = ["AddressFile", "addresses_of", "read_addresses"]
+__all__ = ["LARGEST_BYTES", "AddressFile", "addresses_in", "read_addresses"]
 
 LOOK_EVERY_S = 5.0
-_LARGEST_BYTES = 1024 * 1024
-_TWICE = AddressFault("stands twice in this file", "keep one of them", may_hold_secret=False)
+LARGEST_BYTES = 1024 * 1024
+_TWICE = AddressFault("stands twice in this list", "keep one of them", may_hold_secret=False)
 _HALF_WRITTEN = AddressFault(
     "does not end with a line break, so it may be half written",
     "write the file under another name, then rename it",
@@ -30,10 +29,19 @@ def read_addresses(path: Path) -> tuple[str, ...]:
     the file cannot be read or lists none.
     """
     try:
-        text = read_text(path, _LARGEST_BYTES)
+        text = read_text(path, LARGEST_BYTES)
     except (OSError, ValueError) as error:
         why = f"cannot be read: {error.strerror}" if isinstance(error, OSError) else str(error)
         raise SpecError(Problem(str(path), why, "api_base_file")) from None
+    return addresses_in(text, str(path), "api_base_file", ends_lines=True)
+
+
+def addresses_in(text: str, where: str, field: str, *, ends_lines: bool = False) -> tuple[str, ...]:
+    """The addresses in a text that comes from `where`, as `field` says; with `ends_lines`, a last
+    line without a line break is refused.
+
+    Raises SpecError naming every line that is no address or stands twice, and where there is none.
+    """
     addresses: list[str] = []
     problems = []
     for number, line in enumerate(text.splitlines(keepends=True), 1):
@@ -43,29 +51,19 @@ def read_addresses(path: Path) -> tuple[str, ...]:
         fault = address_fault(address)
         if fault is None and address in addresses:
             fault = _TWICE
-        if fault is None and line == line.rstrip("\r\n"):
+        if fault is None and ends_lines and line == line.rstrip("\r\n"):
             fault = _HALF_WRITTEN
         if fault is not None:
             shown = "" if fault.may_hold_secret else address
-            where = f"{path}:{number}"
-            problems.append(Problem(where, fault.message, "api_base_file", shown, hint=fault.hint))
+            place = f"{where}:{number}"
+            problems.append(Problem(place, fault.message, field, shown, hint=fault.hint))
         addresses.append(address)
     if not addresses:
         hint = "one address a line, for example http://localhost:8000/v1"
-        problems.append(Problem(str(path), "lists no address", "api_base_file", hint=hint))
+        problems.append(Problem(where, "lists no address", field, hint=hint))
     if problems:
         raise SpecError(problems)
     return tuple(addresses)
-
-
-def addresses_of(config: ModelConfig) -> tuple[str | None, ...]:
-    """Every address at which a model is served now; None stands for its provider's.
-
-    Raises SpecError as `read_addresses` does.
-    """
-    if config.api_base_file is not None:
-        return read_addresses(config.api_base_file)
-    return config.addresses or (None,)
 
 
 class AddressFile:
@@ -79,6 +77,11 @@ class AddressFile:
         self._state = self._stat()
         self.addresses = read_addresses(path)
         """The last good list."""
+
+    @property
+    def look_every_s(self) -> float:
+        """How long nothing needs to be looked at."""
+        return LOOK_EVERY_S
 
     def has_changed(self) -> bool:
         """Look, if it is time to, and read the file if it was written; whether the list is new."""
@@ -98,6 +101,9 @@ class AddressFile:
         is_new = addresses != self.addresses
         self.addresses = addresses
         return is_new
+
+    async def aclose(self) -> None:
+        """Look no more."""
 
     def _stat(self) -> tuple[int, ...]:
         """What differs when the file was written; nothing where it is not there."""

@@ -52,9 +52,10 @@ def build_model(
     def transport(at: ModelConfig) -> Transport:
         return DirectTransport(at, secrets) if at.is_direct else LitellmTransport(at, secrets)
 
+    replicas = Replicas(config, transport, breakers or Breakers(policy))
     parts = ChatParts(
-        replicas=Replicas(config, transport, breakers or Breakers(policy)),
-        limiter=ModelLimiter(config.max_concurrency, overall, config.rpm, config.tpm),
+        replicas=replicas,
+        limiter=ModelLimiter(replicas.width, overall, config.rpm, config.tpm),
         cache=cache,
         budget=budget,
         price=price_of(config) if budget is None else require_price(config),

@@ -25,6 +25,7 @@ from phyblock.models.formats import FORMAT_HINT, refuses_format
 from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import hidden
 from phyblock.models.limits import ModelLimiter, Slot
+from phyblock.models.pace import Mark, is_late, says_too_much
 from phyblock.models.payload import wire_params
 from phyblock.models.replicas import Replica, Replicas
 from phyblock.models.retry import RetryPolicy, is_success, with_retries
@@ -146,6 +147,7 @@ class ChatModel:
             async with AsyncExitStack() as stack:
                 with self._parts.halt.giving_up():
                     probed = await stack.enter_async_context(self._parts.replicas.passing())
+                    self._fit_width()
                     slot = await stack.enter_async_context(self._slot(question))
                     turn = await stack.enter_async_context(self._asking(question))
                 if turn.reply is not None:
@@ -157,11 +159,11 @@ class ChatModel:
                 replica = self._parts.replicas.choose(probed, question.failed_at)
                 if replica is None:
                     continue
-                reply = await self._send_watched(question, slot, replica, probed is replica)
+                reply = await self._send_watched(question, replica, is_probe=probed is replica)
                 if reply is None:
                     continue
                 question.reply = reply
-                slot.succeeded(_total(reply))
+                slot.settle(_total(reply))
                 if self._parts.cache is not None:
                     await self._parts.cache.keep(question.key, self._config.id, reply)
                 return reply
@@ -186,14 +188,14 @@ class ChatModel:
         return cache.asking(question.key, by_force=question.by_force)
 
     async def _send_watched(
-        self, question: _Question, slot: Slot, replica: Replica, is_probe: bool
+        self, question: _Question, replica: Replica, *, is_probe: bool
     ) -> Reply | None:
-        """Send, and tell the limits and the breaker what came of it; None where it is the server
+        """Send, and tell the pace and the breaker what came of it; None where it is the server
         that failed, and not this request.
         """
         breaker, replicas = replica.breaker, self._parts.replicas
         try:
-            with replica.asked():
+            with replica.asked() as mark:
                 reply = await self._send_seeded(question, replica)
         except ModelError as error:
             sender = (self.name, question.request.key, question.request.seed)
@@ -205,14 +207,34 @@ class ChatModel:
             elif isinstance(error, RetryableError):
                 question.failure = error
                 question.failed_at = replica
-                if error.status == 429 and slot.rate_limited():
-                    self._tell("slow_down", str(error), limit=self._parts.limiter.width, status=429)
+                self._slow_down(error, replica, mark)
                 replicas.raise_if_none_left()
                 if breaker.is_open and shows_outage(error):
                     return None
             raise
         breaker.heard()
+        replica.pace.answered(mark, reply.latency_s)
+        self._fit_width()
         return self._finished(reply, question)
+
+    def _slow_down(self, error: RetryableError, replica: Replica, mark: Mark) -> None:
+        """Send less at once to a server that has too much to do."""
+        pace = replica.pace
+        is_cut = (says_too_much(error) and pace.refused(mark)) or (
+            is_late(error) and pace.late(mark)
+        )
+        if is_cut:
+            width = self._fit_width()
+            self._tell("slow_down", str(error), limit=width, status=error.status)
+
+    def _fit_width(self) -> int:
+        """Have as many requests under way as the servers may have now; how many that is."""
+        limiter, width = self._parts.limiter, self._parts.replicas.width
+        if width != limiter.width:
+            limiter.width = width
+            if self._config.adapts:
+                self._tell("concurrency", "", limit=width)
+        return width
 
     async def _send_seeded(self, question: _Question, replica: Replica) -> Reply:
         """Send with the seed, or without where the provider is known or found to take none.

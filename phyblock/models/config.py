@@ -48,16 +48,17 @@ class ModelConfig:
 
     `name` is what the tables show; `id` the litellm id (`openai/gpt-4o-2024-08-06`), a baseline's
     name, or the model to read out of a recorded run. It is served at `api_base`, or at each of
-    `api_bases`, or at each address in `api_base_file`; where none of them is given, at its
-    provider's. `api_key_env` names the environment variable
-    that holds the key; None means the provider's usual one. `params` are sampling parameters by
-    their OpenAI names; they win over a request's, and None there means "do not send". `rpm` and
-    `tpm` are limits a minute, None for none. `price` None means litellm's price map is asked.
-    `sends_seed`: `auto` sends seeds until the provider refuses, `always` takes a refusal as an
-    error, `never` sends none. `revision` tells apart models of one id, as other weights behind
-    another address. With `sends_format` a request's `response_format` is sent, without it the
-    prompt alone says the form. `timeout_s` bounds a request from its first byte to the last of its
-    answer, `most_body_bytes` that answer's body, packed and unpacked.
+    `api_bases`, or at each address that `api_base_file` lists or `api_base_command` prints; where
+    none of them is given, at its provider's. `api_key_env` names the environment variable that
+    holds the key; None means the provider's usual one. `params` are sampling parameters by their
+    OpenAI names; they win over a request's, and None there means "do not send". Requests under way
+    at once are `max_concurrency`, or where it `adapts` as many as its servers are found to answer
+    well, and no more than that. `rpm` and `tpm` are limits a minute, None for none. `price` None
+    means litellm's price map is asked. `sends_seed`: `auto` sends seeds until the provider refuses,
+    `always` takes a refusal as an error, `never` sends none. `revision` tells apart models of one
+    id, as other weights behind another address. With `sends_format` a request's `response_format`
+    is sent, without it the prompt alone says the form. `timeout_s` bounds a request from its first
+    byte to the last of its answer, `most_body_bytes` that answer's body, packed and unpacked.
 
     Raises SpecError for an address that is none, or that holds a key or a password.
     """
@@ -68,10 +69,12 @@ class ModelConfig:
     api_base: str | None = None
     api_bases: tuple[str, ...] = ()
     api_base_file: Path | None = None
+    api_base_command: tuple[str, ...] = ()
     api_key_env: str | None = None
     transport: TransportName = "auto"
     params: Mapping[str, object] = field(default_factory=dict)
     max_concurrency: int = 32
+    adapts: bool = False
     rpm: int | None = None
     tpm: int | None = None
     price: Price | None = None
@@ -97,11 +100,13 @@ class ModelConfig:
     @property
     def has_address(self) -> bool:
         """Whether it is served elsewhere than at its provider's address."""
-        return bool(self.addresses) or self.api_base_file is not None
+        is_listed = self.api_base_file is not None or bool(self.api_base_command)
+        return is_listed or bool(self.addresses)
 
     def at(self, address: str | None) -> ModelConfig:
         """The model as one of its servers serves it."""
-        return replace(self, api_base=address, api_bases=(), api_base_file=None)
+        bare = replace(self, api_bases=(), api_base_file=None, api_base_command=())
+        return replace(bare, api_base=address)
 
     @property
     def provider(self) -> str:

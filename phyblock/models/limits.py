@@ -1,7 +1,8 @@
 """Limits on what is under way at once and on what is started in a minute; asyncio, one loop.
 
 `Gate` bounds concurrency and can be narrowed and widened; `MinuteWindow` holds requests and tokens
-a minute; `ModelLimiter` puts both and the gate shared by all models together.
+a minute; `ModelLimiter` puts both and the gate shared by all models together. How wide the gate is
+to be, `pace` says.
 """
 
 from __future__ import annotations
@@ -16,8 +17,6 @@ from dataclasses import dataclass
 __all__ = ["Clock", "Gate", "MinuteWindow", "ModelLimiter", "Slot", "Start"]
 
 WINDOW_S = 60.0
-_RECOVERY_ROUNDS = 8
-"""Rounds of successes after which a model that was slowed down to nothing is at full width."""
 
 
 @dataclass(frozen=True)
@@ -143,34 +142,30 @@ class MinuteWindow:
 
 
 class ModelLimiter:
-    """All limits of one model.
-
-    Concurrency is halved on a 429 and grows back by an eighth of `max_concurrency` a round of
-    successes. Requests that were under way when it was halved do not halve it again: they say
-    nothing of the new width.
-    """
+    """All limits of one model; `width` may be changed at any time."""
 
     def __init__(
         self,
-        max_concurrency: int,
+        width: int,
         overall: Gate,
         rpm: int | None = None,
         tpm: int | None = None,
         clock: Clock | None = None,
     ) -> None:
         self._clock = clock or Clock()
-        self._max = max_concurrency
-        self._gate = Gate(max_concurrency)
+        self._gate = Gate(width)
         self._overall = overall
         self._window = MinuteWindow(rpm, tpm, self._clock.now)
         self._admission = asyncio.Lock()
-        self._exact_width = float(max_concurrency)
-        self._epoch = 0
 
     @property
     def width(self) -> int:
         """How many requests to the model may be under way now."""
         return self._gate.width
+
+    @width.setter
+    def width(self, width: int) -> None:
+        self._gate.width = width
 
     @contextlib.asynccontextmanager
     async def slot(self, tokens: int) -> AsyncIterator[Slot]:
@@ -179,7 +174,7 @@ class ModelLimiter:
         try:
             started = await self._admit(tokens)
             try:
-                yield Slot(self, started, self._epoch)
+                yield Slot(self._window, started)
             finally:
                 self._overall.leave()
         finally:
@@ -197,41 +192,15 @@ class ModelLimiter:
             await self._overall.enter()
             return self._window.start(tokens)
 
-    def succeeded(self) -> None:
-        """Widen a little: a request was answered."""
-        if self._exact_width < self._max:
-            grown = self._exact_width + self._max / _RECOVERY_ROUNDS / self._gate.width
-            self._exact_width = min(float(self._max), grown)
-            self._gate.width = int(self._exact_width)
-
-    def slowed_down(self, epoch: int) -> bool:
-        """Halve the width for a 429 of a request started in `epoch`; whether it was halved."""
-        if epoch != self._epoch:
-            return False
-        self._epoch += 1
-        self._exact_width = max(1.0, self._gate.width / 2)
-        self._gate.width = int(self._exact_width)
-        return True
-
-    def settle(self, started: Start, tokens: int) -> None:
-        """Count the tokens that a request really took."""
-        self._window.settle(started, tokens)
-
 
 @dataclass(frozen=True)
 class Slot:
-    """A place held for one request; tell it how the request went."""
+    """A place held for one request."""
 
-    limiter: ModelLimiter
+    window: MinuteWindow
     started: Start
-    epoch: int
 
-    def succeeded(self, tokens: int | None) -> None:
+    def settle(self, tokens: int | None) -> None:
         """The request was answered, taking so many tokens (None: the provider did not say)."""
-        self.limiter.succeeded()
         if tokens is not None:
-            self.limiter.settle(self.started, tokens)
-
-    def rate_limited(self) -> bool:
-        """The server said 429; whether the model was slowed down for it."""
-        return self.limiter.slowed_down(self.epoch)
+            self.window.settle(self.started, tokens)

@@ -40,7 +40,7 @@ _POLICY = re.compile(
 _NEVER = re.compile(
     r"insufficient_quota|billing_hard_limit_reached|model_not_found|invalid_api_key"
     r"|authentication_error|credit balance is too low|API_KEY_INVALID|API key not valid"
-    r"|LLM Provider NOT provided",
+    r"|LLM Provider NOT provided|Server is pinned to|Unexpected fields in the request",
     re.IGNORECASE,
 )
 _LONGEST_WORDS = 20_000

@@ -9,9 +9,10 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass
 
 from phyblock.errors import UnavailableError
-from phyblock.models.address_file import LOOK_EVERY_S, AddressFile, addresses_of
+from phyblock.models.address_list import AddressList, changing_list
 from phyblock.models.breaker import Breaker, Breakers
 from phyblock.models.config import ModelConfig
+from phyblock.models.pace import AdaptivePace, FixedPace, Mark, Pace
 from phyblock.models.transport import Transport
 
 __all__ = ["Replica", "Replicas"]
@@ -19,23 +20,24 @@ __all__ = ["Replica", "Replicas"]
 
 @dataclass(eq=False)
 class Replica:
-    """A server of the model, how many requests it has now and was ever sent, and why it is no use:
-    what it said that it would say to every request.
+    """A server of the model, how many requests it may have, has now and was ever sent, and why it
+    is no use: what it said that it would say to every request.
     """
 
     transport: Transport
     breaker: Breaker
+    pace: Pace
     under_way: int = 0
     sent: int = 0
     refusal: UnavailableError | None = None
 
     @contextlib.contextmanager
-    def asked(self) -> Iterator[None]:
-        """Count a request while it is under way."""
+    def asked(self) -> Iterator[Mark]:
+        """Count a request while it is under way; yields what its pace is told when it has ended."""
         self.under_way += 1
         self.sent += 1
         try:
-            yield
+            yield self.pace.begin(self.under_way)
         finally:
             self.under_way -= 1
 
@@ -44,7 +46,7 @@ class Replicas:
     """Chooses among the servers of a model; asyncio, one loop.
 
     `transport` makes what sends to the one address of a configuration. Raises SpecError for a list
-    in a file that cannot be used; once begun, the last good list holds.
+    by a file or command that cannot be used; once begun, the last good list holds.
     """
 
     def __init__(
@@ -56,12 +58,21 @@ class Replicas:
         self._config = config
         self._transport = transport
         self._breakers = breakers
-        self._file: AddressFile | None = None
+        self._together = FixedPace(config.max_concurrency)
         self._known: dict[str | None, Replica] = {}
         self._listed: list[Replica] = []
-        if config.api_base_file is not None:
-            self._file = AddressFile(config.api_base_file, breakers.clock, breakers.tell)
-        self._list(addresses_of(config) if self._file is None else self._file.addresses)
+        self._changing: AddressList | None = changing_list(config, breakers.clock, breakers.tell)
+        fixed = config.addresses or (None,)
+        self._list(fixed if self._changing is None else self._changing.addresses)
+
+    @property
+    def width(self) -> int:
+        """How many requests may be under way at all servers together, 1 at least."""
+        usable = self._usable()
+        there = [replica for replica in usable if not replica.breaker.is_open] or usable
+        paces = {id(replica.pace): replica.pace for replica in there}
+        width = sum(pace.width for pace in paces.values())
+        return max(1, min(width, self._config.max_concurrency))
 
     @contextlib.asynccontextmanager
     async def passing(self) -> AsyncIterator[Replica | None]:
@@ -70,7 +81,7 @@ class Replicas:
         Raises UnavailableError where none is left.
         """
         while True:
-            self._look_at_file()
+            self._look_at_list()
             self.raise_if_none_left()
             probed = self._due()
             if probed is not None or self.choose() is not None:
@@ -86,14 +97,15 @@ class Replicas:
         self, probed: Replica | None = None, failed: Replica | None = None
     ) -> Replica | None:
         """The server to probe if it is still listed, else the one that answers and has the fewest
-        requests; the one that failed last only where there is no other. None where all are gone.
+        requests for its pace; the one that failed last only where there is no other. None where
+        all are gone.
         """
-        self._look_at_file()
+        self._look_at_list()
         usable = self._usable()
         if probed in usable:
             return probed
         closed = (replica for replica in usable if not replica.breaker.is_open)
-        return min(closed, key=lambda one: (one is failed, one.under_way, one.sent), default=None)
+        return min(closed, key=lambda one: (one is failed, _load(one), one.sent), default=None)
 
     def leave_out(self, replica: Replica, refusal: UnavailableError) -> bool:
         """Ask a server no more that refuses whatever it is asked; whether others are left."""
@@ -119,6 +131,8 @@ class Replicas:
 
     async def aclose(self) -> None:
         """Release the connections to all servers."""
+        if self._changing is not None:
+            await self._changing.aclose()
         for replica in self._known.values():
             await replica.transport.aclose()
 
@@ -133,14 +147,14 @@ class Replicas:
     async def _wait(self) -> None:
         """Wait until a server is heard of, may be probed, or may be listed anew."""
         waits_s = [replica.breaker.probe_in_s for replica in self._usable()]
-        waits_s.append(None if self._file is None else LOOK_EVERY_S)
+        waits_s.append(None if self._changing is None else self._changing.look_every_s)
         known_s = [wait_s for wait_s in waits_s if wait_s is not None]
         nap = self._breakers.clock.sleep(min(known_s)) if known_s else None
         await self._breakers.changes.wait(nap)
 
-    def _look_at_file(self) -> None:
-        if self._file is not None and self._file.has_changed():
-            self._list(self._file.addresses)
+    def _look_at_list(self) -> None:
+        if self._changing is not None and self._changing.has_changed():
+            self._list(self._changing.addresses)
             count = len(self._listed)
             self._breakers.tell(f"{self._config.name} now has {count} server{'s' * (count > 1)}")
 
@@ -151,8 +165,16 @@ class Replicas:
         for address in addresses:
             if address not in self._known:
                 config = self._config.at(address)
-                self._known[address] = Replica(self._transport(config), self._breakers.of(config))
+                breaker = self._breakers.of(config)
+                cap = config.max_concurrency
+                pace = AdaptivePace(cap) if config.adapts else self._together
+                self._known[address] = Replica(self._transport(config), breaker, pace)
             replica = self._known[address]
             if replica not in before:
                 replica.refusal = None
             self._listed.append(replica)
+
+
+def _load(replica: Replica) -> float:
+    """How much of what it may have a server would have with one request more."""
+    return (replica.under_way + 1) / replica.pace.width

@@ -224,6 +224,7 @@ def _alike(models: Sequence[PlannedModel]) -> list[Problem]:
 
 
 def _served_at(config: ModelConfig) -> frozenset[str]:
-    """The addresses of a model, or the file that lists them: what it lists may change."""
+    """The addresses of a model, or the file or command that lists them: that may change."""
     file = config.api_base_file
-    return frozenset(config.addresses if file is None else (str(file),))
+    named = config.api_base_command if file is None else (str(file),)
+    return frozenset(config.addresses or named)

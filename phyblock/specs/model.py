@@ -5,7 +5,15 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Discriminator, Field, JsonValue, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    JsonValue,
+    Tag,
+    model_validator,
+)
 
 from phyblock.addresses import address_fault
 from phyblock.specs.fields import (
@@ -63,6 +71,22 @@ Addresses = Annotated[
 ]
 """One address, or several of servers that all serve the same model."""
 
+Word = Annotated[str, Field(min_length=1, max_length=4096)]
+
+
+def _check_concurrency(value: Any) -> Any:
+    if isinstance(value, str) and value != "auto":
+        allowed = "a whole number of at least 1, or auto"
+        raise refuse("is no number of calls", allowed=allowed, words=("auto",))
+    return value
+
+
+Concurrency = Annotated[
+    Annotated[Count, Tag("number")] | Annotated[Literal["auto"], Tag("word")],
+    Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
+    BeforeValidator(_check_concurrency),
+]
+
 
 def _check_finite(body: dict[str, JsonValue]) -> dict[str, JsonValue]:
     stack: list[tuple[tuple[str | int, ...], JsonValue]] = [((), body)]
@@ -109,6 +133,11 @@ class ModelSpec(Section):
         description="File that lists such addresses, one a line, in place of api_base; relative "
         "to this file, and read again while a run goes on.",
     )
+    api_base_command: Annotated[tuple[Word, ...], Field(min_length=1)] | None = Field(
+        default=None,
+        description="Command that prints such addresses, as a list of its words, in place of "
+        "api_base; run without a shell at the start and every 30 s while a run goes on.",
+    )
     revision: Annotated[str, Field(min_length=1, max_length=100)] | None = Field(
         default=None,
         description="Which weights answer, where the id does not say it. An address does not tell "
@@ -124,8 +153,10 @@ class ModelSpec(Section):
         description="litellm: through the library. direct: straight HTTP, for servers that speak "
         "the OpenAI chat protocol. auto: direct where it can.",
     )
-    max_concurrency: Count | None = Field(
-        default=None, description="Calls to this model under way at once; null: the suite's limit."
+    max_concurrency: Concurrency | None = Field(
+        default=None,
+        description="Calls to this model under way at once; null: the suite's limit. auto: as many "
+        "as each of its servers answers without getting slow, up to the suite's limit.",
     )
     rpm: Count | None = Field(default=None, description="Requests a minute at most.")
     tpm: Count | None = Field(default=None, description="Tokens a minute at most.")
@@ -181,9 +212,10 @@ class ModelSpec(Section):
                 raise refuse(
                     "needs an id (or a replay folder)", hint="for example id: openai/gpt-4o"
                 )
-            if self.api_base is not None and self.api_base_file is not None:
-                message = "says where the model is served, which api_base says too"
-                raise refuse(message, at=("api_base_file",), key=True, hint="keep one of them")
+            first, *others = self._where_served() or [""]
+            if others:
+                message = f"says where the model is served, which {first} says too"
+                raise refuse(message, at=(others[0],), key=True, hint="keep one of them")
             self._check_direct(self.id)
             return self
         for key in sorted(self.model_fields_set - _WITH_REPLAY):
@@ -196,11 +228,20 @@ class ModelSpec(Section):
             )
         return self
 
+    @property
+    def has_address(self) -> bool:
+        """Whether it says where the model is served."""
+        return bool(self._where_served())
+
+    def _where_served(self) -> list[str]:
+        """The fields that say where the model is served."""
+        fields = ("api_base", "api_base_file", "api_base_command")
+        return [field for field in fields if getattr(self, field) is not None]
+
     def _check_direct(self, model_id: str) -> None:
         """Without an address, a direct call would take the provider's key to OpenAI."""
         provider = model_id.partition("/")[0]
-        has_address = self.api_base is not None or self.api_base_file is not None
-        if self.transport == "direct" and not has_address and provider != "openai":
+        if self.transport == "direct" and not self.has_address and provider != "openai":
             raise refuse(
                 f"needs the address of the server that speaks for {provider}",
                 at=("transport",),

@@ -25,8 +25,8 @@ _NAME = TypeAdapter(ModelName)
 def load_models(path: Path) -> dict[str, ModelSpec]:
     """Read a models file: each name maps to a litellm id or to a mapping.
 
-    Paths of replay folders and of lists of servers come out absolute. Raises SpecError with all
-    that is wrong.
+    Paths of replay folders, of lists of servers and of programs that list them come out absolute.
+    Raises SpecError with all that is wrong.
     """
     source = read_yaml(path)
     data = {} if source.data is None else source.data
@@ -60,17 +60,29 @@ def _read_entry(
     spec, found = check(ModelSpec, {"id": entry} if isinstance(entry, str) else entry, source,
                         (name,), hints)  # fmt: skip
     problems += found
-    for field in ("replay", "api_base_file"):
-        path = None if spec is None else getattr(spec, field)
-        if spec is None or path is None:
-            continue
+    if spec is None:
+        return None, problems
+    for field, path in _paths(spec).items():
         try:
-            absolute = expand(path, Path(source.label).parent)
+            absolute = str(expand(path, Path(source.label).parent))
         except ValueError as error:
             where = source.where((name, field))
             return None, [*problems, Problem(where, str(error), f"{name}.{field}", path)]
-        spec = spec.model_copy(update={field: str(absolute)})
+        words = spec.api_base_command if field == "api_base_command" else None
+        value = absolute if words is None else (absolute, *words[1:])
+        spec = spec.model_copy(update={field: value})
     return spec, problems
+
+
+def _paths(spec: ModelSpec) -> dict[str, str]:
+    """The paths in an entry by field; a program's name alone is looked for as a shell does."""
+    program = (spec.api_base_command or ("",))[0]
+    paths = {
+        "replay": spec.replay,
+        "api_base_file": spec.api_base_file,
+        "api_base_command": program if "/" in program else None,
+    }
+    return {field: path for field, path in paths.items() if path is not None}
 
 
 def _check_name(name: str, source: YamlSource) -> list[Problem]:

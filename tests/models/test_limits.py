@@ -80,7 +80,7 @@ def test_no_window_of_a_minute_has_more_starts_or_tokens_than_allowed(
                 assert inside <= width
                 await time.sleep(takes_s)
                 inside -= 1
-                slot.succeeded(tokens)
+                slot.settle(tokens)
 
         await time.run_until_done(*(asyncio.create_task(call(*one)) for one in arrivals))
 
@@ -125,41 +125,6 @@ def test_a_request_larger_than_the_limit_waits_for_an_empty_window_only() -> Non
     assert window.wait_s(500) == 0
     window.start(1)
     assert window.wait_s(500) == WINDOW_S
-
-
-@pytest.mark.parametrize("width", [2, 7, 64])
-def test_concurrency_is_halved_once_by_all_429s_of_a_round(width: int) -> None:
-    async def main() -> None:
-        limiter = ModelLimiter(width, Gate(width))
-        async with limiter.slot(0) as first, limiter.slot(0) as second:
-            assert first.rate_limited()
-            assert limiter.width == width // 2
-            assert not second.rate_limited()
-            assert limiter.width == width // 2
-        async with limiter.slot(0) as later:
-            assert later.rate_limited()
-            assert limiter.width == max(1, width // 4)
-
-    run(main)
-
-
-@pytest.mark.parametrize("width", [1, 2, 7, 64])
-def test_concurrency_comes_back_in_small_steps(width: int) -> None:
-    async def main() -> None:
-        limiter = ModelLimiter(width, Gate(width))
-        for _ in range(10):
-            async with limiter.slot(0) as slot:
-                slot.rate_limited()
-        widths = [limiter.width]
-        for _ in range(10 * width):
-            async with limiter.slot(0) as slot:
-                slot.succeeded(None)
-            widths.append(limiter.width)
-        assert widths[0] == 1
-        assert widths[-1] == width
-        assert all(0 <= b - a <= max(1, width // 8) for a, b in itertools.pairwise(widths))
-
-    run(main)
 
 
 def test_all_models_together_keep_to_the_overall_limit() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import traceback
 
 import pytest
@@ -10,6 +11,8 @@ from aiohttp import web
 
 from phyblock.errors import RefusedError, RetryableError, SampleError, UnavailableError
 from phyblock.models import ModelConfig, ModelEvent, Reply
+from phyblock.models.http_client import Answer
+from phyblock.models.refusals import refusal
 from tests.models.factory import QUICK, ask, make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Faults, LocalServer, Running, Seen
@@ -221,3 +224,16 @@ def test_a_key_arrives_but_stands_in_no_text(route: str, mode: str) -> None:
         assert "[key]" in str(answer) or "REDACTED" in str(answer)
         told = traceback.format_exception(type(answer), answer, answer.__traceback__)
         assert KEY not in "".join(told)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "Server is pinned to '/models/a'; requested 'b'.",
+        "Unexpected fields in the request: {'top_k'}",
+    ],
+)
+def test_a_server_that_would_say_it_to_every_request_is_asked_no_more(words: str) -> None:
+    """As `transformers serve` says it: its other requests would fare no better."""
+    answer = Answer(400, {}, json.dumps({"detail": words}).encode())
+    assert isinstance(refusal(answer), UnavailableError)

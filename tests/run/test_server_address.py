@@ -164,3 +164,28 @@ def test_one_model_at_two_addresses_is_named_before_anything_is_asked(workspace:
     entries["beta"]["revision"] = "step 2000"
     workspace.write_yaml("models.yaml", entries)
     assert workspace.run("--dry-run").code == 0
+
+
+def test_a_command_of_a_models_file_that_came_with_a_suite_is_not_run(workspace: Workspace) -> None:
+    """Only one of the user's own is: named, or in the folder where they are."""
+    with Running(OpenAIChat()) as server:
+        marker = workspace.root / "marker"
+        words = ["sh", "-c", f"touch {marker}; echo {server.url}/v1"]
+        entry = {"id": "hosted_vllm/alpha", "api_base_command": words}
+        workspace.write_yaml("models.yaml", {"alpha": entry})
+        workspace.write_suite(models=["alpha"], seeds=[0])
+        (workspace.root / "theirs").mkdir()
+        for name in ("suite.yaml", "models.yaml", "data"):
+            (workspace.root / name).rename(workspace.root / "theirs" / name)
+        words = ["run", "theirs/suite.yaml", "--out", "out", "--no-report", "--yes"]
+        refused = workspace.phyblock(*words)
+        assert refused.code == 2
+        assert "alpha.api_base_command: names a command, which only a models file of" in refused.err
+        dry = workspace.phyblock(*words, "--models-file", "theirs/models.yaml", "--dry-run")
+        assert dry.code == 0, dry.err
+        assert workspace.phyblock("validate", "theirs/suite.yaml").code == 0
+        assert not marker.exists()
+        named = workspace.phyblock(*words, "--models-file", "theirs/models.yaml")
+        assert named.code == 0, named.err
+        assert marker.exists()
+        assert server.server.ended["ok"] > 0
