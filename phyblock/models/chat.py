@@ -79,6 +79,7 @@ class ChatModel:
         self._parts = parts
         self._takes_seed = config.sends_seed != "never"
         self._took_format = False
+        self._told_width = 0
         self._unavailable: UnavailableError | None = None
 
     async def ask(self, request: Request) -> Reply:
@@ -229,11 +230,10 @@ class ChatModel:
 
     def _fit_width(self) -> int:
         """Have as many requests under way as the servers may have now; how many that is."""
-        limiter, width = self._parts.limiter, self._parts.replicas.width
-        if width != limiter.width:
-            limiter.width = width
-            if self._config.adapts:
-                self._tell("concurrency", "", limit=width)
+        width = self._parts.limiter.width = self._parts.replicas.width
+        if self._config.adapts and width != self._told_width:
+            self._told_width = width
+            self._tell("concurrency", "", limit=width)
         return width
 
     async def _send_seeded(self, question: _Question, replica: Replica) -> Reply:

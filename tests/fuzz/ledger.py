@@ -101,11 +101,14 @@ def kept_in(folder: Path) -> set[tuple[str, str]]:
 
 
 class LedgerChat(OpenAIChat):
-    """Answers plans and questions; the digest of a request is its reply's reasoning."""
+    """Answers plans and questions; the digest of a request is its reply's reasoning.
 
-    def __init__(self, *args: Any, **options: Any) -> None:
+    Several that serve the same model may share a `ledger`.
+    """
+
+    def __init__(self, *args: Any, ledger: Ledger | None = None, **options: Any) -> None:
         super().__init__(*args, **options)
-        self.ledger = Ledger()
+        self.ledger = ledger or Ledger()
 
     async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
         self.ledger.entries.append(Entry(seen.model, seen.sample, ending))

@@ -23,7 +23,7 @@ from tests.workspace import SCENES, Workspace
 
 AT_ONCE = 6
 LATENCY_S = 0.03
-_TRACKS: dict[str, dict[str, Any]] = {
+TRACKS: dict[str, dict[str, Any]] = {
     "full_planning": {},
     "vqa": vqa_suite(subtasks=["SH", "CO"]),
     "step_planning": {"tracks": ["step_planning"], "steps": {"physics": "off"}},
@@ -63,9 +63,9 @@ def run_until_killed(workspace: Workspace, server: LedgerChat, draw: random.Rand
 
 @pytest.mark.fuzz
 @pytest.mark.slow
-@pytest.mark.parametrize("track", _TRACKS)
+@pytest.mark.parametrize("track", TRACKS)
 def test_kills(workspace: Workspace, tallies: dict[str, Counter[str]], track: str) -> None:
-    kills = -(-KILLS // len(_TRACKS))
+    kills = -(-KILLS // len(TRACKS))
     draw = random.Random(f"{SEED} {track}")
     write_questions(workspace.root / "questions", questions(SCENES, 4, ("SH", "CO")))
     server = (LedgerAgent if track == "step_planning" else LedgerChat)(Faults(latency_s=LATENCY_S))
@@ -74,7 +74,7 @@ def test_kills(workspace: Workspace, tallies: dict[str, Counter[str]], track: st
     with Running(server) as running:
         workspace.write_models(running.url, "alpha")
         seeds = list(range(kills * (_ASKED_PER_KILL + AT_ONCE) // _ASKED_PER_SEED[track] + 2))
-        fields = {"images": {"size_px": 128}, **_TRACKS[track]}
+        fields = {"images": {"size_px": 128}, **TRACKS[track]}
         limits = {"max_concurrency": AT_ONCE}
         workspace.write_suite(**{**fields, "models": ["alpha"], "seeds": seeds, "limits": limits})
         for _ in range(kills):

@@ -9,7 +9,6 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from aiohttp import web
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -22,7 +21,7 @@ from phyblock.models.replicas import Replica, Replicas
 from phyblock.models.transport import Call
 from tests.models.factory import QUICK, ask, make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
-from tests.servers.chassis import Faults, Running, start
+from tests.servers.chassis import Faults, Running, kill, start
 from tests.servers.openai_chat import OpenAIChat
 
 REFUSED = UnreachableError("connection refused")
@@ -54,19 +53,6 @@ def at(*urls: str, route: str = "direct", **fields: object) -> ModelConfig:
 async def answers_of(model: Model, *names: str) -> list[object]:
     asked = (model.ask(make_request(name)) for name in names)
     return list(await asyncio.gather(*asked, return_exceptions=True))
-
-
-async def kill(*runners: web.AppRunner) -> None:
-    """End servers as the death of their processes does: at once, their connections reset."""
-    for runner in runners:
-        for site in list(runner.sites):
-            await site.stop()
-        assert runner.server is not None
-        for connection in runner.server.connections:
-            if connection.transport is not None:
-                connection.transport.abort()
-    for runner in runners:
-        await runner.cleanup()
 
 
 def names(count: int) -> list[str]:

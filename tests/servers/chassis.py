@@ -14,7 +14,7 @@ import json
 import threading
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Coroutine, Iterable
 from contextlib import AbstractAsyncContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any
@@ -234,7 +234,10 @@ class LocalServer(ABC):
 
 
 class Running:
-    """A server on a free port, in a thread with a loop of its own; a context manager."""
+    """A server on a free port, in a thread with a loop of its own; a context manager.
+
+    It may die and come back, on the same port, any number of times.
+    """
 
     def __init__(self, server: LocalServer) -> None:
         self.server = server
@@ -242,6 +245,7 @@ class Running:
         self._ready = threading.Event()
         self._stop: asyncio.Event | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
+        self._runner: web.AppRunner | None = None
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()))
 
     @property
@@ -263,9 +267,48 @@ class Running:
     async def _serve(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._stop = asyncio.Event()
-        runner, self.port = await start(self.server, 0)
+        self._runner, self.port = await start(self.server, 0)
         self._ready.set()
         await self._stop.wait()
+        if self._runner is not None:
+            await self._runner.cleanup()
+
+    @property
+    def is_alive(self) -> bool:
+        return self._runner is not None
+
+    def die(self) -> None:
+        """End as a process that is killed."""
+        self._in_loop(self._die())
+
+    def come_back(self) -> None:
+        """Serve again."""
+        self._in_loop(self._come_back())
+
+    def _in_loop(self, work: Coroutine[Any, Any, None]) -> None:
+        assert self._loop is not None
+        asyncio.run_coroutine_threadsafe(work, self._loop).result(10)
+
+    async def _die(self) -> None:
+        if self._runner is not None:
+            dying, self._runner = self._runner, None
+            await kill(dying)
+
+    async def _come_back(self) -> None:
+        if self._runner is None:
+            self._runner, _ = await start(self.server, self.port)
+
+
+async def kill(*runners: web.AppRunner) -> None:
+    """End servers as the death of their processes does: at once, their connections reset."""
+    for runner in runners:
+        for site in list(runner.sites):
+            await site.stop()
+        assert runner.server is not None
+        for connection in runner.server.connections:
+            if connection.transport is not None:
+                connection.transport.abort()
+    for runner in runners:
         await runner.cleanup()
 
 
