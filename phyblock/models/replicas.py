@@ -9,10 +9,11 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass
 
 from phyblock.errors import UnavailableError
+from phyblock.models.adaptive_pace import AdaptivePace
 from phyblock.models.address_list import AddressList, changing_list
 from phyblock.models.breaker import Breaker, Breakers
 from phyblock.models.config import ModelConfig
-from phyblock.models.pace import AdaptivePace, FixedPace, Mark, Pace
+from phyblock.models.pace import FixedPace, Mark, Pace
 from phyblock.models.transport import Transport
 
 __all__ = ["Replica", "Replicas"]

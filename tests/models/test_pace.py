@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.errors import ModelError, RetryableError, SampleError, UnreachableError
-from phyblock.models.pace import AdaptivePace, FixedPace, Mark, Pace, is_late, says_too_much
+from phyblock.models.adaptive_pace import AdaptivePace
+from phyblock.models.pace import FixedPace, Mark, Pace, is_late, says_too_much
 
 CAPS = st.integers(1, 100)
 PACES = st.tuples(st.sampled_from([FixedPace, AdaptivePace]), CAPS)
