@@ -15,7 +15,7 @@ from tests.servers.openai_chat import OpenAIChat
 from tests.servers.strained import STRAINS, StrainedChat
 
 CAP = 24
-BEARS = 6
+BEARS = 4
 POLICY = RetryPolicy(base_s=0.01, max_wait_s=0.05, max_retry_after_s=0.05)
 
 
@@ -51,7 +51,8 @@ def widths(events: list[ModelEvent]) -> list[int]:
 @pytest.mark.parametrize("strain", STRAINS)
 def test_a_server_gets_more_until_it_shows_that_it_is_too_much(strain: str) -> None:
     server = StrainedChat(strain, BEARS, latency_s=0.02)
-    events = ask_adaptively([server], 200, timeout_s=1.0)
+    timeout_s = 1.0 if strain == "hangs" else 20.0
+    events = ask_adaptively([server], 200, timeout_s=timeout_s)
     found = widths(events)
     assert 1 <= min(found) <= max(found) <= CAP
     assert max(found) >= BEARS
