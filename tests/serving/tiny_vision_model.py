@@ -25,7 +25,7 @@ from transformers.models.clip.image_processing_pil_clip import CLIPImageProcesso
 
 _START, _END, _PADDING, _PICTURE = "<|start|>", "<|end|>", "<|padding|>", "<image>"
 _WORDS = 600
-_HIDDEN = 32
+_HIDDEN = 128
 _PICTURE_PX = 112
 _PATCH_PX = 14
 _LONGEST = 16_384
