@@ -24,6 +24,7 @@ from phyblock.parsing.line_patterns import (
     STEP,
     TAG,
 )
+from phyblock.parsing.plan_patterns import OPTION
 from phyblock.parsing.statement import MOST_AT_ONCE, chain, read_statement
 from phyblock.parsing.structured import Found, find_json, find_tables
 from phyblock.parsing.text_forms import plain_line
@@ -252,7 +253,8 @@ class _Reader:
             label = labeled["label"] if labeled else ""
         last = self.done[-1] if self.done else None
         self._open = None
-        if last is not None and last.form == "labeled" and not self.above and LAYER.search(label):
+        goes_on = LAYER.search(label) and not OPTION.match(label)
+        if last is not None and last.form == "labeled" and not self.above and goes_on:
             last.numbers += listed
             last.last_line = at
             last.label = f"{last.label}, {label}"
