@@ -116,7 +116,8 @@ _HERE = re.compile(
     r"|bottom"
     r"|base|middle|center|centre|top|front|back|rear|side|first|second|third|next)"
     r"(?: (?:side|layer|half|level|row|end|structure|position|corner))?(?! (?:of|block|cube))"
-    r"|(?:auf|an) (?:den|dem) (?:boden|tisch|grund|untergrund))\b",
+    r"|(?:auf|an) (?:den|dem) (?:boden|tisch|grund|untergrund))\b"
+    r"|在[^\d\W]{0,8}?(?:上面?|上方|顶部|旁边|之间|中间|[左右]边|地面)(?=[放移摆搭])",
     re.IGNORECASE,
 )
 _SUPPORT = re.compile(

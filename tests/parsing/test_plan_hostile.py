@@ -312,7 +312,32 @@ LATER: list[tuple[str, tuple[int, ...] | None]] = [
 """Forty replies in the manners of today's models, each written with its reading before any parser
 read it: 31 were read rightly then, 4 failed, 5 were misread."""
 
-FAILING = 2
+LAST: list[tuple[str, tuple[int, ...] | None]] = [
+    ('Start with 4, put 9 on top of it, then 13.', (4, 9, 13)),
+    ('1. Index 2 (base, left)\n2. Index 2 (base, right)\n3. Index 11 (beam)\n4. Index 5 x2 (towers)\n5. Index 16 (roof)', (2, 2, 11, 5, 5, 16)),
+    ('The plan has 6 steps.\n\nStep 1 → 4\nStep 2 → 4\nStep 3 → 8\nStep 4 → 1\nStep 5 → 1\nStep 6 → 15', (4, 4, 8, 1, 1, 15)),
+    ('Ground: 3, 3, 7\nSecond layer: 10\nThird layer: 12, 12\nTop: 14', (3, 3, 7, 10, 12, 12, 14)),
+    ('**Answer:** `[6, 6, 2, 9]`\n\n*Blocks 1, 3 and 4 are distractors.*', (6, 6, 2, 9)),
+    ('Ich beginne mit Block 5. Danach kommt Block 11 darauf. Zum Schluss lege ich Block 2 oben auf.', (5, 11, 2)),
+    ('Schritt 1: Block 4\nSchritt 2: Block 4 (zweite Säule)\nSchritt 3: Block 10 quer darüber', (4, 4, 10)),
+    ('第1步：放置7号积木\n第2步：放置7号积木\n第3步：在上面放置12号积木', (7, 7, 12)),
+    ('搭建计划：[7, 7, 12, 3]', (7, 7, 12, 3)),
+    ('{"thinking": "3 layers", "steps": [{"n": 1, "move": {"block": 9}}, {"n": 2, "move": {"block": 4}}]}', (9, 4)),
+    ('{"sequence": [{"order": 1, "candidate": "#8"}, {"order": 2, "candidate": "#8"}, {"order": 3, "candidate": "#13"}]}', (8, 8, 13)),
+    ("I'm honestly not sure, but I'd go: 2 → 2 → 14 → 7.", (2, 2, 14, 7)),
+    ("I can't give a reliable plan because the picture is too blurry; the candidates seem to include 2, 7 and 14.", None),
+    ('Place two of candidate 6 on the ground 5 cm apart, lay candidate 10 across both, and finish by adding candidate 3.', (6, 6, 10, 3)),
+    ('1. Move block with index 12\n2. Move block with index 4\n   - it rests on 12\n3. Move block with index 4\n   - it rests on 12 as well\n4. Move block with index 9\n   - across the two 4s', (12, 4, 4, 9)),
+    ('Left tower: 2, 5, 8\nRight tower: 2, 5, 9\nBridge: 13', (2, 5, 8, 2, 5, 9, 13)),
+    ('Step1: Move block with index 3\nStep2: Move block with index 3\nStep3: Move block with index 6\n\nWait, the goal shows a third pillar. Updated plan:\n\nStep1: Move block with index 3\nStep2: Move block with index 3\nStep3: Move block with index 3\nStep4: Move block with index 6', (3, 3, 3, 6)),
+    ('<answer>\nStep1: Move block with index 16\nStep2: Move block with index 1\n</answer>', (16, 1)),
+    ('Blocks needed: 2x red cube (index 4), 1x arch (index 7), 1x roof (index 12).', None),
+    ('Steps 1 and 2: index 4 (both pillars). Step 3: index 7. Step 4: index 12.', (4, 4, 7, 12)),
+]  # fmt: skip
+"""Twenty more, written in the same way when those were mended: 14 were read rightly then, 3 failed,
+3 were misread."""
+
+FAILING = {"later": 2, "last": 3}
 """Of those that hold a plan, how many are not read: rather than wrongly."""
 
 ALIKE: list[tuple[str, tuple[int, ...] | None]] = [
@@ -344,10 +369,13 @@ def reading(text: str) -> tuple[int, ...] | None:
     return None if parsed.rule is None else parsed.plan.steps
 
 
-def test_replies_that_were_written_first_are_read_as_noted_or_not_at_all() -> None:
-    readings = [(reading(text), plan) for text, plan in LATER]
+@pytest.mark.parametrize(("name", "rows"), [("later", LATER), ("last", LAST)])
+def test_replies_that_were_written_first_are_read_as_noted_or_not_at_all(
+    name: str, rows: list[tuple[str, tuple[int, ...] | None]]
+) -> None:
+    readings = [(reading(text), plan) for text, plan in rows]
     assert [got for got, plan in readings if got not in (plan, None)] == []
-    assert sum(got is None and plan is not None for got, plan in readings) == FAILING
+    assert sum(got is None and plan is not None for got, plan in readings) == FAILING[name]
 
 
 @pytest.mark.parametrize(("text", "plan"), ALIKE)
