@@ -328,5 +328,5 @@ def _times(text: str, mention: re.Match[str]) -> int:
     before = _SO_MANY.search(text[max(0, mention.start() - 60) : mention.start()])
     if before is None:
         return 1
-    word = before["word"] or before["cjk_word"] or ""
-    return min(int(before["n"] or 0) or number_of_word(word) or 1, MOST_AT_ONCE)
+    spelled = number_of_word(before["word"] or before["cjk_word"] or "")
+    return min(int(before["n"] or 0) or spelled or 1, MOST_AT_ONCE)

@@ -109,8 +109,8 @@ def interaction(scores: Floats, clusters: Clusters) -> Component:
 
     found = jackknife(counts, clusters, variance)
     most = (clusters.size - 1) * (levels - 1)
-    variance, noise = (float(value) for value in found.value)
-    return _of_variance(variance, float(found.se[0]), noise, most)
+    above, noise = (float(value) for value in found.value)
+    return _of_variance(above, float(found.se[0]), noise, most)
 
 
 def within(scores: Floats, clusters: Clusters) -> Component:
