@@ -185,7 +185,11 @@ def test_episodes_are_shuffled_and_blind_as_well(workspace: Workspace) -> None:
 
 
 @pytest.mark.parametrize(
-    "fields", [{}, {"vary": {"candidate_order": ["file", "shuffled"]}, "seeds": list(SEEDS)}]
+    "fields",
+    [
+        {"vary": {"candidate_order": ["file", "shuffled"]}, "seeds": list(SEEDS)},
+        pytest.param({}, marks=pytest.mark.slow),
+    ],
 )
 def test_floors_stand_in_the_manifest_and_name_who_is_above(
     workspace: Workspace, fields: dict[str, Any]
