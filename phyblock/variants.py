@@ -12,13 +12,16 @@ REPEAT = "repeats"
 
 @dataclass(frozen=True)
 class Variant:
-    """The factors in which a way of asking differs from the reference, each with its level."""
+    """The factors in which a way of asking differs from the reference of its run, with levels.
+
+    Another run may have another reference: only where two suites vary alike do names agree.
+    """
 
     levels: tuple[tuple[str, str], ...] = ()
 
     @property
     def key(self) -> str:
-        """What it is called: `background=lawn,repeats=2`, "" for the reference."""
+        """What its run calls it: `background=lawn,repeats=2`, "" for the reference."""
         return ",".join(f"{factor}={level}" for factor, level in self.levels)
 
     @property

@@ -38,21 +38,32 @@ def difference_of(sums: Floats) -> Floats:
     return np.asarray(f1_of(sums)[..., 0] - f1_of(sums)[..., 1])
 
 
-def pigeonhole(
-    counts: Floats, clusters: Clusters, metric: Metric, rng: np.random.Generator, resamples: int
-) -> tuple[float, float, float]:
-    """Interval and p value: base scenes are drawn, a scene weighs the product of their draws."""
+def weights(clusters: Clusters, rng: np.random.Generator, resamples: int) -> Floats:
+    """How often each unit counts in each resample: base scenes are drawn, a scene of several counts
+    the product of their draws; shape (resamples, units).
+    """
     n = clusters.size
     times = np.ones((resamples, n + 1))
     times[:, :-1] = rng.multinomial(n, np.full(n, 1 / n), size=resamples)
-    weights = np.prod([times[:, member] for member in clusters.members.T], axis=0)
-    draws = metric(np.tensordot(weights, counts, axes=1))
+    return np.asarray(np.prod([times[:, member] for member in clusters.members.T], axis=0))
+
+
+def p_of_draws(draws: Floats, n: int) -> float:
+    """The p value of what was drawn of a difference, with `n` base scenes."""
+    below = (draws < 0).sum() + 0.5 * (draws == 0).sum()
+    share = (min(below, len(draws) - below) + 0.5) / (len(draws) + 1)
+    return float(min(2 * stdtr(n - 1, ndtri(share) * np.sqrt((n - 1) / n)), 1.0))
+
+
+def pigeonhole(
+    counts: Floats, clusters: Clusters, metric: Metric, rng: np.random.Generator, resamples: int
+) -> tuple[float, float, float]:
+    """Interval and p value of the bootstrap over base scenes."""
+    n = clusters.size
+    draws = metric(np.tensordot(weights(clusters, rng, resamples), counts, axes=1))
     tail = float(ndtr(np.sqrt(n / (n - 1)) * stdtrit(n - 1, 0.025)))
     lo, hi = np.quantile(draws, [tail, 1 - tail])
-    below = (draws < 0).sum() + 0.5 * (draws == 0).sum()
-    share = (min(below, resamples - below) + 0.5) / (resamples + 1)
-    p = 2 * stdtr(n - 1, ndtri(share) * np.sqrt((n - 1) / n))
-    return float(lo), float(hi), float(min(p, 1.0))
+    return float(lo), float(hi), p_of_draws(draws, n)
 
 
 def weaker(counts: Floats, rng: np.random.Generator) -> Floats:

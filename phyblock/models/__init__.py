@@ -14,7 +14,7 @@ from phyblock.models.base import (
 )
 from phyblock.models.breaker import Breakers
 from phyblock.models.build import build_model
-from phyblock.models.cache import CacheStats, ReplyCache, former_key, reply_key
+from phyblock.models.cache import CacheStats, ReplyCache, former_key, known_keys, reply_key
 from phyblock.models.config import Kind, ModelConfig, Price
 from phyblock.models.cost import (
     Budget,
@@ -69,6 +69,7 @@ __all__ = [
     "former_key",
     "is_billed",
     "is_unlisted",
+    "known_keys",
     "most_usd",
     "price_of",
     "read_raw_reply",

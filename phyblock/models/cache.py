@@ -28,7 +28,7 @@ from phyblock.models.payload import wire_params
 from phyblock.models.raw_replies import token_count
 from phyblock.words import Finish
 
-__all__ = ["CacheBusyError", "CacheStats", "ReplyCache", "former_key", "reply_key"]
+__all__ = ["CacheBusyError", "CacheStats", "ReplyCache", "former_key", "known_keys", "reply_key"]
 
 SCHEMA = 1
 """Version of the file's layout and of what enters a key."""
@@ -79,6 +79,13 @@ def former_key(config: ModelConfig, request: Request) -> str | None:
     if not config.addresses:
         return None
     return _key(request, config, {**config.identity(), "api_base": config.addresses[0].rstrip("/")})
+
+
+def known_keys(config: ModelConfig, request: Request) -> Iterator[str]:
+    """The keys under which a reply may be kept, today's first; each is made when it is needed."""
+    yield reply_key(config, request)
+    if (former := former_key(config, request)) is not None:
+        yield former
 
 
 def _key(request: Request, config: ModelConfig, identity: Mapping[str, object]) -> str:

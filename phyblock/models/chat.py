@@ -17,7 +17,7 @@ from phyblock.errors import (
 )
 from phyblock.models.base import Reply, Request
 from phyblock.models.breaker import shows_outage
-from phyblock.models.cache import former_key, reply_key
+from phyblock.models.cache import known_keys, reply_key
 from phyblock.models.config import ModelConfig, Price
 from phyblock.models.cost import Budget, Estimate, cost_usd, estimate, plausible
 from phyblock.models.events import EventKind, ModelEvent, Observer
@@ -101,11 +101,12 @@ class ChatModel:
 
     async def _kept(self, cache: SharedCache, key: str, request: Request) -> Reply | None:
         """The reply under the key, or under that of former versions, moved to today's."""
-        kept = await cache.find(key)
-        former = former_key(self._config, request) if kept is None else None
-        if former is not None and (kept := await cache.find(former)) is not None:
-            await cache.keep(key, self._config.id, kept)
-        return kept
+        for known in known_keys(self._config, request):
+            if (kept := await cache.find(known)) is not None:
+                if known != key:
+                    await cache.keep(key, self._config.id, kept)
+                return kept
+        return None
 
     async def aclose(self) -> None:
         """Release connections."""

@@ -24,6 +24,14 @@ from phyblock.parsing.line_patterns import (
     STEP,
     TAG,
 )
+from phyblock.parsing.plan_patterns import (
+    LABEL_CHARS,
+    NOT_MEANT,
+    OPTION,
+    PART,
+    PLAN_WORD,
+    REVISION,
+)
 from phyblock.parsing.statement import MOST_AT_ONCE, chain, read_statement
 from phyblock.parsing.structured import Found, find_json, find_tables
 from phyblock.parsing.text_forms import plain_line
@@ -252,7 +260,7 @@ class _Reader:
             label = labeled["label"] if labeled else ""
         last = self.done[-1] if self.done else None
         self._open = None
-        if last is not None and last.form == "labeled" and not self.above and LAYER.search(label):
+        if last is not None and last.form == "labeled" and not self.above and _goes_on(last, label):
             last.numbers += listed
             last.last_line = at
             last.label = f"{last.label}, {label}"
@@ -291,6 +299,16 @@ class _Reader:
         self.above = []
         self.done.append(listing)
         return listing
+
+
+def _goes_on(last: Listing, label: str) -> bool:
+    """Whether a label names a further part of the plan whose part stands above it."""
+    if OPTION.match(label):
+        return False
+    if LAYER.search(label):
+        return True
+    is_plain = not (PLAN_WORD.search(label) or REVISION.search(label) or NOT_MEANT.search(label))
+    return is_plain and bool(PART.search(last.label)) and len(label) < LABEL_CHARS
 
 
 def _is_move(body: str) -> bool:

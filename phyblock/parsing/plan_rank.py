@@ -14,6 +14,7 @@ from phyblock.parsing.plan_patterns import (
     LABEL_CHARS,
     LAYERS,
     NOT_MEANT,
+    OPTION,
     PLAN_WORD,
     REVISION,
 )
@@ -68,6 +69,7 @@ def _rank_of_label(listing: Listing, heading: str, *, is_catalogue: bool) -> int
         return ASKED if many or re.search("answer|final|plan", label, re.IGNORECASE) else NO
     if (
         PLAN_WORD.search(label)
+        or OPTION.match(label)
         or DOWNWARD.search(label)
         or (PLAN_WORD.search(heading) and not is_catalogue)
     ):

@@ -53,7 +53,14 @@ _WORD_NUMBER = (
     r"|cinq|sept|huit|neuf|dix|uno|dos|tres|cuatro|cinco|seis|siete|ocho|nueve|diez|десять|один|два"
     r"|три|четыре|пять|шесть|семь|восемь|девять)(?!\w)|[一二三四五六七八九十]{1,2}(?![号號番\w])"
 )
-_UNIT = r"(?!\s?(?:[x×]\s|times?\b|mal\b|fois|veces|cm|mm|m\b|°|degrees?\b|%|次|个|more\b))"
+_EACH = (
+    r"(?:(?:on|at|for|in)\s)?(?:each|either|both|every|auf jeder|an jeder)\s(?:of\s)?(?:the\s)?"
+    r"(?:sides?|ends?|seite|corners?|ecke)\b"
+)
+_UNIT = (
+    r"(?!\s?(?:[x×]\s|times?\b|mal\b|fois|veces|cm|mm|m\b|°|degrees?\b|%|次|个|块|more\b"
+    rf"|per\b|{_EACH}))"
+)
 _DIGITS = rf"[0-9]{{1,6}}(?![0-9]|\.[0-9]|[a-wyz]){_UNIT}"
 _TO = r"\s{0,2}(?:-|\u2013|\u2014|~|\bto\b|\bthrough\b|\bthru\b|\bbis\b|至|到)\s{0,2}"
 _OR = r"\s{0,3},?\s{0,3}(?:\bor\b|\boder\b|\bou\b|/|或者?)\s{0,3}"
@@ -65,9 +72,14 @@ _AND = (
 )
 _LINK = rf"(?:{_OR}|{_TO}|{_AND})#?"
 _GROUP = rf"(?P<first>{_DIGITS}|{_WORD_NUMBER})(?P<more>(?:{_LINK}{_DIGITS}){{0,40}})"
+_NEXT = (
+    r"(?:\b(?:then|finally|lastly|afterwards|followed by|dann|danach|zuletzt|puis|ensuite|enfin"
+    r"|luego|después)\b|然后|接着|最后)"
+)
+"""Words behind which a number alone goes on with what is moved."""
 _BETWEEN = r"[\s:=#(\[{<.\-→]{0,5}"
 _MENTION = re.compile(
-    rf"(?<![a-zа-я])(?P<noun>{_NOUN}(?:{_BETWEEN}(?:with|mit|the|of|is|con|avec|com|dem|der"
+    rf"(?<![a-zа-я])(?P<noun>{_NOUN}(?:{_BETWEEN}(?:with|mit|the|of|is|con|avec|com|dem|der|为|是"
     rf"|{_NOUN}))"
     rf"{{0,4}}{_BETWEEN}){_GROUP}"
     rf"|(?P<call>{VERB}(?:[ ]?block)?\s?[(\[]\s{{0,3}}(?:(?:block|id|index|n)\s?[=:]\s?)?#?)"
@@ -75,6 +87,8 @@ _MENTION = re.compile(
     rf"|(?P<verb>{VERB}\s(?:the\s)?#?)(?P<moved>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})"
     rf"(?=\s{{0,3}}(?:\Z|[.,;:()\u2014\u2013]|(?:on|onto|to|at|next|and|then|in|beside|over|above"
     rf"|auf)\b))"
+    rf"|(?P<then>{_NEXT}\s?#?)(?P<next>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})"
+    r"(?=\s{0,3}(?:\Z|[.,;:()，。；\u2014\u2013]|(?:on|onto|at|next|and|then|in|beside|over|above|as|goes)\b))"
     r"|(?:(?<=\()#?(?=[0-9][^()]{0,40}\))|(?<!\w)#)(?P<bare>[0-9]{1,6}(?:(?:, ?|\s?&\s?|/| or "
     r"|,? and | und |、)[0-9]{1,6}){0,8})(?![\w]|\.[0-9])"
     r"|(?P<cjk>[0-9]{1,6}(?:(?:、|,|和|-|至|到)[0-9]{1,6}){0,20})(?=\s?(?:号|號|番))",
@@ -86,11 +100,13 @@ _TIMES = re.compile(
     r"|of (?:them|these)\b|copies\b|pieces\b"
     r"|times\b|mal\b|fois\b|veces\b|次)"
     r"|(?P<twice>twice|zweimal|deux fois|dos veces|两次|二次)|(?P<thrice>thrice|dreimal|三次)"
-    r"|(?P<word>[^\W\d_]{2,8})\s(?:times|mal|fois|veces)\b)",
+    r"|(?P<word>[^\W\d_]{2,8})\s(?:times|mal|fois|veces)\b"
+    rf"|(?:(?P<each>\d{{1,2}})|(?P<each_word>one|two|eine[rn]?|zwei))\s(?:\w{{2,8}}\s)?{_EACH})",
     re.IGNORECASE,
 )
 _SO_MANY = re.compile(
-    r"(?:(?P<n>\d{1,2})\s?[x×]\s{0,2}|\b(?P<word>two|three|four|five|six|zwei|drei|vier|deux|trois"
+    r"(?:(?P<n>\d{1,2})\s?(?:[x×]|个|块)\s{0,2}|(?P<cjk_word>[二两三四五六])(?:个|块)"
+    r"|\b(?P<word>two|three|four|five|six|zwei|drei|vier|deux|trois"
     r"|dos|tres)"
     r"\s(?:\w{2,12}\s){0,3}?)\(?\Z",
     re.IGNORECASE,
@@ -99,7 +115,9 @@ _HERE = re.compile(
     r"\b(?:on top(?! of)|(?:on|in|at|to|from|under) (?:the |its )?(?:left|right|ground|floor|table"
     r"|bottom"
     r"|base|middle|center|centre|top|front|back|rear|side|first|second|third|next)"
-    r"(?: (?:side|layer|half|level|row|end|structure|position|corner))?(?! (?:of|block|cube)))\b",
+    r"(?: (?:side|layer|half|level|row|end|structure|position|corner))?(?! (?:of|block|cube))"
+    r"|(?:auf|an) (?:den|dem) (?:boden|tisch|grund|untergrund))\b"
+    r"|在[^\d\W]{0,8}?(?:上面?|上方|顶部|旁边|之间|中间|[左右]边|地面)(?=[放移摆搭])",
     re.IGNORECASE,
 )
 _SUPPORT = re.compile(
@@ -141,8 +159,8 @@ _PIECES = re.compile(
     r"|,(?=\s{0,2}[^\W\d]{0,12}\s?\bit\b)"
 )
 _PIECE_VERB = re.compile(
-    rf"{VERB}|\b(?:then|next(?! to)|finally|lastly|afterwards|dann|danach|zuletzt|puis|ensuite"
-    rf"|enfin|luego)\b|然后|最后",
+    rf"{VERB}|\b(?:then|next(?! to)|finally|lastly|afterwards|dann|danach|zuletzt|darauf"
+    r"|daneben|obendrauf|ganz oben|puis|ensuite|enfin|luego)\b|然后|最后",
     re.IGNORECASE,
 )
 _JOINS = re.compile(
@@ -171,6 +189,7 @@ _CHAIN = re.compile(
     re.IGNORECASE,
 )
 _NUMBER = re.compile(r"\d{1,6}")
+_CORNER = re.compile(r"corner|ecke", re.IGNORECASE)
 _SAYS_NUMBER = re.compile(rf"\d|{_WORD_NUMBER}", re.IGNORECASE)
 
 
@@ -233,14 +252,17 @@ def _moved(piece: str) -> list[int]:
     found: list[int] = []
     last: re.Match[str] | None = None
     for mention in _MENTION.finditer(piece):
-        start = mention.start() + len(mention["verb"] or mention["call"] or "")
-        is_call = bool(mention["verb"] or mention["call"])
+        start = mention.start() + len(mention["verb"] or mention["call"] or mention["then"] or "")
+        is_call = bool(mention["verb"] or mention["call"] or mention["then"])
+        if mention["then"] and last is None:
+            continue
         if not is_call and _STANDS.match(piece, mention.end()):
             continue
         before = piece[max(0, start - 120) : start]
         if _NEGATED.search(before) or (not is_call and _SUPPORT.search(before)):
             continue
-        if last is not None and not (mention["call"] and last["call"]):
+        goes_on = mention["then"] or (last and mention["call"] and last["call"])
+        if last is not None and not goes_on:
             between = piece[last.end() : start]
             times = _TIMES.match(piece, last.end())
             between = piece[times.end() : start] if times and times.end() <= start else between
@@ -256,7 +278,7 @@ def _moved(piece: str) -> list[int]:
 def _counted(mention: re.Match[str], text: str, noun: str) -> list[int]:
     """The numbers of a mention, ranges and multiplicities counted out."""
     groups = mention.groupdict()
-    plain = groups.get("moved") or groups.get("bare") or groups.get("cjk") or groups.get("called")
+    plain = next(filter(None, (groups.get(name) for name in _PLAIN)), "")
     first = groups.get("first") or ""
     word = number_of_word(first)
     given = plain or (first if word is None else str(word)) + (groups.get("more") or "")
@@ -265,6 +287,8 @@ def _counted(mention: re.Match[str], text: str, noun: str) -> list[int]:
     return numbers * times if len(numbers) == 1 else numbers
 
 
+_PLAIN = ("moved", "next", "bare", "cjk", "called")
+"""Groups of a mention that hold its numbers alone."""
 _SIGNED = re.compile(r"(?P<sign>[^\d]*)(?P<number>\d{1,6})")
 
 
@@ -295,9 +319,14 @@ def _times(text: str, mention: re.Match[str]) -> int:
     if after:
         if after["twice"] or after["thrice"]:
             return 2 if after["twice"] else 3
+        if after["each"] or after["each_word"]:
+            n = int(after["each"] or number_of_word(after["each_word"]) or 1)
+            places = 4 if _CORNER.search(after[0]) else 2
+            return min(n * places, MOST_AT_ONCE)
         word = number_of_word(after["word"] or "")
         return min(word or int(after["a"] or after["b"] or 1), MOST_AT_ONCE)
     before = _SO_MANY.search(text[max(0, mention.start() - 60) : mention.start()])
     if before is None:
         return 1
-    return min(int(before["n"] or 0) or number_of_word(before["word"]) or 1, MOST_AT_ONCE)
+    spelled = number_of_word(before["word"] or before["cjk_word"] or "")
+    return min(int(before["n"] or 0) or spelled or 1, MOST_AT_ONCE)

@@ -209,7 +209,10 @@ def _ordered(fields: Fields, *, is_plan: bool) -> list[int]:
     tiers = [_tier(key) for key, _ in kept]
     if kept and all(tier is not None for tier in tiers):
         kept = [kept[i] for i in sorted(range(len(kept)), key=lambda i: tiers[i] or 0)]
-    return [n for _, v in kept if isinstance(v, list) or is_plan for n in _read(v, is_plan=is_plan)]
+    # Beside what holds blocks, a number alone says something of it.
+    holders = [value for _, value in kept if isinstance(value, list)]
+    values = holders or [value for _, value in kept if is_plan]
+    return [number for value in values for number in _read(value, is_plan=is_plan)]
 
 
 def _tier(key: str) -> int | None:

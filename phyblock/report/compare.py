@@ -23,7 +23,7 @@ from phyblock.tracks.kind import kind_of
 
 __all__ = ["Comparison", "Side", "compare", "compare_models", "compare_runs"]
 
-_FLIPPED = ["a", "b", "scene", "item", "seed", "right", "value_a", "value_b"]
+_FLIPPED = ["a", "b", "scene", "item", "seed", "variant", "right", "value_a", "value_b"]
 _AT_ONCE = 100
 """Pairs that are estimated together, which bounds memory."""
 
@@ -49,7 +49,8 @@ class Comparison:
     n_clusters. `ranks` has one row a model where all pairs of several models were compared as a
     whole: model, value, best and worst rank that the model may have. `flipped` has one row a pair
     and sample that one side alone got wholly right: a, b, scene, item (scene or question), seed,
-    right (that side's label), value_a, value_b. `name` is what the values are called, `unit`
+    variant (what differs from the reference of the run), right (that side's label), value_a,
+    value_b. `name` is what the values are called, `unit`
     theirs, `how` says what they are.
     """
 
@@ -272,4 +273,4 @@ def _flipped(a: str, b: str, one: _Paired | None, what: Comparable, part: Part) 
     right = values == what.measure.best
     table["right"] = np.where(right[:, 0], a, b)
     rows = table.loc[right[:, 0] != right[:, 1], _FLIPPED]
-    return rows.sort_values(["right", "scene", "item", "seed"])
+    return rows.sort_values(["right", "scene", "item", "seed", "variant"])

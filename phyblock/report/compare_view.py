@@ -116,10 +116,11 @@ def flipped_lines(found: Comparison) -> tuple[str, ...]:
     for (a, b), flips in found.flipped.groupby(["a", "b"], sort=False):
         for side, other in ((a, b), (b, a)):
             rows = flips[flips["right"] == side]
-            names = [
-                f"{item} (seed {seed})" if several else str(item)
-                for item, seed in zip(rows["item"], rows["seed"], strict=True)
-            ]
+            names = []
+            for row in rows.to_dict("records"):
+                how = (f"seed {row['seed']}" if several else "", row["variant"])
+                told = ", ".join(filter(None, how))
+                names.append(f"{row['item']} ({told})" if told else str(row["item"]))
             if names:
                 lines.append(
                     f"{side} is right where {other} is not, {len(names)}: {', '.join(names)}"

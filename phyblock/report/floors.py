@@ -15,7 +15,7 @@ import pandas as pd
 from phyblock.report.measure_table import main_heading
 from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
-from phyblock.tables.measures import CELL, SCORED_BY, Measure, way_name
+from phyblock.tables.measures import CELL, SCORED_BY, Measure, value_key
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
 from phyblock.tracks.estimates import track_estimates, track_measures
 from phyblock.tracks.headline import headline_columns
@@ -71,7 +71,7 @@ def floors_frame(run: Run) -> pd.DataFrame:
             floors = strongest_floors(run, track, measure)
             named = floors_run(run, track)
             for row in found[found["measure"] == measure.name].to_dict("records"):
-                floor = floors.get(way_name(row))
+                floor = floors.get(value_key(row))
                 if floor is None or row["model"] in named:
                     continue
                 verdict = _VERDICTS[floor.is_below(row["lo"], row["hi"], measure.better)]
@@ -82,13 +82,13 @@ def floors_frame(run: Run) -> pd.DataFrame:
 
 
 def strongest_floors(run: Run, track: str, measure: Measure) -> dict[str, Floor]:
-    """The strongest floor of every cell that has one, by `way_name`."""
+    """The strongest floor of every cell that has one, by `value_key`."""
     best: dict[str, Floor] = {}
-    for way, floor in _known_floors(run, track, measure):
-        other = best.get(way)
+    for key, floor in _known_floors(run, track, measure):
+        other = best.get(key)
         is_higher = other is None or floor.value > other.value
         if other is None or is_higher == (measure.better == "higher"):
-            best[way] = floor
+            best[key] = floor
     return best
 
 
@@ -110,7 +110,7 @@ def headline_floors(run: Run, track: str) -> dict[str, Floor]:
         mine = mine[(mine["criterion"] == column.criterion) | (not column.criterion)]
         if len(mine):
             (measure,) = (m for m in track_measures(track) if m.name == column.measure)
-            floor = strongest_floors(run, track, measure).get(way_name(mine.iloc[0].to_dict()))
+            floor = strongest_floors(run, track, measure).get(value_key(mine.iloc[0].to_dict()))
             if floor is not None:
                 found[column.heading] = Floor(floor.name, measure.scale * floor.value)
     return found
@@ -123,14 +123,14 @@ def _known_floors(run: Run, track: str, measure: Measure) -> Iterator[tuple[str,
     asked = [name for name in measure.floors if name in floors_run(run, track)]
     for row in found[found["model"].isin(asked)].to_dict("records"):
         if not math.isnan(row["value"]):
-            yield way_name(row), Floor(str(row["model"]), float(row["value"]))
+            yield value_key(row), Floor(str(row["model"]), float(row["value"]))
     computed = run.manifest.floors.get(track, {})
     for name in measure.floors:
-        for way, value in computed.get(name, {}).items() if name not in asked else ():
-            yield way, Floor(name, float(value))
+        for key, value in computed.get(name, {}).items() if name not in asked else ():
+            yield key, Floor(name, float(value))
     if measure.chance is not None:
         for row in found.drop_duplicates([CELL, *SCORED_BY]).to_dict("records"):
-            yield way_name(row), Floor(CHANCE, measure.chance(run, str(row[CELL])))
+            yield value_key(row), Floor(CHANCE, measure.chance(run, str(row[CELL])))
 
 
 def floors_view(table: pd.DataFrame, run: Run) -> TextTable:

@@ -71,7 +71,10 @@ def headline_view(track: str, table: pd.DataFrame, run: Run) -> TextTable:
 
 
 def measures_frame(run: Run) -> pd.DataFrame:
-    """Measures that stand in no table of their track: a row a track, measure, model and cell."""
+    """Measures that stand in no table of their track: a row a track, measure, model and cell.
+
+    `n` is the number of samples behind each, whatever a measure counts of them.
+    """
     parts = []
     for track in run.design.suite.tracks:
         found = headline_rows(track_estimates(run, track), run.design)
@@ -109,6 +112,6 @@ def measures_view(table: pd.DataFrame, run: Run) -> TextTable:
         Column("Measure", is_text=True),
         Column("Value"),
         Column("95 % CI"),
-        Column("n"),
+        Column("Samples"),
     )
     return TextTable("Further measures", columns, tuple(rows), tuple(notes.values()))

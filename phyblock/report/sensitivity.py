@@ -18,7 +18,7 @@ from phyblock.scoring.components import (
     spread_of_items,
     within,
 )
-from phyblock.scoring.ratios import Floats
+from phyblock.scoring.ratios import Floats, Metric
 from phyblock.scoring.uncertainty import CONFIDENCE, detectable, holm, jackknife
 from phyblock.tables.load import Run, made_once
 from phyblock.variants import REPEAT
@@ -35,6 +35,7 @@ ITEMS = "items"
 """The row of what differs from item to item, to hold factors against."""
 _LEVEL = 1 - CONFIDENCE
 _KEYS = ["track", "factor", "level"]
+_ONE_LEVEL = ["model", "factor", "level"]
 _TEST = ("lo", "hi", "se", "p", "detectable")
 _COMPONENTS = (
     *("track", "model", "factor", "levels"),
@@ -43,13 +44,13 @@ _COMPONENTS = (
 )
 _LEVELS = (
     *("track", "model", "factor", "level", "value", "rank", "difference"),
-    *(*_TEST, "p_holm"),
+    *(*_TEST, "p_holm", "n_items"),
 )
 _PAIRS = (
     *(*_KEYS, "a", "b", "reference", "here", "change"),
     *(*_TEST, "p_holm", "flips", "is_sure"),
 )
-_RANKS = (*_KEYS, "models", "tau", "pairs", "flips", "sure", "detectable")
+_RANKS = (*_KEYS, "models", "tau", "pairs", "flips", "sure", "detectable", "n_items")
 
 
 @made_once
@@ -59,13 +60,13 @@ def components_frame(run: Run) -> pd.DataFrame:
     `shift` is the standard deviation of the means of the `levels` of a factor, `single` that of the
     scores of single items over levels beyond the shift; of repeats, that of one question asked
     again; in the row `items`, that between items. `*_lo` and `*_hi` bound 95 % intervals over the
-    `n_clusters` base scenes of the `n_items` items that every model has in every way of asking.
+    `n_clusters` base scenes of the `n_items` items that the model has in every way of asking.
     See `phyblock.scoring.components`. Empty where the run varies nothing.
     """
     rows = []
     for found in _of_tracks(run):
-        size = {"n_items": len(found.clusters.members), "n_clusters": found.clusters.size}
-        for model in found.counts:
+        for model, items in found.asked.items():
+            size = {"n_items": len(items.names), "n_clusters": items.clusters.size}
             for factor in (*found.vary.factors, ITEMS):
                 levels, *parts = _components(found, model, factor)
                 row: dict[str, Any] = {"track": found.track, "model": model, "factor": factor}
@@ -85,28 +86,30 @@ def _of_tracks(run: Run) -> list[Varied]:
 
 def _components(found: Varied, model: str, factor: str) -> tuple[int, Component, Component]:
     """Levels of a factor, its shift, and what it does to single items."""
+    clusters = found.asked[model].clusters
     if factor == ITEMS:
-        scores = np.nan_to_num(found.what.each(found.part)(found.counts[model]))
-        return len(scores), NO_COMPONENT, spread_of_items(scores, found.clusters)
+        scores = np.nan_to_num(found.what.each(found.part)(found.asked[model].counts))
+        return len(scores), NO_COMPONENT, spread_of_items(scores, clusters)
     blocks = found.blocks(factor)
     scores = found.scores(model, blocks)
     if factor == REPEAT:
         ways = np.moveaxis(scores[..., 0], 1, 2)
-        return len(blocks.levels), NO_COMPONENT, within(ways, found.clusters)
+        return len(blocks.levels), NO_COMPONENT, within(ways, clusters)
     # Repeats tell noise apart where nothing else was varied.
     cells = scores.mean(axis=3) if scores.shape[2] > 1 else scores[:, :, 0]
-    moved = interaction(cells, found.clusters)
-    return len(blocks.levels), shift(cells, found.clusters), moved
+    return len(blocks.levels), shift(cells, clusters), interaction(cells, clusters)
 
 
 @made_once
 def levels_frame(run: Run) -> pd.DataFrame:
     """One row a track, model, factor and level: the pooled measure, and how it differs.
 
-    `value` is of all samples with this level, `difference` what it lies above that of the factor's
-    first level, on the same items, with its 95 % interval (`lo`, `hi`), standard error, p value and
-    `p_holm`, corrected for all rows of the track; `detectable` is the difference that a single test
-    finds in four of five cases. In the measure's unit. `rank` is 1 for the best model.
+    `value` is of all samples with this level of the `n_items` items that the model has in every way
+    of asking, `difference` what it lies above that of the factor's first level, on the same items,
+    with its 95 % interval (`lo`, `hi`), standard error, p value and `p_holm`, corrected for all
+    rows of the track; `detectable` is the difference that a single test finds in four of five
+    cases. In the measure's unit. `rank` is 1 for the best model, on the items that all ranked
+    models have (`Varied.ranked`); NaN for a model that has too few.
     """
     parts = []
     for found in _of_tracks(run):
@@ -118,9 +121,9 @@ def levels_frame(run: Run) -> pd.DataFrame:
         ]
         table = pd.DataFrame(rows)
         if len(table):
-            sign = -1 if found.what.measure.better == "higher" else 1
-            by = (sign * table["value"]).groupby([table[name] for name in _KEYS])
-            parts.append(table.assign(p_holm=holm(table["p"]), rank=by.rank(method="min")))
+            ranks = _ranks(found, list(table["factor"].unique()))
+            rank = [ranks.get(key, np.nan) for key in table[_ONE_LEVEL].itertuples(index=False)]
+            parts.append(table.assign(p_holm=holm(table["p"]), rank=rank))
     return _joined(parts, _LEVELS)
 
 
@@ -129,29 +132,48 @@ def _joined(parts: Sequence[pd.DataFrame], columns: Sequence[str]) -> pd.DataFra
     return whole[list(columns)]
 
 
+def _ranks(found: Varied, factors: Sequence[str]) -> dict[tuple[str, ...], float]:
+    """Ranks by model, factor and level, 1 for the best, of the models that are ranked."""
+    ranked = found.ranked()
+    ranks: dict[tuple[str, ...], float] = {}
+    sign = -1 if found.what.measure.better == "higher" else 1
+    for factor in factors if ranked.asked else ():
+        blocks = found.blocks(factor)
+        places = pd.DataFrame(_values(ranked, blocks), index=blocks.levels).mul(sign)
+        for level, row in places.rank(axis=1, method="min").iterrows():
+            ranks |= {(str(model), factor, str(level)): rank for model, rank in row.items()}
+    return ranks
+
+
+def _values(found: Varied, blocks: Blocks) -> dict[str, Floats]:
+    """What each model reaches with each level of a factor."""
+    return {
+        model: found.whole(model)(found.sums(model, blocks).sum(axis=0)) for model in found.asked
+    }
+
+
 def _level_rows(found: Varied, blocks: Blocks) -> list[dict[str, Any]]:
-    models, metric = list(found.counts), found.whole()
-    sums = np.stack([found.sums(model, blocks) for model in models], axis=1)
-
-    def values(total: Floats) -> Floats:
-        value = metric(total)
-        return np.stack([value, value - value[..., :1]], axis=-1)
-
-    # (items, models, levels, counts) gives (models, levels, 2).
-    told = jackknife(sums, found.clusters, values)
     scale, rows = found.what.measure.scale, []
-    for m, model in enumerate(models):
+    for model, items in found.asked.items():
+        metric = found.whole(model)
+
+        def values(total: Floats, metric: Metric = metric) -> Floats:
+            value = metric(total)
+            return np.stack([value, value - value[..., :1]], axis=-1)
+
+        # (items, levels, counts) gives (levels, 2).
+        told = jackknife(found.sums(model, blocks), items.clusters, values)
         for n, level in enumerate(blocks.levels):
             row: dict[str, Any] = {"track": found.track, "model": model}
             row |= {"factor": blocks.factor, "level": level}
-            row["value"] = scale * told.value[m, n, 0]
+            row["value"] = scale * told.value[n, 0]
             is_reference = n == 0
             for name in ("value", "lo", "hi", "se"):
-                number = np.nan if is_reference else scale * getattr(told, name)[m, n, 1]
+                number = np.nan if is_reference else scale * getattr(told, name)[n, 1]
                 row["difference" if name == "value" else name] = number
-            row["p"] = np.nan if is_reference else told.p[m, n, 1]
-            row["detectable"] = float(detectable(row["se"], found.clusters.size, _LEVEL))
-            rows.append(row)
+            row["p"] = np.nan if is_reference else told.p[n, 1]
+            row["detectable"] = float(detectable(row["se"], items.clusters.size, _LEVEL))
+            rows.append(row | {"n_items": len(items.names)})
     return rows
 
 
@@ -166,8 +188,9 @@ def pairs_frame(run: Run) -> pd.DataFrame:
     """
     parts = []
     for found in _of_tracks(run):
+        ranked = found.ranked()
         factors = [name for name in found.vary.factors if name != REPEAT]
-        rows = [row for factor in factors for row in _pair_rows(found, found.blocks(factor))]
+        rows = [row for factor in factors for row in _pair_rows(ranked, found.blocks(factor))]
         table = pd.DataFrame(rows)
         if len(table):
             table["p_holm"] = holm(table["p"])
@@ -178,12 +201,15 @@ def pairs_frame(run: Run) -> pd.DataFrame:
 
 
 def _pair_rows(found: Varied, blocks: Blocks) -> list[dict[str, Any]]:
-    models, metric = list(found.counts), found.whole()
+    models = list(found.asked)
+    if len(models) < 2:
+        return []
+    metric, clusters = found.whole(models[0]), found.asked[models[0]].clusters
     scale, rows = found.what.measure.scale, []
     sums = np.stack([found.sums(model, blocks) for model in models], axis=1)
     for a, b in combinations(range(len(models)), 2):
         # (items, 2, levels, counts) gives (levels - 1).
-        told = jackknife(sums[:, [a, b]], found.clusters, lambda total: _changes(metric(total)))
+        told = jackknife(sums[:, [a, b]], clusters, lambda total: _changes(metric(total)))
         value = metric(sums[:, [a, b]].sum(axis=0))
         apart = value[0] - value[1]
         for n, level in enumerate(blocks.levels[1:]):
@@ -193,7 +219,7 @@ def _pair_rows(found: Varied, blocks: Blocks) -> list[dict[str, Any]]:
             for name in ("value", "lo", "hi", "se"):
                 row["change" if name == "value" else name] = scale * getattr(told, name)[n]
             row["p"] = told.p[n]
-            row["detectable"] = float(detectable(row["se"], found.clusters.size, _LEVEL))
+            row["detectable"] = float(detectable(row["se"], clusters.size, _LEVEL))
             rows.append(row)
     return rows
 
@@ -210,22 +236,25 @@ def ranks_frame(run: Run) -> pd.DataFrame:
     `tau` is Kendall's rank correlation (tau-b) of the models' values with those of the first level;
     of `pairs` of models, `flips` change places and `sure` do so beyond noise. `detectable` is the
     change of a difference that the test of a pair finds in four of five cases, the median of pairs.
+    All is of the `n_items` items that the ranked models have in common.
     """
     pairs = pairs_frame(run)
-    levels = levels_frame(run)
     rows = []
-    for track, factor, level in pairs[_KEYS].drop_duplicates().itertuples(index=False):
-        part = pairs[(pairs[_KEYS] == [track, factor, level]).all(axis=1)]
-        mine = levels[(levels["track"] == track) & (levels["factor"] == factor)]
-        # Models stand in one order in all levels.
-        first, here = (
-            mine.loc[mine["level"] == name, "value"].to_numpy(np.float64)
-            for name in (mine["level"].iloc[0], level)
-        )
-        row: dict[str, Any] = {"track": track, "factor": factor, "level": level}
-        row |= {"models": len(first), "tau": _tau(first, here), "pairs": len(part)}
-        row |= {"flips": int(part["flips"].sum()), "sure": int(part["is_sure"].sum())}
-        rows.append(row | {"detectable": float(part["detectable"].median())})
+    for found in _of_tracks(run):
+        ranked = found.ranked()
+        mine = pairs[pairs["track"] == found.track]
+        for factor, of_factor in mine.groupby("factor", sort=False):
+            blocks = found.blocks(str(factor))
+            values = np.array(list(_values(ranked, blocks).values()))
+            for place, level in enumerate(blocks.levels[1:], 1):
+                part = of_factor[of_factor["level"] == level]
+                row: dict[str, Any] = {"track": found.track, "factor": factor, "level": level}
+                row |= {"models": len(values), "tau": _tau(values[:, 0], values[:, place])}
+                row |= {"pairs": len(part), "flips": int(part["flips"].sum())}
+                row |= {"sure": int(part["is_sure"].sum())}
+                row["detectable"] = float(part["detectable"].median())
+                row["n_items"] = len(next(iter(ranked.asked.values())).names)
+                rows.append(row)
     return pd.DataFrame(rows, columns=list(_RANKS))
 
 

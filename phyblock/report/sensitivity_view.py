@@ -8,7 +8,7 @@ import pandas as pd
 
 from phyblock.report.comparable import comparable
 from phyblock.report.compare_view import p_text
-from phyblock.report.sensitivity import ITEMS
+from phyblock.report.sensitivity import ITEMS, levels_frame
 from phyblock.scoring.uncertainty import CONFIDENCE
 from phyblock.tables.load import Run
 from phyblock.tables.text_table import Column, TextTable, between, number
@@ -22,6 +22,7 @@ __all__ = [
     "levels_view",
     "ranks_lines",
     "ranks_view",
+    "sizes_text",
 ]
 
 _NAMES = {REPEAT: "asked again", ITEMS: "between items"}
@@ -53,11 +54,9 @@ def components_view(table: pd.DataFrame, run: Run) -> TextTable:
     pairs = [
         Column(n, group) for group in ("Shift of all", "Single items") for n in ("SD", "95 % CI")
     ]
-    sizes = table.groupby("track", sort=False)[["n_items", "n_clusters"]].max()
-    notes = [
-        f"{what}, {size['n_items']} items of {size['n_clusters']} base scenes."
-        for what, (_, size) in zip(_what(run, list(sizes.index)), sizes.iterrows(), strict=True)
-    ]
+    groups = [group for _, group in table.groupby("track", sort=False)]
+    whats = _what(run, [str(group["track"].iloc[0]) for group in groups])
+    notes = [f"{what}, {sizes_text(group)}." for what, group in zip(whats, groups, strict=True)]
     notes += [
         "Shift: standard deviation of the means of a factor's levels. Single items: of one item's "
         "score over levels, beyond the shift and noise; asked again: of one question repeated.",
@@ -72,6 +71,19 @@ def components_view(table: pd.DataFrame, run: Run) -> TextTable:
     )
 
 
+def sizes_text(table: pd.DataFrame) -> str:
+    """How many items, of how many base scenes, are behind rows of `components_frame`: from the
+    model that has fewest to the one that has most.
+    """
+    items, scenes = (_from_to(table[name]) for name in ("n_items", "n_clusters"))
+    return f"{items} items of {scenes} base scenes"
+
+
+def _from_to(sizes: pd.Series[int]) -> str:
+    least, most = int(sizes.min()), int(sizes.max())
+    return f"{most}" if least == most else f"{least} to {most}"
+
+
 def levels_view(table: pd.DataFrame, run: Run) -> TextTable:
     """Values by level out of `levels_frame`, each beside its difference to the first level."""
     rows = [
@@ -81,7 +93,7 @@ def levels_view(table: pd.DataFrame, run: Run) -> TextTable:
             factor_name(row["factor"]),
             row["level"],
             number(row["value"]),
-            str(int(row["rank"])),
+            number(row["rank"], 0),
             number(row["difference"], signed=True),
             between(row["lo"], row["hi"], signed=True),
             p_text(row["p_holm"]),
@@ -97,7 +109,19 @@ def levels_view(table: pd.DataFrame, run: Run) -> TextTable:
         (
             *(f"{what}." for what in _what(run, list(table["track"].unique()))),
             "Detectable: the difference that a single test finds in four of five cases.",
+            *_unranked(table),
         ),
+    )
+
+
+def _unranked(levels: pd.DataFrame) -> tuple[str, ...]:
+    """Which models were asked about too few items to be ranked, out of `levels_frame`."""
+    names = list(levels.loc[levels["rank"].isna(), "model"].unique())
+    if not names:
+        return ()
+    return (
+        f"Not ranked, with too few items that were asked in every way: {', '.join(names)}. The "
+        "others are ranked on the items that they have in common.",
     )
 
 
@@ -125,6 +149,7 @@ def ranks_view(table: pd.DataFrame, run: Run) -> TextTable:
             f"difference is found at {1 - CONFIDENCE:.0%}, corrected for all pairs and levels.",
             "Detectable: the change of a difference that the test of a pair finds in four of five "
             "cases, the median of pairs.",
+            *_unranked(levels_frame(run)),
         ),
     )
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,7 +17,10 @@ from phyblock.tables.intervals import parents_of
 from phyblock.tables.load import Run
 from phyblock.variants import REPEAT, Variant
 
-__all__ = ["Blocks", "Varied", "varied"]
+__all__ = ["Blocks", "ItemsAsked", "Varied", "varied"]
+
+_ENOUGH = 0.5
+"""Share of the items of the model that has most, from which on a model is ranked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,35 +36,67 @@ class Blocks:
 
 
 @dataclass(frozen=True, eq=False)
+class ItemsAsked:
+    """The items that a model has in every way of asking with every seed, in order.
+
+    `counts` has shape (items, seeds, variants, counts); `clusters` are the items' base scenes.
+    """
+
+    names: tuple[tuple[str, str], ...]
+    counts: Floats
+    clusters: Clusters
+
+    def only(self, names: Sequence[tuple[str, str]], parents: pd.Series[Any]) -> ItemsAsked:
+        """Those of these names."""
+        if tuple(names) == self.names:
+            return self
+        places = [self.names.index(name) for name in names]
+        return ItemsAsked(tuple(names), self.counts[places], _clusters(names, parents))
+
+
+@dataclass(frozen=True, eq=False)
 class Varied:
     """The samples of a track, measured by its first measure as a whole.
 
-    `counts` by model has shape (items, seeds, variants, counts): of items that every model has in
-    every way of asking with every seed; models that have none are left out. `clusters` are the base
-    scenes of the items.
+    `asked` has the items of each model that has any; models need not have the same. `parents` are
+    the base scenes of every scene.
     """
 
     track: str
     what: Comparable
     part: Part
     vary: VarySpec
-    counts: dict[str, Floats]
-    clusters: Clusters
+    asked: dict[str, ItemsAsked]
+    parents: pd.Series[Any]
+
+    def ranked(self) -> Varied:
+        """The models that have at least half of the items of the one that has most, on the items
+        that all of these have; there may be none.
+        """
+        most = max(len(items.names) for items in self.asked.values())
+        kept = {
+            model: items
+            for model, items in self.asked.items()
+            if len(items.names) >= _ENOUGH * most
+        }
+        common = sorted(frozenset.intersection(*(frozenset(i.names) for i in kept.values())))
+        asked = {m: items.only(common, self.parents) for m, items in kept.items()} if common else {}
+        return replace(self, asked=asked)
 
     def scores(self, model: str, blocks: Blocks) -> Floats:
         """Scores of single samples: (items, levels, blocks with each seed, repeats)."""
-        each = np.nan_to_num(self.what.each(self.part)(self.counts[model]))
+        each = np.nan_to_num(self.what.each(self.part)(self.asked[model].counts))
         found = np.moveaxis(each[:, :, blocks.places], 1, 3)
         return found.reshape(*found.shape[:2], -1, found.shape[-1])
 
     def sums(self, model: str, blocks: Blocks) -> Floats:
         """Counts by item and level of a factor, (items, levels, counts)."""
-        chosen = self.counts[model][:, :, blocks.places]
+        chosen = self.asked[model].counts[:, :, blocks.places]
         return np.asarray(chosen.sum(axis=(1, 3, 4)))
 
-    def whole(self) -> Metric:
-        """What sums of counts are worth, as tables show it."""
-        return self.what.whole(self.part, next(iter(self.counts.values())).sum(axis=(0, 1, 2)))
+    def whole(self, model: str) -> Metric:
+        """What sums of a model's counts are worth, as tables show it."""
+        return self.what.whole(self.part, self.asked[model].counts.sum(axis=(0, 1, 2)))
 
     def blocks(self, factor: str) -> Blocks:
         """Where a factor has all its levels."""
@@ -80,7 +117,7 @@ class Varied:
 
 
 def varied(run: Run, track: str) -> Varied | None:
-    """The samples of a track of a run; None where it varies nothing or was not asked whole."""
+    """The samples of a track of a run; None where it varies nothing or no item was asked whole."""
     vary = run.design.suite.vary
     if not vary.factors:
         return None
@@ -88,22 +125,24 @@ def varied(run: Run, track: str) -> Varied | None:
     part = what.parts[-1]
     samples = what.samples(run, part, run.design)
     ways = [(seed, one.key) for seed in run.design.suite.seeds for one in vary.variants]
-    whole = {name: _whole_items(frame, len(ways)) for name, frame in samples.items()}
-    names = [name for name in run.design.model_names if whole.get(name)]
-    items = sorted(frozenset.intersection(*(whole[name] for name in names))) if names else []
-    if not items:
-        return None
-    shape = (len(items), len(run.design.suite.seeds), vary.n_variants, -1)
-    wanted = pd.MultiIndex.from_tuples([(*item, *way) for item in items for way in ways])
-    counts = {
-        name: what.counts_of(samples[name].loc[wanted], part).reshape(shape) for name in names
-    }
+    shape = (len(run.design.suite.seeds), vary.n_variants, -1)
     parents = parents_of(run)
-    clusters = Clusters.of([tuple(parents[scene]) or (scene,) for scene, _ in items])
-    return Varied(track, what, part, vary, counts, clusters)
+    asked = {}
+    for model in run.design.model_names:
+        names = _whole_items(samples[model], len(ways)) if model in samples else ()
+        if names:
+            wanted = pd.MultiIndex.from_tuples([(*name, *way) for name in names for way in ways])
+            counts = what.counts_of(samples[model].loc[wanted], part)
+            counts = counts.reshape(len(names), *shape)
+            asked[model] = ItemsAsked(names, counts, _clusters(names, parents))
+    return Varied(track, what, part, vary, asked, parents) if asked else None
 
 
-def _whole_items(samples: pd.DataFrame, ways: int) -> frozenset[tuple[str, str]]:
+def _clusters(names: Sequence[tuple[str, str]], parents: pd.Series[Any]) -> Clusters:
+    return Clusters.of([tuple(parents[scene]) or (scene,) for scene, _ in names])
+
+
+def _whole_items(samples: pd.DataFrame, ways: int) -> tuple[tuple[str, str], ...]:
     """Scene and name of the items of a model that were asked in so many ways: in all of them."""
     sizes = samples.groupby(level=["scene", "item"]).size()
-    return frozenset((str(scene), str(item)) for scene, item in sizes.index[sizes == ways])
+    return tuple(sorted((str(scene), str(item)) for scene, item in sizes.index[sizes == ways]))

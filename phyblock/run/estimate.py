@@ -15,10 +15,9 @@ from phyblock.models import (
     Request,
     Usage,
     cost_usd,
-    former_key,
+    known_keys,
     most_usd,
     price_of,
-    reply_key,
 )
 from phyblock.models import estimate as estimate_call
 from phyblock.records.reading import run_records
@@ -153,4 +152,4 @@ def _add(
 
 
 def _is_kept(cache: ReplyCache, config: ModelConfig, request: Request) -> bool:
-    return reply_key(config, request) in cache or former_key(config, request) in cache
+    return any(key in cache for key in known_keys(config, request))

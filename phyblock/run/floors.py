@@ -8,6 +8,7 @@ run.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -22,16 +23,18 @@ from phyblock.specs import SuiteSpec
 from phyblock.tables.design import read_design
 from phyblock.tables.estimates import estimate_frame
 from phyblock.tables.load import Run, frames_of
-from phyblock.tables.measures import WAY, way_name
+from phyblock.tables.measures import VALUE_KEY, value_key
 from phyblock.tracks import AnyTrack, SingleTrack, kind_of, shown_item
 from phyblock.tracks.estimates import counted_samples, track_measures
+from phyblock.variants import Variant
 
 __all__ = ["COMPUTED_FLOORS", "FloorValues", "floor_values"]
 
 COMPUTED_FLOORS = ("goal-blind", "all-candidates")
 """Those that leave nothing to chance; `random` stays below them."""
+_ORDER = "candidate_order"
 FloorValues = dict[str, dict[str, dict[str, float]]]
-"""Values by track, floor and way of counting (`way_name`)."""
+"""Values by track, floor and `value_key`."""
 
 
 def floor_values(
@@ -42,12 +45,10 @@ def floor_values(
     """What the floors of `COMPUTED_FLOORS` reach on a run, for every measure that names them.
 
     `reopened` opens a track under a suite, without prompts. Floors learn under each setting of
-    the suite; the best value counts. Where the order of the candidates varies there is none: what a
-    floor reaches hangs on it, and values of models pool all orders.
+    the suite; the best value counts. Where the order of the candidates varies they answer in each
+    order, and are pooled over orders as the values of models are.
     """
     found: FloorValues = {}
-    if "candidate_order" in suite.vary.factors:
-        return found
     for name in suite.tracks:
         named = {floor for measure in track_measures(name) for floor in measure.floors}
         floors = [floor for floor in COMPUTED_FLOORS if floor in named]
@@ -58,32 +59,65 @@ def floor_values(
             # What is learned goes by the first setting; what scores best in B may be either.
             others = (other for other in suite.settings if other != setting)
             one = suite.model_copy(update={"settings": (setting, *others)})
-            records = list(_answered(reopened(name, one), floors, one))
-            for floor, way, value in _estimates(manifest, name, floors, records):
-                found[name][floor][way] = max(value, found[name][floor].get(way, value))
+            records = [
+                record
+                for order, copies in _orders(one)
+                for record in _answered(reopened(name, order), floors, order, copies)
+            ]
+            for floor, key, value in _estimates(manifest, name, floors, records):
+                found[name][floor][key] = max(value, found[name][floor].get(key, value))
     return found
 
 
-def _answered(track: AnyTrack, floors: Sequence[str], suite: SuiteSpec) -> Iterator[Record]:
-    """The judged answers of floors; one seed tells all unless each shows another order."""
+def _orders(suite: SuiteSpec) -> list[tuple[SuiteSpec, int]]:
+    """The suite in each order of the candidates that it asks in, and how often an answer in that
+    order counts, so that orders weigh as they do among all ways of asking and seeds.
+    """
+    orders: dict[str, SuiteSpec] = {}
+    ways = Counter[str]()
+    for variant in suite.vary.variants:
+        level = dict(variant.levels).get(_ORDER, "")
+        if level not in orders:
+            only = Variant(((_ORDER, level),)) if level else Variant()
+            orders[level] = suite.at(only)
+        ways[level] += 1
+    often = {
+        level: ways[level] * len(suite.seeds) // len(_seeds(one)) for level, one in orders.items()
+    }
+    least = math.gcd(*often.values())
+    return [(one, often[level] // least) for level, one in orders.items()]
+
+
+def _seeds(suite: SuiteSpec) -> Sequence[int]:
+    """The seeds under which floors answer: one tells all unless each shows another order."""
+    return suite.seeds if suite.candidates.order == "shuffled" else suite.seeds[:1]
+
+
+def _answered(
+    track: AnyTrack, floors: Sequence[str], suite: SuiteSpec, copies: int
+) -> Iterator[Record]:
+    """The judged answers of floors, each so many times."""
     assert isinstance(track, SingleTrack)
     rules = kind_of(track.name).baselines
-    seeds = suite.seeds if suite.candidates.order == "shuffled" else suite.seeds[:1]
+    order = suite.candidates.order
     for item in track.items:
-        for seed in seeds:
+        for seed in _seeds(suite):
             shown = shown_item(track, item, seed)
             ((request, _),) = track.outlines(shown)
             for floor in floors:
                 text = rules[floor](request.subject, np.random.default_rng(seed))
-                sample = f"{track.name}/{floor}/{item.key}/s{seed}"
+                sample = f"{track.name}/{floor}/{item.key}/s{seed}/{order}"
                 fields = begun(sample, track.name, floor, shown, seed, Reply(text, cost_usd=0.0))
-                yield judged({**fields, **track.about(shown)}, shown, track.judge(shown, text))
+                record = judged({**fields, **track.about(shown)}, shown, track.judge(shown, text))
+                yield from (
+                    record.model_copy(update={"sample": f"{sample}/{n}"}) for n in range(copies)
+                )
 
 
 def _estimates(
     manifest: Manifest, track: str, floors: Sequence[str], records: Sequence[Record]
 ) -> Iterator[tuple[str, str, float]]:
-    """Floor, way of counting and value, of measures that name floors."""
+    """Floor, `value_key` and value, of measures that name floors."""
     models = tuple(ManifestModel(name=floor) for floor in floors)
     facts = manifest.model_copy(update={"models": models})
     design = read_design(facts.fields())
@@ -91,6 +125,6 @@ def _estimates(
     measures = [measure for measure in track_measures(track) if measure.floors]
     counts = partial(counted_samples, run, track)
     rows = estimate_frame(run, measures, kind_of(track).report().cells(run), counts)
-    for row in rows[["model", *WAY, "value"]].to_dict("records"):
+    for row in rows[["model", *VALUE_KEY, "value"]].to_dict("records"):
         if not math.isnan(row["value"]):
-            yield str(row["model"]), way_name(row), float(row["value"])
+            yield str(row["model"]), value_key(row), float(row["value"])

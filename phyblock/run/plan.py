@@ -188,18 +188,17 @@ def _check_models(
             found = ", ".join(suite.vary.factors)
             problems.append(Problem(f"model {model.name}", message, "vary", found))
             continue
+        where, recorded = f"model {model.name}", model.config.recording
+        if recorded is not None and (found := recorded_order(recorded)) != order:
+            message = f"is a recording of candidates in the order {found}"
+            problems.append(Problem(where, message, "candidates.order", order, found))
+        if recorded is not None and (form := recorded_format(recorded)) != asked:
+            message = f"is a recording of answers that were asked for as {form}"
+            problems.append(Problem(where, message, "answer_format", asked, form))
         for track in tracks:
-            where = f"model {model.name}"
             if model.config.kind == "replay" and isinstance(track, EpisodeTrack):
                 message = f"is a recording, which cannot answer in {track.name}"
                 problems.append(Problem(where, message, "tracks", track.name))
-            recorded = model.config.recording
-            if recorded is not None and (found := recorded_order(recorded)) != order:
-                message = f"is a recording of candidates in the order {found}"
-                problems.append(Problem(where, message, "candidates.order", order, found))
-            if recorded is not None and (form := recorded_format(recorded)) != asked:
-                message = f"is a recording of answers that were asked for as {form}"
-                problems.append(Problem(where, message, "answer_format", asked, form))
             able = kind_of(track.name).baselines
             if model.config.kind != "baseline" or model.config.id in able:
                 continue

@@ -15,6 +15,7 @@ the error of the levels' means adds to the shift is taken from the jackknife ove
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,7 +108,9 @@ def interaction(scores: Floats, clusters: Clusters) -> Component:
         return np.stack([of_levels - of_blocks / blocks, of_blocks / blocks], axis=-1)
 
     found = jackknife(counts, clusters, variance)
-    return _of_variance(float(found.value[0]), float(found.se[0]), float(found.value[1]))
+    most = (clusters.size - 1) * (levels - 1)
+    above, noise = (float(value) for value in found.value)
+    return _of_variance(above, float(found.se[0]), noise, most)
 
 
 def within(scores: Floats, clusters: Clusters) -> Component:
@@ -138,20 +141,24 @@ def spread_of_items(scores: Floats, clusters: Clusters) -> Component:
         clusters,
         lambda sums: (sums[..., 2] - sums[..., 1] ** 2 / sums[..., 0]) / (sums[..., 0] - 1),
     )
-    return _of_variance(float(found.value), float(found.se))
+    return _of_variance(float(found.value), float(found.se), most=clusters.size - 1)
 
 
-def _of_variance(variance: float, se: float, noise: float = 0.0) -> Component:
+def _of_variance(
+    variance: float, se: float, noise: float = 0.0, most: float = math.inf
+) -> Component:
     """A variance that is left of a mean square when `noise` is taken off it.
 
     The mean square has the interval of chi-square with the degrees of freedom that its error stands
     for (Satterthwaite, *An approximate distribution of estimates of variance components*,
     Biometrics Bulletin 2, 1946), of which `noise` is taken off too; nothing of it is below zero.
+    An error that was estimated is at times far too small: there are at `most` as many degrees of
+    freedom as independent base scenes have.
     """
     square = variance + noise
     ends = (square, square)
     if square > 0 and se > 0:
-        df = 2 * (square / se) ** 2
+        df = min(2 * (square / se) ** 2, most)
         ends = (square * df / chdtri(df, _TAIL), square * df / chdtri(df, 1 - _TAIL))
     parts = (variance, *(end - noise for end in ends))
     return Component(*(float(np.sqrt(max(part, 0.0))) for part in parts))

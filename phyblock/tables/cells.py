@@ -11,7 +11,7 @@ import pandas as pd
 from phyblock.tables.design import OVERALL
 from phyblock.tables.flat import BLOCK_COLUMNS
 from phyblock.tables.load import Run, made_once
-from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.tables.outcomes import has_reply
 
 __all__ = [
     "METRICS",
@@ -96,6 +96,6 @@ def measured(scores: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
 
     Where empty plans count, such a group has counts, but nothing was measured.
     """
-    replied = scores[list(keys)].assign(replied=~scores["outcome"].isin(WITHOUT_REPLY))
+    replied = scores[list(keys)].assign(replied=has_reply(scores))
     kept = replied.groupby(list(keys))["replied"].transform("any").astype(bool)
     return scores if kept.all() else scores[kept]

@@ -27,6 +27,8 @@ ESTIMATE_COLUMNS = (
     "seeds",
     "mean",
     "sd",
+    "least",
+    "most",
     "lo",
     "hi",
     "se",
@@ -47,10 +49,10 @@ def estimate_frame(
     `counts_of` gives the counts of a family of measures, as `SampleCounts` says.
 
     `value` is of the counts of all `n` samples, summed over scenes and seeds, in the measure's own
-    unit; `mean` and `sd` (ddof = 1) are over the values of the `seeds` single seeds. `lo` and `hi`
-    bound a 95 % interval and `se` is the standard error, from leaving out the `n_clusters` base
-    scenes that the `n_scenes` scenes were made from; a scene's seeds stay together. Where a model
-    said nothing at all in a cell, nothing was measured: NaN.
+    unit; `mean`, `sd` (ddof = 1), `least` and `most` are over the values of the `seeds` single
+    seeds. `lo` and `hi` bound a 95 % interval and `se` is the standard error, from leaving out the
+    `n_clusters` base scenes that the `n_scenes` scenes were made from; a scene's seeds stay
+    together. Where a model said nothing at all in a cell, nothing was measured: NaN.
     """
     parts = []
     families: dict[str, list[Measure]] = {}
@@ -195,8 +197,8 @@ def _over_seeds(
     counted: SampleCounts,
     silent: np.ndarray,
     values: Callable[[Floats], Floats],
-) -> tuple[np.ndarray, Floats, Floats]:
-    """Number of seeds with a value, mean and sample standard deviation over them."""
+) -> tuple[np.ndarray, Floats, Floats, Floats, Floats]:
+    """Number of seeds with a value; mean, sample standard deviation, least and most over them."""
     seeds = sorted(table["seed"].unique())
     sums = np.full((len(seeds), *pool.counts.shape[1:]), np.nan)
     groups = {group: place for place, group in enumerate(pool.groups)}
@@ -210,7 +212,8 @@ def _over_seeds(
         mean = np.where(known, each, 0).sum(axis=0) / np.where(count, count, np.nan)
         square = np.where(known, (each - mean) ** 2, 0).sum(axis=0)
         sd = np.sqrt(square / np.where(count > 1, count - 1, np.nan))
-    return count, mean, sd
+    ends = (np.fmin.reduce(each), np.fmax.reduce(each))
+    return count, mean, sd, *ends
 
 
 def pooled_in(cell: Cell, cells: Sequence[Cell]) -> frozenset[str]:

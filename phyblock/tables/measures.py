@@ -12,14 +12,14 @@ if TYPE_CHECKING:
     from phyblock.scoring.ratios import Metric
     from phyblock.tables.load import Run
 
-__all__ = ["CELL", "SCORED_BY", "WAY", "Cell", "Measure", "SampleCounts", "way_name"]
+__all__ = ["CELL", "SCORED_BY", "VALUE_KEY", "Cell", "Measure", "SampleCounts", "value_key"]
 
 SCORED_BY = ("setting", "matcher", "criterion")
 """Columns that say how a sample was scored; "" where its track knows no such choice."""
 CELL = "cell"
 """Column of the cell that a row of counts is pooled in."""
 
-WAY = ("measure", CELL, *SCORED_BY)
+VALUE_KEY = ("measure", CELL, *SCORED_BY)
 """What tells the values of one model apart."""
 
 Unit = Literal["%", "cm", "degrees", "steps", "blocks", ""]
@@ -98,6 +98,6 @@ class Measure:
         return 100.0 if self.unit == "%" else 1.0
 
 
-def way_name(row: Mapping[Any, Any]) -> str:
+def value_key(row: Mapping[Any, Any]) -> str:
     """What a value is of, as a key: `f1/overall/A/optimal/aov`."""
-    return "/".join(str(row[name]) for name in WAY)
+    return "/".join(str(row[name]) for name in VALUE_KEY)

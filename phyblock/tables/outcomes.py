@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
 from phyblock.words import Outcome
 
-__all__ = ["FAILURES", "HEADINGS", "OUTCOMES", "WITHOUT_REPLY"]
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["FAILURES", "HEADINGS", "OUTCOMES", "WITHOUT_REPLY", "has_reply"]
 
 OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 """Every outcome, in the order of columns."""
@@ -26,3 +29,8 @@ HEADINGS: dict[Outcome, str] = {
     "missing": "Missing",
 }
 """What heads the column of each outcome."""
+
+
+def has_reply(rows: pd.DataFrame) -> pd.Series[bool]:
+    """Of each row of samples, by its `outcome`, whether the model said anything."""
+    return ~rows["outcome"].isin(WITHOUT_REPLY)

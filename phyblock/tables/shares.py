@@ -1,4 +1,4 @@
-"""Parts of a whole as shares with intervals, for tables of what became of steps or answers."""
+"""Parts of a whole as counts and shares with intervals: what became of steps, of answers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from phyblock.tables.measures import CELL, SCORED_BY, Cell, Measure, SampleCount
 from phyblock.tables.text_table import between, number
 from phyblock.tables.track_report import WHOLE
 
-__all__ = ["share_texts", "shares_of"]
+__all__ = ["joined_shares", "share_texts", "shares_of"]
 
 _WHOLE = "whole"
 _ENDS = {"value": "share", "lo": "lo", "hi": "hi"}
@@ -33,8 +33,8 @@ def shares_of(
 
     `rows` has counts of `parts` by sample with model, scene, seed, replied (whether the model said
     anything), and the cell where there are several. The whole is the column of this name, or the
-    sum of the parts. Columns are `<part>_share`, `<part>_lo` and `<part>_hi`, in [0, 1]; a model
-    and cell without a sample have no row.
+    sum of the parts. Columns are `whole` and the parts as sums, then `<part>_share`, `<part>_lo`
+    and `<part>_hi`, in [0, 1]; a model and cell without a sample have no row.
     """
     counted = SampleCounts("parts", (*parts, _WHOLE))
     measures = [
@@ -45,13 +45,22 @@ def shares_of(
     about |= {} if CELL in rows else {CELL: WHOLE.name}
     counts = rows.assign(**about, **{_WHOLE: total})
     found = estimate_frame(run, measures, cells, lambda _: counts)
-    wide = {
+    shares = {
         f"{part}_{name}": mine[end].astype("float64")
         for part in parts
         for mine in (found[found["measure"] == part].set_index(["model", CELL]),)
         for end, name in _ENDS.items()
     }
-    return pd.DataFrame(wide, pd.MultiIndex.from_frame(found[["model", CELL]].drop_duplicates()))
+    at = pd.MultiIndex.from_frame(found[["model", CELL]].drop_duplicates())
+    sums = counts.groupby(["model", CELL])[[_WHOLE, *parts]].sum().reindex(at)
+    return sums.join(pd.DataFrame(shares, at))
+
+
+def joined_shares(table: pd.DataFrame, shares: pd.DataFrame, on: Sequence[str]) -> pd.DataFrame:
+    """A table with the columns of `shares_of` at the rows that `on` names; without them, sums 0."""
+    wide = table.join(shares.rename_axis(list(on)), on=list(on))
+    sums = [name for name in shares if f"{name}_share" in shares or name == _WHOLE]
+    return wide.assign(**wide[sums].fillna(0).astype("int64"))
 
 
 def _share(place: int, sums: Floats) -> Floats:

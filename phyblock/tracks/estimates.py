@@ -13,7 +13,7 @@ from phyblock.registry import added_measures
 from phyblock.tables.estimates import ESTIMATE_COLUMNS, estimate_frame
 from phyblock.tables.load import Run
 from phyblock.tables.measures import SCORED_BY, Measure, SampleCounts
-from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.tables.outcomes import has_reply
 from phyblock.tracks.kind import kind_of
 
 __all__ = [
@@ -108,6 +108,6 @@ def counted_samples(run: Run, track: str, counted: SampleCounts) -> pd.DataFrame
         dtype="float64",
     )
     kept = rows[["sample", "model", "scene", "seed", "variant", "item"]].assign(
-        **dict.fromkeys(SCORED_BY, ""), replied=~rows["outcome"].isin(WITHOUT_REPLY)
+        **dict.fromkeys(SCORED_BY, ""), replied=has_reply(rows)
     )
     return kind_of(track).report().in_cells(pd.concat([kept, numbers], axis=1), run)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.scoring.ratios import f1_of
 from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
@@ -20,7 +19,8 @@ from phyblock.tracks.poses import POSE_COUNTS, POSE_MEASURES
 
 __all__ = ["order_frame", "order_in_terminal", "order_view"]
 
-_ENDS = {"value": "", "lo": "_lo", "hi": "_hi", "mean": "_mean", "sd": "_sd"}
+_INTERVAL = {"value": "", "lo": "_lo", "hi": "_hi"}
+_ENDS = {**_INTERVAL, **{end: f"_{end}" for end in ("mean", "sd", "least", "most")}}
 _SPREAD = ("f1_mean", "f1_sd", "f1_least", "f1_most")
 _SAME = {"_share": "", "_lo": "_lo", "_hi": "_hi"}
 _HOW = {
@@ -31,7 +31,7 @@ _HOW = {
 _POSES = tuple(measure.name for measure in POSE_MEASURES)
 
 
-def order_frame(track: str, criterion: str, matcher: str, run: Run) -> pd.DataFrame:
+def order_frame(track: str, criterion: str, run: Run) -> pd.DataFrame:
     """One row a model: what another order of the candidates changes; shares in [0, 1].
 
     `order` is that of the run (or `varied`); shuffled, each of the `seeds` is another one, and in
@@ -45,13 +45,11 @@ def order_frame(track: str, criterion: str, matcher: str, run: Run) -> pd.DataFr
     """
     design = run.design
     records = run.records[run.records["track"] == track]
-    spread = _extremes(run, track, criterion, matcher)
     found = headline_rows(track_estimates(run, track), design)
     found = found[(found[CELL] == WHOLE.name) & found["criterion"].isin(["", criterion])]
     known = found.set_index(["measure", "model"]).to_dict("index")
     plans = _same_plans(records)
     same = shares_of(run, plans, ("same",), whole="pairs").droplevel(CELL).to_dict("index")
-    pairs = plans.groupby("model")["pairs"].sum()
     named = counted_samples(run, track, POSE_COUNTS)
     counts = named[named[CELL] == WHOLE.name].groupby("model")[list(POSE_COUNTS.columns)].sum()
     rows = []
@@ -60,15 +58,12 @@ def order_frame(track: str, criterion: str, matcher: str, run: Run) -> pd.DataFr
         row["seeds"] = len(design.suite.seeds)
         estimate = known.get(("f1", model), {})
         row |= {f"f1{name}": estimate.get(end, np.nan) for end, name in _ENDS.items()}
-        measured = not np.isnan(row["f1"])
-        row |= spread[model] if measured else dict.fromkeys(_SPREAD[2:], np.nan)
         mine = same.get(model, {})
         row |= {f"same_plan{name}": mine.get(f"same{end}", np.nan) for end, name in _SAME.items()}
-        row["plan_pairs"] = int(pairs.get(model, 0))
+        row["plan_pairs"] = int(mine.get("whole", 0))
         for name in _POSES:
             estimate = known.get((name, model), {})
-            ends = {end: _ENDS[end] for end in ("value", "lo", "hi")}
-            row |= {f"{name}{of}": estimate.get(end, np.nan) for end, of in ends.items()}
+            row |= {f"{name}{of}": estimate.get(end, np.nan) for end, of in _INTERVAL.items()}
         for name in ("first_n", "later_n"):
             row[f"pose_{name}"] = int(counts[name].get(model, 0))
         rows.append(row)
@@ -79,19 +74,6 @@ def _order(run: Run) -> str:
     """The order of the candidates, `varied` where ways of asking differ in it."""
     suite = run.design.suite
     return "varied" if "candidate_order" in suite.vary.factors else suite.candidates.order
-
-
-def _extremes(run: Run, track: str, criterion: str, matcher: str) -> dict[str, dict[str, float]]:
-    """Least and greatest F1 of single seeds, by model."""
-    scores = run.scores
-    kept = (scores["track"] == track) & (scores["criterion"] == criterion)
-    kept &= (scores["setting"] == run.design.setting) & (scores["matcher"] == matcher)
-    kept &= ~scores["outcome"].isin(run.design.outcomes_left_out)
-    sums = scores[kept].groupby(["model", "seed"])[["tp", "fp", "fn"]].sum()
-    values = pd.Series(f1_of(sums.to_numpy(np.float64)), index=sums.index)
-    table = values.groupby(level="model").agg(["min", "max"])
-    names = _SPREAD[2:]
-    return {str(row[0]): dict(zip(names, row[1:], strict=True)) for row in table.itertuples()}
 
 
 def _same_plans(records: pd.DataFrame) -> pd.DataFrame:

@@ -267,6 +267,91 @@ NONE = [
 ]  # fmt: skip
 
 
+LATER: list[tuple[str, tuple[int, ...] | None]] = [
+    ('The structure has ten blocks. Blocks 1-4 form the base, then 9.\n\nStep1: Move block with index 1\nStep2: Move block with index 2\nStep3: Move block with index 3\nStep4: Move block with index 4\nStep5: Move block with index 9', (1, 2, 3, 4, 9)),
+    ('Blocks 1-4 form the base, then block 9 goes on top, then block 12 as the roof.', (1, 2, 3, 4, 9, 12)),
+    ('1. Block 6, 2 at each side\n2. Block 9 across the top', (6, 6, 6, 6, 9)),
+    ('1. Block 6, one at each side\n2. Block 9 across them', (6, 6, 9)),
+    ('Step 1: Move block with index 7 (the first of 3 pillars)\nStep 2: Move block with index 7 (the second of 3 pillars)\nStep 3: Move block with index 7 (the third of 3 pillars)\nStep 4: Move block with index 10', (7, 7, 7, 10)),
+    ('Build order: blocks 2 through 4 as the foundation, then 8, then 11.', (2, 3, 4, 8, 11)),
+    ('The goal consists of 5 blocks in 3 layers: 3 in layer 1, 1 in layer 2 and 1 in layer 3.\n\n**Plan**\n1. Block 4\n2. Block 4\n3. Block 13\n4. Block 7\n5. Block 16', (4, 4, 13, 7, 16)),
+    ('Layers from the ground up:\n- Layer 1 (3 blocks): 2, 2, 5\n- Layer 2 (1 block): 9\n- Layer 3 (1 block): 14', (2, 2, 5, 9, 14)),
+    ("I'll analyze the goal structure carefully.\n\n**Goal structure:**\n- Ground level: two red cubes (candidate 3) side by side, and a blue pillar (candidate 8) to their right\n- Middle: an orange bar lying across (candidate 12)\n- Top: a yellow half cylinder (candidate 15)\n\n**Support relations:**\n- 12 rests on both 3s and 8\n- 15 rests on 12\n\nStep1: Move block with index 3\nStep2: Move block with index 3\nStep3: Move block with index 8\nStep4: Move block with index 12\nStep5: Move block with index 15", (3, 3, 8, 12, 15)),
+    ("Looking at this image, I need to identify which candidates match.\n\nCandidates: 1 red arch, 2 blue cube, 3 blue cube (rotated), 4 green triangle, 5 orange bar.\n\nWait, let me reconsider: the bar in the goal stands upright, so it's candidate 5, not candidate 9.\n\nStep1: Move block with index 5\nStep2: Move block with index 2\n\nHmm, actually the cube has to come first since the bar leans on nothing but the cube is under it.\n\nStep1: Move block with index 2\nStep2: Move block with index 5\nStep3: Move block with index 4", (2, 5, 4)),
+    ("I don't see the goal's rear side, so two blocks may be hidden. My plan covers only what I can see.\n\nStep1: Move block with index 11\nStep2: Move block with index 6", (11, 6)),
+    ("I apologize, but I can't make out a goal structure in this picture: the left half looks blank to me. The right half shows 16 candidates, such as a red cube (1), a blue arch (2) and a green triangle (3). Could you send the picture again?", None),
+    ('**Build sequence**\n\n| # | Candidate | Role |\n|---|---|---|\n| 1 | 8 | left pillar |\n| 2 | 8 | right pillar |\n| 3 | 13 | lintel on 8 and 8 |\n| 4 | 2 | roof |', (8, 8, 13, 2)),
+    ("Step1: Move block with index 9\nStep2: Move block with index 1\nStep3: Move block with index 1\n\nIf you'd like, I can also provide the plan with coordinates or explain how blocks 9 and 1 were identified.", (9, 1, 1)),
+    ('Bottom → top: 10, 10, 4, 16', (10, 10, 4, 16)),
+    ('Place 10 twice for the pillars, bridge them with 4, and finish with 16.', (10, 10, 4, 16)),
+    ("Step1: Move block with index 5\nStep2: Move block with index 5\n…\nI'm not certain about the remaining blocks; the third could be 7 or 14, but I would leave it out.", (5, 5)),
+    ('```text\nStep1: Move block with index 14\nStep2: Move block with index 3\nStep3: Move block with index 3\n```\n\n**Why this order:** 14 is the base plate; the two 3s stand on it.', (14, 3, 3)),
+    ("Here's a breakdown of the goal structure and how it can be built:\n\n*   **Base:** The base is a long brown block. This corresponds to candidate **12**.\n*   **Pillars:** There are two red cylinders. These match candidate **7**.\n*   **Roof:** A blue triangle. That's candidate **1**.\n\nTherefore, the plan is:\n\nStep1: Move block with index 12\nStep2: Move block with index 7\nStep3: Move block with index 7\nStep4: Move block with index 1", (12, 7, 7, 1)),
+    ('```json\n{\n  "analysis": {"n_blocks": 4, "layers": [2, 1, 1]},\n  "plan": {\n    "layers": [\n      {"layer": 1, "moves": [{"candidate": 6, "reason": "left of 11"}, {"candidate": 11, "reason": "right of 6"}]},\n      {"layer": 2, "moves": [{"candidate": 2, "reason": "rests on 6 and 11"}]},\n      {"layer": 3, "moves": [{"candidate": 15, "reason": "roof"}]}\n    ]\n  }\n}\n```', (6, 11, 2, 15)),
+    ('{"goal": {"blocks": [{"type": "cube", "color": "red"}, {"type": "arch", "color": "blue"}]}, "matches": {"red cube": 5, "blue arch": 9}, "assembly_plan": [{"step_number": 1, "candidate_index": 5, "depends_on": []}, {"step_number": 2, "candidate_index": 9, "depends_on": [1]}]}', (5, 9)),
+    ('[\n  {"step": 1, "action": "Move block with index 4", "rationale": "block 4 carries block 8"},\n  {"step": 2, "action": "Move block with index 8", "rationale": "on block 4"},\n  {"step": 3, "action": "Move block with index 13", "rationale": "beside block 4"}\n]', (4, 8, 13)),
+    ('{"status": "uncertain", "confidence": 0.4, "plan": [2, 2, 6], "alternative_plan": [2, 6, 2]}', (2, 2, 6)),
+    ('{"error": "The goal image could not be processed", "plan": []}', None),
+    ('<think>\nOkay, let me see. The goal has a house: two cubes, a bar, a triangle. Candidates: 3 is a red cube, 7 the bar, 11 the triangle. Plan maybe 3, 3, 7, 11. Check: Step1: Move block with index 11? No.\n</think>\n\n### Plan\n\nStep1: Move block with index 3  \nStep2: Move block with index 3  \nStep3: Move block with index 7  \nStep4: Move block with index 11', (3, 3, 7, 11)),
+    ('<think>\nThe tower has 4 blocks. Block 2 at the bottom, then 2, then 9, then 16.\nStep1: Move block with index 2\nStep2: Move block with index 2\nStep3: Move block with index 9\nStep4: Move block', None),
+    ('Okay, so I need to figure out the order. The base seems to be block 13. On it stand blocks 4 and 6. Hmm, maybe it is block 5 instead of 6. No, 6 has the right color.\n\n**Final Answer**\n\nStep1: Move block with index 13\nStep2: Move block with index 4\nStep3: Move block with index 6', (13, 4, 6)),
+    ('### Final Plan\n\n- Step 1: Move block with index `1` (gray cuboid, ground)\n- Step 2: Move block with index `1` (gray cuboid, ground, 5 cm to the right)\n- Step 3: Move block with index `10` (spans both)', (1, 1, 10)),
+    ('Das Ziel besteht aus 4 Blöcken: zwei Säulen, ein Balken, ein Dach.\n\nSchritt 1: Bewege den Block mit Index 7 (linke Säule)\nSchritt 2: Bewege den Block mit Index 7 (rechte Säule)\nSchritt 3: Bewege den Block mit Index 12 auf die beiden Säulen\nSchritt 4: Bewege den Block mit Index 3 auf Block 12', (7, 7, 12, 3)),
+    ('Ich setze zuerst die Blöcke 2 und 5 auf den Boden, darauf Block 8 und ganz oben Block 14.', (2, 5, 8, 14)),
+    ('**Aufbaureihenfolge (von unten nach oben)**\n\n1. Kandidat 9 – blauer Quader\n2. Kandidat 9 – blauer Quader, 2 cm daneben\n3. Kandidat 4 – roter Bogen', (9, 9, 4)),
+    ('Leider ist auf dem Bild kein Ziel zu erkennen. Zu sehen sind nur die Kandidaten 1 bis 16.', None),
+    ('目标结构共有4个积木：底层2个，中层1个，顶层1个。\n\n步骤1：移动编号为6的积木\n步骤2：移动编号为6的积木\n步骤3：移动编号为11的积木\n步骤4：移动编号为2的积木', (6, 6, 11, 2)),
+    ('搭建顺序如下：先放置2个6号积木作为底座，再放11号积木，最后放2号积木。', (6, 6, 11, 2)),
+    ('底层：3号、8号；第二层：12号；顶层：15号。', (3, 8, 12, 15)),
+    ('抱歉，图片中没有显示目标结构，无法给出搭建计划。候选积木包括1号红色立方体、2号蓝色拱形等。', None),
+    ('Most likely plan (not fully certain):\n\n1) 4\n2) 4\n3) 10 — or 11 if the roof is the darker one\n4) 16', (4, 4, 10, 16)),
+    ('Option 1 (roof first): 16, 4, 10\nOption 2 (base first): 4, 10, 16\n\nOnly option 2 respects the supports, so my answer is option 2.', (4, 10, 16)),
+    ('It could be 4, 10, 16 or it could be 10, 4, 16; both orders stand, and I cannot tell which one you want.', None),
+    ('The goal can be built with 6 blocks: 3 cubes (index 5), 2 arches (index 9) and 1 roof (index 14).', None),
+]  # fmt: skip
+"""Forty replies in the manners of today's models, each written with its reading before any parser
+read it: 31 were read rightly then, 4 failed, 5 were misread."""
+
+LAST: list[tuple[str, tuple[int, ...] | None]] = [
+    ('Start with 4, put 9 on top of it, then 13.', (4, 9, 13)),
+    ('1. Index 2 (base, left)\n2. Index 2 (base, right)\n3. Index 11 (beam)\n4. Index 5 x2 (towers)\n5. Index 16 (roof)', (2, 2, 11, 5, 5, 16)),
+    ('The plan has 6 steps.\n\nStep 1 → 4\nStep 2 → 4\nStep 3 → 8\nStep 4 → 1\nStep 5 → 1\nStep 6 → 15', (4, 4, 8, 1, 1, 15)),
+    ('Ground: 3, 3, 7\nSecond layer: 10\nThird layer: 12, 12\nTop: 14', (3, 3, 7, 10, 12, 12, 14)),
+    ('**Answer:** `[6, 6, 2, 9]`\n\n*Blocks 1, 3 and 4 are distractors.*', (6, 6, 2, 9)),
+    ('Ich beginne mit Block 5. Danach kommt Block 11 darauf. Zum Schluss lege ich Block 2 oben auf.', (5, 11, 2)),
+    ('Schritt 1: Block 4\nSchritt 2: Block 4 (zweite Säule)\nSchritt 3: Block 10 quer darüber', (4, 4, 10)),
+    ('第1步：放置7号积木\n第2步：放置7号积木\n第3步：在上面放置12号积木', (7, 7, 12)),
+    ('搭建计划：[7, 7, 12, 3]', (7, 7, 12, 3)),
+    ('{"thinking": "3 layers", "steps": [{"n": 1, "move": {"block": 9}}, {"n": 2, "move": {"block": 4}}]}', (9, 4)),
+    ('{"sequence": [{"order": 1, "candidate": "#8"}, {"order": 2, "candidate": "#8"}, {"order": 3, "candidate": "#13"}]}', (8, 8, 13)),
+    ("I'm honestly not sure, but I'd go: 2 → 2 → 14 → 7.", (2, 2, 14, 7)),
+    ("I can't give a reliable plan because the picture is too blurry; the candidates seem to include 2, 7 and 14.", None),
+    ('Place two of candidate 6 on the ground 5 cm apart, lay candidate 10 across both, and finish by adding candidate 3.', (6, 6, 10, 3)),
+    ('1. Move block with index 12\n2. Move block with index 4\n   - it rests on 12\n3. Move block with index 4\n   - it rests on 12 as well\n4. Move block with index 9\n   - across the two 4s', (12, 4, 4, 9)),
+    ('Left tower: 2, 5, 8\nRight tower: 2, 5, 9\nBridge: 13', (2, 5, 8, 2, 5, 9, 13)),
+    ('Step1: Move block with index 3\nStep2: Move block with index 3\nStep3: Move block with index 6\n\nWait, the goal shows a third pillar. Updated plan:\n\nStep1: Move block with index 3\nStep2: Move block with index 3\nStep3: Move block with index 3\nStep4: Move block with index 6', (3, 3, 3, 6)),
+    ('<answer>\nStep1: Move block with index 16\nStep2: Move block with index 1\n</answer>', (16, 1)),
+    ('Blocks needed: 2x red cube (index 4), 1x arch (index 7), 1x roof (index 12).', None),
+    ('Steps 1 and 2: index 4 (both pillars). Step 3: index 7. Step 4: index 12.', (4, 4, 7, 12)),
+]  # fmt: skip
+"""Twenty more, written in the same way when those were mended: 14 were read rightly then, 3 failed,
+3 were misread."""
+
+FAILING = {"later": 2, "last": 3}
+"""Of those that hold a plan, how many are not read: rather than wrongly."""
+
+ALIKE: list[tuple[str, tuple[int, ...] | None]] = [
+    ('Blocks 1-4 form the base, then 9.', (1, 2, 3, 4, 9)),
+    ('The base is blocks 1-4, then 9 on top.', (1, 2, 3, 4, 9)),
+    ('1. Block 6, 2 on each side\n2. Block 9', (6, 6, 6, 6, 9)),
+    ('1. Block 6, one at each corner\n2. Block 9', (6, 6, 6, 6, 9)),
+    ('Blocks 1-4 form the base.', None),
+    ('Move block 3 first, then 2 more cubes on top', (3,)),
+    ('Step 1: Move block 3, then step 2', (3,)),
+]  # fmt: skip
+"""Written after that, of the same kinds: counts, ranges, what goes on with a number alone."""
+
+
 @pytest.mark.parametrize(("text", "plan"), PLANS)
 def test_a_hard_plan_is_read_as_it_is_meant(text: str, plan: tuple[int, ...]) -> None:
     assert parse_plan(text, 16).plan.steps == plan
@@ -277,3 +362,22 @@ def test_what_only_looks_like_a_plan_is_a_failure(text: str) -> None:
     parsed = parse_plan(text, 16)
     assert (parsed.plan.steps, parsed.rule) == ((), None)
     assert parsed.problem is not None
+
+
+def reading(text: str) -> tuple[int, ...] | None:
+    parsed = parse_plan(text, 16)
+    return None if parsed.rule is None else parsed.plan.steps
+
+
+@pytest.mark.parametrize(("name", "rows"), [("later", LATER), ("last", LAST)])
+def test_replies_that_were_written_first_are_read_as_noted_or_not_at_all(
+    name: str, rows: list[tuple[str, tuple[int, ...] | None]]
+) -> None:
+    readings = [(reading(text), plan) for text, plan in rows]
+    assert [got for got, plan in readings if got not in (plan, None)] == []
+    assert sum(got is None and plan is not None for got, plan in readings) == FAILING[name]
+
+
+@pytest.mark.parametrize(("text", "plan"), ALIKE)
+def test_counts_are_no_blocks_and_sequences_go_on(text: str, plan: tuple[int, ...] | None) -> None:
+    assert reading(text) == plan

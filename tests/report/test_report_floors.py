@@ -13,7 +13,7 @@ from phyblock.report import Run
 from phyblock.report.floors import floor_lines, floors_frame, floors_view, headline_floors
 from phyblock.report.html.headline import headlines
 from phyblock.report.write import make_tables
-from phyblock.tables.measures import way_name
+from phyblock.tables.measures import value_key
 from phyblock.tracks.estimates import track_estimates
 from tests.report.factory import laws, manifest, record, run_of, score
 
@@ -79,10 +79,12 @@ def test_above_is_an_interval_that_lies_wholly_above(
     run = run_with(floors, alpha=tp)
     rows = floors_frame(run)
     assert len(rows) == bool(floors)
-    found = {way_name(row): row for row in track_estimates(run, "full_planning").to_dict("records")}
+    found = {
+        value_key(row): row for row in track_estimates(run, "full_planning").to_dict("records")
+    }
     for row in rows.to_dict("records"):
         assert row["floor_value"] == max(floors.values())
-        lo = found[way_name(row)]["lo"]
+        lo = found[value_key(row)]["lo"]
         wanted = "cannot tell" if np.isnan(lo) else "above" if lo > row["floor_value"] else ""
         assert row["verdict"] == (wanted or "not above")
 

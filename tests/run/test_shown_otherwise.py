@@ -184,13 +184,23 @@ def test_episodes_are_shuffled_and_blind_as_well(workspace: Workspace) -> None:
     assert workspace.phyblock("episode", workspace.out, one, "--sheet", sheet).code == 0
 
 
-def test_floors_stand_in_the_manifest_and_name_who_is_above(workspace: Workspace) -> None:
-    workspace.write_suite(models=["oracle", "random"])
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"vary": {"candidate_order": ["file", "shuffled"]}, "seeds": list(SEEDS)},
+        pytest.param({}, marks=pytest.mark.slow),
+    ],
+)
+def test_floors_stand_in_the_manifest_and_name_who_is_above(
+    workspace: Workspace, fields: dict[str, Any]
+) -> None:
+    """They are what the same rule reaches when it is run, over all orders that it is asked in."""
+    workspace.write_suite(models=["oracle", "random"], **fields)
     done = workspace.run()
     assert "Floors: what is reached without seeing the goal" in done.out
     floors = yaml.safe_load((workspace.out / "run.yaml").read_text())["floors"]["full_planning"]
     assert set(floors) == {"goal-blind", "all-candidates"}
-    workspace.write_suite(models=["all-candidates"])
+    workspace.write_suite(models=["all-candidates"], **fields)
     ran = workspace.phyblock("run", "suite.yaml", "--out", workspace.root / "ran", "--no-report")
     assert ran.code == 0
     estimates = workspace.tables(workspace.root / "ran")["estimates.csv"].decode()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from phyblock.report.sensitivity import ITEMS, components_frame
-from phyblock.report.sensitivity_view import factor_name
+from phyblock.report.sensitivity_view import factor_name, sizes_text
 from phyblock.tables.drawing import ACCENT, COLORS, MARKERS, bare_axes, headed, new_figure
 from phyblock.tables.load import Run
 from phyblock.tracks.estimates import track_measures
@@ -58,11 +58,10 @@ def moved_dots(run: Run, *, track: str) -> Figure | None:
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=2)
     measure = track_measures(track)[0]
     unit = f" ({measure.unit})" if measure.unit else ""
-    sizes = table[["n_items", "n_clusters"]].max()
     headed(
         figure,
         f"{kind_of(track).title}: what the way of asking changes",
         f"Standard deviation of {measure.heading}{unit}; lines: 95 % intervals, "
-        f"{sizes['n_items']} items of {sizes['n_clusters']} base scenes",
+        + sizes_text(table),
     )
     return figure

@@ -8,8 +8,8 @@ from phyblock.scoring import ERROR_TYPES
 from phyblock.tables.cells import with_levels
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL
-from phyblock.tables.outcomes import WITHOUT_REPLY
-from phyblock.tables.shares import shares_of
+from phyblock.tables.outcomes import has_reply
+from phyblock.tables.shares import joined_shares, shares_of
 from phyblock.tracks.full_planning.measures import NAME, level_cells
 
 __all__ = ["errors_frame", "levels_in_order"]
@@ -40,16 +40,13 @@ def errors_frame(run: Run) -> pd.DataFrame:
         & ~run.scores["outcome"].isin(design.outcomes_left_out)
     ][["sample", "model", "scene", "seed", "outcome", *ERROR_TYPES]]
     rows = with_levels(scores, run)
-    groups = rows.groupby(["model", "level"])
-    counts = groups[list(ERROR_TYPES)].sum()
-    counts.insert(0, "n", groups.size())
+    n = rows.groupby(["model", "level"]).size().rename("n")
     cells = [(model, level) for model in design.model_names for level in levels]
-    table = pd.DataFrame(cells, columns=["model", "level"]).join(counts, on=["model", "level"])
-    columns = ["n", *ERROR_TYPES]
-    table[columns] = table[columns].fillna(0).astype("int64")
-    table.insert(3, "wrong_steps", table[list(ERROR_TYPES)].sum(axis=1))
+    table = pd.DataFrame(cells, columns=["model", "level"]).join(n, on=["model", "level"])
+    table["n"] = table["n"].fillna(0).astype("int64")
     rows = rows.rename(columns={"level": CELL})
-    rows["replied"] = ~rows["outcome"].isin(WITHOUT_REPLY)
+    rows["replied"] = has_reply(rows)
     of_level = [cell for cell in level_cells(run) if cell.name in levels]
     shares = shares_of(run, rows, ERROR_TYPES, of_level)
-    return table.join(shares.rename_axis(["model", "level"]), on=["model", "level"])
+    table = joined_shares(table, shares, ["model", "level"])
+    return table.rename(columns={"whole": "wrong_steps"})

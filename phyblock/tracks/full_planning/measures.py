@@ -15,7 +15,7 @@ from phyblock.tables.cells import cell_scores, with_levels
 from phyblock.tables.flat import BLOCK_COLUMNS
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Cell, Measure, SampleCounts
-from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.tables.outcomes import has_reply
 from phyblock.tables.text_table import level_name
 from phyblock.tracks.full_planning.baselines import PLAN_FLOORS
 from phyblock.tracks.poses import POSE_MEASURES
@@ -53,8 +53,7 @@ def in_levels(rows: pd.DataFrame, run: Run) -> pd.DataFrame:
 def _scored(run: Run) -> pd.DataFrame:
     scores = cell_scores(run)
     scores = scores[scores["track"] == NAME].rename(columns={"level": CELL})
-    replied = ~scores["outcome"].isin(WITHOUT_REPLY)
-    return scores.assign(item=scores["scene"], replied=replied)
+    return scores.assign(item=scores["scene"], replied=has_reply(scores))
 
 
 def _steps(run: Run) -> pd.DataFrame:

@@ -86,8 +86,7 @@ def _published(run: Run) -> Mapping[str, float]:
 
 
 def _orders(run: Run) -> pd.DataFrame:
-    criterion = run.design.criterion(OVERALL)
-    return order_frame(NAME, criterion, run.design.matchers(criterion)[0], run)
+    return order_frame(NAME, run.design.criterion(OVERALL), run)
 
 
 def _notes(run: Run) -> Sequence[str]:

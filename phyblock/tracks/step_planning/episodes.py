@@ -12,8 +12,8 @@ import pandas as pd
 from phyblock.scoring import ERROR_TYPES
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL
-from phyblock.tables.outcomes import WITHOUT_REPLY
-from phyblock.tables.shares import shares_of
+from phyblock.tables.outcomes import has_reply
+from phyblock.tables.shares import joined_shares, shares_of
 from phyblock.tracks.step_planning.rules import ENDINGS
 
 __all__ = [
@@ -74,16 +74,16 @@ def endings_frame(run: Run) -> pd.DataFrame:
     for model in run.design.model_names:
         mine = episodes[episodes["model"] == model]
         whole = mine[mine["ending"] == "completed"]
-        counts: Counter[str] = Counter(mine["ending"].tolist())
         row: dict[str, Any] = {"model": model, "n": len(mine)}
         row["expected"] = run.design.samples(NAME)
-        row |= {name: counts[name] for name in ENDINGS}
         row["steps"] = mine["steps"].mean()
         row["steps_to_finish"] = whole["steps"].mean()
         fewest = whole["n_blocks"].sum()
         row["detour"] = whole["steps"].sum() / fewest if fewest else np.nan
         rows.append(row)
-    return pd.DataFrame(rows).join(shares, on="model")
+    table = joined_shares(pd.DataFrame(rows), shares, ["model"])
+    first = ["model", "n", "expected", *ENDINGS]
+    return table[[*first, *(name for name in table if name not in (*first, "whole"))]]
 
 
 def moves_frame(run: Run) -> pd.DataFrame:
@@ -94,22 +94,18 @@ def moves_frame(run: Run) -> pd.DataFrame:
     counted = [Counter(map(_named, outcomes)) for outcomes in episodes["outcomes"]]
     parts = {name: [counts[name] for counts in counted] for name in STEP_OUTCOMES}
     shares = _shares(run, episodes.assign(**parts), STEP_OUTCOMES)
-    rows = []
-    for model in run.design.model_names:
-        mine = episodes.loc[episodes["model"] == model, "outcomes"]
-        counts = Counter(_named(outcome) for outcomes in mine for outcome in outcomes)
-        steps = counts.total()
-        row: dict[str, Any] = {"model": model, "episodes": len(mine), "steps": steps}
-        rows.append(row | {name: counts[name] for name in STEP_OUTCOMES})
-    return pd.DataFrame(rows).join(shares, on="model")
+    models = pd.Series(run.design.model_names, name="model")
+    sizes = models.map(episodes["model"].value_counts()).fillna(0).astype("int64")
+    table = pd.DataFrame({"model": models, "episodes": sizes})
+    return joined_shares(table, shares, ["model"]).rename(columns={"whole": "steps"})
 
 
 def _shares(
     run: Run, episodes: pd.DataFrame, parts: Sequence[str], whole: str | None = None
 ) -> pd.DataFrame:
     """See `shares_of`; by model."""
-    replied = ~episodes["outcome"].isin(WITHOUT_REPLY)
-    return shares_of(run, episodes.assign(replied=replied), parts, whole=whole).droplevel(CELL)
+    rows = episodes.assign(replied=has_reply(episodes))
+    return shares_of(run, rows, parts, whole=whole).droplevel(CELL)
 
 
 def progress_frame(run: Run) -> pd.DataFrame:

@@ -9,7 +9,7 @@ import pandas as pd
 from phyblock.scoring.ratios import f1_of, precision_of, ratio_of, recall_of
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Measure, SampleCounts
-from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.tables.outcomes import has_reply
 from phyblock.tables.track_report import WHOLE
 from phyblock.tracks.poses import POSE_MEASURES
 from phyblock.tracks.step_planning.baselines import STEP_FLOORS
@@ -45,8 +45,7 @@ def _episodes(run: Run) -> pd.DataFrame:
 
 
 def _about(rows: pd.DataFrame) -> dict[str, Any]:
-    replied = ~rows["outcome"].isin(WITHOUT_REPLY)
-    return {CELL: WHOLE.name, "item": rows["scene"], "replied": replied}
+    return {CELL: WHOLE.name, "item": rows["scene"], "replied": has_reply(rows)}
 
 
 _MOVES = SampleCounts("moves", ("tp", "fp", "fn"), _moves)

@@ -105,7 +105,7 @@ REPORT = TrackReport(
         "moves": TableMaker(moves_frame, moves_view, "endings"),
         "progress": TableMaker(progress_frame, progress_view),
         "step_orders": TableMaker(
-            partial(order_frame, NAME, "placed", ""),
+            partial(order_frame, NAME, "placed"),
             order_view,
             "table3",
             in_terminal=order_in_terminal,

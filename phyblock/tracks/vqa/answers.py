@@ -8,7 +8,7 @@ from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
 from phyblock.scoring import letter_rates
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL
-from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.tables.outcomes import has_reply
 from phyblock.tables.shares import shares_of
 from phyblock.tracks.vqa.spec import VqaSpec
 
@@ -58,7 +58,7 @@ def questions_counted(run: Run) -> pd.DataFrame:
     rows = records[keys].assign(
         correct=records["given"].eq(records["right"]).fillna(False).astype("int64"),
         left_out=records["outcome"].isin(run.design.outcomes_left_out),
-        replied=~records["outcome"].isin(WITHOUT_REPLY),
+        replied=has_reply(records),
     )
     asked = rows.groupby(keys, sort=True).agg(
         {"correct": "sum", "left_out": "any", "replied": "any"}
@@ -86,7 +86,7 @@ def letters_frame(run: Run) -> pd.DataFrame:
     named = {f"{kind}_{letter.lower()}": letter for letter in LETTERS for kind in _RIGHT_GIVEN}
     answers = pd.concat(counted)
     letters = {name: (answers[name[:5]] == letter).astype(int) for name, letter in named.items()}
-    replied = ~answers["outcome"].isin(WITHOUT_REPLY)
+    replied = has_reply(answers)
     samples = answers[["model", "scene", "seed"]].assign(**letters, replied=replied, n=1)
     shares = 100 * shares_of(run, samples, list(named), whole="n").droplevel(CELL)
     columns = {f"{name}_share": name for name in named}

@@ -11,7 +11,7 @@ from phyblock.scoring import chance
 from phyblock.scoring.ratios import ratio_of
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Cell, Measure, SampleCounts
-from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.tables.outcomes import has_reply
 from phyblock.tracks.vqa.answers import (
     OVERALL_CELL,
     expected_answers,
@@ -98,7 +98,7 @@ def _single(run: Run) -> pd.DataFrame:
     return rows.assign(
         **dict.fromkeys(SCORED_BY, ""),
         **{CELL: rows["subtask"], "item": rows["question"]},
-        replied=~rows["outcome"].isin(WITHOUT_REPLY),
+        replied=has_reply(rows),
         correct=rows["given"].eq(rows["right"]).fillna(False).astype("int64"),
         n=1,
     )

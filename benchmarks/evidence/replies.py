@@ -1,0 +1,59 @@
+"""How replies that were written for the tests are read, by the released rule and by the default.
+
+    python -m benchmarks.evidence.replies
+
+Run from the root of a checkout. A reading is wrong where it is not what was meant, and a failure
+where nothing is read of a reply that holds a plan. The last two tables were written before any
+parser read them; what the parser of that day made of them stands beside.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from phyblock.parsing import parse_plan
+from phyblock.words import PlanParser
+from tests.parsing.test_plan_hostile import ALIKE, LAST, LATER, NONE, PLANS
+from tests.parsing.test_plan_manners import FAILURES, READ
+
+Rows = list[tuple[str, tuple[int, ...] | None]]
+N_CANDIDATES = 16
+EARLIER = {
+    "written first": {"right": 31, "failed": 4, "wrong": 5},
+    "written then": {"right": 14, "failed": 3, "wrong": 3},
+}
+
+
+def tables() -> dict[str, Rows]:
+    """Replies with what is meant; None: there is no plan in it."""
+    return {
+        "today's manners": [*READ, *((text, None) for text, _ in FAILURES)],
+        "hard ones": [*PLANS, *((text, None) for text in NONE), *ALIKE],
+        "written first": LATER,
+        "written then": LAST,
+    }
+
+
+def verdict(text: str, meant: tuple[int, ...] | None, parser: PlanParser) -> str:
+    """Whether a reply is read as it is meant."""
+    parsed = parse_plan(text, N_CANDIDATES, parser)
+    read = None if parsed.rule is None else parsed.plan.steps
+    return "right" if read == meant else "failed" if read is None else "wrong"
+
+
+def main() -> None:
+    """Print a line a table and parser."""
+    for name, rows in tables().items():
+        print(f"{name}: {len(rows)} replies")
+        parsers: tuple[PlanParser, ...] = ("official", "steps")
+        for parser in parsers:
+            counts = Counter(verdict(text, meant, parser) for text, meant in rows)
+            parts = (f"{kind} {counts[kind]}" for kind in ("right", "failed", "wrong"))
+            print(f"  {parser:9} {', '.join(parts)}")
+        if name in EARLIER:
+            parts = (f"{kind} {n}" for kind, n in EARLIER[name].items())
+            print(f"  then      {', '.join(parts)}")
+
+
+if __name__ == "__main__":
+    main()
