@@ -22,7 +22,8 @@ from phyblock.models import (
     api_key_status,
     ends_on,
     is_unlisted,
-    price_of,
+    prices_of,
+    today,
 )
 from phyblock.registry import baseline_names
 from phyblock.report import NO_VALUE
@@ -146,7 +147,8 @@ def _row(name: str, config: ModelConfig) -> tuple[str, ...]:
         key = "set"
     else:
         key = f"needs {status.variables[0]}" if status.is_needed else "not needed"
-    price = price_of(config)
+    known = prices_of(config)
+    price = None if known is None else known.at(today())
     prices = (
         ("unknown", "unknown") if price is None else (_usd(price.input_usd), _usd(price.output_usd))
     )

@@ -10,6 +10,7 @@ from typing import Literal
 
 from phyblock.addresses import address_fault
 from phyblock.errors import Problem, SpecError
+from phyblock.models.prices import Prices
 from phyblock.words import SendMode, TransportName
 
 __all__ = [
@@ -17,7 +18,6 @@ __all__ = [
     "LARGEST_REPLY_BYTES",
     "Kind",
     "ModelConfig",
-    "Price",
 ]
 
 Kind = Literal["litellm", "replay", "baseline"]
@@ -35,14 +35,6 @@ _RENAMES_PARAMETERS = re.compile(r"o\d|gpt-5")
 
 
 @dataclass(frozen=True)
-class Price:
-    """US dollars per million tokens."""
-
-    input_usd: float
-    output_usd: float
-
-
-@dataclass(frozen=True)
 class ModelConfig:
     """One model.
 
@@ -52,7 +44,7 @@ class ModelConfig:
     provider's. `api_key_env` names the environment variable
     that holds the key; None means the provider's usual one. `params` are sampling parameters by
     their OpenAI names; they win over a request's, and None there means "do not send". `rpm` and
-    `tpm` are limits a minute, None for none. `price` None means litellm's price map is asked.
+    `tpm` are limits a minute, None for none. `prices` None means litellm's map is asked.
     `sends_seed`: `auto` sends seeds until the provider refuses, `always` takes a refusal as an
     error, `never` sends none. `revision` tells apart models of one id, as other weights behind
     another address. With `sends_format` a request's `response_format` is sent, without it the
@@ -74,7 +66,7 @@ class ModelConfig:
     max_concurrency: int = 32
     rpm: int | None = None
     tpm: int | None = None
-    price: Price | None = None
+    prices: Prices | None = None
     recording: Path | None = None
     sends_seed: SendMode = "auto"
     revision: str | None = None

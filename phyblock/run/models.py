@@ -9,13 +9,22 @@ from pathlib import Path
 from phyblock.datasets import recorded_models
 from phyblock.datasets.published_names import match_published
 from phyblock.errors import Problem, SpecError
-from phyblock.models import ModelConfig, Price, server_address, takes_format
+from phyblock.models import (
+    ModelConfig,
+    Price,
+    Prices,
+    Rate,
+    Tariff,
+    server_address,
+    takes_format,
+)
 from phyblock.records import RECORDS, Recorded, RecordedLines
 from phyblock.registry import baseline_names
 from phyblock.specs import (
     RECORDED,
     LoadedSuite,
     ModelSpec,
+    RateSpec,
     SuiteSpec,
     did_you_mean,
     resolve_models,
@@ -105,7 +114,6 @@ def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfi
     if spec.replay is not None:
         return _replay(name, Path(spec.replay))
     assert spec.id is not None
-    price = None if spec.price is None else Price(spec.price.input, spec.price.output)
     params = spec.params(suite.sampling)
     if spec.extra_body:
         params["extra_body"] = spec.extra_body
@@ -125,12 +133,28 @@ def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfi
         max_concurrency=spec.max_concurrency or suite.limits.max_concurrency,
         rpm=spec.rpm,
         tpm=spec.tpm,
-        price=price,
+        prices=_prices(spec),
         sends_seed=spec.seed,
         revision=spec.revision,
         timeout_s=spec.timeout_s or suite.limits.timeout_s,
     )
     return replace(config, sends_format=_sends_format(config, spec, suite))
+
+
+def _prices(spec: ModelSpec) -> Prices | None:
+    tariffs = tuple(
+        Tariff(
+            (Rate(_price(price)), *(Rate(_price(tier), tier.above) for tier in price.tiers)),
+            price.since,
+            price.place,
+        )
+        for price in spec.prices
+    )
+    return Prices(tariffs) if tariffs else None
+
+
+def _price(spec: RateSpec) -> Price:
+    return Price(spec.input, spec.output, spec.cached, spec.cache_write)
 
 
 def _sends_format(config: ModelConfig, spec: ModelSpec, suite: SuiteSpec) -> bool:

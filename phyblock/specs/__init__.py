@@ -1,7 +1,7 @@
 """What a person may write in YAML: suites, models files and --set overrides."""
 
 from phyblock.specs.loading import LoadedSuite, load_suite, resolve_models, suite_tracks
-from phyblock.specs.model import ModelSpec, PriceSpec
+from phyblock.specs.model import ModelSpec, PriceSpec, RateSpec
 from phyblock.specs.models_file import load_models
 from phyblock.specs.schema import models_schema, suite_schema
 from phyblock.specs.sections import (
@@ -23,6 +23,7 @@ __all__ = [
     "LoadedSuite",
     "ModelSpec",
     "PriceSpec",
+    "RateSpec",
     "SamplingSpec",
     "ScoringSpec",
     "SuiteSpec",

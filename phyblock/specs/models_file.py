@@ -60,6 +60,9 @@ def _read_entry(
     spec, found = check(ModelSpec, {"id": entry} if isinstance(entry, str) else entry, source,
                         (name,), hints)  # fmt: skip
     problems += found
+    for index, price in enumerate(() if spec is None else spec.prices):
+        line = source.where((name, "price", index)).split(":")[-2]
+        price.stands_at(f"{Path(source.label).name} line {line}")
     for field in ("replay", "api_base_file"):
         path = None if spec is None else getattr(spec, field)
         if spec is None or path is None:

@@ -223,7 +223,7 @@ def _brief(found: object) -> str:
 
 def _unknown_key(fault: _Fault, source: YamlSource) -> Problem:
     section = _section(fault.root, fault.path[len(fault.base) : -1])
-    known = list(section.model_fields)
+    known = [field.alias or name for name, field in section.model_fields.items()]
     hint = did_you_mean(fault.key, known)
     if fault.key.lower() in SECRET_KEYS and "api_key_env" in known:
         hint = KEY_HINT

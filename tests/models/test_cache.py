@@ -20,7 +20,7 @@ from phyblock.models import (
     Image,
     Message,
     ModelConfig,
-    Price,
+    Prices,
     Reply,
     ReplyCache,
     Request,
@@ -127,7 +127,7 @@ def test_each_thing_that_changes_a_reply_changes_the_key(
     [
         lambda c, r: (replace(c, name="other"), r),
         lambda c, r: (replace(c, transport="litellm", max_concurrency=1, rpm=5, tpm=7), r),
-        lambda c, r: (replace(c, price=Price(1, 2), timeout_s=1.0, api_key_env="KEY"), r),
+        lambda c, r: (replace(c, prices=Prices.flat(1, 2), timeout_s=1.0, api_key_env="KEY"), r),
         lambda c, r: (replace(c, api_base="http://node17:2/v1"), r),
         lambda c, r: (c, replace(r, key="002")),
         lambda c, r: (replace(c, params={"temperature": 0.5}), r),
