@@ -11,7 +11,7 @@ from typing import Literal
 from phyblock.addresses import address_fault
 from phyblock.errors import Problem, SpecError
 from phyblock.models.prices import Prices
-from phyblock.words import SendMode, TransportName
+from phyblock.words import ImageDetail, SendMode, TransportName
 
 __all__ = [
     "DIRECT_PROVIDERS",
@@ -48,7 +48,8 @@ class ModelConfig:
     `sends_seed`: `auto` sends seeds until the provider refuses, `always` takes a refusal as an
     error, `never` sends none. `revision` tells apart models of one id, as other weights behind
     another address. With `sends_format` a request's `response_format` is sent, without it the
-    prompt alone says the form. `timeout_s` bounds a request from its first byte to the last of its
+    prompt alone says the form. `image_detail` is how closely pictures are looked at, None as the
+    provider does. `timeout_s` bounds a request from its first byte to the last of its
     answer, `most_body_bytes` that answer's body, packed and unpacked.
 
     Raises SpecError for an address that is none, or that holds a key or a password.
@@ -71,6 +72,7 @@ class ModelConfig:
     sends_seed: SendMode = "auto"
     revision: str | None = None
     sends_format: bool = False
+    image_detail: ImageDetail | None = None
     timeout_s: float = 600.0
     most_body_bytes: int = LARGEST_REPLY_BYTES
 
@@ -137,4 +139,6 @@ class ModelConfig:
             identity["revision"] = self.revision
         if self.sends_format:
             identity["response_format"] = True
+        if self.image_detail is not None:
+            identity["image_detail"] = self.image_detail
         return identity

@@ -20,6 +20,7 @@ from phyblock.models.payload import wire_params
 from phyblock.models.picture_tokens import picture_tokens
 from phyblock.models.price_map import map_entry, mapped_prices
 from phyblock.models.prices import FREE, Prices, today
+from phyblock.models.text_tokens import text_tokens
 
 __all__ = [
     "Budget",
@@ -33,7 +34,6 @@ __all__ = [
     "require_prices",
 ]
 
-_CHARS_PER_TOKEN = 4
 _TYPICAL_REPLY_TOKENS = 500
 _TYPICAL_THINKING_TOKENS = 4_000
 _ROOM_TO_THINK_TOKENS = 8_192
@@ -47,7 +47,7 @@ _LEAST_EXPECTED_TOKENS = 1_000
 class Estimate:
     """Tokens of a call that was not made yet.
 
-    `prompt_tokens`: a token per four characters, and pictures by their providers' rules;
+    `prompt_tokens`: texts by their words, and pictures by their providers' rules;
     `completion_tokens`: a usual reply, with thoughts where the model is told to think or has room
     for them; `most_completion_tokens`: the longest possible.
     """
@@ -121,13 +121,17 @@ def most_usd(
 def estimate(config: ModelConfig, request: Request) -> Estimate:
     """Tokens that the request would take."""
     parts = [part for message in request.messages for part in message.parts]
-    text = sum(len(part) for part in parts if isinstance(part, str))
-    pictures = sum(picture_tokens(config.id, part) for part in parts if isinstance(part, Image))
+    texts = sum(text_tokens(config.id, part) for part in parts if isinstance(part, str))
+    pictures = sum(
+        picture_tokens(config.id, part, config.image_detail)
+        for part in parts
+        if isinstance(part, Image)
+    )
     params = wire_params(config, request)
     given = params.get("max_completion_tokens", params.get("max_tokens"))
     known = map_entry(config).get("max_output_tokens")
     most = next((n for n in (given, known) if isinstance(n, int)), _LONGEST_REPLY_TOKENS)
-    prompt = math.ceil(text / _CHARS_PER_TOKEN) + pictures
+    prompt = math.ceil(texts) + pictures
     thinks = params.get("reasoning_effort", "none") != "none" or (
         isinstance(given, int) and given > _ROOM_TO_THINK_TOKENS
     )
@@ -147,7 +151,8 @@ def plausible(usage: Usage, expected: Estimate, *, said_something: bool) -> Usag
         usage.completion_tokens, int(said_something), expected.most_completion_tokens
     )
     reasoning = _plausible(usage.reasoning_tokens, 0, expected.most_completion_tokens)
-    cached, written = usage.cached_tokens, usage.cache_write_tokens
+    cached = _plausible(usage.cached_tokens, 0, expected.prompt_tokens)
+    written = _plausible(usage.cache_write_tokens, 0, expected.prompt_tokens)
     if (cached or 0) + (written or 0) > (prompt or 0):
         cached = written = None
     return Usage(prompt, completion, reasoning, cached, written)

@@ -80,7 +80,7 @@ class LitellmTransport(GuardedTransport):
         arguments = {
             **call.params,
             "model": self._config.id,
-            "messages": wire_messages(call.messages),
+            "messages": wire_messages(call.messages, self._config.image_detail),
             "timeout": self._config.timeout_s,
             "num_retries": 0,
             "max_retries": 0,

@@ -136,6 +136,7 @@ def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfi
         prices=_prices(spec),
         sends_seed=spec.seed,
         revision=spec.revision,
+        image_detail=spec.image_detail,
         timeout_s=spec.timeout_s or suite.limits.timeout_s,
     )
     return replace(config, sends_format=_sends_format(config, spec, suite))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
+from collections.abc import Mapping
 from datetime import date
 from itertools import pairwise
 from typing import Annotated, Any, Literal
@@ -32,7 +33,7 @@ from phyblock.specs.fields import (
     refuse,
 )
 from phyblock.specs.sections import SamplingSpec
-from phyblock.words import SendMode, TransportName
+from phyblock.words import ImageDetail, SendMode, TransportName
 
 __all__ = ["ModelSpec", "PriceSpec", "RateSpec"]
 
@@ -42,6 +43,15 @@ UsdPerMillion = Annotated[float, Field(strict=True, ge=0, le=1e9, allow_inf_nan=
 _ID_PATTERN = r"^[A-Za-z0-9_.-]+/\S+$"
 _OWNERS = (("gpt", "openai"), ("o1", "openai"), ("o3", "openai"), ("claude", "anthropic"),
            ("gemini", "gemini"), ("qwen-vl", "dashscope"))  # fmt: skip
+_OPENAI_DETAILS = ("auto", "low", "high", "original")
+_GEMINI_DETAILS = ("low", "medium", "high", "ultra_high")
+_DETAILS: Mapping[str, tuple[str, ...]] = {
+    "openai": _OPENAI_DETAILS,
+    "azure": _OPENAI_DETAILS,
+    "gemini": _GEMINI_DETAILS,
+    "anthropic": (),
+}
+"""What providers know of `image_detail`; of all others nothing is known."""
 _LARGEST_INTEGER = 2**64 - 1
 _WITH_REPLAY = {"replay", "published", "size_b"}
 
@@ -234,6 +244,12 @@ class ModelSpec(Section):
     reasoning_effort: Effort | None = Field(
         default=None, description="How much a reasoning model thinks; null: not sent."
     )
+    image_detail: ImageDetail | None = Field(
+        default=None,
+        description="How closely pictures are looked at: the `detail` of OpenAI and compatible "
+        "servers (auto, low, high, original), the media resolution of Gemini (low, medium, high, "
+        "ultra_high); null: as the provider does where nothing is said.",
+    )
     extra_body: Annotated[dict[str, JsonValue], AfterValidator(_check_finite)] = Field(
         default_factory=dict, description="Further fields of the request body, sent as they are."
     )
@@ -279,6 +295,7 @@ class ModelSpec(Section):
                 message = "says where the model is served, which api_base says too"
                 raise refuse(message, at=("api_base_file",), key=True, hint="keep one of them")
             self._check_direct(self.id)
+            self._check_detail(self.id)
             return self
         for key in sorted(self.model_fields_set - _WITH_REPLAY):
             raise refuse(
@@ -289,6 +306,15 @@ class ModelSpec(Section):
                 hint="keep either id or replay",
             )
         return self
+
+    def _check_detail(self, model_id: str) -> None:
+        """A word that a provider does not know would be ignored, or refused with every request."""
+        known = _DETAILS.get(model_id.partition("/")[0])
+        if self.image_detail is None or known is None or self.image_detail in known:
+            return
+        provider = model_id.partition("/")[0]
+        allowed = ", ".join(known) or f"none: {provider} has no such choice"
+        raise refuse(f"is not known to {provider}", at=("image_detail",), allowed=allowed)
 
     def _check_direct(self, model_id: str) -> None:
         """Without an address, a direct call would take the provider's key to OpenAI."""

@@ -99,6 +99,7 @@ USER = BASE.messages[1]
         lambda c, r: (replace(c, params={"temperature": 0.1}), r),
         lambda c, r: (replace(c, params={"extra_body": {"top_k": 1}}), r),
         lambda c, r: (replace(c, sends_seed="never"), r),
+        lambda c, r: (replace(c, image_detail="low"), r),
         lambda c, r: (c, replace(r, seed=4)),
         lambda c, r: (c, replace(r, prompt_version="prompt-2")),
         lambda c, r: (c, replace(r, params={**r.params, "temperature": 0.6})),
@@ -138,6 +139,14 @@ def test_what_does_not_change_a_reply_does_not_change_the_key(
     change: Callable[[ModelConfig, Request], tuple[ModelConfig, Request]],
 ) -> None:
     assert reply_key(*change(CONFIG, BASE)) == reply_key(CONFIG, BASE)
+
+
+def test_the_keys_of_kept_replies_stay() -> None:
+    plain = ModelConfig(
+        "m", "litellm", "openai/gpt-4o-2024-08-06", params={"temperature": 0.0, "max_tokens": 4096}
+    )
+    known = "1e827a33d555a45fd4d9099d820a2c7a478eb1f5f5bf739d93deb2d8059c05ec"
+    assert reply_key(plain, make_request()) == known
 
 
 def with_parts(request: Request, parts: tuple[str | Image, ...]) -> Request:

@@ -41,6 +41,7 @@ from phyblock.models import (
 from phyblock.models.cost import plausible
 from phyblock.models.picture_tokens import picture_tokens
 from phyblock.tracks.full_planning.baselines import PlanSubject
+from phyblock.words import ImageDetail
 from tests.models.factory import CANDIDATES, SCENE, ask, make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Faults, Running, Seen
@@ -120,10 +121,12 @@ def test_pictures_are_counted_by_tiles(width: int, height: int, tokens: int) -> 
         ("openrouter/openai/gpt-4o-mini", 1024, 1024, 2833 + 4 * 5667),
         ("openai/gpt-4o-2024-08-06", 1024, 1024, 765),
         ("openai/gpt-4.1-mini", 1024, 1024, 1659),
-        ("openai/o4-mini", 2048, 2048, 2642),
+        ("openai/o4-mini", 2048, 2048, 2617),
         ("openai/gpt-4.1-nano", 64, 33, 10),
         ("openai/gpt-5.6", 1024, 512, 615),
         ("openai/gpt-5.6-luna", 1024, 1024, 1229),
+        ("openai/gpt-5.6", 2048, 2048, 4916),
+        ("openai/gpt-5.4", 2048, 2048, 3000),
         ("openai/gpt-5-mini-2025-08-07", 1280, 720, 1104),
         ("openai/gpt-5-2025-08-07", 1024, 512, 350),
         ("openai/gpt-5", 1024, 512, 350),
@@ -148,6 +151,33 @@ def test_a_picture_counts_as_its_model_counts_it(
     assert estimate(config(model_id), request_of(image)).prompt_tokens == tokens
 
 
+@pytest.mark.parametrize(
+    ("model_id", "detail", "width", "height", "tokens"),
+    [
+        ("openai/gpt-4o-2024-08-06", "low", 1024, 512, 85),
+        ("openai/gpt-4o-2024-08-06", "high", 1024, 1024, 765),
+        ("openai/o3", "low", 1024, 512, 75),
+        ("openai/gpt-5.6", "low", 1024, 512, 154),
+        ("openai/gpt-5.6", "original", 4096, 2048, 9831),
+        ("openai/gpt-6-luna", "high", 2048, 2048, 3000),
+        ("openai/gpt-5.5", "auto", 4096, 4096, 12_000),
+        ("openai/gpt-5.4-mini", "low", 2048, 2048, 4916),
+        ("openai/gpt-5.2", "low", 1024, 512, 615),
+        ("gemini/gemini-3.8-flash", "low", 1024, 512, 280),
+        ("gemini/gemini-3.8-flash", "medium", 1024, 512, 560),
+        ("gemini/gemini-4-argon", "ultra_high", 64, 64, 2240),
+        ("gemini/gemini-2.5-pro", "low", 1024, 512, 64),
+        ("xai/grok-4.7", "low", 1024, 512, 1792),
+    ],
+)
+def test_how_closely_a_picture_is_looked_at_is_counted(
+    model_id: str, detail: ImageDetail, width: int, height: int, tokens: int
+) -> None:
+    image = Image(b"", "goal", width, height)
+    asked = config(model_id, image_detail=detail)
+    assert estimate(asked, request_of(image)).prompt_tokens == tokens
+
+
 @given(
     st.sampled_from(["gpt-4o", "gpt-5.6", "claude-opus-4-7", "claude-3", "gemini-2.5", "grok-4"]),
     st.integers(1, 6000),
@@ -155,7 +185,7 @@ def test_a_picture_counts_as_its_model_counts_it(
 )
 def test_every_picture_counts_and_none_without_bound(model: str, width: int, height: int) -> None:
     tokens = picture_tokens(f"x/{model}", Image(b"", "goal", width, height))
-    assert 1 <= tokens <= 20_000
+    assert 1 <= tokens <= 36_000
     assert tokens == picture_tokens(f"x/{model}", Image(b"", "goal", height, width))
 
 

@@ -23,9 +23,18 @@ from phyblock.models import (
     most_usd,
     prices_of,
 )
+from phyblock.models.cost import plausible
 from phyblock.models.price_map import map_entry
+from phyblock.models.stored import reply_of as reply_of_line
+from phyblock.models.stored import stored
 from phyblock.run.models import to_config
 from phyblock.specs import SuiteSpec, load_models
+from tests.models.factory import make_model, make_request, reply_of
+from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.servers.anthropic_messages import AnthropicMessages
+from tests.servers.chassis import LocalServer, Running, Seen
+from tests.servers.gemini_generate import GeminiGenerate
+from tests.servers.openai_chat import OpenAIChat
 
 DAY = date(2026, 11, 22)
 SUITE = SuiteSpec(name="s", models=("m",))
@@ -193,3 +202,73 @@ def test_prices_are_no_part_of_what_a_model_is(tmp_path: Path) -> None:
     plain = read(tmp_path, "m: openai/gpt-4o\n")
     priced = read(tmp_path, "m: {id: openai/gpt-4o, price: [{input: 1, output: 2}]}\n")
     assert plain.identity() == priced.identity()
+
+
+CACHED: dict[type[LocalServer], dict[str, Any]] = {
+    OpenAIChat: {
+        "usage": {
+            "prompt_tokens": 1000,
+            "completion_tokens": 40,
+            "total_tokens": 1040,
+            "prompt_tokens_details": {"cached_tokens": 600, "cache_write_tokens": 300},
+        }
+    },
+    AnthropicMessages: {
+        "usage": {
+            "input_tokens": 100,
+            "output_tokens": 40,
+            "cache_read_input_tokens": 600,
+            "cache_creation_input_tokens": 300,
+        }
+    },
+    GeminiGenerate: {
+        "usageMetadata": {
+            "promptTokenCount": 1000,
+            "candidatesTokenCount": 40,
+            "totalTokenCount": 1040,
+            "cachedContentTokenCount": 600,
+        }
+    },
+}
+"""What each protocol says of a prompt of 1,000 tokens, most of them in its cache."""
+
+
+def test_every_protocol_is_among_the_routes() -> None:
+    assert {route.server for route in ROUTES.values()} == set(CACHED)
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_what_a_prompt_cache_held_is_recorded_and_priced(
+    monkeypatch: pytest.MonkeyPatch, route: str
+) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    kind = ROUTES[route].server
+
+    class Caching(kind):  # type: ignore[misc, valid-type]
+        def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+            return {**super().reply(seen, ending), **CACHED[kind]}
+
+    price = Price(10.0, 100.0, 1.0, 12.0)
+    known = Prices((Tariff((Rate(price),)),))
+    with Running(Caching()) as running:
+        config = ROUTES[route].config(running.url, prices=known)
+        reply = reply_of(make_model(config), make_request())
+    usage = reply.usage
+    written = 0 if kind is GeminiGenerate else 300
+    assert (usage.prompt_tokens, usage.completion_tokens) == (1000, 40)
+    assert (usage.cached_tokens, usage.cache_write_tokens or 0) == (600, written)
+    paid = 600 * 1 + written * 12 + (400 - written) * 10 + 40 * 100
+    assert reply.cost_usd == pytest.approx(paid / 1e6)
+    assert reply_of_line(stored(reply)) == reply
+
+
+@given(st.integers(-5, 2000), st.none() | st.integers(-5, 2000), st.none() | st.integers(-5, 2000))
+def test_no_more_is_cached_than_the_prompt_holds(
+    prompt: int, cached: int | None, written: int | None
+) -> None:
+    expected = Estimate(1000, 100, 100)
+    usage = Usage(prompt, 5, None, cached, written)
+    read = plausible(usage, expected, said_something=True)
+    assert (read.cached_tokens or 0) >= 0
+    assert (read.cache_write_tokens or 0) >= 0
+    assert (read.cached_tokens or 0) + (read.cache_write_tokens or 0) <= (read.prompt_tokens or 0)

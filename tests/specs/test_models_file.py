@@ -298,3 +298,22 @@ def test_recorded_models_are_not_resolved_here(tmp_path: Path) -> None:
     loaded = load_naming(tmp_path, "  - oracle\n", "models=recorded", text)
     with pytest.raises(ValueError, match="listed by its data set"):
         resolve_models(loaded, {})
+
+
+@pytest.mark.parametrize(
+    ("model_id", "detail", "allowed"),
+    [
+        ("openai/gpt-5.6", "ultra_high", "auto, low, high, original"),
+        ("gemini/gemini-3.8-flash", "auto", "low, medium, high, ultra_high"),
+        ("anthropic/claude-opus-5-5", "low", "none: anthropic has no such choice"),
+        ("xai/grok-4.7", "close", "auto"),
+    ],
+)
+def test_a_detail_that_a_provider_does_not_know_is_refused(
+    tmp_path: Path, model_id: str, detail: str, allowed: str
+) -> None:
+    with pytest.raises(SpecError) as caught:
+        load(tmp_path, f"m: {{id: {model_id}, image_detail: {detail}}}\n")
+    (problem,) = caught.value.problems
+    assert problem.field == "m.image_detail"
+    assert allowed in problem.allowed
