@@ -1,5 +1,6 @@
 """What a person may write in YAML: suites, models files and --set overrides."""
 
+from phyblock.specs.groups import GROUP, group_names, unknown_model, with_members
 from phyblock.specs.loading import LoadedSuite, load_suite, resolve_models, suite_tracks
 from phyblock.specs.model import ModelSpec, PriceSpec, RateSpec
 from phyblock.specs.models_file import load_models
@@ -16,6 +17,7 @@ from phyblock.specs.words import did_you_mean
 
 __all__ = [
     "BUILTIN_DATASET",
+    "GROUP",
     "RECORDED",
     "DatasetSpec",
     "ImagesSpec",
@@ -28,6 +30,7 @@ __all__ = [
     "ScoringSpec",
     "SuiteSpec",
     "did_you_mean",
+    "group_names",
     "load_models",
     "load_suite",
     "models_schema",
@@ -35,4 +38,6 @@ __all__ = [
     "suite_model",
     "suite_schema",
     "suite_tracks",
+    "unknown_model",
+    "with_members",
 ]

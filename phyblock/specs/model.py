@@ -29,6 +29,7 @@ from phyblock.specs.fields import (
     Temperature,
     TimeoutS,
     TopP,
+    Unique,
     UniqueSome,
     refuse,
 )
@@ -38,6 +39,7 @@ from phyblock.words import ImageDetail, SendMode, TransportName
 __all__ = ["ModelSpec", "PriceSpec", "RateSpec"]
 
 Effort = Literal["none", "minimal", "low", "medium", "high", "xhigh", "max"]
+GroupName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,39}$")]
 UsdPerMillion = Annotated[float, Field(strict=True, ge=0, le=1e9, allow_inf_nan=False)]
 
 _ID_PATTERN = r"^[A-Za-z0-9_.-]+/\S+$"
@@ -53,7 +55,7 @@ _DETAILS: Mapping[str, tuple[str, ...]] = {
 }
 """What providers know of `image_detail`; of all others nothing is known."""
 _LARGEST_INTEGER = 2**64 - 1
-_WITH_REPLAY = {"replay", "published", "size_b"}
+_WITH_REPLAY = {"groups", "replay", "published", "size_b"}
 
 
 def _check_id(model_id: str) -> str:
@@ -277,6 +279,11 @@ class ModelSpec(Section):
     )
     size_b: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] | None = Field(
         default=None, description="Parameters [billions], where known."
+    )
+    groups: Unique[GroupName] = Field(
+        default=(),
+        description="Groups that it belongs to: group:NAME in a suite or after --models stands for "
+        "all of a group, in the order of this file.",
     )
     replay: Annotated[str, Field(min_length=1)] | None = Field(
         default=None,

@@ -40,6 +40,7 @@ _BOUNDS = {
 }
 _PATTERNS = {
     "name": "1 to 64 small letters, digits and hyphens",
+    "groups": "1 to 40 small letters, digits and hyphens",
     "models": "letters, digits and . _ : + -, starting with a letter or digit",
     "api_key_env": "the name of an environment variable: letters, digits, underscores",
 }

@@ -317,3 +317,40 @@ def test_a_detail_that_a_provider_does_not_know_is_refused(
     (problem,) = caught.value.problems
     assert problem.field == "m.image_detail"
     assert allowed in problem.allowed
+
+
+GROUPED = """\
+b: {id: x/b, groups: [big, all]}
+a: {id: x/a, groups: [all]}
+c: x/c
+"""
+
+
+def test_a_group_stands_for_its_models_in_the_order_of_the_file(tmp_path: Path) -> None:
+    known = load(tmp_path, GROUPED)
+    loaded = load_naming(tmp_path, "  - oracle\n  - group:all\n  - a\n  - c\n  - group:big\n")
+    assert list(resolve_models(loaded, known)) == ["oracle", "b", "a", "c"]
+
+
+def test_an_unknown_group_is_pointed_at(tmp_path: Path) -> None:
+    known = load(tmp_path, GROUPED)
+    loaded = load_naming(tmp_path, "  - group:al\n  - c\n")
+    with pytest.raises(SpecError) as caught:
+        resolve_models(loaded, known)
+    (problem,) = caught.value.problems
+    assert problem.where == f"{tmp_path / 's.yaml'}:3:5"
+    assert problem.message == "is no group of the models file"
+    assert problem.hint == "did you mean group:all?"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("group:a: x/a\n", "begins with group:, which names groups"),
+        ("a: {id: x/a, groups: [Big]}\n", "has characters that are not allowed"),
+        ("a: {id: x/a, groups: [b, b]}\n", "stands twice"),
+    ],
+)
+def test_what_cannot_be_a_group_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    (problem,) = problems_of(tmp_path, text)
+    assert said in problem.message
