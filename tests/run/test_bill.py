@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from contextlib import ExitStack
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -17,8 +18,16 @@ from phyblock.run.estimate import Estimate, estimate
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.specs import load_models, load_suite
 from tests.models.routes import ROUTES
-from tests.servers.billing import COMPLETION, PROVIDERS, Billing, o200k_tokens
-from tests.servers.chassis import Running
+from tests.servers.billing import (
+    COMPLETION,
+    PROVIDERS,
+    Billing,
+    BillingOpenAI,
+    o200k_tokens,
+    tile_tokens,
+)
+from tests.servers.chassis import Running, Seen
+from tests.servers.step_agent import said
 from tests.vqa_set import questions, write_questions
 from tests.workspace import Workspace
 
@@ -128,3 +137,28 @@ def test_texts_count_as_the_public_vocabulary_does(workspace: Workspace, track: 
     ]
     counted = sum(text_tokens("openai/m", text) for text in texts)
     assert counted == pytest.approx(sum(map(o200k_tokens, texts)), rel=0.02)
+
+
+class BillingAgent(BillingOpenAI):
+    """Plays episodes, and bills each turn."""
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        body = super().reply(seen, ending)
+        body["choices"][0]["message"]["content"] = said(seen)
+        return body
+
+
+def test_episodes_are_billed_no_more_than_a_dry_run_expects(workspace: Workspace) -> None:
+    server = BillingAgent(o200k_tokens, tile_tokens, 3)
+    with Running(server) as running:
+        entry = {"id": "openai/gpt-4o-2024-08-06", "api_base": f"{running.url}/v1", "price": PRICE}
+        workspace.write_yaml("models.yaml", {"m": entry})
+        workspace.write_scenes()
+        workspace.write_suite(tracks=["step_planning"], models=["m"])
+        (row,) = estimate(planned(workspace), workspace.out, use_cache=False)
+        done = workspace.run("--yes")
+    assert done.code == 0, done
+    assert len(server.billed) <= row.calls
+    assert sum(server.billed) <= row.prompt_tokens * (1 + WITHIN)
+    a_call, expected = sum(server.billed) / len(server.billed), row.prompt_tokens / row.calls
+    assert a_call == pytest.approx(expected, rel=WITHIN)
