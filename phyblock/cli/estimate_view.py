@@ -52,7 +52,7 @@ def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> 
         console.print(text, soft_wrap=True, markup=False)
     if left:
         console.print(
-            f"Tokens are estimates: texts by their length, pictures by their providers' rules, "
+            f"Tokens are estimates: texts by their words, pictures by their providers' rules, "
             f"{_replies(left)}; at most: each as long as it can be.",
             style="dim",
             soft_wrap=True,

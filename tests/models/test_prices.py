@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from phyblock.errors import SpecError
 from phyblock.models import (
+    Budget,
     Estimate,
     ModelConfig,
     Price,
@@ -272,3 +273,20 @@ def test_no_more_is_cached_than_the_prompt_holds(
     assert (read.cached_tokens or 0) >= 0
     assert (read.cache_write_tokens or 0) >= 0
     assert (read.cached_tokens or 0) + (read.cache_write_tokens or 0) <= (read.prompt_tokens or 0)
+
+
+def test_a_reply_costs_what_its_day_asks_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    from_then = Tariff((Rate(Price(20.0, 200.0)),), DAY + timedelta(days=1))
+    known = Prices((Tariff((Rate(Price(10.0, 100.0)),)), from_then))
+    paid = []
+    with Running(OpenAIChat()) as running:
+        config = ROUTES["direct"].config(running.url, prices=known)
+        for days in (0, 1):
+            day = DAY + timedelta(days=days)
+            monkeypatch.setattr("phyblock.models.chat.today", lambda day=day: day)
+            budget = Budget(1.0)
+            reply = reply_of(make_model(config, budget=budget), make_request())
+            paid.append(reply.cost_usd)
+            assert budget.spent_usd == pytest.approx(reply.cost_usd)
+    assert paid == pytest.approx([0.014, 0.028])
