@@ -116,6 +116,9 @@ class Billing(LocalServer):
         a_message: int = 0,
     ) -> None:
         super().__init__()
+        # Vocabularies are read here, not by the thread that serves: while it imports what reads
+        # them, litellm finds that half imported.
+        text_tokens("")
         self.billed: list[int] = []
         self._text_tokens, self._picture_tokens = text_tokens, picture_tokens
         self._a_message = a_message
