@@ -137,6 +137,8 @@ def _litellm() -> types.ModuleType:
         from phyblock.models.litellm_wire import install
 
         install()
+        # The import made clients of its own, which calls with its usual timeout would be given.
+        litellm.in_memory_llm_clients_cache.flush_cache()
     module: types.ModuleType = litellm
     return module
 
