@@ -2,8 +2,9 @@
 
 from phyblock.specs.groups import GROUP, group_names, unknown_model, with_members
 from phyblock.specs.loading import LoadedSuite, load_suite, resolve_models, suite_tracks
-from phyblock.specs.model import ModelSpec, PriceSpec, RateSpec
+from phyblock.specs.model import ModelSpec
 from phyblock.specs.models_file import load_models
+from phyblock.specs.prices import PriceSpec, RateSpec
 from phyblock.specs.schema import models_schema, suite_schema
 from phyblock.specs.sections import (
     DatasetSpec,

@@ -2,24 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-import re
 from collections.abc import Mapping
-from datetime import date
-from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Discriminator,
-    Field,
-    JsonValue,
-    PrivateAttr,
-    Tag,
-    model_validator,
-)
+from pydantic import AfterValidator, Discriminator, Field, JsonValue, Tag, model_validator
 
 from phyblock.addresses import address_fault
 from phyblock.specs.fields import (
@@ -33,14 +20,14 @@ from phyblock.specs.fields import (
     UniqueSome,
     refuse,
 )
+from phyblock.specs.prices import PriceSpec, PriceSpecs
 from phyblock.specs.sections import SamplingSpec
 from phyblock.words import ImageDetail, SendMode, TransportName
 
-__all__ = ["ModelSpec", "PriceSpec", "RateSpec"]
+__all__ = ["ModelSpec"]
 
 Effort = Literal["none", "minimal", "low", "medium", "high", "xhigh", "max"]
 GroupName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,39}$")]
-UsdPerMillion = Annotated[float, Field(strict=True, ge=0, le=1e9, allow_inf_nan=False)]
 
 _ID_PATTERN = r"^[A-Za-z0-9_.-]+/\S+$"
 _OWNERS = (("gpt", "openai"), ("o1", "openai"), ("o3", "openai"), ("claude", "anthropic"),
@@ -103,92 +90,6 @@ def _check_finite(body: dict[str, JsonValue]) -> dict[str, JsonValue]:
         elif isinstance(value, list):
             stack.extend(((*path, index), item) for index, item in enumerate(value))
     return body
-
-
-def _read_day(value: object) -> date:
-    if isinstance(value, str) and re.fullmatch(r"\d{4}-\d\d-\d\d", value):
-        with contextlib.suppress(ValueError):
-            return date.fromisoformat(value)
-    raise refuse("is no day", allowed="a day such as 2026-12-01")
-
-
-class RateSpec(Section):
-    """What tokens cost."""
-
-    input: UsdPerMillion = Field(description="Prompt tokens [USD per million].")
-    output: UsdPerMillion = Field(description="Reply tokens [USD per million].")
-    cached: UsdPerMillion | None = Field(
-        default=None,
-        description="Prompt tokens that the provider has in its cache [USD per million]; null: as "
-        "the others.",
-    )
-    cache_write: UsdPerMillion | None = Field(
-        default=None,
-        description="Prompt tokens that it puts into its cache [USD per million]; null: as the "
-        "others.",
-    )
-
-
-class TierSpec(RateSpec):
-    """What tokens cost in calls with long prompts."""
-
-    above: Count = Field(description="Prompts of more tokens than this.")
-
-
-def _check_rising(tiers: tuple[TierSpec, ...]) -> tuple[TierSpec, ...]:
-    for index, (tier, following) in enumerate(pairwise(tiers), start=1):
-        if following.above <= tier.above:
-            raise refuse("is not above the one before it", at=(index, "above"))
-    return tiers
-
-
-class PriceSpec(RateSpec):
-    """What a model costs, where litellm's price map does not know it or is wrong."""
-
-    since: Annotated[date, BeforeValidator(_read_day)] | None = Field(
-        default=None,
-        alias="from",
-        description="Day from which this holds (UTC). Before the first one that is named, "
-        "litellm's price map does.",
-    )
-    tiers: Annotated[tuple[TierSpec, ...], AfterValidator(_check_rising)] = Field(
-        default=(), description="Other prices of calls with long prompts, by rising `above`."
-    )
-    _place: str = PrivateAttr(default="")
-
-    def __eq__(self, other: object) -> bool:
-        # Where a price is written is no part of it.
-        return isinstance(other, PriceSpec) and self.__dict__ == other.__dict__
-
-    def __hash__(self) -> int:
-        return hash(tuple(self.__dict__.values()))
-
-    @property
-    def place(self) -> str:
-        """The file and line that say so, "" where none is known."""
-        return self._place
-
-    def stands_at(self, place: str) -> None:
-        """Note the file and line that say so."""
-        self._place = place
-
-
-def _check_days(prices: tuple[PriceSpec, ...]) -> tuple[PriceSpec, ...]:
-    for index, (price, following) in enumerate(pairwise(prices), start=1):
-        if following.since is None or (price.since is not None and following.since <= price.since):
-            message = "does not say from which later day on it holds"
-            raise refuse(message, at=(index,), hint="for example from: 2026-12-01")
-    return prices
-
-
-PriceSpecs = Annotated[
-    Annotated[PriceSpec, Tag("one")]
-    | Annotated[
-        tuple[PriceSpec, ...], Field(min_length=1), AfterValidator(_check_days), Tag("list")
-    ],
-    Discriminator(lambda value: "list" if isinstance(value, list | tuple) else "one"),
-]
-"""One price, or several that follow on one another."""
 
 
 class ModelSpec(Section):

@@ -72,7 +72,9 @@ def test_no_client_is_imported_before_a_call_is_sent(tmp_path: Path, code: str) 
     assert python(code + IMPORTED, str(tmp_path / "c.sqlite")).stdout == "[]\n"
 
 
-def test_litellm_reads_no_key_file_says_nothing_and_sends_through_our_client(tmp_path: Path) -> None:
+def test_litellm_reads_no_key_file_says_nothing_and_sends_through_our_client(
+    tmp_path: Path,
+) -> None:
     (tmp_path / ".env").write_text("FROM_DOTENV=1\nGEMINI_API_KEY=sk-from-a-file-12345\n")
     with Running(GeminiGenerate()) as running:
         done = python(SENDING, str(tmp_path), running.url)
