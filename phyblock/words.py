@@ -23,6 +23,7 @@ __all__ = [
     "DataFormat",
     "Finish",
     "Gating",
+    "ImageDetail",
     "Level1Criterion",
     "Matcher",
     "MissingPolicy",
@@ -96,3 +97,5 @@ Outcome = Literal["ok", "parse_failure", "refusal", "truncated", "api_error", "m
 TransportName = Literal["auto", "litellm", "direct"]
 SendMode = Literal["auto", "always", "never"]
 """Whether a field that not every provider takes is sent."""
+ImageDetail = Literal["auto", "low", "medium", "high", "ultra_high", "original"]
+"""How closely a provider looks at pictures; each knows some of these."""

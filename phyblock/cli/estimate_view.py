@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from rich.console import Console
 
 from phyblock.cli.console import print_view
+from phyblock.models import Price
 from phyblock.report import NO_VALUE, Column, TextTable
 from phyblock.run.estimate import Estimate
 from phyblock.run.plan import RunPlan
@@ -46,24 +47,63 @@ def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> 
     )
     columns = tuple(Column(name, is_text=name in _TEXTS) for name in _HEADINGS)
     print_view(console, TextTable(caption, columns, cells))
-    calls = sum(row.calls for row in rows)
-    known = sum(row.cost_usd or 0.0 for row in rows)
-    unknown = [row.model for row in rows if row.calls and row.cost_usd is None]
-    priced = len(unknown) < sum(row.calls > 0 for row in rows) or not unknown
-    costs = [f"about {_dollars(known)}"] if priced else []
-    if unknown:
-        costs.append(
-            f"unknown cost of {_counted(len(unknown), 'model')} (give a price in models.yaml)"
-        )
-    text = f"{_counted(calls, 'call')}, {' and '.join(costs)}."
-    console.print(text, soft_wrap=True, markup=False)
-    if calls:
+    left = [row for row in rows if row.calls]
+    for text in (_sum(left), *_prices(left)):
+        console.print(text, soft_wrap=True, markup=False)
+    if left:
         console.print(
-            "Tokens are estimates: 4 characters a token, pictures by their providers' rules, "
-            "replies of usual length; at most: each as long as it can be.",
+            f"Tokens are estimates: texts by their words, pictures by their providers' rules, "
+            f"{_replies(left)}; at most: each as long as it can be.",
             style="dim",
             soft_wrap=True,
         )
+
+
+def _sum(rows: Sequence[Estimate]) -> str:
+    known = [row for row in rows if row.cost_usd is not None]
+    costs = []
+    if known or not rows:
+        prompts, replies = (
+            _dollars(sum(usd or 0.0 for usd in part))
+            for part in ([row.prompt_usd for row in known], [row.reply_usd for row in known])
+        )
+        whole = _dollars(sum(row.cost_usd or 0.0 for row in known))
+        parts = f" (prompts {prompts}, replies {replies})" if known else ""
+        costs = [f"about {whole}{parts}"]
+    if unknown := len(rows) - len(known):
+        costs.append(f"unknown cost of {_counted(unknown, 'model')} (give a price in models.yaml)")
+    return f"{_counted(sum(row.calls for row in rows), 'call')}, {' and '.join(costs)}."
+
+
+def _prices(rows: Sequence[Estimate]) -> Iterator[str]:
+    """Where prices are from, and which will be others within days."""
+    by_source: dict[str, list[str]] = {}
+    for row in rows:
+        if row.tariff is not None and row.tariff.source:
+            by_source.setdefault(row.tariff.source, []).append(row.model)
+    if by_source:
+        said = [f"{source} ({', '.join(models)})" for source, models in by_source.items()]
+        yield f"Prices of {rows[0].day}: {'; '.join(said)}."
+    for row in rows:
+        coming = row.next_tariff
+        if coming is not None and row.tariff is not None:
+            now, then = (_a_million(tariff.at(0)) for tariff in (row.tariff, coming))
+            yield f"From {coming.since} on {row.model} costs {then} in place of {now}."
+
+
+def _a_million(price: Price) -> str:
+    return f"${price.input_usd:g} in and ${price.output_usd:g} out per million tokens"
+
+
+def _replies(rows: Sequence[Estimate]) -> str:
+    """How long replies are taken to be."""
+    measured = [
+        f"of {row.model} {row.mean_reply_tokens:,.0f} tokens (the mean of {row.replies:,})"
+        for row in rows
+        if row.mean_reply_tokens is not None
+    ]
+    usual = ["of usual length"] if len(measured) < len(rows) else []
+    return f"replies {', '.join((*measured, *usual))}"
 
 
 def _ways(plan: RunPlan) -> str:

@@ -22,13 +22,22 @@ from phyblock.models import (
     api_key_status,
     ends_on,
     is_unlisted,
-    price_of,
+    prices_of,
+    today,
 )
 from phyblock.registry import baseline_names
 from phyblock.report import NO_VALUE
 from phyblock.run.check import check_model
 from phyblock.run.models import to_config
-from phyblock.specs import ModelSpec, SuiteSpec, did_you_mean, load_models
+from phyblock.specs import (
+    GROUP,
+    ModelSpec,
+    SuiteSpec,
+    did_you_mean,
+    group_names,
+    load_models,
+    with_members,
+)
 
 __all__ = ["command"]
 
@@ -46,7 +55,7 @@ _WIDE = 130
 )
 @click.pass_context
 def command(ctx: click.Context, models_file: str | None, retiring: bool) -> None:
-    """List the models that suites may name; `check NAME` makes one tiny call."""
+    """List the models that suites may name, by groups; `check NAME` makes one tiny call."""
     path = find_models_file(models_file, None)
     ctx.obj = load_models(path)
     if ctx.invoked_subcommand is not None:
@@ -55,17 +64,31 @@ def command(ctx: click.Context, models_file: str | None, retiring: bool) -> None
     if retiring:
         _show_retiring(console, [_config(name, ctx.obj) for name in ctx.obj])
         return
-    names = [*baseline_names(), *ctx.obj]
-    rows = [_row(name, _config(name, ctx.obj)) for name in names]
-    if console.width < _WIDE:
-        rows = [(name, model_id, key) for name, _, model_id, key, *_ in rows]
-        console.print(plain_table(("model", "id", "key"), rows, numbers=0))
-    else:
-        headings = ("model", "kind", "id", "key", "$/M in", "$/M out")
-        console.print(plain_table(headings, rows, numbers=2))
+    for title, names in _by_group(ctx.obj):
+        _show(console, title, [_row(name, _config(name, ctx.obj)) for name in names])
     console.print(
         f"{counted(len(ctx.obj), 'model')} in {shown_path(path)}", soft_wrap=True, markup=False
     )
+
+
+def _by_group(known: dict[str, ModelSpec]) -> Iterator[tuple[str, Sequence[str]]]:
+    """Baselines, then the models of each group, then those of none; one of several groups stands in
+    each.
+    """
+    yield "built in", baseline_names()
+    for group in group_names(known):
+        yield f"{GROUP}{group}", with_members([f"{GROUP}{group}"], known)
+    if others := [name for name, spec in known.items() if not spec.groups]:
+        yield "in no group" if len(others) < len(known) else "models", others
+
+
+def _show(console: Console, title: str, rows: Sequence[tuple[str, ...]]) -> None:
+    if console.width < _WIDE:
+        rows = [(name, model_id, key) for name, _, model_id, key, *_ in rows]
+        console.print(plain_table((title, "id", "key"), rows, numbers=0))
+    else:
+        headings = (title, "kind", "id", "key", "$/M in", "$/M out")
+        console.print(plain_table(headings, rows, numbers=2))
 
 
 @command.command("check")
@@ -146,7 +169,8 @@ def _row(name: str, config: ModelConfig) -> tuple[str, ...]:
         key = "set"
     else:
         key = f"needs {status.variables[0]}" if status.is_needed else "not needed"
-    price = price_of(config)
+    known = prices_of(config)
+    price = None if known is None else known.at(today())
     prices = (
         ("unknown", "unknown") if price is None else (_usd(price.input_usd), _usd(price.output_usd))
     )

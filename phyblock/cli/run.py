@@ -46,7 +46,8 @@ _INTERRUPTED = 130
 @click.option(
     "--models",
     metavar="A,B",
-    help="Run these models in place of the suite's: any of models.yaml or the baselines.",
+    help="Run these models in place of the suite's: any of models.yaml, group:NAME for all of a "
+    "group, or the baselines.",
 )
 @click.option(
     "--limit", type=click.IntRange(min=1), metavar="N", help="Run N scenes, spread over levels."

@@ -15,7 +15,7 @@ from phyblock.models.base import (
 from phyblock.models.breaker import Breakers
 from phyblock.models.build import build_model
 from phyblock.models.cache import CacheStats, ReplyCache, former_key, known_keys, reply_key
-from phyblock.models.config import Kind, ModelConfig, Price
+from phyblock.models.config import Kind, ModelConfig
 from phyblock.models.cost import (
     Budget,
     Estimate,
@@ -23,13 +23,14 @@ from phyblock.models.cost import (
     estimate,
     is_billed,
     most_usd,
-    price_of,
+    prices_of,
 )
 from phyblock.models.events import ModelEvent, Observer, Tell
 from phyblock.models.formats import takes_format
 from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import KeyStatus, api_key_status, server_address
 from phyblock.models.limits import Gate
+from phyblock.models.prices import Price, Prices, Rate, Tariff, today
 from phyblock.models.raw_replies import RawReply, read_raw_reply
 from phyblock.models.retirement import ends_on, is_unlisted
 from phyblock.models.retry import RetryPolicy
@@ -52,12 +53,15 @@ __all__ = [
     "ModelEvent",
     "Observer",
     "Price",
+    "Prices",
+    "Rate",
     "RawReply",
     "Reply",
     "ReplyCache",
     "Request",
     "RetryPolicy",
     "SharedCache",
+    "Tariff",
     "Tell",
     "Usage",
     "addresses_of",
@@ -71,9 +75,10 @@ __all__ = [
     "is_unlisted",
     "known_keys",
     "most_usd",
-    "price_of",
+    "prices_of",
     "read_raw_reply",
     "reply_key",
     "server_address",
     "takes_format",
+    "today",
 ]

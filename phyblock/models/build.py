@@ -8,7 +8,7 @@ from phyblock.models.baselines import BaselineModel
 from phyblock.models.breaker import Breakers
 from phyblock.models.chat import ChatModel, ChatParts
 from phyblock.models.config import ModelConfig
-from phyblock.models.cost import Budget, price_of, require_price
+from phyblock.models.cost import Budget, prices_of, require_prices
 from phyblock.models.direct_call import DirectTransport
 from phyblock.models.events import Observer, ignore_event
 from phyblock.models.halt import Halt
@@ -58,7 +58,7 @@ def build_model(
         limiter=ModelLimiter(replicas.width, overall, config.rpm, config.tpm),
         cache=cache,
         budget=budget,
-        price=price_of(config) if budget is None else require_price(config),
+        prices=prices_of(config) if budget is None else require_prices(config),
         policy=policy,
         secrets=secrets,
         observer=observer,

@@ -18,7 +18,7 @@ from phyblock.errors import (
 from phyblock.models.base import Reply, Request
 from phyblock.models.breaker import shows_outage
 from phyblock.models.cache import known_keys, reply_key
-from phyblock.models.config import ModelConfig, Price
+from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, Estimate, cost_usd, estimate, plausible
 from phyblock.models.events import EventKind, ModelEvent, Observer
 from phyblock.models.formats import FORMAT_HINT, refuses_format
@@ -27,6 +27,7 @@ from phyblock.models.keys import hidden
 from phyblock.models.limits import ModelLimiter, Slot
 from phyblock.models.pace import Mark, is_late, says_too_much
 from phyblock.models.payload import wire_params
+from phyblock.models.prices import Prices, today
 from phyblock.models.replicas import Replica, Replicas
 from phyblock.models.retry import RetryPolicy, is_success, with_retries
 from phyblock.models.shared_cache import SharedCache, Turn
@@ -43,7 +44,7 @@ class ChatParts:
     limiter: ModelLimiter
     cache: SharedCache | None
     budget: Budget | None
-    price: Price | None
+    prices: Prices | None
     policy: RetryPolicy
     secrets: Sequence[str]
     observer: Observer
@@ -85,7 +86,7 @@ class ChatModel:
     async def ask(self, request: Request) -> Reply:
         """The cached reply, or a new one, which is then cached if it is whole.
 
-        `cost_usd` of a cached reply is what it cost when it was new. Raises what the model seam
+        `cost_usd` of a cached reply is what it would cost today. Raises what the model seam
         says, BudgetReachedError when the call does not fit, HaltedError when the run ends before it
         is sent.
         """
@@ -96,7 +97,7 @@ class ChatModel:
             with self._parts.halt.giving_up():
                 kept = await self._kept(cache, key, request)
             if kept is not None:
-                return replace(kept, cost_usd=cost_usd(self._parts.price, kept.usage))
+                return replace(kept, cost_usd=self._cost(kept))
         return await self._ask_new(_Question(request, key, estimate(self._config, request)))
 
     async def _kept(self, cache: SharedCache, key: str, request: Request) -> Reply | None:
@@ -282,8 +283,8 @@ class ChatModel:
         A failure that may have been billed counts in full; a model that is found unable before
         anything is sent costs nothing.
         """
-        budget, price = self._parts.budget, self._parts.price
-        if budget is None or price is None:
+        budget, prices = self._parts.budget, self._parts.prices
+        if budget is None or prices is None:
             question.sent += 1
             return _counted(await replica.transport.send(call), question)
         held: int | None = None
@@ -291,12 +292,12 @@ class ChatModel:
         try:
             with self._parts.halt.giving_up():
                 held = await budget.reserve(
-                    lambda: budget.most_usd(self.name, price, question.expected)
+                    lambda: budget.most_usd(self.name, prices, question.expected, today())
                 )
             spent_usd = None
             question.sent += 1
             reply = _counted(await replica.transport.send(call), question)
-            spent_usd = cost_usd(price, reply.usage)
+            spent_usd = self._cost(reply)
             budget.learn(self.name, question.expected, reply.usage)
             return reply
         except (SeedRefusedError, UnavailableError):
@@ -318,7 +319,7 @@ class ChatModel:
         """A reply that another brought, with what attempts of our own had cost before."""
         return replace(
             kept,
-            cost_usd=cost_usd(self._parts.price, kept.usage),
+            cost_usd=self._cost(kept),
             billed_usd=question.billed_usd,
             attempts=question.sent,
         )
@@ -329,10 +330,14 @@ class ChatModel:
             reply,
             text=hidden(reply.text, secrets, guess=False),
             reasoning=hidden(reply.reasoning, secrets, guess=False),
-            cost_usd=cost_usd(self._parts.price, reply.usage),
+            cost_usd=self._cost(reply),
             billed_usd=question.billed_usd,
             attempts=question.sent,
         )
+
+    def _cost(self, reply: Reply) -> float | None:
+        """US dollars of a reply that comes today."""
+        return cost_usd(self._parts.prices, reply.usage, today())
 
     def _on_retry(self, error: RetryableError, wait_s: float) -> None:
         self._tell("retry", str(error), wait_s=wait_s, status=error.status)

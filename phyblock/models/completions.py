@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 
 from phyblock.errors import ModelError, RetryableError
 from phyblock.models.base import Reply, Usage
@@ -55,7 +56,12 @@ def _believed(usage: Usage, text: str, reasoning: str) -> Usage:
     )
     if completion == 0 and (prompt is None or text or reasoning):
         completion = None
-    return Usage(prompt, completion, None if thoughts == 0 and reasoning else thoughts)
+    return replace(
+        usage,
+        prompt_tokens=prompt,
+        completion_tokens=completion,
+        reasoning_tokens=None if thoughts == 0 and reasoning else thoughts,
+    )
 
 
 def _found(body: object) -> str:

@@ -10,14 +10,14 @@ from typing import Literal
 
 from phyblock.addresses import address_fault
 from phyblock.errors import Problem, SpecError
-from phyblock.words import SendMode, TransportName
+from phyblock.models.prices import Prices
+from phyblock.words import ImageDetail, SendMode, TransportName
 
 __all__ = [
     "DIRECT_PROVIDERS",
     "LARGEST_REPLY_BYTES",
     "Kind",
     "ModelConfig",
-    "Price",
 ]
 
 Kind = Literal["litellm", "replay", "baseline"]
@@ -35,14 +35,6 @@ _RENAMES_PARAMETERS = re.compile(r"o\d|gpt-5")
 
 
 @dataclass(frozen=True)
-class Price:
-    """US dollars per million tokens."""
-
-    input_usd: float
-    output_usd: float
-
-
-@dataclass(frozen=True)
 class ModelConfig:
     """One model.
 
@@ -53,12 +45,13 @@ class ModelConfig:
     holds the key; None means the provider's usual one. `params` are sampling parameters by their
     OpenAI names; they win over a request's, and None there means "do not send". Requests under way
     at once are `max_concurrency`, or where it `adapts` as many as its servers are found to answer
-    well, and no more than that. `rpm` and `tpm` are limits a minute, None for none. `price` None
-    means litellm's price map is asked. `sends_seed`: `auto` sends seeds until the provider refuses,
+    well, and no more than that. `rpm` and `tpm` are limits a minute, None for none. `prices` None
+    means litellm's map is asked. `sends_seed`: `auto` sends seeds until the provider refuses,
     `always` takes a refusal as an error, `never` sends none. `revision` tells apart models of one
     id, as other weights behind another address. With `sends_format` a request's `response_format`
-    is sent, without it the prompt alone says the form. `timeout_s` bounds a request from its first
-    byte to the last of its answer, `most_body_bytes` that answer's body, packed and unpacked.
+    is sent, without it the prompt alone says the form. `image_detail` is how closely pictures are
+    looked at, None as the provider does. `timeout_s` bounds a request from its first byte to the
+    last of its answer, `most_body_bytes` that answer's body, packed and unpacked.
 
     Raises SpecError for an address that is none, or that holds a key or a password.
     """
@@ -77,11 +70,12 @@ class ModelConfig:
     adapts: bool = False
     rpm: int | None = None
     tpm: int | None = None
-    price: Price | None = None
+    prices: Prices | None = None
     recording: Path | None = None
     sends_seed: SendMode = "auto"
     revision: str | None = None
     sends_format: bool = False
+    image_detail: ImageDetail | None = None
     timeout_s: float = 600.0
     most_body_bytes: int = LARGEST_REPLY_BYTES
 
@@ -150,4 +144,6 @@ class ModelConfig:
             identity["revision"] = self.revision
         if self.sends_format:
             identity["response_format"] = True
+        if self.image_detail is not None:
+            identity["image_detail"] = self.image_detail
         return identity

@@ -1,27 +1,26 @@
 """What calls cost: prices, estimates before a call, and a budget that is not passed.
 
-Prices come from models.yaml, else from the price map inside the installed litellm, read as a file
-so that nothing heavy is imported. Where neither knows a model its cost is None, "unknown".
+Prices come from models.yaml, else from litellm's map of models. Where neither knows a model its
+cost is None, "unknown".
 """
 
 from __future__ import annotations
 
 import asyncio
-import functools
-import importlib.util
-import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from datetime import date, timedelta
 
 from phyblock.errors import BudgetReachedError, Problem, SpecError
 from phyblock.models.base import Image, Request, Usage
-from phyblock.models.config import ModelConfig, Price
+from phyblock.models.config import ModelConfig
 from phyblock.models.keys import KEYLESS
 from phyblock.models.payload import wire_params
 from phyblock.models.picture_tokens import picture_tokens
+from phyblock.models.price_map import map_entry, mapped_prices
+from phyblock.models.prices import FREE, Prices, today
+from phyblock.models.text_tokens import text_tokens
 
 __all__ = [
     "Budget",
@@ -29,21 +28,17 @@ __all__ = [
     "cost_usd",
     "estimate",
     "is_billed",
-    "map_entry",
     "most_usd",
     "plausible",
-    "price_of",
-    "require_price",
+    "prices_of",
+    "require_prices",
 ]
 
-_PRICE_MAP = "model_prices_and_context_window_backup.json"
-_CHARS_PER_TOKEN = 4
 _TYPICAL_REPLY_TOKENS = 500
 _TYPICAL_THINKING_TOKENS = 4_000
 _ROOM_TO_THINK_TOKENS = 8_192
 _LONGEST_REPLY_TOKENS = 32_768
 _PROMPT_MARGIN = 1.5
-_PER_MILLION = 1_000_000
 _MOST_TIMES_EXPECTED = 100
 _LEAST_EXPECTED_TOKENS = 1_000
 
@@ -52,7 +47,7 @@ _LEAST_EXPECTED_TOKENS = 1_000
 class Estimate:
     """Tokens of a call that was not made yet.
 
-    `prompt_tokens`: a token per four characters, and pictures by their providers' rules;
+    `prompt_tokens`: texts by their words, and pictures by their providers' rules;
     `completion_tokens`: a usual reply, with thoughts where the model is told to think or has room
     for them; `most_completion_tokens`: the longest possible.
     """
@@ -67,73 +62,76 @@ class Estimate:
         return Usage(self.prompt_tokens, self.completion_tokens)
 
 
-def price_of(config: ModelConfig) -> Price | None:
-    """Price of a model; None when it is not known. Baselines and recordings cost nothing."""
+def prices_of(config: ModelConfig) -> Prices | None:
+    """Prices of a model: its own, before their first day those of litellm's map; None where neither
+    knows any. Baselines and recordings cost nothing.
+    """
     if config.kind != "litellm":
-        return Price(0.0, 0.0)
-    if config.price is not None:
-        return config.price
-    entry = map_entry(config)
-    if "input_cost_per_token" not in entry or "output_cost_per_token" not in entry:
-        return None
-    return Price(
-        float(entry["input_cost_per_token"]) * _PER_MILLION,
-        float(entry["output_cost_per_token"]) * _PER_MILLION,
-    )
+        return FREE
+    mapped = mapped_prices(config)
+    return mapped if config.prices is None else config.prices.after(mapped)
 
 
-def require_price(config: ModelConfig) -> Price:
-    """Price of a model under a cost limit; SpecError when it is not known."""
-    price = price_of(config)
-    if price is None:
+def require_prices(config: ModelConfig) -> Prices:
+    """Prices of a model under a cost limit; SpecError when today's is not known."""
+    prices = prices_of(config)
+    if prices is None or prices.on(today()) is None:
         hint = "give it a price in models.yaml, or run without max_cost_usd"
         message = "has no known price, so that max_cost_usd cannot be kept"
         raise SpecError(Problem(f"model {config.name}", message, "price", config.id, hint=hint))
-    return price
+    return prices
 
 
 def is_billed(config: ModelConfig) -> bool:
     """Whether somebody may be billed for calls: not where the price is 0, nor by a server of one's
     own to which no price and no key was given.
     """
-    price = price_of(config)
-    if price is None:
+    prices = prices_of(config)
+    if prices is None:
         return config.provider not in KEYLESS or config.api_key_env is not None
-    return price != Price(0.0, 0.0)
+    return not prices.is_free
 
 
-def cost_usd(price: Price | None, usage: Usage) -> float | None:
-    """US dollars of a call; None when the price or the tokens are not known."""
-    if price is None:
-        return None
-    if price == Price(0.0, 0.0):
-        return 0.0
-    if usage.prompt_tokens is None or usage.completion_tokens is None:
-        return None
-    spent = usage.prompt_tokens * price.input_usd + usage.completion_tokens * price.output_usd
-    return spent / _PER_MILLION
+def cost_usd(
+    prices: Prices | None, usage: Usage, day: date, *, batched: bool = False
+) -> float | None:
+    """US dollars of a call that was made on a day; None when the price or the tokens are not known.
+
+    By the length of the prompt the price may be another; what came out of the provider's cache, or
+    went into it, has a price of its own. `batched` calls cost what the provider takes for those.
+    """
+    price = None if prices is None else prices.at(day, usage.prompt_tokens or 0, batched=batched)
+    return None if price is None else price.cost(usage)
 
 
-def most_usd(price: Price, expected: Estimate, ratio: float = 1.0) -> float:
+def most_usd(
+    prices: Prices, expected: Estimate, day: date, ratio: float = 1.0, *, batched: bool = False
+) -> float:
     """The most US dollars that a call can cost, its prompt `ratio` times its estimate.
 
-    There is a margin on the prompt, as its tokens are estimated.
+    There is a margin on the prompt, as its tokens are estimated, and a day: a call that is sent
+    before midnight may be answered after it.
     """
     prompt = expected.prompt_tokens * _PROMPT_MARGIN * ratio
-    spent = prompt * price.input_usd + expected.most_completion_tokens * price.output_usd
-    return spent / _PER_MILLION
+    days = (day, day + timedelta(days=1))
+    known = [prices.at(one, math.ceil(prompt), batched=batched) for one in days]
+    return max(p.most(prompt, expected.most_completion_tokens) for p in known if p is not None)
 
 
 def estimate(config: ModelConfig, request: Request) -> Estimate:
     """Tokens that the request would take."""
     parts = [part for message in request.messages for part in message.parts]
-    text = sum(len(part) for part in parts if isinstance(part, str))
-    pictures = sum(picture_tokens(config.id, part) for part in parts if isinstance(part, Image))
+    texts = sum(text_tokens(config.id, part) for part in parts if isinstance(part, str))
+    pictures = sum(
+        picture_tokens(config.id, part, config.image_detail)
+        for part in parts
+        if isinstance(part, Image)
+    )
     params = wire_params(config, request)
     given = params.get("max_completion_tokens", params.get("max_tokens"))
     known = map_entry(config).get("max_output_tokens")
     most = next((n for n in (given, known) if isinstance(n, int)), _LONGEST_REPLY_TOKENS)
-    prompt = math.ceil(text / _CHARS_PER_TOKEN) + pictures
+    prompt = math.ceil(texts) + pictures
     thinks = params.get("reasoning_effort", "none") != "none" or (
         isinstance(given, int) and given > _ROOM_TO_THINK_TOKENS
     )
@@ -153,37 +151,17 @@ def plausible(usage: Usage, expected: Estimate, *, said_something: bool) -> Usag
         usage.completion_tokens, int(said_something), expected.most_completion_tokens
     )
     reasoning = _plausible(usage.reasoning_tokens, 0, expected.most_completion_tokens)
-    return Usage(prompt, completion, reasoning)
+    cached = _plausible(usage.cached_tokens, 0, expected.prompt_tokens)
+    written = _plausible(usage.cache_write_tokens, 0, expected.prompt_tokens)
+    if (cached or 0) + (written or 0) > (prompt or 0):
+        cached = written = None
+    return Usage(prompt, completion, reasoning, cached, written)
 
 
 def _plausible(count: int | None, least: int, expected: int) -> int | None:
     most = _MOST_TIMES_EXPECTED * max(expected, _LEAST_EXPECTED_TOKENS)
     is_count = isinstance(count, int) and not isinstance(count, bool)
     return count if is_count and least <= (count or 0) <= most else None
-
-
-@functools.cache
-def _price_map() -> dict[str, dict[str, Any]]:
-    spec = importlib.util.find_spec("litellm")
-    if spec is None or spec.origin is None:
-        return {}
-    path = Path(spec.origin).with_name(_PRICE_MAP)
-    if not path.is_file():
-        return {}
-    entries: dict[str, dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))
-    return entries
-
-
-def map_entry(config: ModelConfig) -> dict[str, Any]:
-    """What litellm's map says of a model, by full id, or by bare name where the provider is the
-    same; empty where it does not know it.
-    """
-    entries = _price_map()
-    if config.id in entries:
-        return entries[config.id]
-    entry = entries.get(config.provider_model, {})
-    owner = str(entry.get("litellm_provider", ""))
-    return entry if config.provider and owner.startswith(config.provider) else {}
 
 
 class Budget:
@@ -212,9 +190,9 @@ class Budget:
         """The limit."""
         return self._max_usd
 
-    def most_usd(self, model: str, price: Price, expected: Estimate) -> float:
+    def most_usd(self, model: str, prices: Prices, expected: Estimate, day: date) -> float:
         """The most that a call can cost, as far as the model is known by now."""
-        return most_usd(price, expected, self._ratio.get(model, 1.0))
+        return most_usd(prices, expected, day, self._ratio.get(model, 1.0))
 
     async def reserve(self, most_usd: Callable[[], float]) -> int:
         """Hold the most that a call can cost, waiting for calls under way to settle; returns the

@@ -61,4 +61,5 @@ class DirectTransport(GuardedTransport):
             "Content-Type": "application/json",
             **extra_headers,
         }
-        return json_body({**fields, **extra_body}, call.messages), headers
+        body = json_body({**fields, **extra_body}, call.messages, self._config.image_detail)
+        return body, headers

@@ -6,7 +6,7 @@ import re
 
 from phyblock.errors import ModelError, RefusedError
 from phyblock.models.config import DIRECT_PROVIDERS, ModelConfig
-from phyblock.models.cost import map_entry
+from phyblock.models.price_map import map_entry
 
 __all__ = ["FORMAT_HINT", "refuses_format", "takes_format"]
 

@@ -63,11 +63,14 @@ _ADDRESS_VARIABLES: Mapping[str, tuple[str, ...]] = {
             "hosted_vllm",
             "llamafile",
             "lm_studio",
+            "meta",
             "moonshot",
+            "novita",
             "ollama",
             "openrouter",
             "together_ai",
             "xai",
+            "zai",
         )
     },
 }

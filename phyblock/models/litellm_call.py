@@ -80,7 +80,7 @@ class LitellmTransport(GuardedTransport):
         arguments = {
             **call.params,
             "model": self._config.id,
-            "messages": wire_messages(call.messages),
+            "messages": wire_messages(call.messages, self._config.image_detail),
             "timeout": self._config.timeout_s,
             "num_retries": 0,
             "max_retries": 0,
@@ -137,6 +137,8 @@ def _litellm() -> types.ModuleType:
         from phyblock.models.litellm_wire import install
 
         install()
+        # The import made clients of its own, which calls with its usual timeout would be given.
+        litellm.in_memory_llm_clients_cache.flush_cache()
     module: types.ModuleType = litellm
     return module
 

@@ -16,6 +16,7 @@ from typing import Any
 from phyblock.errors import DataError, Problem
 from phyblock.models.base import Image, Message, Request
 from phyblock.models.config import ModelConfig
+from phyblock.words import ImageDetail
 
 __all__ = ["data_uri", "json_body", "mime_type", "wire_messages", "wire_params"]
 
@@ -46,12 +47,19 @@ def data_uri(image: Image) -> str:
     return f"data:{mime_type(image)};base64,{base64.b64encode(image.data).decode('ascii')}"
 
 
-def wire_messages(messages: tuple[Message, ...]) -> list[dict[str, Any]]:
-    """Chat messages, texts and pictures in the order given; a lone text is a plain string."""
-    return _messages(messages, data_uri)
+def wire_messages(
+    messages: tuple[Message, ...], detail: ImageDetail | None
+) -> list[dict[str, Any]]:
+    """Chat messages, texts and pictures in the order given; a lone text is a plain string.
+
+    `detail` is how closely pictures are looked at; None leaves it to the provider.
+    """
+    return _messages(messages, data_uri, detail)
 
 
-def json_body(fields: Mapping[str, Any], messages: tuple[Message, ...]) -> bytes:
+def json_body(
+    fields: Mapping[str, Any], messages: tuple[Message, ...], detail: ImageDetail | None
+) -> bytes:
     """A request body: `messages` in place of that field, beside all others."""
     pictures: list[bytes] = []
 
@@ -60,7 +68,7 @@ def json_body(fields: Mapping[str, Any], messages: tuple[Message, ...]) -> bytes
         return mark
 
     mark = secrets.token_hex(16)
-    body = {**fields, "messages": _messages(messages, placeholder)}
+    body = {**fields, "messages": _messages(messages, placeholder, detail)}
     first, *others = json.dumps(body, allow_nan=False).encode().split(mark.encode())
     pieces = [first]
     for picture, piece in zip(pictures, others, strict=True):
@@ -79,18 +87,17 @@ def wire_params(config: ModelConfig, request: Request) -> dict[str, Any]:
 
 
 def _messages(
-    messages: tuple[Message, ...], url_of: Callable[[Image], str]
+    messages: tuple[Message, ...], url_of: Callable[[Image], str], detail: ImageDetail | None
 ) -> list[dict[str, Any]]:
-    return [{"role": message.role, "content": _content(message, url_of)} for message in messages]
+    def part(part: str | Image) -> dict[str, Any]:
+        if isinstance(part, str):
+            return {"type": "text", "text": part}
+        looked_at = {} if detail is None else {"detail": detail}
+        return {"type": "image_url", "image_url": {"url": url_of(part), **looked_at}}
 
+    def content(message: Message) -> str | list[dict[str, Any]]:
+        if len(message.parts) == 1 and isinstance(message.parts[0], str):
+            return message.parts[0]
+        return [part(each) for each in message.parts]
 
-def _content(message: Message, url_of: Callable[[Image], str]) -> str | list[dict[str, Any]]:
-    if len(message.parts) == 1 and isinstance(message.parts[0], str):
-        return message.parts[0]
-    return [_part(part, url_of) for part in message.parts]
-
-
-def _part(part: str | Image, url_of: Callable[[Image], str]) -> dict[str, Any]:
-    if isinstance(part, str):
-        return {"type": "text", "text": part}
-    return {"type": "image_url", "image_url": {"url": url_of(part)}}
+    return [{"role": message.role, "content": content(message)} for message in messages]

@@ -7,7 +7,7 @@ six shapes of the official outputs and their near relatives.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from phyblock.errors import DataError, Problem
@@ -130,7 +130,7 @@ def _anthropic(raw: object) -> RawReply | None:
         text,
         thoughts,
         finish_of(_get(raw, "stop_reason")),
-        _usage(_get(raw, "usage"), "input_tokens", "output_tokens"),
+        _anthropic_usage(_get(raw, "usage")),
         _text(_get(raw, "model")),
     )
 
@@ -154,6 +154,7 @@ def _gemini(raw: object) -> RawReply | None:
         token_count(_get(counts, "promptTokenCount", "prompt_token_count")),
         token_count(_get(counts, "candidatesTokenCount", "candidates_token_count")),
         token_count(_get(counts, "thoughtsTokenCount", "thoughts_token_count")),
+        token_count(_get(counts, "cachedContentTokenCount", "cached_content_token_count")),
     )
     model = _text(_get(raw, "modelVersion", "model_version"))
     return RawReply("Gemini", text, thoughts, "refusal" if blocked else finish, usage, model)
@@ -227,11 +228,28 @@ def _joined(texts: list[str]) -> str:
 
 def _usage(counts: object, prompt: str, completion: str) -> Usage:
     details = _get(counts, "completion_tokens_details", "output_tokens_details")
+    kept = _get(counts, "prompt_tokens_details", "input_tokens_details")
+    cached = _get(kept, "cached_tokens")
+    if cached is None:
+        cached = _get(counts, "cached_tokens", "prompt_cache_hit_tokens")
     return Usage(
         token_count(_get(counts, prompt)),
         token_count(_get(counts, completion)),
         token_count(_get(details, "reasoning_tokens")),
+        token_count(cached),
+        token_count(_get(kept, "cache_write_tokens", "cache_creation_tokens")),
     )
+
+
+def _anthropic_usage(counts: object) -> Usage:
+    """Anthropic's own counts, where `input_tokens` are those that no cache knows."""
+    usage = _usage(counts, "input_tokens", "output_tokens")
+    cached = token_count(_get(counts, "cache_read_input_tokens"))
+    written = token_count(_get(counts, "cache_creation_input_tokens"))
+    if usage.prompt_tokens is None:
+        return usage
+    prompt = usage.prompt_tokens + (cached or 0) + (written or 0)
+    return replace(usage, prompt_tokens=prompt, cached_tokens=cached, cache_write_tokens=written)
 
 
 def token_count(value: object) -> int | None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from datetime import date
 
 from phyblock.models.config import ModelConfig
-from phyblock.models.cost import map_entry
 from phyblock.models.keys import KEYLESS
+from phyblock.models.price_map import map_entry
 
 __all__ = ["ends_on", "is_unlisted"]
 

@@ -30,6 +30,10 @@ class StoredUsage(Line):
     """Tokens of the reply."""
     reasoning_tokens: Whole | None = None
     """Those of `completion_tokens` that were spent on reasoning."""
+    cached_tokens: Whole | None = None
+    """Those of `prompt_tokens` that the provider had in its prompt cache."""
+    cache_write_tokens: Whole | None = None
+    """Those of `prompt_tokens` that it put into its prompt cache and bills as such."""
 
 
 class StoredReply(Line):

@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from datetime import date, timedelta
 from pathlib import Path
 
 from phyblock.models import Estimate as CallEstimate
 from phyblock.models import (
     ModelConfig,
-    Price,
+    Prices,
+    Reply,
     ReplyCache,
     Request,
-    Usage,
-    cost_usd,
+    Tariff,
     known_keys,
     most_usd,
-    price_of,
+    prices_of,
+    today,
 )
 from phyblock.models import estimate as estimate_call
 from phyblock.records.reading import run_records
@@ -32,29 +34,97 @@ from phyblock.variants import Variant
 __all__ = ["Estimate", "estimate"]
 
 
+_ENOUGH_REPLIES = 20
+"""Replies whose mean length stands for those to come."""
+_SOON = timedelta(days=14)
+
+
 @dataclass
 class Estimate:
-    """What one model would take; dollars are None where the price is not known.
+    """What one model would take; dollars are None where the price of `day` is not known.
 
     `done` samples have a record in the folder, `cached` ones a reply in the cache, `calls` are
-    left to make (none for recordings and baselines, which answer here).
+    left to make (none for recordings and baselines, which answer here). `replies` are those that
+    are there already and tell their tokens, `reply_tokens` in all.
     """
 
     model: str
     kind: str
     samples: int
-    price: Price | None
+    prices: Prices | None
+    day: date
     done: int = 0
     cached: int = 0
     calls: int = 0
     prompt_tokens: int = 0
-    completion_tokens: int = 0
-    most_completion_tokens: int = 0
+    replies: int = 0
+    reply_tokens: int = 0
+    _usual_tokens: int = 0
+    _prompt_usd: float = 0.0
+    _usual_usd: float = 0.0
+    _usd_a_token: float = 0.0
+    _most_usd: float = 0.0
+
+    def add_call(self, expected: CallEstimate) -> None:
+        """Count one call that is left to make."""
+        self.calls += 1
+        self.prompt_tokens += expected.prompt_tokens
+        self._usual_tokens += expected.completion_tokens
+        price = None if self.prices is None else self.prices.at(self.day, expected.prompt_tokens)
+        if self.prices is None or price is None:
+            return
+        self._prompt_usd += price.input_cost(expected.prompt_tokens)
+        self._usual_usd += price.output_cost(expected.completion_tokens)
+        self._usd_a_token += price.output_cost(1)
+        self._most_usd += most_usd(self.prices, expected, self.day)
+
+    def add_reply(self, completion_tokens: int | None) -> None:
+        """Learn from a reply that is there."""
+        if completion_tokens is not None:
+            self.replies += 1
+            self.reply_tokens += completion_tokens
+
+    @property
+    def mean_reply_tokens(self) -> float | None:
+        """Tokens of a reply, where enough are there to tell; else a usual length is taken."""
+        return self.reply_tokens / self.replies if self.replies >= _ENOUGH_REPLIES else None
+
+    @property
+    def completion_tokens(self) -> int:
+        """Tokens of the replies to come."""
+        mean = self.mean_reply_tokens
+        return self._usual_tokens if mean is None else round(mean * self.calls)
+
+    @property
+    def tariff(self) -> Tariff | None:
+        """The prices of the day, with where they are said."""
+        return None if self.prices is None else self.prices.on(self.day)
+
+    @property
+    def next_tariff(self) -> Tariff | None:
+        """Prices that follow on them within days."""
+        coming = None if self.prices is None else self.prices.next_after(self.day)
+        is_soon = coming is not None and coming.since is not None and coming.since - self.day
+        return coming if is_soon and is_soon <= _SOON else None
+
+    @property
+    def prompt_usd(self) -> float | None:
+        """Dollars of the prompts alone."""
+        return None if self.tariff is None else self._prompt_usd
+
+    @property
+    def reply_usd(self) -> float | None:
+        """Dollars of the replies alone."""
+        mean = self.mean_reply_tokens
+        usd = self._usual_usd if mean is None else mean * self._usd_a_token
+        return None if self.tariff is None else usd
 
     @property
     def cost_usd(self) -> float | None:
-        """Dollars of the calls, at the price of today."""
-        return cost_usd(self.price, Usage(self.prompt_tokens, self.completion_tokens))
+        """Dollars of the calls, at the price of the day."""
+        if self.prompt_usd is None or self.reply_usd is None:
+            return None
+        return self.prompt_usd + self.reply_usd
 
     @property
     def may_cost(self) -> bool:
@@ -64,21 +134,18 @@ class Estimate:
     @property
     def most_usd(self) -> float | None:
         """Dollars if every reply were as long as it can be and no call had to be repeated."""
-        if self.price is None:
-            return None
-        tokens = (self.prompt_tokens, self.completion_tokens, self.most_completion_tokens)
-        return most_usd(self.price, CallEstimate(*tokens))
+        return None if self.tariff is None else self._most_usd
 
 
 def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
     """Estimates in the order of the plan's models; StoreError for the folder of another run."""
-    settled = _settled(plan, folder) if holds_run(folder, plan.manifest) else set()
+    rows = [
+        Estimate(m.name, m.config.kind, plan.samples_per_model, prices_of(m.config), today())
+        for m in plan.models
+    ]
+    settled = _settled(plan, folder, rows) if holds_run(folder, plan.manifest) else set()
     path = reply_cache_file()
     with ReplyCache(path) if use_cache and path.exists() else nullcontext() as cache:
-        rows = [
-            Estimate(m.name, m.config.kind, plan.samples_per_model, price_of(m.config))
-            for m in plan.models
-        ]
         for tracks, variants in _alike(plan):
             for track in tracks:
                 for item in track.items:
@@ -113,12 +180,14 @@ def _outlines(
             yield [seed], list(track.outlines(shown[seed]))
 
 
-def _settled(plan: RunPlan, folder: Path) -> set[str]:
-    """Samples whose newest record is final."""
-    newest = {
-        record.sample: record.is_final
-        for _, record in run_records(folder, plan.manifest, plan.sample_ids())
-    }
+def _settled(plan: RunPlan, folder: Path, rows: Sequence[Estimate]) -> set[str]:
+    """Samples whose newest record is final; from their replies the rows learn."""
+    by_model = {row.model: row for row in rows}
+    newest: dict[str, bool] = {}
+    for _, record in run_records(folder, plan.manifest, plan.sample_ids()):
+        newest[record.sample] = record.is_final
+        for reply in record.replies:
+            by_model[record.model].add_reply(reply.usage.completion_tokens)
     return {sample for sample, is_final in newest.items() if is_final}
 
 
@@ -142,14 +211,14 @@ def _add(
             continue
         for request, is_real, tokens in expected:
             sent = sample.asking(replace(request, seed=sample.seed))
-            if is_real and cache is not None and _is_kept(cache, config, sent):
+            kept = _kept(cache, config, sent) if is_real and cache is not None else None
+            if kept is not None:
                 row.cached += 1
+                row.add_reply(kept.usage.completion_tokens)
             else:
-                row.calls += 1
-                row.prompt_tokens += tokens.prompt_tokens
-                row.completion_tokens += tokens.completion_tokens
-                row.most_completion_tokens += tokens.most_completion_tokens
+                row.add_call(tokens)
 
 
-def _is_kept(cache: ReplyCache, config: ModelConfig, request: Request) -> bool:
-    return any(key in cache for key in known_keys(config, request))
+def _kept(cache: ReplyCache, config: ModelConfig, request: Request) -> Reply | None:
+    found = (cache.get(key) for key in known_keys(config, request))
+    return next((reply for reply in found if reply is not None), None)

@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from phyblock.datasets import recorded_models
 from phyblock.datasets.published_names import match_published
 from phyblock.errors import Problem, SpecError
-from phyblock.models import ModelConfig, Price, server_address, takes_format
+from phyblock.models import (
+    ModelConfig,
+    Price,
+    Prices,
+    Rate,
+    Tariff,
+    server_address,
+    takes_format,
+)
 from phyblock.records import RECORDS, Recorded, RecordedLines
 from phyblock.registry import baseline_names
 from phyblock.specs import (
+    GROUP,
     RECORDED,
     LoadedSuite,
     ModelSpec,
+    RateSpec,
     SuiteSpec,
     did_you_mean,
+    group_names,
     resolve_models,
+    unknown_model,
+    with_members,
 )
 from phyblock.words import AnswerFormat, CandidateOrder
 
@@ -40,20 +53,21 @@ def plan_models(
 ) -> tuple[PlannedModel, ...]:
     """The suite's models in its order, or those that `only` names, in its order.
 
-    `only` may name any known model, in the suite or not; of recordings, any that is there. Raises
-    SpecError for a name that is not known, DataError where no recordings are found.
+    `only` may name any known model or group, in the suite or not; of recordings, any that is there.
+    Raises SpecError for a name that is not known, DataError where no recordings are found.
     """
     if loaded.suite.models == RECORDED:
         folders = recorded_models(loaded.dataset_path)
-        _check_known(only, list(folders), f"is not among the recordings: {', '.join(folders)}")
+        missing = f"is not among the recordings: {', '.join(folders)}"
+        _check_known(only, list(folders), lambda _: missing)
         return tuple(
             PlannedModel(name, _replay(name, folders[name]), match_published(name))
             for name in dict.fromkeys(only) or folders
         )
     if only:
-        names = [*baseline_names(), *known]
-        _check_known(only, names, "is neither in the models file nor a built-in baseline")
-        specs = {name: known.get(name) for name in only}
+        names = [*baseline_names(), *known, *(GROUP + name for name in group_names(known))]
+        _check_known(only, names, unknown_model)
+        specs = {name: known.get(name) for name in with_members(only, known)}
     else:
         specs = resolve_models(loaded, known)
     return tuple(_planned(name, spec, loaded.suite) for name, spec in specs.items())
@@ -81,9 +95,9 @@ def _recorded(folder: Path) -> Iterator[Recorded]:
         yield from (record for _, record in RecordedLines(folder / RECORDS) if not record.variant)
 
 
-def _check_known(names: Sequence[str], known: Sequence[str], message: str) -> None:
+def _check_known(names: Sequence[str], known: Sequence[str], message: Callable[[str], str]) -> None:
     problems = [
-        Problem("--models", message, "", name, hint=did_you_mean(name, known))
+        Problem("--models", message(name), "", name, hint=did_you_mean(name, known))
         for name in names
         if name not in known
     ]
@@ -105,7 +119,6 @@ def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfi
     if spec.replay is not None:
         return _replay(name, Path(spec.replay))
     assert spec.id is not None
-    price = None if spec.price is None else Price(spec.price.input, spec.price.output)
     params = spec.params(suite.sampling)
     if spec.extra_body:
         params["extra_body"] = spec.extra_body
@@ -128,12 +141,29 @@ def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfi
         adapts=at_once == "auto",
         rpm=spec.rpm,
         tpm=spec.tpm,
-        price=price,
+        prices=_prices(spec),
         sends_seed=spec.seed,
         revision=spec.revision,
+        image_detail=spec.image_detail,
         timeout_s=spec.timeout_s or suite.limits.timeout_s,
     )
     return replace(config, sends_format=_sends_format(config, spec, suite))
+
+
+def _prices(spec: ModelSpec) -> Prices | None:
+    tariffs = tuple(
+        Tariff(
+            (Rate(_price(price)), *(Rate(_price(tier), tier.above) for tier in price.tiers)),
+            price.since,
+            price.place,
+        )
+        for price in spec.prices
+    )
+    return Prices(tariffs) if tariffs else None
+
+
+def _price(spec: RateSpec) -> Price:
+    return Price(spec.input, spec.output, spec.cached, spec.cache_write)
 
 
 def _sends_format(config: ModelConfig, spec: ModelSpec, suite: SuiteSpec) -> bool:

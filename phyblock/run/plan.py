@@ -16,7 +16,7 @@ from phyblock.run.data import open_dataset
 from phyblock.run.manifest import make_manifest
 from phyblock.run.models import PlannedModel, plan_models, recorded_format, recorded_order
 from phyblock.run.samples import Sample
-from phyblock.specs import LoadedSuite, ModelSpec, SuiteSpec
+from phyblock.specs import RECORDED, LoadedSuite, ModelSpec, SuiteSpec, with_members
 from phyblock.tracks import AnyTrack, EpisodeTrack, Opening, kind_of, open_tracks
 from phyblock.tracks.selection import select_tasks
 from phyblock.variants import Variant
@@ -103,10 +103,11 @@ def make_plan(
     `informative`, the folder of a run, the scenes that tell its models apart best. Raises
     SpecError, DataError, StoreError or PromptError with all that is wrong.
     """
+    dataset = open_dataset(loaded.suite.dataset.format, loaded.dataset_path)
+    models = plan_models(loaded, known, only)
+    loaded = replace(loaded, suite=_with_plain_names(loaded.suite, known))
     suite = loaded.suite
     limit = suite.limit if limit is None else limit
-    dataset = open_dataset(suite.dataset.format, loaded.dataset_path)
-    models = plan_models(loaded, known, only)
     asks = any(model.config.kind != "replay" for model in models)
     chosen = None if informative is None else _informative(informative, loaded, dataset, limit)
     named = None if chosen is None else frozenset(chosen.scenes)
@@ -129,6 +130,13 @@ def make_plan(
         return kind_of(name).open(opening)
 
     return RunPlan(suite, models, selected, variants, manifest, reopened)
+
+
+def _with_plain_names(suite: SuiteSpec, known: Mapping[str, ModelSpec]) -> SuiteSpec:
+    """The suite with the members of groups in their place, which a run stays the same by."""
+    if suite.models == RECORDED:
+        return suite
+    return suite.model_copy(update={"models": with_members(suite.models, known)})
 
 
 def _variants(opening: Opening) -> dict[Variant, tuple[AnyTrack, ...]]:

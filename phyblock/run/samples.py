@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Awaitable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
@@ -195,12 +195,8 @@ def _pooled(replies: Sequence[Reply]) -> Reply:
 
     It is cut off or refused where every one of them is.
     """
-    usage = Usage(
-        *(
-            _sum(getattr(reply.usage, name) for reply in replies)
-            for name in ("prompt_tokens", "completion_tokens", "reasoning_tokens")
-        )
-    )
+    names = [field.name for field in fields(Usage)]
+    usage = Usage(*(_sum(getattr(reply.usage, name) for reply in replies) for name in names))
     billed = [reply.billed_usd for reply in replies if reply.billed_usd is not None]
     ends = {reply.finish for reply in replies}
     return Reply(

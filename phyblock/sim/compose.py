@@ -10,7 +10,15 @@ from PIL import Image, ImageDraw, ImageFont
 from phyblock.sim.surfaces import SURFACES
 from phyblock.words import Background
 
-__all__ = ["GRID_COLUMNS", "LABEL_STRIP", "ink_on", "numbered_grid", "side_by_side", "to_png"]
+__all__ = [
+    "GRID_COLUMNS",
+    "LABEL_STRIP",
+    "ink_on",
+    "joined_size_px",
+    "numbered_grid",
+    "side_by_side",
+    "to_png",
+]
 
 GRID_COLUMNS = 4
 LABEL_STRIP = 0.23
@@ -72,11 +80,20 @@ def numbered_grid(
 
 def side_by_side(left: Image.Image, right: Image.Image) -> Image.Image:
     """Two pictures of one height with a narrow white gap between them."""
-    gap = max(2, round(left.height * _GAP))
+    gap = _gap_px(left.height)
     joined = Image.new("RGB", (left.width + gap + right.width, left.height), "white")
     joined.paste(left, (0, 0))
     joined.paste(right, (left.width + gap, 0))
     return joined
+
+
+def joined_size_px(side_px: int) -> tuple[int, int]:
+    """Width and height of two squares side by side."""
+    return 2 * side_px + _gap_px(side_px), side_px
+
+
+def _gap_px(height_px: int) -> int:
+    return max(2, round(height_px * _GAP))
 
 
 def _write_number(cell: Image.Image, number: int, background: Background) -> None:

@@ -1,8 +1,10 @@
 """What a person may write in YAML: suites, models files and --set overrides."""
 
+from phyblock.specs.groups import GROUP, group_names, unknown_model, with_members
 from phyblock.specs.loading import LoadedSuite, load_suite, resolve_models, suite_tracks
-from phyblock.specs.model import ModelSpec, PriceSpec
+from phyblock.specs.model import ModelSpec
 from phyblock.specs.models_file import load_models
+from phyblock.specs.prices import PriceSpec, RateSpec
 from phyblock.specs.schema import models_schema, suite_schema
 from phyblock.specs.sections import (
     DatasetSpec,
@@ -16,6 +18,7 @@ from phyblock.specs.words import did_you_mean
 
 __all__ = [
     "BUILTIN_DATASET",
+    "GROUP",
     "RECORDED",
     "DatasetSpec",
     "ImagesSpec",
@@ -23,10 +26,12 @@ __all__ = [
     "LoadedSuite",
     "ModelSpec",
     "PriceSpec",
+    "RateSpec",
     "SamplingSpec",
     "ScoringSpec",
     "SuiteSpec",
     "did_you_mean",
+    "group_names",
     "load_models",
     "load_suite",
     "models_schema",
@@ -34,4 +39,6 @@ __all__ = [
     "suite_model",
     "suite_schema",
     "suite_tracks",
+    "unknown_model",
+    "with_members",
 ]

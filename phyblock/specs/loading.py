@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 from phyblock.errors import Problem, SpecError
 from phyblock.registry import baseline_names, known_track
+from phyblock.specs.groups import GROUP, group_names, unknown_model, with_members
 from phyblock.specs.model import ModelSpec
 from phyblock.specs.overrides import apply_overrides
 from phyblock.specs.paths import expand, sort_problems
@@ -107,7 +108,8 @@ def suite_tracks(path: Path) -> tuple[str, ...]:
 def resolve_models(
     loaded: LoadedSuite, known: Mapping[str, ModelSpec]
 ) -> dict[str, ModelSpec | None]:
-    """The suite's models in its order; None stands for a built-in baseline.
+    """The suite's models in its order, those of a group in its place; None stands for a built-in
+    baseline.
 
     Raises SpecError for each unknown name, at its place in the suite, and ValueError when the
     suite asks for recorded replies (those are listed by the data set).
@@ -115,12 +117,12 @@ def resolve_models(
     names = loaded.suite.models
     if names == RECORDED:
         raise ValueError("the models of a suite of recorded replies are listed by its data set")
-    allowed = [*baseline_names(), *known]
+    allowed = [*baseline_names(), *known, *(GROUP + name for name in group_names(known))]
     unknown = [(index, name) for index, name in enumerate(names) if name not in allowed]
     problems = [
         Problem(
             loaded.where("models", index),
-            "is neither in the models file nor a built-in baseline",
+            unknown_model(name),
             f"models[{index}]",
             show(name),
             ", ".join(allowed) if len(allowed) <= 12 else "",
@@ -131,7 +133,7 @@ def resolve_models(
     ]
     if problems:
         raise SpecError(problems)
-    return {name: known.get(name) for name in names}
+    return {name: known.get(name) for name in with_members(names, known)}
 
 
 def _broken_rules(source: YamlSource, problems: list[Problem]) -> list[Problem]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -23,22 +24,33 @@ from phyblock.specs.fields import (
     Temperature,
     TimeoutS,
     TopP,
+    Unique,
     UniqueSome,
     refuse,
 )
+from phyblock.specs.prices import PriceSpec, PriceSpecs
 from phyblock.specs.sections import SamplingSpec
-from phyblock.words import SendMode, TransportName
+from phyblock.words import ImageDetail, SendMode, TransportName
 
-__all__ = ["ModelSpec", "PriceSpec"]
+__all__ = ["ModelSpec"]
 
 Effort = Literal["none", "minimal", "low", "medium", "high", "xhigh", "max"]
-UsdPerMillion = Annotated[float, Field(strict=True, ge=0, le=1e9, allow_inf_nan=False)]
+GroupName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,39}$")]
 
 _ID_PATTERN = r"^[A-Za-z0-9_.-]+/\S+$"
 _OWNERS = (("gpt", "openai"), ("o1", "openai"), ("o3", "openai"), ("claude", "anthropic"),
            ("gemini", "gemini"), ("qwen-vl", "dashscope"))  # fmt: skip
+_OPENAI_DETAILS = ("auto", "low", "high", "original")
+_GEMINI_DETAILS = ("low", "medium", "high", "ultra_high")
+_DETAILS: Mapping[str, tuple[str, ...]] = {
+    "openai": _OPENAI_DETAILS,
+    "azure": _OPENAI_DETAILS,
+    "gemini": _GEMINI_DETAILS,
+    "anthropic": (),
+}
+"""What providers know of `image_detail`; of all others nothing is known."""
 _LARGEST_INTEGER = 2**64 - 1
-_WITH_REPLAY = {"replay", "published", "size_b"}
+_WITH_REPLAY = {"groups", "replay", "published", "size_b"}
 
 
 def _check_id(model_id: str) -> str:
@@ -104,13 +116,6 @@ def _check_finite(body: dict[str, JsonValue]) -> dict[str, JsonValue]:
     return body
 
 
-class PriceSpec(Section):
-    """What a model costs, where litellm's price map does not know it or is wrong."""
-
-    input: UsdPerMillion = Field(description="Prompt tokens [USD per million].")
-    output: UsdPerMillion = Field(description="Reply tokens [USD per million].")
-
-
 class ModelSpec(Section):
     """One model: where it is and how it is asked.
 
@@ -173,11 +178,19 @@ class ModelSpec(Section):
     reasoning_effort: Effort | None = Field(
         default=None, description="How much a reasoning model thinks; null: not sent."
     )
+    image_detail: ImageDetail | None = Field(
+        default=None,
+        description="How closely pictures are looked at: the `detail` of OpenAI and compatible "
+        "servers (auto, low, high, original), the media resolution of Gemini (low, medium, high, "
+        "ultra_high); null: as the provider does where nothing is said.",
+    )
     extra_body: Annotated[dict[str, JsonValue], AfterValidator(_check_finite)] = Field(
         default_factory=dict, description="Further fields of the request body, sent as they are."
     )
-    price: PriceSpec | None = Field(
-        default=None, description="Price; null: litellm's price map, or unknown."
+    price: PriceSpecs | None = Field(
+        default=None,
+        description="Price, or a list of prices by the day from which they hold; null: litellm's "
+        "price map, or unknown.",
     )
     seed: SendMode = Field(
         default="auto",
@@ -199,6 +212,11 @@ class ModelSpec(Section):
     size_b: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] | None = Field(
         default=None, description="Parameters [billions], where known."
     )
+    groups: Unique[GroupName] = Field(
+        default=(),
+        description="Groups that it belongs to: group:NAME in a suite or after --models stands for "
+        "all of a group, in the order of this file.",
+    )
     replay: Annotated[str, Field(min_length=1)] | None = Field(
         default=None,
         description="Folder of recorded replies that stands in for the model (then no id), "
@@ -217,6 +235,7 @@ class ModelSpec(Section):
                 message = f"says where the model is served, which {first} says too"
                 raise refuse(message, at=(others[0],), key=True, hint="keep one of them")
             self._check_direct(self.id)
+            self._check_detail(self.id)
             return self
         for key in sorted(self.model_fields_set - _WITH_REPLAY):
             raise refuse(
@@ -238,6 +257,15 @@ class ModelSpec(Section):
         fields = ("api_base", "api_base_file", "api_base_command")
         return [field for field in fields if getattr(self, field) is not None]
 
+    def _check_detail(self, model_id: str) -> None:
+        """A word that a provider does not know would be ignored, or refused with every request."""
+        known = _DETAILS.get(model_id.partition("/")[0])
+        if self.image_detail is None or known is None or self.image_detail in known:
+            return
+        provider = model_id.partition("/")[0]
+        allowed = ", ".join(known) or f"none: {provider} has no such choice"
+        raise refuse(f"is not known to {provider}", at=("image_detail",), allowed=allowed)
+
     def _check_direct(self, model_id: str) -> None:
         """Without an address, a direct call would take the provider's key to OpenAI."""
         provider = model_id.partition("/")[0]
@@ -248,6 +276,11 @@ class ModelSpec(Section):
                 allowed="direct with an api_base, else auto or litellm",
                 hint="add api_base, or take the line out",
             )
+
+    @property
+    def prices(self) -> tuple[PriceSpec, ...]:
+        """Its own prices in the order of their days."""
+        return (self.price,) if isinstance(self.price, PriceSpec) else self.price or ()
 
     def params(self, defaults: SamplingSpec) -> dict[str, Any]:
         """Sampling parameters to send, by their OpenAI names: its own, else the suite's."""

@@ -10,6 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 from phyblock.errors import Problem, SpecError
 from phyblock.registry import baseline_names
 from phyblock.specs.fields import ModelName
+from phyblock.specs.groups import GROUP
 from phyblock.specs.model import ModelSpec
 from phyblock.specs.paths import expand, sort_problems
 from phyblock.specs.suite import RECORDED
@@ -62,6 +63,9 @@ def _read_entry(
     problems += found
     if spec is None:
         return None, problems
+    for index, price in enumerate(spec.prices):
+        line = source.where((name, "price", index)).split(":")[-2]
+        price.stands_at(f"{Path(source.label).name} line {line}")
     for field, path in _paths(spec).items():
         try:
             absolute = str(expand(path, Path(source.label).parent))
@@ -91,6 +95,9 @@ def _check_name(name: str, source: YamlSource) -> list[Problem]:
         taken = ", ".join((*baseline_names(), RECORDED))
         return [Problem(where, "is a name of phyblock's own", name, allowed=f"not {taken}",
                         hint="choose another name")]  # fmt: skip
+    if name.startswith(GROUP):
+        message, hint = f"begins with {GROUP}, which names groups", "choose another name"
+        return [Problem(where, message, name, show(name), hint=hint)]
     try:
         _NAME.validate_python(name)
     except ValidationError:

@@ -128,8 +128,8 @@ class SuiteSpec(Section):
     )
     seeds: UniqueSome[Seed] = Field(default=(0,), description="Each seed repeats every question.")
     models: ModelNames = Field(
-        description="Names from models.yaml or built-in baselines; or the word recorded: every "
-        "folder of recorded replies in the official data."
+        description="Names from models.yaml or built-in baselines, group:NAME for all models of a "
+        "group; or the word recorded: every folder of recorded replies in the official data."
     )
     prompt: Prompt = Field(
         default="default",

@@ -40,6 +40,7 @@ _BOUNDS = {
 }
 _PATTERNS = {
     "name": "1 to 64 small letters, digits and hyphens",
+    "groups": "1 to 40 small letters, digits and hyphens",
     "models": "letters, digits and . _ : + -, starting with a letter or digit",
     "api_key_env": "the name of an environment variable: letters, digits, underscores",
 }
@@ -223,7 +224,7 @@ def _brief(found: object) -> str:
 
 def _unknown_key(fault: _Fault, source: YamlSource) -> Problem:
     section = _section(fault.root, fault.path[len(fault.base) : -1])
-    known = list(section.model_fields)
+    known = [field.alias or name for name, field in section.model_fields.items()]
     hint = did_you_mean(fault.key, known)
     if fault.key.lower() in SECRET_KEYS and "api_key_env" in known:
         hint = KEY_HINT

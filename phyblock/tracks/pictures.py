@@ -21,7 +21,7 @@ from phyblock.sim import (
     goal_png,
     goal_style,
 )
-from phyblock.sim.compose import to_png
+from phyblock.sim.compose import joined_size_px, to_png
 from phyblock.tracks.showing import ShownTask
 from phyblock.tracks.studio import Drawing, Studio, Workshop, to_image
 from phyblock.words import CandidateScale, PictureLayout, PictureName, PictureSource
@@ -81,8 +81,8 @@ class Pictures(Studio):
             return self._from_dataset(task), True
         drawings = self._drawings(task)
         side = self._shown_style(task).size_px
-        wide = 2 * side if drawings[0].label == "composite" else side
-        return self.outlined(drawings, (wide, side))
+        is_joined = drawings[0].label == "composite"
+        return self.outlined(drawings, joined_size_px(side) if is_joined else (side, side))
 
     def keys(self, task: AssemblyTask) -> tuple[str, ...]:
         """What decides the pixels of a task's pictures: digests of content, style and renderer."""

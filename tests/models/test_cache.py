@@ -20,7 +20,7 @@ from phyblock.models import (
     Image,
     Message,
     ModelConfig,
-    Price,
+    Prices,
     Reply,
     ReplyCache,
     Request,
@@ -99,6 +99,7 @@ USER = BASE.messages[1]
         lambda c, r: (replace(c, params={"temperature": 0.1}), r),
         lambda c, r: (replace(c, params={"extra_body": {"top_k": 1}}), r),
         lambda c, r: (replace(c, sends_seed="never"), r),
+        lambda c, r: (replace(c, image_detail="low"), r),
         lambda c, r: (c, replace(r, seed=4)),
         lambda c, r: (c, replace(r, prompt_version="prompt-2")),
         lambda c, r: (c, replace(r, params={**r.params, "temperature": 0.6})),
@@ -127,7 +128,7 @@ def test_each_thing_that_changes_a_reply_changes_the_key(
     [
         lambda c, r: (replace(c, name="other"), r),
         lambda c, r: (replace(c, transport="litellm", max_concurrency=1, rpm=5, tpm=7), r),
-        lambda c, r: (replace(c, price=Price(1, 2), timeout_s=1.0, api_key_env="KEY"), r),
+        lambda c, r: (replace(c, prices=Prices.flat(1, 2), timeout_s=1.0, api_key_env="KEY"), r),
         lambda c, r: (replace(c, api_base="http://node17:2/v1"), r),
         lambda c, r: (c, replace(r, key="002")),
         lambda c, r: (replace(c, params={"temperature": 0.5}), r),
@@ -138,6 +139,14 @@ def test_what_does_not_change_a_reply_does_not_change_the_key(
     change: Callable[[ModelConfig, Request], tuple[ModelConfig, Request]],
 ) -> None:
     assert reply_key(*change(CONFIG, BASE)) == reply_key(CONFIG, BASE)
+
+
+def test_the_keys_of_kept_replies_stay() -> None:
+    plain = ModelConfig(
+        "m", "litellm", "openai/gpt-4o-2024-08-06", params={"temperature": 0.0, "max_tokens": 4096}
+    )
+    known = "1e827a33d555a45fd4d9099d820a2c7a478eb1f5f5bf739d93deb2d8059c05ec"
+    assert reply_key(plain, make_request()) == known
 
 
 def with_parts(request: Request, parts: tuple[str | Image, ...]) -> Request:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import functools
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from phyblock.models import (
     Message,
     ModelConfig,
     Price,
+    Prices,
     Reply,
     ReplyCache,
     Request,
@@ -34,15 +36,18 @@ from phyblock.models import (
     cost_usd,
     estimate,
     most_usd,
-    price_of,
+    prices_of,
 )
 from phyblock.models.cost import plausible
 from phyblock.models.picture_tokens import picture_tokens
 from phyblock.tracks.full_planning.baselines import PlanSubject
+from phyblock.words import ImageDetail
 from tests.models.factory import CANDIDATES, SCENE, ask, make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.openai_chat import OpenAIChat
+
+DAY = date(2026, 11, 22)
 
 
 def config(model_id: str, **fields: object) -> ModelConfig:
@@ -62,35 +67,38 @@ def config(model_id: str, **fields: object) -> ModelConfig:
 def test_prices_come_from_the_map_where_the_provider_is_the_same(
     model_id: str, price: Price | None
 ) -> None:
-    found = price_of(config(model_id))
+    prices = prices_of(config(model_id))
     if price is None:
-        assert found is None
+        assert prices is None
     else:
+        assert prices is not None
+        found = prices.at(DAY)
         assert found is not None
         assert found.input_usd == pytest.approx(price.input_usd, rel=0.2)
         assert found.output_usd == pytest.approx(price.output_usd, rel=0.2)
 
 
 def test_a_price_of_ones_own_comes_first() -> None:
-    assert price_of(config("openai/o1", price=Price(1, 2))) == Price(1, 2)
+    own = Prices.flat(1, 2)
+    assert prices_of(config("openai/o1", prices=own)) == own
 
 
 @pytest.mark.parametrize("kind", ["replay", "baseline"])
 def test_recordings_and_baselines_cost_nothing(kind: str) -> None:
-    assert price_of(ModelConfig("m", kind)) == Price(0, 0)  # type: ignore[arg-type]
+    assert prices_of(ModelConfig("m", kind)) == Prices.flat(0, 0)  # type: ignore[arg-type]
 
 
 @given(st.integers(0, 10**7), st.integers(0, 10**6))
 def test_cost_is_linear_in_tokens(prompt: int, completion: int) -> None:
-    cost = cost_usd(Price(2.0, 8.0), Usage(prompt, completion))
+    cost = cost_usd(Prices.flat(2.0, 8.0), Usage(prompt, completion), DAY)
     assert cost == pytest.approx((2 * prompt + 8 * completion) / 1e6)
 
 
 @pytest.mark.parametrize("usage", [Usage(), Usage(5, None), Usage(None, 5)])
 def test_what_is_not_known_is_not_nothing(usage: Usage) -> None:
-    assert cost_usd(Price(1, 1), usage) is None
-    assert cost_usd(None, Usage(1, 1)) is None
-    assert cost_usd(Price(0, 0), usage) == 0.0
+    assert cost_usd(Prices.flat(1, 1), usage, DAY) is None
+    assert cost_usd(None, Usage(1, 1), DAY) is None
+    assert cost_usd(Prices.flat(0, 0), usage, DAY) == 0.0
 
 
 def request_of(*parts: str | Image, **params: object) -> Request:
@@ -113,10 +121,12 @@ def test_pictures_are_counted_by_tiles(width: int, height: int, tokens: int) -> 
         ("openrouter/openai/gpt-4o-mini", 1024, 1024, 2833 + 4 * 5667),
         ("openai/gpt-4o-2024-08-06", 1024, 1024, 765),
         ("openai/gpt-4.1-mini", 1024, 1024, 1659),
-        ("openai/o4-mini", 2048, 2048, 2642),
+        ("openai/o4-mini", 2048, 2048, 2617),
         ("openai/gpt-4.1-nano", 64, 33, 10),
         ("openai/gpt-5.6", 1024, 512, 615),
         ("openai/gpt-5.6-luna", 1024, 1024, 1229),
+        ("openai/gpt-5.6", 2048, 2048, 4916),
+        ("openai/gpt-5.4", 2048, 2048, 3000),
         ("openai/gpt-5-mini-2025-08-07", 1280, 720, 1104),
         ("openai/gpt-5-2025-08-07", 1024, 512, 350),
         ("openai/gpt-5", 1024, 512, 350),
@@ -141,6 +151,33 @@ def test_a_picture_counts_as_its_model_counts_it(
     assert estimate(config(model_id), request_of(image)).prompt_tokens == tokens
 
 
+@pytest.mark.parametrize(
+    ("model_id", "detail", "width", "height", "tokens"),
+    [
+        ("openai/gpt-4o-2024-08-06", "low", 1024, 512, 85),
+        ("openai/gpt-4o-2024-08-06", "high", 1024, 1024, 765),
+        ("openai/o3", "low", 1024, 512, 75),
+        ("openai/gpt-5.6", "low", 1024, 512, 154),
+        ("openai/gpt-5.6", "original", 4096, 2048, 9831),
+        ("openai/gpt-6-luna", "high", 2048, 2048, 3000),
+        ("openai/gpt-5.5", "auto", 4096, 4096, 12_000),
+        ("openai/gpt-5.4-mini", "low", 2048, 2048, 4916),
+        ("openai/gpt-5.2", "low", 1024, 512, 615),
+        ("gemini/gemini-3.8-flash", "low", 1024, 512, 280),
+        ("gemini/gemini-3.8-flash", "medium", 1024, 512, 560),
+        ("gemini/gemini-4-argon", "ultra_high", 64, 64, 2240),
+        ("gemini/gemini-2.5-pro", "low", 1024, 512, 64),
+        ("xai/grok-4.7", "low", 1024, 512, 1792),
+    ],
+)
+def test_how_closely_a_picture_is_looked_at_is_counted(
+    model_id: str, detail: ImageDetail, width: int, height: int, tokens: int
+) -> None:
+    image = Image(b"", "goal", width, height)
+    asked = config(model_id, image_detail=detail)
+    assert estimate(asked, request_of(image)).prompt_tokens == tokens
+
+
 @given(
     st.sampled_from(["gpt-4o", "gpt-5.6", "claude-opus-4-7", "claude-3", "gemini-2.5", "grok-4"]),
     st.integers(1, 6000),
@@ -148,7 +185,7 @@ def test_a_picture_counts_as_its_model_counts_it(
 )
 def test_every_picture_counts_and_none_without_bound(model: str, width: int, height: int) -> None:
     tokens = picture_tokens(f"x/{model}", Image(b"", "goal", width, height))
-    assert 1 <= tokens <= 20_000
+    assert 1 <= tokens <= 36_000
     assert tokens == picture_tokens(f"x/{model}", Image(b"", "goal", height, width))
 
 
@@ -176,13 +213,13 @@ def test_a_model_that_thinks_is_expected_to_say_more(params: dict[str, Any], tok
 def test_the_most_of_many_calls_is_the_sum_and_above_the_usual(
     calls: list[tuple[int, int, int]], input_usd: float, output_usd: float
 ) -> None:
-    price = Price(input_usd, output_usd)
+    price = Prices.flat(input_usd, output_usd)
     whole = Estimate(*(sum(call[i] for call in calls) for i in range(3)))
-    together = sum(most_usd(price, Estimate(*call)) for call in calls)
-    assert most_usd(price, whole) == pytest.approx(together)
-    usual = cost_usd(price, whole.usage)
+    together = sum(most_usd(price, Estimate(*call), DAY) for call in calls)
+    assert most_usd(price, whole, DAY) == pytest.approx(together)
+    usual = cost_usd(price, whole.usage, DAY)
     assert usual is not None
-    assert most_usd(price, whole) >= usual
+    assert most_usd(price, whole, DAY) >= usual
 
 
 def test_the_longest_reply_is_what_was_asked_for_or_what_the_model_can() -> None:
@@ -241,12 +278,14 @@ def test_a_reservation_without_a_known_cost_counts_in_full() -> None:
 
 
 def test_a_call_that_waits_reserves_what_was_learned_meanwhile() -> None:
-    budget, price = Budget(1.0), Price(100.0, 0.0)
+    budget, price = Budget(1.0), Prices.flat(100.0, 0.0)
     expected = Estimate(4000, 100, 100)
 
     async def main() -> None:
-        first = await budget.reserve(lambda: budget.most_usd("m", price, expected))
-        second = asyncio.create_task(budget.reserve(lambda: budget.most_usd("m", price, expected)))
+        first = await budget.reserve(lambda: budget.most_usd("m", price, expected, DAY))
+        second = asyncio.create_task(
+            budget.reserve(lambda: budget.most_usd("m", price, expected, DAY))
+        )
         await asyncio.sleep(0)
         budget.learn("m", expected, Usage(8000, 1))
         budget.settle(first, 0.8)
@@ -257,12 +296,12 @@ def test_a_call_that_waits_reserves_what_was_learned_meanwhile() -> None:
 
 
 def test_a_provider_that_counts_pictures_higher_is_reserved_for() -> None:
-    budget, price = Budget(1.0), Price(1.0, 1.0)
+    budget, price = Budget(1.0), Prices.flat(1.0, 1.0)
     expected = Estimate(1000, 100, 100)
-    before = budget.most_usd("m", price, expected)
+    before = budget.most_usd("m", price, expected, DAY)
     budget.learn("m", expected, Usage(20_000, 10))
-    assert budget.most_usd("m", price, expected) > 10 * before
-    assert budget.most_usd("n", price, expected) == before
+    assert budget.most_usd("m", price, expected, DAY) > 10 * before
+    assert budget.most_usd("n", price, expected, DAY) == before
 
 
 strange = st.one_of(
@@ -320,13 +359,13 @@ def test_what_was_spent_never_becomes_less_and_an_unknown_cost_is_the_dearest(
 
 @given(st.lists(st.tuples(st.integers(0, 5000), strange), max_size=20))
 def test_what_is_learned_stays_within_bounds(counts: list[tuple[int, Any]]) -> None:
-    budget, price = Budget(1.0), Price(1.0, 1.0)
+    budget, price = Budget(1.0), Prices.flat(1.0, 1.0)
     expected = Estimate(1000, 100, 100)
-    plain = budget.most_usd("m", price, expected)
+    plain = budget.most_usd("m", price, expected, DAY)
     last = plain
     for asked, told in counts:
         budget.learn("m", Estimate(asked, 1, 1), Usage(told, 1))
-        most = budget.most_usd("m", price, expected)
+        most = budget.most_usd("m", price, expected, DAY)
         assert last <= most <= 100 * plain
         last = most
 
@@ -370,8 +409,10 @@ def test_a_server_that_does_not_count_stops_within_the_limit(
     server = Counting(usage)
     budget = Budget(0.1)
     with Running(server) as running:
-        config = ROUTES[route].config(running.url, price=Price(10.0, 100.0), max_concurrency=4)
-        dearest = most_usd(Price(10.0, 100.0), estimate(config, make_request()))
+        config = ROUTES[route].config(
+            running.url, prices=Prices.flat(10.0, 100.0), max_concurrency=4
+        )
+        dearest = most_usd(Prices.flat(10.0, 100.0), estimate(config, make_request()), DAY)
 
         async def main() -> list[Reply | BaseException | None]:
             model = make_model(config, budget=budget)
@@ -400,7 +441,9 @@ def test_a_run_stops_before_its_limit_and_answers_say_what_they_cost(
     budget = Budget(0.3)
     with Running(server) as running:
         model = make_model(
-            ROUTES["direct"].config(running.url, price=Price(10.0, 100.0), max_concurrency=8),
+            ROUTES["direct"].config(
+                running.url, prices=Prices.flat(10.0, 100.0), max_concurrency=8
+            ),
             budget=budget,
         )
 
@@ -436,7 +479,7 @@ def test_a_failure_that_may_have_been_billed_counts_against_the_budget(
     budget = Budget(100.0)
     with Running(ROUTES["direct"].server(Faults(mode=mode))) as running:
         model = make_model(
-            ROUTES["direct"].config(running.url, price=Price(10.0, 100.0)), budget=budget
+            ROUTES["direct"].config(running.url, prices=Prices.flat(10.0, 100.0)), budget=budget
         )
         (answer,) = ask(model, make_request())
     assert isinstance(answer, RetryableError)
@@ -451,7 +494,7 @@ def test_a_reply_says_what_the_limit_counts_for_all_its_attempts(
     server = ROUTES["direct"].server(Faults(reset=0.2, malformed=0.2, server_error=0.2))
     requests = [make_request(f"{n:03}") for n in range(30)]
     with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
-        config = ROUTES["direct"].config(running.url, price=Price(10.0, 100.0))
+        config = ROUTES["direct"].config(running.url, prices=Prices.flat(10.0, 100.0))
         budget = Budget(100.0)
         replies = ask(make_model(config, cache=cache, budget=budget), *requests)
         again = ask(make_model(config, cache=cache, budget=Budget(1.0)), *requests)
@@ -467,7 +510,7 @@ def test_a_server_to_which_nothing_could_be_sent_costs_nothing(
 ) -> None:
     monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
     budget = Budget(100.0)
-    config = ROUTES["direct"].config("http://127.0.0.1:9", price=Price(10.0, 100.0))
+    config = ROUTES["direct"].config("http://127.0.0.1:9", prices=Prices.flat(10.0, 100.0))
     (answer,) = ask(make_model(config, budget=budget), make_request())
     assert isinstance(answer, UnreachableError)
     assert budget.spent_usd == 0
@@ -476,7 +519,7 @@ def test_a_server_to_which_nothing_could_be_sent_costs_nothing(
 def test_a_model_without_its_key_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(KEY_VARIABLE, raising=False)
     budget = Budget(1.0)
-    config = ROUTES["direct"].config("http://127.0.0.1:9", price=Price(10.0, 100.0))
+    config = ROUTES["direct"].config("http://127.0.0.1:9", prices=Prices.flat(10.0, 100.0))
     (answer,) = ask(make_model(config, budget=budget), make_request())
     assert isinstance(answer, UnavailableError)
     assert budget.spent_usd == 0

@@ -13,7 +13,7 @@ from phyblock.models import (
     Budget,
     Halt,
     HaltedError,
-    Price,
+    Prices,
     Reply,
     ReplyCache,
     SharedCache,
@@ -72,7 +72,7 @@ def test_a_run_that_ends_while_money_is_reserved_sends_nothing_and_holds_none() 
 
     async def main() -> None:
         with Running(server) as running:
-            config = ROUTES["direct"].config(running.url, price=Price(1.0, 1.0))
+            config = ROUTES["direct"].config(running.url, prices=Prices.flat(1.0, 1.0))
             model = make_model(config, budget=Late(100.0), halt=halt)
             with pytest.raises(HaltedError):
                 await model.ask(make_request())

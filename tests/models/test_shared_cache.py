@@ -21,7 +21,7 @@ from phyblock.models import (
     Halt,
     HaltedError,
     ModelConfig,
-    Price,
+    Prices,
     Reply,
     ReplyCache,
     SharedCache,
@@ -400,7 +400,7 @@ def test_a_reply_that_another_brought_says_what_attempts_before_it_cost(path: Pa
     async def main() -> Reply | None:
         async with SharedCache(path) as cache:
             with Running(server) as running:
-                config = ROUTES["direct"].config(running.url, price=Price(10.0, 100.0))
+                config = ROUTES["direct"].config(running.url, prices=Prices.flat(10.0, 100.0))
                 key = reply_key(config, make_request())
                 model = make_model(config, cache=cache, budget=Budget(100.0))
                 asked = asyncio.create_task(model.ask(make_request()))

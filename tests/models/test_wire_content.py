@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from phyblock.models import Image, Message
 from phyblock.models.payload import json_body, wire_messages
+from phyblock.words import ImageDetail
 from tests.models.factory import JPEG, PNG, make_model, make_request, picture, reply_of
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Running, Seen
@@ -103,6 +104,38 @@ def test_thoughts_left_in_the_text_become_reasoning(route: str) -> None:
     assert reply.reasoning.strip() == "red first"
 
 
+def looked_at(seen: Seen) -> list[object]:
+    """What a request says, picture by picture or as a whole, of how closely to look."""
+    if "contents" in seen.raw:
+        whole = seen.params.get("mediaResolution")
+        parts = [part for content in seen.raw["contents"] for part in content["parts"]]
+        return [part.get("media_resolution", whole) for part in parts if "text" not in part]
+    content = seen.raw["messages"][-1]["content"]
+    return [p["image_url"].get("detail") for p in content if p["type"] == "image_url"]
+
+
+@pytest.mark.parametrize(
+    ("route", "model_id", "detail", "arrives"),
+    [
+        ("direct", "openai/m", "low", "low"),
+        ("openai", "openai/m", "original", "original"),
+        ("vllm", "hosted_vllm/m", "high", "high"),
+        ("gemini", "gemini/gemini-3.8-flash", "medium", {"level": "MEDIA_RESOLUTION_MEDIUM"}),
+        ("gemini", "gemini/gemini-2.5-flash", "low", "MEDIA_RESOLUTION_LOW"),
+        ("direct", "openai/m", None, None),
+        ("gemini", "gemini/gemini-3.8-flash", None, None),
+    ],
+)
+def test_how_closely_to_look_arrives_in_the_words_of_the_provider(
+    route: str, model_id: str, detail: ImageDetail | None, arrives: object
+) -> None:
+    server = ROUTES[route].server()
+    with Running(server) as running:
+        config = ROUTES[route].config(running.url, id=model_id, image_detail=detail)
+        reply_of(make_model(config), make_request())
+    assert looked_at(server.seen[0]) == [arrives, arrives]
+
+
 texts = st.text(max_size=30)
 images = st.builds(
     lambda magic, tail: Image(magic + tail, "goal", 8, 8),
@@ -117,14 +150,18 @@ messages = st.builds(
 
 
 @settings(max_examples=200)
-@given(st.lists(messages, max_size=4).map(tuple), st.dictionaries(texts, texts, max_size=3))
+@given(
+    st.lists(messages, max_size=4).map(tuple),
+    st.dictionaries(texts, texts, max_size=3),
+    st.sampled_from([None, "low", "high"]),
+)
 def test_a_body_made_around_the_encoder_says_what_the_encoder_would(
-    content: tuple[Message, ...], fields: dict[str, str]
+    content: tuple[Message, ...], fields: dict[str, str], detail: ImageDetail | None
 ) -> None:
     import json
 
-    expected = {**fields, "messages": wire_messages(content)}
-    assert json.loads(json_body(fields, content)) == expected
+    expected = {**fields, "messages": wire_messages(content, detail)}
+    assert json.loads(json_body(fields, content, detail)) == expected
 
 
 def test_only_pictures_are_sent_as_pictures() -> None:
@@ -132,4 +169,4 @@ def test_only_pictures_are_sent_as_pictures() -> None:
 
     request = make_request(pictures=(b"<html>", picture(1)))
     with pytest.raises(DataError, match=r"'goal'.*is no picture"):
-        wire_messages(replace(request).messages)
+        wire_messages(replace(request).messages, None)

@@ -311,3 +311,59 @@ def test_recorded_models_are_not_resolved_here(tmp_path: Path) -> None:
     loaded = load_naming(tmp_path, "  - oracle\n", "models=recorded", text)
     with pytest.raises(ValueError, match="listed by its data set"):
         resolve_models(loaded, {})
+
+
+@pytest.mark.parametrize(
+    ("model_id", "detail", "allowed"),
+    [
+        ("openai/gpt-5.6", "ultra_high", "auto, low, high, original"),
+        ("gemini/gemini-3.8-flash", "auto", "low, medium, high, ultra_high"),
+        ("anthropic/claude-opus-5-5", "low", "none: anthropic has no such choice"),
+        ("xai/grok-4.7", "close", "auto"),
+    ],
+)
+def test_a_detail_that_a_provider_does_not_know_is_refused(
+    tmp_path: Path, model_id: str, detail: str, allowed: str
+) -> None:
+    with pytest.raises(SpecError) as caught:
+        load(tmp_path, f"m: {{id: {model_id}, image_detail: {detail}}}\n")
+    (problem,) = caught.value.problems
+    assert problem.field == "m.image_detail"
+    assert allowed in problem.allowed
+
+
+GROUPED = """\
+b: {id: x/b, groups: [big, all]}
+a: {id: x/a, groups: [all]}
+c: x/c
+"""
+
+
+def test_a_group_stands_for_its_models_in_the_order_of_the_file(tmp_path: Path) -> None:
+    known = load(tmp_path, GROUPED)
+    loaded = load_naming(tmp_path, "  - oracle\n  - group:all\n  - a\n  - c\n  - group:big\n")
+    assert list(resolve_models(loaded, known)) == ["oracle", "b", "a", "c"]
+
+
+def test_an_unknown_group_is_pointed_at(tmp_path: Path) -> None:
+    known = load(tmp_path, GROUPED)
+    loaded = load_naming(tmp_path, "  - group:al\n  - c\n")
+    with pytest.raises(SpecError) as caught:
+        resolve_models(loaded, known)
+    (problem,) = caught.value.problems
+    assert problem.where == f"{tmp_path / 's.yaml'}:3:5"
+    assert problem.message == "is no group of the models file"
+    assert problem.hint == "did you mean group:all?"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("group:a: x/a\n", "begins with group:, which names groups"),
+        ("a: {id: x/a, groups: [Big]}\n", "has characters that are not allowed"),
+        ("a: {id: x/a, groups: [b, b]}\n", "stands twice"),
+    ],
+)
+def test_what_cannot_be_a_group_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    (problem,) = problems_of(tmp_path, text)
+    assert said in problem.message

@@ -1,0 +1,292 @@
+"""Prices by day, by length of the prompt, in batches, and of what a prompt cache holds."""
+
+from __future__ import annotations
+
+from datetime import date, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.errors import SpecError
+from phyblock.models import (
+    Budget,
+    Estimate,
+    ModelConfig,
+    Price,
+    Prices,
+    Rate,
+    Tariff,
+    Usage,
+    cost_usd,
+    most_usd,
+    prices_of,
+)
+from phyblock.models.cost import plausible
+from phyblock.models.price_map import map_entry
+from phyblock.models.stored import reply_of as reply_of_line
+from phyblock.models.stored import stored
+from phyblock.run.models import to_config
+from phyblock.specs import SuiteSpec, load_models
+from tests.models.factory import make_model, make_request, reply_of
+from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.servers.anthropic_messages import AnthropicMessages
+from tests.servers.chassis import LocalServer, Running, Seen
+from tests.servers.gemini_generate import GeminiGenerate
+from tests.servers.openai_chat import OpenAIChat
+
+DAY = date(2026, 11, 22)
+SUITE = SuiteSpec(name="s", models=("m",))
+
+usd = st.floats(0, 100)
+prices = st.builds(Price, usd, usd, st.none() | usd, st.none() | usd)
+
+
+def config(model_id: str, **fields: Any) -> ModelConfig:
+    return ModelConfig("m", "litellm", model_id, **fields)
+
+
+def read(tmp_path: Path, text: str) -> ModelConfig:
+    path = tmp_path / "models.yaml"
+    path.write_text(text)
+    return to_config("m", load_models(path)["m"], SUITE)
+
+
+@given(prices, st.integers(0, 10**6), st.integers(0, 10**6), st.integers(0, 10**6), st.integers(0))
+def test_each_prompt_token_is_paid_once(
+    price: Price, fresh: int, cached: int, written: int, out: int
+) -> None:
+    usage = Usage(fresh + cached + written, out, None, cached, written)
+    read_usd = price.input_usd if price.cached_usd is None else price.cached_usd
+    write_usd = price.input_usd if price.cache_write_usd is None else price.cache_write_usd
+    paid = fresh * price.input_usd + cached * read_usd + written * write_usd
+    cost = price.cost(usage)
+    assert cost == pytest.approx((paid + out * price.output_usd) / 1e6)
+    half = price.halved().cost(usage)
+    assert half == pytest.approx(cost / 2)
+
+
+@given(
+    st.lists(st.tuples(st.integers(1, 300_000), prices), max_size=3, unique_by=lambda t: t[0]),
+    prices,
+    st.integers(0, 400_000),
+    st.booleans(),
+)
+def test_the_highest_tier_below_the_prompt_holds(
+    tiers: list[tuple[int, Price]], base: Price, prompt: int, batched: bool
+) -> None:
+    rates = (Rate(base), *(Rate(p, above) for above, p in sorted(tiers, key=lambda t: t[0])))
+    found = Prices((Tariff(rates),)).at(DAY, prompt, batched=batched)
+    below = [rate for rate in rates if rate.above_tokens < prompt] or [rates[0]]
+    assert found == (below[-1].price.halved() if batched else below[-1].price)
+
+
+@given(st.lists(st.integers(0, 400), min_size=1, max_size=4, unique=True), st.integers(-9, 410))
+def test_the_price_of_a_day_is_the_last_that_has_begun(begins: list[int], asked: int) -> None:
+    days = [DAY + timedelta(days=n) for n in sorted(begins)]
+    tariffs = tuple(
+        Tariff((Rate(Price(float(n), 0.0)),), day) for n, day in enumerate(days, start=1)
+    )
+    mapped = Prices.flat(99.0, 0.0)
+    day = DAY + timedelta(days=asked)
+    begun = [t for t in tariffs if t.since is not None and t.since <= day]
+    own = Prices(tariffs).at(day)
+    assert own == (begun[-1].at(0) if begun else None)
+    assert Prices(tariffs).after(mapped).at(day) == (own or mapped.at(day))
+
+
+@given(prices, st.integers(0, 10**6), st.integers(0, 10**5), st.data())
+def test_no_call_costs_more_than_the_most(
+    price: Price, prompt: int, completion: int, data: st.DataObject
+) -> None:
+    dearer = Tariff((Rate(price), Rate(Price(50.0, 60.0), 100_000)), DAY + timedelta(days=1))
+    both = Prices((Tariff((Rate(price),)), dearer))
+    most = most_usd(both, Estimate(prompt, 1, completion), DAY)
+    written = data.draw(st.integers(0, prompt))
+    usage = Usage(prompt, completion, None, 0, written)
+    for day in (DAY, DAY + timedelta(days=1)):
+        cost = cost_usd(both, usage, day)
+        assert cost is not None
+        assert cost <= most * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("model_id", "prompt", "names"),
+    [
+        ("gemini/gemini-2.5-pro", 200_000, ("", "")),
+        ("gemini/gemini-2.5-pro", 200_001, ("_above_200k_tokens", "")),
+        ("openai/gpt-5.6", 300_000, ("_above_272k_tokens", "_batches")),
+        ("anthropic/claude-haiku-5-5", 100_001, ("_above_100k_tokens", "_batches")),
+        ("xai/grok-4.7", 10, ("", "")),
+    ],
+)
+def test_tiers_batches_and_caches_are_priced_as_the_map_says(
+    model_id: str, prompt: int, names: tuple[str, str]
+) -> None:
+    entry = map_entry(config(model_id))
+    known = prices_of(config(model_id))
+    assert known is not None
+    price = known.at(DAY, prompt, batched=bool(names[1]))
+    ending = "".join(names)
+    assert price is not None
+    assert price.input_usd == pytest.approx(entry["input_cost_per_token" + ending] * 1e6)
+    assert price.output_usd == pytest.approx(entry["output_cost_per_token" + ending] * 1e6)
+    assert price.cached_usd == pytest.approx(entry["cache_read_input_token_cost" + ending] * 1e6)
+
+
+def test_a_model_that_has_tiers_alone_has_a_price() -> None:
+    known = prices_of(config("dashscope/qwen3-vl-plus"))
+    assert known is not None
+    usual, long = known.at(DAY, 32_000), known.at(DAY, 32_001)
+    assert usual is not None and long is not None  # noqa: PT018
+    assert (usual.input_usd, long.input_usd) == pytest.approx((0.2, 0.3))
+    assert known.on(DAY).source.startswith("litellm ")  # type: ignore[union-attr]
+
+
+def test_prices_by_day_and_tier_are_read_with_the_line_that_says_them(tmp_path: Path) -> None:
+    text = """\
+m:
+  id: openai/gpt-4o-2024-08-06
+  price:
+    - {input: 1, output: 2, cached: 0.5}
+    - from: 2026-12-01
+      input: 2
+      output: 4
+      tiers: [{above: 1000, input: 3, output: 5, cache_write: 6}]
+"""
+    known = prices_of(read(tmp_path, text))
+    assert known is not None
+    december = date(2026, 12, 1)
+    assert known.at(DAY) == Price(1, 2, 0.5)
+    assert known.at(december, 1000) == Price(2, 4)
+    assert known.at(december, 1001) == Price(3, 5, None, 6)
+    found = [known.on(day).source for day in (DAY, december)]  # type: ignore[union-attr]
+    assert found == ["models.yaml line 4", "models.yaml line 5"]
+
+
+def test_before_the_first_day_that_is_named_the_map_holds(tmp_path: Path) -> None:
+    text = "m: {id: openai/gpt-4o-2024-08-06, price: [{from: 2027-01-01, input: 9, output: 9}]}\n"
+    known = prices_of(read(tmp_path, text))
+    mapped = prices_of(config("openai/gpt-4o-2024-08-06"))
+    assert known is not None and mapped is not None  # noqa: PT018
+    assert known.on(DAY) == mapped.on(DAY)
+    assert known.at(date(2027, 1, 1)) == Price(9, 9)
+    coming = known.next_after(DAY)
+    assert coming is not None
+    assert coming.since == date(2027, 1, 1)
+
+
+@pytest.mark.parametrize(
+    ("price", "said"),
+    [
+        ("[{input: 1, output: 1}, {input: 2, output: 2}]", "models.yaml:1:.*from which later day"),
+        ("{from: soon, input: 1, output: 1}", r"m\.price\.from: is no day.*soon"),
+        ("{from: 2026-13-01, input: 1, output: 1}", "is no day"),
+        ("{input: 1}", r"m\.price\.output.* is missing"),
+        (
+            "{input: 1, output: 1, tiers: [{above: 5, input: 1, output: 1},"
+            " {above: 5, input: 1, output: 1}]}",
+            r"tiers\[1\]\.above: is not above the one before",
+        ),
+        ("{form: 2026-12-01, input: 1, output: 1}", "did you mean from"),
+        ("[]", "is empty"),
+    ],
+)
+def test_prices_that_cannot_be_meant_are_refused(tmp_path: Path, price: str, said: str) -> None:
+    with pytest.raises(SpecError, match=f"(?s){said}"):
+        read(tmp_path, f"m: {{id: openai/gpt-4o, price: {price}}}\n")
+
+
+def test_prices_are_no_part_of_what_a_model_is(tmp_path: Path) -> None:
+    plain = read(tmp_path, "m: openai/gpt-4o\n")
+    priced = read(tmp_path, "m: {id: openai/gpt-4o, price: [{input: 1, output: 2}]}\n")
+    assert plain.identity() == priced.identity()
+
+
+CACHED: dict[type[LocalServer], dict[str, Any]] = {
+    OpenAIChat: {
+        "usage": {
+            "prompt_tokens": 1000,
+            "completion_tokens": 40,
+            "total_tokens": 1040,
+            "prompt_tokens_details": {"cached_tokens": 600, "cache_write_tokens": 300},
+        }
+    },
+    AnthropicMessages: {
+        "usage": {
+            "input_tokens": 100,
+            "output_tokens": 40,
+            "cache_read_input_tokens": 600,
+            "cache_creation_input_tokens": 300,
+        }
+    },
+    GeminiGenerate: {
+        "usageMetadata": {
+            "promptTokenCount": 1000,
+            "candidatesTokenCount": 40,
+            "totalTokenCount": 1040,
+            "cachedContentTokenCount": 600,
+        }
+    },
+}
+"""What each protocol says of a prompt of 1,000 tokens, most of them in its cache."""
+
+
+def test_every_protocol_is_among_the_routes() -> None:
+    assert {route.server for route in ROUTES.values()} == set(CACHED)
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_what_a_prompt_cache_held_is_recorded_and_priced(
+    monkeypatch: pytest.MonkeyPatch, route: str
+) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    kind = ROUTES[route].server
+
+    class Caching(kind):  # type: ignore[misc, valid-type]
+        def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+            return {**super().reply(seen, ending), **CACHED[kind]}
+
+    price = Price(10.0, 100.0, 1.0, 12.0)
+    known = Prices((Tariff((Rate(price),)),))
+    with Running(Caching()) as running:
+        config = ROUTES[route].config(running.url, prices=known)
+        reply = reply_of(make_model(config), make_request())
+    usage = reply.usage
+    written = 0 if kind is GeminiGenerate else 300
+    assert (usage.prompt_tokens, usage.completion_tokens) == (1000, 40)
+    assert (usage.cached_tokens, usage.cache_write_tokens or 0) == (600, written)
+    paid = 600 * 1 + written * 12 + (400 - written) * 10 + 40 * 100
+    assert reply.cost_usd == pytest.approx(paid / 1e6)
+    assert reply_of_line(stored(reply)) == reply
+
+
+@given(st.integers(-5, 2000), st.none() | st.integers(-5, 2000), st.none() | st.integers(-5, 2000))
+def test_no_more_is_cached_than_the_prompt_holds(
+    prompt: int, cached: int | None, written: int | None
+) -> None:
+    expected = Estimate(1000, 100, 100)
+    usage = Usage(prompt, 5, None, cached, written)
+    read = plausible(usage, expected, said_something=True)
+    assert (read.cached_tokens or 0) >= 0
+    assert (read.cache_write_tokens or 0) >= 0
+    assert (read.cached_tokens or 0) + (read.cache_write_tokens or 0) <= (read.prompt_tokens or 0)
+
+
+def test_a_reply_costs_what_its_day_asks_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    from_then = Tariff((Rate(Price(20.0, 200.0)),), DAY + timedelta(days=1))
+    known = Prices((Tariff((Rate(Price(10.0, 100.0)),)), from_then))
+    paid = []
+    with Running(OpenAIChat()) as running:
+        config = ROUTES["direct"].config(running.url, prices=known)
+        for days in (0, 1):
+            day = DAY + timedelta(days=days)
+            monkeypatch.setattr("phyblock.models.chat.today", lambda day=day: day)
+            budget = Budget(1.0)
+            reply = reply_of(make_model(config, budget=budget), make_request())
+            paid.append(reply.cost_usd)
+            assert budget.spent_usd == pytest.approx(reply.cost_usd)
+    assert paid == pytest.approx([0.014, 0.028])
