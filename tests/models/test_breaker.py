@@ -67,7 +67,7 @@ def chat(
         limiter=ModelLimiter(width, Gate(width), clock=time.clock),
         cache=None,
         budget=None,
-        price=None,
+        prices=None,
         policy=RetryPolicy(clock=time.clock),
         secrets=(),
         observer=lambda _: None,
