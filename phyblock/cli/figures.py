@@ -28,7 +28,7 @@ def command(run: Path, names: tuple[str, ...]) -> None:
     if unknown := [name for name in names if name not in known]:
         found, allowed = ", ".join(unknown), ", ".join(known)
         raise SpecError(Problem(str(run), "has no such figure", "--only", found, allowed))
-    files = write_figures(loaded, names)
+    files = write_figures(loaded, names or None)
     console = make_console()
     for file in files:
         console.print(shown_path(file), markup=False, soft_wrap=True)

@@ -9,6 +9,7 @@ is not.
 
 from __future__ import annotations
 
+import functools
 import re
 from dataclasses import dataclass
 
@@ -207,7 +208,12 @@ class Statement:
 
 def read_statement(text: str, *, is_item: bool) -> Statement:
     """What a line without markup moves; in an item of a list (`is_item`) a number alone may do."""
-    text = text[:_STATEMENT_CHARS]
+    return _read(text[:_STATEMENT_CHARS], is_item)
+
+
+# A line is read as an item, as what belongs to one and for its verb, and models repeat themselves.
+@functools.lru_cache(maxsize=1024)
+def _read(text: str, is_item: bool) -> Statement:
     if not _SAYS_NUMBER.search(text):
         return Statement(())
     text = _HERE.sub(" ", text)

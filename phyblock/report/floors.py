@@ -7,8 +7,9 @@ guessing; the strongest is the one to hold models against.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 
@@ -67,9 +68,11 @@ def floors_frame(run: Run) -> pd.DataFrame:
     for track in run.design.suite.tracks:
         found = track_estimates(run, track)
         found = found.sort_values("model", key=lambda names: names.map(place), kind="stable")
+        named = floors_run(run, track)
         for measure in track_measures(track):
             floors = strongest_floors(run, track, measure)
-            named = floors_run(run, track)
+            if not floors:
+                continue
             for row in found[found["measure"] == measure.name].to_dict("records"):
                 floor = floors.get(value_key(row))
                 if floor is None or row["model"] in named:
@@ -118,6 +121,8 @@ def headline_floors(run: Run, track: str) -> dict[str, Floor]:
 
 def _known_floors(run: Run, track: str, measure: Measure) -> Iterator[tuple[str, Floor]]:
     """Floors that were run, then those that the manifest knows, then chance."""
+    if not measure.floors and measure.chance is None:
+        return
     found = track_estimates(run, track)
     found = found[found["measure"] == measure.name]
     asked = [name for name in measure.floors if name in floors_run(run, track)]
@@ -142,8 +147,11 @@ def floors_view(table: pd.DataFrame, run: Run) -> TextTable:
         for measure in track_measures(track):
             mine = table[(table["track"] == track) & (table["measure"] == measure.name)]
             mine = mine[mine["matcher"].isin(["", run.design.matcher]) & ~mine[CELL].isin(parts)]
-            for key, group in mine.groupby(["setting", "criterion", CELL], sort=False):
-                setting, criterion, cell = map(str, key)
+            groups: dict[tuple[str, ...], list[dict[Hashable, Any]]] = {}
+            for row in mine.to_dict("records") if len(mine) else ():
+                key = (row["setting"], row["criterion"], row[CELL])
+                groups.setdefault(key, []).append(row)
+            for (setting, criterion, cell), group in groups.items():
                 heading = f"{measure.heading}, {cells[cell].heading}"
                 rows.append(_row(heading, setting, criterion, group, measure))
     columns = ("Measure", "Setting", "Counted by", "Strongest floor", "Floor", "Above", "Not above")
@@ -159,11 +167,15 @@ def floors_view(table: pd.DataFrame, run: Run) -> TextTable:
 
 
 def _row(
-    heading: str, setting: str, criterion: str, group: pd.DataFrame, measure: Measure
+    heading: str,
+    setting: str,
+    criterion: str,
+    group: Sequence[Mapping[Hashable, Any]],
+    measure: Measure,
 ) -> tuple[str, ...]:
-    first = group.iloc[0]
+    first = group[0]
     models = {
-        verdict: group.loc[group["verdict"] == verdict, "model"].tolist()
+        verdict: [row["model"] for row in group if row["verdict"] == verdict]
         for verdict in _VERDICTS.values()
     }
     unclear = [f"({name})" for name in models["cannot tell"]]

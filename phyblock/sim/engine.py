@@ -105,15 +105,6 @@ class Simulation(Protocol):
     def contacts(self) -> tuple[Contact, ...]:
         """List where bodies touched in the last time step; empty before the first step."""
 
-    def save(self) -> object:
-        """Everything that decides what happens next, as a value to give to `restore`."""
-
-    def restore(self, saved: object) -> None:
-        """Bring back what was saved: what happens next is then the same bit for bit.
-
-        Raises SimulationError when blocks were added or removed since.
-        """
-
 
 @runtime_checkable
 class PhysicsEngine(Protocol):

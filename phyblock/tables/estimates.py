@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from phyblock.scoring.ratios import Floats
-from phyblock.scoring.uncertainty import in_unit_range, jackknife
-from phyblock.tables.intervals import CountCube, parents_of
+from phyblock.scoring.uncertainty import Clusters, in_unit_range, jackknife
+from phyblock.tables.intervals import Grouping, base_scenes, grouped, parents_of, summed
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Cell, Measure, SampleCounts
 
@@ -54,17 +56,17 @@ def estimate_frame(
     `n_clusters` base scenes that the `n_scenes` scenes were made from; a scene's seeds stay
     together. Where a model said nothing at all in a cell, nothing was measured: NaN.
     """
-    parts = []
+    rows: list[tuple[object, ...]] = []
     families: dict[str, list[Measure]] = {}
     for measure in measures:
         families.setdefault(measure.counted.name, []).append(measure)
+    parents = parents_of(run)
     for family in families.values():
-        table = counts_of(family[0].counted)
-        parts += [_of_group(run, table, family, group) for group in _joined(cells)]
-    known = [part for part in parts if len(part)]
-    if not known:
-        return pd.DataFrame(columns=list(ESTIMATE_COLUMNS))
-    return pd.concat(known, ignore_index=True)[list(ESTIMATE_COLUMNS)]
+        counted = family[0].counted
+        pool = _Pool.of(counts_of(counted), counted.columns, cells, parents)
+        for group in _joined(cells):
+            rows += _rows_of(pool.only(group), family, group)
+    return pd.DataFrame(rows, columns=list(ESTIMATE_COLUMNS))
 
 
 def _joined(cells: Sequence[Cell]) -> Iterator[list[Cell]]:
@@ -81,30 +83,62 @@ def _joined(cells: Sequence[Cell]) -> Iterator[list[Cell]]:
     yield from groups
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Pool:
-    """The counts of a group of cells: `counts` has shape (scenes, groups, pooled, columns)."""
+    """Counts by model and way of counting (`groups`), and by cell (`pooled`).
+
+    `counts` has shape (scenes, groups, pooled, columns) and is summed over seeds; `rows`, (scenes,
+    groups, pooled), says of how many rows. `of_seeds`, (seeds, groups, pooled, columns), is summed
+    over scenes, NaN where a seed has no row. Where a model said nothing at all, (groups, pooled),
+    it is `silent`. `parents` are the base scenes of each scene.
+    """
 
     groups: list[tuple[str, ...]]
     pooled: list[str]
-    scenes: list[str]
     counts: Floats
-    present: np.ndarray
-    cube: CountCube
+    rows: NDArray[np.intp]
+    of_seeds: Floats
+    silent: NDArray[np.bool_]
+    parents: list[tuple[str, ...]]
 
+    @classmethod
+    def of(
+        cls,
+        table: pd.DataFrame,
+        columns: Sequence[str],
+        cells: Sequence[Cell],
+        parents: pd.Series[Any],
+    ) -> _Pool:
+        """Rows as `SampleCounts` has them, of cells that are no means of others."""
+        pooled = [cell.name for cell in cells if not cell.of]
+        places = pd.Index(pooled).get_indexer(pd.Index(table[CELL]))
+        table, places = table[places >= 0], places[places >= 0]
+        groups, cell = grouped(table, _GROUP), Grouping(places, pooled)
+        scenes, seeds = grouped(table, "scene"), grouped(table, "seed")
+        counts, rows = summed(table, columns, (scenes, groups, cell))
+        of_seeds, seed_rows = summed(table, columns, (seeds, groups, cell))
+        of_seeds[seed_rows == 0] = np.nan
+        model = grouped(table, "model")
+        replies = summed(table, ["replied"], (model, cell))[0][..., 0]
+        silent = replies[[model.values.index(group[0]) for group in groups.values]] == 0
+        origins = base_scenes(parents, scenes.values)
+        return cls(groups.values, pooled, counts, rows, of_seeds, silent, origins)
 
-def _pool(run: Run, table: pd.DataFrame, counted: SampleCounts, pooled: Sequence[str]) -> _Pool:
-    by = [*_GROUP, CELL]
-    cube = CountCube(table, parents_of(run), by, counted.columns)
-    groups = list(dict.fromkeys(cell[:-1] for cell in cube.cells))
-    shape = (len(cube.scenes), len(groups), len(pooled))
-    counts = np.zeros((*shape, len(counted.columns)))
-    present = np.zeros(shape, dtype=bool)
-    places = {group: place for place, group in enumerate(groups)}
-    for column, cell in enumerate(cube.cells):
-        at = (slice(None), places[cell[:-1]], pooled.index(cell[-1]))
-        counts[at], present[at] = cube.counts[:, column], cube.present[:, column]
-    return _Pool(groups, list(pooled), list(cube.scenes), counts, present, cube)
+    def only(self, cells: Sequence[Cell]) -> _Pool:
+        """Of these cells, and of the groups, scenes and seeds that have rows in them."""
+        names = [cell.name for cell in cells if not cell.of]
+        kept = np.array([self.pooled.index(name) for name in names], dtype=np.intp)
+        there = self.rows[:, :, kept] > 0
+        scenes, groups = (np.flatnonzero(there.any(axis=axis)) for axis in ((1, 2), (0, 2)))
+        return _Pool(
+            [self.groups[group] for group in groups],
+            names,
+            self.counts[np.ix_(scenes, groups, kept)],
+            self.rows[np.ix_(scenes, groups, kept)],
+            self.of_seeds[:, groups][:, :, kept],
+            self.silent[np.ix_(groups, kept)],
+            [self.parents[scene] for scene in scenes],
+        )
 
 
 def value_of_cells(
@@ -132,80 +166,56 @@ def value_of_cells(
     return values
 
 
-def _of_group(
-    run: Run, table: pd.DataFrame, measures: Sequence[Measure], cells: Sequence[Cell]
-) -> pd.DataFrame:
+def _rows_of(
+    pool: _Pool, measures: Sequence[Measure], cells: Sequence[Cell]
+) -> Iterator[tuple[object, ...]]:
     """Estimates of measures with the same counts, in cells that are estimated together."""
-    counted = measures[0].counted
-    pooled = [cell.name for cell in cells if not cell.of]
-    table = table[table[CELL].isin(pooled)]
-    if table.empty:
-        return pd.DataFrame()
-    keys = [*_GROUP, CELL]
-    heard = table.groupby(["model", CELL])["replied"].any().to_dict()
-    pool = _pool(run, table, counted, pooled)
-    sizes = table.groupby(keys).size().to_dict()
-    n = np.array([[sizes.get((*g, s), 0) for s in pooled] for g in pool.groups])
-    behind, fewest = _clusters_of_cells(pool, cells)
+    if not pool.groups:
+        return
+    clusters, present = Clusters.of(pool.parents), pool.rows > 0
+    behind, fewest = _clusters_of_cells(clusters, present, pool.pooled, cells)
     # A part of a single base scene leaves a mean without an interval.
     usable = np.where(fewest < 2, fewest, behind)
-    silent = np.array([[not heard.get((g[0], s), False) for s in pooled] for g in pool.groups])
-    # Where a model said nothing, empty plans have counts, and nothing was measured.
-    counts = np.where(silent[None, :, :, None], np.nan, pool.counts)
 
     def all_values(sums: Floats) -> Floats:
-        each = [value_of_cells(measure, cells, pooled)(sums) for measure in measures]
+        # Where a model said nothing, empty plans have counts, and nothing was measured.
+        heard = np.where(pool.silent[..., None], np.nan, sums)
+        each = [value_of_cells(measure, cells, pool.pooled)(heard) for measure in measures]
         return np.stack(each, axis=-1)
 
     found = jackknife(
-        counts,
-        pool.cube.clusters,
+        pool.counts,
+        clusters,
         all_values,
         n_clusters=np.repeat(usable[:, :, None], len(measures), axis=-1),
     )
     is_share = np.array([measure.is_share for measure in measures])
     within = in_unit_range(found, is_share)
-    spread = _over_seeds(table, pool, counted, silent, all_values)
-    members = np.array([[name in pooled_in(cell, cells) for name in pooled] for cell in cells])
-    scenes = np.any(pool.present[:, :, None, :] & members, axis=-1).sum(axis=0)
-    rows = []
+    spread = _over_seeds(all_values(pool.of_seeds))
+    members = np.array([[n in pooled_in(cell, cells) for n in pool.pooled] for cell in cells])
+    scenes = np.any(present[:, :, None, :] & members, axis=-1).sum(axis=0)
+    samples = pool.rows.sum(axis=0) @ members.T
     for g, group in enumerate(pool.groups):
         for c, cell in enumerate(cells):
             for m, measure in enumerate(measures):
                 at = (g, c, m)
-                rows.append(
-                    (
-                        measure.name,
-                        *group,
-                        cell.name,
-                        int(n[g][members[c]].sum()),
-                        found.value[at],
-                        *(values[at] for values in spread),
-                        within.lo[at],
-                        within.hi[at],
-                        found.se[at],
-                        int(scenes[g, c]),
-                        int(behind[g, c]),
-                    )
+                yield (
+                    measure.name,
+                    *group,
+                    cell.name,
+                    int(samples[g, c]),
+                    found.value[at],
+                    *(values[at] for values in spread),
+                    within.lo[at],
+                    within.hi[at],
+                    found.se[at],
+                    int(scenes[g, c]),
+                    int(behind[g, c]),
                 )
-    return pd.DataFrame(rows, columns=list(ESTIMATE_COLUMNS))
 
 
-def _over_seeds(
-    table: pd.DataFrame,
-    pool: _Pool,
-    counted: SampleCounts,
-    silent: np.ndarray,
-    values: Callable[[Floats], Floats],
-) -> tuple[np.ndarray, Floats, Floats, Floats, Floats]:
+def _over_seeds(each: Floats) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats]:
     """Number of seeds with a value; mean, sample standard deviation, least and most over them."""
-    seeds = sorted(table["seed"].unique())
-    sums = np.full((len(seeds), *pool.counts.shape[1:]), np.nan)
-    groups = {group: place for place, group in enumerate(pool.groups)}
-    totals = table.groupby(["seed", *_GROUP, CELL], sort=False)[list(counted.columns)].sum()
-    for key, row in zip(totals.index, totals.to_numpy(np.float64), strict=True):
-        sums[seeds.index(key[0]), groups[key[1:-1]], pool.pooled.index(key[-1])] = row
-    each = values(np.where(silent[..., None], np.nan, sums))
     known = ~np.isnan(each)
     count = known.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -224,15 +234,14 @@ def pooled_in(cell: Cell, cells: Sequence[Cell]) -> frozenset[str]:
     return frozenset().union(*(pooled_in(by_name[name], cells) for name in cell.of))
 
 
-def _clusters_of_cells(pool: _Pool, cells: Sequence[Cell]) -> tuple[np.ndarray, np.ndarray]:
+def _clusters_of_cells(
+    clusters: Clusters, present: NDArray[np.bool_], pooled: Sequence[str], cells: Sequence[Cell]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Base scenes behind each group and cell, and the fewest that are behind a part of it."""
-    by_cell = pool.cube.clusters.behind(pool.present.reshape(len(pool.scenes), -1)).reshape(
-        pool.present.shape[1:]
-    )
+    by_cell = clusters.behind(present.reshape(len(present), -1)).reshape(present.shape[1:])
     behind, fewest = [], []
     for cell in cells:
-        members = [name in pooled_in(cell, cells) for name in pool.pooled]
-        seen = np.any(pool.present[:, :, members], axis=-1)
-        behind.append(pool.cube.clusters.behind(seen))
+        members = [name in pooled_in(cell, cells) for name in pooled]
+        behind.append(clusters.behind(np.any(present[:, :, members], axis=-1)))
         fewest.append(by_cell[:, members].min(axis=-1))
     return np.stack(behind, axis=-1), np.stack(fewest, axis=-1)

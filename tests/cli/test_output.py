@@ -16,10 +16,12 @@ from tests.workspace import COMMAND, Workspace
 
 
 def in_terminal(workspace: Workspace, answer: str, *args: str) -> tuple[int, str]:
-    """Run with a terminal of 120 columns, and type `answer` first; exit code and screen."""
+    """Run with a terminal of 120 columns, and type `answer` first; exit code and screen. No figures
+    and no page, which take seconds.
+    """
     master, slave = pty.openpty()
     with subprocess.Popen(
-        [*COMMAND, "run", "suite.yaml", "--out", str(workspace.out), *args],
+        [*COMMAND, "run", "suite.yaml", "--out", str(workspace.out), "--no-report", *args],
         cwd=workspace.root,
         env=workspace.env | {"TERM": "xterm-256color", "COLUMNS": "120", "LINES": "40"},
         stdin=slave,

@@ -380,7 +380,7 @@ def test_a_report_without_the_data_set_still_shows_replies(
     manifest = yaml.safe_load((folder / "run.yaml").read_text())
     manifest["dataset"]["root"] = "gone"
     (folder / "run.yaml").write_text(yaml.safe_dump(manifest))
-    write_report(write_tables(folder))
+    write_report(write_tables(folder), figures=())
     page = browser.new_page()
     visit = Visit(page, folder / "report.html")
     visit.show("full_planning/oracle/t5/s0")

@@ -145,6 +145,7 @@ def test_every_text_of_the_page_is_escaped(tmp_path: Path) -> None:
     facts["suite"] |= {"name": hostile, "description": hostile}
     folder = write_run(tmp_path / "run", [record(hostile, scores=[score(1, 0, 1)])], facts)
     page = write_page(folder).read_text(encoding="utf-8")
+    assert not (folder / "figures").exists()
     assert "<script>alert" not in page
     assert "<img src=x" not in page
     assert page.count("<script>") == 1

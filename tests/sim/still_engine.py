@@ -6,7 +6,6 @@ import contextlib
 from collections.abc import Iterator, Mapping
 
 from phyblock.domain import Block, BlockType
-from phyblock.errors import SimulationError
 from phyblock.sim.engine import Contact, Physics, Velocity
 from phyblock.sim.pose import Pose
 from phyblock.sim.support import support_graph
@@ -61,16 +60,6 @@ class StillSimulation:
 
     def contacts(self) -> tuple[Contact, ...]:
         return self._contacts
-
-    def save(self) -> object:
-        return dict(self._types), dict(self._poses), dict(self._velocities), self._contacts
-
-    def restore(self, saved: object) -> None:
-        assert isinstance(saved, tuple)
-        types, poses, velocities, contacts = saved
-        if types != self._types:
-            raise SimulationError("what was saved is of other blocks")
-        self._poses, self._velocities, self._contacts = dict(poses), dict(velocities), contacts
 
     def _supports(self) -> tuple[Contact, ...]:
         """What rests on what, from geometry."""

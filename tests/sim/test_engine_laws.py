@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from phyblock.domain import BLOCK_TYPES, SHAPES, Block, BlockType
-from phyblock.errors import InputError, SimulationError
+from phyblock.errors import InputError
 from phyblock.sim.engine import FLOOR, GRAVITY_M_S2, Physics, PhysicsEngine, Simulation, Velocity
 from phyblock.sim.pose import Pose
 from phyblock.sim.registry import ENGINES, installed_engines, physics_engine
@@ -113,29 +113,6 @@ def test_contacts_tell_who_rests_on_whom(simulation: Simulation) -> None:
     simulation.remove(2)
     simulation.step(1)
     assert {contact.second for contact in simulation.contacts()} == {1, 3}
-
-
-def test_what_was_saved_comes_back_bit_for_bit(simulation: Simulation) -> None:
-    """In the middle of a fall, and so does what follows from it."""
-    falling = counterweighted_beam()[:3]
-    add_all(simulation, falling)
-    simulation.step(20)
-    saved, before = simulation.save(), bits(simulation, falling)
-    simulation.step(20)
-    after = bits(simulation, falling)
-    for _ in range(2):
-        simulation.restore(saved)
-        assert bits(simulation, falling) == before
-        simulation.step(20)
-        assert bits(simulation, falling) == after
-
-
-def test_what_was_saved_is_of_the_blocks_that_were_there(simulation: Simulation) -> None:
-    add_all(simulation, tower(2))
-    saved = simulation.save()
-    simulation.remove(2)
-    with pytest.raises(SimulationError, match="other blocks"):
-        simulation.restore(saved)
 
 
 def test_a_velocity_is_the_one_that_was_set(simulation: Simulation) -> None:

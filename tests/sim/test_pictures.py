@@ -48,8 +48,9 @@ def opened(png: bytes) -> np.ndarray:
         return np.asarray(image.convert("RGB"))
 
 
-@pytest.mark.parametrize("background", BACKGROUNDS)
-@pytest.mark.parametrize("size_px", [128, 130])
+@pytest.mark.parametrize(
+    ("size_px", "background"), list(zip(itertools.cycle([128, 130]), BACKGROUNDS))
+)
 def test_pictures_are_squares_of_the_size_asked_for(size_px: int, background: str) -> None:
     scene = designed("l1-gate")
     style = PictureStyle(size_px=size_px, background=background)

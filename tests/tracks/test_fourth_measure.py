@@ -15,6 +15,7 @@ import pytest
 from phyblock import registry
 from phyblock.cli.main import phyblock
 from phyblock.errors import StoreError
+from phyblock.report import write_report, write_tables
 from phyblock.run.rescore import rescore
 from phyblock.scoring.ratios import ratio_of
 from phyblock.tables.measures import Measure, SampleCounts
@@ -108,13 +109,13 @@ def test_scoring_again_fills_in_what_older_records_lack(
         with (here.out / "records.jsonl").open(append, encoding="utf-8") as file:
             file.write(json.dumps({**line, "scores": bare}) + "\n")
     request.getfixturevalue("added")
-    command("report", here.out)
+    write_tables(here.out)
     with (here.out / "tables" / "estimates.csv").open(newline="") as file:
         known = {row["measure"] for row in csv.DictReader(file)}
     assert known.isdisjoint({"needless", "distance", "blocks_order"})
     assert {"success", "macro_f1"} <= known
     command("score", here.out, "--out", here.root / "scored")
-    command("report", here.root / "scored")
+    write_report(write_tables(here.root / "scored"), figures=())
     check_everywhere(here.root / "scored")
     for line, again in zip(stored, here.records(here.root / "scored"), strict=True):
         assert json.dumps({**line, "counts": again["counts"]}, sort_keys=True) == json.dumps(

@@ -61,15 +61,17 @@ def figure_titles(run: Run) -> dict[str, str]:
     return titles
 
 
-def write_figures(run: Run, names: Sequence[str] = ()) -> tuple[Path, ...]:
-    """Draw figures into `figures/` of the run's folder, NAME.svg and NAME.png; all without `names`.
+def write_figures(run: Run, names: Sequence[str] | None = None) -> tuple[Path, ...]:
+    """Draw figures into `figures/` of the run's folder, NAME.svg and NAME.png; all by default.
 
     Figures that the run has no numbers for are left out. The same records give the same bytes.
     Raises StoreError for a folder that cannot be written, and, before anything is drawn, naming
     every file in the way that we never wrote.
     """
     makers = _makers(run)
-    wanted = [name for name in makers if not names or name in names]
+    wanted = [name for name in makers if names is None or name in names]
+    if not wanted:
+        return ()
     folder = run_folder(run.path)
     folder.check(figure_files(wanted))
     files: list[Path] = []
@@ -85,13 +87,15 @@ def write_figures(run: Run, names: Sequence[str] = ()) -> tuple[Path, ...]:
     return tuple(files)
 
 
-def figure_files(names: Sequence[str] = ()) -> tuple[str, ...]:
-    """Every file of these figures, by its name in a run folder; of all that there are without."""
+def figure_files(names: Sequence[str] | None = None) -> tuple[str, ...]:
+    """Every file of these figures, by its name in a run folder; by default of all there are."""
     known = [
         name
         for kind in kinds().values()
         for name in (_bars_name(kind.name), *kind.report().figures, _moved_name(kind.name))
     ]
     return tuple(
-        f"{_FOLDER}/{name}.{ending}" for name in names or (*known, _SCENES) for ending in _FORMS
+        f"{_FOLDER}/{name}.{ending}"
+        for name in ((*known, _SCENES) if names is None else names)
+        for ending in _FORMS
     )

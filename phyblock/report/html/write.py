@@ -59,22 +59,23 @@ class PageWritten:
 
 
 def write_report(
-    written: TablesWritten, data: Path | None = None, figures: Sequence[str] = ()
+    written: TablesWritten, data: Path | None = None, figures: Sequence[str] | None = None
 ) -> Path:
     """Write figures and page as `write_page` does; the page's path."""
     return write_page(written, data, figures).path
 
 
 def write_page(
-    written: TablesWritten, data: Path | None = None, figures: Sequence[str] = ()
+    written: TablesWritten, data: Path | None = None, figures: Sequence[str] | None = None
 ) -> PageWritten:
     """Write figures, `report.html` and `report/` of a run whose tables were.
 
     Goals, candidates and assemblies are drawn by the page from the scenes: `data` is where the
     data set is now, if it has moved; where it cannot be read, the page says so and shows the rest.
     Pictures that were sent lie beside the page as far as the picture cache has them. `figures`
-    names those to draw. Raises DataError for a `data` that is not what the run was made on,
-    StoreError where the folder cannot be written or something is in the way that we never wrote.
+    names those to draw, all by default. Raises DataError for a `data` that is not what the run was
+    made on, StoreError where the folder cannot be written or something is in the way that we never
+    wrote.
     """
     run = written.run
     sources = open_sources(run, data)

@@ -57,13 +57,6 @@ class _Body(NamedTuple):
     center_m: NDArray[np.float64]
 
 
-class _Saved(NamedTuple):
-    """A state that the client keeps, and the bodies that it is of."""
-
-    id: int
-    bodies: tuple[int, ...]
-
-
 class BulletSimulation:
     """Blocks on a plane, as `Simulation`; Bullet itself knows centers of mass only."""
 
@@ -149,18 +142,6 @@ class BulletSimulation:
                 first, second, x, y, z = second, first, -x, -y, -z
             found.append(Contact(first, second, (x, y, z), point[8]))
         return tuple(sorted(found))
-
-    def save(self) -> object:
-        """Everything that decides what happens next; the client keeps it while it is open."""
-        bodies = tuple(body.id for body in self._bodies.values())
-        return _Saved(self._bullet.saveState(physicsClientId=self._client), bodies)
-
-    def restore(self, saved: object) -> None:
-        """Bring back what was saved; SimulationError when other blocks are there now."""
-        bodies = tuple(body.id for body in self._bodies.values())
-        if not isinstance(saved, _Saved) or saved.bodies != bodies:
-            raise SimulationError("what was saved is of other blocks than are there now")
-        self._bullet.restoreState(stateId=saved.id, physicsClientId=self._client)
 
     def _set_friction(self, body: int) -> None:
         self._bullet.changeDynamics(

@@ -80,15 +80,6 @@ class _Body:
         return center
 
 
-@dataclass(frozen=True, eq=False)
-class _Saved:
-    """A state of the data that it is of, and what touched then."""
-
-    data: Any
-    state: Floats
-    contacts: tuple[Contact, ...]
-
-
 class MujocoSimulation:
     """Blocks on a plane, as `Simulation`.
 
@@ -151,22 +142,6 @@ class MujocoSimulation:
         if self._contacts is None:
             self._contacts = tuple(sorted(self._found()))
         return self._contacts
-
-    def save(self) -> object:
-        """Everything that decides what happens next."""
-        self._begin()
-        what = self._mujoco.mjtState.mjSTATE_INTEGRATION
-        state = np.empty(self._mujoco.mj_stateSize(self._model, what))
-        self._mujoco.mj_getState(self._model, self._data, state, what)
-        return _Saved(self._data, state, self.contacts())
-
-    def restore(self, saved: object) -> None:
-        """Bring back what was saved; SimulationError when other blocks are there now."""
-        if not isinstance(saved, _Saved) or saved.data is not self._data:
-            raise SimulationError("what was saved is of other blocks than are there now")
-        what = self._mujoco.mjtState.mjSTATE_INTEGRATION
-        self._mujoco.mj_setState(self._model, self._data, saved.state, what)
-        self._contacts = saved.contacts
 
     def _interrupt(self) -> None:
         """Let go of the data, as other blocks are to come or go."""

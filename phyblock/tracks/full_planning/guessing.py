@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
-from phyblock.tracks.full_planning.goal_blind import goal_blind_plans
+from phyblock.tracks.full_planning.kept_plans import kept_plans
 from phyblock.tracks.showing import Showing, ShownTask, TaskShowing
 from phyblock.words import CandidateOrder, Setting
 
@@ -47,4 +47,4 @@ def _learned(
     showing = TaskShowing(Showing(order))
     shown = [showing.of(one, seed) for one in pool]
     candidates = {one.key: one.candidates for one in shown}
-    return goal_blind_plans([one.scene for one in shown], candidates, setting)
+    return kept_plans([one.scene for one in shown], candidates, setting)

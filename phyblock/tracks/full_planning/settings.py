@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.scoring.ratios import Floats, f1_of
-from phyblock.scoring.uncertainty import jackknife
+from phyblock.scoring.uncertainty import Estimate, jackknife
 from phyblock.tables.cells import cell_scores, measured
 from phyblock.tables.intervals import CountCube, parents_of
 from phyblock.tables.load import Run, made_once_copied
@@ -22,8 +22,13 @@ from phyblock.tracks.full_planning.measures import NAME
 __all__ = ["settings_frame", "settings_view"]
 
 _ENDS = {"value": "", "lo": "_lo", "hi": "_hi"}
-_F1 = tuple(f"f1_{setting}{end}" for setting in "ab" for end in _ENDS.values())
+_F1 = {
+    f"f1_{setting.lower()}{end}": (setting, name)
+    for setting, (name, end) in product("AB", _ENDS.items())
+}
+"""Columns of F1: its setting, and the column of estimates that it is taken from."""
 _COLUMNS = ("model", "level", *_F1, "difference", "lo", "hi", "n_scenes", "n_clusters")
+_UNKNOWN = {"n_scenes": 0, "n_clusters": 0}
 
 
 @made_once_copied
@@ -34,60 +39,61 @@ def settings_frame(run: Run) -> pd.DataFrame:
     under both. Empty where the run has one setting.
     """
     design = run.design
-    parts = []
-    for level in design.levels if {"A", "B"} <= set(design.suite.settings) else ():
-        cube = _counts(run, level)
+    if not {"A", "B"} <= set(design.suite.settings):
+        return pd.DataFrame(columns=list(_COLUMNS))
+    cube, estimates = _counts(run), _estimates(run)
+    found: dict[tuple[str, str], dict[str, Any]] = {}
+    for level in design.levels:
         matcher = design.matchers(design.criterion(level))[0]
-        kept = {
-            (model, setting): place
-            for place, (by, model, setting) in enumerate(cube.cells)
-            if by == matcher
-        }
+        part = cube.only([n for n, cell in enumerate(cube.cells) if cell[0] == level])
+        kept = {cell[2:]: n for n, cell in enumerate(part.cells) if cell[1] == matcher}
         models = [m for m in design.model_names if (m, "A") in kept and (m, "B") in kept]
         if not models:
             continue
         both = np.array([[kept[model, setting] for setting in "AB"] for model in models])
-        n_clusters = cube.clusters.behind(cube.present[:, both[:, 0]])
-        found = jackknife(
-            cube.counts[:, both],
-            cube.clusters,
+        present, clusters = part.present[:, both[:, 0]], part.clusters
+        n_clusters = clusters.behind(present)
+        paired = jackknife(
+            part.counts[:, both],
+            clusters,
             _both_and_difference,
             n_clusters=np.repeat(n_clusters[:, None], 3, axis=1),
         )
-        part = pd.DataFrame({"model": models, "level": level})
-        part["difference"] = found.value[:, 2]
-        part["lo"], part["hi"] = found.lo[:, 2], found.hi[:, 2]
-        f1 = _estimates(run, level, matcher)
-        for name, (setting, end) in zip(_F1, product("AB", _ENDS), strict=True):
-            part[name] = [f1[model, setting][end] for model in models]
-        part["n_scenes"] = cube.present[:, both[:, 0]].sum(axis=0)
-        part["n_clusters"] = n_clusters
-        parts.append(part)
-    if not parts:
-        return pd.DataFrame(columns=list(_COLUMNS))
-    known = pd.concat(parts).set_index(["model", "level"])
-    models = [name for name in design.model_names if name in set(known.index.get_level_values(0))]
-    cells = pd.MultiIndex.from_product([models, design.levels], names=["model", "level"])
-    table = known.reindex(cells).reset_index()[list(_COLUMNS)]
-    sizes = ["n_scenes", "n_clusters"]
-    table[sizes] = table[sizes].fillna(0).astype("int64")
-    return table
+        for n, model in enumerate(models):
+            f1 = [estimates[model, setting, level, matcher] for setting in "AB"]
+            found[model, level] = {
+                **{name: f1["AB".index(of)][end] for name, (of, end) in _F1.items()},
+                **{name: values[n, 2] for name, values in _paired(paired).items()},
+                "n_scenes": int(present[:, n].sum()),
+                "n_clusters": int(n_clusters[n]),
+            }
+    answered = {model for model, _ in found}
+    rows = [
+        {"model": model, "level": level, **(found.get((model, level)) or _UNKNOWN)}
+        for model in design.model_names
+        if model in answered
+        for level in design.levels
+    ]
+    return pd.DataFrame(rows, columns=list(_COLUMNS))
 
 
-def _estimates(run: Run, level: str, matcher: str) -> dict[Hashable, Any]:
-    """F1 of a level by model and setting."""
+def _paired(found: Estimate) -> dict[str, Floats]:
+    return {"difference": found.value, "lo": found.lo, "hi": found.hi}
+
+
+def _estimates(run: Run) -> dict[Hashable, Any]:
+    """F1 by model, setting, level and matcher."""
     found = track_estimates(run, NAME)
-    found = found[(found["measure"] == "f1") & (found[CELL] == level)]
-    mine = found[found["matcher"] == matcher].set_index(["model", "setting"])
-    return dict(mine[list(_ENDS)].astype("float64").to_dict("index"))
+    found = found[found["measure"] == "f1"].set_index(["model", "setting", CELL, "matcher"])
+    return dict(found[list(_ENDS)].astype("float64").to_dict("index"))
 
 
-def _counts(run: Run, level: str) -> CountCube:
-    """Counts tp, fp, fn of every scene by matcher, model and setting."""
+def _counts(run: Run) -> CountCube:
+    """Counts tp, fp, fn of every scene by level, matcher, model and setting."""
     scores = cell_scores(run)
-    scores = scores[(scores["level"] == level) & (scores["track"] == NAME)]
-    by = ["matcher", "model", "setting"]
-    return CountCube(measured(scores, ["model"]), parents_of(run), by, ["tp", "fp", "fn"])
+    scores = measured(scores[scores["track"] == NAME], ["level", "model"])
+    by = ["level", "matcher", "model", "setting"]
+    return CountCube.of(scores, parents_of(run), by, ["tp", "fp", "fn"])
 
 
 def _both_and_difference(sums: Floats) -> Floats:
