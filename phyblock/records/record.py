@@ -51,6 +51,8 @@ class SentPrompt(Line):
     """Digest of the prompt as sent, which stands in `prompts.jsonl`."""
     images: tuple[SentImage, ...] = ()
     """The pictures in the order sent."""
+    examples: tuple[str, ...] = ()
+    """Keys of the worked examples that were shown before what was asked."""
 
 
 class Score(Line):
