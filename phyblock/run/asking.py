@@ -23,7 +23,7 @@ def asking_remarks(loaded: LoadedSuite, plan: RunPlan) -> list[str]:
         return []
     asked = {variant.shown: loaded.at(variant.shown) for variant in plan.variants}
     used = {(track, path): one for one in asked.values() for track, path in one.templates.items()}
-    own = [f"prompt of {track}: {path}" for track, path in used]
+    own = [_named(track, path, one) for (track, path), one in used.items()]
     if loaded.suite.answer_format == "text":
         return own
     unsaid = [_unsaid(track, path) for (track, path), one in used.items() if not _says(track, one)]
@@ -67,6 +67,12 @@ def _models(plan: RunPlan) -> Iterator[str]:
             f"the prompt alone asks for JSON of {', '.join(others)} "
             "(response_format: always in the models file sends the schema)"
         )
+
+
+def _named(track: str, path: Path, loaded: LoadedSuite) -> str:
+    included = template_prompt(loaded, track).included
+    more = f" (with {', '.join(file.name for file in included)})" if included else ""
+    return f"prompt of {track}: {path}{more}"
 
 
 def _says(track: str, loaded: LoadedSuite) -> bool:
