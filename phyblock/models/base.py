@@ -111,8 +111,8 @@ class Model(Protocol):
     def needs_messages(self) -> bool:
         """Whether prompts and pictures must be made for it.
 
-        False for recordings alone: they are looked up by a request's key, and what was asked when
-        they were made is not known.
+        False for recordings, which are looked up by a request's key (what was asked when they were
+        made is not known), and for baselines, which look at the request's subject alone.
         """
 
     async def ask(self, request: Request) -> Reply | None:

@@ -19,6 +19,8 @@ from phyblock.report.html.index import SampleIndex, read_places
 from phyblock.report.html.pack import Pack
 from phyblock.report.html.samples import pack_samples
 from tests.report.factory import laws, manifest, record, record_lists, score, write_run
+from tests.servers.chassis import Running
+from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
 
 JSON = st.recursive(
@@ -240,7 +242,12 @@ def test_other_data_is_refused(run: Workspace) -> None:
     assert "or it was changed since" in Report(run.out).index["no_scenes"]
 
 
-def test_prompts_and_pictures_as_sent_are_there(run: Workspace) -> None:
+def test_prompts_and_pictures_as_sent_are_there(workspace: Workspace) -> None:
+    run = workspace
+    run.write_suite(models=["alpha"], seeds=[0])
+    with Running(OpenAIChat()) as running:
+        run.write_models(running.url, "alpha")
+        assert run.run().code == 0
     done = run.phyblock("report", run.out)
     assert (done.code, done.err) == (0, "")
     report = Report(run.out)
