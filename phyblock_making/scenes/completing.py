@@ -63,7 +63,10 @@ def complete(read: ReadScene) -> Completed:
                 for one in found
             )
     noted = [one.problem for one in findings_of(facts, _NOTED)]
-    notes = [f"{one.message}: {one.found}" if one.found else one.message for one in noted]
+    notes = [
+        f"{one.message}: {one.found} {one.field}, {one.allowed}" if one.found else one.message
+        for one in noted
+    ]
     return Completed(scene, offered, (*notes, *_other(read.given, scene)))
 
 

@@ -19,7 +19,17 @@ from phyblock.domain.blocks import BlockType, Color
 from phyblock.domain.scene import Block
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.records import Line
-from phyblock.records.data_values import Angles, Filled, Format, Name, Order, Position, triple
+from phyblock.records.data_values import (
+    NAME_ALLOWED,
+    Angles,
+    Filled,
+    Format,
+    Name,
+    Order,
+    Position,
+    is_name,
+    triple,
+)
 from phyblock.records.faults import validated
 from phyblock.records.scene import EITHER_NAME, MAX_BLOCKS, CandidateList, Levels
 from phyblock.specs.yaml_source import YamlSource, read_yaml
@@ -132,6 +142,9 @@ def _read(file: Path) -> Iterator[ReadScene]:
 
 def _scene(raw: Any, name: str, where: str) -> ReadScene:
     given = validated(GivenScene, raw, where)
+    if given.id is None and not is_name(name):
+        message, hint = "has no id, and cannot be called as its file", "give it an id"
+        raise DataError(Problem(where, message, "id", name, NAME_ALLOWED, hint))
     return ReadScene(given.id or name, given, where)
 
 

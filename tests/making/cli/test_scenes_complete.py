@@ -138,6 +138,15 @@ def test_a_file_that_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, s
     assert said in str(caught.value)
 
 
+def test_a_scene_is_called_as_its_file_where_that_is_a_name(tmp_path: Path) -> None:
+    text = json.dumps({"blocks": GABLES})
+    for name in ("my gables.json", "gables.json"):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    assert read_given(tmp_path / "gables.json")[0].name == "gables"
+    with pytest.raises(DataError, match="has no id, and cannot be called as its file"):
+        read_given(tmp_path)
+
+
 def test_what_is_completed_is_a_data_set_that_validates_and_runs(workspace: Workspace) -> None:
     source = workspace.write_yaml("gables.yaml", {"scenes": [
         {"id": "gables", "blocks": GABLES},
