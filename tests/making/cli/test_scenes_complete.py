@@ -41,7 +41,7 @@ def same(scene: Scene) -> bool:
 
 
 @given(st.sampled_from(DATA.tasks))
-@settings(max_examples=5)
+@settings(max_examples=5, deadline=None)
 def test_a_scene_that_is_stripped_comes_back(task: Any) -> None:
     assert same(task.scene)
 
@@ -52,7 +52,7 @@ def test_all_scenes_that_are_stripped_come_back() -> None:
 
 
 @given(order=st.permutations(range(5)))
-@settings(max_examples=20)
+@settings(max_examples=20, deadline=None)
 def test_blocks_may_be_listed_in_any_order(order: list[int]) -> None:
     scene = derived("gables", of(*(GABLES[i] for i in order)), "here")
     assert [block.order for block in scene.blocks] == [1, 2, 3, 4, 5]
