@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.errors import PromptError
@@ -56,6 +56,7 @@ def test_bundled_files_are_found_behind_those_beside_the_template(tmp_path: Path
 
 
 @given(first=st.text("ab", max_size=3), second=st.text("ab", max_size=3))
+@settings(max_examples=15, deadline=None)
 def test_an_edit_of_what_is_included_is_another_prompt(
     tmp_path_factory: pytest.TempPathFactory, first: str, second: str
 ) -> None:
