@@ -14,7 +14,7 @@ from phyblock_making.cli.working import jobs_option, tracked
 from phyblock_making.scenes.completing import Completed, complete, palette_of
 from phyblock_making.scenes.given_scenes import ReadScene, read_given
 from phyblock_making.scenes.scene_card import completed_card
-from phyblock_making.scenes.scene_files import open_writer
+from phyblock_making.scenes.scene_files import check_folder, open_writer
 from phyblock_making.workers import open_workers
 
 __all__ = ["command"]
@@ -39,6 +39,7 @@ def command(data: Path, jobs: int, out: Path | None) -> None:
     """
     given = read_given(data)
     folder = out or Path(f"{data.resolve().stem}-set")
+    check_folder(folder)
     problems: list[Problem] = []
     done: list[Completed] = []
     with open_workers(min(jobs, len(given)), None) as workers:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from phyblock.specs import load_suite
 from phyblock.tracks import Opening, open_tracks
 from phyblock.tracks.examples import Examples
 from phyblock.tracks.full_planning.worked import worked_plan
+from phyblock.tracks.vqa import opening
 from phyblock.tracks.vqa.spec import VqaSpec
 from phyblock.variants import Variant
 from phyblock_making.symmetry import transformed
@@ -40,6 +42,20 @@ def suite_file(folder: Path) -> Path:
     path = folder / "suite.yaml"
     path.write_text("name: s\nmodels: [oracle]\nimages: {size_px: 128}\n", encoding="utf-8")
     return path
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _questions_are_read_once() -> Iterator[None]:
+    read, known = opening.open_questions, {}
+
+    def once(*args: Any) -> Any:
+        if not known:
+            known[""] = read(*args)
+        return known[""]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(opening, "open_questions", once)
+        yield
 
 
 def opened(folder: Path, *sets: str, limit: int | None = None) -> Any:
