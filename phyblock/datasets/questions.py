@@ -45,7 +45,7 @@ def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
             raise
         message = "asks about scenes of another data set"
         found = f"the data set {scenes.name}"
-        hint = "make questions about it: phyblock vqa generate --data FOLDER --out QUESTIONS"
+        hint = "make questions about it, or name the data set that they are about"
         problem = Problem(str(path), message, "", found, "questions about its scenes", hint)
         raise DataError(problem) from error
     return QuestionSet(folder.name, folder, tuple(tasks))

@@ -251,7 +251,7 @@ def test_questions_about_another_data_set_are_said_once(tmp_path: Path, scenes: 
         read_questions(folder, scenes)
     (problem,) = caught.value.problems
     assert "of another data set" in problem.message
-    assert "vqa generate" in problem.hint
+    assert "make questions about it" in problem.hint
     # A few are told one by one.
     with pytest.raises(DataError) as caught:
         read_questions(write(tmp_path / "few", QUESTION, *others[:5]), scenes)
