@@ -1,65 +1,17 @@
-"""Turning and mirroring whole structures, and telling whether two are the same but for that.
-
-A mirror image of a block is again a block: every type has a mirror plane of its own, so that the
-image of a pose is the mirrored frame times the block's own mirror, a proper rotation.
-"""
+"""Turning and mirroring whole structures, with the angles that designs use."""
 
 from __future__ import annotations
 
 import functools
-import hashlib
-import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
-from phyblock.domain.blocks import (
-    BlockType,
-    Euler,
-    euler_deg_to_matrix,
-    orientation_class,
-)
+from phyblock.domain.blocks import BlockType, Euler
 from phyblock.domain.scene import Block, Scene
+from phyblock.domain.symmetry import Symmetry, fingerprint, image_deg, image_m, pose_class
 from phyblock_making.poses import POSES
 
-__all__ = [
-    "SYMMETRIES",
-    "Symmetry",
-    "angles_deg",
-    "canonical_form",
-    "find_twins",
-    "fingerprint",
-    "transformed",
-    "turned_form",
-]
-
-Matrix = NDArray[np.float64]
-_MIRROR = np.diag([-1.0, 1.0, 1.0])
-"""Every block type is its own mirror image across the plane x = 0 of its body frame."""
-_STEP_M = 0.001
-_PHASE = 0.37
-"""Keeps multiples of a quarter of a millimeter, which designs are made of, off the borders."""
-
-
-@dataclass(frozen=True)
-class Symmetry:
-    """A mirroring across the plane x = 0, if `mirrored`, and then `turns` quarter turns about z."""
-
-    turns: int = 0
-    mirrored: bool = False
-
-    @functools.cached_property
-    def matrix(self) -> Matrix:
-        """World map, shape (3, 3); its determinant is -1 when mirrored."""
-        cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[self.turns % 4]
-        turn = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]], dtype=np.float64)
-        return turn @ _MIRROR if self.mirrored else turn
-
-
-SYMMETRIES = tuple(Symmetry(turns, mirrored) for mirrored in (False, True) for turns in range(4))
-"""The eight symmetries of a structure on a floor with a square grid."""
+__all__ = ["find_twins", "transformed"]
 
 
 def transformed(blocks: Sequence[Block], symmetry: Symmetry) -> tuple[Block, ...]:
@@ -67,30 +19,11 @@ def transformed(blocks: Sequence[Block], symmetry: Symmetry) -> tuple[Block, ...
     return tuple(
         replace(
             block,
-            position_m=_moved(block.position_m, symmetry),
+            position_m=image_m(block.position_m, symmetry),
             euler_deg=_turned(block.type, block.euler_deg, symmetry),
         )
         for block in blocks
     )
-
-
-def canonical_form(blocks: Sequence[Block]) -> tuple[tuple[object, ...], ...]:
-    """A name of the structure that turning, mirroring and shifting it along the floor keeps.
-
-    The least, over the eight symmetries, of the sorted (type, color, pose class, place) of all
-    blocks, places counted in millimeters from the low corner of the block origins.
-    """
-    return min(_form(transformed(blocks, symmetry)) for symmetry in SYMMETRIES)
-
-
-def turned_form(blocks: Sequence[Block]) -> tuple[tuple[object, ...], ...]:
-    """A name of the structure that turning and shifting it keeps, and mirroring does not."""
-    return min(_form(transformed(blocks, Symmetry(turns))) for turns in range(4))
-
-
-def fingerprint(blocks: Sequence[Block]) -> bytes:
-    """16 bytes that are equal for equal canonical forms, and in practice for no others."""
-    return hashlib.sha256(repr(canonical_form(blocks)).encode()).digest()[:16]
 
 
 def find_twins(scenes: Iterable[Scene]) -> dict[str, str]:
@@ -100,57 +33,12 @@ def find_twins(scenes: Iterable[Scene]) -> dict[str, str]:
     return {name: twin for name, twin in earlier.items() if twin != name}
 
 
-def _form(blocks: Sequence[Block]) -> tuple[tuple[object, ...], ...]:
-    places = np.array([block.position_m for block in blocks])
-    places[:, :2] -= places[:, :2].min(axis=0)
-    steps = np.floor(places / _STEP_M + _PHASE).astype(int)
-    return tuple(
-        sorted(
-            (block.type, block.color, _pose_class(block.type, block.euler_deg), *place)
-            for block, place in zip(blocks, steps.tolist(), strict=True)
-        )
-    )
-
-
-def _moved(position_m: tuple[float, float, float], symmetry: Symmetry) -> Euler:
-    x, y, z = (symmetry.matrix @ np.array(position_m)).tolist()
-    return (round(x, 6) + 0.0, round(y, 6) + 0.0, z)
-
-
 @functools.cache
 def _turned(block_type: BlockType, euler_deg: Euler, symmetry: Symmetry) -> Euler:
     """Angles of the image of a pose, as `POSES` names them where it does."""
-    body = _MIRROR if symmetry.mirrored else np.eye(3)
-    image = symmetry.matrix @ euler_deg_to_matrix(euler_deg) @ body
-    angles = angles_deg(image)
-    wanted = _pose_class(block_type, angles)
+    angles = image_deg(euler_deg, symmetry)
+    wanted = pose_class(block_type, angles)
     for known in POSES[block_type].values():
-        if _pose_class(block_type, known) == wanted:
+        if pose_class(block_type, known) == wanted:
             return known
     return angles
-
-
-@functools.cache
-def _pose_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, ...]:
-    """The orientation class; of an upright cylinder, whose 18 facets no one counts, its axis."""
-    rotation = euler_deg_to_matrix(euler_deg)
-    if block_type == "cylinder" and abs(rotation[2, 2]) > 1 - 1e-6:
-        return (0.0, 0.0, 1.0)
-    return orientation_class(block_type, euler_deg)
-
-
-def angles_deg(rotation: Matrix) -> Euler:
-    """Extrinsic x-y-z angles [degrees] of a rotation matrix: R = Rz Ry Rx."""
-    sine = -float(rotation[2, 0])
-    if abs(sine) > 1 - 1e-9:
-        roll, yaw = math.atan2(-rotation[1, 2], rotation[1, 1]), 0.0
-        pitch = math.copysign(math.pi / 2, sine)
-    else:
-        roll = math.atan2(rotation[2, 1], rotation[2, 2])
-        pitch = math.asin(sine)
-        yaw = math.atan2(rotation[1, 0], rotation[0, 0])
-    return (_neat(roll), _neat(pitch), _neat(yaw))
-
-
-def _neat(angle_rad: float) -> float:
-    return round(math.degrees(angle_rad), 6) + 0.0

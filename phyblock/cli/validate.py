@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import click
@@ -17,7 +18,8 @@ from phyblock.errors import InputError, Problem, SpecError
 from phyblock.resources import bundled
 from phyblock.run.asking import asking_remarks
 from phyblock.run.plan import make_plan
-from phyblock.specs import load_models, load_suite, suite_model
+from phyblock.run.soundness import model_problems
+from phyblock.specs import RECORDED, ModelSpec, load_models, load_suite, suite_model
 
 __all__ = ["command"]
 
@@ -66,17 +68,27 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[s
         raise SpecError(Problem(str(path), "is a prompt, not a suite", hint=hint))
     if not _is_suite(path):
         known = load_models(path)
+        _check_models(path, known, known)
         if not known:
             allowed = "a suite, or a models file with name: provider/model lines"
             raise SpecError(Problem(str(path), "names nothing", allowed=allowed))
         return [f"models file, {counted(len(known), 'model')}"]
     data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
     loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
-    plan = make_plan(loaded, load_models(find_models_file(models_file, path)))
+    named = find_models_file(models_file, path)
+    known = load_models(named)
+    if loaded.suite.models != RECORDED:
+        _check_models(named, known, loaded.suite.models)
+    plan = make_plan(loaded, known)
     calls = plan.samples_per_model
     models = counted(len(plan.models), "model")
     told = f"suite {plan.suite.name}, {models}, {counted(calls, 'sample')} a model"
     return [told, *asking_remarks(loaded, plan)]
+
+
+def _check_models(path: Path, known: Mapping[str, ModelSpec], names: Collection[str]) -> None:
+    if problems := list(model_problems(path, known, names)):
+        raise SpecError(problems)
 
 
 def _is_suite(path: Path) -> bool:

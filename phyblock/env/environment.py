@@ -25,6 +25,7 @@ from phyblock.env.state import LARGEST, MOST_BLOCKS, TRAITS, candidate_rows, goa
 from phyblock.errors import DataError, Problem
 from phyblock.scoring import Assembly
 from phyblock.sim import PictureStyle, candidates_png
+from phyblock.sim.pictures import LARGEST_PX, SMALLEST_PX
 from phyblock.sim.site import ONE_SETTING, Lookout, Settled, Site
 from phyblock.sim.stability import DEFAULT_TRIAL
 from phyblock.words import GATINGS, SETTINGS, Background, Gating, Physics, Setting
@@ -39,6 +40,7 @@ _PICTURES = ("current", "goal", "candidates")
 _KEPT_PICTURES = 64
 """Of one scene; 50 MB at 512 pixels."""
 _MOST_OF_A_KIND = 255
+_SMALLEST_PX = 16
 
 
 class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
@@ -79,6 +81,8 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
         """
         _check_options(setting=setting, gating=gating, physics=physics, observe=observe)
         _check_limits(max_steps=max_steps, max_failures=max_failures)
+        if size_px < _SMALLEST_PX:
+            raise ValueError(f"size_px is {size_px}, allowed {_SMALLEST_PX}..{LARGEST_PX}")
         tasks = read_tasks(data) if isinstance(data, str | Path) else tuple(data)
         if levels is not None:
             tasks = tuple(task for task in tasks if set(task.scene.levels) & set(levels))
@@ -91,7 +95,9 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
         self._gating: Gating = gating
         self._physics = physics
         self._observe = observe
-        self._style = PictureStyle(size_px, background)
+        # Below the smallest that is drawn, whole pixels are put together.
+        self._shrink = max(1, -(-SMALLEST_PX // size_px))
+        self._style = PictureStyle(size_px * self._shrink, background)
         self._max_steps = max_steps
         self._max_failures = max_failures
         self.render_mode = render_mode
@@ -218,7 +224,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, np.int64]):
     ) -> NDArray[np.uint8]:
         """A picture drawn once while it is in use; those unused for longest make room."""
         if name not in self._pictures:
-            self._pictures[name] = np.asarray(draw())
+            self._pictures[name] = np.asarray(draw().reduce(self._shrink))
             if len(self._pictures) > _KEPT_PICTURES:
                 self._pictures.popitem(last=False)
         self._pictures.move_to_end(name)

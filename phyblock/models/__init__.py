@@ -31,6 +31,7 @@ from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import KeyStatus, api_key_status, server_address
 from phyblock.models.limits import Gate
 from phyblock.models.prices import Price, Prices, Rate, Tariff, today
+from phyblock.models.providers import known_providers
 from phyblock.models.raw_replies import RawReply, read_raw_reply
 from phyblock.models.retirement import ends_on, is_unlisted
 from phyblock.models.retry import RetryPolicy
@@ -74,6 +75,7 @@ __all__ = [
     "is_billed",
     "is_unlisted",
     "known_keys",
+    "known_providers",
     "most_usd",
     "prices_of",
     "read_raw_reply",

@@ -51,6 +51,7 @@ class Request:
     is looked up; `seed` is the sample's seed, which also tells repeats apart;
     `params` are sampling parameters by their OpenAI names; `prompt_version` hashes the template.
     `response_format` asks for an answer as JSON, as the OpenAI protocol does; None asks for text.
+    `examples` are the keys of worked examples that `messages` show before the question.
     `subject` is what the question is about, of the type that its track says: only the rules of
     baselines look at it.
     """
@@ -63,6 +64,7 @@ class Request:
     subject: object
     response_format: Mapping[str, object] | None = None
     track: str = ""
+    examples: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -115,8 +117,8 @@ class Model(Protocol):
     def needs_messages(self) -> bool:
         """Whether prompts and pictures must be made for it.
 
-        False for recordings alone: they are looked up by a request's key, and what was asked when
-        they were made is not known.
+        False for recordings, which are looked up by a request's key (what was asked when they were
+        made is not known), and for baselines, which look at the request's subject alone.
         """
 
     async def ask(self, request: Request) -> Reply | None:

@@ -18,11 +18,10 @@ class BaselineModel:
     """A rule instead of a model.
 
     What it draws depends on its name, the seed and the request's key alone, not on the order in
-    which it is asked. It takes prompts and pictures like any model and does not look at them, so
-    that a run of baselines shows that a whole run works.
+    which it is asked. It looks at no prompt and no picture, and so none is made for it.
     """
 
-    needs_messages = True
+    needs_messages = False
 
     def __init__(self, config: ModelConfig) -> None:
         if config.id not in baseline_names():

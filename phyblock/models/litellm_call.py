@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from phyblock.models.litellm_wire import Exchange
 
-__all__ = ["LitellmTransport"]
+__all__ = ["LitellmTransport", "litellm_providers"]
 
 _SETTINGS = {
     "LITELLM_LOCAL_MODEL_COST_MAP": "True",  # else the import fetches the price map
@@ -141,6 +141,11 @@ def _litellm() -> types.ModuleType:
         litellm.in_memory_llm_clients_cache.flush_cache()
     module: types.ModuleType = litellm
     return module
+
+
+def litellm_providers() -> frozenset[str]:
+    """The names of all providers that litellm knows."""
+    return frozenset(str(getattr(one, "value", one)) for one in _litellm().provider_list)
 
 
 def _plain(response: Any) -> Mapping[str, object]:

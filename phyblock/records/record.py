@@ -51,6 +51,8 @@ class SentPrompt(Line):
     """Digest of the prompt as sent, which stands in `prompts.jsonl`."""
     images: tuple[SentImage, ...] = ()
     """The pictures in the order sent."""
+    examples: tuple[str, ...] = ()
+    """Keys of the worked examples that were shown before what was asked."""
 
 
 class Score(Line):
@@ -128,7 +130,8 @@ class Record(Line):
     error: StoredError | None
     """The error, null when there is none."""
     prompt: SentPrompt | None = None
-    """What was sent, null for recordings; of an episode, with the first turn."""
+    """What was sent, null for recordings and baselines, which are sent nothing; of an episode, with
+    the first turn."""
     parse: Any = None
     """What was read in the reply, as the track says; null: nothing was."""
     scores: tuple[Score, ...]

@@ -34,9 +34,11 @@ from phyblock.records.faults import Fault, free_of, worded
 from phyblock.records.line import Line
 
 __all__ = [
+    "EITHER_NAME",
     "MAX_BLOCKS",
     "BlockList",
     "CandidateList",
+    "Levels",
     "SceneBlocks",
     "StoredBlock",
     "StoredCandidate",
@@ -52,7 +54,8 @@ _LEVELS = ([1], [2], [3], [4], [1, 2])
 _NO_LEVELS = ("are not allowed", "one level 1 to 4, or [1, 2]")
 
 # The paper's text calls the field `orientation`, the released files `euler`.
-_EITHER_NAME = Field(validation_alias=AliasChoices("euler", "orientation"))
+EITHER_NAME = Field(validation_alias=AliasChoices("euler", "orientation"))
+"""An orientation, by either name."""
 
 
 class StoredBlock(Line, extra="ignore"):
@@ -70,7 +73,7 @@ class StoredBlock(Line, extra="ignore"):
     """Orders of the blocks that must stand before it; 0 is the ground; never empty, no cycles."""
     position: Position
     """Origin of the body frame in the world [m], z up, the ground at z = 0."""
-    euler: Annotated[Angles, _EITHER_NAME]
+    euler: Annotated[Angles, EITHER_NAME]
     """Extrinsic x-y-z angles [degrees]: R = Rz·Ry·Rx (scipy's `'xyz'`)."""
 
     @classmethod
@@ -100,7 +103,7 @@ class StoredCandidate(Line, extra="ignore"):
     """Its shape."""
     color: Color
     """Its color."""
-    euler: Annotated[Angles, _EITHER_NAME]
+    euler: Annotated[Angles, EITHER_NAME]
     """As of a block."""
     required: Any = None
     """Whether the scene needs it; not read."""
@@ -196,12 +199,13 @@ SceneBlocks = Annotated[BlockList, free_of(_dependency_faults)]
 """Blocks whose dependencies are a graph without cycles."""
 CandidateList = Annotated[tuple[StoredCandidate, ...], Filled(MAX_CANDIDATES), free_of(look_faults)]
 """Candidates of which no two look the same."""
-_Levels = Annotated[
+Levels = Annotated[
     tuple[StrictInt, ...],
     worded(*_NO_LEVELS),
     free_of(_level_faults),
     WithJsonSchema({"enum": list(_LEVELS)}),
 ]
+"""The levels that a scene counts in."""
 
 
 class StoredScene(Line, extra="ignore"):
@@ -209,7 +213,7 @@ class StoredScene(Line, extra="ignore"):
 
     id: Name
     """Unique in the file; up to 100 letters, digits, `.`, `_`, `-`, a letter or digit first."""
-    levels: _Levels
+    levels: Levels
     """The levels that the scene counts in: `[1]`, `[2]`, `[3]`, `[4]` or `[1, 2]`."""
     parents: Annotated[tuple[Name, ...], Filled(_MOST_PARENTS)]
     """The base scenes that it was made from, one at least; a base scene names itself. Statistics

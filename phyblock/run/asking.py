@@ -9,6 +9,7 @@ from pathlib import Path
 from phyblock.records import Manifest
 from phyblock.run.plan import RunPlan
 from phyblock.specs import LoadedSuite
+from phyblock.tracks import kind_of
 from phyblock.tracks.opening import template_prompt
 from phyblock.tracks.prompts import FORM_FACTS
 
@@ -23,7 +24,8 @@ def asking_remarks(loaded: LoadedSuite, plan: RunPlan) -> list[str]:
         return []
     asked = {variant.shown: loaded.at(variant.shown) for variant in plan.variants}
     used = {(track, path): one for one in asked.values() for track, path in one.templates.items()}
-    own = [f"prompt of {track}: {path}" for track, path in used]
+    own = [_named(track, path, one) for (track, path), one in used.items()]
+    own += [_unused(track, path, loaded) for track, path in loaded.unused.items()]
     if loaded.suite.answer_format == "text":
         return own
     unsaid = [_unsaid(track, path) for (track, path), one in used.items() if not _says(track, one)]
@@ -67,6 +69,24 @@ def _models(plan: RunPlan) -> Iterator[str]:
             f"the prompt alone asks for JSON of {', '.join(others)} "
             "(response_format: always in the models file sends the schema)"
         )
+
+
+def _named(track: str, path: Path, loaded: LoadedSuite) -> str:
+    included = template_prompt(loaded, track).included
+    more = f" (with {', '.join(file.name for file in included)})" if included else ""
+    return f"prompt of {track}: {path}{more}"
+
+
+def _unused(track: str, path: Path, loaded: LoadedSuite) -> str:
+    form = loaded.suite.answer_format
+    used = loaded.templates.get(track)
+    kind = kind_of(track)
+    bundled = kind.template if form == "text" else kind.json_template
+    name = f"{bundled.name}, which is the bundled one" if bundled else "another one"
+    return (
+        f"{path} is NOT used: answers are asked for as {form}, and the prompt of {track} is "
+        f"{name if used is None else used}"
+    )
 
 
 def _says(track: str, loaded: LoadedSuite) -> bool:

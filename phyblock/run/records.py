@@ -75,8 +75,13 @@ def judged(
 def about_prompt(request: Request, template: str, digest: str) -> SentPrompt:
     """What a record says of a prompt that stands in `prompts.jsonl` under `digest`."""
     images = tuple(_picture(part) for part in _pictures(request.messages))
+    examples: dict[str, Any] = {"examples": request.examples} if request.examples else {}
     return SentPrompt(
-        template=template, version=request.prompt_version, messages=digest, images=images
+        template=template,
+        version=request.prompt_version,
+        messages=digest,
+        images=images,
+        **examples,
     )
 
 

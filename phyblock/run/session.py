@@ -23,6 +23,7 @@ from phyblock.resources import reply_cache_file
 from phyblock.run.events import ModelNotice, RunNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.plan import RunPlan
+from phyblock.run.soundness import provider_problem
 from phyblock.run.store import RunStore, holds_run
 
 __all__ = ["SERVERS", "Session", "check_ready"]
@@ -51,6 +52,9 @@ def check_ready(plan: RunPlan) -> None:
         if status.fault:
             problems.append(Problem(f"model {model.name}", status.fault, "", model.config.id))
         if status.is_needed and not status.is_set:
+            if (unknown := provider_problem(model.config, f"model {model.name}")) is not None:
+                problems.append(unknown)
+                continue
             message = "needs an API key, and none is set"
             names = " or ".join(status.variables)
             hint = f"set {names} in the environment, or leave the model out with --models"

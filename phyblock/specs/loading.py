@@ -44,7 +44,8 @@ class LoadedSuite:
     `dataset_path` is the absolute folder of the data set; by track, `folders` are those of data of
     its own, and `templates` the absolute paths of prompts that are files. Where prompts
     vary, `suite` and `templates` are those of the reference, and `prompts` has the paths of all by
-    their texts.
+    their texts. `unused` are templates of one's own that stand in for the bundled one of the other
+    form of answers.
     """
 
     suite: SuiteSpec
@@ -54,6 +55,7 @@ class LoadedSuite:
     folders: Mapping[str, Path] = field(default_factory=dict)
     templates: Mapping[str, Path] = field(default_factory=dict)
     prompts: Mapping[str, Path] = field(default_factory=dict)
+    unused: Mapping[str, Path] = field(default_factory=dict)
 
     def at(self, variant: Variant) -> LoadedSuite:
         """The suite as a variant asks."""
@@ -188,6 +190,7 @@ def _locate(
     dataset = finder.data(scenes.path or BUILTIN_DATASET, ("dataset", "path"), is_bundled)
     folders: dict[str, Path | None] = {}
     templates: dict[str, Path | None] = {}
+    unused: dict[str, Path | None] = {}
     for name in suite.tracks:
         kind = known_track(name)
         if (own := kind.data_folder(suite)) is not None:
@@ -197,8 +200,10 @@ def _locate(
             templates[name] = finder.file(prompt, kind.prompt_field)
         elif prompt == PROMPT_WORDS[0] or "default" in suite.vary.prompt:
             in_text = suite.answer_format == "text"
-            bundled = kind.template if in_text else kind.json_template
+            forms = (kind.template, kind.json_template)
+            bundled, other = forms if in_text else reversed(forms)
             templates[name] = _in_place_of(bundled, prompt_dirs)
+            unused[name] = _in_place_of(other, prompt_dirs)
     prompts = {
         text: finder.file(text, ("vary", "prompt", place))
         for place, text in enumerate(suite.vary.prompt)
@@ -209,7 +214,7 @@ def _locate(
     finder.check_twice(prompts, ("vary", "prompt"))
     if dataset is None or finder.problems:
         raise SpecError(sort_problems(finder.problems))
-    found = map(_there, (folders, templates, prompts))
+    found = map(_there, (folders, templates, prompts, unused))
     return LoadedSuite(suite, path, dataset, source, *found).at(Variant())
 
 

@@ -39,7 +39,7 @@ from phyblock.specs.sections import (
     SamplingSpec,
     ScoringSpec,
 )
-from phyblock.specs.vary import FACTORS, VarySpec, with_values
+from phyblock.specs.vary import FACTORS, ExampleCount, VarySpec, with_values
 from phyblock.variants import Variant
 from phyblock.words import (
     AnswerFormat,
@@ -69,6 +69,7 @@ def _check_whole(level: object) -> object:
 
 
 Level = Annotated[Literal[1, 2, 3, 4], BeforeValidator(_check_whole)]
+SceneName = Annotated[str, Field(min_length=1)]
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
 
 
@@ -97,6 +98,16 @@ def _models_tag(value: object) -> str:
 ModelNames = Annotated[
     Annotated[UniqueSome[ModelName], Tag("list")] | Annotated[Literal["recorded"], Tag("word")],
     Discriminator(_models_tag),
+]
+
+
+def _examples_tag(value: object) -> str:
+    return "names" if isinstance(value, list | tuple) else "number"
+
+
+Examples = Annotated[
+    Annotated[ExampleCount, Tag("number")] | Annotated[UniqueSome[SceneName], Tag("names")],
+    Discriminator(_examples_tag),
 ]
 
 
@@ -141,6 +152,13 @@ class SuiteSpec(Section):
         description="text: lines of text. json_schema: one JSON object, of which the prompt says "
         "the schema; it is sent as response_format too where the provider takes one.",
     )
+    examples: Examples = Field(
+        default=0,
+        description="Worked examples that are shown before each question, with a right answer: a "
+        "number (drawn by the first of seeds, never a scene that shares a base scene or its goal "
+        "with the one asked about), or names of scenes (where one may not be shown, a drawn one "
+        "stands in).",
+    )
     images: ImagesSpec = Field(
         default_factory=ImagesSpec, description="Which pictures a model is shown."
     )
@@ -171,7 +189,7 @@ class SuiteSpec(Section):
         "compares with the paper's numbers.",
     )
 
-    later: ClassVar[tuple[str, ...]] = ("limit", "vary")
+    later: ClassVar[tuple[str, ...]] = ("limit", "vary", "examples")
 
     @model_validator(mode="after")
     def _check_rules(self) -> SuiteSpec:

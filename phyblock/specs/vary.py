@@ -19,7 +19,7 @@ from phyblock.specs.prompt import Prompt
 from phyblock.variants import REPEAT, Variant
 from phyblock.words import Background, CandidateOrder, PictureLayout, View
 
-__all__ = ["FACTORS", "VarySpec", "with_values"]
+__all__ = ["FACTORS", "ExampleCount", "VarySpec", "with_values"]
 
 FACTORS: Mapping[str, tuple[str, ...] | None] = {
     "prompt": None,
@@ -27,6 +27,7 @@ FACTORS: Mapping[str, tuple[str, ...] | None] = {
     "view": ("images", "view"),
     "candidate_order": ("candidates", "order"),
     "layout": ("images", "layout"),
+    "examples": ("examples",),
     REPEAT: None,
 }
 """Factors with the path of the field that each gives values to; every track names its prompt in a
@@ -51,6 +52,9 @@ Levels = Annotated[
 ]
 
 
+ExampleCount = Annotated[int, Field(strict=True, ge=0, le=16)]
+
+
 class VarySpec(Section):
     """Ways of asking that are crossed; the first level of each is the reference."""
 
@@ -70,6 +74,9 @@ class VarySpec(Section):
     )
     layout: Levels[PictureLayout] = Field(
         default=(), description="Layouts of pictures, as images.layout."
+    )
+    examples: Levels[ExampleCount] = Field(
+        default=(), description="Numbers of worked examples, as examples."
     )
     repeats: Annotated[int, Field(strict=True, ge=1, le=100)] = Field(
         default=1,

@@ -54,6 +54,7 @@ class TrackKind:
     matchers, and `phyblock score` judges them again even where no measure counts samples. With
     `plays`, samples are episodes of several turns. `record` is the model of its records, where it
     adds something to them. `counted` is what its measures count of every sample as it is judged.
+    `no_examples` says why it shows no worked examples, "" where it does.
     `varies` names the factors of a suite's `vary` that change what it asks.
     """
 
@@ -77,6 +78,7 @@ class TrackKind:
     own_root: Callable[[Manifest], str | None] = lambda _: None
     rescored: bool = False
     counted: tuple[SampleCounts, ...] = ()
+    no_examples: str = "it declares none"
     varies: tuple[str, ...] = ("repeats",)
 
     def data_folder(self, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:

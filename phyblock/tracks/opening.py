@@ -44,6 +44,11 @@ def open_tracks(opening: Opening, names: Sequence[str]) -> tuple[AnyTrack, ...]:
             where, message = loaded.where("answer_format"), "cannot be asked for as JSON"
             found, hint = f"track {', '.join(lacking)}", "use answer_format: text"
             raise SpecError(Problem(where, message, "answer_format", found, hint=hint))
+    if loaded.suite.examples:
+        for name in names:
+            if reason := kind_of(name).no_examples:
+                where, message = loaded.where("examples"), f"cannot be shown in {name}: {reason}"
+                raise SpecError(Problem(where, message, "examples", hint="leave them out"))
     return tuple(kind_of(name).open(opening) for name in names)
 
 

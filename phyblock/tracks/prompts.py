@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,12 +14,13 @@ import jinja2
 import jinja2.meta
 import jinja2.nodes
 
-from phyblock.bounded import read_text
 from phyblock.errors import Problem, PromptError, said
 from phyblock.models.base import Image, Message
 from phyblock.parsing import AnswerForm
+from phyblock.resources import bundled
 from phyblock.specs import did_you_mean
 from phyblock.tracks.template_bounds import BoundedEnvironment, render_block
+from phyblock.tracks.template_sources import Sources, read_sources
 
 __all__ = [
     "FORM_FACTS",
@@ -36,7 +37,6 @@ FORM_FACTS = ("answer_schema", "answer_example")
 _BLOCKS = ("system", "user")
 _ALL_BLOCKS = (*_BLOCKS, "caption", "answer", "turn", "check")
 """Blocks that bundled templates have; another would say its text to nobody."""
-_LARGEST_BYTES = 256 * 1024
 
 
 def form_facts(form: AnswerForm[Any] | None) -> dict[str, object]:
@@ -69,6 +69,23 @@ class Prompt(Protocol):
         """The messages to send; pictures stand before the text, in the order given."""
 
 
+class _Known(jinja2.BaseLoader):
+    """Gives the files that were read, and no others."""
+
+    def __init__(self, sources: Sources) -> None:
+        self._sources = sources
+
+    def get_source(
+        self, environment: jinja2.Environment, template: str
+    ) -> tuple[str, str | None, Callable[[], bool] | None]:
+        """The text and path of a file; TemplateNotFound for one that is not there."""
+        del environment
+        if template not in self._sources.included:
+            raise jinja2.TemplateNotFound(template)
+        source = self._sources.included[template]
+        return source.text, str(source.path), None
+
+
 @dataclass(frozen=True)
 class OfficialPrompt:
     """The official prompt, read out of the user's own checkout; it has no system part."""
@@ -92,6 +109,9 @@ class OfficialPrompt:
 class TemplatePrompt:
     """A Jinja template with a block `user` and, if wanted, blocks `system` and `caption`.
 
+    What stands outside of the blocks is not sent, but they can use macros, values and imports in
+    it. Files beside the template, and bundled ones, can be included and imported.
+
     `caption` is rendered for each picture, with its `label` and its `number` from 1, and stands
     before it.
 
@@ -103,30 +123,28 @@ class TemplatePrompt:
     def __init__(self, path: Path, name: str) -> None:
         self.name = name
         self._path = path
+        self._sources = read_sources(path, (path.parent, bundled("prompts")))
+        self.version = self._sources.version
+        self._environment = BoundedEnvironment(_Known(self._sources))
         try:
-            source = read_text(path, _LARGEST_BYTES)
-        except OSError as error:
-            raise PromptError(Problem(str(path), f"cannot be read: {said(error)}")) from error
-        except ValueError as error:
-            raise PromptError(Problem(str(path), f"cannot be read: it {error}")) from error
-        self.version = _digest(source)
-        self._source = source
-        try:
-            self._template = BoundedEnvironment().bounded_template(source)
-        except jinja2.TemplateSyntaxError as error:
-            where = f"{path}:{error.lineno}"
-            raise PromptError(Problem(where, f"is not valid Jinja: {error.message}")) from error
+            self._template = self._environment.bounded_template(self._sources.main.text)
+            self._head = self._environment.head(self._sources.main.text)
         except Exception as error:
             # Python compiles what Jinja makes of it, and has bounds of its own.
             raise PromptError(Problem(str(path), f"is not valid Jinja: {said(error)}")) from error
         self.require("user", "and, if wanted, a block system")
-        self._check_blocks(source)
+        self._check_blocks()
+
+    @property
+    def included(self) -> tuple[Path, ...]:
+        """Files that it includes or imports."""
+        return tuple(source.path for source in self._sources.included.values())
 
     @property
     def says_form(self) -> bool:
         """Whether it uses a name that tells the JSON that is asked for."""
-        names = jinja2.meta.find_undeclared_variables(jinja2.Environment().parse(self._source))
-        return not names.isdisjoint(FORM_FACTS)
+        find = jinja2.meta.find_undeclared_variables
+        return any(not find(one.tree).isdisjoint(FORM_FACTS) for one in self._sources.all)
 
     def require(self, block: str, more: str) -> None:
         """Raise PromptError where the template lacks a block; `more` is told of what is allowed."""
@@ -136,9 +154,9 @@ class TemplatePrompt:
             problem = Problem(str(self._path), f"has no {block} block", "", found, allowed)
             raise PromptError(problem)
 
-    def _check_blocks(self, source: str) -> None:
+    def _check_blocks(self) -> None:
         """Raise PromptError for a block that no other is around and that nothing would say."""
-        for node in jinja2.Environment().parse(source).body:
+        for node in self._sources.main.tree.body:
             if isinstance(node, jinja2.nodes.Block) and node.name not in _ALL_BLOCKS:
                 where, hint = f"{self._path}:{node.lineno}", did_you_mean(node.name, _ALL_BLOCKS)
                 allowed, message = ", ".join(_ALL_BLOCKS), "is a block that nothing uses"
@@ -168,20 +186,29 @@ class TemplatePrompt:
         if block not in self._template.blocks:
             return ""
         try:
-            return render_block(self._template, block, dict(facts)).strip()
+            return render_block(self._template, self._head, block, dict(facts)).strip()
         except Exception as error:
             # A template is a program: what it computes can fail in any way.
             is_name = isinstance(error, jinja2.UndefinedError)
             known = "names that are there: " + ", ".join(sorted(facts)) if is_name else ""
             message = f"cannot be rendered: {said(error)}"
-            where = f"{self._path}:{self._line_of(error)}"
+            where = self._place_of(error)
             raise PromptError(Problem(where, message, f"block {block}", "", known)) from error
 
-    def _line_of(self, error: Exception) -> int:
-        """The template's line at which rendering failed."""
+    def _place_of(self, error: Exception) -> str:
+        """The file and line at which rendering failed."""
+        names = {str(one.path): name for name, one in self._sources.included.items()}
         frames = traceback.extract_tb(error.__traceback__)
-        compiled = [frame.lineno or 1 for frame in frames if frame.filename == "<template>"]
-        return self._template.get_corresponding_lineno(compiled[-1]) if compiled else 1
+        of_templates = [one for one in frames if one.filename in ("<template>", *names)]
+        if not of_templates:
+            return f"{self._path}:1"
+        file, line = of_templates[-1].filename, of_templates[-1].lineno or 1
+        if file in names:
+            included = self._environment.get_template(names[file])
+            return f"{file}:{included.get_corresponding_lineno(line)}"
+        is_head = of_templates[-1].name == "root"
+        compiled = self._head if is_head else self._template
+        return f"{self._path}:{compiled.get_corresponding_lineno(line)}"
 
 
 def _digest(text: str) -> str:

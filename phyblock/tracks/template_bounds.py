@@ -17,6 +17,7 @@ from contextvars import ContextVar
 from typing import Any
 
 import jinja2
+import jinja2.nodes
 from jinja2.exceptions import SecurityError
 from jinja2.nodes import EvalContext
 from jinja2.runtime import Context
@@ -35,6 +36,13 @@ _MOST_RANGE = 10_000
 _MOST_WIDTH = 1_000
 _MOST_PRODUCT = 10_000_000
 _MOST_BITS = 1_024
+_HEAD = (
+    jinja2.nodes.Assign,
+    jinja2.nodes.AssignBlock,
+    jinja2.nodes.FromImport,
+    jinja2.nodes.Import,
+    jinja2.nodes.Macro,
+)
 _GONE = ("lipsum", "cycler", "joiner", "namespace")
 _TEXT_METHODS = frozenset({
     "capitalize", "casefold", "center", "count", "endswith", "expandtabs", "find", "format",
@@ -114,13 +122,21 @@ def _meter() -> _Meter:
     return _METER.get(None) or _Meter()
 
 
-def render_block(template: jinja2.Template, block: str, facts: dict[str, object]) -> str:
-    """The text of a block; raises BoundError, and whatever the template makes go wrong."""
+def render_block(
+    template: jinja2.Template, head: jinja2.Template, block: str, facts: dict[str, object]
+) -> str:
+    """The text of a block; raises BoundError, and whatever the template makes go wrong.
+
+    `head` is what stands outside of the template's blocks.
+    """
     token = _METER.set(_Meter())
     try:
+        above = head.new_context(facts)
+        for _ in head.root_render_func(above):
+            pass
         pieces: list[str] = []
         length = 0
-        for piece in template.blocks[block](template.new_context(facts)):
+        for piece in template.blocks[block](template.new_context({**facts, **above.vars})):
             pieces.append(piece)
             length += len(piece)
             if length > MOST_TEXT:
@@ -135,8 +151,9 @@ class BoundedEnvironment(ImmutableSandboxedEnvironment):
 
     intercepted_binops = frozenset(["+", "-", "*", "/", "//", "%", "**"])
 
-    def __init__(self) -> None:
+    def __init__(self, loader: jinja2.BaseLoader | None = None) -> None:
         super().__init__(
+            loader=loader,
             undefined=jinja2.StrictUndefined,
             trim_blocks=True,
             lstrip_blocks=True,
@@ -156,10 +173,23 @@ class BoundedEnvironment(ImmutableSandboxedEnvironment):
         """Compile a template; raises jinja2.TemplateSyntaxError, and others for what is too deep
         or too large for Python.
         """
+        return self._compiled(self.parse(source))
+
+    def head(self, source: str) -> jinja2.Template:
+        """What a template says outside of its blocks that they can use: macros, values, imports."""
         tree = self.parse(source)
-        Counting().visit(tree)
+        tree.body = [node for node in tree.body if isinstance(node, _HEAD)]
+        return self._compiled(tree)
+
+    def _compiled(self, tree: jinja2.nodes.Template) -> jinja2.Template:
         tree.set_environment(self)
         return jinja2.Template.from_code(self, self.compile(tree), self.make_globals(None))
+
+    def _parse(self, source: str, name: str | None, filename: str | None) -> jinja2.nodes.Template:
+        # Templates that are included are parsed here, too, and are to be counted alike.
+        tree = super()._parse(source, name, filename)
+        Counting().visit(tree)
+        return tree
 
     def call_binop(self, context: Context, operator: str, left: Any, right: Any) -> Any:
         """The result of an operator, unless it would be huge."""

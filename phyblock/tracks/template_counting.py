@@ -9,7 +9,7 @@ from jinja2.visitor import NodeTransformer
 
 __all__ = ["Counting"]
 
-_BODIES = (nodes.For, nodes.Macro, nodes.CallBlock, nodes.Block)
+_BODIES = (nodes.For, nodes.Macro, nodes.CallBlock, nodes.Block, nodes.Template)
 
 
 class Counting(NodeTransformer):

@@ -85,7 +85,7 @@ def command(
     order = Order(seed, kind, shares(count, levels))
     with (
         open_workers(jobs, ray_address) as workers,
-        open_writer(out, kind, replace) as writer,
+        open_writer(out, kind, replace, "give another --out, or --replace") as writer,
     ):
         tasks = []
         for scene in tracked(produce(order, workers), count, "Making"):

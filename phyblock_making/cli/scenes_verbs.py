@@ -10,6 +10,7 @@ __all__ = ["command"]
 
 _VERBS = {
     "generate": "Make a data set from a seed.",
+    "complete": "Make a data set from positions written by hand.",
     "verify": "Derive everything in a data set again and compare.",
     "audit": "Hold any data set against geometry and physics.",
     "show": "Show the facts of one scene.",

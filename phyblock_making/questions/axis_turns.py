@@ -15,8 +15,8 @@ from phyblock.domain.blocks import (
     orientation_class,
 )
 from phyblock.domain.scene import Block
+from phyblock.domain.symmetry import angles_deg
 from phyblock_making.questions.lengths import length_axis
-from phyblock_making.symmetry import angles_deg
 
 __all__ = ["AXIS_TURNS", "LONG_TYPES", "axis_turns", "tipped_over"]
 

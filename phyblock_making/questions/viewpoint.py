@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
+from phyblock.domain.symmetry import Symmetry, turned_form
 from phyblock.sim.seeing import least_difference, seen, shown_pixels
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import recolored
@@ -36,7 +37,7 @@ from phyblock_making.questions.pictured_drafts import (
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.shifts import shifted
 from phyblock_making.questions.wording import slots_of
-from phyblock_making.symmetry import Symmetry, transformed, turned_form
+from phyblock_making.symmetry import transformed
 
 __all__ = ["ViewpointMaker"]
 

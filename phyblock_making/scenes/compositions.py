@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.scene import Block
+from phyblock.domain.symmetry import Symmetry
 from phyblock.sim.support import whole_bounds_m
 from phyblock_making.scenes.buildings import BUILDINGS
 from phyblock_making.scenes.creatures import CREATURES
 from phyblock_making.scenes.scene_draft import Draft, Theme
 from phyblock_making.scenes.sketch import UNIT_M
-from phyblock_making.symmetry import Symmetry, transformed
+from phyblock_making.symmetry import transformed
 
 __all__ = ["COMPOSITIONS", "Axis", "beside"]
 

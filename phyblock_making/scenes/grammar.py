@@ -15,6 +15,7 @@ import numpy as np
 from phyblock.domain.aov import CycleError
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.scene import Block, Kind, Scene
+from phyblock.domain.symmetry import SYMMETRIES
 from phyblock.sim.support import find_gaps
 from phyblock_making.checks.tolerances import LEVEL_LIMITS
 from phyblock_making.scenes.buildings import BUILDINGS
@@ -22,7 +23,7 @@ from phyblock_making.scenes.compositions import COMPOSITIONS, beside
 from phyblock_making.scenes.creatures import CREATURES
 from phyblock_making.scenes.scene_draft import PALETTES, Draft, Palette, Theme
 from phyblock_making.scenes.sketch import make_scene
-from phyblock_making.symmetry import SYMMETRIES, transformed
+from phyblock_making.symmetry import transformed
 
 __all__ = ["GROUP_LEVELS", "Group", "Request", "draw"]
 

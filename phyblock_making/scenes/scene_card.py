@@ -10,7 +10,7 @@ from phyblock.sim.visibility import LEAST_SHARE, LEAST_SHOWN
 from phyblock_making.checks.tolerances import FINISHED_REST, LEVEL_LIMITS
 from phyblock_making.scenes.scene_files import QUANTITIES, SET_VERSION, LevelStatistics, SetWriter
 
-__all__ = ["card"]
+__all__ = ["card", "completed_card"]
 
 _TEXT = """# {name}
 
@@ -137,6 +137,27 @@ def card(
         ),
     )
     return text + _FILE_TEXT
+
+
+_COMPLETED = """# {name}
+
+{count} block structures for assembly planning, with their candidate blocks, completed by
+
+    {command}
+
+from the types, colors and poses of their blocks. `depend` comes from the contacts of the finished
+structure and `layer` from the longest path in that graph. Candidates that were not given are
+every look that a scene needs, and distractors drawn by its id as often as goals need them. No
+block overlaps another or hangs above its support by more than {fit_mm:g} mm, and the structure
+stands when it is finished and at every step of the stored order.
+
+"""
+
+
+def completed_card(name: str, count: int, command: str) -> str:
+    """Markdown text of the card of scenes that were given by their positions."""
+    fit_mm = FIT_TOLERANCE_M * 1000
+    return _COMPLETED.format(name=name, count=count, command=command, fit_mm=fit_mm) + _FILE_TEXT
 
 
 def _limit(level: int) -> str:

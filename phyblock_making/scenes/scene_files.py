@@ -26,6 +26,7 @@ __all__ = [
     "SUMS_FILE",
     "LevelStatistics",
     "SetWriter",
+    "check_folder",
     "open_writer",
     "sums_text",
 ]
@@ -73,9 +74,9 @@ class SetWriter:
         self.shared = self.base = self.count = 0
         self.sizes: set[int] = set()
 
-    def add(self, scene: Scene) -> CandidateSet:
-        """Append a scene with a candidate set of its own, which is returned."""
-        candidates = make_candidates(scene, palette=PALETTES[self._palette])
+    def add(self, scene: Scene, offered: CandidateSet | None = None) -> CandidateSet:
+        """Append a scene with a candidate set of its own, else the one given, which is returned."""
+        candidates = offered or make_candidates(scene, palette=PALETTES[self._palette])
         with (self._parts / f"{scene.levels[0]}").open("a", encoding="utf-8", newline="\n") as file:
             file.write(StoredScene.of(scene, candidates).as_json() + "\n")
         for level in scene.levels:
@@ -99,18 +100,26 @@ class SetWriter:
         atomic_write(self._folder / SUMS_FILE, sums_text(self._folder))
 
 
-@contextlib.contextmanager
-def open_writer(folder: Path, palette: Palette, replace: bool = False) -> Iterator[SetWriter]:
-    """A writer into a folder; what is half written is gone when the with statement fails.
-
-    Raises StoreError when the folder holds scenes already (and not `replace`) or cannot be written.
+def check_folder(folder: Path, replace: bool = False, hint: str = "give another --out") -> None:
+    """Raise StoreError, with `hint`, where the folder holds scenes already (and not `replace`), or
+    other files of these names.
     """
     if (folder / SCENES_FILE).exists() and not replace:
-        hint = "give another --out, or --replace"
         raise StoreError(Problem(str(folder), "holds a data set already", hint=hint))
     if not (folder / SCENES_FILE).exists():
         others = [folder / name for name in (SCENES_FILE, CARD_FILE, VERSION_FILE, SUMS_FILE)]
         check_free(others, "give another --out")
+
+
+@contextlib.contextmanager
+def open_writer(
+    folder: Path, palette: Palette, replace: bool = False, hint: str = "give another --out"
+) -> Iterator[SetWriter]:
+    """A writer into a folder; what is half written is gone when the with statement fails.
+
+    Raises StoreError as `check_folder`, and where the folder cannot be written.
+    """
+    check_folder(folder, replace, hint)
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".making-", dir=folder) as parts:

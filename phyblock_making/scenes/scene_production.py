@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from phyblock.domain.scene import Scene
+from phyblock.domain.symmetry import fingerprint
 from phyblock.errors import DataError, Problem
 from phyblock_making.checks.acceptance import is_acceptable
 from phyblock_making.scenes.grammar import GROUP_LEVELS, Group, Request, draw
 from phyblock_making.scenes.scene_draft import PALETTES, Palette
-from phyblock_making.symmetry import fingerprint
 from phyblock_making.workers import Workers
 
 __all__ = ["Order", "Share", "produce", "shares"]

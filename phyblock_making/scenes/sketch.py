@@ -6,6 +6,7 @@ on; so a design holds no heights, no overlap and no gap, and its order can be bu
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from phyblock.sim.geometry import corners_m
 from phyblock.sim.support import GROUND, drop_height_m, support_graph, whole_bounds_m
 from phyblock_making.poses import KIT_COLOR, POSES
 
-__all__ = ["UNIT_M", "Sketch", "make_scene"]
+__all__ = ["UNIT_M", "Sketch", "make_scene", "scene_of"]
 
 UNIT_M = 0.025
 """Grid unit [m]: half the side of a cube."""
@@ -58,12 +59,19 @@ class Sketch:
 def make_scene(
     name: str, levels: tuple[int, ...], blocks: list[Block], parents: tuple[str, ...] = ()
 ) -> Scene:
-    """The scene that blocks make: dependencies from contact, layers from the longest path.
+    """The scene that blocks make, moved so that the middle of its ground plan is the origin.
 
-    The structure is moved so that the middle of its ground plan is the origin. Raises CycleError
-    when contacts name no order.
+    Raises CycleError as `scene_of`.
     """
-    blocks = _centered(blocks)
+    return scene_of(name, levels, _centered(blocks), parents)
+
+
+def scene_of(
+    name: str, levels: tuple[int, ...], blocks: Sequence[Block], parents: tuple[str, ...] = ()
+) -> Scene:
+    """The scene that blocks make where they are: dependencies from contact, layers from the longest
+    path. Raises CycleError when contacts name no order.
+    """
     below = support_graph(blocks)
     number = {block.order: index for index, block in enumerate(blocks)}
     rests_on = [sorted(below[block.order] - {GROUND}) for block in blocks]

@@ -242,3 +242,17 @@ def test_the_digest_of_a_set_follows_every_field(
         for name, question in (("a", QUESTION), ("b", QUESTION), ("c", {**QUESTION, field: value}))
     ]
     assert digests[0] == digests[1] != digests[2]
+
+
+def test_questions_about_another_data_set_are_said_once(tmp_path: Path, scenes: Dataset) -> None:
+    others = [{**QUESTION, "id": f"co-{n}", "scene_id": f"far-{n}"} for n in range(30)]
+    folder = write(tmp_path / "q", QUESTION, *others)
+    with pytest.raises(DataError) as caught:
+        read_questions(folder, scenes)
+    (problem,) = caught.value.problems
+    assert "of another data set" in problem.message
+    assert "make questions about it" in problem.hint
+    # A few are told one by one.
+    with pytest.raises(DataError) as caught:
+        read_questions(write(tmp_path / "few", QUESTION, *others[:5]), scenes)
+    assert len(caught.value.problems) == 5

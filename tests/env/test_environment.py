@@ -49,7 +49,7 @@ def solve(env: PhyBlockEnv, info: dict[str, Any]) -> tuple[float, dict[str, Any]
 
 @pytest.mark.parametrize(
     "options",
-    [{"size_px": 128}, {"observe": "state"}, {"observe": "state", "physics": "strict"}],
+    [{"size_px": 32}, {"observe": "state"}, {"observe": "state", "physics": "strict"}],
     ids=["pictures", "state", "strict"],
 )
 def test_gymnasium_finds_nothing_wrong(options: dict[str, Any]) -> None:
@@ -137,8 +137,9 @@ def test_done_ends_and_a_wrong_move_changes_nothing() -> None:
 
 
 def test_a_finished_assembly_looks_like_the_goal() -> None:
-    env = PhyBlockEnv(SOME[:1], size_px=128, physics="off", render_mode="rgb_array")
+    env = PhyBlockEnv(SOME[:1], size_px=64, physics="off", render_mode="rgb_array")
     observation, info = env.reset()
+    assert {picture.shape for picture in observation.values()} == {(64, 64, 3)}
     assert not np.array_equal(observation["current"], observation["goal"])
     solve(env, info)
     picture = env.render()
@@ -218,6 +219,8 @@ def test_an_invalid_candidate_is_told() -> None:
         ({"gating": "height"}, "gating is 'height'"),
         ({"physics": "strct"}, "allowed: off, settle, strict"),
         ({"observe": "picture"}, "allowed: pictures, state"),
+        ({"size_px": 15}, "size_px is 15, allowed 16..2048"),
+        ({"size_px": 2049}, "size_px is 2049, allowed"),
         ({"max_steps": 0}, "max_steps is 0"),
         ({"max_failures": -1}, "max_failures is -1"),
         ({"data": ()}, "no tasks"),

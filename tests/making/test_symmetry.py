@@ -9,10 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain import BLOCK_TYPES, Block, orientation_class
+from phyblock.domain.symmetry import SYMMETRIES, Symmetry, canonical_form
 from phyblock.sim import find_overlaps, support_graph
 from phyblock.sim.render import DrawnBlock
 from phyblock_making.poses import POSES
-from phyblock_making.symmetry import SYMMETRIES, Symmetry, canonical_form, transformed
+from phyblock_making.symmetry import transformed
 from tests.designs.scenes import designed_scenes
 
 SCENES = designed_scenes()

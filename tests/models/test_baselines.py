@@ -24,7 +24,7 @@ seeds = st.integers(0, 10**6)
 
 def reply(name: str, request: Request) -> Reply:
     model = build_model(ModelConfig(name, "baseline", name), cache=None, overall=Gate(1))
-    assert model.needs_messages
+    assert not model.needs_messages
     answer = asyncio.run(model.ask(request))
     assert answer is not None
     return answer

@@ -13,6 +13,8 @@ import yaml
 
 from phyblock.report import write_report, write_tables
 from tests.report.html_run import HOSTILE, HOSTILE_SAMPLE, make_run, many
+from tests.servers.chassis import Running
+from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -165,14 +167,33 @@ def test_a_sample_shows_everything_about_it(visit: Visit) -> None:
     assert "F1 100.0" in page.inner_text(".facts")
     assert page.locator(".strip button.right").count() == 4
     assert "read by the rule" in page.inner_text(".parsed")
+    assert page.get_by_text("Prompt as sent").count() == 0
+    page.locator("summary", has_text="Facts").click()
+    expect(page.locator("details[open] dl")).to_contain_text("Finish")
+
+
+def test_a_prompt_is_shown_as_it_was_sent(browser: Browser, workspace: Workspace) -> None:
+    tracks = ["full_planning", "step_planning"]
+    workspace.write_suite(models=["alpha"], seeds=[0], limit=1, tracks=tracks)
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "alpha")
+        assert workspace.run().code == 0
+    assert workspace.phyblock("report", workspace.out).code == 0
+    samples = {record["track"]: record["sample"] for record in workspace.records()}
+    page = browser.new_page()
+    visit = Visit(page, workspace.out / "report.html")
+    visit.show(samples["full_planning"])
     page.get_by_text("Prompt as sent").click()
     page.locator(".prompt pre").first.wait_for()
     picture = page.locator(".prompt img").first
     picture.scroll_into_view_if_needed()
     picture.evaluate("image => image.decode()")
     assert picture.evaluate("image => image.naturalWidth") > 256
-    page.locator("summary", has_text="Facts").click()
-    expect(page.locator("details[open] dl")).to_contain_text("Finish")
+    visit.show(samples["step_planning"])
+    page.locator(".turns summary").first.click()
+    page.locator(".turns").get_by_text("Prompt as sent").first.click()
+    page.locator(".turns .prompt pre").first.wait_for()
+    page.close()
 
 
 def test_wrong_steps_say_why_and_what_was_possible(visit: Visit) -> None:
@@ -308,8 +329,6 @@ def test_an_episode_turn_by_turn(visit: Visit) -> None:
     assert "goal completed" in page.inner_text(".facts")
     page.locator(".turns summary").first.click()
     assert "Move(" in page.locator(".turns .reply").first.inner_text()
-    page.locator(".turns").get_by_text("Prompt as sent").first.click()
-    page.locator(".turns .prompt pre").first.wait_for()
     page.locator("#scrub").fill("1")
     assert "Turn 1" in page.inner_text(".said")
 

@@ -19,6 +19,8 @@ from phyblock.report.html.index import SampleIndex, read_places
 from phyblock.report.html.pack import Pack
 from phyblock.report.html.samples import pack_samples
 from tests.report.factory import laws, manifest, record, record_lists, score, write_run
+from tests.servers.chassis import Running
+from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
 
 JSON = st.recursive(
@@ -241,14 +243,22 @@ def test_other_data_is_refused(run: Workspace) -> None:
     assert "or it was changed since" in Report(run.out).index["no_scenes"]
 
 
-def test_prompts_and_pictures_as_sent_are_there(run: Workspace) -> None:
+def test_prompts_and_pictures_as_sent_are_there(workspace: Workspace) -> None:
+    run = workspace
+    run.write_suite(models=["oracle", "alpha"], seeds=[0])
+    with Running(OpenAIChat()) as running:
+        run.write_models(running.url, "alpha")
+        assert run.run().code == 0
     done = run.phyblock("report", run.out)
     assert (done.code, done.err) == (0, "")
     report = Report(run.out)
     facts = yaml.safe_load((run.out / "run.yaml").read_text())
-    assert facts["items"]["full_planning"] == len(report.index["rows"]["item"]) == 5
-    for row in range(5):
-        prompt = report.entry("records", row)["prompt"]
+    assert facts["items"]["full_planning"] == 5
+    records = [report.entry("records", row) for row in range(10)]
+    prompts = [record["prompt"] for record in records]
+    # Baselines, whose records stand before those of the model, are sent nothing.
+    assert prompts.count(None) == 5
+    for prompt in filter(None, prompts):
         sent = report.entry("prompts", prompt["n"])
         assert [message["role"] for message in sent] == ["system", "user"]
         (image,) = prompt["images"]

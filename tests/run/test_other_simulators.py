@@ -23,6 +23,8 @@ from phyblock.tracks.step_planning.rules import StepRules
 from phyblock.tracks.step_planning.track import StepPlanning
 from phyblock.words import Physics
 from tests.fork_server import Done
+from tests.servers.chassis import Running
+from tests.servers.openai_chat import OpenAIChat
 from tests.sim.box_renderer import BOX_RENDERER
 from tests.sim.still_engine import STILL_ENGINE
 from tests.workspace import Raw, Workspace, candidates
@@ -73,10 +75,12 @@ def unsteady_scene() -> Raw:
 def test_full_shows_what_the_other_renderer_draws(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    done = run(workspace, "full")
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "alpha")
+        done = run(workspace, "full", "--models", "oracle,alpha")
     assert (done.code, done.err) == (0, "")
     records = workspace.records()
-    assert len(records) == 3
+    assert len(records) == 6
     assert workspace.tables()["table1.csv"]
     monkeypatch.setenv("PHYBLOCK_RENDERER", BOX_RENDERER)
     drawn = {
@@ -86,8 +90,10 @@ def test_full_shows_what_the_other_renderer_draws(
         for task in read_builtin(workspace.root / "data").tasks
     }
     for record in records:
+        if record["model"] == "oracle":
+            assert {score["fp"] + score["fn"] for score in record["scores"]} == {0}
+            continue
         assert [image["sha256"] for image in record["prompt"]["images"]] == [drawn[record["key"]]]
-        assert {score["fp"] + score["fn"] for score in record["scores"]} == {0}
 
 
 def test_steps_let_blocks_go_in_the_other_engine_and_go_on_with_it_alone(
@@ -103,9 +109,15 @@ def test_steps_let_blocks_go_in_the_other_engine_and_go_on_with_it_alone(
     track = yaml.safe_load((workspace.out / "run.yaml").read_bytes())["tracks"]["step_planning"]
     assert track["physics"] == {"engine": "still", "still": "1"}
 
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "alpha")
+        elsewhere = workspace.root / "seen"
+        done = run(workspace, "steps", *strict, "--models", "alpha", "--out", str(elsewhere))
+    assert (done.code, done.err) == (0, "")
+    (alpha,) = workspace.records(elsewhere)
     monkeypatch.setenv("PHYBLOCK_RENDERER", BOX_RENDERER)
     (task,) = read_builtin(workspace.root / "data").tasks
-    first = {i["label"]: i["sha256"] for i in oracle["turns"][0]["prompt"]["images"]}
+    first = {i["label"]: i["sha256"] for i in alpha["turns"][0]["prompt"]["images"]}
     assert first["goal"] == digest(goal_png(task.scene, STYLE))
     empty = state_picture(task.scene, (), STYLE)
     assert first["current"] == digest(question_png(empty, STYLE))

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+import yaml
 
 from phyblock import load_run
 from phyblock.report import write_tables
@@ -227,17 +228,38 @@ def test_a_record_is_one_line_of_json_whatever_the_reply_holds(workspace: Worksp
     assert all("😀" in json.loads(line)["reply"]["text"] for line in lines)
 
 
-def test_baselines_need_no_replies_kept_but_take_prompts_and_pictures(
-    workspace: Workspace,
+@pytest.mark.parametrize("track", ["full_planning", "step_planning"])
+def test_baselines_need_no_replies_kept_and_nothing_is_drawn_for_them(
+    workspace: Workspace, track: str
 ) -> None:
     (workspace.cache / "replies.sqlite").mkdir()
-    workspace.write_suite(models=["random", "oracle"], prompt="mine.j2")
-    (workspace.root / "mine.j2").write_text("{% block user %}Build it.{% endblock %}")
+    (workspace.cache / "pictures").unlink()
+    workspace.write_suite(models=["random", "oracle"], tracks=[track])
     done = workspace.run()
     assert (done.code, done.err) == (0, "")
     records = workspace.records()
     assert len(records) == 10
-    assert {record["prompt"]["template"] for record in records} == {"mine"}
-    shown = {r["scene"]: [i["sha256"] for i in r["prompt"]["images"]] for r in records}
-    assert all(shown.values())
-    assert len({tuple(pictures) for pictures in shown.values()}) == 5
+    assert {record["outcome"] for record in records} == {"ok"}
+    assert {str(record["prompt"]) for record in records} == {"None"}
+    assert not (workspace.cache / "pictures").exists()
+    # What the pictures would be is a part of what the run is all the same.
+    facts = yaml.safe_load((workspace.out / "run.yaml").read_text())
+    assert len(facts["tracks"][track]["pictures"]) == 64
+
+
+def test_a_run_of_baselines_that_has_prompts_goes_on(workspace: Workspace) -> None:
+    """Earlier versions made prompts and pictures for baselines."""
+    workspace.write_suite(models=["oracle"])
+    assert workspace.run().code == 0
+    first, *lines = (workspace.out / "records.jsonl").read_text().splitlines()
+    version = yaml.safe_load((workspace.out / "run.yaml").read_text())["tracks"]["full_planning"]
+    image = {"label": "composite", "sha256": "0" * 64, "width_px": 256, "height_px": 128}
+    about = {"template": "default", "version": version["prompt"]["version"], "messages": "0" * 64}
+    older = {**json.loads(first), "prompt": {**about, "images": [image]}}
+    kept = [json.dumps(older), *lines[:2]]
+    (workspace.out / "records.jsonl").write_text("".join(f"{line}\n" for line in kept))
+    done = workspace.run()
+    assert (done.code, done.err) == (0, "")
+    records = workspace.records()
+    assert records[0] == older
+    assert len(records) == 5

@@ -121,7 +121,8 @@ def check_scored_again(workspace: Workspace) -> None:
     assert workspace.phyblock("score", workspace.out, "--out", scored).code == 0
     first, again = ([r["scores"] for r in workspace.records(f)] for f in (workspace.out, scored))
     assert first == again
-    sent = {i["sha256"][:24] for r in workspace.records() for i in r["prompt"]["images"]}
+    asked = [r["prompt"] for r in workspace.records() if r["model"] == "alpha"]
+    sent = {image["sha256"][:24] for prompt in asked for image in prompt["images"]}
     beside = {path.stem for path in (workspace.out / "report" / "pictures").glob("*.png")}
     assert beside == sent
     assert (workspace.out / "figures" / "sensitivity-full-planning.svg").stat().st_size > 1000
@@ -171,7 +172,8 @@ def test_questions_and_episodes_vary_what_they_know(workspace: Workspace) -> Non
     assert len(records) == 2 * 4
     oracle = [r for r in records if r["model"] == "oracle"]
     assert {r["ending"] for r in oracle} == {"completed"}
-    assert len({r["turns"][0]["prompt"]["images"][0]["sha256"] for r in oracle}) == 2
+    ways = yaml.safe_load((workspace.out / "run.yaml").read_text())["variants"]
+    assert len({way["step_planning"]["pictures"] for way in ways.values()}) == 2
     assert len({turn["seed"] for r in oracle for turn in r["turns"]}) == 2
     assert {r["factor"] for r in table(workspace, "sensitivity")} == {"view", "repeats", "items"}
     scored = workspace.root / "scored"

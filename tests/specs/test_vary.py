@@ -20,7 +20,7 @@ HEAD = "name: s\nmodels: [oracle]\n"
 OFFICIAL = HEAD + "dataset: {format: official, path: .}\n"
 
 
-def levels(*values: str) -> st.SearchStrategy[tuple[str, ...]]:
+def levels(*values: Any) -> st.SearchStrategy[tuple[Any, ...]]:
     some = st.permutations(values).flatmap(
         lambda order: st.integers(2, len(order)).map(lambda n: tuple(order[:n]))
     )
@@ -34,6 +34,7 @@ sections = st.fixed_dictionaries(
         "view": levels("oblique", "top", "front"),
         "candidate_order": levels("file", "shuffled"),
         "layout": levels("composite", "separate"),
+        "examples": levels(0, 2, 5),
         REPEAT: st.integers(1, 3),
         "design": st.sampled_from(["crossed", "one_at_a_time"]),
     }

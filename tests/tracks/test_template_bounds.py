@@ -81,7 +81,7 @@ BOMBS = {
                   + "{% set x = [x, x] %}{% set y = [y, y] %}" * 40 + "{{ x == y }}", STEPS),
     "self": ("{{ self.user() }}", "nested too deeply"),
     "loop": ("{% for i in [[1]] recursive %}{{ loop([i]) }}{% endfor %}", "nested too deeply"),
-    "import": ("{% import 'x' as x %}", "loader"),
+    "import": ("{% import 'x' as x %}", "no such file"),
 }  # fmt: skip
 
 

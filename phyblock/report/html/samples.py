@@ -49,8 +49,8 @@ def pack_samples(
 
 
 def pictures_sent(folder: Path, places: Sequence[Place]) -> bool:
-    """Whether the first record of any track tells of a picture that was sent."""
-    first = {place.track: place for place in reversed(places)}
+    """Whether a model's first record of any track tells of a picture that was sent."""
+    first = {(place.track, place.model): place for place in reversed(places)}
     return any(
         record.prompt is not None and record.prompt.images
         for record in _records(folder, first.values())

@@ -35,5 +35,6 @@ TRACK = TrackKind(
     counted=(POSE_COUNTS,),
     tables=("assembly", "table1", "errors"),
     rescored=True,
-    varies=("prompt", "background", "view", "candidate_order", "layout", "repeats"),
+    no_examples="",
+    varies=("prompt", "background", "view", "candidate_order", "layout", "examples", "repeats"),
 )

@@ -10,7 +10,7 @@ import numpy as np
 from phyblock.domain import Block, CandidateSet, Plan, Scene
 from phyblock.errors import DataError, Problem
 
-__all__ = ["PLAN_FLOORS", "PLAN_RULES", "PlanSubject"]
+__all__ = ["PLAN_FLOORS", "PLAN_RULES", "PlanSubject", "plan_text"]
 
 _RANDOM_STEPS = 4
 """As in the paper's Random row."""
@@ -25,28 +25,29 @@ class PlanSubject:
     guess: Callable[[], Plan] = field(default=Plan, compare=False)
 
 
-def _plan(steps: Iterable[int]) -> str:
+def plan_text(steps: Iterable[int]) -> str:
+    """A plan in the benchmark's own reply form."""
     return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(steps, 1))
 
 
 def _random_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
-    return _plan(int(n) for n in rng.integers(1, len(subject.candidates) + 1, _RANDOM_STEPS))
+    return plan_text(int(n) for n in rng.integers(1, len(subject.candidates) + 1, _RANDOM_STEPS))
 
 
 def _all_candidates(subject: PlanSubject, _: np.random.Generator) -> str:
-    return _plan(range(1, len(subject.candidates) + 1))
+    return plan_text(range(1, len(subject.candidates) + 1))
 
 
 def _oracle_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
     blocks = subject.scene.blocks
-    return _plan(_needed(subject, blocks[v]) for v in subject.scene.graph.random_order(rng))
+    return plan_text(_needed(subject, blocks[v]) for v in subject.scene.graph.random_order(rng))
 
 
 def _unoriented_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
     """A valid order in which every block stands wrongly, wherever a wrong one can be chosen."""
     blocks = subject.scene.blocks
     order = subject.scene.graph.random_order(rng)
-    return _plan(
+    return plan_text(
         _turned(subject.candidates, blocks[v], rng) or _needed(subject, blocks[v]) for v in order
     )
 
@@ -56,11 +57,11 @@ def _first_poses(subject: PlanSubject, rng: np.random.Generator) -> str:
     blocks = subject.scene.blocks
     order = subject.scene.graph.random_order(rng)
     first = subject.candidates.first_of
-    return _plan(first(blocks[v].kind) or _needed(subject, blocks[v]) for v in order)
+    return plan_text(first(blocks[v].kind) or _needed(subject, blocks[v]) for v in order)
 
 
 def _goal_blind(subject: PlanSubject, _: np.random.Generator) -> str:
-    return _plan(subject.guess().steps)
+    return plan_text(subject.guess().steps)
 
 
 def _needed(subject: PlanSubject, block: Block) -> int:

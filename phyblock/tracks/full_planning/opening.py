@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from phyblock.datasets import AssemblyTask, Dataset, official_prompt
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.tracks.examples import examples_of
 from phyblock.tracks.full_planning.spec import PlanningSpec
 from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
+from phyblock.tracks.full_planning.worked import can_be_worked
 from phyblock.tracks.kind import Opening
 from phyblock.tracks.opening import assembly_pictures, task_showing, template_prompt
 from phyblock.tracks.prompts import OfficialPrompt, Prompt
 from phyblock.tracks.selection import select_tasks
+from phyblock.tracks.showing import TaskShowing
 
 __all__ = ["open_full_planning"]
 
@@ -27,8 +31,15 @@ def open_full_planning(opening: Opening) -> FullPlanning:
         return FullPlanning(_rules(suite), items=tasks, showing=showing, pool=pool)
     if suite.images.source == "dataset":
         _check_composites(opening.dataset, tasks)
-    pictures = assembly_pictures(suite, opening.shop)
-    return FullPlanning(_rules(suite), _prompt(opening.loaded), pictures, tasks, showing, pool)
+    prompt, pictures = _prompt(opening.loaded), assembly_pictures(suite, opening.shop)
+    as_shown = TaskShowing(replace(showing.how, wrong_image=False))
+    able = [
+        as_shown.of(task, suite.seeds[0])
+        for task in pool
+        if can_be_worked(task) and (task.composite or suite.images.source == "render")
+    ]
+    examples = examples_of(opening.loaded, able, tasks, "scene")
+    return FullPlanning(_rules(suite), prompt, pictures, tasks, showing, pool, examples)
 
 
 def _rules(suite: SuiteSpec) -> PlanningRules:

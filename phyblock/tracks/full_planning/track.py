@@ -21,8 +21,10 @@ from phyblock.parsing import (
     reader_version,
 )
 from phyblock.scoring import AssemblyScorer, Score
+from phyblock.tracks.examples import Examples, Shots, WorkedExample
 from phyblock.tracks.full_planning.baselines import PlanSubject
 from phyblock.tracks.full_planning.guessing import BlindGuesses
+from phyblock.tracks.full_planning.worked import worked_plan
 from phyblock.tracks.pictures import Pictures
 from phyblock.tracks.prompts import Prompt, form_facts, response_format
 from phyblock.tracks.showing import Showing, TaskShowing, file_plan, told_of
@@ -105,9 +107,10 @@ class FullPlanning:
         items: Sequence[AssemblyTask] = (),
         showing: TaskShowing = _PLAIN,
         pool: Sequence[AssemblyTask] = (),
+        examples: Examples[AssemblyTask] | None = None,
     ) -> None:
         """`prompt` and `pictures` are None where every model is a recording; from `pool`, else
-        `items`, baselines learn.
+        `items`, baselines learn. `examples` are in the form in which they are shown.
         """
         self.rules = rules
         self.items = items
@@ -115,6 +118,7 @@ class FullPlanning:
         self._prompt = prompt
         self._pictures = pictures
         self._showing = showing
+        self._examples = examples or Examples((), 0)
         self._guesses = BlindGuesses(showing, pool or items, rules.settings[0])
         self._scorers: dict[object, AssemblyScorer] = {}
 
@@ -130,10 +134,13 @@ class FullPlanning:
         """Name and version of the prompt, and a digest of all that decides the pictures."""
         if self._prompt is None or self._pictures is None:
             return {"prompt": None, "pictures": None}
-        keys = [self._pictures.keys(task) for task in self._showing.each(self.items)]
+        examples = self._examples.used(self.items)
+        shown = (*self._showing.each(self.items), *examples)
+        keys = [self._pictures.keys(task) for task in shown]
         return {
             "prompt": {"name": self._prompt.name, "version": self._prompt.version},
             "pictures": hashlib.sha256(json.dumps(keys).encode()).hexdigest(),
+            **({"examples": [task.key for task in examples]} if examples else {}),
         }
 
     async def request(
@@ -142,7 +149,10 @@ class FullPlanning:
         """The request of one sample; without messages for models that need none."""
         if not with_messages or self._prompt is None or self._pictures is None:
             return Request(item.key, seed, (), params, "", self._subject(item))
-        return self._request(item, seed, params, self._prompt, await self._pictures.of(item))
+        show = partial(self._worked, self._prompt, self._pictures)
+        shots = await self._examples.shots(item, show)
+        pictures = await self._pictures.of(item)
+        return self._request(item, seed, params, self._prompt, pictures, shots)
 
     def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
         """The one request, made without rendering, and whether its pictures are the real ones."""
@@ -150,7 +160,23 @@ class FullPlanning:
             yield Request(item.key, 0, (), {}, "", self._subject(item)), True
             return
         pictures, real = self._pictures.outline(item)
-        yield self._request(item, 0, {}, self._prompt, pictures), real
+        examples = []
+        for task in self._examples.of(item):
+            seen, is_real = self._pictures.outline(task)
+            examples.append(self._example(self._prompt, task, seen))
+            real = real and is_real
+        yield self._request(item, 0, {}, self._prompt, pictures, Shots(tuple(examples))), real
+
+    async def _worked(
+        self, prompt: Prompt, pictures: Pictures, task: AssemblyTask
+    ) -> WorkedExample:
+        return self._example(prompt, task, await pictures.of(task))
+
+    def _example(
+        self, prompt: Prompt, task: AssemblyTask, pictures: tuple[Image, ...]
+    ) -> WorkedExample:
+        *_, question = prompt.messages(pictures, self.facts(task, pictures))
+        return WorkedExample(task.key, question, worked_plan(task, self.rules.form(task)))
 
     def _request(
         self,
@@ -159,16 +185,18 @@ class FullPlanning:
         params: Mapping[str, object],
         prompt: Prompt,
         pictures: tuple[Image, ...],
+        shots: Shots,
     ) -> Request:
         messages = prompt.messages(pictures, self.facts(item, pictures))
         return Request(
             item.key,
             seed,
-            messages,
+            shots.before(messages),
             params,
             prompt.version,
             self._subject(item),
             response_format(self.rules.form(item)),
+            examples=shots.keys,
         )
 
     def _subject(self, item: AssemblyTask) -> PlanSubject:

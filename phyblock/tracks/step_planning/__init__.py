@@ -47,5 +47,6 @@ TRACK = TrackKind(
     prompt_field=("steps", "prompt"),
     counted=(POSE_COUNTS,),
     tables=("table3", "endings", "progress"),
+    no_examples="one would be an episode of several turns, each with a picture of its own",
     varies=("prompt", "background", "view", "candidate_order", "layout", "repeats"),
 )

@@ -58,5 +58,6 @@ TRACK = TrackKind(
     own_data=_questions,
     manifest=_manifest,
     own_root=_found_at,
-    varies=("prompt", "background", "repeats"),
+    no_examples="",
+    varies=("prompt", "background", "examples", "repeats"),
 )

@@ -9,7 +9,7 @@ import numpy as np
 
 from phyblock.domain import LETTERS, Question
 
-__all__ = ["CHOICE_RULES", "ChoiceSubject"]
+__all__ = ["CHOICE_RULES", "ChoiceSubject", "choice_text"]
 
 
 @dataclass(frozen=True)
@@ -27,23 +27,24 @@ class ChoiceSubject:
 def _random_choice(subject: ChoiceSubject, rng: np.random.Generator) -> str:
     n = len(subject.question.options)
     if subject.question.subtask == "OR":
-        return _choice(int(index) for index in rng.permutation(n))
-    return _choice([int(rng.integers(n))])
+        return choice_text(int(index) for index in rng.permutation(n))
+    return choice_text([int(rng.integers(n))])
 
 
 def _oracle_choice(subject: ChoiceSubject, _: np.random.Generator) -> str:
-    return _choice(subject.question.answer)
+    return choice_text(subject.question.answer)
 
 
 def _majority_choice(subject: ChoiceSubject, _: np.random.Generator) -> str:
-    return _choice(subject.guesses["majority"])
+    return choice_text(subject.guesses["majority"])
 
 
 def _text_choice(subject: ChoiceSubject, _: np.random.Generator) -> str:
-    return _choice(subject.guesses["text-only"])
+    return choice_text(subject.guesses["text-only"])
 
 
-def _choice(indices: Iterable[int]) -> str:
+def choice_text(indices: Iterable[int]) -> str:
+    """An answer in the benchmark's own reply form."""
     return "Answer: " + ", ".join(LETTERS[index] for index in indices)
 
 

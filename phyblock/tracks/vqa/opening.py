@@ -16,6 +16,7 @@ from phyblock.datasets import (
 from phyblock.domain import SUBTASKS, Subtask
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.resources import bundled_sets
+from phyblock.tracks.examples import examples_of
 from phyblock.tracks.kind import Opening
 from phyblock.tracks.opening import (
     picture_folder,
@@ -24,8 +25,9 @@ from phyblock.tracks.opening import (
 )
 from phyblock.tracks.selection import spread, stratified
 from phyblock.tracks.vqa.pictures import QuestionPictures
+from phyblock.tracks.vqa.rules import VqaRules
 from phyblock.tracks.vqa.spec import VqaSpec
-from phyblock.tracks.vqa.track import Vqa, VqaRules
+from phyblock.tracks.vqa.track import Vqa, subtask_of
 
 __all__ = ["open_questions", "open_vqa", "select_questions"]
 
@@ -54,7 +56,8 @@ def open_vqa(opening: Opening) -> Vqa:
         opening.shop,
         suite.images.background,
     )
-    return Vqa(rules, questions, tasks, template_prompt(loaded, Vqa.name), pictures)
+    examples = examples_of(loaded, questions.tasks, tasks, "question", subtask_of)
+    return Vqa(rules, questions, tasks, template_prompt(loaded, Vqa.name), pictures, examples)
 
 
 def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSet:

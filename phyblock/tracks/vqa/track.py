@@ -7,6 +7,7 @@ import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from phyblock.datasets import QuestionSet, QuestionTask
@@ -14,46 +15,15 @@ from phyblock.domain import LETTERS, Question, Scene, is_picture_option
 from phyblock.domain.rotation import rotated, rotated_label
 from phyblock.models.base import Image, Request
 from phyblock.models.guesses import Guesses
-from phyblock.parsing import (
-    AnswerForm,
-    ParsedAnswer,
-    choice_form,
-    parse_answer,
-    parse_asked_answer,
-)
+from phyblock.parsing import ParsedAnswer
 from phyblock.tracks.elsewhere import Elsewhere
+from phyblock.tracks.examples import Examples, Shots, WorkedExample
 from phyblock.tracks.prompts import Prompt, form_facts, response_format
 from phyblock.tracks.vqa.baselines import ChoiceSubject
-from phyblock.tracks.vqa.pictures import OptionsAs, QuestionPictures, ShownQuestion
-from phyblock.words import AnswerFormat
+from phyblock.tracks.vqa.pictures import QuestionPictures, ShownQuestion
+from phyblock.tracks.vqa.rules import VqaRules
 
-__all__ = ["AskedQuestion", "ChoiceJudgement", "Vqa", "VqaRules", "asked"]
-
-
-@dataclass(frozen=True)
-class VqaRules:
-    """How questions are shown.
-
-    `circular`: every rotation of the options is asked; `blind`: no picture is sent;
-    `wrong_image`: the pictures are those of a question about another scene.
-    """
-
-    options_as: OptionsAs = "images"
-    circular: bool = False
-    blind: bool = False
-    wrong_image: bool = False
-    answer_format: AnswerFormat = "text"
-
-    def form(self, question: Question) -> AnswerForm[str] | None:
-        """The form in which an answer is asked for; None where that is text."""
-        if self.answer_format == "text":
-            return None
-        return choice_form(question.options, question.subtask == "OR")
-
-    def read(self, question: Question, text: str) -> ParsedAnswer:
-        """What a reply to a question says."""
-        parse = parse_answer if self.answer_format == "text" else parse_asked_answer
-        return parse(text, question.options, question.subtask == "OR")
+__all__ = ["AskedQuestion", "ChoiceJudgement", "Vqa", "asked", "subtask_of"]
 
 
 @dataclass(frozen=True)
@@ -123,6 +93,7 @@ class Vqa:
         tasks: Sequence[QuestionTask],
         prompt: Prompt | None = None,
         pictures: QuestionPictures | None = None,
+        examples: Examples[QuestionTask] | None = None,
     ) -> None:
         """Ask `tasks` out of `questions`, of which all serve as wrong pictures and for baselines.
 
@@ -140,6 +111,7 @@ class Vqa:
         self.template = "" if prompt is None else prompt.name
         self._questions = questions
         self._prompt = prompt
+        self._examples = examples or Examples((), 0)
         self._pictures = pictures
         self._guesses = Guesses([task.question for task in questions.tasks])
         self._elsewhere: Elsewhere[QuestionTask] | None = None
@@ -174,8 +146,11 @@ class Vqa:
         }
         if self._prompt is not None and self._pictures is not None:
             told["prompt"] = {"name": self._prompt.name, "version": self._prompt.version}
-            shown = [] if self.rules.blind else [self._pictures.keys(i.shown) for i in self.items]
-            told["pictures"] = _digest(shown)
+            examples = [asked(task) for task in self._examples.used(self._tasks.values())]
+            if examples:
+                told["examples"] = [example.key for example in examples]
+            items = () if self.rules.blind else (*self.items, *examples)
+            told["pictures"] = _digest([self._pictures.keys(item.shown) for item in items])
         return told
 
     async def request(
@@ -184,20 +159,45 @@ class Vqa:
         """The request of one sample; without messages for models that need none."""
         if not with_messages or self._prompt is None or self._pictures is None:
             return Request(item.key, seed, (), params, "", self._about(item))
+        show = partial(self._worked, self._prompt, self._pictures)
+        shots = await self._examples.shots(self._tasks[item.question.id], show)
         pictures: tuple[Image, ...] = ()
         if not self.rules.blind:
             pictures = await self._pictures.of(self._seen(item, seed))
-        return self._request(item, seed, params, self._prompt, pictures)
+        return self._request(item, seed, params, self._prompt, pictures, shots)
 
     def outlines(self, item: AskedQuestion) -> Iterator[tuple[Request, bool]]:
         """The one request, made without rendering, and whether its pictures are the real ones."""
         if self._prompt is None or self._pictures is None:
             yield Request(item.key, 0, (), {}, "", self._about(item)), True
             return
-        pictures, are_real = (
-            ((), True) if self.rules.blind else self._pictures.outline(self._seen(item, 0))
-        )
-        yield self._request(item, 0, {}, self._prompt, pictures), are_real
+        pictures, are_real = self._outline(self._pictures, self._seen(item, 0))
+        examples = []
+        for task in self._examples.of(self._tasks[item.question.id]):
+            example = asked(task)
+            seen, is_real = self._outline(self._pictures, example.shown)
+            examples.append(self._example(self._prompt, example, seen))
+            are_real = are_real and is_real
+        shots = Shots(tuple(examples))
+        yield self._request(item, 0, {}, self._prompt, pictures, shots), are_real
+
+    def _outline(
+        self, pictures: QuestionPictures, shown: ShownQuestion
+    ) -> tuple[tuple[Image, ...], bool]:
+        return ((), True) if self.rules.blind else pictures.outline(shown)
+
+    async def _worked(
+        self, prompt: Prompt, pictures: QuestionPictures, task: QuestionTask
+    ) -> WorkedExample:
+        example = asked(task)
+        seen = () if self.rules.blind else await pictures.of(example.shown)
+        return self._example(prompt, example, seen)
+
+    def _example(
+        self, prompt: Prompt, item: AskedQuestion, pictures: tuple[Image, ...]
+    ) -> WorkedExample:
+        *_, question = prompt.messages(pictures, self.facts(item, pictures))
+        return WorkedExample(item.key, question, self.rules.right_answer(item.question))
 
     def facts(self, item: AskedQuestion, pictures: Sequence[Image]) -> dict[str, object]:
         """What templates may use; nothing in it gives the answer away."""
@@ -239,16 +239,18 @@ class Vqa:
         params: Mapping[str, object],
         prompt: Prompt,
         pictures: tuple[Image, ...],
+        shots: Shots,
     ) -> Request:
         messages = prompt.messages(pictures, self.facts(item, pictures))
         return Request(
             item.key,
             seed,
-            messages,
+            shots.before(messages),
             params,
             prompt.version,
             self._about(item),
             response_format(self.rules.form(item.question)),
+            examples=shots.keys,
         )
 
     def _seen(self, item: AskedQuestion, seed: int) -> ShownQuestion:
@@ -261,6 +263,11 @@ class Vqa:
             return item.shown
         other = self._elsewhere.of(self._tasks[item.question.id], seed)
         return asked(other, item.rotation).shown
+
+
+def subtask_of(task: QuestionTask) -> str:
+    """What a question and its worked examples share."""
+    return task.question.subtask
 
 
 def _sort_of(task: QuestionTask) -> tuple[object, ...]:

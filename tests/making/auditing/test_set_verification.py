@@ -9,6 +9,7 @@ import pytest
 
 from phyblock.datasets import read_builtin
 from phyblock.domain import CandidateSet, Scene
+from phyblock.domain.symmetry import Symmetry
 from phyblock_making.auditing.set_verification import (
     LAWS,
     check_looks,
@@ -19,7 +20,7 @@ from phyblock_making.checks.set_checks import find_duplicates, find_orphans
 from phyblock_making.scenes import make_candidates
 from phyblock_making.scenes.scene_files import SUMS_FILE, sums_text
 from phyblock_making.scenes.sketch import make_scene
-from phyblock_making.symmetry import Symmetry, transformed
+from phyblock_making.symmetry import transformed
 from phyblock_making.workers import open_workers
 from tests.designs.pad import Pad
 from tests.designs.scenes import designed_scene, designed_scenes

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from phyblock.datasets import read_builtin
 from phyblock.domain import Block, BlockType, Color, QuestionPicture, Scene
 from phyblock.domain.blocks import Euler
+from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
 from phyblock.resources import bundled
 from phyblock.sim.seeing import least_difference, seen
 from phyblock.sim.support import find_overlaps, support_graph
@@ -25,7 +26,7 @@ from phyblock_making.questions.loose_blocks import put_beside
 from phyblock_making.questions.question_draft import Draft, UnfairError
 from phyblock_making.questions.shifts import shifted
 from phyblock_making.questions.viewpoint import ViewpointMaker
-from phyblock_making.symmetry import SYMMETRIES, Symmetry, transformed, turned_form
+from phyblock_making.symmetry import transformed
 
 SCENES = [t.scene for t in read_builtin(bundled("benchmarks", "data", "phyblock-400")).tasks]
 scenes = st.sampled_from(SCENES[::9])

@@ -10,6 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain import KIT_PALETTE, Scene
+from phyblock.domain.symmetry import canonical_form
 from phyblock.sim import find_gaps, find_overlaps
 from phyblock.sim.support import bounds_m
 from phyblock_making.scenes import form_problems
@@ -18,7 +19,6 @@ from phyblock_making.scenes.compositions import COMPOSITIONS, beside
 from phyblock_making.scenes.creatures import CREATURES
 from phyblock_making.scenes.grammar import GROUP_LEVELS, Request, draw
 from phyblock_making.scenes.scene_draft import PALETTES, Draft
-from phyblock_making.symmetry import canonical_form
 
 GROUPS = tuple(GROUP_LEVELS)
 seeds = st.integers(0, 2**31)

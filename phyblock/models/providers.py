@@ -1,0 +1,25 @@
+"""Which providers there are, by litellm and by what is reached without it."""
+
+from __future__ import annotations
+
+import importlib.util
+
+from phyblock.models.config import DIRECT_PROVIDERS, ModelConfig
+from phyblock.models.keys import KEYLESS
+from phyblock.models.litellm_call import litellm_providers
+from phyblock.models.price_map import map_entry
+
+__all__ = ["known_providers"]
+
+_AT_HAND = frozenset((*DIRECT_PROVIDERS, *KEYLESS))
+
+
+def known_providers(config: ModelConfig) -> frozenset[str]:
+    """The providers of which a model's is one; litellm is imported only where its map does not have
+    the model, which takes seconds.
+    """
+    if config.provider in _AT_HAND or map_entry(config):
+        return frozenset((config.provider,))
+    if importlib.util.find_spec("litellm") is None:
+        return _AT_HAND
+    return _AT_HAND | litellm_providers()

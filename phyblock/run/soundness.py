@@ -1,0 +1,43 @@
+"""Whether the models of a file could be asked, as far as that shows without asking."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
+
+from phyblock.errors import Problem
+from phyblock.models import ModelConfig, known_providers
+from phyblock.specs import ModelSpec, did_you_mean
+from phyblock.specs.yaml_source import read_yaml
+
+__all__ = ["model_problems", "provider_problem"]
+
+
+def model_problems(
+    path: Path, known: Mapping[str, ModelSpec], names: Collection[str]
+) -> Iterator[Problem]:
+    """What is wrong with the models of these names in a models file: recordings that are not there,
+    providers that nobody knows.
+    """
+    source = read_yaml(path)
+    for name in (name for name in names if name in known):
+        spec = known[name]
+        if spec.replay is not None and not os.path.isdir(spec.replay):
+            where, message = source.where((name, "replay")), "recordings not found"
+            hint = "the path is taken relative to the models file"
+            yield Problem(where, message, f"{name}.replay", spec.replay, "a folder", hint)
+        if spec.id is not None:
+            config = ModelConfig(name, "litellm", spec.id)
+            if (problem := provider_problem(config, source.where((name, "id")))) is not None:
+                yield problem
+
+
+def provider_problem(config: ModelConfig, where: str) -> Problem | None:
+    """That a model is of a provider which litellm does not know, or None."""
+    providers = known_providers(config)
+    if config.kind != "litellm" or config.provider in providers:
+        return None
+    message, hint = "is of no provider that is known", did_you_mean(config.provider, providers)
+    allowed = "provider/model, as litellm names them"
+    return Problem(where, message, f"{config.name}.id", config.id, allowed, hint)

@@ -1,0 +1,164 @@
+"""Worked examples: other items of a track with right answers, shown before what is asked."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from collections.abc import Awaitable, Callable, Hashable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import islice
+from typing import Generic, Protocol, TypeVar
+
+from phyblock.domain import Scene
+from phyblock.domain.symmetry import fingerprint
+from phyblock.errors import Problem, SpecError
+from phyblock.models.base import Image, Message
+from phyblock.specs import LoadedSuite, did_you_mean
+
+__all__ = ["Examples", "Shots", "WorkedExample", "examples_of"]
+
+
+class _Asked(Protocol):
+    @property
+    def key(self) -> str: ...
+
+    @property
+    def scene(self) -> Scene: ...
+
+
+AskedT = TypeVar("AskedT", bound=_Asked)
+
+
+@dataclass(frozen=True)
+class WorkedExample:
+    """An example as it is sent: its key, the question as the track asks it, a right answer."""
+
+    key: str
+    question: Message
+    answer: str
+
+    @functools.cached_property
+    def turns(self) -> tuple[Message, Message]:
+        """A turn of the user, whose pictures say whose they are, and one of the assistant."""
+        parts = tuple(
+            replace(part, label=f"example {self.key}: {part.label}")
+            if isinstance(part, Image)
+            else part
+            for part in self.question.parts
+        )
+        return Message("user", parts), Message("assistant", (self.answer,))
+
+
+@dataclass(frozen=True)
+class Shots:
+    """The worked examples of one request."""
+
+    examples: tuple[WorkedExample, ...] = ()
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Which they are."""
+        return tuple(example.key for example in self.examples)
+
+    def before(self, messages: tuple[Message, ...]) -> tuple[Message, ...]:
+        """Messages with the examples before the last, which asks."""
+        *first, question = messages
+        turns = (turn for example in self.examples for turn in example.turns)
+        return (*first, *turns, question)
+
+
+@dataclass
+class Examples(Generic[AskedT]):
+    """Chooses `n` examples for an item out of a pool.
+
+    They are tried in one order for all items, so that requests begin alike: those about the scenes
+    `named` first, then as `seed` draws. None is of another sort than the item, shares a base scene
+    with it, or has its goal, be it turned, mirrored or shifted. Sorted by digests, the order is the
+    same on every machine.
+    """
+
+    pool: Iterable[AskedT]
+    n: int
+    named: Sequence[str] = ()
+    seed: int = 0
+    sort_of: Callable[[AskedT], Hashable] = lambda _: None
+    _alike: dict[Hashable, list[AskedT]] = field(default_factory=dict, init=False)
+    _goals: dict[str, bytes] = field(default_factory=dict, init=False)
+    _shown: dict[str, WorkedExample] = field(default_factory=dict, init=False)
+
+    def __post_init__(self) -> None:
+        """Put the pool in order."""
+        for one in sorted(self.pool, key=self._place) if self.n else ():
+            self._alike.setdefault(self.sort_of(one), []).append(one)
+
+    def of(self, item: AskedT) -> tuple[AskedT, ...]:
+        """The examples of an item, fewer than `n` where there are no more."""
+        return tuple(islice(self._others(item), self.n))
+
+    async def shots(
+        self, item: AskedT, show: Callable[[AskedT], Awaitable[WorkedExample]]
+    ) -> Shots:
+        """The examples of an item, each made once by `show`."""
+        chosen = self.of(item)
+        for one in chosen:
+            if one.key not in self._shown:
+                self._shown[one.key] = await show(one)
+        return Shots(tuple(self._shown[one.key] for one in chosen))
+
+    def used(self, items: Iterable[AskedT]) -> tuple[AskedT, ...]:
+        """All that are examples of any of the items, by key."""
+        found = {one.key: one for item in items for one in self.of(item)}
+        return tuple(found[key] for key in sorted(found))
+
+    def check(self, items: Sequence[AskedT], noun: str, where: str) -> None:
+        """Raise SpecError for the first item that has fewer than wanted."""
+        for item in items:
+            if (found := len(self.of(item))) < self.n:
+                message = f"{noun} {item.key} has fewer others to be shown as examples"
+                allowed = "others of its kind that share neither base scene nor goal with it"
+                raise SpecError(Problem(where, message, "examples", str(found), allowed))
+
+    def _others(self, item: AskedT) -> Iterator[AskedT]:
+        own, goal = _bases(item.scene), self._goal(item)
+        for one in self._alike.get(self.sort_of(item), ()):
+            if own.isdisjoint(_bases(one.scene)) and self._goal(one) != goal:
+                yield one
+
+    def _goal(self, item: AskedT) -> bytes:
+        if item.key not in self._goals:
+            self._goals[item.key] = fingerprint(item.scene.blocks)
+        return self._goals[item.key]
+
+    def _place(self, one: AskedT) -> tuple[int, bytes]:
+        text = f"example|{self.seed}|{one.key}"
+        place = self.named.index(one.scene.id) if one.scene.id in self.named else len(self.named)
+        return place, hashlib.sha256(text.encode()).digest()
+
+
+def examples_of(
+    loaded: LoadedSuite,
+    pool: Iterable[AskedT],
+    items: Sequence[AskedT],
+    noun: str,
+    sort_of: Callable[[AskedT], Hashable] = lambda _: None,
+) -> Examples[AskedT]:
+    """The examples that a suite wants, out of a pool; they are drawn by the first of its seeds.
+
+    Raises SpecError for a scene that the pool has not, and where an item has too few others.
+    """
+    suite, where = loaded.suite, loaded.where("examples")
+    wanted = suite.examples
+    n, named = (wanted, ()) if isinstance(wanted, int) else (len(wanted), wanted)
+    kept = list(pool) if n else []
+    known = {one.scene.id for one in kept}
+    if lacking := [name for name in named if name not in known]:
+        message = f"no {noun} that can be an example is about this scene"
+        hint = did_you_mean(lacking[0], sorted(known))
+        raise SpecError(Problem(where, message, "examples", lacking[0], hint=hint))
+    examples = Examples(kept, n, named, suite.seeds[0], sort_of)
+    examples.check(items, noun, where)
+    return examples
+
+
+def _bases(scene: Scene) -> frozenset[str]:
+    return frozenset((scene.id, *scene.parents))

@@ -1,0 +1,43 @@
+"""`phyblock validate` of models: recordings that are not there, and providers that nobody knows."""
+
+from __future__ import annotations
+
+import pytest
+
+from phyblock.models import ModelConfig, known_providers, providers
+from tests.workspace import Workspace
+
+
+def test_missing_recordings_and_unknown_providers_are_found(workspace: Workspace) -> None:
+    models = {
+        "far": {"replay": "./nowhere"},
+        "odd": "opnai/gpt-4o",
+        "own": {"id": "hosted_vllm/x", "api_base": "http://localhost:1/v1"},
+    }
+    workspace.write_yaml("models.yaml", models)
+    workspace.write_suite(models=["odd", "own"], seeds=[0])
+    done = workspace.phyblock("validate", "models.yaml", "suite.yaml")
+    assert done.code == 2
+    assert "models.yaml:2:11: far.replay: recordings not found" in done.err
+    # Of the suite its own models alone are looked at.
+    assert done.err.count("far.replay") == 1
+    assert done.err.count("models.yaml:3:6: odd.id: is of no provider that is known") == 2
+    assert "did you mean openai?" in done.err
+    assert "own.id" not in done.err
+
+
+@pytest.mark.parametrize("model", ["hosted_vllm/x", "openai/new", "gemini/gemini-2.5-pro"])
+def test_a_model_at_hand_needs_no_litellm(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(providers, "litellm_providers", lambda: pytest.fail("it was imported"))
+    assert model.partition("/")[0] in known_providers(ModelConfig("m", "litellm", model))
+
+
+def test_validate_uses_the_models_file_that_a_run_would(workspace: Workspace) -> None:
+    workspace.write_suite(models=["delta"], seeds=[0])
+    assert "delta" in workspace.phyblock("validate", "suite.yaml").err
+    (workspace.root / "other").mkdir()
+    workspace.write_yaml("other/mine.yaml", {"delta": "openai/gpt-4o"})
+    named = workspace.phyblock("validate", "suite.yaml", "--models-file", "other/mine.yaml")
+    assert named.code == 0, named.err
+    workspace.write_yaml("models.yaml", {"delta": "openai/gpt-4o"})
+    assert workspace.phyblock("validate", "suite.yaml").code == 0

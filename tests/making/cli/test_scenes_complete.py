@@ -1,0 +1,180 @@
+"""`phyblock scenes complete`: positions become a data set, or are refused with the reason."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from benchmarks.evidence.completing import stripped
+from phyblock.datasets import read_builtin
+from phyblock.domain import Scene
+from phyblock.errors import DataError
+from phyblock.resources import bundled
+from phyblock_making.auditing.set_verification import check_sums, verify_scene
+from phyblock_making.scenes.completing import complete, derived
+from phyblock_making.scenes.given_scenes import GivenScene, ReadScene, read_given
+from tests.workspace import SCENES, Workspace
+
+DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
+GABLES = [
+    {"type": "cube", "color": "red", "position": [0, -0.05, 0.025]},
+    {"type": "cube", "color": "red", "position": [0, 0.05, 0.025]},
+    {"type": "cuboid3", "color": "yellow", "position": [0, 0, 0.0625], "euler": [0, 0, 90]},
+    {"type": "triangle", "color": "orange", "position": [0, -0.0375, 0.075]},
+    {"type": "triangle", "color": "orange", "position": [0, 0.0375, 0.075]},
+]
+
+
+def of(*blocks: Any, **fields: Any) -> GivenScene:
+    return GivenScene.model_validate({"blocks": list(blocks), **fields})
+
+
+def same(scene: Scene) -> bool:
+    return derived(scene.id, stripped(scene), scene.id) == scene
+
+
+@given(st.sampled_from(DATA.tasks))
+@settings(max_examples=5, deadline=None)
+def test_a_scene_that_is_stripped_comes_back(task: Any) -> None:
+    assert same(task.scene)
+
+
+@pytest.mark.slow
+def test_all_scenes_that_are_stripped_come_back() -> None:
+    assert [task.key for task in DATA.tasks if not same(task.scene)] == []
+
+
+@given(order=st.permutations(range(5)))
+@settings(max_examples=20, deadline=None)
+def test_blocks_may_be_listed_in_any_order(order: list[int]) -> None:
+    scene = derived("gables", of(*(GABLES[i] for i in order)), "here")
+    assert [block.order for block in scene.blocks] == [1, 2, 3, 4, 5]
+    assert scene.graph.is_valid(range(5))
+    assert [block.layer for block in scene.blocks] == [1, 1, 2, 3, 3]
+    (deck,) = (block for block in scene.blocks if block.type == "cuboid3")
+    assert set(deck.depend) == {1, 2}
+
+
+def moved(number: int, *by_m: float) -> list[Any]:
+    block = {**GABLES[number]}
+    block["position"] = [at + by for at, by in zip(block["position"], by_m, strict=True)]
+    return [*GABLES[:number], block, *GABLES[number + 1 :]]
+
+
+@pytest.mark.parametrize(
+    ("blocks", "said"),
+    [
+        (moved(2, 0, 0, -0.002), "block 3 overlaps block 1 by 2.00 mm"),
+        (moved(0, 0, 0, -0.002), "block 1 overlaps the ground by 2.00 mm"),
+        (moved(4, 0, 0, 0.01), "block 5 floats 10.00 mm above its support"),
+        (moved(4, 0, 0.08, 0), "floats"),
+        ([GABLES[0], {**GABLES[2], "position": [0, 0.02, 0.0625]}], "block 2 falls"),
+        ([{**GABLES[0], "order": 1}, {**GABLES[1], "order": 1}], "two blocks of the same order"),
+        ([{**GABLES[2], "order": 1}, {**GABLES[0], "order": 2}, {**GABLES[1], "order": 3}],
+         "before its support"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_built_is_refused(blocks: list[Any], said: str) -> None:
+    with pytest.raises(DataError) as caught:
+        complete(ReadScene("mine", of(*blocks), "mine.yaml:3:1"))
+    assert said in str(caught.value)
+    assert all(problem.where == "mine.yaml:3:1" for problem in caught.value.problems)
+
+
+def test_what_is_given_and_wrong_is_noted_and_what_is_unusual() -> None:
+    blocks = [{**block, "order": n} for n, block in enumerate(GABLES, 1)]
+    blocks[2] |= {"depend": [1], "layer": 3}
+    done = complete(ReadScene("mine", of(*blocks, levels=[1]), "here"))
+    assert done.scene.levels == (1,)
+    assert any("depends on [1, 2] by contact, not [1]" in note for note in done.notes)
+    assert any("on layer 2, not 3" in note for note in done.notes)
+    assert any("wrong size" in note for note in done.notes)
+
+
+@pytest.mark.parametrize("form", ["one.yaml", "list.yml", "named.json", "lines.jsonl", "folder"])
+def test_scenes_are_read_in_any_form(tmp_path: Path, form: str) -> None:
+    one = {"id": "gables", "blocks": GABLES}
+    path = tmp_path / form
+    if form == "one.yaml":
+        path.write_text(yaml.safe_dump(one), encoding="utf-8")
+    elif form == "list.yml":
+        path.write_text(yaml.safe_dump([one]), encoding="utf-8")
+    elif form == "named.json":
+        path.write_text(json.dumps({"scenes": [one]}), encoding="utf-8")
+    elif form == "lines.jsonl":
+        path.write_text(json.dumps(one) + "\n", encoding="utf-8")
+    else:
+        path.mkdir()
+        (path / "gables.json").write_text(json.dumps({"blocks": GABLES}), encoding="utf-8")
+    (read,) = read_given(path)
+    assert read.name == "gables"
+    assert read.given.blocks == of(*GABLES).blocks
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("blocks:\n  - {type: cube, color: red}\n", "yaml:2:5: blocks[0].position: is missing"),
+        ("blocks:\n  - {type: cube, color: rot, position: [0, 0, 0]}\n", "mine.yaml:2:25"),
+        ("blocks:\n  - {type: cube, color: red, positon: [0, 0, 0]}\n", "positon: is not known"),
+        ("blocks: [\n", "mine.yaml"),
+        ("", "is not an object"),
+        ("[{id: a, blocks: [{type: cube, color: red, position: [0, 0, 0.025]}]},"
+         " {id: a, blocks: [{type: cube, color: red, position: [0, 0, 0.025]}]}]", "is used by"),
+    ],
+)  # fmt: skip
+def test_a_file_that_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(DataError) as caught:
+        read_given(path)
+    assert said in str(caught.value)
+
+
+def test_a_scene_is_called_as_its_file_where_that_is_a_name(tmp_path: Path) -> None:
+    text = json.dumps({"blocks": GABLES})
+    for name in ("my gables.json", "gables.json"):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    assert read_given(tmp_path / "gables.json")[0].name == "gables"
+    with pytest.raises(DataError, match="has no id, and cannot be called as its file"):
+        read_given(tmp_path)
+
+
+def test_what_is_completed_is_a_data_set_that_validates_and_runs(workspace: Workspace) -> None:
+    source = workspace.write_yaml("gables.yaml", {"scenes": [
+        {"id": "gables", "blocks": GABLES},
+        {"id": "tower", "blocks": [{k: v for k, v in block.items() if k not in ("depend", "layer")}
+                                   for block in SCENES[0]["blocks"]],
+         "candidates": SCENES[0]["candidates"]},
+    ]})  # fmt: skip
+    before = source.read_bytes()
+    done = workspace.phyblock("scenes", "complete", "gables.yaml", "--jobs", "1")
+    assert done.code == 0, done.err
+    folder = workspace.root / "gables-set"
+    gables, tower = read_builtin(folder).tasks
+    assert (len(gables.candidates), len(tower.candidates)) == (16, 16)
+    assert [c.look for c in tower.candidates.candidates][:1] == [tower.scene.blocks[0].look]
+    assert not any(verify_scene((gables.scene, gables.candidates)).values())
+    assert check_sums(folder) == (3, ())
+    assert source.read_bytes() == before
+    again = workspace.phyblock("scenes", "complete", "gables.yaml", "--jobs", "1")
+    assert (again.code, "holds a data set already" in again.err) == (2, True)
+    assert workspace.phyblock("validate", "gables-set").code == 0
+    workspace.write_suite(models=["oracle"], dataset={"path": "./gables-set"}, seeds=[0])
+    ran = workspace.run()
+    assert ran.code == 0, ran.err
+    assert {record["outcome"] for record in workspace.records()} == {"ok"}
+
+
+def test_a_given_order_is_kept() -> None:
+    blocks = [{**block, "order": 10 * n} for n, block in enumerate(GABLES, 1)]
+    scene = derived("gables", of(*blocks), "here")
+    assert [block.order for block in scene.blocks] == [10, 20, 30, 40, 50]
+    assert replace(scene, id="x").blocks[2].depend == (10, 20)

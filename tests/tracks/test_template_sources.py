@@ -1,0 +1,138 @@
+"""Templates of several files: what they include is read once, counted, bounded and named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phyblock.errors import PromptError
+from phyblock.models.base import Message
+from phyblock.resources import bundled
+from phyblock.tracks import TemplatePrompt
+from tests.workspace import Workspace
+
+FACTS = {"pictures": ["goal"], "n_candidates": 16}
+MACROS = "{% macro twice(x) %}{{ x }}{{ x }}{% endmacro %}{% set rules = 'R' %}"
+
+
+def prompt(folder: Path, body: str, **files: str) -> TemplatePrompt:
+    """A template with this block `user`, or with blocks of its own; other files are `NAME.j2`."""
+    for name, text in files.items():
+        (folder / f"{name}.j2").write_text(text, encoding="utf-8")
+    whole = body if "block" in body else f"{{% block user %}}{body}{{% endblock %}}"
+    (folder / "mine.j2").write_text(whole, encoding="utf-8")
+    return TemplatePrompt(folder / "mine.j2", "mine")
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("a{% include 'rules.j2' %}", "aof 16"),
+        ("{% include ['gone.j2', 'rules.j2'] %}", "of 16"),
+        ("a{% include 'gone.j2' ignore missing %}", "a"),
+        ("{% import 'macros.j2' as m %}{{ m.twice('x') }}{{ m.rules }}", "xxR"),
+        ("{% from 'macros.j2' import twice %}{% block user %}{{ twice('x') }}{% endblock %}", "xx"),
+        (MACROS + "{% block user %}{{ twice(rules) }}{% endblock %}", "RR"),
+        ("{% include 'outer.j2' %}", "(of 16)"),
+    ],
+)
+def test_parts_are_included_and_imported(tmp_path: Path, body: str, said: str) -> None:
+    files = {"rules": "of {{ n_candidates }}", "outer": "({% include 'rules.j2' %})"}
+    made = prompt(tmp_path, body, macros=MACROS, **files)
+    assert made.messages((), FACTS) == (Message("user", (said,)),)
+
+
+def test_bundled_files_are_found_behind_those_beside_the_template(tmp_path: Path) -> None:
+    name = "full_planning.j2"
+    body = f"{{% include '{name}' %}}"
+    facts = {**FACTS, "is_blind": False, "candidate_scale": None}
+    bundled_text = TemplatePrompt(bundled("prompts", name), "x").text("user", facts)
+    assert bundled_text in prompt(tmp_path, body).text("user", facts)
+    (tmp_path / name).write_text("own", encoding="utf-8")
+    assert prompt(tmp_path, body).text("user", facts) == "own"
+
+
+@given(first=st.text("ab", max_size=3), second=st.text("ab", max_size=3))
+@settings(max_examples=15, deadline=None)
+def test_an_edit_of_what_is_included_is_another_prompt(
+    tmp_path_factory: pytest.TempPathFactory, first: str, second: str
+) -> None:
+    folder = tmp_path_factory.mktemp("prompts")
+    body = "a{% include 'outer.j2' %}"
+    versions = [
+        prompt(folder, body, outer="({% include 'rules.j2' %})", rules=text).version
+        for text in (first, second)
+    ]
+    assert (versions[0] == versions[1]) == (first == second)
+
+
+def test_what_is_edited_later_is_not_said(tmp_path: Path) -> None:
+    made = prompt(tmp_path, "{% include 'rules.j2' %}", rules="old")
+    (tmp_path / "rules.j2").write_text("new", encoding="utf-8")
+    assert made.messages((), FACTS) == (Message("user", ("old",)),)
+
+
+LOOP = "{% for i in range(9999) %}{% include 'part.j2' %}{% endfor %}"
+
+
+@pytest.mark.parametrize(
+    ("body", "part", "where", "said"),
+    [
+        ("{% include 'gone.j2' %}", "", "mine.j2:1", "no such file"),
+        ("\n{% include n_candidates %}", "", "mine.j2:2", "not named in quotes"),
+        ("{% include '../mine.j2' %}", "", "mine.j2:1", "of another folder"),
+        ("{% include '/etc/hostname' %}", "", "mine.j2:1", "of another folder"),
+        ("{% include 'a/../../b' %}", "", "mine.j2:1", "of another folder"),
+        ("{% include 'link.j2' %}", "", "mine.j2:1", "leads out of its folder"),
+        ("{% include 'below/link.j2' %}", "", "mine.j2:1", "leads out of its folder"),
+        ("{% extends 'part.j2' %}{% block user %}{% endblock %}", "", "mine.j2:1", "extend"),
+        ("{% include 'part.j2' %}", "a\n\n{{ wrong }}", "part.j2:3", "'wrong' is undefined"),
+        ("{% include 'part.j2' %}", "a\n{% if %}", "part.j2:2", "is not valid Jinja"),
+        ("{% include 'part.j2' %}", "\n{% include 'gone.j2' %}", "part.j2:2", "no such file"),
+        ("{% set x = wrong ~ 1 %}\n{% block user %}a{% endblock %}", "", "mine.j2:1", "undefined"),
+        ("{% import 'part.j2' as p %}{{ p.f() }}",
+         "{% macro f() %}\n{{ 1 // 0 }}{% endmacro %}", "part.j2:2", "division"),
+        ("{% include 'part.j2' %}", "{% include 'part.j2' %}", "part.j2:1", "nested too deeply"),
+        ("{% set x %}" + LOOP + "{% endset %}", "x" * 900, "", "more than 500,000 steps"),
+        (LOOP, "x" * 900, "", "longer than 200,000 characters"),
+        ("{% include 'part.j2' %}", "{{ 'x' * 10**9 }}", "part.j2:1", "more than 500,000 steps"),
+        ("{% include 'part.j2' %}", "{{ pictures.__class__ }}", "part.j2:1", "is unsafe"),
+        ("{% include 'part.j2' %}", "x" * 300_000, "part.j2", "cannot be read"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_with_the_file_that_is_included(
+    tmp_path: Path, body: str, part: str, where: str, said: str
+) -> None:
+    (tmp_path / "secret.txt").write_text("secret", encoding="utf-8")
+    folder = tmp_path / "prompts"
+    (folder / "below").mkdir(parents=True)
+    (folder / "link.j2").symlink_to(tmp_path / "secret.txt")
+    (folder / "below" / "link.j2").symlink_to("../../secret.txt")
+    with pytest.raises(PromptError) as caught:
+        prompt(folder, body, part=part).messages((), FACTS)
+    (problem,) = caught.value.problems
+    assert said in problem.message
+    assert problem.where.endswith(where)
+
+
+def test_no_more_than_some_files_are_included(tmp_path: Path) -> None:
+    files = {f"part{n}": f"{{% include 'part{n + 1}.j2' %}}" for n in range(40)}
+    with pytest.raises(PromptError) as caught:
+        prompt(tmp_path, "{% include 'part0.j2' %}", **files)
+    assert "more than 32 files" in str(caught.value)
+
+
+def test_validate_names_what_is_included(workspace: Workspace) -> None:
+    folder = workspace.root / "prompts"
+    folder.mkdir()
+    workspace.write_suite(models=["alpha"])
+    workspace.write_models("http://127.0.0.1:9", "alpha")
+    body = "{% block user %}{% include 'rules.j2' %}{% endblock %}"
+    (folder / "full_planning.j2").write_text(body, encoding="utf-8")
+    (folder / "rules.j2").write_text("Build.", encoding="utf-8")
+    done = workspace.phyblock("validate", "suite.yaml")
+    assert done.code == 0, done.err
+    assert "full_planning.j2 (with rules.j2)" in done.out.replace("\n", "")
