@@ -9,12 +9,16 @@ from phyblock.domain.blocks import (
     BlockType,
     Color,
     Euler,
+    euler_deg_to_matrix,
     euler_deg_to_quat_xyzw,
     orientation_class,
     quat_xyzw_to_matrix,
+    symmetries,
+    turn_deg,
 )
 from phyblock.domain.candidates import MAX_CANDIDATES, Candidate, CandidateSet
 from phyblock.domain.plan import Plan
+from phyblock.domain.pose_plan import PosePlan, PoseStep
 from phyblock.domain.question import (
     CATEGORIES,
     LETTERS,
@@ -53,13 +57,18 @@ __all__ = [
     "Look",
     "Mark",
     "Plan",
+    "PosePlan",
+    "PoseStep",
     "Question",
     "QuestionPicture",
     "Scene",
     "Subtask",
     "category_of",
+    "euler_deg_to_matrix",
     "euler_deg_to_quat_xyzw",
     "is_picture_option",
     "orientation_class",
     "quat_xyzw_to_matrix",
+    "symmetries",
+    "turn_deg",
 ]

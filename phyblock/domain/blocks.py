@@ -32,6 +32,8 @@ __all__ = [
     "euler_deg_to_quat_xyzw",
     "orientation_class",
     "quat_xyzw_to_matrix",
+    "symmetries",
+    "turn_deg",
 ]
 
 BlockType = Literal[
@@ -195,7 +197,7 @@ def euler_deg_to_matrix(euler_deg: Euler) -> NDArray[np.float64]:
 
 
 @functools.cache
-def _symmetries(block_type: BlockType) -> NDArray[np.float64]:
+def symmetries(block_type: BlockType) -> NDArray[np.float64]:
     """Rotations that map the block onto itself, body frame, shape (k, 3, 3)."""
     if block_type == "cube":
         return _cube_rotations()
@@ -230,5 +232,14 @@ def orientation_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, .
     rotations that are indistinguishable from the given one.
     """
     rotation = euler_deg_to_matrix(euler_deg)
-    alike = np.round(rotation @ _symmetries(block_type), 4) + 0.0
+    alike = np.round(rotation @ symmetries(block_type), 4) + 0.0
     return min(tuple(float(entry) for entry in matrix.ravel()) for matrix in alike)
+
+
+def turn_deg(block_type: BlockType, one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """The least angle [degrees] by which a block is to be turned from one rotation (3, 3) to what
+    looks like the other.
+    """
+    alike = one @ symmetries(block_type)
+    cosines = (np.einsum("kij,ij->k", alike, other) - 1) / 2
+    return math.degrees(math.acos(min(1.0, max(-1.0, float(cosines.max())))))

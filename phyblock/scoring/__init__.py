@@ -9,6 +9,8 @@ from phyblock.scoring.losses import BLOCK_OUTCOMES, BlockOutcome, block_outcomes
 from phyblock.scoring.match import Match, match_plan, most_placed, step_errors
 from phyblock.scoring.metrics import Counts, micro
 from phyblock.scoring.nearest import steps_kept
+from phyblock.scoring.pose import POSE_FRAMES, Laid, PoseFit, PoseFrame, PoseScore, PoseScorer
+from phyblock.scoring.pose_match import TOLERANCES_CM, TURN_TOLERANCE_DEG
 from phyblock.scoring.steps import (
     MOVE_OUTCOMES,
     Assembly,
@@ -23,16 +25,24 @@ __all__ = [
     "BLOCK_OUTCOMES",
     "ERROR_TYPES",
     "MOVE_OUTCOMES",
+    "POSE_FRAMES",
+    "TOLERANCES_CM",
+    "TURN_TOLERANCE_DEG",
     "Assembly",
     "AssemblyScorer",
     "BlockOutcome",
     "Counts",
     "ErrorType",
     "Goal",
+    "Laid",
     "LetterRates",
     "Match",
     "Move",
     "MoveOutcome",
+    "PoseFit",
+    "PoseFrame",
+    "PoseScore",
+    "PoseScorer",
     "Score",
     "attempted_counts",
     "block_outcomes",

@@ -1,0 +1,280 @@
+"""Laws of setting C: whom steps stand for, the two frames, and what cannot matter."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phyblock.domain import (
+    BLOCK_TYPES,
+    AOVGraph,
+    Block,
+    Candidate,
+    CandidateSet,
+    Plan,
+    Scene,
+    euler_deg_to_matrix,
+    symmetries,
+    turn_deg,
+)
+from phyblock.domain.blocks import SHAPES, BlockType
+from phyblock.scoring import Goal, Laid, PoseScore, PoseScorer, most_placed
+from phyblock.scoring.pose_match import Nearness, matched
+from phyblock.scoring.solids import Piece, overlap_volume, placed, volume
+from phyblock.sim.geometry import collision_pieces
+from phyblock.sim.pose import quat_xyzw_to_euler_deg
+from phyblock.words import Setting
+
+KINDS: tuple[BlockType, ...] = ("cube", "cuboid2", "triangle", "arch")
+
+
+def pieces(block_type: BlockType) -> tuple[Piece, ...]:
+    return tuple(Piece(p.vertices_m, p.face_normals) for p in collision_pieces(block_type))
+
+
+@st.composite
+def scenes(draw: st.DrawFn) -> tuple[Scene, CandidateSet]:
+    """Blocks anywhere, in any valid order: geometry does not ask whether they would stand."""
+    n = draw(st.integers(2, 6))
+    grid = st.integers(-6, 6).map(lambda k: k * 0.025)
+    blocks = []
+    for order in range(1, n + 1):
+        kind, turn = (
+            draw(st.sampled_from(KINDS[: draw(st.integers(1, 4))])),
+            draw(st.integers(0, 3)),
+        )
+        place = (draw(grid), draw(grid), draw(st.integers(0, 5)) * 0.025)
+        below = draw(st.sets(st.integers(1, n), max_size=2))
+        depend = tuple(sorted(o for o in below if o < order))
+        blocks.append(Block(order, kind, "red", place, (0.0, 0.0, 90.0 * turn), depend, 1))
+    looks = {block.look: block for block in blocks}
+    candidates = [Candidate(b.type, b.color, b.euler_deg) for b in looks.values()]
+    candidates.append(Candidate("cylinder", "red", (0.0, 0.0, 0.0)))
+    return Scene("s", (2,), tuple(blocks), ("s",)), CandidateSet(tuple(candidates))
+
+
+def laid(scene: Scene, candidates: CandidateSet, order: list[int]) -> list[Laid]:
+    found = []
+    for vertex in order:
+        block = scene.blocks[vertex]
+        number = candidates.index_of(block.look)
+        assert number is not None
+        found.append(Laid(number, block.position_m, block.euler_deg))
+    return found
+
+
+def noisy(steps: list[Laid], rng: np.random.Generator, sigma_m: float) -> list[Laid]:
+    def off(step: Laid) -> tuple[float, float, float]:
+        x, y, z = np.array(step.position_m) + rng.normal(0, sigma_m, 3)
+        return (float(x), float(y), float(z))
+
+    return [replace(step, position_m=off(step)) for step in steps]
+
+
+def turned(step: Laid, angle_deg: float, shift_m: tuple[float, float], *, along: bool) -> Laid:
+    matrix = euler_deg_to_matrix((0.0, 0.0, angle_deg))
+    x, y, z = matrix @ np.array(step.position_m)
+    euler = (0.0, 0.0, step.euler_deg[2] + angle_deg) if along else step.euler_deg
+    return Laid(step.candidate, (x + shift_m[0], y + shift_m[1], z), euler)
+
+
+def summary(score: PoseScore) -> tuple[object, ...]:
+    fits = [fit for fit in score.fits if fit is not None]
+    far = sorted(round(fit.position_cm, 2) for fit in fits)
+    shared = sorted(round(fit.iou, 2) for fit in fits if fit.iou is not None)
+    return score.right, len(fits), far, shared
+
+
+@settings(max_examples=20, deadline=None)
+@given(scenes(), st.integers(0, 99), st.sampled_from(["A", "B"]))
+def test_a_valid_order_at_true_poses_is_wholly_right(
+    drawn: tuple[Scene, CandidateSet], seed: int, setting: Setting
+) -> None:
+    scene, candidates = drawn
+    order = scene.graph.random_order(np.random.default_rng(seed))
+    for score in PoseScorer(scene, candidates, setting, pieces).score(
+        laid(scene, candidates, list(order))
+    ):
+        assert score.right == (len(scene),) * 4
+        assert all(fit is not None and fit.iou in (1, None) for fit in score.fits)
+
+
+@settings(max_examples=20, deadline=None)
+@given(scenes(), st.integers(0, 99), st.sampled_from([0.002, 0.01, 0.04]), st.data())
+def test_no_more_steps_are_right_than_without_poses_and_wider_tolerances_lose_none(
+    drawn: tuple[Scene, CandidateSet], seed: int, sigma_m: float, data: st.DataObject
+) -> None:
+    scene, candidates = drawn
+    vertices = data.draw(st.lists(st.integers(0, len(scene) - 1), max_size=7))
+    steps = noisy(laid(scene, candidates, vertices), np.random.default_rng(seed), sigma_m)
+    goal = Goal(scene, candidates, "A")
+    most = most_placed(goal, Plan(tuple(step.candidate for step in steps)))
+    for score in PoseScorer(scene, candidates, "A", pieces).score(steps):
+        assert sum(fit is not None for fit in score.fits) == most
+        assert list(score.right) == sorted(score.right)
+        assert score.right[-1] <= most
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    scenes(),
+    st.integers(0, 999),
+    st.sampled_from([0.0, 0.003, 0.012]),
+    st.floats(-180, 180),
+    st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8)),
+    st.sampled_from(["A", "B"]),
+)
+def test_aligned_does_not_change_when_the_whole_plan_is_shifted_and_turned(
+    drawn: tuple[Scene, CandidateSet],
+    seed: int,
+    sigma_m: float,
+    angle_deg: float,
+    shift_m: tuple[float, float],
+    setting: Setting,
+) -> None:
+    """Under A candidates keep how they were shown, so that places alone are turned."""
+    scene, candidates = drawn
+    rng = np.random.default_rng(seed)
+    steps = noisy(laid(scene, candidates, list(scene.graph.random_order(rng))), rng, sigma_m)
+    scorer = PoseScorer(scene, candidates, setting, pieces)
+    moved = [turned(step, angle_deg, shift_m, along=setting == "B") for step in steps]
+    one, other = scorer.score(steps)[1], scorer.score(moved)[1]
+    assert one.right == other.right
+    if sigma_m == 0:
+        assert other.right == (len(scene),) * 4
+        assert max(fit.position_cm for fit in other.fits if fit is not None) < 1e-3
+
+
+@settings(max_examples=20, deadline=None)
+@given(scenes(), st.integers(0, 99), st.data())
+def test_symmetries_and_the_order_of_equal_blocks_in_the_file_change_nothing(
+    drawn: tuple[Scene, CandidateSet], seed: int, data: st.DataObject
+) -> None:
+    scene, candidates = drawn
+    rng = np.random.default_rng(seed)
+    steps = noisy(laid(scene, candidates, list(scene.graph.random_order(rng))), rng, 0.012)
+    other = []
+    for step in steps:
+        alike = symmetries(candidates[step.candidate].type)
+        turn = euler_deg_to_matrix(step.euler_deg) @ alike[int(rng.integers(len(alike)))]
+        other.append(replace(step, euler_deg=_euler(turn)))
+    blocks = data.draw(st.permutations(scene.blocks))
+    shuffled = replace(scene, blocks=tuple(blocks))
+    one = PoseScorer(scene, candidates, "B", pieces).score(steps)
+    two = PoseScorer(shuffled, candidates, "B", pieces).score(other)
+    assert [summary(score) for score in one] == [summary(score) for score in two]
+
+
+def _euler(matrix: np.ndarray) -> tuple[float, float, float]:
+    w = math.sqrt(max(0.0, 1 + np.trace(matrix))) / 2
+    if w > 1e-3:
+        x, y, z = (
+            (matrix[2, 1] - matrix[1, 2]) / (4 * w),
+            (matrix[0, 2] - matrix[2, 0]) / (4 * w),
+            (matrix[1, 0] - matrix[0, 1]) / (4 * w),
+        )
+    else:
+        axis = int(np.argmax(np.diag(matrix)))
+        column = (matrix + np.eye(3))[:, axis]
+        x, y, z = column / np.linalg.norm(column)
+        w = 0.0
+    return quat_xyzw_to_euler_deg(np.array([x, y, z, w]))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(1, 5), st.integers(1, 6), st.integers(0, 9999))
+def test_steps_are_matched_at_the_least_cost_of_all_valid_ways(
+    n_blocks: int, n_steps: int, seed: int
+) -> None:
+    """Against every way there is."""
+    rng = np.random.default_rng(seed)
+    depend = [tuple(int(o) for o in range(1, v + 1) if rng.random() < 0.3) for v in range(n_blocks)]
+    colors = [("red", "blue")[int(rng.integers(2))] for _ in range(n_blocks)]
+    blocks = tuple(
+        Block(v + 1, "cube", colors[v], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), depend[v], 1)  # type: ignore[arg-type]
+        for v in range(n_blocks)
+    )
+    scene = Scene("s", (2,), blocks, ("s",))
+    candidates = CandidateSet(
+        (Candidate("cube", "red", (0.0, 0.0, 0.0)), Candidate("cube", "blue", (0.0, 0.0, 0.0)))
+    )
+    numbers = [int(n) for n in rng.integers(1, 3, n_steps)]
+    goal = Goal(scene, candidates, "A")
+    equal = np.array([[v in goal.equal_to[n] for v in range(n_blocks)] for n in numbers])
+    distance = np.round(rng.uniform(0, 8, equal.shape), 1)
+    near = Nearness(distance, np.zeros(equal.shape), equal)
+    found = matched(goal, numbers, near)
+
+    def cost(way: tuple[int | None, ...]) -> tuple[int, float]:
+        pairs = [(s, v) for s, v in enumerate(way) if v is not None]
+        return -len(pairs), round(sum(float(near.cost[pair]) for pair in pairs), 9)
+
+    ways = itertools.product(*([None, *np.flatnonzero(row).tolist()] for row in equal))
+    assert cost(found) == min(cost(way) for way in ways if valid(scene.graph, way))
+    assert valid(scene.graph, found)
+
+
+def valid(graph: AOVGraph, way: tuple[int | None, ...]) -> bool:
+    done: set[int] = set()
+    for vertex in way:
+        if vertex is not None:
+            if vertex in done or not graph.depends_on[vertex] <= done:
+                return False
+            done.add(vertex)
+    return True
+
+
+@pytest.mark.parametrize("block_type", BLOCK_TYPES)
+def test_pieces_fill_their_block_and_its_symmetries_map_it_onto_itself(
+    block_type: BlockType,
+) -> None:
+    solid = pieces(block_type)
+    assert volume(solid) == pytest.approx(SHAPES[block_type].volume_m3)
+    for rotation in symmetries(block_type)[:6]:
+        shared = overlap_volume(solid, placed(solid, rotation, np.zeros(3)))
+        assert shared == pytest.approx(volume(solid))
+        assert turn_deg(block_type, rotation, np.eye(3)) == pytest.approx(0, abs=1e-4)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.sampled_from(BLOCK_TYPES), st.sampled_from(BLOCK_TYPES), st.integers(0, 999))
+def test_shared_volumes_agree_with_points_drawn_at_random(
+    one: BlockType, other: BlockType, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    turn = euler_deg_to_matrix(tuple(rng.uniform(-180, 180, 3)))
+    first, second = pieces(one), placed(pieces(other), turn, rng.uniform(-0.03, 0.03, 3))
+    shape = SHAPES[one]
+    low, high = np.array(shape.low_m), np.array(shape.high_m)
+    points = rng.uniform(low, high, (20_000, 3))
+    both = _inside(points, first) & _inside(points, second)
+    drawn = both.mean() * float(np.prod(high - low))
+    found = overlap_volume(first, second)
+    assert found == pytest.approx(drawn, abs=0.02 * float(np.prod(high - low)))
+    assert found == pytest.approx(overlap_volume(second, first), abs=1e-12)
+
+
+def _inside(points: np.ndarray, solid: tuple[Piece, ...]) -> np.ndarray:
+    found = np.zeros(len(points), dtype=bool)
+    for piece in solid:
+        heights, spans = points @ piece.normals.T, piece.corners @ piece.normals.T
+        found |= ((heights >= spans.min(axis=0)) & (heights <= spans.max(axis=0))).all(axis=1)
+    return found
+
+
+def test_two_cubes_half_a_cube_apart_share_a_third() -> None:
+    block = Block(1, "cube", "red", (0.0, 0.0, 0.025), (0.0, 0.0, 0.0), (), 1)
+    candidates = CandidateSet((Candidate("cube", "red", (0.0, 0.0, 0.0)),))
+    scene = Scene("s", (2,), (block,), ("s",))
+    scorer = PoseScorer(scene, candidates, "A", pieces)
+    absolute, aligned = scorer.score([Laid(1, (0.025, 0.0, 0.025), (0.0, 0.0, 0.0))])
+    assert absolute.fits[0] is not None
+    assert absolute.fits[0].iou == pytest.approx(1 / 3, abs=1e-4)
+    assert (absolute.right, aligned.right) == ((0, 0, 0, 1), (1, 1, 1, 1))
+    assert aligned.motion.shift_cm == pytest.approx((-2.5, 0.0))
