@@ -18,19 +18,33 @@ from phyblock.parsing.move import (
     parse_move,
 )
 from phyblock.parsing.plan import PLAN_PROBLEMS, ParsedPlan, PlanProblem, parse_plan
+from phyblock.parsing.pose_plan import (
+    MOST_POSE_STEPS,
+    POSE_PROBLEMS,
+    POSE_READER_VERSION,
+    ParsedPoses,
+    PoseProblem,
+    parse_poses,
+    pose_form,
+)
 from phyblock.parsing.version import READER_VERSION, reader_version
 
 __all__ = [
+    "MOST_POSE_STEPS",
     "MOVE_PROBLEMS",
     "MOVE_RULES",
     "PLAN_PROBLEMS",
+    "POSE_PROBLEMS",
+    "POSE_READER_VERSION",
     "READER_VERSION",
     "AnswerForm",
     "MoveProblem",
     "ParsedAnswer",
     "ParsedMove",
     "ParsedPlan",
+    "ParsedPoses",
     "PlanProblem",
+    "PoseProblem",
     "choice_form",
     "move_form",
     "parse_answer",
@@ -39,6 +53,8 @@ __all__ = [
     "parse_asked_plan",
     "parse_move",
     "parse_plan",
+    "parse_poses",
     "plan_form",
+    "pose_form",
     "reader_version",
 ]

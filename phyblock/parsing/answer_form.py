@@ -184,7 +184,13 @@ def _is_number(value: Any) -> bool:
 
 
 def _follows(value: Any, schema: Mapping[str, Any]) -> bool:
-    """Whether a value follows the schema of a list or of single choices."""
+    """Whether a value follows a schema of lists, objects, single choices and numbers."""
     if schema["type"] == "array":
         return isinstance(value, list) and all(_follows(item, schema["items"]) for item in value)
-    return any(type(value) is type(choice) and value == choice for choice in schema["enum"])
+    if schema["type"] == "object":
+        found = dict(value) if isinstance(value, Fields) else {}
+        parts = schema["properties"]
+        return set(found) == set(parts) and all(_follows(found[key], parts[key]) for key in parts)
+    if "enum" in schema:
+        return any(type(value) is type(choice) and value == choice for choice in schema["enum"])
+    return type(value) in (int, float)
