@@ -10,6 +10,7 @@ from phyblock.scoring.match import Match, match_plan, most_placed, step_errors
 from phyblock.scoring.metrics import Counts, micro
 from phyblock.scoring.nearest import steps_kept
 from phyblock.scoring.pose import POSE_FRAMES, Laid, PoseFit, PoseFrame, PoseScore, PoseScorer
+from phyblock.scoring.pose_end import blocks_reached
 from phyblock.scoring.pose_match import TOLERANCES_CM, TURN_TOLERANCE_DEG
 from phyblock.scoring.steps import (
     MOVE_OUTCOMES,
@@ -46,6 +47,7 @@ __all__ = [
     "Score",
     "attempted_counts",
     "block_outcomes",
+    "blocks_reached",
     "chance",
     "count_errors",
     "gated",

@@ -1,0 +1,187 @@
+"""A plan with poses carried out: block after block is put at its pose, let go, and watched.
+
+The hand that puts a block gives way a little: one that would share space with others, or with the
+floor, by no more than a tolerance is moved out the shortest way; by more, it is refused and stays
+out. Nothing is set right later: what fell or was knocked over stays so for the steps that follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.domain.scene import Block
+from phyblock.sim.convex import separating_axes
+from phyblock.sim.engine import PhysicsEngine
+from phyblock.sim.pose import Pose
+from phyblock.sim.steps import wait
+from phyblock.sim.support import bounds_m, boxes_near, drop_height_m, pieces_of
+from phyblock.sim.world import World
+
+__all__ = ["STEP_ENDS", "Carried", "CarriedStep", "CarryLimits", "StepEnd", "carry_out"]
+
+StepEnd = Literal["stands", "falls", "knocks_over", "overlaps", "under_floor", "no_block"]
+STEP_ENDS: tuple[StepEnd, ...] = get_args(StepEnd)
+"""`stands`: the block is where it was put, and so are the others. `falls`: it is not.
+`knocks_over`: others are not where they were. `overlaps`, `under_floor`: it was refused.
+`no_block`: there is no candidate of its number.
+"""
+
+_SETTLE_S, _COLLAPSE_S = 2.0, 3.0
+_CLEAR_M = 0.0002
+"""Overlaps up to this are left to the engine [m]."""
+_TRIES = 16
+_CM = 100.0
+_DIGITS = 3
+
+
+@dataclass(frozen=True)
+class CarryLimits:
+    """What is tolerated: how far a block may be moved out of others [cm], and how far one may move
+    when it is let go, or another is, and still count as standing [cm, degrees].
+    """
+
+    overlap_cm: float = 0.5
+    stand_cm: float = 1.0
+    stand_deg: float = 10.0
+
+
+@dataclass(frozen=True)
+class CarriedStep:
+    """What became of a step.
+
+    `moved_cm` and `turned_deg` say how far the block came to lie from the pose it was to have,
+    `gap_cm` how far it was above whatever it would fall on when it was let go, `overlap_cm` how far
+    it had to be moved out of others or the floor, or how deep it was refused; `knocked` are the
+    numbers of the steps whose blocks it moved, from 1.
+    """
+
+    end: StepEnd
+    moved_cm: float = 0.0
+    turned_deg: float = 0.0
+    gap_cm: float = 0.0
+    overlap_cm: float = 0.0
+    knocked: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Carried:
+    """What became of a plan: its steps, and after each of them the blocks where they lie, each with
+    the number of its step as its order.
+    """
+
+    steps: tuple[CarriedStep, ...]
+    worlds: tuple[tuple[Block, ...], ...]
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """The blocks in the end."""
+        return self.worlds[-1] if self.worlds else ()
+
+
+def carry_out(
+    blocks: Sequence[Block | None],
+    limits: CarryLimits | None = None,
+    engine: PhysicsEngine | None = None,
+) -> Carried:
+    """Put blocks at their poses, one after another; None stands for a step that names no block.
+
+    Their orders are taken anew, from 1 by step. The same call gives the same result, whatever was
+    carried out before; `engine` is the chosen one unless another is given. Raises SimulationError
+    where the engine cannot be used.
+    """
+    steps: list[CarriedStep] = []
+    worlds: list[tuple[Block, ...]] = []
+    with World(engine=engine) as world:
+        lying: dict[int, Block] = {}
+        for number, block in enumerate(blocks, 1):
+            if block is None:
+                steps.append(CarriedStep("no_block"))
+            else:
+                numbered = replace(block, order=number)
+                steps.append(_put(world, numbered, lying, limits or CarryLimits()))
+            worlds.append(tuple(lying.values()))
+    return Carried(tuple(steps), tuple(worlds))
+
+
+def _put(world: World, block: Block, lying: dict[int, Block], limits: CarryLimits) -> CarriedStep:
+    """Put one block into the world; `lying` is where all of them are, before and after."""
+    depth_m = -float(bounds_m(block)[0, 2])
+    if depth_m * _CM > limits.overlap_cm:
+        return CarriedStep("under_floor", overlap_cm=round(depth_m * _CM, _DIGITS))
+    free, given_m = _out_of_others(block, tuple(lying.values()), limits.overlap_cm / _CM)
+    if free is None:
+        return CarriedStep("overlaps", overlap_cm=round(given_m * _CM, _DIGITS))
+    gap_m = drop_height_m(free, tuple(lying.values()))
+    before = world.poses()
+    world.place(free)
+    if not wait(world, _SETTLE_S):
+        wait(world, _COLLAPSE_S)
+    after = world.poses()
+    moved_cm, turned_deg = _moved(Pose.goal(block), after[block.order])
+    knocked = tuple(
+        order
+        for order, pose in before.items()
+        if not _is_still(*_moved(pose, after[order]), limits)
+    )
+    lying[block.order] = free
+    for order, pose in after.items():
+        lying[order] = pose.put(lying[order])
+    is_still = _is_still(moved_cm, turned_deg, limits)
+    end: StepEnd = "knocks_over" if knocked else "stands" if is_still else "falls"
+    numbers = (moved_cm, turned_deg, gap_m * _CM, given_m * _CM)
+    moved, turned, gap, given = (round(number, _DIGITS) + 0.0 for number in numbers)
+    return CarriedStep(end, moved, turned, gap, given, knocked)
+
+
+def _moved(start: Pose, end: Pose) -> tuple[float, float]:
+    return start.distance_m(end) * _CM, start.angle_deg(end)
+
+
+def _is_still(moved_cm: float, turned_deg: float, limits: CarryLimits) -> bool:
+    return moved_cm <= limits.stand_cm and turned_deg <= limits.stand_deg
+
+
+def _out_of_others(
+    block: Block, others: Sequence[Block], most_m: float
+) -> tuple[Block | None, float]:
+    """The block moved out of others and of the floor, and how far; None where that is farther than
+    `most_m` [m].
+    """
+    start = np.array(block.position_m)
+    for _ in range(_TRIES):
+        way = _way_out(block, others)
+        depth_m = float(np.linalg.norm(way))
+        moved_m = float(np.linalg.norm(np.array(block.position_m) + way - start))
+        if moved_m > most_m or depth_m > most_m:
+            return None, max(moved_m, depth_m)
+        if depth_m <= _CLEAR_M:
+            break
+        x, y, z = (float(part) for part in np.array(block.position_m) + way)
+        block = replace(block, position_m=(x, y, z))
+    return block, float(np.linalg.norm(np.array(block.position_m) - start))
+
+
+def _way_out(block: Block, others: Sequence[Block]) -> NDArray[np.float64]:
+    """The shortest way out of the deepest overlap, shape (3,) [m]; zero where there is none."""
+    deepest = np.array([0.0, 0.0, max(0.0, -float(bounds_m(block)[0, 2]))])
+    for way in _overlaps(block, others):
+        if np.linalg.norm(way) > np.linalg.norm(deepest):
+            deepest = way
+    return deepest
+
+
+def _overlaps(block: Block, others: Sequence[Block]) -> Iterator[NDArray[np.float64]]:
+    box, mine = bounds_m(block), pieces_of(block)
+    for other in others:
+        if boxes_near(bounds_m(other), box, 0.0):
+            for theirs in pieces_of(other):
+                for piece in mine:
+                    axes = separating_axes(theirs, piece)
+                    best = int(axes.gaps_m.argmax())
+                    if axes.gaps_m[best] < 0:
+                        yield -axes.gaps_m[best] * axes.directions[best]

@@ -1,0 +1,96 @@
+"""Plans carried out: how steps end, in every engine that is installed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from phyblock.domain import Block
+from phyblock.scoring.pose_end import blocks_reached
+from phyblock.sim.carry import CarryLimits, carry_out
+from phyblock.sim.engine import PhysicsEngine
+from phyblock.sim.registry import installed_engines, physics_engine
+from phyblock.sim.voxels import VOXEL_M, voxel_iou, voxels
+from tests.sim.structures import block, counterweighted_beam, tower
+
+
+@pytest.fixture(params=installed_engines(), scope="module")
+def engine(request: pytest.FixtureRequest) -> PhysicsEngine:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PHYBLOCK_PHYSICS", request.param)
+        return physics_engine()
+
+
+def at(one: Block, x_m: float, y_m: float, z_m: float) -> Block:
+    return replace(one, position_m=(x_m, y_m, z_m))
+
+
+def ends(blocks: list[Block | None], engine: PhysicsEngine, **limits: float) -> list[str]:
+    return [step.end for step in carry_out(blocks, CarryLimits(**limits), engine).steps]
+
+
+def test_a_tower_stands_in_its_order_and_falls_in_the_opposite_one(engine: PhysicsEngine) -> None:
+    done = carry_out(tower(3), engine=engine)
+    assert [step.end for step in done.steps] == ["stands"] * 3
+    assert [len(world) for world in done.worlds] == [1, 2, 3]
+    assert voxel_iou(tower(3), done.blocks) == 1
+    assert blocks_reached(tower(3), done.blocks, 1, 10) == 3
+    assert ends(tower(3)[::-1], engine)[0] == "falls"
+
+
+def test_what_floats_falls_as_far_as_the_gap_below_it(engine: PhysicsEngine) -> None:
+    (step,) = carry_out([at(tower(1)[0], 0, 0, 0.065)], engine=engine).steps
+    assert (step.end, step.gap_cm, step.overlap_cm) == ("falls", pytest.approx(4), 0)
+    assert step.moved_cm == pytest.approx(4, abs=0.1)
+
+
+def test_overlaps_beyond_the_tolerance_are_refused_and_smaller_ones_give_way(
+    engine: PhysicsEngine,
+) -> None:
+    first = tower(1)[0]
+    deep, slight = at(first, 0.03, 0, 0.025), at(first, 0.046, 0, 0.025)
+    assert ends([first, deep, slight], engine) == ["stands", "overlaps", "stands"]
+    assert ends([first, slight], engine, overlap_cm=0.3) == ["stands", "overlaps"]
+    done = carry_out([first, deep, slight], engine=engine)
+    assert [len(world) for world in done.worlds] == [1, 1, 2]
+    assert done.steps[1].overlap_cm == pytest.approx(2, abs=0.01)
+    assert done.steps[2].overlap_cm == pytest.approx(0.4, abs=0.05)
+    assert done.blocks[1].position_m[0] == pytest.approx(0.05, abs=0.001)
+
+
+def test_what_is_under_the_floor_or_no_block_is_not_put(engine: PhysicsEngine) -> None:
+    first = tower(1)[0]
+    blocks = [at(first, 0, 0, 0.01), at(first, 0, 0, -0.5), None, at(first, 0, 0, 0.0215)]
+    done = carry_out(blocks, engine=engine)
+    found = [step.end for step in done.steps]
+    assert found == ["under_floor", "under_floor", "no_block", "stands"]
+    assert done.blocks[0].order == 4
+
+
+def test_who_is_knocked_over_is_named_and_stays_so(engine: PhysicsEngine) -> None:
+    beam = counterweighted_beam()
+    done = carry_out([*beam[:3], None, beam[0]], engine=engine)
+    assert [step.end for step in done.steps[:2]] == ["stands", "stands"]
+    assert done.steps[2].end == "knocks_over"
+    assert done.steps[2].knocked == (2,)
+    lying = {one.order: one for one in done.worlds[3]}
+    assert lying == {one.order: one for one in done.worlds[2]}
+    assert blocks_reached(beam, done.blocks, 1, 10) < len(beam)
+
+
+def test_the_same_plan_ends_the_same_to_the_last_digit_whatever_came_before(
+    engine: PhysicsEngine,
+) -> None:
+    beam: list[Block | None] = [*counterweighted_beam()[:3]]
+    first = carry_out(beam, engine=engine)
+    carry_out(tower(2), engine=engine)
+    assert carry_out(beam, engine=engine) == first
+
+
+def test_voxels_are_those_whose_middle_is_in_a_block() -> None:
+    cube = block(1, "cube", (0.0, 0.0, 0.025))
+    assert len(voxels([cube])) == round((0.05 / VOXEL_M) ** 3)
+    assert voxel_iou([cube], [at(cube, 0.025, 0, 0.025)]) == pytest.approx(1 / 3)
+    assert voxel_iou([], []) == 1
+    assert voxel_iou([cube], []) == 0
