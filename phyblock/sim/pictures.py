@@ -44,12 +44,15 @@ __all__ = [
     "common_distance_m",
     "composite_png",
     "drawn",
+    "empty_cell",
     "goal_camera",
     "goal_key",
     "goal_png",
     "goal_style",
     "on_the_floor",
+    "picture_key",
     "pixel_versions",
+    "thumbnail",
 ]
 
 RENDER_VERSION = 2
@@ -120,8 +123,8 @@ def candidates_png(candidates: CandidateSet, style: PictureStyle) -> bytes:
     cell_px = math.ceil(style.size_px / GRID_COLUMNS)
     blocks = [on_the_floor(c.type, c.color, c.euler_deg) for c in candidates.candidates]
     distance_m = common_distance_m(blocks, style) if style.candidate_scale == "common" else None
-    cells = [_thumbnail(block, style, cell_px, distance_m, renderer()) for block in blocks]
-    empty = _empty_cell(style, cell_px)
+    cells = [thumbnail(block, style, cell_px, distance_m, renderer()) for block in blocks]
+    empty = empty_cell(style, cell_px)
     return to_png(numbered_grid(cells, empty, style.background, style.size_px))
 
 
@@ -133,13 +136,13 @@ def composite_png(goal: bytes, candidates: bytes) -> bytes:
 
 def goal_key(scene: Scene, style: PictureStyle) -> str:
     """SHA-256 [hex] of all that the goal picture depends on; the scene's id is not part of it."""
-    return _key("goal", style, [astuple(block) for block in drawn(scene)])
+    return picture_key("goal", style, [astuple(block) for block in drawn(scene)])
 
 
 def candidates_key(candidates: CandidateSet, style: PictureStyle) -> str:
     """SHA-256 [hex] of all that the candidate grid depends on."""
     content = [astuple(candidate) for candidate in candidates.candidates]
-    return _key("candidates", style, [style.candidate_scale, *content])
+    return picture_key("candidates", style, [style.candidate_scale, *content])
 
 
 def goal_camera(scene: Scene, style: PictureStyle) -> Camera:
@@ -223,18 +226,20 @@ def on_the_floor(block_type: BlockType, color: Color, euler_deg: Euler) -> Drawn
 
 
 @functools.lru_cache(maxsize=512)
-def _thumbnail(
+def thumbnail(
     block: DrawnBlock,
     style: PictureStyle,
     cell_px: int,
     distance_m: float | None,
     drawn_by: Renderer,
 ) -> Image.Image:
+    """One cell of the grid of candidates, before its number; shared: do not draw on it."""
     camera = candidate_camera(block, style, distance_m)
     return picture([block], camera, style.background, cell_px, drawn_by=drawn_by)
 
 
-def _empty_cell(style: PictureStyle, cell_px: int) -> Image.Image:
+def empty_cell(style: PictureStyle, cell_px: int) -> Image.Image:
+    """A cell of the grid in which there is no candidate."""
     block = on_the_floor("cube", "red", (0.0, 0.0, 0.0))
     return picture([], candidate_camera(block, style), style.background, cell_px)
 
@@ -250,7 +255,8 @@ def pixel_versions() -> dict[str, str]:
     return {"renderer": drawn_by.name, **drawn_by.versions, "pillow": library_pixels()}
 
 
-def _key(kind: str, style: PictureStyle, content: Iterable[object]) -> str:
+def picture_key(kind: str, style: PictureStyle, content: Iterable[object]) -> str:
+    """SHA-256 [hex] of what decides a picture: what it shows, its style, and who draws it."""
     parts = {
         "kind": kind,
         "render_version": RENDER_VERSION,
