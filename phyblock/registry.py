@@ -36,6 +36,7 @@ _PACKAGES = (
     "phyblock.tracks.full_planning",
     "phyblock.tracks.step_planning",
     "phyblock.tracks.vqa",
+    "phyblock.tracks.pose_planning",
 )
 """Packages that hold a `TRACK`, in the order in which tracks are listed."""
 

@@ -14,6 +14,7 @@ __all__ = [
     "MATCHERS",
     "PLAN_PARSERS",
     "SETTINGS",
+    "STEP_ENDS",
     "AnswerFormat",
     "AskedAs",
     "Background",
@@ -33,9 +34,11 @@ __all__ = [
     "PictureName",
     "PictureSource",
     "PlanParser",
+    "PoseRotation",
     "Role",
     "SendMode",
     "Setting",
+    "StepEnd",
     "TransportName",
     "View",
 ]
@@ -71,6 +74,15 @@ Gating = Literal["aov", "layer"]
 GATINGS: tuple[Gating, ...] = get_args(Gating)
 Physics = Literal["off", "settle", "strict"]
 """What is simulated of every new state, and whether a collapse ends the episode."""
+
+PoseRotation = Literal["candidate", "free"]
+"""Whether candidates keep the orientation in which they are shown, or steps bring one."""
+StepEnd = Literal["stands", "falls", "knocks_over", "overlaps", "under_floor", "no_block"]
+"""How a step that is carried out ends. `stands`: the block is where it was put, and so are the
+others. `falls`: it is not. `knocks_over`: others are not where they were. `overlaps`,
+`under_floor`: it was refused. `no_block`: there is no candidate of its number.
+"""
+STEP_ENDS: tuple[StepEnd, ...] = get_args(StepEnd)
 
 DataFormat = Literal["builtin", "official"]
 """Layouts of data sets and question sets."""

@@ -21,7 +21,7 @@ from phyblock.run.records import judged
 from phyblock.run.reopen import reopen_tracks
 from phyblock.run.replayed import counted_again
 from phyblock.specs import SuiteSpec, suite_model
-from phyblock.tracks import AnyTrack, EpisodeTrack, kind_of, shown_item
+from phyblock.tracks import AnyTrack, EpisodeTrack, judgement_of, kind_of, shown_item
 from phyblock.tracks.counting import counts_samples
 from phyblock.variants import Variant
 from phyblock.words import Matcher, PlanParser
@@ -96,7 +96,8 @@ async def _judged_again(
         if isinstance(track, EpisodeTrack):
             records.append(await counted_again(track, item, record, where))
             continue
-        judgement = track.judge(item, None if record.reply is None else record.reply.text)
+        text = None if record.reply is None else record.reply.text
+        judgement = await judgement_of(track, item, text, record)
         records.append(judged(record.as_given(), item, judgement))
     return records
 

@@ -14,7 +14,15 @@ from phyblock.records import Record, SentPrompt, StoredReply, Turn
 from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, begun, judged
 from phyblock.run.writer import RecordWriter
-from phyblock.tracks import AnyTrack, Episode, EpisodeTrack, Item, SingleTrack, shown_item
+from phyblock.tracks import (
+    AnyTrack,
+    Episode,
+    EpisodeTrack,
+    Item,
+    SingleTrack,
+    judgement_of,
+    shown_item,
+)
 from phyblock.variants import Variant
 from phyblock.words import AskedAs
 
@@ -101,7 +109,8 @@ class SampleRunner:
         answer = await _answer(model.ask(request))
         fields = self._begin(sample, answer) | _asked(config, request)
         fields["prompt"] = self._prompt(track, request)
-        judgement = track.judge(sample.item, answer.text if isinstance(answer, Reply) else None)
+        text = answer.text if isinstance(answer, Reply) else None
+        judgement = await judgement_of(track, sample.item, text)
         return judged(fields, sample.item, judgement)
 
     async def _play(

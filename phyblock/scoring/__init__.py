@@ -11,6 +11,7 @@ from phyblock.scoring.metrics import Counts, micro
 from phyblock.scoring.nearest import steps_kept
 from phyblock.scoring.pose import POSE_FRAMES, Laid, PoseFit, PoseFrame, PoseScore, PoseScorer
 from phyblock.scoring.pose_end import blocks_reached
+from phyblock.scoring.pose_errors import ERROR_TOLERANCE_CM, POSE_ERRORS, PoseError, pose_errors
 from phyblock.scoring.pose_match import TOLERANCES_CM, TURN_TOLERANCE_DEG
 from phyblock.scoring.steps import (
     MOVE_OUTCOMES,
@@ -24,8 +25,10 @@ from phyblock.scoring.steps import (
 
 __all__ = [
     "BLOCK_OUTCOMES",
+    "ERROR_TOLERANCE_CM",
     "ERROR_TYPES",
     "MOVE_OUTCOMES",
+    "POSE_ERRORS",
     "POSE_FRAMES",
     "TOLERANCES_CM",
     "TURN_TOLERANCE_DEG",
@@ -40,6 +43,7 @@ __all__ = [
     "Match",
     "Move",
     "MoveOutcome",
+    "PoseError",
     "PoseFit",
     "PoseFrame",
     "PoseScore",
@@ -57,6 +61,7 @@ __all__ = [
     "micro",
     "most_placed",
     "placed_counts",
+    "pose_errors",
     "step_errors",
     "steps_kept",
 ]

@@ -93,7 +93,7 @@ class PoseScorer:
     ) -> None:
         self._types = {n: one.type for n, one in enumerate(candidates.candidates, 1)}
         self._blocks = scene.blocks
-        self._goal = Goal(scene, candidates, setting)
+        self.goal = Goal(scene, candidates, setting)
         self._turns = setting == "B"
         self._pieces_of = pieces_of
         self._poses = _poses([(b.type, b.position_m, b.euler_deg) for b in scene.blocks])
@@ -109,7 +109,7 @@ class PoseScorer:
         )
         equal = np.zeros((len(steps), len(self._blocks)), dtype=bool)
         for place, step in enumerate(steps):
-            equal[place, list(self._goal.equal_to[step.candidate])] = True
+            equal[place, list(self.goal.equal_to[step.candidate])] = True
         alike = tuple(symmetries(block_type) for block_type in types)
         motion = best_motion(poses, self._poses, equal, alike, turns=self._turns)
         moved = poses.moved(motion, turns=self._turns)
@@ -130,7 +130,7 @@ class PoseScorer:
         motion: Motion,
     ) -> PoseScore:
         near = nearness(poses, self._poses, equal, alike)
-        vertices = matched(self._goal, numbers, near)
+        vertices = matched(self.goal, numbers, near)
         fits = tuple(
             None
             if vertex is None

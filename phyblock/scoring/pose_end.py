@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
 
 from phyblock.domain import Block, euler_deg_to_matrix, turn_deg
 from phyblock.domain.blocks import SHAPES
+from phyblock.scoring.assignment import cheapest
 
 __all__ = ["blocks_reached"]
 
@@ -25,8 +25,7 @@ def blocks_reached(
     )
     if not near.size:
         return 0
-    rows, columns = linear_sum_assignment(~near)
-    return int(near[rows, columns].sum())
+    return sum(bool(near[pair]) for pair in cheapest((~near).astype(np.float64)))
 
 
 def _is_near(one: Block, other: Block, within_cm: float, within_deg: float) -> bool:

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
 
 from phyblock.domain import Plan
+from phyblock.scoring.assignment import cheapest
 from phyblock.scoring.goal import Goal
 from phyblock.scoring.match import most_placed
 from phyblock.scoring.ratios import Floats
@@ -69,9 +69,9 @@ class Nearness:
 def assigned(near: Nearness) -> list[int | None]:
     """The goal block of each step at the least total cost, in whatever order they are placed."""
     vertices: list[int | None] = [None] * len(near.equal)
-    for step, vertex in zip(*linear_sum_assignment(near.cost), strict=True):
+    for step, vertex in cheapest(near.cost):
         if near.equal[step, vertex]:
-            vertices[int(step)] = int(vertex)
+            vertices[step] = vertex
     return vertices
 
 

@@ -1,15 +1,15 @@
 """A plan with poses carried out: block after block is put at its pose, let go, and watched.
 
 The hand that puts a block gives way a little: one that would share space with others, or with the
-floor, by no more than a tolerance is moved out the shortest way; by more, it is refused and stays
-out. Nothing is set right later: what fell or was knocked over stays so for the steps that follow.
+floor, by no more than a tolerance is moved out the shortest way, and one that hangs no higher above
+them is lowered; where it would share more, it is refused and stays out. Nothing is set right later:
+what fell or was knocked over stays so for the steps that follow.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,18 +18,13 @@ from phyblock.domain.scene import Block
 from phyblock.sim.convex import separating_axes
 from phyblock.sim.engine import PhysicsEngine
 from phyblock.sim.pose import Pose
+from phyblock.sim.stability import DEFAULT_TRIAL, movement
 from phyblock.sim.steps import wait
 from phyblock.sim.support import bounds_m, boxes_near, drop_height_m, pieces_of
 from phyblock.sim.world import World
+from phyblock.words import StepEnd
 
-__all__ = ["STEP_ENDS", "Carried", "CarriedStep", "CarryLimits", "StepEnd", "carry_out"]
-
-StepEnd = Literal["stands", "falls", "knocks_over", "overlaps", "under_floor", "no_block"]
-STEP_ENDS: tuple[StepEnd, ...] = get_args(StepEnd)
-"""`stands`: the block is where it was put, and so are the others. `falls`: it is not.
-`knocks_over`: others are not where they were. `overlaps`, `under_floor`: it was refused.
-`no_block`: there is no candidate of its number.
-"""
+__all__ = ["Carried", "CarriedStep", "CarryLimits", "carry_out"]
 
 _SETTLE_S, _COLLAPSE_S = 2.0, 3.0
 _CLEAR_M = 0.0002
@@ -97,53 +92,75 @@ def carry_out(
     steps: list[CarriedStep] = []
     worlds: list[tuple[Block, ...]] = []
     with World(engine=engine) as world:
-        lying: dict[int, Block] = {}
+        table = _Table(world, limits or CarryLimits())
         for number, block in enumerate(blocks, 1):
-            if block is None:
-                steps.append(CarriedStep("no_block"))
-            else:
-                numbered = replace(block, order=number)
-                steps.append(_put(world, numbered, lying, limits or CarryLimits()))
-            worlds.append(tuple(lying.values()))
+            put = None if block is None else replace(block, order=number)
+            steps.append(CarriedStep("no_block") if put is None else table.put(put))
+            worlds.append(tuple(table.resting.values()))
     return Carried(tuple(steps), tuple(worlds))
 
 
-def _put(world: World, block: Block, lying: dict[int, Block], limits: CarryLimits) -> CarriedStep:
-    """Put one block into the world; `lying` is where all of them are, before and after."""
-    depth_m = -float(bounds_m(block)[0, 2])
-    if depth_m * _CM > limits.overlap_cm:
-        return CarriedStep("under_floor", overlap_cm=round(depth_m * _CM, _DIGITS))
-    free, given_m = _out_of_others(block, tuple(lying.values()), limits.overlap_cm / _CM)
-    if free is None:
-        return CarriedStep("overlaps", overlap_cm=round(given_m * _CM, _DIGITS))
-    gap_m = drop_height_m(free, tuple(lying.values()))
-    before = world.poses()
-    world.place(free)
-    if not wait(world, _SETTLE_S):
-        wait(world, _COLLAPSE_S)
-    after = world.poses()
-    moved_cm, turned_deg = _moved(Pose.goal(block), after[block.order])
-    knocked = tuple(
-        order
-        for order, pose in before.items()
-        if not _is_still(*_moved(pose, after[order]), limits)
-    )
-    lying[block.order] = free
-    for order, pose in after.items():
-        lying[order] = pose.put(lying[order])
-    is_still = _is_still(moved_cm, turned_deg, limits)
-    end: StepEnd = "knocks_over" if knocked else "stands" if is_still else "falls"
-    numbers = (moved_cm, turned_deg, gap_m * _CM, given_m * _CM)
-    moved, turned, gap, given = (round(number, _DIGITS) + 0.0 for number in numbers)
-    return CarriedStep(end, moved, turned, gap, given, knocked)
+class _Table:
+    """Where blocks are put; `resting` is where each came to rest, by the order of its step.
+
+    Where a step moves no block past the limits by which a state stands (`DEFAULT_TRIAL`), all is set
+    back, so that no step is judged by the drift of the ones before it.
+    """
+
+    def __init__(self, world: World, limits: CarryLimits) -> None:
+        self.resting: dict[int, Block] = {}
+        self._world, self._limits = world, limits
+
+    def put(self, block: Block) -> CarriedStep:
+        """Put a block where it is, if there is room for it, and let it go."""
+        depth_cm = -float(bounds_m(block)[0, 2]) * _CM
+        if depth_cm > self._limits.overlap_cm:
+            return CarriedStep("under_floor", overlap_cm=round(depth_cm, _DIGITS))
+        before = self._world.poses()
+        others = tuple(pose.put(self.resting[order]) for order, pose in before.items())
+        most_m = self._limits.overlap_cm / _CM
+        free, given_m = _out_of_others(block, others, most_m)
+        if free is None:
+            return CarriedStep("overlaps", overlap_cm=round(given_m * _CM, _DIGITS))
+        gap_m = drop_height_m(free, others)
+        if gap_m <= most_m:
+            x, y, z = free.position_m
+            free = replace(free, position_m=(x, y, z - gap_m))
+        after = self._let_go(free)
+        moved_cm, turned_deg = _moved(Pose.goal(block), after[block.order])
+        knocked = tuple(
+            order
+            for order, pose in before.items()
+            if not self._is_still(*_moved(pose, after[order]))
+        )
+        is_still = self._is_still(moved_cm, turned_deg)
+        end: StepEnd = "knocks_over" if knocked else "stands" if is_still else "falls"
+        numbers = (moved_cm, turned_deg, gap_m * _CM, given_m * _CM)
+        moved, turned, gap, given = (round(number, _DIGITS) + 0.0 for number in numbers)
+        return CarriedStep(end, moved, turned, gap, given, knocked)
+
+    def _let_go(self, block: Block) -> dict[int, Pose]:
+        """Where all blocks are once they rest with this one among them."""
+        self._world.place(block)
+        if not wait(self._world, _SETTLE_S):
+            wait(self._world, _COLLAPSE_S)
+        after = self._world.poses()
+        self.resting[block.order] = block
+        if movement(tuple(self.resting.values()), after, DEFAULT_TRIAL).fallen:
+            for order, pose in after.items():
+                self.resting[order] = pose.put(self.resting[order])
+        else:
+            for order in after:
+                self._world.remove(order)
+            self._world.place_all(self.resting.values())
+        return after
+
+    def _is_still(self, moved_cm: float, turned_deg: float) -> bool:
+        return moved_cm <= self._limits.stand_cm and turned_deg <= self._limits.stand_deg
 
 
 def _moved(start: Pose, end: Pose) -> tuple[float, float]:
     return start.distance_m(end) * _CM, start.angle_deg(end)
-
-
-def _is_still(moved_cm: float, turned_deg: float, limits: CarryLimits) -> bool:
-    return moved_cm <= limits.stand_cm and turned_deg <= limits.stand_deg
 
 
 def _out_of_others(

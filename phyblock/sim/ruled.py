@@ -126,7 +126,8 @@ def _ruled(
     ruled = ground * (1 - share) + ink * share
     image = Image.fromarray(np.rint(ruled).astype(np.uint8))
     _write(_Pen(camera, size_px, image), field, style)
-    return np.asarray(image, dtype=np.float32).copy()
+    written: NDArray[np.float32] = np.array(image, dtype=np.float32)
+    return written
 
 
 def _lines(field: _Field) -> Iterator[tuple[Point, Point, bool]]:

@@ -12,6 +12,7 @@ from phyblock.tracks.base import (
     ShowsBySeed,
     SingleTrack,
     Track,
+    judgement_of,
     shown_item,
 )
 from phyblock.tracks.kind import Opening, TrackKind, kind_of, kinds
@@ -38,6 +39,7 @@ __all__ = [
     "TemplatePrompt",
     "Track",
     "TrackKind",
+    "judgement_of",
     "kind_of",
     "kinds",
     "open_tracks",

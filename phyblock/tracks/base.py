@@ -19,9 +19,11 @@ __all__ = [
     "EpisodeTrack",
     "Item",
     "Judgement",
+    "JudgesApart",
     "ShowsBySeed",
     "SingleTrack",
     "Track",
+    "judgement_of",
     "shown_item",
 ]
 
@@ -118,6 +120,25 @@ def shown_item(track: AnyTrack, item: Any, seed: int) -> Any:
     return track.shown(item, seed) if isinstance(track, ShowsBySeed) else item
 
 
+@runtime_checkable
+class JudgesApart(Protocol):
+    """A track that takes so long to judge a reply that it does so beside the calls of others."""
+
+    async def judge_apart(self, item: Any, text: str | None, earlier: Record | None) -> Judgement:
+        """What `judge` gives; of the `earlier` record of the same sample it may take what replies
+        alone do not decide.
+        """
+
+
+async def judgement_of(
+    track: AnySingleTrack, item: Any, text: str | None, earlier: Record | None = None
+) -> Judgement:
+    """A reply read and scored, for the first time or again after an `earlier` record."""
+    if isinstance(track, JudgesApart):
+        return await track.judge_apart(item, text, earlier)
+    return track.judge(item, text)
+
+
 class Episode(Protocol):
     """One sample of several turns, as a state machine that replies alone drive.
 
@@ -157,5 +178,6 @@ class EpisodeTrack(Track[ItemT], Protocol[ItemT]):
         """
 
 
-AnyTrack = SingleTrack[Any] | EpisodeTrack[Any]
+AnySingleTrack = SingleTrack[Any]
+AnyTrack = AnySingleTrack | EpisodeTrack[Any]
 """A track of either kind."""

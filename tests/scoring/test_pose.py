@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
 
 from phyblock.domain import (
     BLOCK_TYPES,
@@ -25,6 +26,7 @@ from phyblock.domain import (
 )
 from phyblock.domain.blocks import SHAPES, BlockType
 from phyblock.scoring import Goal, Laid, PoseScore, PoseScorer, most_placed
+from phyblock.scoring.assignment import cheapest
 from phyblock.scoring.pose_match import Nearness, matched
 from phyblock.scoring.solids import Piece, overlap_volume, placed, volume
 from phyblock.sim.geometry import collision_pieces
@@ -185,6 +187,14 @@ def _euler(matrix: np.ndarray) -> tuple[float, float, float]:
         x, y, z = column / np.linalg.norm(column)
         w = 0.0
     return quat_xyzw_to_euler_deg(np.array([x, y, z, w]))
+
+
+@given(st.integers(1, 9), st.integers(1, 9), st.integers(0, 9999))
+def test_assignments_are_as_cheap_as_those_of_scipy(rows: int, columns: int, seed: int) -> None:
+    cost = np.round(np.random.default_rng(seed).uniform(0, 4, (rows, columns)), 1)
+    pairs = cheapest(cost)
+    assert len({r for r, _ in pairs}) == len({c for _, c in pairs}) == min(rows, columns)
+    assert sum(cost[p] for p in pairs) == pytest.approx(cost[linear_sum_assignment(cost)].sum())
 
 
 @settings(max_examples=60, deadline=None)

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
 from phyblock.records import Line, Record, ShownScene
+from phyblock.scoring import Score
 
-__all__ = ["PLAN_COLUMNS", "PlanParse", "PlanRecord", "plan_row"]
+__all__ = ["PLAN_COLUMNS", "PlanParse", "PlanRecord", "plan_row", "score_fields"]
 
 
 class PlanParse(Line):
@@ -60,3 +61,20 @@ class PlanRecord(Record):
     def row(self) -> Mapping[str, Any]:
         """The plan in both numberings, and by which parser it was read."""
         return plan_row(self.parse, self.shown)
+
+
+def score_fields(score: Score) -> dict[str, Any]:
+    """A score as records hold it."""
+    return {
+        "criterion": score.criterion,
+        "matcher": score.matcher,
+        "setting": score.setting,
+        "tp": score.counts.tp,
+        "fp": score.counts.fp,
+        "fn": score.counts.fn,
+        "errors": score.errors,
+        "placed": None if score.vertices is None else list(score.vertices),
+        "why": None if score.step_errors is None else list(score.step_errors),
+        "blocks": score.blocks,
+        "kept": score.kept,
+    }

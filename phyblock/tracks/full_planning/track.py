@@ -24,6 +24,7 @@ from phyblock.scoring import AssemblyScorer, Score
 from phyblock.tracks.examples import Examples, Shots, WorkedExample
 from phyblock.tracks.full_planning.baselines import PlanSubject
 from phyblock.tracks.full_planning.guessing import BlindGuesses
+from phyblock.tracks.full_planning.record import score_fields
 from phyblock.tracks.full_planning.worked import worked_plan
 from phyblock.tracks.pictures import Pictures
 from phyblock.tracks.prompts import Prompt, form_facts, response_format
@@ -87,7 +88,7 @@ class PlanJudgement:
                 "version": reader_version(self.parser),
                 "problem": self.parsed.problem,
             },
-            "scores": [_score(score) for score in self.scores],
+            "scores": [score_fields(score) for score in self.scores],
         }
 
 
@@ -229,19 +230,3 @@ class FullPlanning:
         """Stop the processes that draw pictures."""
         if self._pictures is not None:
             self._pictures.close()
-
-
-def _score(score: Score) -> dict[str, Any]:
-    return {
-        "criterion": score.criterion,
-        "matcher": score.matcher,
-        "setting": score.setting,
-        "tp": score.counts.tp,
-        "fp": score.counts.fp,
-        "fn": score.counts.fn,
-        "errors": score.errors,
-        "placed": None if score.vertices is None else list(score.vertices),
-        "why": None if score.step_errors is None else list(score.step_errors),
-        "blocks": score.blocks,
-        "kept": score.kept,
-    }

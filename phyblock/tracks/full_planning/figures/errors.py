@@ -10,9 +10,9 @@ from phyblock.tables.drawing import COLORS, MUTED, bare_axes, headed, new_figure
 from phyblock.tables.load import Run
 from phyblock.tracks.full_planning.errors import errors_frame
 from phyblock.tracks.full_planning.figures.levels import how_measured, ranked
-from phyblock.tracks.full_planning.figures.stacked import Part, stack
 from phyblock.tracks.full_planning.seeds import intervals_table
 from phyblock.tracks.full_planning.views import ERROR_NAMES
+from phyblock.tracks.stacked import Part, stack
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,10 +9,10 @@ from phyblock.tables.design import OVERALL
 from phyblock.tables.drawing import COLORS, PALE, bare_axes, headed, new_figure
 from phyblock.tables.load import Run
 from phyblock.tracks.full_planning.figures.levels import how_measured, ranked
-from phyblock.tracks.full_planning.figures.stacked import Part, stack
 from phyblock.tracks.full_planning.losses import losses_frame
 from phyblock.tracks.full_planning.measures import BLOCK_NAMES
 from phyblock.tracks.full_planning.seeds import intervals_table
+from phyblock.tracks.stacked import Part, stack
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

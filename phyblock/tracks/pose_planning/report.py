@@ -1,0 +1,69 @@
+"""What pose planning brings to the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from phyblock.tables.design import OVERALL
+from phyblock.tables.load import Run
+from phyblock.tables.showing import planning_words
+from phyblock.tables.track_report import HeadlineColumn, TableMaker, TrackReport
+from phyblock.tracks.pose_planning.figures import f1_by_tolerance, pose_error_bars
+from phyblock.tracks.pose_planning.measures import (
+    POSE_PLANNING_MEASURES,
+    in_levels,
+    level_cells,
+)
+from phyblock.tracks.pose_planning.tables import (
+    pose_errors_frame,
+    pose_errors_view,
+    table_c_frame,
+    table_c_in_terminal,
+    table_c_view,
+)
+
+__all__ = ["REPORT"]
+
+_MAIN = "Overall F1 in C"
+
+
+def _headline(run: Run) -> tuple[HeadlineColumn, ...]:
+    levels = [
+        HeadlineColumn("f1_c", cell.name, _MAIN if cell.name == OVERALL else f"Level {cell.name}")
+        for cell in level_cells(run)
+    ]
+    sides = [
+        HeadlineColumn(name, OVERALL, heading)
+        for name, heading in (("f1_a", "F1 in A"), ("stands", "Stand"), ("completed", "Completed"))
+    ]
+    return (*levels, *sides)
+
+
+def _notes(run: Run) -> Sequence[str]:
+    return (
+        "F1 in setting C in percent: steps right in kind, rotation and order, and in place, mean "
+        f"over 0.5, 1, 2 and 4 cm; F1 in A leaves out the poses, matcher {run.design.matcher}.",
+    )
+
+
+REPORT = TrackReport(
+    measures=POSE_PLANNING_MEASURES,
+    cells=level_cells,
+    in_cells=in_levels,
+    headline=_headline,
+    main=_MAIN,
+    short="f1_c",
+    notes=_notes,
+    tables={
+        "table_c": TableMaker(table_c_frame, table_c_view, in_terminal=table_c_in_terminal),
+        "pose_errors": TableMaker(pose_errors_frame, pose_errors_view),
+    },
+    bars="f1-poses",
+    figures={"f1-tolerance": f1_by_tolerance, "pose-errors": pose_error_bars},
+    figure_titles={
+        "f1-poses": "F1 with poses, by level",
+        "f1-tolerance": "F1 with poses, by tolerance",
+        "pose-errors": "Steps with poses that were wrong, by what was wrong first",
+    },
+    showing=lambda run: planning_words(run, "pose"),
+)

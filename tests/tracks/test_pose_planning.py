@@ -1,0 +1,282 @@
+"""Pose planning: what a reply is worth in three settings, and a run of it from YAML to the page."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phyblock.cli.main import phyblock
+from phyblock.datasets import AssemblyTask, read_builtin
+from phyblock.domain import Block, Candidate, CandidateSet, PoseStep
+from phyblock.models.base import Image
+from phyblock.parsing import pose_form
+from phyblock.records.known import known_records
+from phyblock.resources import bundled
+from phyblock.run.records import begun, judged
+from phyblock.run.rescore import rescore
+from phyblock.scoring import Goal, PoseFit
+from phyblock.scoring.pose_errors import POSE_ERRORS, pose_errors
+from phyblock.sim.carry import CarryLimits
+from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
+from phyblock.tracks.pose_planning import judging
+from phyblock.tracks.pose_planning.baselines import POSE_RULES, PoseSubject, written
+from phyblock.tracks.pose_planning.frame import center_cm, put
+from phyblock.tracks.pose_planning.judging import PoseRules
+from phyblock.tracks.pose_planning.spec import PoseSpec
+from phyblock.tracks.pose_planning.track import PosePlanning
+from phyblock.tracks.prompts import TemplatePrompt
+from phyblock.tracks.showing import ShownTask
+from phyblock.words import STEP_ENDS, StepEnd
+from tests.datasets.broken import write_scenes
+from tests.servers.chassis import Faults, Running, Seen
+from tests.servers.openai_chat import OpenAIChat
+from tests.sim.structures import block_types, eulers
+from tests.workspace import SCENES, Workspace
+
+RULES = PoseRules("candidate", ("A", "B"), ("optimal", "paper"), CarryLimits(), 1.0, 10.0)
+FREE = replace(RULES, rotation="free")
+STANDS = "Step1: block 1 at (0, 0, 2.5)\nStep2: block 3 at (0, 0, 7.5)"
+
+
+@pytest.fixture(scope="module")
+def task(tmp_path_factory: pytest.TempPathFactory) -> AssemblyTask:
+    """A red cube under a blue one; candidate 1 is the red cube, 3 the blue one."""
+    return read_builtin(write_scenes(tmp_path_factory.mktemp("data"), SCENES[0])).tasks[0]
+
+
+@pytest.fixture(scope="module")
+def built_in() -> list[AssemblyTask]:
+    """Three scenes with arches, triangles and cylinders that are turned."""
+    data = read_builtin(bundled("benchmarks", "data") / "phyblock-400")
+    wanted = ("l1-001-animal", "l2-020", "l3-028-arcade")
+    return [task for task in data.tasks if task.key.startswith(wanted)]
+
+
+@given(block_types, eulers, st.tuples(*[st.floats(-1, 1)] * 3))
+def test_a_block_is_put_where_its_box_is_said_to_be(
+    name: Any, euler_deg: Any, place_m: tuple[float, float, float]
+) -> None:
+    block = Block(1, name, "red", place_m, euler_deg, (), 1)
+    kept = CandidateSet((Candidate(name, "red", euler_deg),))
+    upright = CandidateSet((Candidate(name, "red", (0.0, 0.0, 0.0)),))
+    for candidates, euler in ((kept, None), (upright, euler_deg)):
+        found = put(PoseStep(1, center_cm(block), euler), candidates)
+        assert found is not None
+        assert found.position_m == pytest.approx(place_m)
+        assert found.euler_deg == euler_deg
+    assert put(PoseStep(2, (0, 0, 0)), kept) is None
+
+
+@pytest.mark.parametrize("rules", [RULES, FREE], ids=["candidate", "free"])
+def test_true_poses_in_a_random_valid_order_are_right_and_stand(
+    built_in: list[AssemblyTask], rules: PoseRules
+) -> None:
+    track = PosePlanning(rules)
+    for seed, item in enumerate(built_in):
+        shown = track.shown(item, seed)
+        subject = PoseSubject(shown.scene, shown.candidates, rules.is_free)
+        found = track.judge(shown, POSE_RULES["oracle"](subject, np.random.default_rng(seed)))
+        n = len(item.scene)
+        assert [score.right for score in found.poses] == [(n,) * 4] * 2
+        assert {step.end for step in found.ended.steps} == {"stands"}
+        assert (found.ended.reached, found.ended.completed) == (n, True)
+        assert found.ended.iou >= 0.98
+        assert not any(found.errors)
+        assert all(score.counts.tp == n for score in found.scores)
+
+
+@pytest.mark.parametrize(
+    ("text", "right", "ends", "errors", "reached"),
+    [
+        (STANDS, (2, 2, 2, 2), ["stands"] * 2, [None] * 2, 2),
+        (STANDS.replace("7.5", "7.9"), (2, 2, 2, 2), ["stands"] * 2, [None] * 2, 2),
+        (STANDS.replace("7.5", "10.5"), (1, 1, 1, 2), ["stands", "falls"], [None, "off_height"], 2),
+        (STANDS.replace("(0, 0, 7.5)", "(3.5, 0, 7.5)"), (1, 1, 1, 2), ["stands", "falls"],
+         [None, "off_sideways"], 1),
+        (STANDS.replace("7.5", "5.5"), (1, 1, 2, 2), ["stands", "overlaps"],
+         [None, "off_height"], 1),
+        (STANDS.replace("7.5", "6.8"), (1, 2, 2, 2), ["stands", "overlaps"],
+         [None, "interpenetrating"], 1),
+        (STANDS.replace("block 1", "block 99"), (0, 0, 0, 0), ["no_block", "falls"],
+         ["wrong_kind", "too_early"], 0),
+        ("Step1: block 3 at (0, 0, 7.5)", (0, 0, 0, 0), ["falls"], ["too_early"], 0),
+        ("I cannot say.", (0, 0, 0, 0), [], [], 0),
+        (None, (0, 0, 0, 0), [], [], 0),
+    ],
+)  # fmt: skip
+def test_a_reply_is_read_scored_and_carried_out(
+    task: AssemblyTask,
+    text: str | None,
+    right: tuple[int, ...],
+    ends: list[str],
+    errors: list[str | None],
+    reached: int,
+) -> None:
+    track = PosePlanning(RULES)
+    found = track.judge(task, text)
+    assert found.poses[0].right == right
+    assert [step.end for step in found.ended.steps] == ends
+    assert list(found.errors) == errors
+    assert found.ended.reached == reached
+    assert found.is_read == bool(ends)
+    # Its record is written, read again and judged again, and says the same.
+    fields = begun("s", track.name, "m", task, 0, None)
+    record = judged({**fields, **track.about(task)}, task, found)
+    assert known_records().validate_json(record.as_json()) == record
+    again = asyncio.run(track.judge_apart(task, text, record))
+    assert judged({**fields, **track.about(task)}, task, again) == record
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.lists(st.sampled_from([1, 1, 3, 3, 2, 17, 0]), max_size=4))
+def test_without_poses_a_plan_is_scored_as_full_planning_scores_it(numbers: list[int]) -> None:
+    """Far from one another, so that nothing falls on anything."""
+    task = _TASK
+    steps = [PoseStep(n, (20.0 * place, 0.0, 2.5)) for place, n in enumerate(numbers)]
+    plain = "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(numbers, 1))
+    rules = PlanningRules("steps", ("A", "B"), ("optimal", "paper"), None)
+    wanted = FullPlanning(rules).judge(task, plain if numbers else None).fields()["scores"]
+    assert PosePlanning(RULES).judge(task, written(steps)).fields()["scores"] == wanted
+
+
+@pytest.fixture(autouse=True)
+def _known_task(task: AssemblyTask) -> None:
+    global _TASK
+    _TASK = task
+
+
+_TASK: AssemblyTask
+
+
+def test_with_free_rotation_each_kind_is_shown_once_upright(built_in: list[AssemblyTask]) -> None:
+    track = PosePlanning(FREE)
+    for item in built_in:
+        shown = track.shown(item, 0)
+        assert isinstance(shown, ShownTask)
+        kinds = [one.kind for one in shown.candidates.candidates]
+        assert len(set(kinds)) == len(kinds)
+        assert {one.kind for one in item.candidates.candidates} == set(kinds)
+        assert {one.euler_deg for one in shown.candidates.candidates} == {(0.0, 0.0, 0.0)}
+        assert [item.candidates[number].kind for number in shown.order] == kinds
+
+
+def fit(position_cm: float, up_cm: float, turn_deg: float = 0.0) -> PoseFit:
+    return PoseFit(0, position_cm, (position_cm**2 - up_cm**2) ** 0.5, up_cm, turn_deg, 1.0)
+
+
+@pytest.mark.parametrize("end", STEP_ENDS)
+@pytest.mark.parametrize(
+    ("one", "error"),
+    [
+        (fit(0, 0), None),
+        (fit(0.99, 0), None),
+        (fit(3, 1), "off_sideways"),
+        (fit(3, -2.9), "off_height"),
+        (fit(3, 1, 16), "wrong_rotation"),
+    ],
+)
+def test_a_step_has_one_error_the_first_in_time(
+    one: PoseFit, error: str | None, end: StepEnd
+) -> None:
+    """What was said wrongly comes before what follows when it is carried out."""
+    goal = Goal(_TASK.scene, _TASK.candidates, "A")
+    physical = {"stands": None, "falls": "floating", "knocks_over": "toppling"}
+    physical |= {"overlaps": "interpenetrating", "under_floor": "interpenetrating"}
+    wanted = error or {**physical, "no_block": "wrong_kind"}[end]
+    assert pose_errors(goal, [1], [one], [end]) == (wanted,)
+    assert wanted is None or wanted in POSE_ERRORS
+
+
+class Builder(OpenAIChat):
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        body = super().reply(seen, ending)
+        body["choices"][0]["message"]["content"] = f"I measured.\n\n{STANDS}"
+        return body
+
+
+def test_a_run_with_faults_is_killed_resumed_scored_again_compared_and_shown(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(workspace.root)
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+    monkeypatch.setattr(sys, "argv", ["phyblock"])
+    models = ["builder", "oracle", "random"]
+    workspace.write_suite(tracks=["pose_planning"], models=models, pose={"views": ["top"]})
+    run = ["run", "suite.yaml", "--out", "out"]
+    with Running(Builder(faults=Faults(server_error=0.3))) as running:
+        workspace.write_models(running.url, "builder")
+        assert not phyblock.main([*run, "--no-report"], standalone_mode=False)
+        assert running.server.ended["500"] > 0
+        whole = workspace.records()
+        text = (workspace.out / "records.jsonl").read_text()
+        (workspace.out / "records.jsonl").write_text(text[: len(text) // 2])
+        assert not phyblock.main(run, standalone_mode=False)
+        assert running.server.ended["ok"] == len(SCENES)
+    assert "What poses cost" in capsys.readouterr().out
+
+    def by_sample(records: list[dict[str, Any]]) -> dict[str, Any]:
+        kept = ("parse", "scores", "pose", "counts")
+        return {one["sample"]: {name: one[name] for name in kept} for one in records}
+
+    assert by_sample(workspace.records()) == by_sample(whole)
+    # What fell when it was asked is what fell: nothing is carried out again.
+    monkeypatch.setattr(judging, "carry_out", None)
+    again = rescore(workspace.out, None, None, workspace.root / "again")
+    assert by_sample(workspace.records(again)) == by_sample(whole)
+    table = pd.read_csv(workspace.out / "tables" / "table_c.csv").set_index("model")
+    assert (
+        table.loc["oracle", ["f1_a", "f1_b", "f1_c", "stands", "completed"]].tolist() == [100] * 5
+    )
+    assert table.loc["builder", "f1_a"] == pytest.approx(200 * 3 / 24)
+    assert table.loc["builder", "stands"] == 100
+    assert table.loc["builder", "completed"] == 20
+    for file in ("tables/pose_errors.md", "figures/f1-tolerance.svg", "figures/pose-errors.svg"):
+        assert (workspace.out / file).exists(), file
+    assert "Pose planning" in (workspace.out / "report.html").read_text("utf-8")
+    for more in ("compare --out out", "compare --measure stands", "export --to csv"):
+        verb, *options = more.split()
+        assert not phyblock.main([verb, "out", *options], standalone_mode=False)
+    assert pd.read_csv(workspace.out / "comparison.csv")["verdict"].notna().all()
+
+
+def test_a_suite_says_how_poses_are_asked_for_and_what_is_wrong_with_it() -> None:
+    assert PoseSpec().views == ("oblique", "top")
+    view = {"azimuth_deg": 30.0, "elevation_deg": 50.0}
+    assert len(PoseSpec.model_validate({"views": ["top", view]}).views) == 2
+    for wrong in (
+        {"views": []},
+        {"views": ["top", "top"]},
+        {"views": ["above"]},
+        {"views": [view, "top", "side", "front", "oblique"]},
+        {"views": [{"azimuth_deg": 0.0, "elevation_deg": 0.0}]},
+        {"overlap_cm": 0},
+        {"overlap_cm": float("nan")},
+        {"rotation": "any"},
+    ):
+        with pytest.raises(ValueError, match="validation error"):
+            PoseSpec.model_validate(wrong)
+
+
+def test_the_prompt_says_every_view_and_what_a_place_means() -> None:
+    pictures = tuple(Image(b"", label, 8, 8) for label in ("goal, oblique", "goal, top", "blocks"))
+    for name, rules in (("pose_planning.j2", RULES), ("pose_planning_json.j2", RULES),
+                        ("pose_planning.j2", FREE), ("pose_planning_json.j2", FREE)):  # fmt: skip
+        is_json = "json" in name
+        asked = replace(rules, answer_format="json_schema") if is_json else rules
+        track = PosePlanning(asked)
+        prompt = TemplatePrompt(bundled("prompts", name), "default")
+        facts = track.facts(_TASK, pictures)
+        texts = [part for m in prompt.messages(pictures, facts) for part in m.parts]
+        said = " ".join(part for part in texts if isinstance(part, str))
+        assert "Picture 2: goal, top" in said
+        assert ("turned" in said.split("exactly this form")[1]) == rules.is_free or is_json
+        assert ("RX" in said) == rules.is_free
+        assert (pose_form(16, free=rules.is_free).example in said) == is_json
