@@ -103,8 +103,8 @@ def carry_out(
 class _Table:
     """Where blocks are put; `resting` is where each came to rest, by the order of its step.
 
-    Where a step moves no block past the limits by which a state stands (`DEFAULT_TRIAL`), all is set
-    back, so that no step is judged by the drift of the ones before it.
+    Where a step moves no block past the limits by which a state stands (`DEFAULT_TRIAL`), all is
+    set back, so that no step is judged by the drift of the ones before it.
     """
 
     def __init__(self, world: World, limits: CarryLimits) -> None:
