@@ -48,9 +48,14 @@ def _built(
     rng: np.random.Generator,
     move: Callable[[Block, Center], Center] = lambda _, center: center,
 ) -> str:
-    """The goal's blocks in a random valid order, each moved from its true place."""
-    blocks = subject.scene.blocks
-    order = subject.scene.graph.random_order(rng)
+    """The goal's blocks in a random valid order, each moved from its true place.
+
+    Layer by layer: a balance of which one arm is loaded to its top before the other topples, though
+    the order is a valid one.
+    """
+    blocks, layers = subject.scene.blocks, subject.scene.graph.layers
+    drawn = rng.random(len(blocks)).tolist()
+    order = sorted(range(len(blocks)), key=lambda vertex: (layers[vertex], drawn[vertex]))
     return written(_step(subject, blocks[v], move(blocks[v], center_cm(blocks[v]))) for v in order)
 
 
