@@ -20,15 +20,19 @@ from phyblock.sim.engine import PhysicsEngine
 from phyblock.sim.pose import Pose
 from phyblock.sim.stability import DEFAULT_TRIAL, movement
 from phyblock.sim.steps import wait
-from phyblock.sim.support import bounds_m, boxes_near, drop_height_m, pieces_of
+from phyblock.sim.support import (
+    FIT_TOLERANCE_M,
+    bounds_m,
+    boxes_near,
+    drop_height_m,
+    pieces_of,
+)
 from phyblock.sim.world import World
 from phyblock.words import StepEnd
 
 __all__ = ["Carried", "CarriedStep", "CarryLimits", "carry_out"]
 
 _SETTLE_S, _COLLAPSE_S = 2.0, 3.0
-_CLEAR_M = 0.0002
-"""Overlaps up to this are left to the engine [m]."""
 _TRIES = 16
 _CM = 100.0
 _DIGITS = 3
@@ -123,7 +127,7 @@ class _Table:
         if free is None:
             return CarriedStep("overlaps", overlap_cm=round(given_m * _CM, _DIGITS))
         gap_m = drop_height_m(free, others)
-        if gap_m <= most_m:
+        if FIT_TOLERANCE_M < gap_m <= most_m:
             x, y, z = free.position_m
             free = replace(free, position_m=(x, y, z - gap_m))
         after = self._let_go(free)
@@ -176,7 +180,7 @@ def _out_of_others(
         moved_m = float(np.linalg.norm(np.array(block.position_m) + way - start))
         if moved_m > most_m or depth_m > most_m:
             return None, max(moved_m, depth_m)
-        if depth_m <= _CLEAR_M:
+        if depth_m <= FIT_TOLERANCE_M:
             break
         x, y, z = (float(part) for part in np.array(block.position_m) + way)
         block = replace(block, position_m=(x, y, z))
