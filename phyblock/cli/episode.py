@@ -72,7 +72,7 @@ def command(
 
 def _views() -> dict[str, EpisodeView]:
     """How episodes are shown, by track."""
-    views = {name: kind.report().episodes for name, kind in kinds().items() if kind.plays}
+    views = {name: kind.report().episodes for name, kind in kinds().items()}
     return {name: view for name, view in views.items() if view is not None}
 
 

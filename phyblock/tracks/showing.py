@@ -99,12 +99,17 @@ class TaskShowing:
         return [self.of(task, seed) for seed in seeds for task in tasks]
 
 
-def in_order(task: AssemblyTask, numbers: Sequence[int], goal: AssemblyTask | None) -> ShownTask:
+def in_order(
+    task: AssemblyTask, numbers: Sequence[int], goal: AssemblyTask | None, *, some: bool = False
+) -> ShownTask:
     """The task with its candidates in an order, given by their numbers in the file, and a goal.
 
-    Raises DataError for numbers that are not those of its candidates, each once.
+    Raises DataError for numbers that are not those of its candidates, each once, or once at most
+    where `some` of them were shown.
     """
-    if sorted(numbers) != list(range(1, len(task.candidates) + 1)):
+    known = range(1, len(task.candidates) + 1)
+    is_some = some and len(set(numbers)) == len(numbers) and set(numbers) <= set(known)
+    if sorted(numbers) != list(known) and not is_some:
         allowed = f"the numbers 1 to {len(task.candidates)}, each once"
         found = ", ".join(map(str, numbers))
         raise DataError(
@@ -117,8 +122,8 @@ def in_order(task: AssemblyTask, numbers: Sequence[int], goal: AssemblyTask | No
 
 
 def as_recorded(task: AssemblyTask, record: Record) -> AssemblyTask:
-    """The task with its candidates in the order in which a record says that they were shown."""
-    return task if record.shown is None else in_order(task, record.shown.order, task)
+    """The task with the candidates that a record says were shown, in their order."""
+    return task if record.shown is None else in_order(task, record.shown.order, task, some=True)
 
 
 def shown_order(task: AssemblyTask, seed: int) -> tuple[int, ...]:

@@ -12,11 +12,12 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 
 from phyblock.cli.main import phyblock
 from phyblock.datasets import AssemblyTask, read_builtin
 from phyblock.domain import Block, Candidate, CandidateSet, PoseStep
-from phyblock.models.base import Image
+from phyblock.models.base import Image as SentPicture
 from phyblock.parsing import pose_form
 from phyblock.records.known import known_records
 from phyblock.resources import bundled
@@ -241,6 +242,12 @@ def test_a_run_with_faults_is_killed_resumed_scored_again_compared_and_shown(
     for file in ("tables/pose_errors.md", "figures/f1-tolerance.svg", "figures/pose-errors.svg"):
         assert (workspace.out / file).exists(), file
     assert "Pose planning" in (workspace.out / "report.html").read_text("utf-8")
+    gif, sample = workspace.root / "a.gif", "builder/t4/s0"
+    shown = ["episode", "out", sample, "--gif", str(gif), "--size", "128"]
+    assert not phyblock.main(shown, standalone_mode=False)
+    assert "falls" not in capsys.readouterr().out
+    with Image.open(gif) as frames:
+        assert frames.n_frames == 4
     for more in ("compare --measure stands --out out", "export --to csv"):
         verb, *options = more.split()
         assert not phyblock.main([verb, "out", *options], standalone_mode=False)
@@ -266,7 +273,9 @@ def test_a_suite_says_how_poses_are_asked_for_and_what_is_wrong_with_it() -> Non
 
 
 def test_the_prompt_says_every_view_and_what_a_place_means() -> None:
-    pictures = tuple(Image(b"", label, 8, 8) for label in ("goal, oblique", "goal, top", "blocks"))
+    pictures = tuple(
+        SentPicture(b"", label, 8, 8) for label in ("goal, oblique", "goal, top", "blocks")
+    )
     for name, rules in (("pose_planning.j2", RULES), ("pose_planning_json.j2", RULES),
                         ("pose_planning.j2", FREE), ("pose_planning_json.j2", FREE)):  # fmt: skip
         is_json = "json" in name

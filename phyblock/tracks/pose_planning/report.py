@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run
 from phyblock.tables.showing import planning_words
-from phyblock.tables.track_report import HeadlineColumn, TableMaker, TrackReport
+from phyblock.tables.track_report import EpisodeView, HeadlineColumn, TableMaker, TrackReport
 from phyblock.tracks.pose_planning.figures import f1_by_tolerance, pose_error_bars
+from phyblock.tracks.pose_planning.film import pose_film, pose_table
 from phyblock.tracks.pose_planning.measures import (
     POSE_PLANNING_MEASURES,
     in_levels,
@@ -65,5 +66,6 @@ REPORT = TrackReport(
         "f1-tolerance": "F1 with poses, by tolerance",
         "pose-errors": "Steps with poses that were wrong, by what was wrong first",
     },
+    episodes=EpisodeView(pose_table, pose_film),
     showing=lambda run: planning_words(run, "pose"),
 )

@@ -1,0 +1,93 @@
+"""A plan with poses step by step: as a table of text, and as the frames of a film."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from phyblock.datasets import AssemblyTask
+from phyblock.domain import PoseStep
+from phyblock.sim.carry import CarryLimits, carry_out
+from phyblock.sim.film import FilmStep, Tone
+from phyblock.sim.registry import told_engine
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
+from phyblock.tracks.pose_planning.frame import put, upright
+from phyblock.tracks.pose_planning.measures import ERROR_NAMES
+from phyblock.tracks.pose_planning.record import PoseOutcome, PoseRecord, StepOutcome
+from phyblock.words import StepEnd
+
+__all__ = ["pose_film", "pose_table"]
+
+_ENDS: dict[StepEnd, str] = {
+    "stands": "stands",
+    "falls": "falls",
+    "knocks_over": "knocks others over",
+    "overlaps": "no room",
+    "under_floor": "under the floor",
+    "no_block": "no such block",
+}
+
+
+def pose_table(record: PoseRecord) -> TextTable:
+    """Every step: what it puts where, how far off that is, and how it ended."""
+    columns = ("Step", "Block", "At (cm)", "Off by (cm)", "Ended", "Error")
+    given = record.parse.steps if record.parse else ()
+    steps = record.pose.steps if record.pose else ()
+    rows = tuple(
+        (
+            str(n),
+            str(one.block),
+            ", ".join(f"{part:g}" for part in one.center_cm),
+            NO_VALUE if step.position_cm is None else number(step.position_cm, 2),
+            _ended(step),
+            "" if step.error is None else ERROR_NAMES[step.error],
+        )
+        for n, (one, step) in enumerate(zip(given, steps, strict=True), 1)
+    )
+    text = ("At (cm)", "Ended", "Error")
+    return TextTable(
+        f"{record.sample}: {_came_to(record, record.pose)}",
+        tuple(Column(name, is_text=name in text) for name in columns),
+        rows,
+    )
+
+
+def pose_film(record: PoseRecord, task: AssemblyTask) -> Iterator[FilmStep]:
+    """A frame for the plan as it was given, one for the world after each step, and one for the end.
+
+    It is carried out again, in the engine that is chosen now.
+    """
+    given = record.parse.steps if record.parse else ()
+    pose, candidates = record.pose, task.candidates
+    if pose is None:
+        return
+    if pose.rotation == "free":
+        candidates, _ = upright(candidates)
+    steps = [PoseStep(one.block, one.center_cm, one.euler_deg) for one in given]
+    blocks = [put(step, candidates) for step in steps]
+    yield FilmStep(
+        f"{record.model}, {task.scene.id}: the plan as given", "plain", None,
+        tuple(block for block in blocks if block is not None),
+    )  # fmt: skip
+    tolerances = pose.limits
+    limits = CarryLimits(tolerances.overlap_cm, tolerances.stand_cm, tolerances.stand_deg)
+    done = carry_out(blocks, limits)
+    for n, (one, step, world) in enumerate(zip(given, pose.steps, done.worlds, strict=True), 1):
+        tone: Tone = "good" if step.end == "stands" else "bad"
+        yield FilmStep(f"{n}. block {one.block}: {_ended(step)}", tone, one.block, world)
+    by = "" if pose.engine == told_engine() else f" (shown in {told_engine()}, not {pose.engine})"
+    tone = "good" if pose.completed else "bad"
+    yield FilmStep(f"{_came_to(record, pose)}{by}", tone, None, done.blocks)
+
+
+def _ended(step: StepOutcome) -> str:
+    if step.end == "falls":
+        return f"falls, {number(step.moved_cm)} cm from its place"
+    if step.end == "knocks_over":
+        return f"knocks over {', '.join(map(str, step.knocked))}"
+    return _ENDS[step.end]
+
+
+def _came_to(record: PoseRecord, pose: PoseOutcome | None) -> str:
+    if pose is None:
+        return "nothing was carried out"
+    return f"{pose.reached} of {record.n_blocks} blocks reached, IoU {pose.iou:.2f}"
