@@ -9,6 +9,7 @@ from typing import Literal, get_args
 
 __all__ = [
     "BACKGROUNDS",
+    "BATCH_PROVIDERS",
     "GATINGS",
     "LEVEL1_CRITERIA",
     "MATCHERS",
@@ -107,6 +108,8 @@ Finish = Literal["stop", "length", "refusal", "unknown"]
 Outcome = Literal["ok", "parse_failure", "refusal", "truncated", "api_error", "missing"]
 """What became of a sample."""
 TransportName = Literal["auto", "litellm", "direct"]
+BATCH_PROVIDERS = ("openai", "hosted_vllm", "anthropic", "gemini")
+"""Prefixes of model ids whose servers may take batches in a protocol that is spoken here."""
 SendMode = Literal["auto", "always", "never"]
 """Whether a field that not every provider takes is sent."""
 ImageDetail = Literal["auto", "low", "medium", "high", "ultra_high", "original"]

@@ -33,7 +33,7 @@ def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> 
     cells = tuple(
         (
             row.model,
-            row.kind,
+            "batch" if row.batch else row.kind,
             f"{row.samples:,}",
             f"{row.done:,}",
             f"{row.cached:,}",
@@ -50,6 +50,13 @@ def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> 
     left = [row for row in rows if row.calls]
     for text in (_sum(left), *_prices(left)):
         console.print(text, soft_wrap=True, markup=False)
+    for row in rows:
+        if row.waiting:
+            asked = f"{_counted(row.waiting, 'call')} of {row.model} went out in batches before."
+            console.print(asked, soft_wrap=True, markup=False)
+    if any(row.batch for row in left):
+        text = "batch: answers come within a day, at the price of batches; no call is sent twice."
+        console.print(text, style="dim", soft_wrap=True)
     if left:
         console.print(
             f"Tokens are estimates: texts by their words, pictures by their providers' rules, "

@@ -5,6 +5,8 @@ Importing this package imports neither litellm nor aiohttp: the first call throu
 
 from phyblock.models.address_list import addresses_of
 from phyblock.models.base import (
+    AskLaterError,
+    GatheringModel,
     Image,
     Message,
     Model,
@@ -12,6 +14,7 @@ from phyblock.models.base import (
     Request,
     Usage,
 )
+from phyblock.models.batches import BatchFiles, under_way, waiting_keys
 from phyblock.models.breaker import Breakers
 from phyblock.models.build import build_model
 from phyblock.models.cache import CacheStats, ReplyCache, former_key, known_keys, reply_key
@@ -38,11 +41,14 @@ from phyblock.models.retry import RetryPolicy
 from phyblock.models.shared_cache import SharedCache
 
 __all__ = [
+    "AskLaterError",
+    "BatchFiles",
     "Breakers",
     "Budget",
     "CacheStats",
     "Estimate",
     "Gate",
+    "GatheringModel",
     "Halt",
     "HaltedError",
     "Image",
@@ -83,4 +89,6 @@ __all__ = [
     "server_address",
     "takes_format",
     "today",
+    "under_way",
+    "waiting_keys",
 ]

@@ -6,11 +6,14 @@ import functools
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
+from phyblock.errors import PhyblockError
 from phyblock.words import Finish, Role
 
 __all__ = [
+    "AskLaterError",
+    "GatheringModel",
     "Image",
     "Message",
     "Model",
@@ -90,7 +93,7 @@ class Reply:
     cost limit counts for it, failed attempts included, None where there is no limit; `attempts`
     counts requests sent for it, 0 when `cached`; `seed_sent` is False where the provider takes no
     seed, so that seeds are independent repeats; `latency_s` is the time of the successful request
-    alone.
+    alone, 0 where it came in a batch: `batched` replies cost less.
     """
 
     text: str
@@ -104,6 +107,7 @@ class Reply:
     attempts: int = 1
     cached: bool = False
     seed_sent: bool = True
+    batched: bool = False
 
 
 class Model(Protocol):
@@ -130,3 +134,30 @@ class Model(Protocol):
 
     async def aclose(self) -> None:
         """Release connections; the model is not used afterwards."""
+
+
+class AskLaterError(PhyblockError):
+    """The request has to be gathered once more: its answer failed, or it was not sent yet."""
+
+
+@runtime_checkable
+class GatheringModel(Model, Protocol):
+    """A model whose requests are gathered, sent together and only then asked for, in rounds.
+
+    A round is `begin`, `gather` of each request that is not answered yet, `dispatch`, `ask` of each
+    that was gathered; those whose `ask` raises AskLaterError belong to the next round.
+    """
+
+    async def begin(self) -> None:
+        """Begin a round. Raises UnavailableError where nothing more can be sent."""
+
+    async def gather(self, request: Request, *, anew: bool = False) -> bool:
+        """Take a request in, unless its answer is here or on its way; False where there is no room
+        for it in this round.
+
+        `anew` says that its failure has been recorded, so that it is asked again. Raises
+        BudgetReachedError where it alone could pass the cost limit.
+        """
+
+    async def dispatch(self) -> None:
+        """Send what was gathered."""

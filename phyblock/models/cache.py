@@ -164,7 +164,11 @@ class ReplyCache:
             return False
         # What this run paid is no part of what another finds.
         reply = replace(reply, billed_usd=None)
-        text = json.dumps(asdict(reply), ensure_ascii=True, separators=(",", ":"))
+        fields = asdict(reply)
+        if not reply.batched:
+            # Earlier versions know no such field, and share the file.
+            del fields["batched"]
+        text = json.dumps(fields, ensure_ascii=True, separators=(",", ":"))
         with self._explained():
             self._db.execute(
                 "INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?)",

@@ -19,7 +19,7 @@ from phyblock.models.base import Reply, Request
 from phyblock.models.breaker import shows_outage
 from phyblock.models.cache import known_keys, reply_key
 from phyblock.models.config import ModelConfig
-from phyblock.models.cost import Budget, Estimate, cost_usd, estimate, plausible
+from phyblock.models.cost import Budget, Estimate, counted, estimate, reply_cost_usd
 from phyblock.models.events import EventKind, ModelEvent, Observer
 from phyblock.models.formats import FORMAT_HINT, refuses_format
 from phyblock.models.halt import Halt, HaltedError
@@ -33,7 +33,7 @@ from phyblock.models.retry import RetryPolicy, is_success, with_retries
 from phyblock.models.shared_cache import SharedCache, Turn
 from phyblock.models.transport import Call, SeedRefusedError
 
-__all__ = ["ChatModel", "ChatParts"]
+__all__ = ["ChatModel", "ChatParts", "may_be_billed"]
 
 
 @dataclass(frozen=True)
@@ -286,7 +286,7 @@ class ChatModel:
         budget, prices = self._parts.budget, self._parts.prices
         if budget is None or prices is None:
             question.sent += 1
-            return _counted(await replica.transport.send(call), question)
+            return counted(await replica.transport.send(call), question.expected)
         held: int | None = None
         spent_usd: float | None = 0.0
         try:
@@ -296,7 +296,7 @@ class ChatModel:
                 )
             spent_usd = None
             question.sent += 1
-            reply = _counted(await replica.transport.send(call), question)
+            reply = counted(await replica.transport.send(call), question.expected)
             spent_usd = self._cost(reply)
             budget.learn(self.name, question.expected, reply.usage)
             return reply
@@ -304,7 +304,7 @@ class ChatModel:
             spent_usd = 0.0
             raise
         except ModelError as error:
-            spent_usd = None if _may_be_billed(error) else 0.0
+            spent_usd = None if may_be_billed(error) else 0.0
             raise
         finally:
             if held is not None:
@@ -337,7 +337,7 @@ class ChatModel:
 
     def _cost(self, reply: Reply) -> float | None:
         """US dollars of a reply that comes today."""
-        return cost_usd(self._parts.prices, reply.usage, today())
+        return reply_cost_usd(self._parts.prices, reply)
 
     def _on_retry(self, error: RetryableError, wait_s: float) -> None:
         self._tell("retry", str(error), wait_s=wait_s, status=error.status)
@@ -359,16 +359,9 @@ class ChatModel:
         self._parts.observer(ModelEvent(self.name, kind, message, wait_s, limit, status))
 
 
-def _may_be_billed(error: ModelError) -> bool:
+def may_be_billed(error: ModelError) -> bool:
     """Whether the server may have made a reply: it promised one, or was lost on the way."""
     return error.sent in ("lost", "maybe") or is_success(error.status)
-
-
-def _counted(reply: Reply, question: _Question) -> Reply:
-    """The reply with the counts alone that can be true."""
-    said_something = bool(reply.text or reply.reasoning)
-    usage = plausible(reply.usage, question.expected, said_something=said_something)
-    return replace(reply, usage=usage)
 
 
 def _total(reply: Reply) -> int | None:

@@ -51,7 +51,8 @@ class ModelConfig:
     id, as other weights behind another address. With `sends_format` a request's `response_format`
     is sent, without it the prompt alone says the form. `image_detail` is how closely pictures are
     looked at, None as the provider does. `timeout_s` bounds a request from its first byte to the
-    last of its answer, `most_body_bytes` that answer's body, packed and unpacked.
+    last of its answer, `most_body_bytes` that answer's body, packed and unpacked. With `batch`
+    requests go out in the provider's batches.
 
     Raises SpecError for an address that is none, or that holds a key or a password.
     """
@@ -78,6 +79,7 @@ class ModelConfig:
     image_detail: ImageDetail | None = None
     timeout_s: float = 600.0
     most_body_bytes: int = LARGEST_REPLY_BYTES
+    batch: bool = False
 
     def __post_init__(self) -> None:
         for address in self.addresses:

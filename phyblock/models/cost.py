@@ -9,11 +9,11 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date, timedelta
 
 from phyblock.errors import BudgetReachedError, Problem, SpecError
-from phyblock.models.base import Image, Request, Usage
+from phyblock.models.base import Image, Reply, Request, Usage
 from phyblock.models.config import ModelConfig
 from phyblock.models.keys import KEYLESS
 from phyblock.models.payload import wire_params
@@ -26,11 +26,13 @@ __all__ = [
     "Budget",
     "Estimate",
     "cost_usd",
+    "counted",
     "estimate",
     "is_billed",
     "most_usd",
     "plausible",
     "prices_of",
+    "reply_cost_usd",
     "require_prices",
 ]
 
@@ -39,6 +41,7 @@ _TYPICAL_THINKING_TOKENS = 4_000
 _ROOM_TO_THINK_TOKENS = 8_192
 _LONGEST_REPLY_TOKENS = 32_768
 _PROMPT_MARGIN = 1.5
+_NOTHING_USD = 1e-9
 _MOST_TIMES_EXPECTED = 100
 _LEAST_EXPECTED_TOKENS = 1_000
 
@@ -102,6 +105,17 @@ def cost_usd(
     """
     price = None if prices is None else prices.at(day, usage.prompt_tokens or 0, batched=batched)
     return None if price is None else price.cost(usage)
+
+
+def reply_cost_usd(prices: Prices | None, reply: Reply) -> float | None:
+    """US dollars of a reply that comes today, by whether it was asked for in a batch."""
+    return cost_usd(prices, reply.usage, today(), batched=reply.batched)
+
+
+def counted(reply: Reply, expected: Estimate) -> Reply:
+    """The reply with the counts alone that can be true."""
+    said_something = bool(reply.text or reply.reasoning)
+    return replace(reply, usage=plausible(reply.usage, expected, said_something=said_something))
 
 
 def most_usd(
@@ -190,9 +204,11 @@ class Budget:
         """The limit."""
         return self._max_usd
 
-    def most_usd(self, model: str, prices: Prices, expected: Estimate, day: date) -> float:
+    def most_usd(
+        self, model: str, prices: Prices, expected: Estimate, day: date, *, batched: bool = False
+    ) -> float:
         """The most that a call can cost, as far as the model is known by now."""
-        return most_usd(prices, expected, day, self._ratio.get(model, 1.0))
+        return most_usd(prices, expected, day, self._ratio.get(model, 1.0), batched=batched)
 
     async def reserve(self, most_usd: Callable[[], float]) -> int:
         """Hold the most that a call can cost, waiting for calls under way to settle; returns the
@@ -221,11 +237,30 @@ class Budget:
 
         Returns what was counted [US dollars].
         """
-        held = self._held.pop(reservation)
+        held = self._held.pop(reservation, 0.0)
         counted = usd if usd is not None and _is_amount(usd) else held
         self._spent_usd += counted
         self._changed.set()
         return counted
+
+    def fits(self, usd: float) -> bool:
+        """Whether a further cost would stay within the limit."""
+        return self._spent_usd + sum(self._held.values()) + usd <= self._max_usd
+
+    def hold(self, usd: float, onto: int | None = None) -> int:
+        """Add to a reservation, or make one, whether it fits or not; returns its number."""
+        if onto is None:
+            self._next += 1
+            onto = self._next
+        self._held[onto] = self._held.get(onto, 0.0) + _amount(usd)
+        return onto
+
+    def settle_part(self, reservation: int, part_usd: float, usd: float | None) -> float:
+        """As `settle`, of one call among those that a reservation is for."""
+        left_usd = self._held.pop(reservation, 0.0) - part_usd
+        if left_usd > _NOTHING_USD:
+            self._held[reservation] = left_usd
+        return self.settle(self.hold(part_usd), usd)
 
     def learn(self, model: str, expected: Estimate, usage: Usage) -> None:
         """Compare an estimate with what the provider counted, where that can be true."""

@@ -12,6 +12,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.models.base import Reply
 from phyblock.models.completions import read_completion
 from phyblock.models.config import ModelConfig
+from phyblock.models.http_client import Client
 from phyblock.models.keys import api_key
 from phyblock.models.payload import json_body
 from phyblock.models.refusals import read_body, refusal, refuses_seed
@@ -25,7 +26,9 @@ OPENAI_API_BASE = "https://api.openai.com/v1"
 class DirectTransport(GuardedTransport):
     """`POST {api_base}/chat/completions`."""
 
-    def __init__(self, config: ModelConfig, secrets: Sequence[str]) -> None:
+    def __init__(
+        self, config: ModelConfig, secrets: Sequence[str], client: Client | None = None
+    ) -> None:
         """Raise SpecError where no address is given and the provider is not OpenAI.
 
         Without an address the request, with another provider's key, would go to OpenAI.
@@ -33,7 +36,7 @@ class DirectTransport(GuardedTransport):
         if config.api_base is None and config.provider != "openai":
             message = "needs an api_base to be called directly"
             raise SpecError(Problem(f"model {config.name}", message, "api_base", config.id))
-        super().__init__(config, secrets)
+        super().__init__(config, secrets, client)
         base = config.api_base or OPENAI_API_BASE
         self._url = f"{base.rstrip('/')}/chat/completions"
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 import asyncio
 import urllib.parse
 import urllib.request
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO, Protocol
 
 from phyblock.addresses import host_of
 from phyblock.errors import RetryableError, UnreachableError
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     import aiohttp
 
-__all__ = ["Answer", "HttpClient"]
+__all__ = ["Answer", "Client", "HttpClient"]
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,24 @@ class Answer:
     def is_success(self) -> bool:
         """Whether the status promises a reply."""
         return 200 <= self.status < 300
+
+
+class Client(Protocol):
+    """What sends the request of a transport; see HttpClient."""
+
+    async def send(
+        self,
+        url: str,
+        body: bytes,
+        headers: Mapping[str, str],
+        *,
+        method: str = "POST",
+        tls: ssl.SSLContext | bool = True,
+    ) -> Answer:
+        """Send once and read the answer."""
+
+    async def aclose(self) -> None:
+        """Close all connections."""
 
 
 @dataclass
@@ -66,13 +84,15 @@ class HttpClient:
     async def send(
         self,
         url: str,
-        body: bytes,
+        body: bytes | BinaryIO,
         headers: Mapping[str, str],
         *,
         method: str = "POST",
         tls: ssl.SSLContext | bool = True,
+        sink: Callable[[bytes], object] | None = None,
     ) -> Answer:
-        """Send once and read the answer.
+        """Send once and read the answer; a file is sent as it is read. `sink` takes the body of a
+        success piece by piece, and the answer then has none.
 
         Raises UnreachableError where no connection could be made in time, and RetryableError where
         it was lost or the answer did not end in time.
@@ -80,7 +100,7 @@ class HttpClient:
         import aiohttp
 
         progress = _Progress()
-        exchange = self._exchange(method, url, body, headers, tls, progress)
+        exchange = self._exchange(method, url, body, headers, tls, progress, sink)
         try:
             return await asyncio.wait_for(exchange, self._timeout_s)
         except asyncio.TimeoutError:
@@ -105,10 +125,11 @@ class HttpClient:
         self,
         method: str,
         url: str,
-        body: bytes,
+        body: bytes | BinaryIO,
         headers: Mapping[str, str],
         tls: ssl.SSLContext | bool,
         progress: _Progress,
+        sink: Callable[[bytes], object] | None,
     ) -> Answer:
         import yarl
 
@@ -126,15 +147,17 @@ class HttpClient:
                 response.close()
                 fault = _redirect(url, response.headers.get("Location"))
                 return Answer(response.status, response.headers, b"", fault)
-            return await self._read(response)
+            return await self._read(response, sink if response.ok else None)
 
-    async def _read(self, response: aiohttp.ClientResponse) -> Answer:
+    async def _read(
+        self, response: aiohttp.ClientResponse, sink: Callable[[bytes], object] | None
+    ) -> Answer:
         """The answer, its body read up to the limit; what is not read to its end is cut off."""
         import aiohttp
 
         status, headers = response.status, response.headers
         try:
-            reader = BodyReader(headers.get("Content-Encoding", ""), self._most_bytes)
+            reader = BodyReader(headers.get("Content-Encoding", ""), self._most_bytes, sink)
             async for piece in response.content.iter_any():
                 reader.add(piece)
             return Answer(status, headers, reader.body())

@@ -22,7 +22,7 @@ from litellm.llms.custom_httpx.http_handler import AsyncHTTPHandler, HTTPHandler
 
 from phyblock.errors import ModelError, UnavailableError, UnreachableError
 from phyblock.models.config import ModelConfig
-from phyblock.models.http_client import Answer, HttpClient
+from phyblock.models.http_client import Answer, Client
 from phyblock.models.litellm_bodies import readable_body
 from phyblock.models.refusals import read_body, refusal
 
@@ -58,7 +58,7 @@ class Exchange:
     `refused` is why something was not sent that litellm wanted to send, "" for nothing.
     """
 
-    def __init__(self, client: HttpClient, config: ModelConfig) -> None:
+    def __init__(self, client: Client, config: ModelConfig) -> None:
         self.answer: Answer | None = None
         self.failure: ModelError | None = None
         self.refused = ""

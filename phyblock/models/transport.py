@@ -10,7 +10,7 @@ from typing import Any, Protocol
 from phyblock.errors import ModelError, PhyblockError, RetryableError
 from phyblock.models.base import Message, Reply
 from phyblock.models.config import ModelConfig
-from phyblock.models.http_client import HttpClient
+from phyblock.models.http_client import Client, HttpClient
 from phyblock.models.keys import hidden
 from phyblock.plain_text import well_formed
 
@@ -56,10 +56,13 @@ class GuardedTransport(ABC):
     and no end of the run. What stops the process passes: cancellation, Ctrl-C.
     """
 
-    def __init__(self, config: ModelConfig, secrets: Sequence[str]) -> None:
+    def __init__(
+        self, config: ModelConfig, secrets: Sequence[str], client: Client | None = None
+    ) -> None:
+        """`client` sends in the place of a connection of its own."""
         self._config = config
         self._secrets = tuple(secrets)
-        self._client = HttpClient(config)
+        self._client: Client = client or HttpClient(config)
 
     async def send(self, call: Call) -> Reply:
         """Send once; see Transport."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 
 __all__ = ["ACCEPTED_ENCODINGS", "BodyReader"]
 
@@ -16,8 +17,13 @@ _PLAIN = ("", "identity")
 class BodyReader:
     """Takes a body in pieces, as they arrive; counts them before and after unpacking."""
 
-    def __init__(self, encoding: str, most_bytes: int) -> None:
-        """ValueError for an encoding that was not offered, or for several on top of another."""
+    def __init__(
+        self, encoding: str, most_bytes: int, sink: Callable[[bytes], object] | None = None
+    ) -> None:
+        """`sink` takes what is unpacked where the body is too large to be kept in memory.
+
+        ValueError for an encoding that was not offered, or for several on top of another.
+        """
         name = encoding.strip().lower()
         if name not in (*_PLAIN, "gzip", "x-gzip", "deflate"):
             raise ValueError(f"has an encoding that was not asked for ({name[:40]!r})")
@@ -25,6 +31,7 @@ class BodyReader:
         self._most_bytes = most_bytes
         self._arrived_bytes = 0
         self._pieces: list[bytes] = []
+        self._sink = self._pieces.append if sink is None else sink
         self._length_bytes = 0
         self._unpacker: zlib._Decompress | None = None
 
@@ -46,7 +53,7 @@ class BodyReader:
             raise ValueError(f"is not {self._name} as it says it is") from None
 
     def body(self) -> bytes:
-        """All of it; ValueError when a compressed body is not whole."""
+        """All of it that no sink took; ValueError when a compressed body is not whole."""
         if self._unpacker is not None and not self._unpacker.eof:
             raise ValueError("breaks off in the middle of its compression")
         return b"".join(self._pieces)
@@ -70,7 +77,7 @@ class BodyReader:
         self._length_bytes += len(piece)
         if self._length_bytes > self._most_bytes:
             raise self._too_large()
-        self._pieces.append(piece)
+        self._sink(piece)
 
     def _too_large(self) -> ValueError:
         return ValueError(f"is larger than {self._most_bytes / 2**20:g} MB")

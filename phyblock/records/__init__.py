@@ -5,9 +5,18 @@ A model of a line reads it, says what is wrong with it, writes it and documents 
 
 from phyblock.records.belonging import Belonging
 from phyblock.records.line import Line
-from phyblock.records.lines import PROMPTS, RECORDS, TURNS, Lines, PromptLines, TurnLines
+from phyblock.records.lines import (
+    BATCHES,
+    PROMPTS,
+    RECORDS,
+    TURNS,
+    BatchLines,
+    Lines,
+    PromptLines,
+    TurnLines,
+)
 from phyblock.records.manifest import FORMAT, MANIFEST, Manifest, read_manifest
-from phyblock.records.others import PictureMark, Prompt, PromptMessage, Turn
+from phyblock.records.others import BatchLine, PictureMark, Prompt, PromptMessage, Turn
 from phyblock.records.question import StoredQuestion
 from phyblock.records.record import (
     AskedTurn,
@@ -23,12 +32,15 @@ from phyblock.records.reply import StoredError, StoredReply, StoredUsage
 from phyblock.records.scene import StoredScene
 
 __all__ = [
+    "BATCHES",
     "FORMAT",
     "MANIFEST",
     "PROMPTS",
     "RECORDS",
     "TURNS",
     "AskedTurn",
+    "BatchLine",
+    "BatchLines",
     "Belonging",
     "Line",
     "Lines",

@@ -14,13 +14,23 @@ from phyblock.errors import InputError, Problem, StoreError
 from phyblock.records.belonging import Belonging
 from phyblock.records.decode import decode, is_cut, problem_of
 from phyblock.records.line import Line
-from phyblock.records.others import Prompt, Turn
+from phyblock.records.others import BatchLine, Prompt, Turn
 
-__all__ = ["PROMPTS", "RECORDS", "TURNS", "Lines", "PromptLines", "TurnLines"]
+__all__ = [
+    "BATCHES",
+    "PROMPTS",
+    "RECORDS",
+    "TURNS",
+    "BatchLines",
+    "Lines",
+    "PromptLines",
+    "TurnLines",
+]
 
 RECORDS = "records.jsonl"
 TURNS = "turns.jsonl"
 PROMPTS = "prompts.jsonl"
+BATCHES = "batches.jsonl"
 
 _LONGEST_LINE_BYTES = 256 * 1024 * 1024
 
@@ -117,6 +127,7 @@ class Lines(Generic[LineT]):
 
 _TURN: TypeAdapter[Turn] = TypeAdapter(Turn)
 _PROMPT: TypeAdapter[Prompt] = TypeAdapter(Prompt)
+_BATCH: TypeAdapter[BatchLine] = TypeAdapter(BatchLine)
 
 
 class TurnLines(Lines[Turn]):
@@ -146,3 +157,16 @@ class PromptLines(Lines[Prompt]):
         for where, line in super().__iter__():
             self.digests.add(line.sha256)
             yield where, line
+
+
+class BatchLines(Lines[BatchLine]):
+    """What became of the batches of a run."""
+
+    noun = "line about a batch"
+    hint = (
+        "restore the file from a copy, or remove all lines of the same batch: its questions are "
+        "then asked again"
+    )
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder / BATCHES, _BATCH)

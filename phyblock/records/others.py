@@ -1,12 +1,16 @@
-"""Lines of the other files of a run: turns of episodes, and prompts."""
+"""Lines of the other files of a run: turns of episodes, prompts, and what became of batches."""
 
 from __future__ import annotations
 
-from phyblock.records.line import Line, Whole
+from typing import Literal
+
+from phyblock.records.line import Line, Usd, Whole
 from phyblock.records.reply import StoredReply
 from phyblock.words import Role
 
-__all__ = ["PictureMark", "Prompt", "PromptMessage", "Turn"]
+__all__ = ["BatchEvent", "BatchLine", "PictureMark", "Prompt", "PromptMessage", "Turn"]
+
+BatchEvent = Literal["intended", "created", "lost", "ended"]
 
 
 class Turn(Line):
@@ -45,3 +49,29 @@ class Prompt(Line):
     """Digest of the messages, by which records name it."""
     messages: tuple[PromptMessage, ...]
     """What was sent."""
+
+
+class BatchLine(Line):
+    """What became of a batch of requests; the first line of each is written before it is sent."""
+
+    batch: str
+    """Our name for it, which the provider is told, so that it is found there again."""
+    model: str
+    """Name of the model."""
+    event: BatchEvent
+    """`intended`: it is about to be sent; `created`: the provider has it; `lost`: it has not, and
+    nothing was asked; `ended`: its answers are in `batches/`."""
+    time: str
+    """When, UTC."""
+    id: str = ""
+    """The provider's name for it."""
+    keys: tuple[str, ...] = ()
+    """Of an intended one: the requests in their order, by their keys in the reply cache."""
+    most_usd: tuple[Usd, ...] = ()
+    """Of an intended one under a cost limit: what each of them can cost."""
+    seeded: bool = True
+    """Of an intended one: whether seeds are sent."""
+    words: str = ""
+    """Why it was lost, or how it ended."""
+    is_complete: bool = True
+    """Of an ended one: False where the provider took back what it had not asked yet."""

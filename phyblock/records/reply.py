@@ -62,6 +62,8 @@ class StoredReply(Line):
     """Whether it came from the cache."""
     seed_sent: bool = True
     """Whether the provider takes a seed; where not, seeds are independent repeats."""
+    batched: bool = False
+    """Whether it came in a batch, at the price of one."""
 
     @classmethod
     def of(cls, reply: Mapping[str, Any]) -> Self:
@@ -73,7 +75,10 @@ class StoredReply(Line):
         usage = reply["usage"].items()
         counts = {name: _within(count, -LARGEST_WHOLE) for name, count in usage}
         money = {name: _within(reply.get(name), 0) for name in ("cost_usd", "billed_usd")}
-        return cls.model_validate({**reply, **texts, **money, "usage": counts})
+        fields = {**reply, **texts, **money, "usage": counts}
+        if not reply.get("batched"):
+            fields.pop("batched", None)
+        return cls.model_validate(fields)
 
     @property
     def tokens(self) -> int:

@@ -35,7 +35,7 @@ async def check_model(config: ModelConfig) -> Reply:
     messages = (Message("user", (picture, _QUESTION)),)
     request = Request("check", 0, messages, {}, "", None)
     model = build_model(
-        replace(config, sends_seed="never"),
+        replace(config, sends_seed="never", batch=False),
         cache=None,
         overall=Gate(1),
         policy=RetryPolicy(attempts=1, retry_for_s=0.0),

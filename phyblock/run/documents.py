@@ -9,7 +9,16 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from phyblock.records import Line, Manifest, Prompt, Record, StoredQuestion, StoredScene, Turn
+from phyblock.records import (
+    BatchLine,
+    Line,
+    Manifest,
+    Prompt,
+    Record,
+    StoredQuestion,
+    StoredScene,
+    Turn,
+)
 from phyblock.records.describe import field_tables, json_schema, put_between
 from phyblock.records.known import known_records, record_types
 
@@ -21,6 +30,7 @@ _SECTIONS: Mapping[str, Mapping[str, Callable[[], Sequence[type[Line]]]]] = {
         "What the tracks add": record_types,
         "A turn": lambda: (Turn,),
         "A prompt": lambda: (Prompt,),
+        "A batch": lambda: (BatchLine,),
         "The manifest": lambda: (Manifest,),
     },
     "data-format.md": {"A line of `scenes.jsonl`": lambda: (StoredScene,)},
@@ -57,6 +67,7 @@ def _schemas() -> dict[str, Any]:
         "record": json_schema("phyblock record", known_records(), record_types()),
         "turn": json_schema("phyblock turn", TypeAdapter(Turn), (Turn,)),
         "prompt": json_schema("phyblock prompt", TypeAdapter(Prompt), (Prompt,)),
+        "batch": json_schema("phyblock batch", TypeAdapter(BatchLine), (BatchLine,)),
         "manifest": json_schema("phyblock run.yaml", TypeAdapter(Manifest), (Manifest,)),
         "scene": json_schema("phyblock scene", TypeAdapter(StoredScene), (StoredScene,)),
         "question": json_schema(

@@ -20,8 +20,10 @@ from phyblock.models import (
     most_usd,
     prices_of,
     today,
+    waiting_keys,
 )
 from phyblock.models import estimate as estimate_call
+from phyblock.records import BatchLines
 from phyblock.records.reading import run_records
 from phyblock.resources import reply_cache_file
 from phyblock.run.models import PlannedModel
@@ -43,8 +45,9 @@ _SOON = timedelta(days=14)
 class Estimate:
     """What one model would take; dollars are None where the price of `day` is not known.
 
-    `done` samples have a record in the folder, `cached` ones a reply in the cache, `calls` are
-    left to make (none for recordings and baselines, which answer here). `replies` are those that
+    `done` samples have a record in the folder, `cached` ones a reply in the cache, `waiting` ones
+    went out in batches, `calls` are left to make (none for recordings and baselines, which answer
+    here); with `batch` they go out in batches, at the price of these. `replies` are those that
     are there already and tell their tokens, `reply_tokens` in all.
     """
 
@@ -53,8 +56,10 @@ class Estimate:
     samples: int
     prices: Prices | None
     day: date
+    batch: bool = False
     done: int = 0
     cached: int = 0
+    waiting: int = 0
     calls: int = 0
     prompt_tokens: int = 0
     replies: int = 0
@@ -70,13 +75,17 @@ class Estimate:
         self.calls += 1
         self.prompt_tokens += expected.prompt_tokens
         self._usual_tokens += expected.completion_tokens
-        price = None if self.prices is None else self.prices.at(self.day, expected.prompt_tokens)
+        price = (
+            None
+            if self.prices is None
+            else self.prices.at(self.day, expected.prompt_tokens, batched=self.batch)
+        )
         if self.prices is None or price is None:
             return
         self._prompt_usd += price.input_cost(expected.prompt_tokens)
         self._usual_usd += price.output_cost(expected.completion_tokens)
         self._usd_a_token += price.output_cost(1)
-        self._most_usd += most_usd(self.prices, expected, self.day)
+        self._most_usd += most_usd(self.prices, expected, self.day, batched=self.batch)
 
     def add_reply(self, completion_tokens: int | None) -> None:
         """Learn from a reply that is there."""
@@ -140,10 +149,20 @@ class Estimate:
 def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
     """Estimates in the order of the plan's models; StoreError for the folder of another run."""
     rows = [
-        Estimate(m.name, m.config.kind, plan.samples_per_model, prices_of(m.config), today())
+        Estimate(
+            m.name,
+            m.config.kind,
+            plan.samples_per_model,
+            prices_of(m.config),
+            today(),
+            m.config.batch,
+        )
         for m in plan.models
     ]
-    settled = _settled(plan, folder, rows) if holds_run(folder, plan.manifest) else set()
+    is_begun = holds_run(folder, plan.manifest)
+    settled = _settled(plan, folder, rows) if is_begun else set()
+    lines = (line for _, line in BatchLines(folder)) if is_begun else ()
+    waiting = waiting_keys(lines)
     path = reply_cache_file()
     with ReplyCache(path) if use_cache and path.exists() else nullcontext() as cache:
         for tracks, variants in _alike(plan):
@@ -156,7 +175,7 @@ def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
                                 for seed in seeds
                                 for variant in variants
                             ]
-                            _add(row, model, samples, outlines, settled, cache)
+                            _add(row, model, samples, outlines, settled, cache, waiting)
     return rows
 
 
@@ -198,6 +217,7 @@ def _add(
     outlines: Sequence[tuple[Request, bool]],
     settled: set[str],
     cache: ReplyCache | None,
+    waiting: frozenset[str],
 ) -> None:
     """Count one item of one model, with seeds that show it alike."""
     config = model.config
@@ -215,6 +235,8 @@ def _add(
             if kept is not None:
                 row.cached += 1
                 row.add_reply(kept.usage.completion_tokens)
+            elif is_real and config.batch and not waiting.isdisjoint(known_keys(config, sent)):
+                row.waiting += 1
             else:
                 row.add_call(tokens)
 

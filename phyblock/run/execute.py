@@ -15,7 +15,7 @@ from enum import Enum, auto
 from typing import Any
 
 from phyblock.errors import BudgetReachedError, UnavailableError
-from phyblock.models import Halt, HaltedError, Model
+from phyblock.models import AskLaterError, GatheringModel, Halt, HaltedError, Model
 from phyblock.run.events import ModelStopped, SampleDone, Stopping, Watcher
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
@@ -86,6 +86,7 @@ class Executor:
             for sample, summary in store.standing.samples.items()
             if (summary.is_answered if retry_failed else summary.is_final)
         }
+        self._recorded = store.standing.samples
         self._plan = plan
         self._writer = RecordWriter(store.records)
         self._turns = RecordWriter(store.turns)
@@ -123,8 +124,12 @@ class Executor:
                 if sample.id not in self.settled
             )
             self.result.settled += self._plan.samples_per_model - len(queue)
-            count = min(planned.config.max_concurrency, len(queue))
-            workers += [asyncio.create_task(self._work(planned, queue)) for _ in range(count)]
+            model = self._models[planned.name]
+            if isinstance(model, GatheringModel):
+                workers.append(asyncio.create_task(self._in_rounds(planned, model, queue)))
+            else:
+                count = min(planned.config.max_concurrency, len(queue))
+                workers += [asyncio.create_task(self._work(planned, queue)) for _ in range(count)]
         try:
             # One worker's error must not end the others: they wait for what is paid for.
             ended = await asyncio.gather(*workers, return_exceptions=True)
@@ -143,24 +148,90 @@ class Executor:
         await self._writer.drain()
         await self._turns.drain()
 
-    async def _work(self, planned: PlannedModel, queue: deque[Sample]) -> None:
-        while queue and not self.stopping and planned.name not in self.result.stopped:
+    async def _work(
+        self, planned: PlannedModel, queue: deque[Sample], later: deque[Sample] | None = None
+    ) -> None:
+        """Ask until the queue is empty; `later` takes what its model wants to be asked again."""
+        while queue and self._goes_on(planned):
             sample = queue.popleft()
-            self._in_flight += 1
             try:
-                await self._one(planned, sample)
-            except UnavailableError as error:
-                self._stop_model(planned.name, str(error))
-            except BudgetReachedError as error:
-                self._stop(Stop(Cause.COST, str(error)))
-            except HaltedError:
-                return
-            except Exception as error:
-                # A mistake of our own is no reason to lose what others have paid for.
-                self._failure = self._failure or error
-                self._stop(Stop(Cause.ERROR, "an error that the run cannot go on with"))
-            finally:
-                self._in_flight -= 1
+                await self._guarded(planned, self._one(planned, sample))
+            except AskLaterError:
+                assert later is not None, "only gathering models ask for it"
+                later.append(sample)
+
+    async def _in_rounds(
+        self, planned: PlannedModel, model: GatheringModel, queue: deque[Sample]
+    ) -> None:
+        """Ask a model that sends many requests together."""
+        width = planned.config.max_concurrency
+        while queue and self._goes_on(planned):
+            taken: deque[Sample] = deque()
+            later: deque[Sample] = deque()
+            gathering = self._gather(planned, model, queue, taken)
+            await self._guarded(planned, gathering, is_call=False)
+            await asyncio.gather(
+                *(self._work(planned, taken, later) for _ in range(min(width, len(taken))))
+            )
+            queue.extendleft(reversed(later))
+
+    async def _gather(
+        self,
+        planned: PlannedModel,
+        model: GatheringModel,
+        queue: deque[Sample],
+        taken: deque[Sample],
+    ) -> None:
+        """Have a round's requests sent; those that belong to it are `taken` from the queue."""
+        await model.begin()
+        count = len(queue)
+        is_full = False
+
+        async def gather() -> None:
+            nonlocal is_full
+            while queue and not is_full and self._goes_on(planned):
+                sample = queue.popleft()
+                request = await self._samples.request(sample, planned.config)
+                is_taken = await model.gather(request, anew=sample.id in self._recorded)
+                is_full = is_full or not is_taken
+                (taken if is_taken else left).append(sample)
+
+        left: deque[Sample] = deque()
+        width = min(planned.config.max_concurrency, count)
+        await asyncio.gather(*(self._guarded(planned, gather()) for _ in range(width)))
+        queue.extendleft(reversed(left))
+        if not self._goes_on(planned):
+            return
+        await self._guarded(planned, model.dispatch())
+        if not taken:
+            # Where it is the model that takes no more, it says so now.
+            await model.begin()
+            raise BudgetReachedError("what is left may cost more than is left of max_cost_usd")
+
+    def _goes_on(self, planned: PlannedModel) -> bool:
+        return not self.stopping and planned.name not in self.result.stopped
+
+    async def _guarded(
+        self, planned: PlannedModel, work: Coroutine[Any, Any, None], *, is_call: bool = True
+    ) -> None:
+        """Do a part of the work on a model; what keeps it from going on stops it, or the run."""
+        self._in_flight += is_call
+        try:
+            await work
+        except UnavailableError as error:
+            self._stop_model(planned.name, str(error))
+        except BudgetReachedError as error:
+            self._stop(Stop(Cause.COST, str(error)))
+        except HaltedError:
+            return
+        except AskLaterError:
+            raise
+        except Exception as error:
+            # A mistake of our own is no reason to lose what others have paid for.
+            self._failure = self._failure or error
+            self._stop(Stop(Cause.ERROR, "an error that the run cannot go on with"))
+        finally:
+            self._in_flight -= is_call
 
     def _stop(self, stop: Stop) -> None:
         if self.result.stop is None:

@@ -10,12 +10,12 @@ from pathlib import Path
 from phyblock.errors import Problem, StoreError
 from phyblock.files import writing
 from phyblock.folders import LIST, OutFolder
-from phyblock.records import MANIFEST, PROMPTS, RECORDS, TURNS
+from phyblock.records import BATCHES, MANIFEST, PROMPTS, RECORDS, TURNS
 
 __all__ = ["LOCK", "check_place", "run_folder"]
 
 LOCK = ".lock"
-_OWN = (MANIFEST, RECORDS, TURNS, PROMPTS, LOCK, LIST)
+_OWN = (MANIFEST, RECORDS, TURNS, PROMPTS, BATCHES, "batches", LOCK, LIST)
 _BEGUN = re.compile(rf"{re.escape(LOCK)}|{re.escape(LIST)}|\.[0-9a-f]{{32}}\.part")
 """What a run that was killed before it had a manifest leaves behind."""
 _PAGE, _REBUILT = "report.html", ("tables", "figures", "export")

@@ -146,6 +146,7 @@ def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfi
         revision=spec.revision,
         image_detail=spec.image_detail,
         timeout_s=spec.timeout_s or suite.limits.timeout_s,
+        batch=spec.batch,
     )
     return replace(config, sends_format=_sends_format(config, spec, suite))
 

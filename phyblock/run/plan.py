@@ -207,6 +207,10 @@ def _check_models(
             if model.config.kind == "replay" and isinstance(track, EpisodeTrack):
                 message = f"is a recording, which cannot answer in {track.name}"
                 problems.append(Problem(where, message, "tracks", track.name))
+            if model.config.batch and isinstance(track, EpisodeTrack):
+                message = f"is asked in batches, and {track.name} plays episodes of several turns"
+                hint = "each turn waits for the one before: take batch: true out, or the track"
+                problems.append(Problem(where, message, "batch", track.name, hint=hint))
             able = kind_of(track.name).baselines
             if model.config.kind != "baseline" or model.config.id in able:
                 continue

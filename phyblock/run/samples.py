@@ -94,6 +94,23 @@ class SampleRunner:
             return await self._play(sample, sample.track, model, config)
         return await self._ask(sample, sample.track, model, config)
 
+    async def request(
+        self, sample: Sample, config: ModelConfig, *, with_messages: bool = True
+    ) -> Request:
+        """The request of a sample that is asked once. HaltedError where the run ends meanwhile."""
+        sample = sample.shown()
+        assert isinstance(sample.track, SingleTrack), "an episode has many requests"
+        return await self._request(sample, sample.track, config, with_messages=with_messages)
+
+    async def _request(
+        self, sample: Sample, track: SingleTrack[Any], config: ModelConfig, *, with_messages: bool
+    ) -> Request:
+        with self._halt.giving_up():
+            request = await track.request(
+                sample.item, sample.seed, config.params, with_messages=with_messages
+            )
+        return sample.asking(replace(request, track=track.name))
+
     async def _ask(
         self,
         sample: Sample,
@@ -101,11 +118,7 @@ class SampleRunner:
         model: Model,
         config: ModelConfig,
     ) -> Record:
-        with self._halt.giving_up():
-            request = await track.request(
-                sample.item, sample.seed, config.params, with_messages=model.needs_messages
-            )
-        request = sample.asking(replace(request, track=track.name))
+        request = await self._request(sample, track, config, with_messages=model.needs_messages)
         answer = await _answer(model.ask(request))
         fields = self._begin(sample, answer) | _asked(config, request)
         fields["prompt"] = self._prompt(track, request)

@@ -7,6 +7,7 @@ from types import TracebackType
 
 from phyblock.errors import Problem, SpecError
 from phyblock.models import (
+    BatchFiles,
     Breakers,
     Budget,
     Gate,
@@ -18,13 +19,16 @@ from phyblock.models import (
     addresses_of,
     api_key_status,
     build_model,
+    under_way,
 )
+from phyblock.records import BATCHES
 from phyblock.resources import reply_cache_file
 from phyblock.run.events import ModelNotice, RunNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.plan import RunPlan
 from phyblock.run.soundness import provider_problem
 from phyblock.run.store import RunStore, holds_run
+from phyblock.run.writer import RecordWriter
 
 __all__ = ["SERVERS", "Session", "check_ready"]
 
@@ -82,6 +86,7 @@ class Session:
         self._use_cache = use_cache
         self._cache: SharedCache | None = None
         self._store: RunStore | None = None
+        self._batch_writer: RecordWriter | None = None
         self._models: dict[str, Model] = {}
         self.executor: Executor
 
@@ -91,6 +96,7 @@ class Session:
             is_there = holds_run(self._folder, plan.manifest)
             manifest = plan.manifest if is_there else plan.begun()
             self._store = RunStore(self._folder, manifest, plan.sample_ids())
+            self._check_batches(self._store)
             if self._use_cache and any(m.config.kind == "litellm" for m in plan.models):
                 self._cache = SharedCache(reply_cache_file(), self._tell)
                 await self._cache.open()
@@ -114,6 +120,7 @@ class Session:
                     policy=policy,
                     breakers=breakers,
                     halt=halt,
+                    batches=self._batches(self._store) if model.config.batch else None,
                 )
             self.executor = Executor(
                 plan,
@@ -150,6 +157,27 @@ class Session:
         )
         return await self.executor.run()
 
+    def _check_batches(self, store: RunStore) -> None:
+        """Raise SpecError for models that are asked singly and have a batch under way."""
+        waiting = under_way(store.standing.batches)
+        message = "has a batch under way, whose questions would be asked twice"
+        hint = f"let it end with batch: true, or remove its lines from {BATCHES} to give it up"
+        problems = [
+            Problem(f"model {model.name}", message, "batch", waiting[model.name], hint=hint)
+            for model in self._plan.models
+            if model.name in waiting and not model.config.batch
+        ]
+        if problems:
+            raise SpecError(problems)
+
+    def _batches(self, store: RunStore) -> BatchFiles:
+        if self._batch_writer is None:
+            self._batch_writer = RecordWriter(store.batches)
+        poll_s = self._plan.suite.limits.batch_poll_s
+        return BatchFiles(
+            tuple(store.standing.batches), self._batch_writer.put, self._folder, poll_s
+        )
+
     def _notice(self, event: ModelEvent) -> None:
         notice = ModelNotice(
             event.model, event.kind, event.message, event.wait_s, event.limit, event.status
@@ -162,6 +190,8 @@ class Session:
     async def _close(self) -> None:
         for model in self._models.values():
             await model.aclose()
+        if self._batch_writer is not None:
+            await self._batch_writer.drain()
         self._plan.close()
         if self._cache is not None:
             await self._cache.aclose()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from phyblock.records import Record, Turn
+from phyblock.records import BatchLine, Record, Turn
 from phyblock.scoring import Counts
 
 __all__ = ["Standing", "Summary"]
@@ -49,12 +49,13 @@ class Summary:
 class Standing:
     """The newest record of every sample, summed up, and what the run cost so far.
 
-    `limit_usd` is what the cost limit counted, of every line, also of those that later ones
-    replaced.
+    `batches` are all lines about batches, oldest first. `limit_usd` is what the cost limit counted,
+    of every line, also of those that later ones replaced.
     """
 
     samples: dict[str, Summary] = field(default_factory=dict)
     limit_usd: float = 0.0
+    batches: list[BatchLine] = field(default_factory=list)
 
     def add(self, record: Record) -> None:
         """Take in a record as it was read, oldest first."""

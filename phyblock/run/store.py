@@ -19,6 +19,7 @@ from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, writing
 from phyblock.records import (
     MANIFEST,
+    BatchLines,
     Belonging,
     Line,
     Lines,
@@ -57,8 +58,8 @@ _NOT_IDENTITY = (
 class RunStore:
     """A run folder opened for writing; one process at a time.
 
-    `records` and `turns` are synced line by line; `prompts` hold what could be made again.
-    `standing` is how far the run was when it was opened.
+    `records`, `turns` and `batches` are synced line by line; `prompts` hold what could be made
+    again. `standing` is how far the run was when it was opened.
     """
 
     def __init__(self, folder: Path, manifest: Manifest, samples: Collection[str]) -> None:
@@ -83,6 +84,8 @@ class RunStore:
                 self.records = self._open(records, self.standing.add)
                 turns = TurnLines(folder, self._belonging)
                 self.turns = self._open(turns, self.standing.add_turn)
+                batches = BatchLines(folder)
+                self.batches = self._open(batches, self.standing.batches.append)
                 known = PromptLines(folder)
                 self.prompts = PromptFile(self._open(known, sync=False), known.digests)
         except StoreError:
@@ -155,7 +158,7 @@ def holds_run(folder: Path, manifest: Manifest) -> bool:
     found = read_manifest(folder)
     if found.identity == manifest.identity:
         return True
-    paid: tuple[Lines[Any], ...] = (any_records(folder), TurnLines(folder))
+    paid: tuple[Lines[Any], ...] = (any_records(folder), TurnLines(folder), BatchLines(folder))
     if all(next(iter(lines), None) is None for lines in paid):
         return False
     names = _changed(found, manifest)

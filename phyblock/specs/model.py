@@ -19,6 +19,7 @@ from pydantic import (
 from phyblock.addresses import address_fault
 from phyblock.specs.fields import (
     Count,
+    Flag,
     MaxTokens,
     Section,
     Temperature,
@@ -30,7 +31,7 @@ from phyblock.specs.fields import (
 )
 from phyblock.specs.prices import PriceSpec, PriceSpecs
 from phyblock.specs.sections import SamplingSpec
-from phyblock.words import ImageDetail, SendMode, TransportName
+from phyblock.words import BATCH_PROVIDERS, ImageDetail, SendMode, TransportName
 
 __all__ = ["ModelSpec"]
 
@@ -158,6 +159,12 @@ class ModelSpec(Section):
         description="litellm: through the library. direct: straight HTTP, for servers that speak "
         "the OpenAI chat protocol. auto: direct where it can.",
     )
+    batch: Flag = Field(
+        default=False,
+        description="Send requests in the provider's batches (OpenAI and servers with its /files "
+        "and /batches, Anthropic, Gemini): slower, by up to a day, and at half the price. How a "
+        "model is asked is no part of a run: it may change when the run goes on.",
+    )
     max_concurrency: Concurrency | None = Field(
         default=None,
         description="Calls to this model under way at once; null: the suite's limit. auto: as many "
@@ -236,6 +243,8 @@ class ModelSpec(Section):
                 raise refuse(message, at=(others[0],), key=True, hint="keep one of them")
             self._check_direct(self.id)
             self._check_detail(self.id)
+            if self.batch:
+                self._check_batch(self.id)
             return self
         for key in sorted(self.model_fields_set - _WITH_REPLAY):
             raise refuse(
@@ -275,6 +284,24 @@ class ModelSpec(Section):
                 at=("transport",),
                 allowed="direct with an api_base, else auto or litellm",
                 hint="add api_base, or take the line out",
+            )
+
+    def _check_batch(self, model_id: str) -> None:
+        """A batch lies at one server, which must be known to speak one of three protocols."""
+        provider = model_id.partition("/")[0]
+        if provider not in BATCH_PROVIDERS:
+            raise refuse(
+                f"is not possible: phyblock does not speak the batches of {provider}",
+                at=("batch",),
+                allowed=", ".join(f"{name}/..." for name in BATCH_PROVIDERS),
+                hint="where the provider has the /files and /batches of OpenAI, use openai/... "
+                "with its api_base; else take the line out",
+            )
+        if self.has_address and not isinstance(self.api_base, str):
+            raise refuse(
+                "is not possible with a list of servers: a batch lies at one",
+                at=("batch",),
+                hint="give one api_base, or take the line out",
             )
 
     @property

@@ -145,6 +145,8 @@ class SamplingSpec(Section):
 class LimitsSpec(Section):
     """Bounds of a run; they change how fast results come, not what they are."""
 
+    later: ClassVar[tuple[str, ...]] = ("batch_poll_s",)
+
     max_concurrency: Count = Field(
         default=64, description="Calls under way at once, over all models."
     )
@@ -164,6 +166,10 @@ class LimitsSpec(Section):
         "stopped where it has not answered once in this run.",
     )
     timeout_s: TimeoutS = Field(default=300.0, description="Longest wait for one reply [s].")
+    batch_poll_s: Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] = Field(
+        default=60.0,
+        description="Longest pause between two looks at a batch [s], for models with batch: true.",
+    )
     max_cost_usd: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] | None = Field(
         default=None,
         description="The run stops before it costs more than this [USD]; null: no bound.",

@@ -1,0 +1,75 @@
+"""What requests in batches count against a run's cost limit, from before they are sent."""
+
+from __future__ import annotations
+
+from phyblock.models.base import Reply, Request
+from phyblock.models.batches.ledger import Batch
+from phyblock.models.config import ModelConfig
+from phyblock.models.cost import Budget, estimate
+from phyblock.models.halt import Halt
+from phyblock.models.prices import Prices, today
+
+__all__ = ["Purse"]
+
+
+class Purse:
+    """One model's part of the budget; without a budget nothing is counted.
+
+    Of each batch the dearest case of its requests is held, and each is settled when its answer is
+    read. `billed_usd` is what was counted for a request so far.
+    """
+
+    def __init__(self, config: ModelConfig, budget: Budget | None, prices: Prices | None) -> None:
+        self._config = config
+        self._budget = budget
+        self._prices = prices
+        self._held: set[tuple[str, str]] = set()
+        self._billed_usd: dict[str, float] = {}
+
+    def most_usd(self, request: Request) -> float:
+        """The most that a request can cost."""
+        if self._budget is None or self._prices is None:
+            return 0.0
+        expected, name = estimate(self._config, request), self._config.name
+        return self._budget.most_usd(name, self._prices, expected, today(), batched=True)
+
+    def fits(self, usd: float) -> bool:
+        """Whether so much is left."""
+        return self._budget is None or self._budget.fits(usd)
+
+    async def wait_for(self, usd: float, halt: Halt) -> None:
+        """Wait for so much to be left; BudgetReachedError where it never will be."""
+        if self._budget is not None:
+            with halt.giving_up():
+                self._budget.settle(await self._budget.reserve(lambda: usd), 0.0)
+
+    def hold(self, usd: float, onto: int | None) -> int | None:
+        """Hold so much, together with what is held already."""
+        return None if self._budget is None else self._budget.hold(usd, onto)
+
+    def hold_again(self, batch: Batch, key: str) -> None:
+        """Hold for a request of an earlier command, once."""
+        if (batch.token, key) not in self._held:
+            self._held.add((batch.token, key))
+            batch.held = self.hold(batch.most_usd(key), batch.held)
+
+    def settle(self, key: str, batch: Batch, usd: float | None) -> None:
+        """Count what a request cost; None is all that it can have cost."""
+        if self._budget is not None and batch.held is not None:
+            spent_usd = self._budget.settle_part(batch.held, batch.most_usd(key), usd)
+            self._billed_usd[key] = self._billed_usd.get(key, 0.0) + spent_usd
+
+    def settle_all(self, held: int | None, usd: float | None) -> None:
+        """Count what all requests of a reservation cost that are not settled."""
+        if self._budget is not None and held is not None:
+            self._budget.settle(held, usd)
+
+    def billed_usd(self, key: str) -> float | None:
+        """What was counted for a request; None where there is no limit."""
+        return self._billed_usd.get(key)
+
+    def learn(self, request: Request, reply: Reply) -> None:
+        """Compare the estimate with what the provider counted."""
+        if self._budget is not None:
+            expected = estimate(self._config, request)
+            self._budget.learn(self._config.name, expected, reply.usage)

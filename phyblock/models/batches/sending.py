@@ -1,0 +1,220 @@
+"""Sending a batch so that it is never sent twice, and finding again one that was cut off.
+
+Between the request that makes a batch and its id on disk nobody knows whether there is one. It is
+looked for under our name; where the provider tells no names, among the batches of that time with as
+many requests, by what the first answer of each says that it answers.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import TypeVar
+
+from phyblock.errors import ModelError, RetryableError, UnavailableError
+from phyblock.files import writing
+from phyblock.models.batches.ledger import Batch, BatchFiles, Ledger, new_token
+from phyblock.models.batches.protocol import BatchProtocol, BatchStatus
+from phyblock.models.batches.results import Results, custom_id
+from phyblock.models.batches.wording import Written
+from phyblock.models.retry import RetryPolicy, with_retries
+
+__all__ = ["Draft", "Sender", "UnsureError"]
+
+T = TypeVar("T")
+
+_CLOCKS_APART_S = 3600.0
+_HINT = "free some space and give the same command again: nothing of this batch was sent"
+
+
+class UnsureError(UnavailableError):
+    """It is not known whether the provider has a batch."""
+
+
+class Draft:
+    """A batch that is being written into a file; `keys` are its requests with the most that each
+    can cost [US dollars], `held` is its reservation in the budget.
+    """
+
+    def __init__(self, protocol: BatchProtocol, folder: Path, *, seeded: bool) -> None:
+        self.seeded = seeded
+        self.token = new_token()
+        self.path = folder / f"{self.token}.requests"
+        self.keys: dict[str, float] = {}
+        self.held: int | None = None
+        self._protocol = protocol
+        self._bytes = 0
+        with writing(self.path, _HINT):
+            folder.mkdir(parents=True, exist_ok=True)
+            self._file = self.path.open("wb")
+        self._write(protocol.head(self.token))
+
+    def takes(self, written: Written) -> bool:
+        """Whether a request still fits, by the provider's limits and as all ask with a seed or
+        without.
+        """
+        size = self._bytes + len(self._line(written)) + len(self._protocol.tail(self.token)) + 1
+        has_room = len(self.keys) < self._protocol.most_requests
+        return has_room and size <= self._protocol.most_bytes and written.seeded == self.seeded
+
+    def add(self, key: str, written: Written, most_usd: float) -> None:
+        """Write a request, which can cost so much."""
+        line = self._line(written)
+        self._write(self._protocol.between if self.keys else b"")
+        self._write(line)
+        self.keys[key] = most_usd
+
+    def close(self) -> None:
+        """End the file."""
+        if not self._file.closed:
+            self._write(self._protocol.tail(self.token))
+            with writing(self.path, _HINT):
+                self._file.close()
+
+    def drop(self) -> None:
+        """Remove the file: the batch is there, or nothing was asked."""
+        self._file.close()
+        self.path.unlink(missing_ok=True)
+
+    def _line(self, written: Written) -> bytes:
+        name = custom_id(self.token, len(self.keys))
+        return self._protocol.line(name, written.body, written.headers)
+
+    def _write(self, data: bytes) -> None:
+        with writing(self.path, _HINT):
+            self._bytes += self._file.write(data)
+
+    @property
+    def size(self) -> str:
+        """How much it is, in words."""
+        several = "s" * (len(self.keys) != 1)
+        megabytes = self._bytes / 1e6
+        weight = f"{megabytes:.1f} MB" if megabytes >= 0.1 else f"{1000 * megabytes:.0f} kB"
+        return f"{len(self.keys):,} request{several}, {weight}"
+
+
+class Sender:
+    """Sends drafts of one model, and finds again what an earlier process was sending."""
+
+    def __init__(
+        self, protocol: BatchProtocol, ledger: Ledger, files: BatchFiles, policy: RetryPolicy
+    ) -> None:
+        self._protocol = protocol
+        self._ledger = ledger
+        self._files = files
+        self._policy = policy
+
+    async def send(self, draft: Draft) -> Batch:
+        """Send a draft: the batch, which the provider has, with its id on disk.
+
+        Raises UnavailableError where it cannot be sent, and nothing was asked; UnsureError where
+        that is not known: the next command finds out.
+        """
+        draft.close()
+        most_usd = () if draft.held is None else draft.keys.values()
+        batch = await self._ledger.intend(draft.token, draft.keys, most_usd, seeded=draft.seeded)
+        batch.held = draft.held
+        try:
+            status = await self._create(batch, draft.path)
+        except UnsureError:
+            raise
+        except ModelError as error:
+            await self._ledger.tell(batch, "lost", words=str(error))
+            raise UnavailableError(
+                f"a batch could not be sent: {error}", status=error.status, sent=error.sent
+            ) from None
+        finally:
+            draft.drop()
+        await self._ledger.tell(batch, "created", id=status.id)
+        return batch
+
+    async def recover(self, batch: Batch) -> bool:
+        """Whether the provider has a batch whose sending was cut off; it is then known by its id.
+
+        Raises UnavailableError where that cannot be found out.
+        """
+        # A request that was cut off may still be worked on over there.
+        status = await self._find(batch, time.time() + 2 * self._files.poll_s)
+        if status is None:
+            await self._ledger.tell(batch, "lost", words="not found at the provider")
+            return False
+        await self._ledger.tell(batch, "created", id=status.id)
+        return True
+
+    async def _create(self, batch: Batch, path: Path) -> BatchStatus:
+        """Upload and begin, as often as is usual for requests."""
+        file = await self.patiently(lambda: self._protocol.upload(batch.token, path))
+
+        async def create() -> BatchStatus:
+            try:
+                return _named(await self._protocol.create(batch.token, path, file))
+            except RetryableError as error:
+                if error.sent == "no" or error.status == 429:
+                    raise
+                known = await self._find(batch, time.time() + self._files.poll_s)
+                if known is None:
+                    raise
+                return known
+
+        return await self.patiently(create)
+
+    async def _find(self, batch: Batch, until_s: float) -> BatchStatus | None:
+        """The batch with our name; None where there is none until then."""
+        while True:
+            try:
+                found = await self.patiently(lambda: self._look_for(batch))
+            except UnavailableError as error:
+                why = f"whether a batch was sent cannot be found out: {error}"
+                raise UnsureError(why, status=error.status, sent=error.sent) from None
+            if found is not None or time.time() >= until_s:
+                return found
+            await asyncio.sleep(min(self._files.poll_s, max(0.01, until_s - time.time())))
+
+    async def _look_for(self, batch: Batch) -> BatchStatus | None:
+        requests, candidates = len(batch.places), []
+        async for status in self._protocol.listed():
+            if status.token == batch.token:
+                return status
+            created_s = status.created_s
+            if created_s is not None and created_s < batch.created_s - _CLOCKS_APART_S:
+                break
+            is_like = status.total in (None, 0, requests) and status.id not in self._ledger.ids
+            if status.token is None and is_like and status.state != "refused":
+                candidates.append(status)
+        for status in candidates:
+            if await self._answers(status, batch):
+                return status
+        return None
+
+    async def _answers(self, status: BatchStatus, batch: Batch) -> bool:
+        """Whether a batch without our name answers what this one asks; waits until it has ended."""
+        batch_id = status.id
+        while status.state == "running":
+            await asyncio.sleep(self._files.poll_s)
+            status = await self.patiently(lambda: self._protocol.look(batch_id))
+        path = self._files.folder / f"{batch.token}.candidate"
+        await self._protocol.wire.download(status.results, path)
+        try:
+            found = await asyncio.to_thread(
+                Results, path, self._protocol, batch.token, len(batch.places)
+            )
+        finally:
+            path.unlink(missing_ok=True)
+        return len(found) > 0
+
+    async def patiently(self, call: Callable[[], Awaitable[T]]) -> T:
+        """Call until it succeeds or cannot; UnavailableError where it never does."""
+        try:
+            return await with_retries(call, self._policy, lambda *_: None)
+        except UnavailableError:
+            raise
+        except ModelError as error:
+            raise UnavailableError(str(error), status=error.status, sent=error.sent) from None
+
+
+def _named(status: BatchStatus) -> BatchStatus:
+    if not status.id:
+        raise RetryableError("a batch without an id was answered", status=200)
+    return status

@@ -1,0 +1,106 @@
+"""Laws of what is kept of batches: which one a request is in, and which line answers it."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.models.batches.fields import joined
+from phyblock.models.batches.ledger import BatchFiles, Ledger, waiting_keys
+from phyblock.models.batches.openai import OpenAIBatches
+from phyblock.models.batches.results import Results, custom_id
+from phyblock.models.config import ModelConfig
+from phyblock.records import BatchLine
+
+TOKEN = "pb0"
+keys = st.lists(st.sampled_from("abcdef"), unique=True, min_size=1)
+fates = st.sampled_from(["intended", "created", "lost", "ended"])
+values = st.none() | st.integers() | st.text()
+
+
+@given(st.lists(st.tuples(keys, fates)))
+def test_a_request_is_in_the_last_batch_that_was_not_lost(
+    batches: list[tuple[list[str], str]],
+) -> None:
+    """So a ledger says that goes on, and one that reads its lines again."""
+    lines: list[BatchLine] = []
+
+    async def put(line: BatchLine) -> None:
+        lines.append(BatchLine.model_validate_json(line.as_json()))
+
+    async def write() -> Ledger:
+        ledger = Ledger("m", BatchFiles((), put, Path()))
+        made = [
+            await ledger.intend(f"t{n}", of_batch, (), seeded=True)
+            for n, (of_batch, _) in enumerate(batches)
+        ]
+        for batch, (_, fate) in zip(made, batches, strict=True):
+            if fate in ("created", "ended"):
+                await ledger.tell(batch, "created", id=f"id-{batch.token}")
+            if fate in ("lost", "ended"):
+                await ledger.tell(batch, fate)  # type: ignore[arg-type]
+        return ledger
+
+    async def nowhere(_: BatchLine) -> None: ...
+
+    written = asyncio.run(write())
+    read = Ledger("m", BatchFiles(tuple(lines), nowhere, Path()))
+    others = Ledger("another", BatchFiles(tuple(lines), nowhere, Path()))
+    for key in "abcdef":
+        holding = [n for n, (k, fate) in enumerate(batches) if key in k and fate != "lost"]
+        expected = f"t{holding[-1]}" if holding else None
+        for ledger in (written, read):
+            newest = ledger.newest(key)
+            assert (newest and newest.token) == expected
+        assert others.newest(key) is None
+        assert (key in waiting_keys(lines)) == bool(holding)
+    assert {b.token: (b.event, b.id) for b in written.batches.values()} == {
+        b.token: (b.event, b.id) for b in read.batches.values()
+    }
+
+
+@st.composite
+def result_lines(draw: st.DrawFn) -> list[tuple[str, Any]]:
+    """Lines with the names of requests of this and of other batches, some of them broken."""
+    names = st.integers(0, 5).map(lambda n: custom_id(TOKEN, n)) | st.sampled_from(
+        ["pb0-x", "pb0--1", "pb01-1", "pb0-1-1", "pb0-", "-", "", "pb0-٣", "pb0-99999999999"]
+    )
+    return draw(st.lists(st.tuples(names, st.booleans())))
+
+
+@given(lines=result_lines(), requests=st.integers(0, 4))
+def test_the_first_whole_line_of_a_request_answers_it(
+    lines: list[tuple[str, bool]], requests: int, tmp_path_factory: Any
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "results.jsonl"
+    whole = [
+        json.dumps({"custom_id": name, "response": {"status_code": 200, "body": {"n": n}}})
+        for n, (name, _) in enumerate(lines)
+    ]
+    kept = [
+        text if is_whole else text[:-9] for text, (_, is_whole) in zip(whole, lines, strict=True)
+    ]
+    path.write_text("\n\n".join(kept), encoding="utf-8")
+    protocol = OpenAIBatches(ModelConfig("m", "litellm", "openai/m"), ())
+    results = Results(path, protocol, TOKEN, requests)
+    for place in range(requests):
+        name = custom_id(TOKEN, place)
+        first = [n for n, (found, is_whole) in enumerate(lines) if found == name and is_whole]
+        line = results.of(place)
+        assert (line is not None) == bool(first)
+        if line is not None:
+            assert json.loads(line.answer.body) == {"n": first[0]}  # type: ignore[union-attr]
+    assert len(results) + sum(results.faults.values()) == len(lines)
+
+
+@given(st.dictionaries(st.text(), values, max_size=3), st.text(min_size=1), values)
+def test_bodies_stand_in_lines_as_they_are(fields: dict[str, Any], name: str, body: Any) -> None:
+    data = json.dumps(body).encode()
+    line = joined(fields, name, data)
+    assert json.loads(line) == {**{k: v for k, v in fields.items() if k != name}, name: body}
+    assert b"\n" not in line

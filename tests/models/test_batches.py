@@ -1,0 +1,455 @@
+"""Batches: every question gets what a call of its own would have got, once, whatever happens."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from phyblock.errors import (
+    BudgetReachedError,
+    RetryableError,
+    SampleError,
+    UnavailableError,
+)
+from phyblock.models import (
+    Budget,
+    ModelConfig,
+    ModelEvent,
+    Prices,
+    Reply,
+    ReplyCache,
+    Request,
+)
+from phyblock.models.batches import batch_protocol
+from phyblock.models.batches.protocol import BatchProtocol
+from phyblock.models.batches.sending import UnsureError
+from tests.models.batching import Disk, Killing, command, run_command
+from tests.models.factory import QUICK, ask, make_model, make_request
+from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.servers.anthropic_batches import AnthropicBatches
+from tests.servers.batches import BatchFaults, BatchServer
+from tests.servers.chassis import Running
+from tests.servers.gemini_batches import GeminiBatches
+from tests.servers.openai_batches import OpenAIBatches
+
+KEY = "sk-not-a-real-key-1234"
+SERVERS: dict[str, type[BatchServer]] = {
+    "direct": OpenAIBatches,
+    "anthropic": AnthropicBatches,
+    "gemini": GeminiBatches,
+}
+PROTOCOLS = list(SERVERS)
+PRICES = Prices.flat(1000.0, 1000.0)
+
+
+@pytest.fixture(autouse=True)
+def _key(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, KEY)
+
+
+@pytest.fixture(params=PROTOCOLS)
+def route(request: pytest.FixtureRequest) -> str:
+    name: str = request.param
+    return name
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Disk:
+    return Disk(tmp_path)
+
+
+def config_at(route: str, url: str, **fields: Any) -> ModelConfig:
+    return ROUTES[route].config(url, batch=True, prices=PRICES, **fields)
+
+
+def requests_of(count: int) -> list[Request]:
+    return [make_request(f"{n:03d}") for n in range(count)]
+
+
+def served(
+    route: str, disk: Disk, requests: Sequence[Request], faults: BatchFaults, **options: Any
+) -> tuple[BatchServer, list[Reply | Exception]]:
+    with Running(SERVERS[route](batch=faults)) as running:
+        config = config_at(route, running.url, **options.pop("config", {}))
+        ended = run_command(config, disk, requests, **options)
+    server = running.server
+    assert isinstance(server, BatchServer)
+    return server, ended
+
+
+def texts(ended: Sequence[Reply | Exception]) -> list[str]:
+    assert all(isinstance(one, Reply) for one in ended), ended
+    return [one.text for one in ended if isinstance(one, Reply)]
+
+
+def once(server: BatchServer, count: int) -> bool:
+    return len(server.asked) == count and set(server.asked.values()) == {1}
+
+
+def test_a_batch_asks_and_answers_as_single_calls_do(route: str, disk: Disk) -> None:
+    requests = requests_of(3)
+    server, ended = served(route, disk, requests, BatchFaults(lines={0: {1: "length"}}))
+    with Running(SERVERS[route]()) as running:
+        config = replace(config_at(route, running.url), batch=False)
+        single = ask(make_model(config), *requests)
+        in_order = {one.sample: one.raw for one in running.server.seen}
+    assert {one.sample: one.raw for one in server.seen} == in_order
+    for place, (one, other) in enumerate(zip(ended, single, strict=True)):
+        assert isinstance(one, Reply)
+        assert isinstance(other, Reply)
+        assert one.batched
+        assert one.finish == ("length" if place == 1 else "stop")
+        assert other.cost_usd is not None
+        assert one.cost_usd == pytest.approx(other.cost_usd / 2)
+        if place != 1:
+            alike = {"batched": False, "latency_s": 0.0, "cost_usd": None}
+            assert replace(one, **alike) == replace(other, **alike)
+    assert server.keys == {KEY}
+    assert once(server, 3)
+
+
+FAULTS = {
+    "500": (True, Reply), "429": (True, Reply), "expired": (False, Reply),
+    "missing": (True, Reply), "broken": (True, Reply), "twice": (False, Reply),
+    "stranger": (False, Reply), "400": (False, SampleError),
+}  # fmt: skip
+"""By fault of a line: whether the question is asked again, and what comes in the end."""
+
+
+def test_each_line_that_fails_is_asked_again_or_ends_as_a_call_would(
+    route: str, disk: Disk
+) -> None:
+    requests = requests_of(len(FAULTS) + 1)
+    told: list[ModelEvent] = []
+    faults = BatchFaults(lines={0: dict(enumerate(FAULTS))})
+    server, ended = served(route, disk, requests, faults, told=told)
+    samples = [one.sample for one in server.seen[: len(requests)]]
+    for sample, one, (again, kind) in zip(samples, ended, FAULTS.values(), strict=False):
+        assert isinstance(one, kind), (one, kind)
+        assert server.asked[sample] == 1 + again
+    assert isinstance(ended[-1], Reply)
+    assert len(server.made) == 2
+    assert len(server.made[1].requests) == 5
+    assert any("holds lines 1 that cannot be read, 1 to what has an" in one.message for one in told)
+
+
+def test_a_question_that_always_fails_ends_after_the_usual_attempts(disk: Disk) -> None:
+    faults = BatchFaults(lines={n: {0: "500"} for n in range(9)})
+    policy = replace(QUICK, attempts=3)
+    server, ended = served("direct", disk, requests_of(2), faults, policy=policy)
+    assert isinstance(ended[0], RetryableError)
+    assert isinstance(ended[1], Reply)
+    assert [len(made.requests) for made in server.made] == [2, 1, 1]
+
+
+def test_what_expired_is_asked_again_and_what_was_answered_is_not(route: str, disk: Disk) -> None:
+    # Of a batch that expired Gemini has no results at all.
+    places = range(4) if route == "gemini" else (0, 2)
+    faults = BatchFaults(ends={0: "expired"}, lines={0: dict.fromkeys(places, "expired")})
+    server, ended = served(route, disk, requests_of(4), faults, budget=Budget(1e9))
+    assert len(texts(ended)) == 4
+    assert once(server, 4)
+    assert [len(made.requests) for made in server.made] == [4, len(places)]
+    # What was never asked costs nothing.
+    assert {one.billed_usd == one.cost_usd for one in ended if isinstance(one, Reply)} == {True}
+
+
+def test_a_cancelled_batch_keeps_its_answers_and_stops_the_model(route: str, disk: Disk) -> None:
+    faults = BatchFaults(ends={0: "cancelled"}, lines={0: {1: "cancelled", 2: "cancelled"}})
+    with Running(SERVERS[route](batch=faults)) as running:
+        config, requests = config_at(route, running.url), requests_of(4)
+        server = running.server
+        assert isinstance(server, BatchServer)
+        ended = run_command(config, disk, requests)
+        assert [isinstance(one, Reply) for one in ended] == [True, False, False, True]
+        assert isinstance(ended[1], UnavailableError)
+        assert "was taken back" in str(ended[1])
+        assert len(server.made) == 1
+        assert len(texts(run_command(config, disk, requests))) == 4
+    assert once(server, 4)
+
+
+def test_a_refused_batch_stops_the_model_and_asks_nothing(disk: Disk) -> None:
+    faults = BatchFaults(ends={0: "refused"})
+    with Running(OpenAIBatches(batch=faults)) as running:
+        config, requests = config_at("direct", running.url), requests_of(2)
+        ended = run_command(config, disk, requests, budget=Budget(1e9))
+        assert isinstance(ended[0], UnavailableError)
+        assert "Enqueued token limit" in str(ended[0])
+        assert disk.events[-1] == "lost"
+        assert len(texts(run_command(config, disk, requests))) == 2
+        assert once(running.server, 2)  # type: ignore[arg-type]
+
+
+CALLS = {
+    "a look fails": {"look": ("500", "reset", "503")},
+    "an upload fails": {"upload": ("500", "reset"), "create": ("429",)},
+    "a batch is made unheard": {"create": ("done-reset",)},
+    "a batch is made with an error": {"create": ("500",), "list": ("500",)},
+    "results fail": {"results": ("500", "done-reset", "reset")},
+}
+
+
+@pytest.mark.parametrize("calls", CALLS.values(), ids=list(CALLS))
+def test_calls_that_fail_lose_nothing_and_ask_nothing_twice(
+    route: str, disk: Disk, calls: dict[str, tuple[str, ...]]
+) -> None:
+    server, ended = served(route, disk, requests_of(2), BatchFaults(calls=calls))
+    assert len(texts(ended)) == 2
+    assert once(server, 2)
+
+
+TROUBLE = {
+    "a look is rejected": {"look": ("400",)},
+    "a batch is not known": {"look": ("404",)},
+    "looks fail for long": {"look": ("500",) * 3},
+    "results fail for long": {"results": ("500",) * 3},
+    "results are not known": {"results": ("404",)},
+    "nobody knows whether it is sent": {"create": ("done-reset",), "list": ("500",) * 3},
+    "the list is not allowed": {"create": ("500",), "list": ("403",)},
+}
+
+
+@pytest.mark.parametrize("calls", TROUBLE.values(), ids=list(TROUBLE))
+def test_what_cannot_be_learned_now_stops_the_model_and_is_learned_by_the_next_command(
+    route: str, disk: Disk, calls: dict[str, tuple[str, ...]]
+) -> None:
+    policy = replace(QUICK, attempts=3, max_connection_failures=3)
+    with Running(SERVERS[route](batch=BatchFaults(calls=calls))) as running:
+        config, requests, server = config_at(route, running.url), requests_of(2), running.server
+        assert isinstance(server, BatchServer)
+        budget = Budget(1e9)
+        ended = run_command(config, disk, requests, policy=policy, budget=budget)
+        assert {type(one) for one in ended} <= {UnavailableError, UnsureError}
+        assert server.made == [] or budget.spent_usd > 0
+        assert len(texts(run_command(config, disk, requests))) == 2
+    assert once(server, 2)
+
+
+def test_results_that_are_not_there_yet_or_no_more_are_not_taken_for_none(disk: Disk) -> None:
+    class Late(OpenAIBatches):
+        is_late = True
+
+    class Archived(AnthropicBatches):
+        is_archived = True
+
+    with Running(Late()) as running:
+        ended = run_command(config_at("direct", running.url), disk, requests_of(2))
+        assert len(texts(ended)) == 2
+        assert len(running.server.made) == 1  # type: ignore[attr-defined]
+    with Running(Archived()) as running:
+        config = config_at("anthropic", running.url)
+        ended = run_command(config, Disk(disk.folder / "old"), requests_of(2))
+        assert {type(one) for one in ended} == {UnavailableError}
+        assert "archived" in str(ended[0])
+        assert len(running.server.made) == 1  # type: ignore[attr-defined]
+
+
+def test_a_wrong_key_stops_the_model_and_is_written_nowhere(route: str, disk: Disk) -> None:
+    server, ended = served(route, disk, requests_of(2), BatchFaults(key="another"))
+    assert isinstance(ended[0], UnavailableError)
+    assert "401" in str(ended[0])
+    assert KEY not in str(ended[0])
+    assert KEY not in "".join(line.as_json() for line in disk.lines)
+    assert not server.made
+
+
+def test_a_key_in_an_answer_is_not_kept(disk: Disk) -> None:
+    class Echoing(OpenAIBatches):
+        def line(self, custom_id: str, seen: Any, ending: str) -> dict[str, Any]:
+            line = super().line(custom_id, seen, ending)
+            line["response"]["body"]["choices"][0]["message"]["content"] = f"Step1 {KEY}"
+            return line
+
+    with Running(Echoing()) as running:
+        ended = run_command(config_at("direct", running.url), disk, requests_of(1))
+    assert texts(ended) == ["Step1 [key]"]
+    kept = b"".join(path.read_bytes() for path in disk.folder.rglob("*") if path.is_file())
+    assert KEY.encode() not in kept
+
+
+def test_what_does_not_fit_goes_out_in_further_batches(
+    route: str, disk: Disk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kind = type(batch_protocol(config_at(route, "http://localhost:9"), ()))
+    monkeypatch.setattr(kind, "most_requests", 2)
+    server, ended = served(route, disk, requests_of(5), BatchFaults())
+    assert len(texts(ended)) == 5
+    assert [len(made.requests) for made in server.made] == [2, 2, 1]
+    assert once(server, 5)
+
+    monkeypatch.setattr(kind, "most_requests", 9)
+    monkeypatch.setattr(kind, "most_bytes", 4_000)
+    sizes: list[int] = []
+    upload, create = kind.upload, kind.create
+
+    async def sized(self: BatchProtocol, token: str, path: Path, *more: Any) -> Any:
+        sizes.append(path.stat().st_size)
+        return await (create if more else upload)(self, token, path, *more)
+
+    monkeypatch.setattr(kind, "upload", sized)
+    server, ended = served(route, Disk(disk.folder), requests_of(5), BatchFaults())
+    assert len(texts(ended)) == 5
+    assert 1 < len(server.made) < 5
+    assert max(sizes) <= 4_000
+
+
+@pytest.mark.parametrize(("shares", "first"), [(2.5, 2), (0.5, 0)])
+def test_a_cost_limit_is_kept_by_the_dearest_case_of_what_is_sent(
+    disk: Disk, shares: float, first: int
+) -> None:
+    """The limit is so many requests at their dearest; what is left of it pays for the next."""
+    requests = requests_of(4)
+    free = Disk(disk.folder / "free")
+    served("direct", free, requests, BatchFaults(), budget=Budget(1e9))
+    most_usd = free.lines[0].most_usd[0]
+    budget = Budget(shares * most_usd)
+    server, ended = served("direct", disk, requests, BatchFaults(), budget=budget)
+    assert [len(made.requests) for made in server.made][:1] == [first] * bool(first)
+    answered = [one for one in ended if isinstance(one, Reply)]
+    assert len(answered) == sum(server.asked.values())
+    assert 0 < budget.spent_usd <= shares * most_usd or not first
+    assert sum(one.billed_usd or 0.0 for one in answered) == pytest.approx(budget.spent_usd)
+    assert first or isinstance(ended[0], BudgetReachedError)
+
+
+def test_what_is_in_the_cache_is_not_asked_and_answers_go_there(route: str, tmp_path: Path) -> None:
+    """Batched or not, it is the same question; what it cost is what it was asked for as."""
+    cache = tmp_path / "replies.sqlite"
+    requests = requests_of(2)
+    disk = Disk(tmp_path, cache)
+    server, (first,) = served(route, disk, requests[:1], BatchFaults())
+    assert isinstance(first, Reply)
+    with Running(SERVERS[route]()) as running:
+        config = replace(config_at(route, running.url), batch=False)
+        with ReplyCache(cache) as kept:
+            found, single = ask(make_model(config, cache=kept), *requests)
+    assert isinstance(found, Reply)
+    assert isinstance(single, Reply)
+    assert (found.cached, found.batched, found.cost_usd) == (True, True, first.cost_usd)
+    assert (single.cached, single.batched) == (False, False)
+    server, ended = served(route, Disk(tmp_path / "other", cache), requests, BatchFaults())
+    assert not server.calls
+    assert [one.cost_usd for one in ended if isinstance(one, Reply)] == [
+        first.cost_usd, single.cost_usd,
+    ]  # fmt: skip
+
+
+def test_a_name_that_the_provider_forgets_is_found_by_what_was_answered(disk: Disk) -> None:
+    class Forgetful(OpenAIBatches):
+        forgets_names = True
+
+    with Running(Forgetful(batch=BatchFaults(calls={"create": ("", "", "done-reset")}))) as running:
+        config, server = config_at("direct", running.url), running.server
+        assert isinstance(server, OpenAIBatches)
+        for n in range(2):
+            # Of others, as large and as new.
+            assert len(texts(run_command(config, Disk(disk.folder / str(n)), requests_of(2)))) == 2
+        server.asked.clear()
+        requests = [make_request(f"{n:03d}", seed=5) for n in range(2)]
+        assert len(texts(run_command(config, disk, requests))) == 2
+        assert once(server, 2)
+
+
+# What a kill cuts off in litellm is closed when it is collected.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_kill_at_any_moment_loses_nothing_and_asks_nothing_twice(
+    route: str, tmp_path: Path
+) -> None:
+    requests = requests_of(2)
+    moments = None
+    for at in itertools.count():
+        disk = Disk(tmp_path / str(at))
+        killing = Killing(at)
+        with Running(SERVERS[route]()) as running:
+            server = running.server
+            assert isinstance(server, BatchServer)
+            config = config_at(route, running.url)
+            disk.moment, server.moment = killing.here, killing.there
+            is_over = asyncio.run(killing.run(command(config, disk, requests)))
+            disk.moment, server.moment = None, lambda *_: None
+            again = run_command(config, disk, requests, budget=Budget(1e9))
+            assert len(texts(again)) == 2
+        assert once(server, 2), killing.names[at]
+        if is_over:
+            moments = at
+            break
+        assert len(server.made) == 1, killing.names[at]
+    assert moments is not None
+    assert moments >= 14
+
+
+def test_rejected_requests_are_asked_again_only_when_that_is_wanted(disk: Disk) -> None:
+    faults = BatchFaults(lines={0: {0: "400"}})
+    with Running(OpenAIBatches(batch=faults)) as running:
+        config, requests = config_at("direct", running.url), requests_of(1)
+        assert isinstance(run_command(config, disk, requests)[0], SampleError)
+        budget = Budget(1e9)
+        assert isinstance(run_command(config, disk, requests, budget=budget)[0], SampleError)
+        assert budget.spent_usd == 0
+        assert len(texts(run_command(config, disk, requests, anew=True, budget=budget))) == 1
+        assert len(texts(run_command(config, disk, requests, anew=True))) == 1
+        assert len(running.server.made) == 2  # type: ignore[attr-defined]
+
+
+def test_a_provider_that_takes_no_seed_is_asked_again_without(disk: Disk) -> None:
+    class Seedless(OpenAIBatches):
+        def line(self, custom_id: str, seen: Any, ending: str) -> dict[str, Any]:
+            line = super().line(custom_id, seen, ending)
+            if seen.seed is not None:
+                error = self.error(400, "seed", "Unrecognized request argument supplied: seed")
+                line["response"] = {"status_code": 400, "body": error}
+            return line
+
+    with Running(Seedless()) as running:
+        told: list[ModelEvent] = []
+        config, requests = config_at("direct", running.url), requests_of(2)
+        ended = run_command(config, disk, requests, told=told)
+        assert {one.seed_sent for one in ended if isinstance(one, Reply)} == {False}
+        assert "seed_unsupported" in [one.kind for one in told]
+        always = replace(config, sends_seed="always")
+        (refused,) = run_command(always, Disk(disk.folder / "always"), requests[:1])
+        assert isinstance(refused, UnavailableError)
+        assert "seed is `always`" in str(refused)
+
+
+def test_a_refused_schema_stops_the_model_with_what_to_do(disk: Disk) -> None:
+    class Schemaless(OpenAIBatches):
+        def line(self, custom_id: str, seen: Any, ending: str) -> dict[str, Any]:
+            line = super().line(custom_id, seen, ending)
+            error = self.error(400, "400", "response_format is not supported")
+            line["response"] = {"status_code": 400, "body": error}
+            return line
+
+    with Running(Schemaless()) as running:
+        config = config_at("direct", running.url, sends_format=True)
+        request = replace(make_request(), response_format={"type": "json_schema"})
+        (refused,) = run_command(config, disk, [request])
+    assert isinstance(refused, UnavailableError)
+    assert "response_format: never" in str(refused)
+
+
+def test_headers_that_requests_need_go_with_their_batch(disk: Disk) -> None:
+    schema = {"type": "object", "properties": {}, "additionalProperties": False}
+    form = {"type": "json_schema", "json_schema": {"name": "a", "strict": True, "schema": schema}}
+    betas: list[str] = []
+
+    class Noting(AnthropicBatches):
+        def key_of(self, request: Any) -> str:
+            betas.append(request.headers.get("anthropic-beta", ""))
+            return super().key_of(request)
+
+    with Running(Noting()) as running:
+        fields = {"id": "anthropic/claude-sonnet-4-5", "sends_format": True}
+        config = config_at("anthropic", running.url, **fields)
+        request = replace(make_request(), response_format=form)
+        (reply,) = run_command(config, disk, [request])
+    assert isinstance(reply, Reply)
+    assert betas[0].startswith("structured-outputs")
+    assert set(betas[2:]) == {""}

@@ -1,0 +1,206 @@
+"""Whole runs whose models are asked in batches: stopped, killed and resumed by the same command."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import random
+import re
+import signal
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.servers.anthropic_batches import AnthropicBatches
+from tests.servers.batches import BatchFaults, BatchServer
+from tests.servers.chassis import Running
+from tests.servers.gemini_batches import GeminiBatches
+from tests.servers.openai_batches import OpenAIBatches
+from tests.vqa_set import questions, write_questions
+from tests.workspace import Workspace
+
+POLLING = {"batch_poll_s": 0.05}
+SERVERS: dict[str, tuple[type[BatchServer], str, str]] = {
+    "openai": (OpenAIBatches, "openai/gpt-4o-2024-08-06", "/v1"),
+    "anthropic": (AnthropicBatches, "anthropic/claude-sonnet-4-5", ""),
+    "gemini": (GeminiBatches, "gemini/gemini-2.5-flash", ""),
+}
+"""By protocol: the server, a model id that leads to it, the path of its API."""
+
+
+def prepare(workspace: Workspace, url: str, protocol: str = "openai", **suite: Any) -> None:
+    _, model_id, path = SERVERS[protocol]
+    entry = {"id": model_id, "api_base": url + path, "batch": True}
+    workspace.write_yaml("models.yaml", {"alpha": entry})
+    workspace.write_suite(**{"models": ["alpha"], "limits": POLLING, "seeds": [0, 1], **suite})
+
+
+def counted_once(server: BatchServer, samples: int) -> bool:
+    """Where no seeds are sent, both seeds of an item ask the same."""
+    return sum(server.asked.values()) == samples and len(set(server.asked.values())) == 1
+
+
+def test_all_tracks_of_one_turn_go_out_in_batches_at_half_the_price(workspace: Workspace) -> None:
+    write_questions(workspace.root / "questions", questions(subtasks=["SH", "OR"], per_subtask=1))
+    with Running(OpenAIBatches()) as running:
+        tracks = {"tracks": ["full_planning", "vqa"]}
+        prepare(workspace, running.url, vqa={"path": "./questions"}, limit=2, seeds=[0], **tracks)
+        text = (workspace.root / "models.yaml").read_text()
+        (workspace.root / "singly.yaml").write_text(text.replace("batch: true", "batch: false"))
+        costs = []
+        for name in ("models.yaml", "singly.yaml"):
+            dry = workspace.run("--dry-run", "--models-file", name)
+            costs += re.findall(r"4 calls, about \$([\d.]+) ", dry.out)
+            assert ("at the price of batches" in dry.out) == (name == "models.yaml")
+        batched, single = map(float, costs)
+        assert batched == pytest.approx(single / 2, abs=0.006)  # cents are shown
+        done = workspace.run("--yes")
+        assert (done.code, done.err) == (0, "")
+        assert "waiting for batch batch-0 since" in done.out
+        server = running.server
+        assert isinstance(server, OpenAIBatches)
+        records = workspace.records()
+        assert len(records) == 4
+        assert counted_once(server, 4)
+        assert [len(made.requests) for made in server.made] == [4]
+        for record in records:
+            reply = record["reply"]
+            assert (reply["batched"], reply["cached"]) == (True, False)
+            assert reply["cost_usd"] == pytest.approx((1000 * 2.5 + 40 * 10) / 1e6 / 2)
+
+
+def test_steps_refuse_batches_and_say_why(workspace: Workspace) -> None:
+    prepare(workspace, "http://localhost:9", tracks=["step_planning"])
+    for words in (["validate", "suite.yaml"], ["run", "suite.yaml"]):
+        done = workspace.phyblock(*words)
+        assert done.code == 2
+        assert "is asked in batches, and step_planning plays episodes of several turns" in done.err
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ({"id": "mistral/m"}, "does not speak the batches of mistral"),
+        ({"id": "openai/m", "api_base": ["http://a:1/v1", "http://b:1/v1"]}, "a list of servers"),
+    ],
+)
+def test_models_that_have_no_batches_are_refused_where_they_stand(
+    workspace: Workspace, entry: dict[str, Any], words: str
+) -> None:
+    workspace.write_yaml("models.yaml", {"alpha": {**entry, "batch": True}})
+    done = workspace.phyblock("validate", "models.yaml")
+    assert done.code == 2
+    assert words in done.err
+    assert "models.yaml:" in done.err
+
+
+def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace: Workspace) -> None:
+    """Between both commands the provider is asked nothing, and the estimate asks for no money."""
+    with Running(OpenAIBatches(batch=BatchFaults(looks=10**6))) as running:
+        server = running.server
+        assert isinstance(server, OpenAIBatches)
+        prepare(workspace, running.url)
+        waits = threading.Event()
+        server.moment = lambda _, name: waits.set() if name == "look done" else None
+        with workspace.start("--yes") as process:
+            assert waits.wait(60)
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate()
+        assert (process.returncode, err) == (130, "")
+        assert "waiting for batch batch-0 since" in out
+        assert "0 of 10 samples are done (interrupted)" in out
+        assert "give the same command again" in out
+
+        dry = workspace.run("--dry-run")
+        assert "10 calls of alpha went out in batches before." in dry.out
+        assert "0 calls, about $0.00." in dry.out
+        other = workspace.run("--set", "sampling.temperature=0.5")
+        assert other.code == 2
+        assert "holds another run" in other.err
+
+        text = (workspace.root / "models.yaml").read_text()
+        (workspace.root / "singly.yaml").write_text(text.replace("batch: true", "batch: false"))
+        singly = workspace.run("--yes", "--models-file", "singly.yaml")
+        assert singly.code == 2
+        assert "has a batch under way, whose questions would be asked twice" in singly.err
+        assert not server.by_sample
+
+        server.batch_faults = BatchFaults()
+        done = workspace.run("--yes")
+        assert done.code == 0
+        assert "All 10 samples are done" in done.out
+        assert counted_once(server, 10)
+
+
+def killed_at(workspace: Workspace, server: BatchServer, number: int, extra_s: float) -> bool:
+    """Kill a run at a moment of its server, or a little later; whether it was reached."""
+    reached = threading.Event()
+    first = threading.Event()
+    pids: list[int] = []
+    count = iter(range(10**6))
+
+    def moment(_: int, __: str) -> None:
+        if next(count) == number:
+            first.wait(30)
+            time.sleep(extra_s)
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pids[0], signal.SIGKILL)
+            reached.set()
+
+    server.moment = moment
+    with workspace.start("--yes") as process:
+        pids.append(process.pid)
+        first.set()
+        process.communicate()
+    server.moment = lambda *_: None
+    return reached.is_set()
+
+
+def finished(workspace: Workspace, server: BatchServer, samples: int) -> None:
+    done = workspace.run("--yes")
+    assert (done.code, done.err) == (0, "")
+    records = workspace.records()
+    assert len(records) == samples
+    assert {record["outcome"] for record in records} == {"ok"}
+    assert counted_once(server, samples)
+    ids = [json.loads(line) for line in batches_of(workspace).splitlines()]
+    assert {line["batch"] for line in ids} >= {made.token for made in server.made if made.token}
+
+
+def batches_of(workspace: Workspace) -> str:
+    return (workspace.out / "batches.jsonl").read_text(encoding="utf-8")
+
+
+def test_kills_of_the_process_lose_nothing_and_ask_nothing_twice(workspace: Workspace) -> None:
+    """When a batch is made and nobody heard, then when its answers are on their way."""
+    with Running(OpenAIBatches()) as running:
+        server = running.server
+        assert isinstance(server, OpenAIBatches)
+        prepare(workspace, running.url)
+        for number, name in ((3, "create"), (6, "results")):
+            assert killed_at(workspace, server, number, 0.0)
+            assert server.calls[-1] == name
+            assert not workspace.records()
+        finished(workspace, server, 10)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("protocol", SERVERS)
+def test_twenty_kills_of_the_process(workspace: Workspace, protocol: str, tmp_path: Path) -> None:
+    """Twelve at calls of the first batch, eight while its answers are judged and written."""
+    draw = random.Random(7)
+    kind = SERVERS[protocol][0]
+    moments = [(n, 0.0) for n in range(12)] + [(n, draw.random() / 2) for n in range(4, 12)]
+    for n, (number, extra_s) in enumerate(moments):
+        with Running(kind(batch=BatchFaults(looks=3))) as running:
+            server = running.server
+            assert isinstance(server, BatchServer)
+            workspace.out = tmp_path / f"out-{n}"
+            (workspace.cache / "replies.sqlite").unlink(missing_ok=True)
+            prepare(workspace, running.url, protocol)
+            killed_at(workspace, server, number, extra_s)
+            finished(workspace, server, 10)
