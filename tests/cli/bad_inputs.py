@@ -258,7 +258,7 @@ CACHES: tuple[Bad, ...] = (
         ("replies.sqlite", "cannot be used: disk I/O error", "free some space"),
         writes=("fresh", "cache/replies.sqlite-"), bytes_left=6000),
     Bad("no-pictures", pictures_taken, ("c2/pictures", "cannot be written", "PHYBLOCK_CACHE"),
-        env=(("PHYBLOCK_CACHE", "c2"),), writes=("fresh", "c2/replies.sqlite")),
+        env=(("PHYBLOCK_CACHE", "c2"),), writes=("fresh", "c2/goal-blind", "c2/replies.sqlite")),
     Bad("cache-below", file_in_the_way("run", "suite.yaml", "--out", "fresh", "--models", "alpha"),
         ("taken/x", "PHYBLOCK_CACHE"), env=(("PHYBLOCK_CACHE", "taken/x"),), writes=("fresh",)),
 )  # fmt: skip
