@@ -104,5 +104,5 @@ def _bars(ax: Axes, values: NDArray[np.float64], longest: float, color: str) -> 
 def _subtitle(run: Run, track: str, clusters: int) -> str:
     suite = f"Suite {run.design.suite.name}; " if run.design.suite.name else ""
     notes = kind_of(track).report().notes(run)[:1]
-    how = "".join(note.partition(".")[0] + "; " for note in notes)
+    how = "".join(note.partition(". ")[0].rstrip(".") + "; " for note in notes)
     return f"{suite}{how}lines: 95 % intervals over {clusters} base scenes"

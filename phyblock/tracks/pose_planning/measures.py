@@ -110,12 +110,13 @@ def _plan_f1(setting: Setting, meaning: str) -> Measure:
     return Measure(name, heading, PLANS[setting], f1_of, meaning, over="steps")
 
 
-_WITHIN = "right steps within a distance of their place and 15 degrees"
+_WITHIN = "right steps within {} of their place and 15 degrees"
 
 POSE_PLANNING_MEASURES = (
     Measure(
         "f1_c", "F1 in C", RIGHT, partial(_f1, "absolute", TOLERANCES_CM),
-        f"{_WITHIN}: mean of F1 at 0.5, 1, 2 and 4 cm", over="steps", floors=POSE_FLOORS,
+        _WITHIN.format("0.5, 1, 2 and 4 cm") + ", the mean of the four", over="steps",
+        floors=POSE_FLOORS,
     ),
     Measure(
         "f1_c_aligned", "F1 in C, aligned", RIGHT, partial(_f1, "aligned", TOLERANCES_CM),
@@ -125,7 +126,7 @@ POSE_PLANNING_MEASURES = (
     *(
         Measure(
             tolerance_measure(frame, cm), f"F1 at {cm:g} cm{', aligned' * (frame == 'aligned')}",
-            RIGHT, partial(_f1, frame, (cm,)), f"{_WITHIN} of {cm:g} cm", over="steps",
+            RIGHT, partial(_f1, frame, (cm,)), _WITHIN.format(f"{cm:g} cm"), over="steps",
             in_tables=frame == "absolute",
         )
         for frame in POSE_FRAMES

@@ -31,6 +31,7 @@ __all__ = [
 ]
 
 _INTERVAL = "95 % CI"
+_INTERVAL_C = f"C, {_INTERVAL}"
 _SETTINGS = {"f1_a": "A", "f1_b": "B", "f1_c": "C"}
 _CURVE = {tolerance_measure("absolute", cm): f"{cm:g} cm" for cm in TOLERANCES_CM}
 _CARRIED = {
@@ -79,7 +80,7 @@ def table_c_view(table: pd.DataFrame, run: Run) -> TextTable:
     """Table C out of `table_c_frame`."""
     columns = [Column("Model", is_text=True)]
     columns += [Column(name, "F1 in") for name in _SETTINGS.values()]
-    columns += [Column(_INTERVAL, "F1 in")]
+    columns += [Column(_INTERVAL_C, "F1 in")]
     columns += [Column(name, "F1 in C at") for name in _CURVE.values()]
     columns += [Column("aligned", "F1 in C"), Column("cm", "Off by")]
     columns += [Column(name, "Carried out") for name in _CARRIED.values()]
@@ -103,7 +104,8 @@ def table_c_view(table: pd.DataFrame, run: Run) -> TextTable:
             f"One reply, scored three times: A and B leave out the poses, matcher "
             f"{run.design.matcher}; C is the mean of F1 at 0.5, 1, 2 and 4 cm and 15 degrees. "
             f"{level_name(OVERALL)}; micro averages.",
-            "Aligned: after the best shift over the floor and turn of the whole plan. Stand: steps "
+            "Aligned: after the best shift over the floor and turn of the whole plan. Off by: mean "
+            "distance of steps from the blocks that they stand for. Stand: steps "
             "carried out that stay and let others stay. Reached: blocks of the goal in their "
             "places in the end. IoU: of all that stands then with the goal.",
         ),
@@ -113,7 +115,7 @@ def table_c_view(table: pd.DataFrame, run: Run) -> TextTable:
 def table_c_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
     """All of it, else without tolerances, else without intervals too."""
     short = view.without(list(_CURVE.values()))
-    return view, short, short.without([_INTERVAL, "cm"])
+    return view, short, short.without([_INTERVAL_C, "cm"])
 
 
 @made_once_copied
