@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import date, timedelta
 
+from phyblock.addresses import host_of
 from phyblock.errors import BudgetReachedError, Problem, SpecError
 from phyblock.models.base import Image, Reply, Request, Usage
 from phyblock.models.config import ModelConfig
@@ -35,6 +36,13 @@ __all__ = [
     "reply_cost_usd",
     "require_prices",
 ]
+
+_HALVING_HOSTS = {
+    "openai": "api.openai.com",
+    "anthropic": "api.anthropic.com",
+    "gemini": "generativelanguage.googleapis.com",
+}
+"""By provider: the host whose batches cost half, as their price lists of November 2026 say."""
 
 _TYPICAL_REPLY_TOKENS = 500
 _TYPICAL_THINKING_TOKENS = 4_000
@@ -67,12 +75,22 @@ class Estimate:
 
 def prices_of(config: ModelConfig) -> Prices | None:
     """Prices of a model: its own, before their first day those of litellm's map; None where neither
-    knows any. Baselines and recordings cost nothing.
+    knows any. Baselines and recordings cost nothing. Batches whose price nobody says cost half at
+    the provider's own address; elsewhere nothing is known of them, and they cost what others do.
     """
     if config.kind != "litellm":
         return FREE
     mapped = mapped_prices(config)
-    return mapped if config.prices is None else config.prices.after(mapped)
+    prices = mapped if config.prices is None else config.prices.after(mapped)
+    return prices.with_halves() if prices is not None and _halves_batches(config) else prices
+
+
+def _halves_batches(config: ModelConfig) -> bool:
+    """Whether a model is served where batches are known to cost half."""
+    own = _HALVING_HOSTS.get(config.provider)
+    if config.api_base is not None:
+        return host_of(config.api_base) == own
+    return own is not None and not config.has_address
 
 
 def require_prices(config: ModelConfig) -> Prices:

@@ -21,10 +21,13 @@ from phyblock.models import (
     Budget,
     ModelConfig,
     ModelEvent,
+    Price,
     Prices,
+    Rate,
     Reply,
     ReplyCache,
     Request,
+    Tariff,
 )
 from phyblock.models.batches import batch_protocol
 from phyblock.models.batches.protocol import BatchProtocol
@@ -45,7 +48,7 @@ SERVERS: dict[str, type[BatchServer]] = {
     "gemini": GeminiBatches,
 }
 PROTOCOLS = list(SERVERS)
-PRICES = Prices.flat(1000.0, 1000.0)
+PRICES = Prices((Tariff((Rate(Price(1000.0, 1000.0), batch=Price(500.0, 500.0)),)),))
 
 
 @pytest.fixture(autouse=True)

@@ -1,4 +1,4 @@
-"""Asking in the batches of providers: slower, at half the price, and never twice.
+"""Asking in the batches of providers: slower, cheaper where the provider says so, and never twice.
 
 `protocol` says what a provider's batches are, with a module for each; `ledger` what is on disk;
 `sending`, `following` and `results` are a batch's way; `model` is what a run asks.
