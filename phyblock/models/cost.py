@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from datetime import date, timedelta
 
 from phyblock.addresses import host_of
-from phyblock.errors import BudgetReachedError, Problem, SpecError
+from phyblock.errors import BudgetReachedError, ModelError, Problem, SpecError
 from phyblock.models.base import Image, Reply, Request, Usage
 from phyblock.models.config import ModelConfig
 from phyblock.models.keys import KEYLESS
@@ -21,6 +21,7 @@ from phyblock.models.payload import wire_params
 from phyblock.models.picture_tokens import picture_tokens
 from phyblock.models.price_map import map_entry, mapped_prices
 from phyblock.models.prices import FREE, Prices, today
+from phyblock.models.retry import is_success
 from phyblock.models.text_tokens import text_tokens
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "counted",
     "estimate",
     "is_billed",
+    "may_be_billed",
     "most_usd",
     "plausible",
     "prices_of",
@@ -125,9 +127,14 @@ def cost_usd(
     return None if price is None else price.cost(usage)
 
 
-def reply_cost_usd(prices: Prices | None, reply: Reply) -> float | None:
-    """US dollars of a reply that comes today, by whether it was asked for in a batch."""
-    return cost_usd(prices, reply.usage, today(), batched=reply.batched)
+def reply_cost_usd(prices: Prices | None, reply: Reply, day: date) -> float | None:
+    """US dollars of a reply that was asked for on a day, by whether that was in a batch."""
+    return cost_usd(prices, reply.usage, day, batched=reply.batched)
+
+
+def may_be_billed(error: ModelError) -> bool:
+    """Whether the server may have made a reply: it promised one, or was lost on the way."""
+    return error.sent in ("lost", "maybe") or is_success(error.status)
 
 
 def counted(reply: Reply, expected: Estimate) -> Reply:
@@ -142,10 +149,10 @@ def most_usd(
     """The most US dollars that a call can cost, its prompt `ratio` times its estimate.
 
     There is a margin on the prompt, as its tokens are estimated, and a day: a call that is sent
-    before midnight may be answered after it.
+    before midnight may be answered after it, and one of a batch a day after that.
     """
     prompt = expected.prompt_tokens * _PROMPT_MARGIN * ratio
-    days = (day, day + timedelta(days=1))
+    days = [day + timedelta(days=n) for n in range(3 if batched else 2)]
     known = [prices.at(one, math.ceil(prompt), batched=batched) for one in days]
     return max(p.most(prompt, expected.most_completion_tokens) for p in known if p is not None)
 

@@ -33,7 +33,7 @@ class Price:
     @property
     def is_free(self) -> bool:
         """Whether nothing is to be paid, whatever the numbers of tokens."""
-        return self.input_usd == self.output_usd == 0
+        return not any((self.input_usd, self.output_usd, self.cached_usd, self.cache_write_usd))
 
     def input_cost(self, prompt: int, cached: int = 0, written: int = 0) -> float:
         """US dollars of a prompt; `cached` and `written` are among its tokens."""

@@ -6,6 +6,7 @@ import asyncio
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from phyblock.models import (
     ReplyCache,
     Request,
     Tariff,
+    today,
 )
 from phyblock.models.batches import batch_protocol
 from phyblock.models.batches.protocol import BatchProtocol
@@ -320,6 +322,21 @@ def test_a_cost_limit_is_kept_by_the_dearest_case_of_what_is_sent(
     assert 0 < budget.spent_usd <= shares * most_usd or not first
     assert sum(one.billed_usd or 0.0 for one in answered) == pytest.approx(budget.spent_usd)
     assert first or isinstance(ended[0], BudgetReachedError)
+
+
+def test_an_answer_costs_what_the_day_of_its_sending_asked_for(disk: Disk) -> None:
+    dearer = Tariff((Rate(Price(9000.0, 9000.0), batch=Price(4500.0, 4500.0)),), today())
+    prices = Prices((*PRICES.tariffs, dearer))
+    with Running(OpenAIBatches(batch=BatchFaults(calls={"results": ("400",)}))) as running:
+        config = replace(config_at("direct", running.url), prices=prices)
+        (stopped,) = run_command(config, disk, requests_of(1))
+        assert isinstance(stopped, UnavailableError)
+        sent = datetime.now(timezone.utc) - timedelta(days=1)
+        time = sent.strftime("%Y-%m-%dT%H:%M:%SZ")
+        disk.lines = [line.model_copy(update={"time": time}) for line in disk.lines]
+        (reply,) = run_command(config, disk, requests_of(1))
+    assert isinstance(reply, Reply)
+    assert reply.cost_usd == pytest.approx((1000 + 40) * 500 / 1e6)
 
 
 def test_what_is_in_the_cache_is_not_asked_and_answers_go_there(route: str, tmp_path: Path) -> None:

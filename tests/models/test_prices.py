@@ -141,13 +141,15 @@ def test_the_price_of_a_day_is_the_last_that_has_begun(begins: list[int], asked:
 def test_no_call_costs_more_than_the_most(
     price: Price, prompt: int, completion: int, data: st.DataObject
 ) -> None:
-    dearer = Tariff((Rate(price), Rate(Price(50.0, 60.0), 100_000)), DAY + timedelta(days=1))
+    batched = data.draw(st.booleans())
+    days = [DAY + timedelta(days=n) for n in range(3 if batched else 2)]
+    dearer = Tariff((Rate(price), Rate(Price(50.0, 60.0), 100_000)), days[-1])
     both = Prices((Tariff((Rate(price),)), dearer))
-    most = most_usd(both, Estimate(prompt, 1, completion), DAY)
+    most = most_usd(both, Estimate(prompt, 1, completion), DAY, batched=batched)
     written = data.draw(st.integers(0, prompt))
     usage = Usage(prompt, completion, None, 0, written)
-    for day in (DAY, DAY + timedelta(days=1)):
-        cost = cost_usd(both, usage, day)
+    for day in days:
+        cost = cost_usd(both, usage, day, batched=batched)
         assert cost is not None
         assert cost <= most * (1 + 1e-9)
 

@@ -11,7 +11,7 @@ import asyncio
 import secrets
 from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass, field
-from datetime import datetime, timezone
+from datetime import date, datetime, timezone
 from pathlib import Path
 
 from phyblock.models.batches.results import Results
@@ -71,13 +71,20 @@ class Batch:
         return self.id or self.token
 
     @property
+    def created(self) -> datetime:
+        """When it was about to be sent, in UTC."""
+        time = datetime.strptime(self.intent.time, "%Y-%m-%dT%H:%M:%SZ")
+        return time.replace(tzinfo=timezone.utc)
+
+    @property
     def created_s(self) -> float:
-        """When it was about to be sent, Unix time."""
-        return (
-            datetime.strptime(self.intent.time, "%Y-%m-%dT%H:%M:%SZ")
-            .replace(tzinfo=timezone.utc)
-            .timestamp()
-        )
+        """As Unix time."""
+        return self.created.timestamp()
+
+    @property
+    def day(self) -> date:
+        """The day by which its answers are priced, whenever they are read."""
+        return self.created.date()
 
     def most_usd(self, key: str) -> float:
         """What one of its requests can cost."""
