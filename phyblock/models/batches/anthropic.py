@@ -4,7 +4,8 @@ A batch has no name of ours, so that one whose making was cut off is found by wh
 answer. Sources, read in November 2026: Anthropic, guide "Batch processing" (100,000 requests or
 256 MB, 24 hours, errors and requests that expired are not billed, results in any order) and API
 reference of message batches (`processing_status`, `request_counts`, results at
-`/{id}/results`, lists with `after_id`; `custom_id` of at most 64 letters, digits, dashes and underscores).
+`/{id}/results`, lists with `after_id`; `custom_id` of at most 64 letters, digits, dashes and
+underscores).
 """
 
 from __future__ import annotations
