@@ -262,7 +262,7 @@ class Budget:
 
         Returns what was counted [US dollars].
         """
-        held = self._held.pop(reservation, 0.0)
+        held = self._held.pop(reservation)
         counted = usd if usd is not None and _is_amount(usd) else held
         self._spent_usd += counted
         self._changed.set()
@@ -281,11 +281,18 @@ class Budget:
         return onto
 
     def settle_part(self, reservation: int, part_usd: float, usd: float | None) -> float:
-        """As `settle`, of one call among those that a reservation is for."""
+        """As `settle`, of one call among those that a reservation is for, the last of which ends
+        it; what is read again may have none any more.
+        """
         left_usd = self._held.pop(reservation, 0.0) - part_usd
         if left_usd > _NOTHING_USD:
             self._held[reservation] = left_usd
         return self.settle(self.hold(part_usd), usd)
+
+    def settle_rest(self, reservation: int, usd: float | None) -> None:
+        """As `settle`, of all calls of a reservation that are not settled, if there are any."""
+        if reservation in self._held:
+            self.settle(reservation, usd)
 
     def learn(self, model: str, expected: Estimate, usage: Usage) -> None:
         """Compare an estimate with what the provider counted, where that can be true."""

@@ -331,6 +331,8 @@ def test_an_answer_costs_what_the_day_of_its_sending_asked_for(disk: Disk) -> No
         config = replace(config_at("direct", running.url), prices=prices)
         (stopped,) = run_command(config, disk, requests_of(1))
         assert isinstance(stopped, UnavailableError)
+        assert disk.lines[0].most_usd
+        assert not list(disk.folder.rglob("*.requests"))
         sent = datetime.now(timezone.utc) - timedelta(days=1)
         time = sent.strftime("%Y-%m-%dT%H:%M:%SZ")
         disk.lines = [line.model_copy(update={"time": time}) for line in disk.lines]
@@ -394,8 +396,13 @@ def test_a_kill_at_any_moment_loses_nothing_and_asks_nothing_twice(
             disk.moment, server.moment = killing.here, killing.there
             is_over = asyncio.run(killing.run(command(config, disk, requests)))
             disk.moment, server.moment = None, lambda *_: None
+            if disk.events == ["intended"]:
+                # What a process leaves that has no time to tidy up.
+                left = disk.files().folder / f"{disk.lines[0].batch}.requests"
+                left.write_bytes(b"{}")
             again = run_command(config, disk, requests, budget=Budget(1e9))
             assert len(texts(again)) == 2
+            assert not list(disk.folder.rglob("*.requests"))
         assert once(server, 2), killing.names[at]
         if is_over:
             moments = at

@@ -35,14 +35,14 @@ class UnsureError(UnavailableError):
 
 class Draft:
     """A batch that is being written into a file; `keys` are its requests with the most that each
-    can cost [US dollars], `held` is its reservation in the budget.
+    can cost [US dollars], None where no price is known; `held` is its reservation in the budget.
     """
 
     def __init__(self, protocol: BatchProtocol, folder: Path, *, seeded: bool) -> None:
         self.seeded = seeded
         self.token = new_token()
-        self.path = folder / f"{self.token}.requests"
-        self.keys: dict[str, float] = {}
+        self.path = _requests_file(folder, self.token)
+        self.keys: dict[str, float | None] = {}
         self.held: int | None = None
         self._protocol = protocol
         self._bytes = 0
@@ -59,7 +59,7 @@ class Draft:
         has_room = len(self.keys) < self._protocol.most_requests
         return has_room and size <= self._protocol.most_bytes and written.seeded == self.seeded
 
-    def add(self, key: str, written: Written, most_usd: float) -> None:
+    def add(self, key: str, written: Written, most_usd: float | None) -> None:
         """Write a request, which can cost so much."""
         line = self._line(written)
         self._write(self._protocol.between if self.keys else b"")
@@ -112,8 +112,15 @@ class Sender:
         Raises UnavailableError where it cannot be sent, and nothing was asked; UnsureError where
         that is not known: the next command finds out.
         """
+        try:
+            return await self._send(draft)
+        finally:
+            draft.drop()
+
+    async def _send(self, draft: Draft) -> Batch:
         draft.close()
-        most_usd = () if draft.held is None else draft.keys.values()
+        known = [usd for usd in draft.keys.values() if usd is not None]
+        most_usd = known if len(known) == len(draft.keys) else []
         batch = await self._ledger.intend(draft.token, draft.keys, most_usd, seeded=draft.seeded)
         batch.held = draft.held
         try:
@@ -125,8 +132,6 @@ class Sender:
             raise UnavailableError(
                 f"a batch could not be sent: {error}", status=error.status, sent=error.sent
             ) from None
-        finally:
-            draft.drop()
         await self._ledger.tell(batch, "created", id=status.id)
         return batch
 
@@ -135,6 +140,7 @@ class Sender:
 
         Raises UnavailableError where that cannot be found out.
         """
+        _requests_file(self._files.folder, batch.token).unlink(missing_ok=True)
         # A request that was cut off may still be worked on over there.
         status = await self._find(batch, time.time() + 2 * self._files.poll_s)
         if status is None:
@@ -212,6 +218,11 @@ class Sender:
             raise
         except ModelError as error:
             raise UnavailableError(str(error), status=error.status, sent=error.sent) from None
+
+
+def _requests_file(folder: Path, token: str) -> Path:
+    """Where a batch is written before it is sent."""
+    return folder / f"{token}.requests"
 
 
 def _named(status: BatchStatus) -> BatchStatus:
