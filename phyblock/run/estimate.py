@@ -199,8 +199,12 @@ def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
     ]
     is_begun = holds_run(folder, plan.manifest)
     settled = _settled(plan, folder, rows) if is_begun else set()
-    lines = (line for _, line in BatchLines(folder)) if is_begun else ()
-    waiting = waiting_keys(lines)
+    lines = tuple(line for _, line in BatchLines(folder)) if is_begun else ()
+    waiting = {
+        model.name: waiting_keys(model.config, lines, folder)
+        for model in plan.models
+        if model.config.batch
+    }
     path = reply_cache_file()
     with ReplyCache(path) if use_cache and path.exists() else nullcontext() as cache:
         for tracks, variants in _alike(plan):
@@ -213,7 +217,15 @@ def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
                                 for seed in seeds
                                 for variant in variants
                             ]
-                            _add(row, model, samples, outlines, settled, cache, waiting)
+                            _add(
+                                row,
+                                model,
+                                samples,
+                                outlines,
+                                settled,
+                                cache,
+                                waiting.get(model.name, frozenset()),
+                            )
     return rows
 
 
@@ -275,7 +287,7 @@ def _add(
             if kept is not None:
                 row.cached += 1
                 row.add_reply(kept.usage.completion_tokens, kind)
-            elif is_real and config.batch and not waiting.isdisjoint(known_keys(config, sent)):
+            elif is_real and not waiting.isdisjoint(known_keys(config, sent)):
                 row.waiting += 1
             else:
                 row.add_call(tokens, kind)

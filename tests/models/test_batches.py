@@ -29,7 +29,9 @@ from phyblock.models import (
     ReplyCache,
     Request,
     Tariff,
+    reply_key,
     today,
+    waiting_keys,
 )
 from phyblock.models.batches import batch_protocol
 from phyblock.models.batches.protocol import BatchProtocol
@@ -142,6 +144,18 @@ def test_each_line_that_fails_is_asked_again_or_ends_as_a_call_would(
     assert len(server.made) == 2
     assert len(server.made[1].requests) == 5
     assert any("holds lines 1 that cannot be read, 1 to what has an" in one.message for one in told)
+
+
+def test_only_what_failed_in_a_batch_that_has_ended_is_left_to_ask(route: str, disk: Disk) -> None:
+    requests = requests_of(2)
+    faults = BatchFaults(lines={0: {1: "500"}}, calls={"create": ("", "400")})
+    with Running(SERVERS[route](batch=faults)) as running:
+        config = config_at(route, running.url)
+        answered, failed = run_command(config, disk, requests)
+    assert isinstance(answered, Reply)
+    assert isinstance(failed, UnavailableError)
+    waiting = waiting_keys(config, disk.lines, disk.folder)
+    assert waiting == {reply_key(config, requests[0])}
 
 
 def test_a_question_that_always_fails_ends_after_the_usual_attempts(disk: Disk) -> None:

@@ -5,7 +5,8 @@
 """
 
 from phyblock.models.batches.choice import batch_protocol
-from phyblock.models.batches.ledger import BatchFiles, under_way, waiting_keys
+from phyblock.models.batches.ledger import BatchFiles, under_way
 from phyblock.models.batches.model import BatchModel, BatchParts
+from phyblock.models.batches.waiting import waiting_keys
 
 __all__ = ["BatchFiles", "BatchModel", "BatchParts", "batch_protocol", "under_way", "waiting_keys"]

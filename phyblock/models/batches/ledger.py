@@ -17,7 +17,7 @@ from pathlib import Path
 from phyblock.models.batches.results import Results
 from phyblock.records.others import BatchEvent, BatchLine
 
-__all__ = ["Batch", "BatchFiles", "Ledger", "new_token", "under_way", "waiting_keys"]
+__all__ = ["Batch", "BatchFiles", "Ledger", "new_token", "under_way"]
 
 _FOLDER = "batches"
 
@@ -38,6 +38,10 @@ class BatchFiles:
     def folder(self) -> Path:
         """Where requests and answers lie."""
         return self.run_folder / _FOLDER
+
+    def answers(self, token: str) -> Path:
+        """The answers of a batch, once it has ended."""
+        return self.folder / f"{token}.answers.jsonl"
 
 
 @dataclass(eq=False)
@@ -161,17 +165,6 @@ class Ledger:
 def new_token() -> str:
     """A name that no other batch has; what the providers allow in names and boundaries."""
     return f"pb{secrets.token_hex(12)}"
-
-
-def waiting_keys(lines: Iterable[BatchLine]) -> frozenset[str]:
-    """Requests that went out in batches, by their keys in the reply cache."""
-    sent: dict[str, BatchLine] = {}
-    for line in lines:
-        if line.event == "intended":
-            sent[line.batch] = line
-        elif line.event == "lost":
-            sent.pop(line.batch, None)
-    return frozenset(key for line in sent.values() for key in line.keys)
 
 
 def under_way(lines: Iterable[BatchLine]) -> dict[str, str]:
