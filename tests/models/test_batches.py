@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta, timezone
@@ -40,7 +41,7 @@ from tests.models.batching import Disk, Killing, command, run_command
 from tests.models.factory import QUICK, ask, make_model, make_request
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.anthropic_batches import AnthropicBatches
-from tests.servers.batches import BatchFaults, BatchServer
+from tests.servers.batches import BatchFaults, BatchServer, Made
 from tests.servers.chassis import Running
 from tests.servers.gemini_batches import GeminiBatches
 from tests.servers.openai_batches import OpenAIBatches
@@ -391,6 +392,45 @@ def test_a_name_that_the_provider_forgets_is_found_by_what_was_answered(disk: Di
         requests = [make_request(f"{n:03d}", seed=5) for n in range(2)]
         assert len(texts(run_command(config, disk, requests))) == 2
         assert once(server, 2)
+
+
+class Crowded(OpenAIBatches):
+    """Forgets names; at a moment another batch is there, as large and as new."""
+
+    forgets_names = True
+    other = Made("other", "", [("other-0", {}), ("other-1", {})], 99, 0.0)
+
+    def begin(self, at: str, **fields: Any) -> None:
+        self.other = replace(self.other, created_s=time.time(), **fields)
+        self.moment = lambda _, name: self.made.append(self.other) if name == at else None
+
+
+def test_a_nameless_batch_is_found_beside_one_that_never_ends(disk: Disk) -> None:
+    told: list[ModelEvent] = []
+    with Running(Crowded(batch=BatchFaults(calls={"create": ("done-reset",)}))) as running:
+        config, server = config_at("direct", running.url), running.server
+        assert isinstance(server, Crowded)
+        server.begin("create done", looks=-(10**6))
+        assert len(texts(run_command(config, disk, requests_of(2), told=told))) == 2
+        assert once(server, 2)
+    assert any("waiting for that" in event.message for event in told)
+
+
+def test_a_batch_that_cannot_be_told_from_ours_stops_the_model_with_what_to_do(disk: Disk) -> None:
+    calls = {"create": ("reset",), "results": ("404",)}
+    with Running(Crowded(batch=BatchFaults(calls=calls))) as running:
+        config, server = config_at("direct", running.url), running.server
+        assert isinstance(server, Crowded)
+        server.begin("create arrived", looks=99, state="ended", lines=['{"response": null}'])
+        (first, _) = run_command(config, disk, requests_of(2))
+        assert isinstance(first, UnsureError)
+        assert f"remove the lines of {disk.lines[0].batch} from batches.jsonl" in str(first)
+        assert not server.asked
+        server.moment = lambda *_: None
+        assert len(texts(run_command(config, disk, requests_of(2)))) == 2
+        assert once(server, 2)
+        # Unread, read once and never again, and ours.
+        assert server.calls.count("results") == 3
 
 
 # What a kill cuts off in litellm is closed when it is collected.

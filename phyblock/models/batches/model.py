@@ -60,7 +60,7 @@ class BatchModel:
         self._parts = parts
         protocol, files, policy = parts.protocol, parts.files, parts.policy
         self._ledger = Ledger(config.name, files)
-        self._sender = Sender(protocol, self._ledger, files, policy)
+        self._sender = Sender(protocol, self._ledger, files, policy, self._tell)
         self._follower = Follower(protocol, self._ledger, files, self._sender, policy, self._tell)
         self._wording = Wording(config, protocol, parts.transport, self._say_seedless)
         self._purse = Purse(config, parts.budget, parts.prices)
