@@ -104,13 +104,18 @@ def _a_million(price: Price) -> str:
 
 def _replies(rows: Sequence[Estimate]) -> str:
     """How long replies are taken to be."""
-    measured = [
-        f"of {row.model} {row.mean_reply_tokens:,.0f} tokens (the mean of {row.replies:,})"
-        for row in rows
-        if row.mean_reply_tokens is not None
-    ]
-    usual = ["of usual length"] if len(measured) < len(rows) else []
-    return f"replies {', '.join((*measured, *usual))}"
+    measured, usual = [], False
+    for row in rows:
+        for kind, lengths in row.lengths.items():
+            if not lengths.has_calls:
+                continue
+            if lengths.mean is None:
+                usual = True
+                continue
+            asked = f" in {kind}" if len(row.lengths) > 1 else ""
+            mean = f"{lengths.mean:,.0f} tokens (the mean of {lengths.replies:,})"
+            measured.append(f"of {row.model}{asked} {mean}")
+    return f"replies {', '.join((*measured, *['of usual length'] * usual))}"
 
 
 def _ways(plan: RunPlan) -> str:

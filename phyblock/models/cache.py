@@ -33,6 +33,9 @@ __all__ = ["CacheBusyError", "CacheStats", "ReplyCache", "former_key", "known_ke
 SCHEMA = 1
 """Version of the file's layout and of what enters a key."""
 
+_LATER_FIELDS = frozenset({"batched", "cached_tokens", "cache_write_tokens"})
+"""Fields of a reply and its usage that came after the first files."""
+
 _BUSY_TIMEOUT_S = 5.0
 _BUSY = re.compile(r"\b(locked|busy)\b")
 _FOREIGN = "belongs to another version of phyblock, or is no reply cache"
@@ -164,11 +167,7 @@ class ReplyCache:
             return False
         # What this run paid is no part of what another finds.
         reply = replace(reply, billed_usd=None)
-        fields = asdict(reply)
-        if not reply.batched:
-            # Earlier versions know no such field, and share the file.
-            del fields["batched"]
-        text = json.dumps(fields, ensure_ascii=True, separators=(",", ":"))
+        text = json.dumps(_fields(reply), ensure_ascii=True, separators=(",", ":"))
         with self._explained():
             self._db.execute(
                 "INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?)",
@@ -256,6 +255,18 @@ class ReplyCache:
     def _said(self, message: str, found: str = "", allowed: str = "", hint: str = _HINT) -> Problem:
         where = f"reply cache {self.path}"
         return Problem(where, message, found=found, allowed=allowed, hint=hint)
+
+
+def _fields(reply: Reply) -> dict[str, Any]:
+    """What is kept of a reply, without later fields that say nothing: earlier versions share the
+    file, and take a reply with a field that they do not know for broken.
+    """
+    fields = asdict(reply)
+    for place in (fields, fields["usage"]):
+        for name in _LATER_FIELDS & place.keys():
+            if place[name] is None or place[name] is False:
+                del place[name]
+    return fields
 
 
 def _reply(stored: dict[str, Any]) -> Reply:

@@ -19,7 +19,14 @@ from phyblock.models.base import Reply, Request
 from phyblock.models.breaker import shows_outage
 from phyblock.models.cache import known_keys, reply_key
 from phyblock.models.config import ModelConfig
-from phyblock.models.cost import Budget, Estimate, counted, estimate, reply_cost_usd
+from phyblock.models.cost import (
+    Budget,
+    Estimate,
+    counted,
+    estimate,
+    may_be_billed,
+    reply_cost_usd,
+)
 from phyblock.models.events import EventKind, ModelEvent, Observer
 from phyblock.models.formats import FORMAT_HINT, refuses_format
 from phyblock.models.halt import Halt, HaltedError
@@ -29,11 +36,11 @@ from phyblock.models.pace import Mark, is_late, says_too_much
 from phyblock.models.payload import wire_params
 from phyblock.models.prices import Prices, today
 from phyblock.models.replicas import Replica, Replicas
-from phyblock.models.retry import RetryPolicy, is_success, with_retries
+from phyblock.models.retry import RetryPolicy, with_retries
 from phyblock.models.shared_cache import SharedCache, Turn
 from phyblock.models.transport import Call, SeedRefusedError
 
-__all__ = ["ChatModel", "ChatParts", "may_be_billed"]
+__all__ = ["ChatModel", "ChatParts"]
 
 
 @dataclass(frozen=True)
@@ -337,7 +344,7 @@ class ChatModel:
 
     def _cost(self, reply: Reply) -> float | None:
         """US dollars of a reply that comes today."""
-        return reply_cost_usd(self._parts.prices, reply)
+        return reply_cost_usd(self._parts.prices, reply, today())
 
     def _on_retry(self, error: RetryableError, wait_s: float) -> None:
         self._tell("retry", str(error), wait_s=wait_s, status=error.status)
@@ -357,11 +364,6 @@ class ChatModel:
         status: int | None = None,
     ) -> None:
         self._parts.observer(ModelEvent(self.name, kind, message, wait_s, limit, status))
-
-
-def may_be_billed(error: ModelError) -> bool:
-    """Whether the server may have made a reply: it promised one, or was lost on the way."""
-    return error.sent in ("lost", "maybe") or is_success(error.status)
 
 
 def _total(reply: Reply) -> int | None:

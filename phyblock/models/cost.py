@@ -12,7 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import date, timedelta
 
-from phyblock.errors import BudgetReachedError, Problem, SpecError
+from phyblock.addresses import host_of
+from phyblock.errors import BudgetReachedError, ModelError, Problem, SpecError
 from phyblock.models.base import Image, Reply, Request, Usage
 from phyblock.models.config import ModelConfig
 from phyblock.models.keys import KEYLESS
@@ -20,6 +21,7 @@ from phyblock.models.payload import wire_params
 from phyblock.models.picture_tokens import picture_tokens
 from phyblock.models.price_map import map_entry, mapped_prices
 from phyblock.models.prices import FREE, Prices, today
+from phyblock.models.retry import is_success
 from phyblock.models.text_tokens import text_tokens
 
 __all__ = [
@@ -29,12 +31,20 @@ __all__ = [
     "counted",
     "estimate",
     "is_billed",
+    "may_be_billed",
     "most_usd",
     "plausible",
     "prices_of",
     "reply_cost_usd",
     "require_prices",
 ]
+
+_HALVING_HOSTS = {
+    "openai": "api.openai.com",
+    "anthropic": "api.anthropic.com",
+    "gemini": "generativelanguage.googleapis.com",
+}
+"""By provider: the host whose batches cost half, as their price lists of November 2026 say."""
 
 _TYPICAL_REPLY_TOKENS = 500
 _TYPICAL_THINKING_TOKENS = 4_000
@@ -67,12 +77,22 @@ class Estimate:
 
 def prices_of(config: ModelConfig) -> Prices | None:
     """Prices of a model: its own, before their first day those of litellm's map; None where neither
-    knows any. Baselines and recordings cost nothing.
+    knows any. Baselines and recordings cost nothing. Batches whose price nobody says cost half at
+    the provider's own address; elsewhere nothing is known of them, and they cost what others do.
     """
     if config.kind != "litellm":
         return FREE
     mapped = mapped_prices(config)
-    return mapped if config.prices is None else config.prices.after(mapped)
+    prices = mapped if config.prices is None else config.prices.after(mapped)
+    return prices.with_halves() if prices is not None and _halves_batches(config) else prices
+
+
+def _halves_batches(config: ModelConfig) -> bool:
+    """Whether a model is served where batches are known to cost half."""
+    own = _HALVING_HOSTS.get(config.provider)
+    if config.api_base is not None:
+        return host_of(config.api_base) == own
+    return own is not None and not config.has_address
 
 
 def require_prices(config: ModelConfig) -> Prices:
@@ -107,9 +127,14 @@ def cost_usd(
     return None if price is None else price.cost(usage)
 
 
-def reply_cost_usd(prices: Prices | None, reply: Reply) -> float | None:
-    """US dollars of a reply that comes today, by whether it was asked for in a batch."""
-    return cost_usd(prices, reply.usage, today(), batched=reply.batched)
+def reply_cost_usd(prices: Prices | None, reply: Reply, day: date) -> float | None:
+    """US dollars of a reply that was asked for on a day, by whether that was in a batch."""
+    return cost_usd(prices, reply.usage, day, batched=reply.batched)
+
+
+def may_be_billed(error: ModelError) -> bool:
+    """Whether the server may have made a reply: it promised one, or was lost on the way."""
+    return error.sent in ("lost", "maybe") or is_success(error.status)
 
 
 def counted(reply: Reply, expected: Estimate) -> Reply:
@@ -124,10 +149,10 @@ def most_usd(
     """The most US dollars that a call can cost, its prompt `ratio` times its estimate.
 
     There is a margin on the prompt, as its tokens are estimated, and a day: a call that is sent
-    before midnight may be answered after it.
+    before midnight may be answered after it, and one of a batch a day after that.
     """
     prompt = expected.prompt_tokens * _PROMPT_MARGIN * ratio
-    days = (day, day + timedelta(days=1))
+    days = [day + timedelta(days=n) for n in range(3 if batched else 2)]
     known = [prices.at(one, math.ceil(prompt), batched=batched) for one in days]
     return max(p.most(prompt, expected.most_completion_tokens) for p in known if p is not None)
 
@@ -237,7 +262,7 @@ class Budget:
 
         Returns what was counted [US dollars].
         """
-        held = self._held.pop(reservation, 0.0)
+        held = self._held.pop(reservation)
         counted = usd if usd is not None and _is_amount(usd) else held
         self._spent_usd += counted
         self._changed.set()
@@ -256,11 +281,18 @@ class Budget:
         return onto
 
     def settle_part(self, reservation: int, part_usd: float, usd: float | None) -> float:
-        """As `settle`, of one call among those that a reservation is for."""
+        """As `settle`, of one call among those that a reservation is for, the last of which ends
+        it; what is read again may have none any more.
+        """
         left_usd = self._held.pop(reservation, 0.0) - part_usd
         if left_usd > _NOTHING_USD:
             self._held[reservation] = left_usd
         return self.settle(self.hold(part_usd), usd)
+
+    def settle_rest(self, reservation: int, usd: float | None) -> None:
+        """As `settle`, of all calls of a reservation that are not settled, if there are any."""
+        if reservation in self._held:
+            self.settle(reservation, usd)
 
     def learn(self, model: str, expected: Estimate, usage: Usage) -> None:
         """Compare an estimate with what the provider counted, where that can be true."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date, datetime, timezone
 
 from phyblock.models.base import Usage
@@ -33,7 +33,7 @@ class Price:
     @property
     def is_free(self) -> bool:
         """Whether nothing is to be paid, whatever the numbers of tokens."""
-        return self.input_usd == self.output_usd == 0
+        return not any((self.input_usd, self.output_usd, self.cached_usd, self.cache_write_usd))
 
     def input_cost(self, prompt: int, cached: int = 0, written: int = 0) -> float:
         """US dollars of a prompt; `cached` and `written` are among its tokens."""
@@ -73,7 +73,7 @@ class Price:
 @dataclass(frozen=True)
 class Rate:
     """Prices of calls whose prompts are longer than `above_tokens`; `batch` of those in batches,
-    None: half of the others.
+    None: as of the others.
     """
 
     price: Price
@@ -82,7 +82,7 @@ class Rate:
 
     def of(self, *, batched: bool) -> Price:
         """The price of a call."""
-        return self.price if not batched else self.batch or self.price.halved()
+        return self.batch if batched and self.batch is not None else self.price
 
 
 @dataclass(frozen=True)
@@ -133,10 +133,25 @@ class Prices:
             return self
         return Prices((*earlier.tariffs, *self.tariffs))
 
+    def with_halves(self) -> Prices:
+        """These, with half of each for batches where nothing else is said of them."""
+        tariffs = (
+            replace(
+                tariff,
+                rates=tuple(
+                    rate if rate.batch is not None else replace(rate, batch=rate.price.halved())
+                    for rate in tariff.rates
+                ),
+            )
+            for tariff in self.tariffs
+        )
+        return Prices(tuple(tariffs))
+
     @property
     def is_free(self) -> bool:
         """Whether nothing is ever to be paid."""
-        return all(rate.price.is_free for tariff in self.tariffs for rate in tariff.rates)
+        rates = [rate for tariff in self.tariffs for rate in tariff.rates]
+        return all(rate.of(batched=batched).is_free for rate in rates for batched in (False, True))
 
 
 FREE = Prices.flat(0.0, 0.0)

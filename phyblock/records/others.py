@@ -68,7 +68,7 @@ class BatchLine(Line):
     keys: tuple[str, ...] = ()
     """Of an intended one: the requests in their order, by their keys in the reply cache."""
     most_usd: tuple[Usd, ...] = ()
-    """Of an intended one under a cost limit: what each of them can cost."""
+    """Of an intended one: what each of them can cost, empty where no price is known."""
     seeded: bool = True
     """Of an intended one: whether seeds are sent."""
     words: str = ""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import date, timedelta
 from pathlib import Path
 
@@ -42,13 +43,62 @@ _SOON = timedelta(days=14)
 
 
 @dataclass
+class ReplyLengths:
+    """Tokens of replies to questions of one kind: `replies` that are there already and tell them,
+    `tokens` in all, and those to come.
+
+    `_coming` counts calls by the length of a usual reply, the longest possible, and dollars a
+    token.
+    """
+
+    replies: int = 0
+    tokens: int = 0
+    _coming: Counter[tuple[int, int, float]] = field(default_factory=Counter)
+
+    def add_call(self, expected: CallEstimate, usd_a_token: float) -> None:
+        """Count a reply to come."""
+        self._coming[expected.completion_tokens, expected.most_completion_tokens, usd_a_token] += 1
+
+    def add_reply(self, tokens: int) -> None:
+        """Learn from a reply that is there."""
+        self.replies += 1
+        self.tokens += tokens
+
+    @property
+    def mean(self) -> float | None:
+        """Tokens of a reply, where enough are there to tell; else a usual length is taken."""
+        return self.tokens / self.replies if self.replies >= _ENOUGH_REPLIES else None
+
+    @property
+    def has_calls(self) -> bool:
+        """Whether replies are to come."""
+        return bool(self._coming)
+
+    @property
+    def coming_tokens(self) -> float:
+        """Tokens of the replies to come, none longer than it can be."""
+        return sum(length * calls for length, _, calls in self._lengths())
+
+    @property
+    def coming_usd(self) -> float:
+        """Dollars of these tokens."""
+        return sum(length * usd * calls for length, usd, calls in self._lengths())
+
+    def _lengths(self) -> Iterator[tuple[float, float, int]]:
+        mean = self.mean
+        for (usual, most, usd), calls in self._coming.items():
+            yield (usual if mean is None else min(mean, most)), usd, calls
+
+
+@dataclass
 class Estimate:
     """What one model would take; dollars are None where the price of `day` is not known.
 
     `done` samples have a record in the folder, `cached` ones a reply in the cache, `waiting` ones
     went out in batches, `calls` are left to make (none for recordings and baselines, which answer
-    here); with `batch` they go out in batches, at the price of these. `replies` are those that
-    are there already and tell their tokens, `reply_tokens` in all.
+    here); with `batch` they go out in batches, at the price of these. `lengths` are those of
+    replies by the kind of question, which is a track, and its way of asking where there are
+    several.
     """
 
     model: str
@@ -62,47 +112,36 @@ class Estimate:
     waiting: int = 0
     calls: int = 0
     prompt_tokens: int = 0
-    replies: int = 0
-    reply_tokens: int = 0
-    _usual_tokens: int = 0
+    lengths: defaultdict[str, ReplyLengths] = field(
+        default_factory=lambda: defaultdict(ReplyLengths)
+    )
     _prompt_usd: float = 0.0
-    _usual_usd: float = 0.0
-    _usd_a_token: float = 0.0
     _most_usd: float = 0.0
 
-    def add_call(self, expected: CallEstimate) -> None:
-        """Count one call that is left to make."""
+    def add_call(self, expected: CallEstimate, kind: str) -> None:
+        """Count one call that is left to make, of a kind of question."""
         self.calls += 1
         self.prompt_tokens += expected.prompt_tokens
-        self._usual_tokens += expected.completion_tokens
         price = (
             None
             if self.prices is None
             else self.prices.at(self.day, expected.prompt_tokens, batched=self.batch)
         )
+        self.lengths[kind].add_call(expected, 0.0 if price is None else price.output_cost(1))
         if self.prices is None or price is None:
             return
         self._prompt_usd += price.input_cost(expected.prompt_tokens)
-        self._usual_usd += price.output_cost(expected.completion_tokens)
-        self._usd_a_token += price.output_cost(1)
         self._most_usd += most_usd(self.prices, expected, self.day, batched=self.batch)
 
-    def add_reply(self, completion_tokens: int | None) -> None:
-        """Learn from a reply that is there."""
+    def add_reply(self, completion_tokens: int | None, kind: str) -> None:
+        """Learn from a reply that is there, to a kind of question."""
         if completion_tokens is not None:
-            self.replies += 1
-            self.reply_tokens += completion_tokens
-
-    @property
-    def mean_reply_tokens(self) -> float | None:
-        """Tokens of a reply, where enough are there to tell; else a usual length is taken."""
-        return self.reply_tokens / self.replies if self.replies >= _ENOUGH_REPLIES else None
+            self.lengths[kind].add_reply(completion_tokens)
 
     @property
     def completion_tokens(self) -> int:
         """Tokens of the replies to come."""
-        mean = self.mean_reply_tokens
-        return self._usual_tokens if mean is None else round(mean * self.calls)
+        return round(sum(lengths.coming_tokens for lengths in self.lengths.values()))
 
     @property
     def tariff(self) -> Tariff | None:
@@ -124,8 +163,7 @@ class Estimate:
     @property
     def reply_usd(self) -> float | None:
         """Dollars of the replies alone."""
-        mean = self.mean_reply_tokens
-        usd = self._usual_usd if mean is None else mean * self._usd_a_token
+        usd = sum(lengths.coming_usd for lengths in self.lengths.values())
         return None if self.tariff is None else usd
 
     @property
@@ -161,8 +199,12 @@ def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
     ]
     is_begun = holds_run(folder, plan.manifest)
     settled = _settled(plan, folder, rows) if is_begun else set()
-    lines = (line for _, line in BatchLines(folder)) if is_begun else ()
-    waiting = waiting_keys(lines)
+    lines = tuple(line for _, line in BatchLines(folder)) if is_begun else ()
+    waiting = {
+        model.name: waiting_keys(model.config, lines, folder)
+        for model in plan.models
+        if model.config.batch
+    }
     path = reply_cache_file()
     with ReplyCache(path) if use_cache and path.exists() else nullcontext() as cache:
         for tracks, variants in _alike(plan):
@@ -175,7 +217,15 @@ def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
                                 for seed in seeds
                                 for variant in variants
                             ]
-                            _add(row, model, samples, outlines, settled, cache, waiting)
+                            _add(
+                                row,
+                                model,
+                                samples,
+                                outlines,
+                                settled,
+                                cache,
+                                waiting.get(model.name, frozenset()),
+                            )
     return rows
 
 
@@ -205,8 +255,9 @@ def _settled(plan: RunPlan, folder: Path, rows: Sequence[Estimate]) -> set[str]:
     newest: dict[str, bool] = {}
     for _, record in run_records(folder, plan.manifest, plan.sample_ids()):
         newest[record.sample] = record.is_final
+        kind = _kind(record.track, record.way)
         for reply in record.replies:
-            by_model[record.model].add_reply(reply.usage.completion_tokens)
+            by_model[record.model].add_reply(reply.usage.completion_tokens, kind)
     return {sample for sample, is_final in newest.items() if is_final}
 
 
@@ -226,6 +277,7 @@ def _add(
         asked = [(replace(outline, params=config.params), real) for outline, real in outlines]
         expected = [(request, real, estimate_call(config, request)) for request, real in asked]
     for sample in samples:
+        kind = _kind(sample.track.name, sample.variant)
         if sample.id in settled:
             row.done += 1
             continue
@@ -234,11 +286,16 @@ def _add(
             kept = _kept(cache, config, sent) if is_real and cache is not None else None
             if kept is not None:
                 row.cached += 1
-                row.add_reply(kept.usage.completion_tokens)
-            elif is_real and config.batch and not waiting.isdisjoint(known_keys(config, sent)):
+                row.add_reply(kept.usage.completion_tokens, kind)
+            elif is_real and not waiting.isdisjoint(known_keys(config, sent)):
                 row.waiting += 1
             else:
-                row.add_call(tokens)
+                row.add_call(tokens, kind)
+
+
+def _kind(track: str, variant: Variant) -> str:
+    """What replies of one length have in common."""
+    return f"{track} {variant.shown.key}".strip()
 
 
 def _kept(cache: ReplyCache, config: ModelConfig, request: Request) -> Reply | None:

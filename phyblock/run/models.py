@@ -23,6 +23,7 @@ from phyblock.registry import baseline_names
 from phyblock.specs import (
     GROUP,
     RECORDED,
+    BatchRateSpec,
     LoadedSuite,
     ModelSpec,
     RateSpec,
@@ -154,7 +155,7 @@ def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfi
 def _prices(spec: ModelSpec) -> Prices | None:
     tariffs = tuple(
         Tariff(
-            (Rate(_price(price)), *(Rate(_price(tier), tier.above) for tier in price.tiers)),
+            (_rate(price), *(_rate(tier, tier.above) for tier in price.tiers)),
             price.since,
             price.place,
         )
@@ -163,7 +164,12 @@ def _prices(spec: ModelSpec) -> Prices | None:
     return Prices(tariffs) if tariffs else None
 
 
-def _price(spec: RateSpec) -> Price:
+def _rate(spec: RateSpec, above_tokens: int = 0) -> Rate:
+    batch = None if spec.batch is None else _price(spec.batch)
+    return Rate(_price(spec), above_tokens, batch)
+
+
+def _price(spec: BatchRateSpec) -> Price:
     return Price(spec.input, spec.output, spec.cached, spec.cache_write)
 
 

@@ -4,7 +4,7 @@ from phyblock.specs.groups import GROUP, group_names, unknown_model, with_member
 from phyblock.specs.loading import LoadedSuite, load_suite, resolve_models, suite_tracks
 from phyblock.specs.model import ModelSpec
 from phyblock.specs.models_file import load_models
-from phyblock.specs.prices import PriceSpec, RateSpec
+from phyblock.specs.prices import BatchRateSpec, PriceSpec, RateSpec
 from phyblock.specs.schema import models_schema, suite_schema
 from phyblock.specs.sections import (
     DatasetSpec,
@@ -20,6 +20,7 @@ __all__ = [
     "BUILTIN_DATASET",
     "GROUP",
     "RECORDED",
+    "BatchRateSpec",
     "DatasetSpec",
     "ImagesSpec",
     "LimitsSpec",

@@ -162,7 +162,7 @@ class ModelSpec(Section):
     batch: Flag = Field(
         default=False,
         description="Send requests in the provider's batches (OpenAI and servers with its /files "
-        "and /batches, Anthropic, Gemini): slower, by up to a day, and at half the price. How a "
+        "and /batches, Anthropic, Gemini): slower, by up to a day, and cheaper. How a "
         "model is asked is no part of a run: it may change when the run goes on.",
     )
     max_concurrency: Concurrency | None = Field(

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Priv
 
 from phyblock.specs.fields import Count, Section, refuse
 
-__all__ = ["PriceSpec", "PriceSpecs", "RateSpec"]
+__all__ = ["BatchRateSpec", "PriceSpec", "PriceSpecs", "RateSpec"]
 
 UsdPerMillion = Annotated[float, Field(strict=True, ge=0, le=1e9, allow_inf_nan=False)]
 
@@ -24,8 +24,8 @@ def _read_day(value: object) -> date:
     raise refuse("is no day", allowed="a day such as 2026-12-01")
 
 
-class RateSpec(Section):
-    """What tokens cost."""
+class BatchRateSpec(Section):
+    """What tokens cost in the provider's batches."""
 
     input: UsdPerMillion = Field(description="Prompt tokens [USD per million].")
     output: UsdPerMillion = Field(description="Reply tokens [USD per million].")
@@ -38,6 +38,16 @@ class RateSpec(Section):
         default=None,
         description="Prompt tokens that it puts into its cache [USD per million]; null: as the "
         "others.",
+    )
+
+
+class RateSpec(BatchRateSpec):
+    """What tokens cost."""
+
+    batch: BatchRateSpec | None = Field(
+        default=None,
+        description="What they cost in batches; null: half at OpenAI's, Anthropic's and Google's "
+        "own addresses, and at others as outside of batches.",
     )
 
 

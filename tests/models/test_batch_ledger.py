@@ -11,9 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.models.batches.fields import joined
-from phyblock.models.batches.ledger import BatchFiles, Ledger, waiting_keys
+from phyblock.models.batches.ledger import BatchFiles, Ledger
 from phyblock.models.batches.openai import OpenAIBatches
 from phyblock.models.batches.results import Results, custom_id
+from phyblock.models.batches.waiting import waiting_keys
 from phyblock.models.config import ModelConfig
 from phyblock.records import BatchLine
 
@@ -58,7 +59,8 @@ def test_a_request_is_in_the_last_batch_that_was_not_lost(
             newest = ledger.newest(key)
             assert (newest and newest.token) == expected
         assert others.newest(key) is None
-        assert (key in waiting_keys(lines)) == bool(holding)
+        config = ModelConfig("m", "litellm", "openai/m")
+        assert (key in waiting_keys(config, lines, Path("nowhere"))) == bool(holding)
     assert {b.token: (b.event, b.id) for b in written.batches.values()} == {
         b.token: (b.event, b.id) for b in read.batches.values()
     }

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import time
 from collections.abc import Sequence
 from dataclasses import replace
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +23,16 @@ from phyblock.models import (
     Budget,
     ModelConfig,
     ModelEvent,
+    Price,
     Prices,
+    Rate,
     Reply,
     ReplyCache,
     Request,
+    Tariff,
+    reply_key,
+    today,
+    waiting_keys,
 )
 from phyblock.models.batches import batch_protocol
 from phyblock.models.batches.protocol import BatchProtocol
@@ -33,7 +41,7 @@ from tests.models.batching import Disk, Killing, command, run_command
 from tests.models.factory import QUICK, ask, make_model, make_request
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.anthropic_batches import AnthropicBatches
-from tests.servers.batches import BatchFaults, BatchServer
+from tests.servers.batches import BatchFaults, BatchServer, Made
 from tests.servers.chassis import Running
 from tests.servers.gemini_batches import GeminiBatches
 from tests.servers.openai_batches import OpenAIBatches
@@ -45,7 +53,7 @@ SERVERS: dict[str, type[BatchServer]] = {
     "gemini": GeminiBatches,
 }
 PROTOCOLS = list(SERVERS)
-PRICES = Prices.flat(1000.0, 1000.0)
+PRICES = Prices((Tariff((Rate(Price(1000.0, 1000.0), batch=Price(500.0, 500.0)),)),))
 
 
 @pytest.fixture(autouse=True)
@@ -137,6 +145,18 @@ def test_each_line_that_fails_is_asked_again_or_ends_as_a_call_would(
     assert len(server.made) == 2
     assert len(server.made[1].requests) == 5
     assert any("holds lines 1 that cannot be read, 1 to what has an" in one.message for one in told)
+
+
+def test_only_what_failed_in_a_batch_that_has_ended_is_left_to_ask(route: str, disk: Disk) -> None:
+    requests = requests_of(2)
+    faults = BatchFaults(lines={0: {1: "500"}}, calls={"create": ("", "400")})
+    with Running(SERVERS[route](batch=faults)) as running:
+        config = config_at(route, running.url)
+        answered, failed = run_command(config, disk, requests)
+    assert isinstance(answered, Reply)
+    assert isinstance(failed, UnavailableError)
+    waiting = waiting_keys(config, disk.lines, disk.folder)
+    assert waiting == {reply_key(config, requests[0])}
 
 
 def test_a_question_that_always_fails_ends_after_the_usual_attempts(disk: Disk) -> None:
@@ -319,6 +339,23 @@ def test_a_cost_limit_is_kept_by_the_dearest_case_of_what_is_sent(
     assert first or isinstance(ended[0], BudgetReachedError)
 
 
+def test_an_answer_costs_what_the_day_of_its_sending_asked_for(disk: Disk) -> None:
+    dearer = Tariff((Rate(Price(9000.0, 9000.0), batch=Price(4500.0, 4500.0)),), today())
+    prices = Prices((*PRICES.tariffs, dearer))
+    with Running(OpenAIBatches(batch=BatchFaults(calls={"results": ("400",)}))) as running:
+        config = replace(config_at("direct", running.url), prices=prices)
+        (stopped,) = run_command(config, disk, requests_of(1))
+        assert isinstance(stopped, UnavailableError)
+        assert disk.lines[0].most_usd
+        assert not list(disk.folder.rglob("*.requests"))
+        sent = datetime.now(timezone.utc) - timedelta(days=1)
+        time = sent.strftime("%Y-%m-%dT%H:%M:%SZ")
+        disk.lines = [line.model_copy(update={"time": time}) for line in disk.lines]
+        (reply,) = run_command(config, disk, requests_of(1))
+    assert isinstance(reply, Reply)
+    assert reply.cost_usd == pytest.approx((1000 + 40) * 500 / 1e6)
+
+
 def test_what_is_in_the_cache_is_not_asked_and_answers_go_there(route: str, tmp_path: Path) -> None:
     """Batched or not, it is the same question; what it cost is what it was asked for as."""
     cache = tmp_path / "replies.sqlite"
@@ -357,6 +394,45 @@ def test_a_name_that_the_provider_forgets_is_found_by_what_was_answered(disk: Di
         assert once(server, 2)
 
 
+class Crowded(OpenAIBatches):
+    """Forgets names; at a moment another batch is there, as large and as new."""
+
+    forgets_names = True
+    other = Made("other", "", [("other-0", {}), ("other-1", {})], 99, 0.0)
+
+    def begin(self, at: str, **fields: Any) -> None:
+        self.other = replace(self.other, created_s=time.time(), **fields)
+        self.moment = lambda _, name: self.made.append(self.other) if name == at else None
+
+
+def test_a_nameless_batch_is_found_beside_one_that_never_ends(disk: Disk) -> None:
+    told: list[ModelEvent] = []
+    with Running(Crowded(batch=BatchFaults(calls={"create": ("done-reset",)}))) as running:
+        config, server = config_at("direct", running.url), running.server
+        assert isinstance(server, Crowded)
+        server.begin("create done", looks=-(10**6))
+        assert len(texts(run_command(config, disk, requests_of(2), told=told))) == 2
+        assert once(server, 2)
+    assert any("waiting for that" in event.message for event in told)
+
+
+def test_a_batch_that_cannot_be_told_from_ours_stops_the_model_with_what_to_do(disk: Disk) -> None:
+    calls = {"create": ("reset",), "results": ("404",)}
+    with Running(Crowded(batch=BatchFaults(calls=calls))) as running:
+        config, server = config_at("direct", running.url), running.server
+        assert isinstance(server, Crowded)
+        server.begin("create arrived", looks=99, state="ended", lines=['{"response": null}'])
+        (first, _) = run_command(config, disk, requests_of(2))
+        assert isinstance(first, UnsureError)
+        assert f"remove the lines of {disk.lines[0].batch} from batches.jsonl" in str(first)
+        assert not server.asked
+        server.moment = lambda *_: None
+        assert len(texts(run_command(config, disk, requests_of(2)))) == 2
+        assert once(server, 2)
+        # Unread, read once and never again, and ours.
+        assert server.calls.count("results") == 3
+
+
 # What a kill cuts off in litellm is closed when it is collected.
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_a_kill_at_any_moment_loses_nothing_and_asks_nothing_twice(
@@ -374,8 +450,13 @@ def test_a_kill_at_any_moment_loses_nothing_and_asks_nothing_twice(
             disk.moment, server.moment = killing.here, killing.there
             is_over = asyncio.run(killing.run(command(config, disk, requests)))
             disk.moment, server.moment = None, lambda *_: None
+            if disk.events == ["intended"]:
+                # What a process leaves that has no time to tidy up.
+                left = disk.files().folder / f"{disk.lines[0].batch}.requests"
+                left.write_bytes(b"{}")
             again = run_command(config, disk, requests, budget=Budget(1e9))
             assert len(texts(again)) == 2
+            assert not list(disk.folder.rglob("*.requests"))
         assert once(server, 2), killing.names[at]
         if is_over:
             moments = at

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import signal
 import sqlite3
@@ -329,6 +331,20 @@ def test_processes_share_one_file(tmp_path: Path) -> None:
     with ReplyCache(path) as cache:
         assert cache.stats().replies == 400
         assert all(f"{name}-{n}" in cache for name in "abcd" for n in range(100))
+
+
+def test_earlier_versions_can_read_what_is_kept_where_nothing_new_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "replies.sqlite"
+    with ReplyCache(path) as cache:
+        cache.put("old", "openai/m", REPLY)
+        told = replace(REPLY, usage=replace(REPLY.usage, cached_tokens=0))
+        cache.put("new", "openai/m", told)
+        assert cache.get("new") == replace(told, cached=True, attempts=0)
+    with contextlib.closing(sqlite3.connect(path)) as file:
+        (text,) = file.execute("SELECT reply FROM replies WHERE key = 'old'").fetchone()
+    fields = json.loads(text)
+    assert set(fields["usage"]) == {"prompt_tokens", "completion_tokens", "reasoning_tokens"}
+    assert "batched" not in fields
 
 
 def test_what_was_kept_survives_a_kill(tmp_path: Path) -> None:

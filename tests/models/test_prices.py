@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import date, timedelta
 from pathlib import Path
 from typing import Any
@@ -78,9 +79,48 @@ def test_the_highest_tier_below_the_prompt_holds(
     tiers: list[tuple[int, Price]], base: Price, prompt: int, batched: bool
 ) -> None:
     rates = (Rate(base), *(Rate(p, above) for above, p in sorted(tiers, key=lambda t: t[0])))
-    found = Prices((Tariff(rates),)).at(DAY, prompt, batched=batched)
+    known = Prices((Tariff(rates),))
     below = [rate for rate in rates if rate.above_tokens < prompt] or [rates[0]]
-    assert found == (below[-1].price.halved() if batched else below[-1].price)
+    assert known.at(DAY, prompt, batched=batched) == below[-1].price
+    half = known.with_halves().at(DAY, prompt, batched=batched)
+    assert half == (below[-1].price.halved() if batched else below[-1].price)
+
+
+@pytest.mark.parametrize(
+    ("model_id", "fields", "is_half"),
+    [
+        ("openai/mine", {}, True),
+        ("openai/mine", {"api_base": "https://api.openai.com/v1"}, True),
+        ("openai/mine", {"api_base": "https://gateway.example/v1"}, False),
+        ("hosted_vllm/mine", {"api_base": "http://localhost:8000/v1"}, False),
+        ("anthropic/mine", {"api_base": "https://gateway.example"}, False),
+        ("gemini/mine", {}, True),
+    ],
+)
+def test_batches_cost_half_only_where_that_is_known(
+    model_id: str, fields: dict[str, Any], is_half: bool
+) -> None:
+    whole = Price(8.0, 40.0, 1.0)
+    served = config(model_id, batch=True, **fields)
+    known = prices_of(replace(served, prices=Prices((Tariff((Rate(whole),)),))))
+    assert known is not None
+    assert known.at(DAY, batched=True) == (whole.halved() if is_half else whole)
+    expected = Estimate(1000, 500, 500)
+    most = [most_usd(known, expected, DAY, batched=batched) for batched in (True, False)]
+    assert most[0] == pytest.approx(most[1] / (1 + is_half))
+    told = Prices((Tariff((Rate(whole, batch=Price(3.0, 4.0)),)),))
+    own = prices_of(replace(served, prices=told))
+    assert own is not None
+    assert own.at(DAY, batched=True) == Price(3.0, 4.0)
+
+
+def test_the_price_of_batches_can_be_told(tmp_path: Path) -> None:
+    told = "{input: 8, output: 40, batch: {input: 3, output: 4, cached: 1}}"
+    base = "api_base: https://gateway.example/v1"
+    known = prices_of(read(tmp_path, f"m: {{id: openai/mine, {base}, price: {told}}}"))
+    assert known is not None
+    assert known.at(DAY) == Price(8.0, 40.0)
+    assert known.at(DAY, batched=True) == Price(3.0, 4.0, 1.0)
 
 
 @given(st.lists(st.integers(0, 400), min_size=1, max_size=4, unique=True), st.integers(-9, 410))
@@ -101,13 +141,15 @@ def test_the_price_of_a_day_is_the_last_that_has_begun(begins: list[int], asked:
 def test_no_call_costs_more_than_the_most(
     price: Price, prompt: int, completion: int, data: st.DataObject
 ) -> None:
-    dearer = Tariff((Rate(price), Rate(Price(50.0, 60.0), 100_000)), DAY + timedelta(days=1))
+    batched = data.draw(st.booleans())
+    days = [DAY + timedelta(days=n) for n in range(3 if batched else 2)]
+    dearer = Tariff((Rate(price), Rate(Price(50.0, 60.0), 100_000)), days[-1])
     both = Prices((Tariff((Rate(price),)), dearer))
-    most = most_usd(both, Estimate(prompt, 1, completion), DAY)
+    most = most_usd(both, Estimate(prompt, 1, completion), DAY, batched=batched)
     written = data.draw(st.integers(0, prompt))
     usage = Usage(prompt, completion, None, 0, written)
-    for day in (DAY, DAY + timedelta(days=1)):
-        cost = cost_usd(both, usage, day)
+    for day in days:
+        cost = cost_usd(both, usage, day, batched=batched)
         assert cost is not None
         assert cost <= most * (1 + 1e-9)
 

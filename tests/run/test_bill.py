@@ -10,6 +10,8 @@ from importlib.metadata import version
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from rich.console import Console
 
 from phyblock.cli.estimate_view import show_estimate
@@ -121,22 +123,47 @@ def test_a_dry_run_is_near_the_bill_of_every_provider(workspace: Workspace) -> N
         assert paid == pytest.approx(dollars(sum(billed), CALLS))
         assert row.most_usd is not None
         assert paid < row.most_usd
-    assert [(row.calls, row.replies, row.reply_tokens) for row in left] == [
-        (0, CALLS, CALLS * COMPLETION) for _ in rows
-    ]
+    for row in left:
+        lengths = row.lengths.values()
+        assert (row.calls, sum(one.replies for one in lengths)) == (0, CALLS)
+        assert [one.tokens for one in lengths] == [CALLS // 2 * COMPLETION] * 2
 
 
 def test_the_length_of_replies_is_learned_from_those_that_are_there() -> None:
     row = Estimate("m", "litellm", 100, Prices.flat(0.0, 10.0), today())
     for _ in range(10):
-        row.add_call(CallEstimate(100, 500, 4096))
-    assert (row.mean_reply_tokens, row.completion_tokens) == (None, 5000)
+        row.add_call(CallEstimate(100, 500, 4096), "a")
+    assert (row.lengths["a"].mean, row.completion_tokens) == (None, 5000)
     assert row.reply_usd == pytest.approx(0.05)
     for tokens in range(20):
-        row.add_reply(tokens)
-    row.add_reply(None)
-    assert (row.mean_reply_tokens, row.completion_tokens) == (9.5, 95)
+        row.add_reply(tokens, "a")
+    row.add_reply(None, "a")
+    assert (row.lengths["a"].mean, row.completion_tokens) == (9.5, 95)
     assert row.reply_usd == pytest.approx(95 * 10 / 1e6)
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from("ab"), st.integers(1, 500), st.integers(1, 500)), min_size=1
+    ),
+    st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 2000)), max_size=80),
+)
+def test_replies_of_one_kind_say_nothing_of_another_and_none_is_longer_than_it_can_be(
+    calls: list[tuple[str, int, int]], replies: list[tuple[str, int]]
+) -> None:
+    row = Estimate("m", "litellm", 100, Prices.flat(0.0, 10.0), today())
+    for kind, usual, more in calls:
+        row.add_call(CallEstimate(100, usual, usual + more), kind)
+    for kind, tokens in replies:
+        row.add_reply(tokens, kind)
+    assert row.cost_usd is not None
+    assert row.most_usd is not None
+    assert row.cost_usd <= row.most_usd * (1 + 1e-9)
+    for kind in "ab":
+        known = [tokens for other, tokens in replies if other == kind]
+        if len(known) < 20:
+            usual_tokens = sum(usual for other, usual, _ in calls if other == kind)
+            assert row.lengths[kind].coming_tokens == usual_tokens
 
 
 @pytest.mark.parametrize("track", ["full_planning", "step_planning"])

@@ -12,6 +12,8 @@ from tests.servers.batches import BatchServer, Made
 from tests.servers.chassis import Seen
 
 _KINDS = {"400": "invalid_request_error", "500": "api_error", "429": "rate_limit_error"}
+_OWN = "https://api.anthropic.com/v1/messages/batches"
+"""What the provider names, whichever gateway it was asked through."""
 
 
 class AnthropicBatches(BatchServer, AnthropicMessages):
@@ -48,7 +50,7 @@ class AnthropicBatches(BatchServer, AnthropicMessages):
             requests = [(one["custom_id"], one["params"]) for one in body["requests"]]
             assert all(len(name) <= 64 for name, _ in requests)
             token = requests[0][0].rpartition("-")[0]
-            return web.json_response(self._told(self.make(token, requests, request), request))
+            return web.json_response(self._told(self.make(token, requests, request)))
 
         return await self.guarded("create", request, work)
 
@@ -56,13 +58,13 @@ class AnthropicBatches(BatchServer, AnthropicMessages):
         async def work() -> web.Response:
             made = self.find(request.match_info["id"])
             self.look(made)
-            return web.json_response(self._told(made, request))
+            return web.json_response(self._told(made))
 
         return await self.guarded("look", request, work)
 
     async def _list(self, request: web.Request) -> web.StreamResponse:
         async def work() -> web.Response:
-            newest = [self._told(made, request) for made in reversed(self.made)]
+            newest = [self._told(made) for made in reversed(self.made)]
             after = request.query.get("after_id")
             start = [one["id"] for one in newest].index(after) + 1 if after else 0
             rows = newest[start : start + self.page]
@@ -80,14 +82,13 @@ class AnthropicBatches(BatchServer, AnthropicMessages):
 
         return await self.guarded("results", request, work)
 
-    def _told(self, made: Made, request: web.Request) -> dict[str, Any]:
+    def _told(self, made: Made) -> dict[str, Any]:
         has_ended = made.state != "running"
         kinds = [line.split('"type": "', 1)[-1].split('"', 1)[0] for line in made.lines]
         counts = {
             name: kinds.count(name) for name in ("succeeded", "errored", "canceled", "expired")
         }
         counts["processing"] = len(made.requests) - sum(counts.values())
-        base = f"http://{request.host}/v1/messages/batches"
         created = datetime.fromtimestamp(made.created_s, timezone.utc)
         return {
             "id": made.id,
@@ -96,5 +97,5 @@ class AnthropicBatches(BatchServer, AnthropicMessages):
             "request_counts": counts,
             "archived_at": "2026-01-01T00:00:00Z" if self.is_archived else None,
             "created_at": created.isoformat().replace("+00:00", "Z"),
-            "results_url": f"{base}/{made.id}/results" if has_ended else None,
+            "results_url": f"{_OWN}/{made.id}/results" if has_ended else None,
         }

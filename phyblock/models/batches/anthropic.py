@@ -3,8 +3,9 @@
 A batch has no name of ours, so that one whose making was cut off is found by what its answers
 answer. Sources, read in November 2026: Anthropic, guide "Batch processing" (100,000 requests or
 256 MB, 24 hours, errors and requests that expired are not billed, results in any order) and API
-reference of message batches (`processing_status`, `request_counts`, `results_url`, lists with
-`after_id`; `custom_id` of at most 64 letters, digits, dashes and underscores).
+reference of message batches (`processing_status`, `request_counts`, results at
+`/{id}/results`, lists with `after_id`; `custom_id` of at most 64 letters, digits, dashes and
+underscores).
 """
 
 from __future__ import annotations
@@ -121,10 +122,11 @@ class AnthropicBatches(BatchProtocol):
     def _status(self, batch: Mapping[str, Any]) -> BatchStatus:
         word, counts = text(batch.get("processing_status")), mapping(batch.get("request_counts"))
         numbers = {name: count(number) or 0 for name, number in counts.items()}
-        results = text(batch.get("results_url"))
-        has_ended = word == "ended"
+        batch_id, has_ended = text(batch.get("id")), word == "ended"
+        # Not `results_url`, which behind a gateway is the provider's own and out of reach.
+        results = (f"{self._url}/{batch_id}/results",) if has_ended else ()
         return BatchStatus(
-            text(batch.get("id")),
+            batch_id,
             "ended" if has_ended else "running",
             word,
             None,
@@ -132,7 +134,7 @@ class AnthropicBatches(BatchProtocol):
             numbers.get("succeeded", 0),
             numbers.get("errored", 0) + numbers.get("expired", 0) + numbers.get("canceled", 0),
             unix_s(batch.get("created_at")),
-            (results,) if results else (),
+            results,
             not (has_ended and numbers.get("canceled")),
             error_words(batch.get("error")),
         )

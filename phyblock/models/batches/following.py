@@ -6,7 +6,6 @@ import asyncio
 import time
 from collections.abc import Callable
 from datetime import datetime
-from pathlib import Path
 
 from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.files import sync_folder, writing
@@ -65,7 +64,7 @@ class Follower:
                 await self._ledger.tell(batch, "lost", words=words)
                 return
             await self._ledger.tell(batch, "ended", words=words, is_complete=status.is_complete)
-        path = self._answers(batch)
+        path = self._files.answers(batch.token)
         if not path.exists():
             raise UnavailableError(
                 f"the answers of batch {batch.shown} are gone ({path}): without its lines in "
@@ -76,9 +75,6 @@ class Follower:
         )
         if batch.results.remark:
             self._tell(f"batch {batch.shown} holds lines {batch.results.remark}")
-
-    def _answers(self, batch: Batch) -> Path:
-        return self._files.folder / f"{batch.token}.answers.jsonl"
 
     def _words(self, status: BatchStatus) -> str:
         said = f": {status.words}" if status.words else ""
@@ -111,7 +107,7 @@ class Follower:
 
     async def _fetch(self, batch: Batch, status: BatchStatus) -> None:
         """Have the answers on disk, whole."""
-        path = self._answers(batch)
+        path = self._files.answers(batch.token)
         part = path.with_suffix(".part")
         path.parent.mkdir(parents=True, exist_ok=True)
         wire = self._protocol.wire

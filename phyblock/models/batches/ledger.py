@@ -11,13 +11,13 @@ import asyncio
 import secrets
 from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass, field
-from datetime import datetime, timezone
+from datetime import date, datetime, timezone
 from pathlib import Path
 
 from phyblock.models.batches.results import Results
 from phyblock.records.others import BatchEvent, BatchLine
 
-__all__ = ["Batch", "BatchFiles", "Ledger", "new_token", "under_way", "waiting_keys"]
+__all__ = ["Batch", "BatchFiles", "Ledger", "new_token", "under_way"]
 
 _FOLDER = "batches"
 
@@ -38,6 +38,10 @@ class BatchFiles:
     def folder(self) -> Path:
         """Where requests and answers lie."""
         return self.run_folder / _FOLDER
+
+    def answers(self, token: str) -> Path:
+        """The answers of a batch, once it has ended."""
+        return self.folder / f"{token}.answers.jsonl"
 
 
 @dataclass(eq=False)
@@ -71,13 +75,20 @@ class Batch:
         return self.id or self.token
 
     @property
+    def created(self) -> datetime:
+        """When it was about to be sent, in UTC."""
+        time = datetime.strptime(self.intent.time, "%Y-%m-%dT%H:%M:%SZ")
+        return time.replace(tzinfo=timezone.utc)
+
+    @property
     def created_s(self) -> float:
-        """When it was about to be sent, Unix time."""
-        return (
-            datetime.strptime(self.intent.time, "%Y-%m-%dT%H:%M:%SZ")
-            .replace(tzinfo=timezone.utc)
-            .timestamp()
-        )
+        """As Unix time."""
+        return self.created.timestamp()
+
+    @property
+    def day(self) -> date:
+        """The day by which its answers are priced, whenever they are read."""
+        return self.created.date()
 
     def most_usd(self, key: str) -> float:
         """What one of its requests can cost."""
@@ -154,17 +165,6 @@ class Ledger:
 def new_token() -> str:
     """A name that no other batch has; what the providers allow in names and boundaries."""
     return f"pb{secrets.token_hex(12)}"
-
-
-def waiting_keys(lines: Iterable[BatchLine]) -> frozenset[str]:
-    """Requests that went out in batches, by their keys in the reply cache."""
-    sent: dict[str, BatchLine] = {}
-    for line in lines:
-        if line.event == "intended":
-            sent[line.batch] = line
-        elif line.event == "lost":
-            sent.pop(line.batch, None)
-    return frozenset(key for line in sent.values() for key in line.keys)
 
 
 def under_way(lines: Iterable[BatchLine]) -> dict[str, str]:

@@ -15,13 +15,12 @@ from phyblock.models.batches.purse import Purse
 from phyblock.models.batches.sending import Draft, Sender, UnsureError
 from phyblock.models.batches.wording import Wording, Written
 from phyblock.models.cache import known_keys, reply_key
-from phyblock.models.chat import may_be_billed
 from phyblock.models.config import ModelConfig
-from phyblock.models.cost import Budget, reply_cost_usd
+from phyblock.models.cost import Budget, may_be_billed, reply_cost_usd
 from phyblock.models.events import EventKind, ModelEvent, Observer
 from phyblock.models.halt import Halt
 from phyblock.models.http_client import Client
-from phyblock.models.prices import Prices
+from phyblock.models.prices import Prices, today
 from phyblock.models.retry import RetryPolicy
 from phyblock.models.shared_cache import SharedCache
 from phyblock.models.transport import Transport
@@ -61,7 +60,7 @@ class BatchModel:
         self._parts = parts
         protocol, files, policy = parts.protocol, parts.files, parts.policy
         self._ledger = Ledger(config.name, files)
-        self._sender = Sender(protocol, self._ledger, files, policy)
+        self._sender = Sender(protocol, self._ledger, files, policy, self._tell)
         self._follower = Follower(protocol, self._ledger, files, self._sender, policy, self._tell)
         self._wording = Wording(config, protocol, parts.transport, self._say_seedless)
         self._purse = Purse(config, parts.budget, parts.prices)
@@ -115,7 +114,7 @@ class BatchModel:
             kept = await self._kept(request)
             if kept is None:
                 raise AskLaterError
-            return replace(kept, cost_usd=reply_cost_usd(self._parts.prices, kept))
+            return replace(kept, cost_usd=reply_cost_usd(self._parts.prices, kept, today()))
         try:
             with self._parts.halt.giving_up():
                 await asyncio.shield(self._following(batch))
@@ -256,7 +255,7 @@ class BatchModel:
 
     async def _finished(self, key: str, request: Request, batch: Batch, reply: Reply) -> Reply:
         """The reply with its cost, in the cache; to a second sample that asks the same a copy."""
-        reply = replace(reply, cost_usd=reply_cost_usd(self._parts.prices, reply))
+        reply = replace(reply, cost_usd=reply_cost_usd(self._parts.prices, reply, batch.day))
         if key in self._given:
             return replace(reply, cached=True, attempts=0)
         self._given.add(key)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from phyblock.models.base import Reply, Request
 from phyblock.models.batches.ledger import Batch
 from phyblock.models.config import ModelConfig
-from phyblock.models.cost import Budget, estimate
+from phyblock.models.cost import Budget, estimate, most_usd
 from phyblock.models.halt import Halt
 from phyblock.models.prices import Prices, today
 
@@ -26,26 +26,31 @@ class Purse:
         self._held: set[tuple[str, str]] = set()
         self._billed_usd: dict[str, float] = {}
 
-    def most_usd(self, request: Request) -> float:
-        """The most that a request can cost."""
-        if self._budget is None or self._prices is None:
-            return 0.0
+    def most_usd(self, request: Request) -> float | None:
+        """The most that a request can cost, also without a limit, as the command that reads the
+        answer may have one; None where no price is known.
+        """
+        day = today()
+        if self._prices is None or self._prices.on(day) is None:
+            return None
         expected, name = estimate(self._config, request), self._config.name
-        return self._budget.most_usd(name, self._prices, expected, today(), batched=True)
+        if self._budget is None:
+            return most_usd(self._prices, expected, day, batched=True)
+        return self._budget.most_usd(name, self._prices, expected, day, batched=True)
 
-    def fits(self, usd: float) -> bool:
-        """Whether so much is left."""
-        return self._budget is None or self._budget.fits(usd)
+    def fits(self, usd: float | None) -> bool:
+        """Whether so much is left; None is nothing, as under a limit prices are known."""
+        return self._budget is None or self._budget.fits(usd or 0.0)
 
-    async def wait_for(self, usd: float, halt: Halt) -> None:
+    async def wait_for(self, usd: float | None, halt: Halt) -> None:
         """Wait for so much to be left; BudgetReachedError where it never will be."""
         if self._budget is not None:
             with halt.giving_up():
-                self._budget.settle(await self._budget.reserve(lambda: usd), 0.0)
+                self._budget.settle(await self._budget.reserve(lambda: usd or 0.0), 0.0)
 
-    def hold(self, usd: float, onto: int | None) -> int | None:
+    def hold(self, usd: float | None, onto: int | None) -> int | None:
         """Hold so much, together with what is held already."""
-        return None if self._budget is None else self._budget.hold(usd, onto)
+        return None if self._budget is None else self._budget.hold(usd or 0.0, onto)
 
     def hold_again(self, batch: Batch, key: str) -> None:
         """Hold for a request of an earlier command, once."""
@@ -62,7 +67,7 @@ class Purse:
     def settle_all(self, held: int | None, usd: float | None) -> None:
         """Count what all requests of a reservation cost that are not settled."""
         if self._budget is not None and held is not None:
-            self._budget.settle(held, usd)
+            self._budget.settle_rest(held, usd)
 
     def billed_usd(self, key: str) -> float | None:
         """What was counted for a request; None where there is no limit."""

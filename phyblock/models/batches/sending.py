@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections import defaultdict
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import TypeVar
@@ -19,7 +20,9 @@ from phyblock.models.batches.ledger import Batch, BatchFiles, Ledger, new_token
 from phyblock.models.batches.protocol import BatchProtocol, BatchStatus
 from phyblock.models.batches.results import Results, custom_id
 from phyblock.models.batches.wording import Written
+from phyblock.models.events import Tell
 from phyblock.models.retry import RetryPolicy, with_retries
+from phyblock.records import BATCHES
 
 __all__ = ["Draft", "Sender", "UnsureError"]
 
@@ -35,14 +38,14 @@ class UnsureError(UnavailableError):
 
 class Draft:
     """A batch that is being written into a file; `keys` are its requests with the most that each
-    can cost [US dollars], `held` is its reservation in the budget.
+    can cost [US dollars], None where no price is known; `held` is its reservation in the budget.
     """
 
     def __init__(self, protocol: BatchProtocol, folder: Path, *, seeded: bool) -> None:
         self.seeded = seeded
         self.token = new_token()
-        self.path = folder / f"{self.token}.requests"
-        self.keys: dict[str, float] = {}
+        self.path = _requests_file(folder, self.token)
+        self.keys: dict[str, float | None] = {}
         self.held: int | None = None
         self._protocol = protocol
         self._bytes = 0
@@ -59,7 +62,7 @@ class Draft:
         has_room = len(self.keys) < self._protocol.most_requests
         return has_room and size <= self._protocol.most_bytes and written.seeded == self.seeded
 
-    def add(self, key: str, written: Written, most_usd: float) -> None:
+    def add(self, key: str, written: Written, most_usd: float | None) -> None:
         """Write a request, which can cost so much."""
         line = self._line(written)
         self._write(self._protocol.between if self.keys else b"")
@@ -96,15 +99,24 @@ class Draft:
 
 
 class Sender:
-    """Sends drafts of one model, and finds again what an earlier process was sending."""
+    """Sends drafts of one model, and finds again what an earlier process was sending; `tell` hears
+    what is waited for. `_strangers` are batches that are known not to be the one of a token.
+    """
 
     def __init__(
-        self, protocol: BatchProtocol, ledger: Ledger, files: BatchFiles, policy: RetryPolicy
+        self,
+        protocol: BatchProtocol,
+        ledger: Ledger,
+        files: BatchFiles,
+        policy: RetryPolicy,
+        tell: Tell,
     ) -> None:
         self._protocol = protocol
         self._ledger = ledger
         self._files = files
         self._policy = policy
+        self._tell = tell
+        self._strangers: defaultdict[str, set[str]] = defaultdict(set)
 
     async def send(self, draft: Draft) -> Batch:
         """Send a draft: the batch, which the provider has, with its id on disk.
@@ -112,8 +124,15 @@ class Sender:
         Raises UnavailableError where it cannot be sent, and nothing was asked; UnsureError where
         that is not known: the next command finds out.
         """
+        try:
+            return await self._send(draft)
+        finally:
+            draft.drop()
+
+    async def _send(self, draft: Draft) -> Batch:
         draft.close()
-        most_usd = () if draft.held is None else draft.keys.values()
+        known = [usd for usd in draft.keys.values() if usd is not None]
+        most_usd = known if len(known) == len(draft.keys) else []
         batch = await self._ledger.intend(draft.token, draft.keys, most_usd, seeded=draft.seeded)
         batch.held = draft.held
         try:
@@ -125,8 +144,6 @@ class Sender:
             raise UnavailableError(
                 f"a batch could not be sent: {error}", status=error.status, sent=error.sent
             ) from None
-        finally:
-            draft.drop()
         await self._ledger.tell(batch, "created", id=status.id)
         return batch
 
@@ -135,6 +152,7 @@ class Sender:
 
         Raises UnavailableError where that cannot be found out.
         """
+        _requests_file(self._files.folder, batch.token).unlink(missing_ok=True)
         # A request that was cut off may still be worked on over there.
         status = await self._find(batch, time.time() + 2 * self._files.poll_s)
         if status is None:
@@ -164,7 +182,9 @@ class Sender:
         """The batch with our name; None where there is none until then."""
         while True:
             try:
-                found = await self.patiently(lambda: self._look_for(batch))
+                found = await self._look_for(batch)
+            except UnsureError:
+                raise
             except UnavailableError as error:
                 why = f"whether a batch was sent cannot be found out: {error}"
                 raise UnsureError(why, status=error.status, sent=error.sent) from None
@@ -173,30 +193,74 @@ class Sender:
             await asyncio.sleep(min(self._files.poll_s, max(0.01, until_s - time.time())))
 
     async def _look_for(self, batch: Batch) -> BatchStatus | None:
+        """The batch among those that the provider lists now, by its name or its answers.
+
+        Those without a name are waited for, as none can be told before it has ended. Raises
+        UnsureError where the answers of one cannot be read, and no other is ours.
+        """
+        named, candidates = await self.patiently(lambda: self._listed(batch))
+        if named is not None:
+            return named
+        unread: dict[str, str] = {}
+        is_told = False
+        while candidates:
+            for status in candidates:
+                if status.state == "running":
+                    continue
+                try:
+                    if await self._answers(status, batch):
+                        return status
+                except ModelError as error:
+                    unread[status.id] = str(error)
+                else:
+                    self._strangers[batch.token].add(status.id)
+            running = [status.id for status in candidates if status.state == "running"]
+            if running and not is_told:
+                is_told = True
+                self._tell(
+                    f"whether one of the batches {', '.join(running)} is the one that was being "
+                    "sent shows when it has ended: waiting for that"
+                )
+            if running:
+                await asyncio.sleep(self._files.poll_s)
+            candidates = []
+            for batch_id in running:
+                try:
+                    candidates.append(await self._looked_at(batch_id))
+                except ModelError as error:
+                    unread[batch_id] = str(error)
+        if unread:
+            said = "; ".join(f"{batch_id}: {why}" for batch_id, why in unread.items())
+            raise UnsureError(
+                f"a batch of {len(batch.places):,} that was being sent may be one whose answers "
+                f"cannot be read ({said}). If it is not, remove the lines of {batch.token} from "
+                f"{BATCHES}: its questions are then asked again, and billed again if it is"
+            )
+        return None
+
+    async def _looked_at(self, batch_id: str) -> BatchStatus:
+        return await self.patiently(lambda: self._protocol.look(batch_id))
+
+    async def _listed(self, batch: Batch) -> tuple[BatchStatus | None, list[BatchStatus]]:
+        """The batch with our name, and those without a name that may be it."""
         requests, candidates = len(batch.places), []
+        others = self._ledger.ids | self._strangers[batch.token]
         async for status in self._protocol.listed():
             if status.token == batch.token:
-                return status
+                return status, []
             created_s = status.created_s
             if created_s is not None and created_s < batch.created_s - _CLOCKS_APART_S:
                 break
-            is_like = status.total in (None, 0, requests) and status.id not in self._ledger.ids
+            is_like = status.total in (None, 0, requests) and status.id not in others
             if status.token is None and is_like and status.state != "refused":
                 candidates.append(status)
-        for status in candidates:
-            if await self._answers(status, batch):
-                return status
-        return None
+        return None, candidates
 
     async def _answers(self, status: BatchStatus, batch: Batch) -> bool:
-        """Whether a batch without our name answers what this one asks; waits until it has ended."""
-        batch_id = status.id
-        while status.state == "running":
-            await asyncio.sleep(self._files.poll_s)
-            status = await self.patiently(lambda: self._protocol.look(batch_id))
+        """Whether a batch that has ended answers what this one asks."""
         path = self._files.folder / f"{batch.token}.candidate"
-        await self._protocol.wire.download(status.results, path)
         try:
+            await self.patiently(lambda: self._protocol.wire.download(status.results, path))
             found = await asyncio.to_thread(
                 Results, path, self._protocol, batch.token, len(batch.places)
             )
@@ -212,6 +276,11 @@ class Sender:
             raise
         except ModelError as error:
             raise UnavailableError(str(error), status=error.status, sent=error.sent) from None
+
+
+def _requests_file(folder: Path, token: str) -> Path:
+    """Where a batch is written before it is sent."""
+    return folder / f"{token}.requests"
 
 
 def _named(status: BatchStatus) -> BatchStatus:
