@@ -114,7 +114,7 @@ def command(
         console.print(remark, style="dim", markup=False, soft_wrap=True)
     if dry_run:
         return 0
-    check_ready(plan)
+    plan = check_ready(plan)
     if not yes and not _agreed(console, plan, folder, use_cache=not no_cache):
         console.print("Nothing was asked.")
         return 1

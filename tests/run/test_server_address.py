@@ -173,7 +173,9 @@ def test_a_command_of_a_models_file_that_came_with_a_suite_is_not_run(workspace:
     """Only one of the user's own is: named, or in the folder where they are."""
     with Running(OpenAIChat()) as server:
         marker = workspace.root / "marker"
-        words = ["sh", "-c", f"touch {marker}; echo {server.url}/v1", "--token", "hunter2"]
+        # It works once: what it lists when it is checked is what the run begins with.
+        once = f"test ! -e {marker} && touch {marker} && echo {server.url}/v1"
+        words = ["sh", "-c", once, "--token", "hunter2"]
         entry = {"id": "hosted_vllm/alpha", "api_base_command": words}
         workspace.write_yaml("models.yaml", {"alpha": entry})
         workspace.write_suite(models=["alpha"], seeds=[0])
