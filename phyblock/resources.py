@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-__all__ = ["bundled", "bundled_sets", "cache_dir", "reply_cache_file"]
+__all__ = ["bundled", "bundled_sets", "cache_dir", "learned_dir", "reply_cache_file"]
 
 _PACKAGE = Path(__file__).parent
 
@@ -30,6 +30,11 @@ def cache_dir() -> Path:
     if named:
         return Path(named).expanduser()
     return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "phyblock"
+
+
+def learned_dir() -> Path:
+    """Where plans are kept that floors learned, `DIGEST.json` each: they cost time alone."""
+    return cache_dir() / "goal-blind"
 
 
 def reply_cache_file() -> Path:

@@ -1,14 +1,22 @@
-"""`phyblock cache`: what paid replies are kept, and clearing them."""
+"""`phyblock cache`: what paid replies and learned plans are kept, and clearing them."""
 
 from __future__ import annotations
 
+import contextlib
+import os
+import re
+from pathlib import Path
+
 import click
 
-from phyblock.cli.console import make_console, plain_table
+from phyblock.cli.console import counted, make_console, plain_table
+from phyblock.errors import InputError, Problem, said
 from phyblock.models import ReplyCache
-from phyblock.resources import reply_cache_file
+from phyblock.resources import learned_dir, reply_cache_file
 
 __all__ = ["command"]
+
+_LEARNED = re.compile(r"[0-9a-f]{64}\.json")
 
 
 @click.group("cache")
@@ -18,7 +26,7 @@ def command() -> None:
 
 @command.command("stats")
 def stats() -> None:
-    """Replies kept, by model, and the size of the file."""
+    """Replies kept, by model, and the size of the file; plans that floors learned."""
     console = make_console()
     with ReplyCache(reply_cache_file()) as cache:
         found = cache.stats()
@@ -27,15 +35,53 @@ def stats() -> None:
     size = f"{found.size_bytes / 1e6:,.1f} MB"
     text = f"{found.replies:,} replies, {size}, in {found.path}"
     console.print(text, soft_wrap=True, markup=False)
+    if sizes := _learned():
+        text = f"{_told(list(sizes.values()))}, in {learned_dir()}"
+        console.print(text, soft_wrap=True, markup=False)
 
 
 @command.command("clear")
 @click.option("--model", metavar="ID", help="Forget the replies of this model id alone.")
+@click.option(
+    "--learned",
+    is_flag=True,
+    help="Remove what floors learned in place of replies: learning it again costs seconds.",
+)
 @click.option("--yes", is_flag=True, help="Do not ask.")
-def clear(model: str | None, yes: bool) -> None:
+def clear(model: str | None, learned: bool, yes: bool) -> None:
     """Forget replies; they cost money again when they are needed again."""
+    if learned:
+        if model is not None:
+            raise click.UsageError("--learned is of no model: leave --model out")
+        _clear_learned()
+        return
     which = f"replies of {model}" if model else "all replies"
     if not yes:
         click.confirm(f"Forget {which}? Asking again costs money.", abort=True)
     with ReplyCache(reply_cache_file()) as cache:
         make_console().print(f"Forgot {cache.clear(model):,} replies.")
+
+
+def _clear_learned() -> None:
+    removed: list[int] = []
+    for path, size in _learned().items():
+        try:
+            path.unlink(missing_ok=True)
+        except OSError as error:
+            raise InputError(Problem(str(path), f"cannot be removed: {said(error)}")) from error
+        removed.append(size)
+    make_console().print(f"Removed {_told(removed)}.")
+
+
+def _learned() -> dict[Path, int]:
+    """The files of learned plans and their sizes [bytes]; others that lie there are not ours."""
+    found: dict[Path, int] = {}
+    with contextlib.suppress(OSError), os.scandir(learned_dir()) as entries:
+        for entry in entries:
+            if _LEARNED.fullmatch(entry.name) and entry.is_file(follow_symlinks=False):
+                found[Path(entry.path)] = entry.stat(follow_symlinks=False).st_size
+    return found
+
+
+def _told(sizes: list[int]) -> str:
+    return f"{counted(len(sizes), 'file')} of learned plans, {sum(sizes) / 1e6:,.1f} MB"

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import os
 import shlex
+from collections.abc import Iterable
 from pathlib import Path
 
 from phyblock.errors import Problem, SpecError
 from phyblock.resources import bundled
-from phyblock.specs import ModelSpec, did_you_mean, load_models
+from phyblock.run.models import PlannedModel
+from phyblock.specs import did_you_mean
 
 __all__ = [
     "bundled_suites",
+    "check_commands",
     "find_models_file",
     "find_suite",
-    "load_known",
     "prompt_dirs",
     "what_it_is",
 ]
@@ -67,30 +69,29 @@ def find_models_file(named: str | None, suite: Path | None) -> Path:
     return bundled("models.yaml")
 
 
-def load_known(named: str | None, suite: Path) -> dict[str, ModelSpec]:
-    """The models that a suite may name when it is run.
+def check_commands(models: Iterable[PlannedModel], models_file: Path, named: str | None) -> None:
+    """Raise SpecError for planned models whose servers a command lists that is not the user's own.
 
     A models file that merely lies near a suite came with it, so it may not say what is run here.
-    Raises SpecError for one that does, and as `find_models_file` and `load_models` do.
+    `models_file` is the file that was read, `named` the one that the user named, if any.
     """
-    path = find_models_file(named, suite)
-    known = load_models(path)
-    is_own = named is not None or path.parent == Path()
+    if named is not None or models_file.parent == Path():
+        return
     problems = [
         Problem(
-            str(path),
+            str(models_file),
             "names a command, which only a models file of your own may do",
-            f"{name}.api_base_command",
-            shlex.join(spec.api_base_command),
+            f"{model.name}.api_base_command",
+            # The program alone: its other words may hold what is worth hiding.
+            model.config.api_base_command[0],
             "models.yaml in the folder where you are, or a file given with --models-file",
-            hint=f"if you trust it, give it: --models-file {shlex.quote(str(path))}",
+            hint=f"if you trust it, give it: --models-file {shlex.quote(str(models_file))}",
         )
-        for name, spec in known.items()
-        if spec.api_base_command is not None and not is_own
+        for model in models
+        if model.config.api_base_command
     ]
     if problems:
         raise SpecError(problems)
-    return known
 
 
 def prompt_dirs(suite: Path) -> list[Path]:

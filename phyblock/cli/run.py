@@ -13,7 +13,13 @@ from rich.console import Console
 
 from phyblock.cli.console import counted, make_console, shown_path
 from phyblock.cli.estimate_view import show_estimate
-from phyblock.cli.files import bundled_suites, find_suite, load_known, prompt_dirs
+from phyblock.cli.files import (
+    bundled_suites,
+    check_commands,
+    find_models_file,
+    find_suite,
+    prompt_dirs,
+)
 from phyblock.cli.names import split_names
 from phyblock.cli.paths import NAME_OR_PATH, UserPath, models_file_option
 from phyblock.cli.progress import ProgressView
@@ -31,7 +37,7 @@ from phyblock.run.folder import run_folder
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.session import Session, check_ready
 from phyblock.run.store import holds_run
-from phyblock.specs import load_suite
+from phyblock.specs import load_models, load_suite
 
 __all__ = ["command"]
 
@@ -92,9 +98,10 @@ def command(
     path = find_suite(suite)
     data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
     loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
-    known = load_known(models_file, path)
-    only = split_names(models)
+    known_in = find_models_file(models_file, path)
+    only, known = split_names(models), load_models(known_in)
     plan = make_plan(loaded, known, only=only, limit=limit, informative=informative)
+    check_commands(plan.models, known_in, models_file)
     folder = out or Path("results") / plan.folder_name
     moved: list[str] = []
     if holds_run(folder, plan.manifest):
@@ -107,7 +114,7 @@ def command(
         console.print(remark, style="dim", markup=False, soft_wrap=True)
     if dry_run:
         return 0
-    check_ready(plan)
+    plan = check_ready(plan)
     if not yes and not _agreed(console, plan, folder, use_cache=not no_cache):
         console.print("Nothing was asked.")
         return 1

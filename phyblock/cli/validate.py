@@ -11,7 +11,7 @@ import click
 
 from phyblock.bounded import read_bytes
 from phyblock.cli.console import counted, make_console, shown_path
-from phyblock.cli.files import find_models_file, find_suite, prompt_dirs
+from phyblock.cli.files import check_commands, find_models_file, find_suite, prompt_dirs
 from phyblock.cli.paths import UserPath, models_file_option
 from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
@@ -80,6 +80,7 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[s
     if loaded.suite.models != RECORDED:
         _check_models(named, known, loaded.suite.models)
     plan = make_plan(loaded, known)
+    check_commands(plan.models, named, models_file)
     calls = plan.samples_per_model
     models = counted(len(plan.models), "model")
     told = f"suite {plan.suite.name}, {models}, {counted(calls, 'sample')} a model"

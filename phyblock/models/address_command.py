@@ -12,7 +12,7 @@ import time
 from collections.abc import Sequence
 from typing import IO
 
-from phyblock.errors import Problem, SpecError
+from phyblock.errors import Problem, SpecError, said
 from phyblock.models.address_file import LARGEST_BYTES, addresses_in
 from phyblock.models.events import Tell
 from phyblock.models.limits import Clock
@@ -38,14 +38,21 @@ class _Runs:
         try:
             text = self._output()
         except ValueError as error:
-            raise SpecError(Problem(self.name, str(error), _FIELD)) from None
+            raise self.fault(str(error)) from None
+        except OSError as error:
+            raise self.fault(f"cannot be run: {said(error)}") from None
         return addresses_in(text, self.name, _FIELD)
 
     def end(self) -> None:
         """Kill what still runs, with all that it started."""
-        if self._process is not None:
+        process = self._process
+        if process is not None:
             with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.killpg(self._process.pid, signal.SIGKILL)
+                os.killpg(process.pid, signal.SIGKILL)
+
+    def fault(self, message: str) -> SpecError:
+        """What is wrong with it."""
+        return SpecError(Problem(self.name, message, _FIELD))
 
     @property
     def name(self) -> str:
@@ -66,10 +73,11 @@ class _Runs:
             why = error.strerror if isinstance(error, OSError) else error
             raise ValueError(f"cannot be run: {why}") from None
         self._process = process
+        until_s = time.monotonic() + LONGEST_S
         with process:
             try:
-                printed, said = _read_both(process, time.monotonic() + LONGEST_S)
-                code = process.wait(1.0)
+                printed, complaint = _read_both(process, until_s)
+                code = process.wait(max(0.0, until_s - time.monotonic()))
             except subprocess.TimeoutExpired:
                 raise ValueError(f"does not end within {LONGEST_S:g} s") from None
             finally:
@@ -77,7 +85,7 @@ class _Runs:
                 process.wait()
                 self._process = None
         if code != 0:
-            words = one_line(said.decode("utf-8", "replace").strip())[-_LONGEST_SAID:]
+            words = one_line(complaint.decode("utf-8", "replace").strip())[-_LONGEST_SAID:]
             raise ValueError(f"ends with code {code}" + (f": {words}" if words else ""))
         try:
             return printed.decode("utf-8")
@@ -127,17 +135,21 @@ def addresses_by(words: Sequence[str]) -> tuple[str, ...]:
 class AddressCommand:
     """Runs the command now and then, beside the calls; what is wrong is told once until it changes.
 
-    asyncio, one loop, in which it is first looked at.
+    asyncio, one loop, in which it is first looked at. `listed` is what it printed a while ago: then
+    it is first run when it is looked at, else when this is made. Raises SpecError as `addresses_by`
+    does.
     """
 
-    def __init__(self, words: Sequence[str], clock: Clock, tell: Tell) -> None:
+    def __init__(
+        self, words: Sequence[str], clock: Clock, tell: Tell, listed: tuple[str, ...] = ()
+    ) -> None:
         self._runs = _Runs(words)
         self._clock = clock
         self._tell = tell
         self._told = ""
-        self._run_at_s = clock.now() + RUN_EVERY_S
+        self._run_at_s = clock.now() + (0.0 if listed else RUN_EVERY_S)
         self._running: asyncio.Task[tuple[str, ...]] | None = None
-        self.addresses = self._runs.addresses()
+        self.addresses = listed or self._runs.addresses()
         """The last good list."""
 
     @property
@@ -150,7 +162,7 @@ class AddressCommand:
         if self._running is None:
             now_s = self._clock.now()
             if now_s >= self._run_at_s:
-                self._running = asyncio.create_task(asyncio.to_thread(self._runs.addresses))
+                self._running = asyncio.create_task(self._run())
             return False
         if not self._running.done():
             return False
@@ -167,6 +179,13 @@ class AddressCommand:
         is_new = addresses != self.addresses
         self.addresses = addresses
         return is_new
+
+    async def _run(self) -> tuple[str, ...]:
+        try:
+            return await asyncio.to_thread(self._runs.addresses)
+        except RuntimeError as error:
+            # No thread is left to run it in.
+            raise self._runs.fault(f"cannot be run: {said(error)}") from None
 
     async def aclose(self) -> None:
         """End what still runs."""

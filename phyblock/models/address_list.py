@@ -51,5 +51,5 @@ def changing_list(config: ModelConfig, clock: Clock, tell: Tell) -> AddressList 
     if config.api_base_file is not None:
         return AddressFile(config.api_base_file, clock, tell)
     if config.api_base_command:
-        return AddressCommand(config.api_base_command, clock, tell)
+        return AddressCommand(config.api_base_command, clock, tell, config.listed)
     return None

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from phyblock.errors import Problem
 from phyblock.models import ModelConfig, known_providers
-from phyblock.specs import ModelSpec, did_you_mean
+from phyblock.specs import ModelSpec, did_you_mean, with_members
 from phyblock.specs.yaml_source import read_yaml
 
 __all__ = ["model_problems", "provider_problem"]
 
 
 def model_problems(
-    path: Path, known: Mapping[str, ModelSpec], names: Collection[str]
+    path: Path, known: Mapping[str, ModelSpec], names: Iterable[str]
 ) -> Iterator[Problem]:
-    """What is wrong with the models of these names in a models file: recordings that are not there,
-    providers that nobody knows.
+    """What is wrong with the models and groups of these names in a models file: recordings that are
+    not there, providers that nobody knows.
     """
     source = read_yaml(path)
-    for name in (name for name in names if name in known):
+    for name in (name for name in with_members(tuple(names), known) if name in known):
         spec = known[name]
         if spec.replay is not None and not os.path.isdir(spec.replay):
             where, message = source.where((name, "replay")), "recordings not found"

@@ -110,7 +110,7 @@ def interaction(scores: Floats, clusters: Clusters) -> Component:
     found = jackknife(counts, clusters, variance)
     most = (clusters.size - 1) * (levels - 1)
     above, noise = (float(value) for value in found.value)
-    return _of_variance(above, float(found.se[0]), noise, most)
+    return _of_variance(above, float(found.se[0]), noise, most=most)
 
 
 def within(scores: Floats, clusters: Clusters) -> Component:
@@ -118,13 +118,14 @@ def within(scores: Floats, clusters: Clusters) -> Component:
 
     `scores` has shape (items, ways, repeats).
     """
-    items, _, repeats = scores.shape
+    items, ways, repeats = scores.shape
     if items < 2 or repeats < 2 or clusters.size < 2:
         return NO_COMPONENT
     variances = scores.var(axis=2, ddof=1).mean(axis=1)
     counts = np.stack([np.ones(items), variances], axis=1)
     found = jackknife(counts, clusters, lambda sums: sums[..., 1] / sums[..., 0])
-    return _of_variance(float(found.value), float(found.se))
+    most = clusters.size * ways * (repeats - 1)
+    return _of_variance(float(found.value), float(found.se), most=most)
 
 
 def spread_of_items(scores: Floats, clusters: Clusters) -> Component:
@@ -144,21 +145,20 @@ def spread_of_items(scores: Floats, clusters: Clusters) -> Component:
     return _of_variance(float(found.value), float(found.se), most=clusters.size - 1)
 
 
-def _of_variance(
-    variance: float, se: float, noise: float = 0.0, most: float = math.inf
-) -> Component:
+def _of_variance(variance: float, se: float, noise: float = 0.0, *, most: float) -> Component:
     """A variance that is left of a mean square when `noise` is taken off it.
 
     The mean square has the interval of chi-square with the degrees of freedom that its error stands
     for (Satterthwaite, *An approximate distribution of estimates of variance components*,
     Biometrics Bulletin 2, 1946), of which `noise` is taken off too; nothing of it is below zero.
-    An error that was estimated is at times far too small: there are at `most` as many degrees of
-    freedom as independent base scenes have.
+    An error that was estimated is at times far too small, even 0: there are at `most` as many
+    degrees of freedom as independent base scenes have.
     """
     square = variance + noise
     ends = (square, square)
-    if square > 0 and se > 0:
-        df = min(2 * (square / se) ** 2, most)
+    if square > 0:
+        ratio = square / se if se > 0 else math.inf
+        df = min(2 * ratio * ratio, most)
         ends = (square * df / chdtri(df, _TAIL), square * df / chdtri(df, 1 - _TAIL))
     parts = (variance, *(end - noise for end in ends))
     return Component(*(float(np.sqrt(max(part, 0.0))) for part in parts))

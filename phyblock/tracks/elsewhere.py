@@ -42,6 +42,10 @@ class Elsewhere(Generic[AskedT]):
         digest = hashlib.sha256(f"wrong image|{seed}|{item.key}".encode()).digest()
         return others[int.from_bytes(digest, "big") % len(others)]
 
+    def each(self, item: AskedT, seeds: Iterable[int]) -> tuple[AskedT, ...]:
+        """Those whose pictures are shown with any of the seeds."""
+        return tuple(self.of(item, seed) for seed in seeds)
+
     def check(self, items: Sequence[AskedT], noun: str, field: str) -> None:
         """Raise SpecError for the first item that has no other; `field` is that of the suite."""
         lacking = next((item for item in items if not self._others(item)), None)

@@ -72,9 +72,10 @@ class Examples(Generic[AskedT]):
     """Chooses `n` examples for an item out of a pool.
 
     They are tried in one order for all items, so that requests begin alike: those about the scenes
-    `named` first, then as `seed` draws. None is of another sort than the item, shares a base scene
-    with it, or has its goal, be it turned, mirrored or shifted. Sorted by digests, the order is the
-    same on every machine.
+    `named` first, then as `seed` draws; no two are about one scene. None is of another sort than
+    the item, shares a base scene with it, or has its goal, be it turned, mirrored or shifted; nor
+    is it so akin to one of the item's `stand_ins`, whose pictures are shown in the place of its
+    own. Sorted by digests, the order is the same on every machine.
     """
 
     pool: Iterable[AskedT]
@@ -82,6 +83,7 @@ class Examples(Generic[AskedT]):
     named: Sequence[str] = ()
     seed: int = 0
     sort_of: Callable[[AskedT], Hashable] = lambda _: None
+    stand_ins: Callable[[AskedT], Iterable[AskedT]] = lambda _: ()
     _alike: dict[Hashable, list[AskedT]] = field(default_factory=dict, init=False)
     _goals: dict[str, bytes] = field(default_factory=dict, init=False)
     _shown: dict[str, WorkedExample] = field(default_factory=dict, init=False)
@@ -115,13 +117,20 @@ class Examples(Generic[AskedT]):
         for item in items:
             if (found := len(self.of(item))) < self.n:
                 message = f"{noun} {item.key} has fewer others to be shown as examples"
-                allowed = "others of its kind that share neither base scene nor goal with it"
+                allowed = "others of its kind, of scenes that differ, which share neither base "
+                allowed += "scene nor goal with it or with what is shown in its place"
                 raise SpecError(Problem(where, message, "examples", str(found), allowed))
 
     def _others(self, item: AskedT) -> Iterator[AskedT]:
-        own, goal = _bases(item.scene), self._goal(item)
+        seen = (item, *self.stand_ins(item))
+        bases = frozenset[str]().union(*(_bases(one.scene) for one in seen))
+        goals = {self._goal(one) for one in seen}
+        scenes: set[str] = set()
         for one in self._alike.get(self.sort_of(item), ()):
-            if own.isdisjoint(_bases(one.scene)) and self._goal(one) != goal:
+            if one.scene.id in scenes or not bases.isdisjoint(_bases(one.scene)):
+                continue
+            if self._goal(one) not in goals:
+                scenes.add(one.scene.id)
                 yield one
 
     def _goal(self, item: AskedT) -> bytes:
@@ -141,8 +150,11 @@ def examples_of(
     items: Sequence[AskedT],
     noun: str,
     sort_of: Callable[[AskedT], Hashable] = lambda _: None,
+    stand_ins: Callable[[AskedT], Iterable[AskedT]] = lambda _: (),
 ) -> Examples[AskedT]:
     """The examples that a suite wants, out of a pool; they are drawn by the first of its seeds.
+
+    `sort_of` and `stand_ins` are those of `Examples`.
 
     Raises SpecError for a scene that the pool has not, and where an item has too few others.
     """
@@ -155,7 +167,7 @@ def examples_of(
         message = f"no {noun} that can be an example is about this scene"
         hint = did_you_mean(lacking[0], sorted(known))
         raise SpecError(Problem(where, message, "examples", lacking[0], hint=hint))
-    examples = Examples(kept, n, named, suite.seeds[0], sort_of)
+    examples = Examples(kept, n, named, suite.seeds[0], sort_of, stand_ins)
     examples.check(items, noun, where)
     return examples
 

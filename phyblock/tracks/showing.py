@@ -93,6 +93,12 @@ class TaskShowing:
             goal = self._elsewhere.of(task, seed)
         return replace(in_order(task, numbers, goal), seed=seed)
 
+    def stand_ins(self, task: AssemblyTask) -> tuple[AssemblyTask, ...]:
+        """The tasks whose goals are shown in the place of its own."""
+        if self._elsewhere is None or self.how.blind:
+            return ()
+        return self._elsewhere.each(task, self.how.seeds)
+
     def each(self, tasks: Sequence[AssemblyTask]) -> list[AssemblyTask]:
         """The tasks in every form in which the suite shows them."""
         seeds = self.how.seeds[:1] if self.how.is_plain else self.how.seeds

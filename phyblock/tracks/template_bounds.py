@@ -66,7 +66,7 @@ _PERCENT = re.compile(r"%(?:\([^)]*\))?[#0\- +]*(\d+|\*)?(?:\.(\d+|\*))?")
 
 
 class BoundError(Exception):
-    """A template passes a bound; the text says which."""
+    """A template does what none may; the text says what."""
 
 
 class _Meter:
@@ -127,13 +127,15 @@ def render_block(
 ) -> str:
     """The text of a block; raises BoundError, and whatever the template makes go wrong.
 
-    `head` is what stands outside of the template's blocks.
+    `head` is what stands outside of the template's blocks; no name in it may be that of a fact.
     """
     token = _METER.set(_Meter())
     try:
         above = head.new_context(facts)
         for _ in head.root_render_func(above):
             pass
+        if taken := sorted(above.vars.keys() & facts.keys()):
+            raise BoundError(f"{taken[0]}, set outside of the blocks, is a fact of what is asked")
         pieces: list[str] = []
         length = 0
         for piece in template.blocks[block](template.new_context({**facts, **above.vars})):

@@ -10,7 +10,7 @@ import hashlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 
 import jinja2
 from jinja2 import nodes
@@ -22,6 +22,7 @@ __all__ = ["Source", "Sources", "read_sources"]
 
 _LARGEST_BYTES = 256 * 1024
 _MOST_FILES = 32
+_TEMPLATES = "a file that ends in .j2, of which no part begins with a dot"
 _Naming = nodes.Extends | nodes.Include | nodes.Import | nodes.FromImport
 _NAMING = (nodes.Extends, nodes.Include, nodes.Import, nodes.FromImport)
 
@@ -133,8 +134,20 @@ def _find(name: str, folders: Sequence[Path], where: str) -> Path | None:
         path = folder / inside
         if not os.path.isfile(path):
             continue
-        if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
+        if not _is_template(inside):
+            message = "includes what is no template"
+            raise PromptError(Problem(where, message, "", name, _TEMPLATES))
+        real, real_folder = Path(os.path.realpath(path)), Path(os.path.realpath(folder))
+        if not real.is_relative_to(real_folder):
             message = f"includes {name}, a link that leads out of its folder"
-            raise PromptError(Problem(where, message, "", os.path.realpath(path), str(folder)))
+            raise PromptError(Problem(where, message, "", str(real), str(folder)))
+        if not _is_template(real.relative_to(real_folder)):
+            message = f"includes {name}, a link to what is no template"
+            raise PromptError(Problem(where, message, "", str(real), _TEMPLATES))
         return path
     return None
+
+
+def _is_template(inside: PurePath) -> bool:
+    """Whether a file may be sent: beside templates lie others, which may hold keys."""
+    return inside.suffix == ".j2" and not any(part.startswith(".") for part in inside.parts)

@@ -11,17 +11,17 @@ from tests.workspace import Workspace
 def test_missing_recordings_and_unknown_providers_are_found(workspace: Workspace) -> None:
     models = {
         "far": {"replay": "./nowhere"},
-        "odd": "opnai/gpt-4o",
+        "odd": {"id": "opnai/gpt-4o", "groups": ["mine"]},
         "own": {"id": "hosted_vllm/x", "api_base": "http://localhost:1/v1"},
     }
     workspace.write_yaml("models.yaml", models)
-    workspace.write_suite(models=["odd", "own"], seeds=[0])
+    workspace.write_suite(models=["group:mine", "own"], seeds=[0])
     done = workspace.phyblock("validate", "models.yaml", "suite.yaml")
     assert done.code == 2
     assert "models.yaml:2:11: far.replay: recordings not found" in done.err
     # Of the suite its own models alone are looked at.
     assert done.err.count("far.replay") == 1
-    assert done.err.count("models.yaml:3:6: odd.id: is of no provider that is known") == 2
+    assert done.err.count("models.yaml:4:7: odd.id: is of no provider that is known") == 2
     assert "did you mean openai?" in done.err
     assert "own.id" not in done.err
 

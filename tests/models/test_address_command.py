@@ -63,6 +63,43 @@ def test_one_that_does_not_end_is_ended_with_all_that_it_started(
     assert not late.exists()
 
 
+def test_one_that_closes_what_it_prints_to_may_go_on_for_a_while() -> None:
+    words = ["sh", "-c", "echo http://a:1/v1; exec >&- 2>&-; sleep 1.2"]
+    assert addresses_by(words) == ("http://a:1/v1",)
+
+
+@pytest.mark.parametrize(
+    ("place", "error"),
+    [
+        ("selectors.DefaultSelector", OSError(24, "Too many open files")),
+        ("asyncio.to_thread", RuntimeError("can't start new thread")),
+    ],
+)
+def test_the_list_that_is_known_holds_when_nothing_more_can_be_started(
+    monkeypatch: pytest.MonkeyPatch, place: str, error: Exception
+) -> None:
+    """It is not run when it is taken up, but as soon as it is looked at."""
+    told: list[str] = []
+
+    def fail(*_: object) -> object:
+        raise error
+
+    async def main() -> tuple[str, ...]:
+        command = AddressCommand(["cat"], Clock(), told.append, ("http://a:1/v1",))
+        # A loop needs a selector of its own to begin.
+        monkeypatch.setattr(place, fail)
+        while not told:
+            assert not command.has_changed()
+            await asyncio.sleep(0.01)
+        await command.aclose()
+        return command.addresses
+
+    assert run(main) == ("http://a:1/v1",)
+    (text,) = told
+    assert text.startswith("the servers stay the same: the command cat: ")
+    assert "cannot be run: " in text
+
+
 def test_its_list_is_taken_up_while_a_run_goes_on(tmp_path: Path) -> None:
     """As `squeue` would say it; a hundred times as often."""
     listed, said = tmp_path / "listed", list[str]()

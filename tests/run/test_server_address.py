@@ -173,7 +173,9 @@ def test_a_command_of_a_models_file_that_came_with_a_suite_is_not_run(workspace:
     """Only one of the user's own is: named, or in the folder where they are."""
     with Running(OpenAIChat()) as server:
         marker = workspace.root / "marker"
-        words = ["sh", "-c", f"touch {marker}; echo {server.url}/v1"]
+        # It works once: what it lists when it is checked is what the run begins with.
+        once = f"test ! -e {marker} && touch {marker} && echo {server.url}/v1"
+        words = ["sh", "-c", once, "--token", "hunter2"]
         entry = {"id": "hosted_vllm/alpha", "api_base_command": words}
         workspace.write_yaml("models.yaml", {"alpha": entry})
         workspace.write_suite(models=["alpha"], seeds=[0])
@@ -181,12 +183,16 @@ def test_a_command_of_a_models_file_that_came_with_a_suite_is_not_run(workspace:
         for name in ("suite.yaml", "models.yaml", "data"):
             (workspace.root / name).rename(workspace.root / "theirs" / name)
         words = ["run", "theirs/suite.yaml", "--out", "out", "--no-report", "--yes"]
-        refused = workspace.phyblock(*words)
-        assert refused.code == 2
-        assert "alpha.api_base_command: names a command, which only a models file of" in refused.err
+        checked = ["validate", "theirs/suite.yaml"]
+        for refused in (workspace.phyblock(*words), workspace.phyblock(*checked)):
+            assert refused.code == 2
+            assert "alpha.api_base_command: names a command, which only a" in refused.err
+            assert "hunter2" not in refused.err
+        free = workspace.phyblock(*words, "--models", "random", "--dry-run")
+        assert free.code == 0, free.err
         dry = workspace.phyblock(*words, "--models-file", "theirs/models.yaml", "--dry-run")
         assert dry.code == 0, dry.err
-        assert workspace.phyblock("validate", "theirs/suite.yaml").code == 0
+        assert workspace.phyblock(*checked, "--models-file", "theirs/models.yaml").code == 0
         assert not marker.exists()
         named = workspace.phyblock(*words, "--models-file", "theirs/models.yaml")
         assert named.code == 0, named.err

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.special import gammaincinv  # type: ignore[import-untyped]
 
 from phyblock.scoring.components import (
     Component,
@@ -103,6 +104,22 @@ def test_known_components_lie_in_their_intervals() -> None:
         # Three standard errors of a share of 0.95 in so many runs, and of their mean.
         assert hits[name] / RUNS > 0.89, name
         assert np.sqrt(squares[name]) == pytest.approx(TRUTH[name], rel=0.15), name
+
+
+def test_scenes_that_agree_by_chance_are_no_certainty() -> None:
+    """Where every scene says the same the error is 0, but there are four scenes of each alone."""
+    alike = np.tile(np.array([0.0, 1.0, 0.0, 1.0]), (4, 3, 1))
+    spread = np.array([0.0, 1.0, 0.0, 1.0])[:, None] * np.ones((4, 3))
+    across = np.array([[[0.0, 0.0], [1.0, 1.0]], [[1.0, 1.0], [0.0, 0.0]]] * 2)
+    parts = (
+        within(alike, apart(4)),
+        spread_of_items(spread, apart(4)),
+        interaction(across, apart(4)),
+    )
+    for part, df in zip(parts, (4 * 3 * 3, 3, 3), strict=True):
+        assert part.lo < part.sd < part.hi
+        ends = part.sd * np.sqrt(df / (2 * gammaincinv(df / 2, [0.975, 0.025])))
+        assert np.allclose([part.lo, part.hi], ends)
 
 
 def test_nothing_to_tell_has_no_value() -> None:

@@ -34,6 +34,7 @@ from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
 
 DATA = open_dataset("builtin", bundled("benchmarks", "data", "phyblock-400"))
+DATA_PARENTS = {task.key: {task.scene.id, *task.scene.parents} for task in DATA.tasks}
 names = st.lists(st.sampled_from([task.key for task in DATA.tasks]), max_size=3, unique=True)
 
 
@@ -75,7 +76,7 @@ def test_no_example_is_kin_of_what_is_asked_about(first: list[str], n: int, seed
     examples: Examples[AssemblyTask] = Examples(DATA.tasks, n, first, seed)
     for task in DATA.tasks[seed::20]:
         shown = examples.of(task)
-        assert len({one.key for one in shown}) == len(shown) == n
+        assert len({one.scene.id for one in shown}) == len(shown) == n
         assert all(bases(task).isdisjoint(bases(one)) for one in shown)
         forms = {canonical_form(one.scene.blocks) for one in shown}
         assert canonical_form(task.scene.blocks) not in forms
@@ -150,11 +151,24 @@ def test_examples_are_turns_before_the_question(
 
 
 def test_questions_have_examples_of_their_subtask_with_the_right_option(tmp_path: Path) -> None:
-    track, _ = opened(tmp_path, "tracks=[vqa]", "examples=2", limit=32)
-    known = {task.key: task for task in track._questions.tasks}
+    """They are about two scenes: those named, wherever both have a question of the subtask."""
+    asked_of, _ = opened(tmp_path, "tracks=[vqa]")
+    known = {task.key: task for task in asked_of._questions.tasks}
+    in_scene: dict[str, set[str]] = {}
+    for task in known.values():
+        in_scene.setdefault(task.scene.id, set()).add(task.question.subtask)
+    two = sorted(in_scene, key=lambda scene: (-len(in_scene[scene]), scene))[:2]
+    track, _ = opened(tmp_path, "tracks=[vqa]", f"examples=[{', '.join(two)}]", limit=32)
     subtasks = set()
+    both = 0
     for item in track.items:
         ((asked, _),) = track.outlines(item)
+        scenes = {known[key].scene.id for key in asked.examples}
+        assert len(scenes) == len(asked.examples) == 2
+        may = {one for one in two if item.question.subtask in in_scene[one]}
+        if all(bases(item).isdisjoint(DATA_PARENTS[one]) for one in two):
+            assert may <= scenes
+            both += len(may) == 2
         for key, answer in zip(asked.examples, asked.messages[2::2], strict=True):
             example = known[key]
             assert example.question.subtask == item.question.subtask
@@ -163,6 +177,22 @@ def test_questions_have_examples_of_their_subtask_with_the_right_option(tmp_path
             assert read.letters == example.question.answer_letters
         subtasks.add(item.question.subtask)
     assert len(subtasks) == 16
+    assert both
+
+
+@pytest.mark.parametrize("track", ["full_planning", "vqa"])
+def test_no_example_is_kin_of_what_is_shown_instead(tmp_path: Path, track: str) -> None:
+    sets = (f"tracks=[{track}]", f"{track}.wrong_image=true", "seeds=[0, 1]", "examples=6")
+    shown, _ = opened(tmp_path, *sets)
+    for item in shown.items[::3]:
+        for seed in (0, 1):
+            if track == "vqa":
+                task = shown._tasks[item.question.id]
+                instead = shown._elsewhere.of(task, seed)
+            else:
+                task = shown.shown(item, seed)
+                instead = task.goal
+            assert all(bases(instead).isdisjoint(bases(one)) for one in shown._examples.of(task))
 
 
 def manifest_of(folder: Path, *sets: str) -> Any:

@@ -6,7 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from phyblock.cli.cache import command
 from phyblock.domain import CandidateSet, Plan, Scene
 from phyblock.tracks.full_planning import kept_plans as module
 from phyblock.tracks.full_planning.goal_blind import goal_blind_plans
@@ -56,12 +58,46 @@ def test_whatever_decides_the_plans_is_in_the_key(
         code = tmp_path / "code"
         for name in module._DECIDE:
             (code / name).mkdir(parents=True)
+            (code / name / "code.py").write_text("", encoding="utf-8")
         patch.setattr(module, "_PACKAGE", code)
         kept_plans(SCENES, SETS, "A")
         (code / module._DECIDE[-1] / "goal_blind.py").write_text("changed", encoding="utf-8")
         kept_plans(SCENES, SETS, "A")
     kept_plans(SCENES, SETS, "A")
     assert learned == ["A", "B", "A", "A", "A", "A"]
+
+
+@pytest.mark.parametrize("gone", range(len(module._DECIDE)))
+def test_without_its_code_nothing_is_kept(
+    learned: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, gone: int
+) -> None:
+    """As in an archive, or where bytecode alone is there: an edit of it would not be seen."""
+    for at, name in enumerate(module._DECIDE):
+        (tmp_path / "code" / name).mkdir(parents=True)
+        if at != gone:
+            (tmp_path / "code" / name / "code.py").write_text("", encoding="utf-8")
+    monkeypatch.setattr(module, "_PACKAGE", tmp_path / "code")
+    assert kept_plans(SCENES, SETS, "A") == kept_plans(SCENES, SETS, "A")
+    assert learned == ["A", "A"]
+    assert files(tmp_path) == []
+
+
+def test_what_was_learned_is_told_and_removed_by_the_user(
+    learned: list[str], tmp_path: Path
+) -> None:
+    kept_plans(SCENES, SETS, "A")
+    kept_plans(SCENES, SETS, "B")
+    (folder,) = {path.parent for path in files(tmp_path)}
+    mine = folder / "mine.json"
+    mine.write_text("{}", encoding="utf-8")
+    told = CliRunner().invoke(command, ["stats"])
+    assert "2 files of learned plans" in told.output
+    assert CliRunner().invoke(command, ["clear", "--learned", "--model", "m"]).exit_code == 2
+    assert "Removed 2 files" in CliRunner().invoke(command, ["clear", "--learned"]).output
+    assert files(tmp_path) == [mine]
+    assert "learned plans" not in CliRunner().invoke(command, ["stats"]).output
+    kept_plans(SCENES, SETS, "A")
+    assert learned == ["A", "B", "A"]
 
 
 @pytest.mark.parametrize(

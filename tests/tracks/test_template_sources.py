@@ -88,6 +88,16 @@ LOOP = "{% for i in range(9999) %}{% include 'part.j2' %}{% endfor %}"
         ("{% include 'a/../../b' %}", "", "mine.j2:1", "of another folder"),
         ("{% include 'link.j2' %}", "", "mine.j2:1", "leads out of its folder"),
         ("{% include 'below/link.j2' %}", "", "mine.j2:1", "leads out of its folder"),
+        ("{% include '.env' %}", "", "mine.j2:1", "no template"),
+        ("{% include 'keys.txt' %}", "", "mine.j2:1", "no template"),
+        ("{% include '.below/part.j2' %}", "", "mine.j2:1", "no template"),
+        ("{% include 'inside.j2' %}", "", "mine.j2:1", "a link to what is no template"),
+        ("{% set n_candidates = 4 %}{% block user %}a{% endblock %}", "", "mine.j2:1",
+         "n_candidates, set outside of the blocks, is a fact"),
+        ("{% macro pictures() %}{% endmacro %}{% block user %}a{% endblock %}", "", "mine.j2:1",
+         "pictures, set outside of the blocks, is a fact"),
+        ("{% import 'part.j2' as pictures %}{% block user %}a{% endblock %}", "", "mine.j2:1",
+         "pictures, set outside of the blocks, is a fact"),
         ("{% extends 'part.j2' %}{% block user %}{% endblock %}", "", "mine.j2:1", "extend"),
         ("{% include 'part.j2' %}", "a\n\n{{ wrong }}", "part.j2:3", "'wrong' is undefined"),
         ("{% include 'part.j2' %}", "a\n{% if %}", "part.j2:2", "is not valid Jinja"),
@@ -109,6 +119,10 @@ def test_what_is_wrong_is_said_with_the_file_that_is_included(
     (tmp_path / "secret.txt").write_text("secret", encoding="utf-8")
     folder = tmp_path / "prompts"
     (folder / "below").mkdir(parents=True)
+    (folder / ".below").mkdir()
+    for name in (".env", "keys.txt", ".below/part.j2"):
+        (folder / name).write_text("secret", encoding="utf-8")
+    (folder / "inside.j2").symlink_to(".env")
     (folder / "link.j2").symlink_to(tmp_path / "secret.txt")
     (folder / "below" / "link.j2").symlink_to("../../secret.txt")
     with pytest.raises(PromptError) as caught:

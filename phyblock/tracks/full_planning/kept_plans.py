@@ -17,13 +17,12 @@ import numpy as np
 from phyblock.bounded import load_json, read_bytes
 from phyblock.domain import CandidateSet, Plan, Scene
 from phyblock.files import atomic_write
-from phyblock.resources import cache_dir
+from phyblock.resources import learned_dir
 from phyblock.tracks.full_planning.goal_blind import goal_blind_plans
 from phyblock.words import Setting
 
 __all__ = ["kept_plans"]
 
-_FOLDER = "goal-blind"
 _PACKAGE = Path(__file__).parents[2]
 _DECIDE = ("domain", "scoring", "tracks/full_planning")
 """Packages whose code decides the plans."""
@@ -34,9 +33,13 @@ def kept_plans(
 ) -> dict[str, Plan]:
     """What `goal_blind_plans` gives, from the cache folder where the same was learned before.
 
-    A folder that cannot be read or written, or a file that is not whole, costs only the time.
+    A folder that cannot be read or written, or a file that is not whole, costs only the time; so
+    does code that is not there as files, by which kept plans would be known.
     """
-    path = cache_dir() / _FOLDER / f"{_key(scenes, candidates, setting)}.json"
+    key = _key(scenes, candidates, setting)
+    if key is None:
+        return goal_blind_plans(scenes, candidates, setting)
+    path = learned_dir() / f"{key}.json"
     if (kept := _read(path, candidates)) is not None:
         return kept
     plans = goal_blind_plans(scenes, candidates, setting)
@@ -46,12 +49,20 @@ def kept_plans(
     return plans
 
 
-def _key(scenes: Sequence[Scene], candidates: Mapping[str, CandidateSet], setting: Setting) -> str:
-    """Digest of the code, the scenes with their candidates, and the setting."""
+def _key(
+    scenes: Sequence[Scene], candidates: Mapping[str, CandidateSet], setting: Setting
+) -> str | None:
+    """Digest of the code, the scenes with their candidates, and the setting; None without code."""
     digest = hashlib.sha256(f"{np.__version__} {setting}".encode())
     for name in _DECIDE:
-        for path in sorted((_PACKAGE / name).glob("*.py")):
-            digest.update(path.read_bytes())
+        sources = sorted((_PACKAGE / name).glob("*.py"))
+        if not sources:
+            return None
+        try:
+            for path in sources:
+                digest.update(path.read_bytes())
+        except OSError:
+            return None
     for scene in scenes:
         digest.update(repr((scene, candidates[scene.id])).encode("utf-8", "surrogatepass"))
     return digest.hexdigest()

@@ -38,7 +38,7 @@ def open_full_planning(opening: Opening) -> FullPlanning:
         for task in pool
         if can_be_worked(task) and (task.composite or suite.images.source == "render")
     ]
-    examples = examples_of(opening.loaded, able, tasks, "scene")
+    examples = examples_of(opening.loaded, able, tasks, "scene", stand_ins=showing.stand_ins)
     return FullPlanning(_rules(suite), prompt, pictures, tasks, showing, pool, examples)
 
 

@@ -27,7 +27,7 @@ from phyblock.tracks.selection import spread, stratified
 from phyblock.tracks.vqa.pictures import QuestionPictures
 from phyblock.tracks.vqa.rules import VqaRules
 from phyblock.tracks.vqa.spec import VqaSpec
-from phyblock.tracks.vqa.track import Vqa, subtask_of
+from phyblock.tracks.vqa.track import Vqa, elsewhere_in, subtask_of
 
 __all__ = ["open_questions", "open_vqa", "select_questions"]
 
@@ -56,7 +56,14 @@ def open_vqa(opening: Opening) -> Vqa:
         opening.shop,
         suite.images.background,
     )
-    examples = examples_of(loaded, questions.tasks, tasks, "question", subtask_of)
+    elsewhere = elsewhere_in(questions) if rules.wrong_image else None
+
+    def stand_ins(task: QuestionTask) -> tuple[QuestionTask, ...]:
+        return () if elsewhere is None else elsewhere.each(task, suite.seeds)
+
+    if elsewhere is not None:
+        elsewhere.check(tasks, "question", "vqa.wrong_image")
+    examples = examples_of(loaded, questions.tasks, tasks, "question", subtask_of, stand_ins)
     return Vqa(rules, questions, tasks, template_prompt(loaded, Vqa.name), pictures, examples)
 
 

@@ -23,7 +23,7 @@ from phyblock.tracks.vqa.baselines import ChoiceSubject
 from phyblock.tracks.vqa.pictures import QuestionPictures, ShownQuestion
 from phyblock.tracks.vqa.rules import VqaRules
 
-__all__ = ["AskedQuestion", "ChoiceJudgement", "Vqa", "asked", "subtask_of"]
+__all__ = ["AskedQuestion", "ChoiceJudgement", "Vqa", "asked", "elsewhere_in", "subtask_of"]
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class Vqa:
         self._guesses = Guesses([task.question for task in questions.tasks])
         self._elsewhere: Elsewhere[QuestionTask] | None = None
         if rules.wrong_image:
-            self._elsewhere = Elsewhere(questions.tasks, _sort_of)
+            self._elsewhere = elsewhere_in(questions)
             self._elsewhere.check(tasks, "question", "vqa.wrong_image")
 
     def about(self, item: AskedQuestion) -> dict[str, Any]:
@@ -263,6 +263,11 @@ class Vqa:
             return item.shown
         other = self._elsewhere.of(self._tasks[item.question.id], seed)
         return asked(other, item.rotation).shown
+
+
+def elsewhere_in(questions: QuestionSet) -> Elsewhere[QuestionTask]:
+    """What wrong pictures of a question are taken from: others that show what it shows."""
+    return Elsewhere(questions.tasks, _sort_of)
 
 
 def subtask_of(task: QuestionTask) -> str:
