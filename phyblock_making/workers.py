@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-import multiprocessing
 import socket
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from typing import Any, Protocol, TypeVar
 
 from phyblock.errors import InputError, PhyblockError, Problem
+from phyblock.worker_processes import end_workers, without_interrupts, worker_pool
 
 __all__ = ["Workers", "open_workers"]
 
@@ -46,9 +46,13 @@ def open_workers(jobs: int = 1, ray_address: str | None = None) -> Iterator[Work
     elif jobs == 1:
         yield _Here()
     else:
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(jobs, mp_context=context) as pool:
-            yield _Processes(pool, jobs * _AHEAD)
+        with worker_pool(jobs) as pool:
+            try:
+                yield _Processes(pool, jobs * _AHEAD)
+            except KeyboardInterrupt:
+                # Of what is under way nothing is wanted, and a worker hears no Ctrl-C of its own.
+                end_workers(pool)
+                raise
 
 
 class _Here:
@@ -62,13 +66,17 @@ class _Processes:
 
     def map(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
         waiting = iter(tasks)
-        running = [self._pool.submit(function, task) for task in islice(waiting, self._ahead)]
+        running = [self._submit(function, task) for task in islice(waiting, self._ahead)]
         try:
             while running:
                 yield running.pop(0).result()
-                running += [self._pool.submit(function, task) for task in islice(waiting, 1)]
+                running += [self._submit(function, task) for task in islice(waiting, 1)]
         except BrokenProcessPool as error:
             raise PhyblockError("a worker process was killed; nothing was written") from error
+
+    def _submit(self, function: Callable[[T], R], task: T) -> Future[R]:
+        with without_interrupts():
+            return self._pool.submit(function, task)
 
 
 class _Ray:

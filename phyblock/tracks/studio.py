@@ -5,14 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import signal
-import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from multiprocessing import get_context, parent_process
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,6 +18,7 @@ from phyblock.errors import DataError, SimulationError
 from phyblock.files import atomic_write, writing
 from phyblock.models.base import Image
 from phyblock.picture_files import LARGEST_PICTURE_BYTES, picture_size
+from phyblock.worker_processes import without_interrupts, worker_pool
 
 __all__ = ["Drawing", "Studio", "Workshop", "render_workers", "to_image"]
 
@@ -52,19 +50,27 @@ class Workshop:
         self.recent: OrderedDict[tuple[Studio, str], tuple[Image, ...]] = OrderedDict()
         self._workers = workers
         self._pool: ProcessPoolExecutor | None = None
+        self._alone = asyncio.Lock()
 
     async def work_out(self, work: Callable[[], _Result]) -> _Result:
-        """What `work`, a `partial` of a function of a module, gives in a worker process."""
-        if self._pool is None:
-            self._pool = ProcessPoolExecutor(
-                self._workers, get_context("spawn"), initializer=_start_worker
-            )
-        try:
-            with _workers_without_interrupts():
-                done = asyncio.get_running_loop().run_in_executor(self._pool, work)
-            return await done
-        except BrokenProcessPool as error:
-            raise SimulationError("a process that draws pictures was killed") from error
+        """What `work`, a `partial` of a function of a module, gives in a worker process.
+
+        Where one was killed it is done once more, alone; SimulationError where it is killed again.
+        """
+        pool = self._pool = self._pool or worker_pool(self._workers)
+        with contextlib.suppress(BrokenProcessPool):
+            return await _done_in(pool, work)
+        # All that was under way ends with the one that was killed: each is done again alone.
+        if self._pool is pool:
+            self._pool = None
+            pool.shutdown(wait=False)
+        async with self._alone:
+            with worker_pool(1) as lone:
+                try:
+                    return await _done_in(lone, work)
+                except BrokenProcessPool as error:
+                    message = "a process that draws and simulates was killed twice"
+                    raise SimulationError(message) from error
 
     def close(self) -> None:
         """Stop the worker processes."""
@@ -164,16 +170,6 @@ class Studio:
         self._shop.close()
 
 
-@contextlib.contextmanager
-def _workers_without_interrupts() -> Iterator[None]:
-    """Processes that start here never see Ctrl-C, not even while they import."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 def _take_note(drawn: asyncio.Task[bytes]) -> None:
     # Where all who waited were cancelled, nobody asks for the failure, and asyncio would print it.
     if not drawn.cancelled():
@@ -200,15 +196,7 @@ def _whole_png(path: Path) -> bytes | None:
     return data if is_whole else None
 
 
-def _start_worker() -> None:
-    # Ctrl-C reaches the whole process group; only the runner decides what to do about it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """A runner that is killed tells its workers nothing: without this they would stay for ever."""
-    parent = parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
+async def _done_in(pool: ProcessPoolExecutor, work: Callable[[], _Result]) -> _Result:
+    with without_interrupts():
+        done = asyncio.get_running_loop().run_in_executor(pool, work)
+    return await done
