@@ -35,7 +35,7 @@ __all__ = [
     "pose_form",
 ]
 
-POSE_READER_VERSION = 1
+POSE_READER_VERSION = 2
 """Of this reader alone; raised when any reply can be read otherwise."""
 
 MOST_POSE_STEPS = 100

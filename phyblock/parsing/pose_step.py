@@ -16,7 +16,7 @@ from typing import Literal, get_args
 from phyblock.domain import PoseStep
 
 __all__ = [
-    "FARTHEST_CM",
+    "FARTHEST_PLACE_CM",
     "MOST_TURN_DEG",
     "OTHER_UNIT",
     "STEP_PROBLEMS",
@@ -42,7 +42,7 @@ StepProblem = Literal[
 STEP_PROBLEMS: tuple[StepProblem, ...] = get_args(StepProblem)
 """Why a step cannot be read. `turned`: it is given a rotation where candidates keep theirs."""
 
-FARTHEST_CM = 1000.0
+FARTHEST_PLACE_CM = 1000.0
 """Coordinates beyond this are no place on a table [cm]."""
 MOST_TURN_DEG = 3600.0
 
@@ -98,12 +98,20 @@ _TURN_WORD = re.compile(r"\b(?:turned|rotat(?:ed|ion)|degrees?)\b|°", re.IGNORE
 _MENTION = re.compile(r"\b(?:blocks?|steps?|candidates?|layers?|levels?)\s{0,2}#?\d{1,6}(?:\W|\Z)")
 _INCHES = re.compile("\\d\\s{0,2}[\"\u2033\u2032\u201d']")
 
+_OTHER = (
+    r"(?:m|km|dm|mm|[\u00b5\u03bc]m|(?:kilo|deci|milli|micro)?met(?:er|re)s?|inch(?:es)?|feet"
+    r"|foot|ft|yards?|px|pixels?|voxels?|studs?|cells?|blocks|grid \w+|block \w+"
+    r"|units of (?!(?:1 |one )?c(?:m|enti))\w+)"
+)
 OTHER_UNIT = re.compile(
     r"\b(?:units?|coordinates?|positions?|values?|numbers?|measured|given|expressed|dimensions?"
-    r"|lengths?|distances?|everything|all)\b[^.\n]{0,40}?(?:\b(?:in|are|is)\b|[:=])[\s\"'(]{0,4}"
-    r"(?:the )?(?:m|mm|millimet\w{2,4}|decimet\w{2,4}|met(?:er|re)s?|inch(?:es)?|in|feet|ft|px"
-    r"|pixels?|voxels?|studs?|grid \w+|block \w+)\b(?![\w(])"
-    r"|\((?:in )?(?:m|mm|millimet\w{2,4}|met(?:er|re)s?|inch(?:es)?|feet|ft|px|pixels?)\)",
+    r"|lengths?|distances?|everything|all)\b[^.\n]{0,40}?"
+    r"(?:(?<!not )(?<!never )(?<!than )(?<!instead of )\b(?:in|are|is)\b|[:=])[\s\"'(*_`]{0,6}"
+    # "in" is a unit where nothing comes behind it: "are in cm" says another one.
+    rf"(?:the )?(?:{_OTHER}|in(?=[\"'*_`]{{0,3}}[ \t]*(?:[.,;)\]}}\n]|\Z))"
+    r"(?!\s*[\"'(*_`]*(?:the |units? of )?(?:1 )?c(?:m|enti)))"
+    r"(?:(?![\w(])|(?=_+(?:\W|\Z)))"
+    rf"|\((?:in )?{_OTHER}\)",
     re.IGNORECASE,
 )
 """A text that says of all its numbers that they are no centimeters."""
@@ -163,7 +171,7 @@ def checked_step(
     """A step of finite numbers that a table has room for, with a rotation where one is asked."""
     if not all(map(math.isfinite, (*place, *(euler or ())))):
         return "not_a_number"
-    if max(map(abs, place)) > FARTHEST_CM or max(map(abs, euler or (0.0,))) > MOST_TURN_DEG:
+    if max(map(abs, place)) > FARTHEST_PLACE_CM or max(map(abs, euler or (0.0,))) > MOST_TURN_DEG:
         return "out_of_range"
     x, y, z = place
     if not free:

@@ -226,6 +226,40 @@ REFUSED: list[tuple[str, str]] = [
 ]
 
 
+CENTIMETERS = (
+    "cm", "CM", "cms", "cm.", "centimeter", "centimeters", "centimetre", "Centimetres", "**cm**",
+    "`cm`", '"cm"', "(cm)", "centimeters (cm)", "the cm shown", "units of 1 cm", "units of cm",
+)  # fmt: skip
+SAID_OF_ALL = (
+    "All coordinates are in {}", "All values are in {}, not in m", "All numbers are in {} (not m)",
+    "Units: {}", "Unit = {}", "Positions: in {}", "Everything is measured in {} rather than in mm",
+    "All lengths given are\nin {}", "Coordinates are in\n{}", "The dimensions are in {}",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("unit", CENTIMETERS)
+def test_a_reply_may_say_of_all_its_numbers_that_they_are_centimeters(unit: str) -> None:
+    for said in SAID_OF_ALL:
+        sentence = said.format(unit)
+        for reply in (one("(5, 10, 2.5)"), plan(STEP)):
+            for text in (f"{sentence}.\n{reply}", f"{reply}\n\n{sentence}"):
+                parsed = parse_poses(text, 16, free=False)
+                assert (parsed.problem, len(parsed.plan)) == (None, 1), text
+
+
+@pytest.mark.parametrize(
+    "unit",
+    ["m", "mm", "dm", "in", "inches", "ft", "feet", "yards", "meters", "decimetres", "px", "cells",
+     "**meters**", "_mm_", '"in"', "units of 5", "µm", "the grid units", "blocks"],
+)  # fmt: skip
+def test_a_reply_that_says_that_they_are_others_is_refused(unit: str) -> None:
+    for said in ("All coordinates are in {}", "Units: {}", "Positions are given in {}"):
+        for reply in (one("(5, 10, 2.5)"), plan(STEP)):
+            for text in (f"{said.format(unit)}.\n{reply}", f"{reply}\n\n{said.format(unit)}"):
+                parsed = parse_poses(text, 16, free=False)
+                assert (parsed.problem, len(parsed.plan)) == ("other_unit", 0), text
+
+
 def test_there_are_enough_of_them() -> None:
     assert len(REFUSED) >= 120
     assert {problem for _, problem in REFUSED} == set(POSE_PROBLEMS)
