@@ -14,6 +14,7 @@ from phyblock.records import Record
 
 __all__ = [
     "ENGINE",
+    "READER",
     "AnyTrack",
     "Episode",
     "EpisodeTrack",
@@ -32,6 +33,8 @@ ENGINE = "physics"
 """Key in a track's identity of the physics engine that decides its results, where there is one and
 it is not the engine of reference. What it decided stands in the records.
 """
+READER = "reader"
+"""The same of the version of a reader of the track's own; what is scored again is read anew."""
 
 
 class Item(Protocol):

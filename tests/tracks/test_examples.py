@@ -186,6 +186,7 @@ def test_examples_are_a_part_of_what_a_run_is_only_where_there_are_some(tmp_path
         (("examples=17",), "examples"),
         (("examples=[nowhere]",), "is about this scene"),
         (("examples=1", "tracks=[step_planning]"), "episode of several turns"),
+        (("examples=1", "tracks=[pose_planning]"), "the floor and the sheet of blocks"),
         (("vary.examples=[0, 2]", "tracks=[step_planning]"), "has no meaning in step_planning"),
     ],
 )

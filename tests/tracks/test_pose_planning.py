@@ -18,7 +18,7 @@ from phyblock.cli.main import phyblock
 from phyblock.datasets import AssemblyTask, read_builtin
 from phyblock.domain import Block, Candidate, CandidateSet, PoseStep
 from phyblock.models.base import Image as SentPicture
-from phyblock.parsing import pose_form
+from phyblock.parsing import POSE_READER_VERSION, pose_form
 from phyblock.records.known import known_records
 from phyblock.resources import bundled
 from phyblock.run.records import begun, judged
@@ -230,7 +230,13 @@ def test_a_run_with_faults_is_killed_resumed_scored_again_compared_and_shown(
     assert by_sample(workspace.records()) == by_sample(whole)
     # What fell when it was asked is what fell: nothing is carried out again.
     monkeypatch.setattr(judging, "carry_out", None)
+    described = workspace.out / "run.yaml"
+    told = described.read_text()
+    assert f"reader: {POSE_READER_VERSION}\n" in told
+    # A run of another version of the reader is read anew.
+    described.write_text(told.replace(f"reader: {POSE_READER_VERSION}\n", "reader: 0\n"))
     again = rescore(workspace.out, None, None, workspace.root / "again")
+    described.write_text(told)
     assert by_sample(workspace.records(again)) == by_sample(whole)
     table = pd.read_csv(workspace.out / "tables" / "table_c.csv").set_index("model")
     assert (

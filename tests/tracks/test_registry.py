@@ -104,6 +104,24 @@ def test_only_the_registry_and_its_own_folder_name_a_track() -> None:
     assert not found
 
 
+BORROWED = {("step_planning", "phyblock.tracks.full_planning.guessing")}
+"""Steps of episodes are guessed by the odds of whole plans."""
+
+
+def test_what_tracks_share_lies_beside_them() -> None:
+    names, root = registry.known_tracks(), Path(registry.__file__).parent / "tracks"
+    borrowed = {
+        (name, node.module)
+        for name in names
+        for path in (root / name).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom)
+        and (node.module or "").startswith("phyblock.tracks.")
+        and (set(str(node.module).split(".")) & set(names)) - {name}
+    }
+    assert borrowed == BORROWED
+
+
 def tracks_named(path: Path, tracks: set[str]) -> set[str]:
     """Tracks that a module names."""
     texts: list[str] = []

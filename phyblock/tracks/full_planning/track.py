@@ -24,9 +24,9 @@ from phyblock.scoring import AssemblyScorer, Score
 from phyblock.tracks.examples import Examples, Shots, WorkedExample
 from phyblock.tracks.full_planning.baselines import PlanSubject
 from phyblock.tracks.full_planning.guessing import BlindGuesses
-from phyblock.tracks.full_planning.record import score_fields
 from phyblock.tracks.full_planning.worked import worked_plan
 from phyblock.tracks.pictures import Pictures
+from phyblock.tracks.plans import score_fields
 from phyblock.tracks.prompts import Prompt, form_facts, response_format
 from phyblock.tracks.showing import Showing, TaskShowing, file_plan, told_of
 from phyblock.words import AnswerFormat, Level1Criterion, Matcher, PlanParser, Setting

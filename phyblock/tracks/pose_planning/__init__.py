@@ -50,5 +50,6 @@ TRACK = TrackKind(
     counted=COUNTED,
     tables=("table_c", "pose_errors"),
     rescored=True,
+    no_examples="one would need the floor and the sheet of blocks of a scene of its own",
     varies=("prompt", "background", "candidate_order", "repeats"),
 )

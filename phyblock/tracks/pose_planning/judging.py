@@ -37,7 +37,7 @@ from phyblock.scoring import (
 from phyblock.sim.carry import Carried, CarriedStep, CarryLimits, carry_out
 from phyblock.sim.registry import told_engine
 from phyblock.sim.voxels import voxel_iou
-from phyblock.tracks.full_planning.record import score_fields
+from phyblock.tracks.plans import score_fields
 from phyblock.tracks.pose_planning.frame import laid, pieces_of, put
 from phyblock.tracks.showing import file_plan
 from phyblock.words import AnswerFormat, Matcher, PoseRotation, Setting

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 from phyblock.records import Line, Record
 from phyblock.records.line import Amount, Whole
 from phyblock.scoring import PoseError
-from phyblock.tracks.full_planning.record import PLAN_COLUMNS, PlanParse, plan_row
+from phyblock.tracks.plans import PLAN_COLUMNS, PlanParse, plan_row
 from phyblock.words import PoseRotation, StepEnd
 
 __all__ = ["CarryTolerances", "GivenStep", "PoseOutcome", "PoseParse", "PoseRecord", "StepOutcome"]

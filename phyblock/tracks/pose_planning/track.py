@@ -17,10 +17,11 @@ from typing import Any
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import PoseStep
 from phyblock.models.base import Image, Request
+from phyblock.parsing import POSE_READER_VERSION
 from phyblock.records import Record
 from phyblock.sim.carry import CarriedStep
 from phyblock.sim.registry import REFERENCE_ENGINE, physics_engine
-from phyblock.tracks.base import ENGINE
+from phyblock.tracks.base import ENGINE, READER
 from phyblock.tracks.pose_planning.baselines import PoseSubject
 from phyblock.tracks.pose_planning.frame import upright
 from phyblock.tracks.pose_planning.judging import (
@@ -77,12 +78,14 @@ class PosePlanning:
         return told_of(item)
 
     def identity(self) -> dict[str, Any]:
-        """Name and version of the prompt, a digest of all that decides the pictures, and the
-        physics engine where it is another one than PyBullet.
+        """Name and version of the prompt, a digest of all that decides the pictures, the
+        version of the reader, and the physics engine where it is another one than PyBullet.
         """
         engine = physics_engine()
         other = {} if engine.name == REFERENCE_ENGINE else {"engine": engine.name}
-        told = {ENGINE: {**other, **engine.versions}} if other else {}
+        told: dict[str, Any] = {READER: POSE_READER_VERSION}
+        if other:
+            told[ENGINE] = {**other, **engine.versions}
         if self._prompt is None or self._pictures is None:
             return {"prompt": None, "pictures": None, **told}
         seeds = self._showing.how.seeds[:1] if self._showing.how.is_plain else None

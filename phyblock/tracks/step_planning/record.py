@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from phyblock.records import AskedTurn, Line, Record, StoredReply
 from phyblock.records.line import Whole
-from phyblock.tracks.full_planning.record import PLAN_COLUMNS, PlanParse, plan_row
+from phyblock.tracks.plans import PLAN_COLUMNS, PlanParse, plan_row
 from phyblock.tracks.step_planning.prompt import StepOutcome
 from phyblock.tracks.step_planning.rules import Ending
 
