@@ -208,7 +208,7 @@ class Record(Line):
     @property
     def is_final(self) -> bool:
         """Whether asking again would be wrong: answered, or an error that asking cannot mend."""
-        return self.error is None or self.error.kind in ("refused", "sample")
+        return self.error is None or self.error.kind in ("refused", "sample", "unjudged")
 
     @property
     def replies(self) -> tuple[StoredReply, ...]:

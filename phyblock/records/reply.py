@@ -12,7 +12,7 @@ from phyblock.words import Finish
 
 __all__ = ["ErrorKind", "StoredError", "StoredReply", "StoredUsage"]
 
-ErrorKind = Literal["retryable", "sample", "refused", "unavailable"]
+ErrorKind = Literal["retryable", "sample", "refused", "unavailable", "unjudged"]
 
 _NumberT = TypeVar("_NumberT", int, float)
 
@@ -94,11 +94,11 @@ class StoredReply(Line):
 
 
 class StoredError(Line):
-    """Why there is no reply."""
+    """Why there is no reply, or no judgement of it."""
 
     kind: ErrorKind
     """`retryable`: every attempt failed; `sample`: this request cannot succeed; `refused`: by a
-    content policy."""
+    content policy; `unjudged`: there is a reply, which no engine could carry out."""
     status: Whole | None = None
     """HTTP status, where there was one."""
     message: str = ""

@@ -20,6 +20,7 @@ from phyblock.run.events import ModelStopped, SampleDone, Stopping, Watcher
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
 from phyblock.run.samples import Sample, SampleRunner
+from phyblock.run.shielded import to_its_end
 from phyblock.run.standing import Summary
 from phyblock.run.store import RunStore
 from phyblock.run.writer import RecordWriter
@@ -134,7 +135,9 @@ class Executor:
             # One worker's error must not end the others: they wait for what is paid for.
             ended = await asyncio.gather(*workers, return_exceptions=True)
         finally:
-            await _to_its_end(self._end(workers))
+            _, is_cancelled = await to_its_end(self._end(workers))
+            if is_cancelled:
+                raise asyncio.CancelledError
         for error in (self._failure, *ended):
             if error is not None:
                 raise error
@@ -252,17 +255,3 @@ class Executor:
         if name not in self.result.stopped:
             self.result.stopped[name] = reason
             self._watch(ModelStopped(name, reason))
-
-
-async def _to_its_end(work: Coroutine[Any, Any, None]) -> None:
-    """Wait for work that must be done, even where the waiting task is cancelled meanwhile."""
-    task = asyncio.create_task(work)
-    is_cancelled = False
-    while not task.done():
-        try:
-            await asyncio.wait([task])
-        except asyncio.CancelledError:
-            is_cancelled = True
-    task.result()
-    if is_cancelled:
-        raise asyncio.CancelledError

@@ -98,7 +98,10 @@ async def _judged_again(
             continue
         text = None if record.reply is None else record.reply.text
         judgement = await judgement_of(track, item, text, record)
-        records.append(judged(record.as_given(), item, judgement))
+        given = record.as_given()
+        if record.error is not None and record.error.kind == "unjudged":
+            given["error"] = None
+        records.append(judged(given, item, judgement))
     return records
 
 

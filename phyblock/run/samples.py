@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 from collections.abc import Awaitable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
-from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
+from phyblock.errors import BudgetReachedError, ModelError, SimulationError, UnavailableError
 from phyblock.models import Halt, Model, ModelConfig, Reply, Request, Usage
 from phyblock.models.stored import reply_of, stored
-from phyblock.records import Record, SentPrompt, StoredReply, Turn
+from phyblock.records import Record, SentPrompt, StoredError, StoredReply, Turn
 from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, begun, judged
+from phyblock.run.shielded import to_its_end
 from phyblock.run.writer import RecordWriter
 from phyblock.tracks import (
     AnyTrack,
@@ -123,8 +125,12 @@ class SampleRunner:
         fields = self._begin(sample, answer) | _asked(config, request)
         fields["prompt"] = self._prompt(track, request)
         text = answer.text if isinstance(answer, Reply) else None
-        judgement = await judgement_of(track, sample.item, text)
-        return judged(fields, sample.item, judgement)
+        record, is_cancelled = await to_its_end(_judged(track, sample.item, text, fields))
+        task = asyncio.current_task()
+        if is_cancelled and task is not None:
+            # It ends at its next wait, which is that for its record.
+            task.cancel()
+        return record
 
     async def _play(
         self,
@@ -193,6 +199,20 @@ class SampleRunner:
         if sample.variant.levels:
             fields["variant"] = dict(sample.variant.levels)
         return {**fields, "run": self._run, **sample.track.about(item)}
+
+
+async def _judged(
+    track: SingleTrack[Any], item: Item, text: str | None, fields: Mapping[str, Any]
+) -> Record:
+    """The record of a reply, also where no engine could carry it out: it can be scored again."""
+    try:
+        return judged(fields, item, await judgement_of(track, item, text))
+    except SimulationError as error:
+        if text is None:
+            raise
+        lacking = StoredError(kind="unjudged", message=str(error))
+        nothing = await judgement_of(track, item, None)
+        return judged({**fields, "error": lacking}, item, nothing)
 
 
 def _asked(config: ModelConfig, request: Request) -> dict[str, AskedAs]:

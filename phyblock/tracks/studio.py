@@ -52,19 +52,31 @@ class Workshop:
         self.recent: OrderedDict[tuple[Studio, str], tuple[Image, ...]] = OrderedDict()
         self._workers = workers
         self._pool: ProcessPoolExecutor | None = None
+        self._alone = asyncio.Lock()
 
     async def work_out(self, work: Callable[[], _Result]) -> _Result:
-        """What `work`, a `partial` of a function of a module, gives in a worker process."""
-        if self._pool is None:
-            self._pool = ProcessPoolExecutor(
-                self._workers, get_context("spawn"), initializer=_start_worker
-            )
-        try:
-            with _workers_without_interrupts():
-                done = asyncio.get_running_loop().run_in_executor(self._pool, work)
-            return await done
-        except BrokenProcessPool as error:
-            raise SimulationError("a process that draws pictures was killed") from error
+        """What `work`, a `partial` of a function of a module, gives in a worker process.
+
+        Where one was killed it is done once more, alone; SimulationError where it is killed again.
+        """
+        pool = self._pool = self._pool or self._new_pool(self._workers)
+        with contextlib.suppress(BrokenProcessPool):
+            return await _done_in(pool, work)
+        # All that was under way ends with the one that was killed: each is done again alone.
+        if self._pool is pool:
+            self._pool = None
+            pool.shutdown(wait=False)
+        async with self._alone:
+            with self._new_pool(1) as lone:
+                try:
+                    return await _done_in(lone, work)
+                except BrokenProcessPool as error:
+                    message = "a process that draws and simulates was killed twice"
+                    raise SimulationError(message) from error
+
+    @staticmethod
+    def _new_pool(workers: int) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(workers, get_context("spawn"), initializer=_start_worker)
 
     def close(self) -> None:
         """Stop the worker processes."""
@@ -198,6 +210,12 @@ def _whole_png(path: Path) -> bytes | None:
         return None
     is_whole = data.startswith(b"\x89PNG\r\n\x1a\n") and data.endswith(b"IEND\xaeB`\x82")
     return data if is_whole else None
+
+
+async def _done_in(pool: ProcessPoolExecutor, work: Callable[[], _Result]) -> _Result:
+    with _workers_without_interrupts():
+        done = asyncio.get_running_loop().run_in_executor(pool, work)
+    return await done
 
 
 def _start_worker() -> None:

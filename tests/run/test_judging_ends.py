@@ -1,0 +1,86 @@
+"""A reply is kept where it cannot be judged, and where one who waits for it is given up."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from phyblock.cli.main import phyblock
+from phyblock.errors import SimulationError
+from phyblock.run.rescore import rescore
+from phyblock.run.shielded import to_its_end
+from phyblock.tracks.pose_planning.track import PosePlanning
+from phyblock.tracks.studio import Workshop
+from tests.run.killing import killed
+from tests.workspace import SCENES, Workspace
+
+
+def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path: Path) -> None:
+    async def work() -> None:
+        assert await shop.work_out(partial(killed, tmp_path, 1)) == "done"
+        with pytest.raises(SimulationError, match="killed twice"):
+            await shop.work_out(partial(killed, tmp_path, 3))
+
+    shop = Workshop(1)
+    try:
+        asyncio.run(work())
+    finally:
+        shop.close()
+
+
+def test_what_must_be_done_is_done_though_nobody_waits() -> None:
+    done = []
+
+    async def work() -> str:
+        await asyncio.sleep(0.05)
+        done.append("work")
+        return "record"
+
+    async def wait() -> tuple[str, bool]:
+        return await to_its_end(work())
+
+    async def cancelled() -> tuple[str, bool]:
+        waiting = asyncio.create_task(wait())
+        for _ in range(3):
+            await asyncio.sleep(0.01)
+            waiting.cancel()
+        return await waiting
+
+    assert asyncio.run(cancelled()) == ("record", True)
+    assert done == ["work"]
+    assert asyncio.run(wait()) == ("record", False)
+
+
+def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(workspace.root)
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+    monkeypatch.setattr(sys, "argv", ["phyblock"])
+    workspace.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["top"]})
+    marks = workspace.root / "marks"
+    marks.mkdir()
+    whole = PosePlanning.judge_apart
+
+    async def fatal(track: PosePlanning, item: Any, text: str | None, earlier: Any) -> Any:
+        if text is not None and item.key == SCENES[0]["id"]:
+            assert track._pictures is not None
+            await track._pictures.work_out(partial(killed, marks, 2))
+        return await whole(track, item, text, earlier)
+
+    monkeypatch.setattr(PosePlanning, "judge_apart", fatal)
+    run = ["run", "suite.yaml", "--out", "out", "--no-report", "--limit", "2"]
+    phyblock.main(run, standalone_mode=False)
+    lost, *others = sorted(workspace.records(), key=lambda record: record["scene"])
+    assert lost["error"]["kind"] == "unjudged"
+    assert lost["reply"]["text"].startswith("Step1")
+    assert [record["outcome"] for record in others] == ["ok"]
+    monkeypatch.setattr(PosePlanning, "judge_apart", whole)
+    again = workspace.records(rescore(workspace.out, None, None, workspace.root / "again"))
+    assert {record["outcome"] for record in again} == {"ok"}
+    assert all(record["pose"]["completed"] and record["error"] is None for record in again)
