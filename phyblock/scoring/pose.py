@@ -5,7 +5,7 @@ as a whole.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -21,7 +21,7 @@ from phyblock.domain import (
 )
 from phyblock.domain.blocks import SHAPES
 from phyblock.scoring.goal import Goal
-from phyblock.scoring.pose_align import Motion, Poses, best_motion, nearness
+from phyblock.scoring.pose_align import Motion, Poses, likely_motions, nearness
 from phyblock.scoring.pose_match import TOLERANCES_CM, Nearness, matched
 from phyblock.scoring.ratios import Floats
 from phyblock.scoring.solids import Piece, overlap_volume, placed
@@ -32,10 +32,11 @@ __all__ = ["POSE_FRAMES", "Laid", "PoseFit", "PoseFrame", "PoseScore", "PoseScor
 PoseFrame = Literal["absolute", "aligned"]
 POSE_FRAMES: tuple[PoseFrame, ...] = get_args(PoseFrame)
 """`absolute`: where the plan says. `aligned`: after the best shift over the floor and turn about
-the vertical of the whole plan.
+the vertical of the whole plan, which is none where none counts more.
 """
 _CM = 100.0
 _DIGITS = 4
+_MOST_COUNTED = 8
 _SAME_CM, _SAME_DEG = 1e-7, 1e-5
 
 
@@ -111,13 +112,22 @@ class PoseScorer:
         for place, step in enumerate(steps):
             equal[place, list(self.goal.equal_to[step.candidate])] = True
         alike = tuple(symmetries(block_type) for block_type in types)
-        motion = best_motion(poses, self._poses, equal, alike, turns=self._turns)
-        moved = poses.moved(motion, turns=self._turns)
         numbers = [step.candidate for step in steps]
-        return (
-            self._scored("absolute", numbers, types, poses, equal, alike, Motion()),
-            self._scored("aligned", numbers, types, moved, equal, alike, motion),
-        )
+        absolute = self._scored("absolute", numbers, types, poses, equal, alike, Motion())
+        aligned: PoseScore | None = None
+        motions = likely_motions(poses, self._poses, equal, alike, turns=self._turns)
+        for most, motion in motions[:_MOST_COUNTED]:
+            # In a valid order no more is within a tolerance than in any.
+            if aligned is not None and sum(aligned.right) >= most:
+                break
+            moved = poses.moved(motion, turns=self._turns)
+            score = self._scored("aligned", numbers, types, moved, equal, alike, motion)
+            if aligned is None or sum(score.right) > sum(aligned.right):
+                aligned = score
+        if aligned is None or sum(absolute.right) > sum(aligned.right):
+            still = tuple(fit and replace(fit, iou=None) for fit in absolute.fits)
+            aligned = replace(absolute, frame="aligned", fits=still)
+        return absolute, aligned
 
     def _scored(
         self,

@@ -2,9 +2,9 @@
 goal.
 
 Every pair of steps laid upon a pair of equal goal blocks is a hypothesis, and where steps bring a
-rotation, so is every step laid upon one; the best are drawn nearer by least squares over the blocks
-that they match. Nothing in it depends on where the plan was or how it was turned, so its result
-does not either.
+rotation, so is every step laid upon one; the best are drawn nearer by weighted least squares over
+the blocks that they match. Nothing in it depends on where the plan was or how it was turned, so its
+result does not either.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from phyblock.scoring.pose_match import (
 )
 from phyblock.scoring.ratios import Floats
 
-__all__ = ["Motion", "Poses", "best_motion", "nearness"]
+__all__ = ["Motion", "Poses", "likely_motions", "nearness"]
 
 _WIDEST_CM = TOLERANCES_CM[-1]
 _APART_CM = 1.0
@@ -32,7 +32,7 @@ _APART_CM = 1.0
 _MOST_PAIRS = 6000
 _MOST_TURNED = 240
 _MOST_TRIED = 12
-_ROUNDS = 4
+_ROUNDS = 5
 _DIGITS = 6
 _TRACE_SLACK = 1e-4
 
@@ -83,41 +83,40 @@ def nearness(
     return Nearness(distance, turn, equal)
 
 
-def best_motion(
+def likely_motions(
     steps: Poses,
     goal: Poses,
     equal: NDArray[np.bool_],
     alike: tuple[Floats, ...],
     *,
     turns: bool,
-) -> Motion:
-    """The motion of all steps that brings most of them within most tolerances, then nearest.
+) -> list[tuple[int, Motion]]:
+    """Motions of all steps, each with how many tolerances its steps are within in whatever order
+    they are placed; those with most first, then those that bring steps nearest.
 
     With `turns` the rotation of each step turns along; without, candidates keep the orientation
     in which they were shown.
     """
     if not equal.any():
-        return Motion()
+        return [(0, Motion())]
     found = _hypotheses(steps, goal, equal, alike, turns=turns)
     found = _likeliest(found, steps, goal, equal, alike, turns=turns)
-    best, best_rank = Motion(), (-1.0, -np.inf)
+    ranked: dict[tuple[float, float], Motion] = {}
     for turn, shift in zip(found.turns_rad, found.shifts_cm, strict=True):
         motion = Motion(float(turn), (float(shift[0]), float(shift[1])))
-        before = (-1.0, -np.inf)
         for _ in range(_ROUNDS):
-            moved = steps.moved(motion, turns=turns)
-            near = nearness(moved, goal, equal, alike)
-            vertices = assigned(near)
-            pairs = [(s, v) for s, v in enumerate(vertices) if v is not None]
+            near = nearness(steps.moved(motion, turns=turns), goal, equal, alike)
+            pairs = [(s, v) for s, v in enumerate(assigned(near)) if v is not None]
             rank = _rank(near, pairs)
-            if rank > best_rank:
-                best, best_rank = motion, rank
-            close = [pair for pair in pairs if near.within[pair]]
-            if len(close) < 2 or rank <= before:
+            if rank in ranked:
                 break
-            before = rank
-            motion = _fitted(steps.centers_cm, goal.centers_cm, close, motion)
-    return best
+            ranked[rank] = motion
+            close = [pair for pair in pairs if near.within[pair]]
+            if len(close) < 2:
+                break
+            motion = _fitted(steps.centers_cm, goal.centers_cm, close, near, motion)
+    best = sorted(ranked.items(), key=lambda item: item[0], reverse=True)
+    return [(int(within), motion) for (within, _), motion in best]
 
 
 def _rank(near: Nearness, pairs: list[tuple[int, int]]) -> tuple[float, float]:
@@ -127,15 +126,27 @@ def _rank(near: Nearness, pairs: list[tuple[int, int]]) -> tuple[float, float]:
 
 
 def _fitted(
-    steps_cm: Floats, goal_cm: Floats, pairs: list[tuple[int, int]], before: Motion
+    steps_cm: Floats,
+    goal_cm: Floats,
+    pairs: list[tuple[int, int]],
+    near: Nearness,
+    before: Motion,
 ) -> Motion:
-    """The motion of least squares over pairs, in the plane of the floor (Kabsch)."""
+    """The motion of weighted least squares over pairs, in the plane of the floor (Kabsch).
+
+    Weights are those under which its fixed points are the peaks of a smooth count of tolerances, a
+    bell for each: pairs that are far off give way to those that can be brought within one more.
+    """
     one = steps_cm[[s for s, _ in pairs], :2]
     other = goal_cm[[v for _, v in pairs], :2]
-    middle, target = one.mean(axis=0), other.mean(axis=0)
+    distance = np.array([near.distance_cm[pair] for pair in pairs])
+    limits = np.array(TOLERANCES_CM)
+    weight = (np.exp(-((distance[:, None] / limits) ** 2)) / limits**2).sum(axis=1)[:, None]
+    weight /= weight.sum()
+    middle, target = (weight * one).sum(axis=0), (weight * other).sum(axis=0)
     a, b = one - middle, other - target
-    along = float((a * b).sum())
-    across = float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+    along = float((weight * a * b).sum())
+    across = float((weight[:, 0] * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])).sum())
     is_one_place = float(np.abs(a).max()) < _APART_CM or float(np.abs(b).max()) < _APART_CM
     turn = before.turn_rad if is_one_place else math.atan2(across, along)
     return _laid(turn, middle, target)

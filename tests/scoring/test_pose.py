@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
+from random import Random
 
 import numpy as np
 import pytest
@@ -27,11 +28,12 @@ from phyblock.domain import (
 from phyblock.domain.blocks import SHAPES, BlockType
 from phyblock.scoring import Goal, Laid, PoseScore, PoseScorer, most_placed
 from phyblock.scoring.assignment import cheapest
+from phyblock.scoring.pose_align import Motion
 from phyblock.scoring.pose_match import Nearness, matched
 from phyblock.scoring.solids import Piece, overlap_volume, placed, volume
 from phyblock.sim.geometry import collision_pieces
 from phyblock.sim.pose import quat_xyzw_to_euler_deg
-from phyblock.words import Setting
+from phyblock.words import SETTINGS, Setting
 
 KINDS: tuple[BlockType, ...] = ("cube", "cuboid2", "triangle", "arch")
 
@@ -140,17 +142,39 @@ def test_aligned_does_not_change_when_the_whole_plan_is_shifted_and_turned(
     shift_m: tuple[float, float],
     setting: Setting,
 ) -> None:
-    """Under A candidates keep how they were shown, so that places alone are turned."""
+    """Under A candidates keep how they were shown, so that places alone are turned. Meters away
+    none stands where it should: what is aligned there is what was sought.
+    """
     scene, candidates = drawn
     rng = np.random.default_rng(seed)
     steps = noisy(laid(scene, candidates, list(scene.graph.random_order(rng))), rng, sigma_m)
     scorer = PoseScorer(scene, candidates, setting, pieces)
-    moved = [turned(step, angle_deg, shift_m, along=setting == "B") for step in steps]
-    one, other = scorer.score(steps)[1], scorer.score(moved)[1]
+    away = [turned(step, 0.0, (5.0, 0.0), along=True) for step in steps]
+    moved = [turned(step, angle_deg, shift_m, along=setting == "B") for step in away]
+    here, one, other = (scorer.score(plan)[1] for plan in (steps, away, moved))
     assert one.right == other.right
+    assert sum(here.right) >= sum(one.right)
     if sigma_m == 0:
         assert other.right == (len(scene),) * 4
         assert max(fit.position_cm for fit in other.fits if fit is not None) < 1e-3
+
+
+@settings(max_examples=40, deadline=None)
+@given(scenes(), st.randoms(use_true_random=False), st.sampled_from([0.005, 0.015, 0.03]))
+def test_the_best_motion_of_a_plan_is_no_worse_than_none(
+    drawn: tuple[Scene, CandidateSet], random: Random, sigma_m: float
+) -> None:
+    """Also where steps come in an order that is not valid, or some are anywhere."""
+    scene, candidates = drawn
+    order = random.choices(range(len(scene)), k=random.randint(1, len(scene)))
+    steps = noisy(
+        laid(scene, candidates, order), np.random.default_rng(random.getrandbits(32)), sigma_m
+    )
+    for setting in SETTINGS:
+        absolute, aligned = PoseScorer(scene, candidates, setting, pieces).score(steps)
+        assert sum(aligned.right) >= sum(absolute.right)
+        if aligned.motion == Motion():
+            assert aligned.right == absolute.right
 
 
 @settings(max_examples=20, deadline=None)

@@ -203,18 +203,23 @@ class Builder(OpenAIChat):
         return body
 
 
-def test_a_run_with_faults_is_killed_resumed_scored_again_compared_and_shown(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def prepared(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """A suite, and the words of the command that runs it."""
     monkeypatch.chdir(workspace.root)
     monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
     monkeypatch.setattr(sys, "argv", ["phyblock"])
     models = ["builder", "oracle"]
     workspace.write_suite(tracks=["pose_planning"], models=models, pose={"views": ["top"]})
-    run = ["run", "suite.yaml", "--out", "out"]
+    return ["run", "suite.yaml", "--out", "out", "--no-report"]
+
+
+def test_a_run_with_faults_is_killed_resumed_and_scored_again(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = prepared(workspace, monkeypatch)
     with Running(Builder(faults=Faults(server_error=0.3))) as running:
         workspace.write_models(running.url, "builder")
-        assert not phyblock.main([*run, "--no-report"], standalone_mode=False)
+        assert not phyblock.main(run, standalone_mode=False)
         assert running.server.ended["500"] > 0
         whole = workspace.records()
         text = (workspace.out / "records.jsonl").read_text()
@@ -245,6 +250,17 @@ def test_a_run_with_faults_is_killed_resumed_scored_again_compared_and_shown(
     assert table.loc["builder", "f1_a"] == pytest.approx(200 * 3 / 24)
     assert table.loc["builder", "stands"] == 100
     assert table.loc["builder", "completed"] == 20
+
+
+@pytest.mark.slow
+def test_a_run_has_a_page_figures_a_film_and_is_compared(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = prepared(workspace, monkeypatch)
+    with Running(Builder()) as running:
+        workspace.write_models(running.url, "builder")
+        assert not phyblock.main(run[:-1], standalone_mode=False)
+    capsys.readouterr()
     for file in ("tables/pose_errors.md", "figures/f1-tolerance.svg", "figures/pose-errors.svg"):
         assert (workspace.out / file).exists(), file
     assert "Pose planning" in (workspace.out / "report.html").read_text("utf-8")
