@@ -45,7 +45,7 @@ STEP = re.compile(
 NUMBERED = re.compile(
     r"[\s>+\-#({|•·]{0,8}(?P<number>\d{1,3})(?:st|nd|rd|th)?\s?(?:[.):、](?!\d)|\)\.?)\s{0,4}(?=\D|\d)"
 )
-MARKED = re.compile(r"\s{0,40}(?:[-+•·▪–]|>)\s{1,4}(?=\S)|\s{0,40}[a-h][.)]\s")
+MARKED = re.compile(r"\s{0,40}(?:[-+•·▪–]|>)\s{1,4}(?=\S)|\s{0,40}(?:[a-h][.)]|\d{1,2}(?:\.\d{1,2}){1,2}[.):]?)\s")
 STARTS_MOVING = re.compile(
     rf"[\s>\[{{(]{{0,12}}(?:(?:first|then|next|finally|now|please|und|dann|zuerst),?\s)?(?:robot\.)?(?:{VERB})",
     re.I,
@@ -62,7 +62,7 @@ LABELED = re.compile(
 ARRAY = re.compile(
     r"\[\s{0,9}(?:[\"']?\d{1,6}[\"']?\s{0,9},\s{0,9}){1,63}[\"']?\d{1,6}[\"']?\s{0,9}\]"
 )
-TAG = re.compile(r"</?[a-z_]{1,20}(?:\s[^<>\n]{0,80})?>", re.IGNORECASE)
+TAG = re.compile(r"<\|[a-z_]{1,30}\|>|</?[a-z_]{1,20}(?:\s[^<>\n]{0,80})?>", re.IGNORECASE)
 NOUN_LABEL = re.compile(
     r"[-\s]{0,4}(?:block|index|id|candidate|piece|number)(?: (?:index|id|number))?\s*", re.I
 )

@@ -60,6 +60,7 @@ class Listing:
     heading: str = ""
     ends_named: bool = True
     leaves: bool = False
+    loose: set[int] = field(default_factory=set)
 
     @property
     def is_firm(self) -> bool:
@@ -278,6 +279,7 @@ class _Reader:
         listed = statement.numbers or (chain(body)[0] if is_item else ())
         to.last_line = at
         to.ends_named = bool(listed)
+        to.loose |= statement.loose
         if not listed:
             return False
         to.numbers += list(listed) * (self._times if len(listed) == 1 and is_item else 1)

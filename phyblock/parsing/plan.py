@@ -39,7 +39,7 @@ from phyblock.words import PlanParser
 __all__ = ["PLAN_PROBLEMS", "ParsedPlan", "PlanProblem", "kept_plan", "parse_plan"]
 
 PlanProblem = Literal[
-    "empty", "thoughts_only", "refusal", "catalogue", "two_plans", "no_plan", FormProblem
+    "empty", "thoughts_only", "refusal", "catalogue", "two_plans", "ambiguous", "no_plan", FormProblem
 ]
 PLAN_PROBLEMS: tuple[PlanProblem, ...] = get_args(PlanProblem)
 
@@ -145,6 +145,8 @@ def _choose(answer: str) -> _Read:
     if plan is plans[-1] and _is_cut_off(answer, found, below):
         firm = plans if len(plans) > 1 else [*_plans(named, ranks, MOVES, found), plan]
         plan = firm[-2] if len(firm) > 1 else plan
+    if _is_doubtful(plan):
+        return "ambiguous"
     form = plan.lists[-1].form
     numbers = plan.numbers * (2 if any(map(AGAIN.search, below)) else 1)
     return form, numbers[::-1] if _is_reversed(plan, form) else numbers
@@ -211,6 +213,12 @@ def _chosen(plans: list[_Plan], answer: str) -> _Plan | None:
         named = [plan for plan in plans if chosen and plan.option == chosen[-1].lower()]
         return named[-1] if named else (last if len(plans) == 1 else None)
     return last
+
+
+def _is_doubtful(plan: _Plan) -> bool:
+    """Whether the reply says something of the plan that the reading does not account for."""
+    numbers = {*plan.numbers}
+    return any(listing.loose - numbers for listing in plan.lists)
 
 
 def _is_cut_off(answer: str, found: list[Listing], below: list[str]) -> bool:

@@ -51,7 +51,7 @@ _WORD_NUMBER = (
     r"(?:one|two|three|four|five|six|seven|eight|nine|ten|eleven|twelve|thirteen|fourteen|fifteen"
     r"|sixteen|eins|zwei|drei|vier|fünf|sechs|sieben|acht|neun|zehn|elf|zwölf|un|deux|trois|quatre"
     r"|cinq|sept|huit|neuf|dix|uno|dos|tres|cuatro|cinco|seis|siete|ocho|nueve|diez|десять|один|два"
-    r"|три|четыре|пять|шесть|семь|восемь|девять)(?!\w)|[一二三四五六七八九十]{1,2}(?![号號番\w])"
+    r"|три|четыре|пять|шесть|семь|восемь|девять)(?!\w|\s(?:of|copies|times)\b)|[一二三四五六七八九十]{1,2}(?![号號番\w])"
 )
 _EACH = (
     r"(?:(?:on|at|for|in)\s)?(?:each|either|both|every|auf jeder|an jeder)\s(?:of\s)?(?:the\s)?"
@@ -105,7 +105,7 @@ _TIMES = re.compile(
     re.IGNORECASE,
 )
 _SO_MANY = re.compile(
-    r"(?:(?P<n>\d{1,2})\s?(?:[x×]|个|块)\s{0,2}|(?P<cjk_word>[二两三四五六])(?:个|块)"
+    r"(?:(?P<twice>\b(?:twice|zweimal|deux fois|dos veces)|两次)|(?P<n>\d{1,2})\s?(?:[x×]|times|mal|个|块)\s{0,2}|(?P<cjk_word>[二两三四五六])(?:个|块)"
     r"|\b(?P<word>two|three|four|five|six|zwei|drei|vier|deux|trois"
     r"|dos|tres)"
     r"\s(?:\w{2,12}\s){0,3}?)\(?\Z",
@@ -129,7 +129,7 @@ _SUPPORT = re.compile(
     r"|connect\w{0,3}"
     r"|bridg\w{1,3}|span(?:s|ning)?|across|alongside|to|toward|(?:align\w{0,3}|flush|level|contact"
     r"|parallel) with"
-    r"|instead of|rather than|not|never|don't|without|except|like|as with|same as|before|after|once"
+    r"|instead of|rather than|not|never|don't|without|except|like|as with|same as|before|after|once(?! ?[,;]| and)"
     r"|until|when|if"
     r"|since|because|while|so that|auf|über|unter|neben|zwischen|hinter|vor|statt|nicht|ohne"
     r"|kein\w{0,2}|sobre"
@@ -197,12 +197,14 @@ _SAYS_NUMBER = re.compile(rf"\d|{_WORD_NUMBER}", re.IGNORECASE)
 class Statement:
     """The blocks that a statement moves, in order; whether it says so by a verb.
 
-    `leaves` tells that it names others, too, of which it does not say so.
+    `leaves` tells that it names others, too, of which it does not say so; `loose` are blocks that
+    it names and of which the grammar does not tell whether they are moved.
     """
 
     numbers: tuple[int, ...]
     has_verb: bool = False
     leaves: bool = False
+    loose: frozenset[int] = frozenset()
 
 
 def read_statement(text: str, *, is_item: bool) -> Statement:
@@ -213,16 +215,18 @@ def read_statement(text: str, *, is_item: bool) -> Statement:
     text = _HERE.sub(" ", text)
     bare: tuple[int, ...] = ()
     moved: list[int] = []
+    loose: set[int] = set()
     for piece in _pieces(text):
-        found = _moved(piece)
+        found = _moved(piece, loose)
         if found and _PIECE_VERB.search(piece):
             moved += found
         else:
             bare = bare or tuple(found)
     if moved:
-        return Statement(tuple(moved), True, not {*bare} <= {*moved})
+        return Statement(tuple(moved), True, not {*bare} <= {*moved}, frozenset(loose) - {*moved})
     whole = _IS_WHOLE.match(text) if is_item else None
-    return Statement(tuple(_counted(whole, text, "s")) if whole else bare)
+    named = tuple(_counted(whole, text, "s")) if whole else bare
+    return Statement(named, loose=frozenset(loose) - {*named})
 
 
 def chain(text: str) -> tuple[tuple[int, ...], bool]:
@@ -247,8 +251,8 @@ def _pieces(text: str) -> list[str]:
     return [*pieces, text[start:]]
 
 
-def _moved(piece: str) -> list[int]:
-    """The first free mention of a piece, and those that are joined to it."""
+def _moved(piece: str, loose: set[int]) -> list[int]:
+    """The first free mention of a piece, and those that are joined to it; the others are loose."""
     found: list[int] = []
     last: re.Match[str] | None = None
     for mention in _MENTION.finditer(piece):
@@ -269,6 +273,8 @@ def _moved(piece: str) -> list[int]:
             if not (_JOINS.match(between) and _AND_THEN.search(between)) and not (
                 _PIECE_VERB.search(between) and not is_call
             ):
+                if mention["noun"]:
+                    loose.update(_counted(mention, piece, mention["noun"]))
                 continue
         found += _counted(mention, piece, mention["noun"] or "")
         last = mention
@@ -328,5 +334,7 @@ def _times(text: str, mention: re.Match[str]) -> int:
     before = _SO_MANY.search(text[max(0, mention.start() - 60) : mention.start()])
     if before is None:
         return 1
+    if before["twice"]:
+        return 2
     spelled = number_of_word(before["word"] or before["cjk_word"] or "")
     return min(int(before["n"] or 0) or spelled or 1, MOST_AT_ONCE)
