@@ -62,7 +62,12 @@ LABELED = re.compile(
 ARRAY = re.compile(
     r"\[\s{0,9}(?:[\"']?\d{1,6}[\"']?\s{0,9},\s{0,9}){1,63}[\"']?\d{1,6}[\"']?\s{0,9}\]"
 )
-TAG = re.compile(r"<\|[a-z_]{1,30}\|>|</?[a-z_]{1,20}(?:\s[^<>\n]{0,80})?>", re.IGNORECASE)
+TAG = re.compile(
+    r"<(?:step|move|place|action)\b[^<>\n]{0,80}?\b(?:block|candidate)(?:[_-]?(?:id|index))?="
+    r"[\"'](?P<block>\d{1,6})[\"'][^<>\n]{0,80}/>"
+    r"|<\|[a-z_]{1,30}\|>|</?[a-z_]{1,20}(?:\s[^<>\n]{0,80})?>",
+    re.IGNORECASE,
+)
 NOUN_LABEL = re.compile(
     r"[-\s]{0,4}(?:block|index|id|candidate|piece|number)(?: (?:index|id|number))?\s*", re.I
 )

@@ -31,6 +31,7 @@ from phyblock.parsing.plan_patterns import (
     PART,
     PLAN_WORD,
     REVISION,
+    SUPPOSED_SENTENCE,
 )
 from phyblock.parsing.statement import MOST_AT_ONCE, chain, read_statement
 from phyblock.parsing.structured import Found, find_json, find_tables
@@ -61,6 +62,7 @@ class Listing:
     ends_named: bool = True
     leaves: bool = False
     loose: set[int] = field(default_factory=set)
+    between: list[str] = field(default_factory=list)
 
     @property
     def is_firm(self) -> bool:
@@ -73,7 +75,7 @@ _ABOVE = 12
 
 def listings(text: str) -> tuple[list[Listing], list[str]]:
     """The lists of a text in order, and the lines that stand below the last one."""
-    text = INLINE_STEP.sub("\n", TAG.sub("\n", text))
+    text = INLINE_STEP.sub("\n", TAG.sub(_of_tag, _ROWS.sub(_in_line, text)))
     reader = _Reader()
     forms = sorted(_apart(text), key=lambda found: found.start)
     starts = [found.start for found in forms]
@@ -91,6 +93,20 @@ def listings(text: str) -> tuple[list[Listing], list[str]]:
                 reader.read(number, line[inside.end - at :])
         at += len(line)
     return reader.done, reader.above
+
+
+_ROWS = re.compile(r"\[\s{0,9}(?:\d{1,6},?[ \t]{0,9}(?:(?:#|//)[^\n]{0,200})?\n\s{0,40}){1,63}\]")
+_ROW = re.compile(r"^\W{0,40}(\d{1,6})", re.MULTILINE)
+
+
+def _in_line(rows: re.Match[str]) -> str:
+    """An array of numbers without its line ends and comments."""
+    return f"[{', '.join(_ROW.findall(rows[0]))}]"
+
+
+def _of_tag(tag: re.Match[str]) -> str:
+    """The move that an empty element holds in its attributes; of others, that a line ends."""
+    return f"\nMove block {tag['block']}\n" if tag["block"] else "\n"
 
 
 def _apart(text: str) -> list[Found]:
@@ -196,6 +212,8 @@ class _Reader:
         if marked is None and not statement.has_verb:
             return False
         form = "marked" if marked or STARTS_MOVING.match(line) else "sentences"
+        if form == "sentences" and SUPPOSED_SENTENCE.search(line):
+            return False
         return self._extend(form, at, body, is_item=marked is not None)
 
     def _is_nested(self, at: int, marked: re.Match[str] | None) -> bool:
@@ -282,6 +300,8 @@ class _Reader:
         to.loose |= statement.loose
         if not listed:
             return False
+        if to.n_named:
+            to.between += self.above
         to.numbers += list(listed) * (self._times if len(listed) == 1 and is_item else 1)
         to.n_named += 1
         to.n_moves += statement.has_verb

@@ -18,6 +18,7 @@ from typing import Literal, get_args
 from phyblock.domain import Plan
 from phyblock.parsing.answer_form import FormProblem
 from phyblock.parsing.listing import Listing, listings
+from phyblock.parsing.plan_doubt import is_doubtful
 from phyblock.parsing.plan_patterns import (
     AGAIN,
     CHOICE,
@@ -27,6 +28,7 @@ from phyblock.parsing.plan_patterns import (
     NOT_REVERSED,
     OPTION,
     OR_ELSE,
+    ORDINALS,
     PART,
     REFUSAL,
     REVISION,
@@ -142,10 +144,14 @@ def _choose(answer: str) -> _Read:
     plan = _chosen(plans, answer)
     if plan is None:
         return "two_plans"
-    if plan is plans[-1] and _is_cut_off(answer, found, below):
+    is_cut_off = _is_cut_off(answer, found, below)
+    if plan is plans[-1] and is_cut_off:
         firm = plans if len(plans) > 1 else [*_plans(named, ranks, MOVES, found), plan]
         plan = firm[-2] if len(firm) > 1 else plan
-    if _is_doubtful(plan):
+    after = [] if plan.option else found[found.index(plan.lists[-1]) + 1 :]
+    if is_cut_off:
+        after = after[:-1]
+    if is_doubtful(plan.lists, plan.below, after):
         return "ambiguous"
     form = plan.lists[-1].form
     numbers = plan.numbers * (2 if any(map(AGAIN.search, below)) else 1)
@@ -206,19 +212,13 @@ def _chosen(plans: list[_Plan], answer: str) -> _Plan | None:
     if options and last.option:
         if len({tuple(plan.numbers) for plan in plans}) == 1:
             return last
-        chosen = [
-            match["a"] or match["b"] or match["c"] or match["d"]
-            for match in CHOICE.finditer(answer)
-        ]
+        chosen = [match[match.lastgroup or 0] for match in CHOICE.finditer(answer)]
+        ordinal = ORDINALS.get(chosen[-1].lower()) if chosen and len(plans) == 2 else None
+        if ordinal is not None:
+            return plans[ordinal]
         named = [plan for plan in plans if chosen and plan.option == chosen[-1].lower()]
         return named[-1] if named else (last if len(plans) == 1 else None)
     return last
-
-
-def _is_doubtful(plan: _Plan) -> bool:
-    """Whether the reply says something of the plan that the reading does not account for."""
-    numbers = {*plan.numbers}
-    return any(listing.loose - numbers for listing in plan.lists)
 
 
 def _is_cut_off(answer: str, found: list[Listing], below: list[str]) -> bool:

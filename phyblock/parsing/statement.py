@@ -39,7 +39,7 @@ _NOUN = (
     r"|blöcken?|blocos?|candidates?|kandidat(?:en)?|pieces?|bricks?|cubes?|arch(?:es)?|cylinders?"
     r"|bausteine?n?|steine?|klotz|klötze|piezas?|peças?|pièces?|numbers?|número|numéro|numero"
     r"|nummern?|no\.?|nr\.?|n°|ids?|блоки?|блока|кубик|индекс(?:ом)?|номер)(?![a-zа-я])"
-    r"|积木|方块|木块|块|编号|索引|序号|ブロック|番号|블록|번호)"
+    r"|积木|方块|木块|块|编号|索引|序号|ブロック|インデックス|番号|블록|번호)"
 )
 _PLURAL = re.compile(
     r"\b(?:ind(?:ices|exes|izes)|blocks|cubes|arches|cylinders|pieces|bricks|candidates|numbers|ids"
@@ -51,7 +51,8 @@ _WORD_NUMBER = (
     r"(?:one|two|three|four|five|six|seven|eight|nine|ten|eleven|twelve|thirteen|fourteen|fifteen"
     r"|sixteen|eins|zwei|drei|vier|fünf|sechs|sieben|acht|neun|zehn|elf|zwölf|un|deux|trois|quatre"
     r"|cinq|sept|huit|neuf|dix|uno|dos|tres|cuatro|cinco|seis|siete|ocho|nueve|diez|десять|один|два"
-    r"|три|четыре|пять|шесть|семь|восемь|девять)(?!\w|\s(?:of|copies|times)\b)|[一二三四五六七八九十]{1,2}(?![号號番\w])"
+    r"|три|четыре|пять|шесть|семь|восемь|девять)(?!\w"
+    r"|\s(?!(?:on|onto|to|at|and|then|next|in|beside|above|over|as|is|goes|or|first|auf|und|et|y)\b)[^\W\d])|[一二三四五六七八九十]{1,2}(?![号號番\w])"
 )
 _EACH = (
     r"(?:(?:on|at|for|in)\s)?(?:each|either|both|every|auf jeder|an jeder)\s(?:of\s)?(?:the\s)?"
