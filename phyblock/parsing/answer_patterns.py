@@ -13,6 +13,7 @@ __all__ = [
     "CONCLUDED",
     "CONDITIONAL",
     "CORRECTED",
+    "COUNTED",
     "DANGLES",
     "IS_REJECTED",
     "IS_RIGHT",
@@ -26,6 +27,7 @@ __all__ = [
     "REJECTS",
     "REVISED",
     "SENTENCE",
+    "SO",
     "TAG",
     "TURNED",
     "UNSURE",
@@ -56,7 +58,7 @@ SENTENCE = re.compile(
 )
 CHOSEN = re.compile(
     r"(?:\bI(?:['\u2019]ll|['\u2019]d| will| would| am going to)?"
-    r" (?:choose|pick|select|prefer|go with|answer)"
+    r" (?:choose|pick|select|prefer|go with|answer|say|lean (?:more )?(?:to|towards?))"
     r"|\bmy (?:choice|pick|guess|selection) (?:is|would be)"
     r"|\b(?:correct|right|best) (?:option|choice|one|picture|image|letter|place|match)"
     r" (?:is|would be|must be|should be)"
@@ -74,6 +76,18 @@ ORDER = re.compile(
     rf"(?::|=|\bis\b|\bwould be\b|\bshould be\b|\bmust be\b)[ \t*_`:]{{0,6}}{_VALUE}",
     re.IGNORECASE,
 )
+SO = re.compile(
+    r"(?:(?:^|[.;,:]\s|\s[\u2013\u2014]\s)(?:and )?(?:so|therefore|thus|hence|but then|also|daher|donc)\b,?"
+    r"|\bnot\b[^.;,\n]{1,60}\bbut\b)\s(?=(?P<value>[^\n.;]{1,120}))",
+    re.IGNORECASE,
+)
+"""Behind this stands what follows from the rest of a sentence."""
+COUNTED = re.compile(
+    r"\b(?:I count|(?:in|a) total(?: of|:| is)|total(?: number)?(?: of \w{1,12})?(?::| is)|which (?:gives|makes)|gives|=)"
+    r"\s{1,2}(?P<a>\d{1,3})\b(?!\s?[+*x×/.\-]\s?\d)|(?<![+*/.\d] )\b(?P<b>\d{1,3})(?:\s\w{1,12}){0,2}\s(?:in total|altogether|overall)\b",
+    re.IGNORECASE,
+)
+"""How many there are in all."""
 CONCLUDED = re.compile(
     r"\b(?i:(?:it|this|that|which|answer|option|choice|picture|image|place)"
     r"(?: must be| has to be| should be| is|['\u2019]s| leaves| matches| corresponds to)"

@@ -25,6 +25,7 @@ _NOUN = r"(?:option|choice|answer|letter|alternative|picture|image|figure|place|
 _LEAD = re.compile(
     rf"(?:(?:(?:the|la|correct|best|right|definitely|clearly|likely|most|selected)\s{{1,3}}){{0,3}}"
     rf"(?P<noun>{_NOUN})\s{{0,3}}(?P<is>is\s{{1,3}})?:?\s{{0,3}}"
+    rf"|(?:la|le|el|die|il)\s(?=\(?[A-Z]\)?(?:[\s.,:]|\Z))"
     rf"|(?:la\s|a\s)?(?:选项|选|選択肢|вариант|opción|opção)\s{{0,3}})",
     re.IGNORECASE,
 )
