@@ -62,6 +62,7 @@ class Listing:
     ends_named: bool = True
     leaves: bool = False
     loose: set[int] = field(default_factory=set)
+    supports: set[int] = field(default_factory=set)
     between: list[str] = field(default_factory=list)
 
     @property
@@ -297,6 +298,7 @@ class _Reader:
         listed = statement.numbers or (chain(body)[0] if is_item else ())
         to.last_line = at
         to.ends_named = bool(listed)
+        to.supports |= statement.supports
         to.loose |= statement.loose
         if not listed:
             return False

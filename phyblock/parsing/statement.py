@@ -10,11 +10,11 @@ is not.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from phyblock.parsing.text_forms import number_of_word
 
-__all__ = ["MOST_AT_ONCE", "VERB", "Statement", "chain", "read_statement"]
+__all__ = ["MOST_AT_ONCE", "VERB", "Statement", "chain", "named_blocks", "read_statement"]
 
 MOST_AT_ONCE = 22
 """Blocks that one statement moves at most: longer ranges and multiplicities are none."""
@@ -139,6 +139,14 @@ _SUPPORT = re.compile(
     rf"(?:[\s(,]{{0,3}}(?!{VERB}|(?:it|them)\b)[^\W\d]{{1,16}}){{0,7}}[\s(#]{{0,3}}\Z",
     re.IGNORECASE,
 )
+_INSTEAD = re.compile(
+    r"(?:instead of|rather than|not|never|don't|without|except|like|as with|same as|if|statt|nicht"
+    r"|ohne|kein\w{0,2}|не|不要?)",
+    re.IGNORECASE,
+)
+"""Words of those that tell of a block that it is no part of the plan."""
+_ALSO_CALLED = re.compile(r"[\s(\[:=\u2013\u2014-]{0,4}")
+"""What stands between two names of one block."""
 _STANDS = re.compile(
     r"[\s)]{0,3}(?:\([^()\n]{0,40}\)\s?)?(?:as (?:a |the |its )?(?:support|reference|anchor)\b"
     r"|(?:below|beneath|underneath)(?=\s?[,;]|\Z)"
@@ -199,13 +207,23 @@ class Statement:
     """The blocks that a statement moves, in order; whether it says so by a verb.
 
     `leaves` tells that it names others, too, of which it does not say so; `loose` are blocks that
-    it names and of which the grammar does not tell whether they are moved.
+    it names and of which the grammar does not tell whether they are moved, `supports` those on or
+    beside which others are put.
     """
 
     numbers: tuple[int, ...]
     has_verb: bool = False
     leaves: bool = False
     loose: frozenset[int] = frozenset()
+    supports: frozenset[int] = frozenset()
+
+
+@dataclass
+class _Rest:
+    """Blocks that a statement names beside those that it moves."""
+
+    loose: set[int] = field(default_factory=set)
+    supports: set[int] = field(default_factory=set)
 
 
 def read_statement(text: str, *, is_item: bool) -> Statement:
@@ -216,18 +234,18 @@ def read_statement(text: str, *, is_item: bool) -> Statement:
     text = _HERE.sub(" ", text)
     bare: tuple[int, ...] = ()
     moved: list[int] = []
-    loose: set[int] = set()
+    rest = _Rest()
     for piece in _pieces(text):
-        found = _moved(piece, loose)
+        found = _moved(piece, rest)
         if found and _PIECE_VERB.search(piece):
             moved += found
         else:
             bare = bare or tuple(found)
+    beside = {"loose": frozenset(rest.loose), "supports": frozenset(rest.supports)}
     if moved:
-        return Statement(tuple(moved), True, not {*bare} <= {*moved}, frozenset(loose) - {*moved})
+        return Statement(tuple(moved), True, not {*bare} <= {*moved}, **beside)
     whole = _IS_WHOLE.match(text) if is_item else None
-    named = tuple(_counted(whole, text, "s")) if whole else bare
-    return Statement(named, loose=frozenset(loose) - {*named})
+    return Statement(tuple(_counted(whole, text, "s")) if whole else bare, **beside)
 
 
 def chain(text: str) -> tuple[tuple[int, ...], bool]:
@@ -244,6 +262,17 @@ def chain(text: str) -> tuple[tuple[int, ...], bool]:
     )
 
 
+def named_blocks(text: str) -> set[int]:
+    """The blocks that a text calls blocks, whatever it says of them."""
+    mentions = _MENTION.finditer(text[:_STATEMENT_CHARS])
+    return {
+        number
+        for mention in mentions
+        if mention["noun"] or mention["cjk"] or mention["call"]
+        for number in _counted(mention, text, mention["noun"] or "")
+    }
+
+
 def _pieces(text: str) -> list[str]:
     pieces, start = [], 0
     for end in _PIECES.finditer(text):
@@ -252,8 +281,8 @@ def _pieces(text: str) -> list[str]:
     return [*pieces, text[start:]]
 
 
-def _moved(piece: str, loose: set[int]) -> list[int]:
-    """The first free mention of a piece, and those that are joined to it; the others are loose."""
+def _moved(piece: str, rest: _Rest) -> list[int]:
+    """The first free mention of a piece, and those that are joined to it; the others are left."""
     found: list[int] = []
     last: re.Match[str] | None = None
     for mention in _MENTION.finditer(piece):
@@ -264,7 +293,12 @@ def _moved(piece: str, loose: set[int]) -> list[int]:
         if not is_call and _STANDS.match(piece, mention.end()):
             continue
         before = piece[max(0, start - 120) : start]
-        if _NEGATED.search(before) or (not is_call and _SUPPORT.search(before)):
+        if _NEGATED.search(before):
+            continue
+        support = None if is_call else _SUPPORT.search(before)
+        if support:
+            if not _INSTEAD.match(support[0]) and mention["noun"]:
+                rest.supports.update(_counted(mention, piece, mention["noun"]))
             continue
         goes_on = mention["then"] or (last and mention["call"] and last["call"])
         if last is not None and not goes_on:
@@ -274,8 +308,8 @@ def _moved(piece: str, loose: set[int]) -> list[int]:
             if not (_JOINS.match(between) and _AND_THEN.search(between)) and not (
                 _PIECE_VERB.search(between) and not is_call
             ):
-                if mention["noun"]:
-                    loose.update(_counted(mention, piece, mention["noun"]))
+                if (mention["noun"] or mention["cjk"]) and not _ALSO_CALLED.fullmatch(between):
+                    rest.loose.update(_counted(mention, piece, mention["noun"] or ""))
                 continue
         found += _counted(mention, piece, mention["noun"] or "")
         last = mention
