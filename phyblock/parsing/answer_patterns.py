@@ -62,7 +62,7 @@ CHOSEN = re.compile(
     r"|\bmy (?:choice|pick|guess|selection) (?:is|would be)"
     r"|\b(?:correct|right|best) (?:option|choice|one|picture|image|letter|place|match)"
     r" (?:is|would be|must be|should be)"
-    r"|应?(?:该)?选(?:择|项)?(?:是|为)?)[ \t*_`:]{0,6}(?=(?P<value>[^\n]{1,80}))",
+    r"|我认为(?:答案)?是?|应?(?:该)?选(?:择|项)?(?:是|为)?)[ \t*_`:]{0,6}(?=(?P<value>[^\n]{1,80}))",
     re.IGNORECASE,
 )
 IS_RIGHT = re.compile(
@@ -83,7 +83,7 @@ SO = re.compile(
 )
 """Behind this stands what follows from the rest of a sentence."""
 COUNTED = re.compile(
-    r"\b(?:I count|(?:in|a) total(?: of|:| is)|total(?: number)?(?: of \w{1,12})?(?::| is)|which (?:gives|makes)|gives|=)"
+    r"(?:\b(?:I count|(?:in|a) total(?: of|:| is)|total(?: number)?(?: of \w{1,12})?(?::| is)|which (?:gives|makes)|gives))"
     r"\s{1,2}(?P<a>\d{1,3})\b(?!\s?[+*x×/.\-]\s?\d)|(?<![+*/.\d] )\b(?P<b>\d{1,3})(?:\s\w{1,12}){0,2}\s(?:in total|altogether|overall)\b",
     re.IGNORECASE,
 )

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from phyblock.parsing.answer_form import FormProblem
+from phyblock.parsing.answer_patterns import CONDITIONAL
 from phyblock.parsing.statement import read_statement
 from phyblock.parsing.text_forms import answer_of
 
@@ -69,7 +70,7 @@ _LABEL = (
 )
 _OPERATION = rf"(?:{_named(_CALL, 'call')}|{_named(_PHRASE, 'phrase')}|(?P<done>{_DONE}))"
 _ANSWER_LINE = re.compile(rf"(?:{_LABEL}:?\s{{0,3}})?{_OPERATION}\s{{0,3}}[.!;]?", re.IGNORECASE)
-_LABELED = re.compile(rf"(?<![\w]){_LABEL}[`*\"'_ ]{{0,6}}{_OPERATION}(?!\w)", re.IGNORECASE)
+_LABELED = re.compile(rf"(?<![\w]){_LABEL}[`*\"'_ ]{{0,6}}{_OPERATION}(?![\w?])", re.IGNORECASE)
 _MENTION = re.compile(
     rf"(?<![\w]){_named(_CALL, 'call')}|(?<![\w]){_named(_PHRASE, 'phrase')}", re.IGNORECASE
 )
@@ -91,7 +92,7 @@ _EDGES = " \t\r\f\v>#-*+\u2022|\"'"
 _INDEX_KEYS = ("index", "block_index", "id", "block_id", "block", "candidate", "number")
 _INDEX_ALONE = _INDEX_KEYS[:4]
 """Keys that are enough without an action."""
-_ACTION_KEYS = ("action", "operation", "next_plan", "next plan", "plan", "answer", "move", "step")
+_ACTION_KEYS = ("action", "operation", "next_plan", "next plan", "plan", "answer", "move", "step", "op")
 
 
 def parse_move(text: str) -> ParsedMove:
@@ -102,6 +103,8 @@ def parse_move(text: str) -> ParsedMove:
         return ParsedMove(problem="no_move" if text.strip() else "empty")
     for rule, find in _RULES:
         if found := find(answer, lines):
+            if rule in _LENIENT and CONDITIONAL.search(lines[-1]):
+                break
             return _verdict(found, rule)
     return ParsedMove(problem="no_move")
 
@@ -228,5 +231,7 @@ _RULES: tuple[tuple[str, _Find], ...] = (
     ("loose", _loose),
     ("bare_number", _bare),
 )
+_LENIENT = ("last_line_mention", "mention", "loose")
+"""Rules that read sentences, which may tie a move to a condition."""
 MOVE_RULES: tuple[str, ...] = tuple(name for name, _ in _RULES)
 """Rules in the order in which they are tried."""

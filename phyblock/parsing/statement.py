@@ -32,7 +32,7 @@ VERB = (
     r"|déplace[rz]?|place[rz]|pose[rz]?|met(?:s|tre|tez)|ajoute[rz]?|empile[rz]?"
     r"|mueve|mover|coloca(?:r|mos)?|coloque|pon(?:er)?|añad(?:e|ir)|apila[r]?|mova|sposta(?:re)?"
     r"|posiziona(?:re)?|metti|aggiungi|перемест\w{1,5}|постав\w{1,5}|полож\w{1,5}|возьм\w{1,5})\b"
-    r"|移动|移動|放置|摆放|放入|放|搬|使用|取出|将|把|置く|置|積む|옮|놓)"
+    r"|移动|移動|放置|摆放|放入|放|搬|(?<!未)使用|取出|将|把|置く|置|積む|옮|놓)"
 )
 _NOUN = (
     r"(?:(?:ind(?:ex(?:es)?|ices|izes)|idx|índices?|indices?|blocks?|bloques?|blocs?|blocco|blocchi"
@@ -106,7 +106,7 @@ _TIMES = re.compile(
     re.IGNORECASE,
 )
 _SO_MANY = re.compile(
-    r"(?:(?P<twice>\b(?:twice|zweimal|deux fois|dos veces)|两次)|(?P<n>\d{1,2})\s?(?:[x×]|times|mal|个|块)\s{0,2}|(?P<cjk_word>[二两三四五六])(?:个|块)"
+    r"(?:(?P<twice>\b(?:twice|zweimal|deux fois|dos veces)\s|两次)|(?P<n>\d{1,2})\s?(?:[x×]|times|mal|个|块)\s{0,2}|(?P<cjk_word>[二两三四五六])(?:个|块)"
     r"|\b(?P<word>two|three|four|five|six|zwei|drei|vier|deux|trois"
     r"|dos|tres)"
     r"\s(?:\w{2,12}\s){0,3}?)\(?\Z",
@@ -134,7 +134,7 @@ _SUPPORT = re.compile(
     r"|until|when|if"
     r"|since|because|while|so that|auf|über|unter|neben|zwischen|hinter|vor|statt|nicht|ohne"
     r"|kein\w{0,2}|sobre"
-    r"|encima de|sur|dessus d\w|à côté d\w|entre|debajo de|sopra|accanto|su|на|над|рядом с|не)\b"
+    r"|encima del?|sur|dessus d\w|à côté d\w|entre|debajo de|sopra|accanto|su(?! lado| izq| der)|на|над|рядом с|не)\b"
     r"|在|到|于|不要?|上的|の上)"
     rf"(?:[\s(,]{{0,3}}(?!{VERB}|(?:it|them)\b)[^\W\d]{{1,16}}){{0,7}}[\s(#]{{0,3}}\Z",
     re.IGNORECASE,
@@ -147,6 +147,9 @@ _INSTEAD = re.compile(
 """Words of those that tell of a block that it is no part of the plan."""
 _ALSO_CALLED = re.compile(r"[\s(\[:=\u2013\u2014-]{0,4}")
 """What stands between two names of one block."""
+_ALSO_SUPPORT = re.compile(
+    r"[\s)\]号番]{0,3}(?:,|&|\+|and|und|et|y|和|与|、)[\s,(]{0,3}(?:and\s)?(?:the\s|den\s|le\s|el\s)?", re.IGNORECASE
+)
 _STANDS = re.compile(
     r"[\s)]{0,3}(?:\([^()\n]{0,40}\)\s?)?(?:as (?:a |the |its )?(?:support|reference|anchor)\b"
     r"|(?:below|beneath|underneath)(?=\s?[,;]|\Z)"
@@ -169,11 +172,12 @@ _PIECES = re.compile(
 )
 _PIECE_VERB = re.compile(
     rf"{VERB}|\b(?:then|next(?! to)|finally|lastly|afterwards|dann|danach|zuletzt|darauf"
-    r"|daneben|obendrauf|ganz oben|puis|ensuite|enfin|luego)\b|然后|最后",
+    r"|daneben|obendrauf|ganz oben|zum schluss|schließlich|puis|ensuite|enfin|luego|por último"
+    r"|finalmente|and (?:another|one more))\b|然后|最后",
     re.IGNORECASE,
 )
 _JOINS = re.compile(
-    rf"(?:[\s,()\]\-→>&+、，。]|\([^()\n]{{0,80}}\)|\b(?:and|then|und|dann|et|puis|y|luego"
+    rf"(?:[\s,()\]\-→>&+、，。]|[号號番](?=[和与及])|\([^()\n]{{0,80}}\)|\b(?:and|then|und|dann|et|puis|y|luego"
     r"|followed by"
     rf"|finally|also|next"
     rf"|another|again|more|the|a|one|an|(?:red|blue|green|yellow|orange|purple|long|small|large"
@@ -239,8 +243,10 @@ def read_statement(text: str, *, is_item: bool) -> Statement:
         found = _moved(piece, rest)
         if found and _PIECE_VERB.search(piece):
             moved += found
+        elif bare:
+            rest.loose.update({*found} - {*bare})
         else:
-            bare = bare or tuple(found)
+            bare = tuple(found)
     beside = {"loose": frozenset(rest.loose), "supports": frozenset(rest.supports)}
     if moved:
         return Statement(tuple(moved), True, not {*bare} <= {*moved}, **beside)
@@ -285,6 +291,7 @@ def _moved(piece: str, rest: _Rest) -> list[int]:
     """The first free mention of a piece, and those that are joined to it; the others are left."""
     found: list[int] = []
     last: re.Match[str] | None = None
+    support_end = 0
     for mention in _MENTION.finditer(piece):
         start = mention.start() + len(mention["verb"] or mention["call"] or mention["then"] or "")
         is_call = bool(mention["verb"] or mention["call"] or mention["then"])
@@ -296,7 +303,12 @@ def _moved(piece: str, rest: _Rest) -> list[int]:
         if _NEGATED.search(before):
             continue
         support = None if is_call else _SUPPORT.search(before)
+        if support_end and _ALSO_SUPPORT.fullmatch(piece, support_end, start):
+            support_end = mention.end()
+            rest.supports.update(_counted(mention, piece, mention["noun"] or ""))
+            continue
         if support:
+            support_end = mention.end()
             if not _INSTEAD.match(support[0]) and mention["noun"]:
                 rest.supports.update(_counted(mention, piece, mention["noun"]))
             continue

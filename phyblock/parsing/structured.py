@@ -53,7 +53,7 @@ _OPPOSITE_KEY = re.compile(
     r"|remain|left[ _-]?over|spare|available|candidate(?:s|_list)|ignor|skip|avoid|wrong|draft"
     r"|example|attempt"
     r"|alternativ|initial|previous|old|count|total|number_of|num_|confidence|layers?_count|reason"
-    r"|thought|analysis"
+    r"|thought|analysis|^(?:to|onto?|target|under|location|destination|next[ _]to)$"
     r"|explanation|descri|comment|note|supports?$|depend|on[ _]?top|below|position|coord|rotation"
     r"|orient|size"
     r"|color|colour|shape|type|blocks?[ _](?:needed|required|used)|required|needed|selected"
@@ -66,6 +66,10 @@ _INDEX_KEY = re.compile(
     r"|place|baustein|积木|编号",
     re.IGNORECASE,
 )
+_BLOCK_KEY = re.compile(
+    r"(?:block|candidate|piece)(?:[ _-]?(?:index|idx|id|number|no))?|积木", re.IGNORECASE
+)
+"""Keys that outweigh an `id` or `number`, which may be that of the step."""
 _ACTION_KEY = re.compile(
     r"action|instruction|operation|description|move|text|do|command", re.IGNORECASE
 )
@@ -232,7 +236,15 @@ def _items(items: list[Any]) -> list[int]:
         if None not in places and len(set(places)) == len(places):
             steps.sort(key=lambda step: _place(step) or 0)
         return [n for step in steps for n in _step(step)]
-    return [number for item in items for number in _read(item, is_plan=True)]
+    found = [_read(item, is_plan=True) for item in items]
+    if any(len(numbers) > 1 and _is_flat(item) for item, numbers in zip(items, found, strict=True)):
+        return []
+    return [number for numbers in found for number in numbers]
+
+
+def _is_flat(item: Any) -> bool:
+    """Whether an object holds plain values alone: of several numbers no key says which is meant."""
+    return isinstance(item, Fields) and not any(isinstance(v, (list, str)) for _, v in item)
 
 
 def _is_step(fields: Fields) -> bool:
@@ -258,7 +270,7 @@ def _place(fields: Fields) -> int | None:
 def _step(fields: Fields) -> list[int]:
     """The blocks of one step: by its index, else by a list of them, else by what it does."""
     found: list[int] = []
-    for pattern in (_INDEX_KEY, _MANY_KEY, _ACTION_KEY):
+    for pattern in (_BLOCK_KEY, _INDEX_KEY, _MANY_KEY, _ACTION_KEY):
         for key, value in fields:
             if not found and pattern.fullmatch(key.strip()):
                 found = _read(value, is_plan=True)
@@ -274,6 +286,7 @@ _STEP_COLUMN = re.compile(
     r"step|order|seq|^#$|^no\.?$|^nr\.?$|schritt|reihenfolge|paso|étape|步骤|顺序|序号|手順",
     re.IGNORECASE,
 )
+_LAYER_COLUMN = re.compile(r"layer|level|ebene|schicht|couche|nivel|层", re.IGNORECASE)
 _BLOCK_COLUMN = re.compile(
     r"block|ind(?:ex|ice)|idx|candidate|piece|move|action|^id$|baustein|bloc|bloque|aktion|积木|编号|块"
     r"|ブロック",
@@ -298,6 +311,9 @@ def _cells(line: str) -> list[str]:
 def _of_rows(head: list[str], rows: list[list[str]]) -> list[int]:
     steps = next((i for i, name in enumerate(head) if _STEP_COLUMN.search(name)), None)
     times = next((i for i, name in enumerate(head) if _TIMES_KEY.fullmatch(name)), None)
+    is_layers = steps is None
+    if steps is None:
+        steps = next((i for i, name in enumerate(head) if _LAYER_COLUMN.search(name)), None)
     if steps is None:
         return []
     columns = [i for i, name in enumerate(head) if i != steps and _BLOCK_COLUMN.search(name)]
@@ -310,6 +326,8 @@ def _of_rows(head: list[str], rows: list[list[str]]) -> list[int]:
         ]
     for column in columns:
         named = [list(_line(row[column])) for row in rows]
+        if is_layers and max(map(len, named), default=0) < 2:  # It may say how many.
+            continue
         if rows and all(named):
             many = [(whole_number(row[times]) if times is not None else None) or 1 for row in rows]
             return [
