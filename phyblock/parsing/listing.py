@@ -64,6 +64,7 @@ class Listing:
     loose: set[int] = field(default_factory=set)
     supports: set[int] = field(default_factory=set)
     between: list[str] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
 
     @property
     def is_firm(self) -> bool:
@@ -206,6 +207,7 @@ class _Reader:
                 2,
                 1 if by_arrows else 0,
             )
+            listing.lines.append(body)
             self._open = None
             return True
         if not statement.numbers:
@@ -276,6 +278,7 @@ class _Reader:
             if not arrays:
                 return False
             listed, label = chain(arrays[-1][0])[0], line[: arrays[-1].start()]
+            value = line[arrays[-1].start() :]
         else:
             label = labeled["label"] if labeled else ""
         last = self.done[-1] if self.done else None
@@ -287,6 +290,7 @@ class _Reader:
         else:
             last = self._new("labeled", at)
             last.numbers, last.label, last.n_named = list(listed), label, 2
+        last.lines.append(value)
         if rest:
             self.read(at, rest)
         return True
@@ -297,6 +301,7 @@ class _Reader:
         statement = read_statement(body, is_item=is_item)
         listed = statement.numbers or (chain(body)[0] if is_item else ())
         to.last_line = at
+        to.lines.append(body)
         to.ends_named = bool(listed)
         to.supports |= statement.supports
         to.loose |= statement.loose

@@ -74,6 +74,10 @@ _LABELED = re.compile(rf"(?<![\w]){_LABEL}[`*\"'_ ]{{0,6}}{_OPERATION}(?![\w?])"
 _MENTION = re.compile(
     rf"(?<![\w]){_named(_CALL, 'call')}|(?<![\w]){_named(_PHRASE, 'phrase')}", re.IGNORECASE
 )
+_MORE = re.compile(
+    rf"[\s,;&+`*]{{1,4}}(?:(?:and|then|or)\s{{1,3}}){{0,2}}{_named(_CALL, 'call')}", re.IGNORECASE
+)
+"""A further operation behind one, with nothing said between them."""
 _MANY = re.compile(
     r"(?<!\w)move\s{0,3}[(\[]\s{0,9}(?P<list>[0-9]{1,6}"
     r"(?:\s{0,3}(?:[,;/&]|and|or)\s{0,3}[0-9]{1,6}){1,31})(?![0-9])",
@@ -186,7 +190,13 @@ def _whole(value: object) -> int | None:
 
 
 def _labeled(_: str, lines: list[str]) -> list[_Operation]:
-    return [_operation(match) for line in lines for match in _LABELED.finditer(line)]
+    found: list[_Operation] = []
+    for line in lines:
+        for match in _LABELED.finditer(line):
+            found.append(_operation(match))
+            while match and (match := _MORE.match(line, match.end())):
+                found.append(_operation(match))
+    return found
 
 
 def _mentions(line: str) -> list[_Operation]:

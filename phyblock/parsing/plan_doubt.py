@@ -8,6 +8,7 @@ correction beside the list, a list without its beginning, another list after it 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from phyblock.parsing.listing import Listing
@@ -31,6 +32,27 @@ _ASIDE = re.compile(
     re.IGNORECASE,
 )
 """Words of a sentence about blocks that are no part of the plan."""
+_LOOSE_FORMS = ("labeled", "chain", "numbers", "sentences", "marked")
+_WHOLE = re.compile(r"(?<![\d.])\d{1,6}(?![\d]|\.\d)")
+_ROLE = re.compile(
+    r"\b(?:steps?|layers?|levels?|rows?|col(?:umn)?s?|schritte?|ebene|schicht|plan|option|attempt|structure|part|phase|stage)[ #_]?\d+"
+    r"|\d+(?:\.\d+)?\s?(?:%|°|cm|mm|m\b|percent|degrees?|[x×](?![a-z])|times|mal\b)|[x×]\s?\d+"
+    r"|\(\s?-?\d+(?:\.\d+)?(?:\s?,\s?-?\d+(?:\.\d+)?){1,2}\s?\)|\d+(?:st|nd|rd|th)\b"
+    r"|第\d+[层步]|\d+\s?[个块层步]|^\W*[a-z]{0,4}\d{1,3}(?:/\d{1,3})?\s?[.):-]\s|#\s\d{1,3}$"
+    r"|(?<!block )(?<!index )\b\d+\s(?:\w+\s)?(?:blocks?|layers?|levels?|steps?|moves?|pieces?|pillars?|copies|rows?|sides?)\b"
+    r"|\d+\s(?:more|further|other)\b",
+    re.IGNORECASE | re.MULTILINE,
+)
+"""Numbers that are no block's: places, sizes, counts, coordinates."""
+_BRACKETS = re.compile(r"\([^()\n]{0,200}\)|\[[^\[\]\n]{0,200}\]")
+_STEP_AGAIN = re.compile(
+    r"(?:\b(?:swap\w*|skip|remov\w+|drop|wrong|replac\w+|should|must|has to|needs? to|exchange"
+    r"|delete|ignore|unnecessary|(?:not|n't) (?:needed|required|necessary))\b.{0,60})?"
+    r"\bsteps?\s?\d(?P<then>.{0,60}\b(?:swap\w*|skip\w*|remov\w+|drop\w*|wrong|replac\w+|should|must"
+    r"|has to|needs? to|exchange\w*|unnecessary|(?:not|n't) (?:needed|required|necessary)))?",
+    re.IGNORECASE,
+)
+"""A step named again, to take it back."""
 _FRAGMENT = 3
 """Steps of a list that may go on from what stands there already."""
 _MOST_LEFT_OUT = 4
@@ -46,6 +68,8 @@ def is_doubtful(lists: Sequence[Listing], below: Sequence[str], later: Sequence[
     is_whole = n_steps > _FRAGMENT or lists[0].form == "sentences"
     if is_whole and any(listing.supports - numbers for listing in lists):
         return True
+    if any(listing.form in _LOOSE_FORMS and _leaves_numbers(listing) for listing in lists):
+        return True
     own = lists[0].own
     if own and 1 < own[0] <= _MOST_LEFT_OUT:
         return True
@@ -57,12 +81,29 @@ def is_doubtful(lists: Sequence[Listing], below: Sequence[str], later: Sequence[
     )
 
 
+def _leaves_numbers(listing: Listing) -> bool:
+    """Whether the lines of a list hold numbers that are no blocks of it and nothing else, either."""
+    text = _BRACKETS.sub(_unless_aside, "\n".join(listing.lines))
+    said = Counter(map(int, _WHOLE.findall(_ROLE.sub(" ", text))))
+    return any(
+        number not in listing.supports and n > listing.numbers.count(number)
+        for number, n in said.items()
+    )
+
+
+def _unless_aside(brackets: re.Match[str]) -> str:
+    return " " if _ASIDE.search(brackets[0]) else brackets[0]
+
+
 def _is_corrected(lines: Sequence[str], numbers: set[int]) -> bool:
     """Whether lines beside a plan take a step back, or name blocks that it lacks."""
     for line in lines:
         if EXPLANATION.search(line):
             return False
         if _CORRECTS.search(line) and _NUMBER.search(line):
+            return True
+        again = _STEP_AGAIN.search(line)
+        if again and (again["then"] or not again[0].lower().startswith("step")):
             return True
         for sentence in _SENTENCE.split(line):
             if not _ASIDE.search(sentence) and named_blocks(sentence) - numbers:

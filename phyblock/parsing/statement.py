@@ -91,7 +91,7 @@ _MENTION = re.compile(
     rf"|(?P<then>{_NEXT}\s?#?)(?P<next>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})"
     r"(?=\s{0,3}(?:\Z|[.,;:()，。；\u2014\u2013]|(?:on|onto|at|next|and|then|in|beside|over|above|as|goes)\b))"
     r"|(?:(?<=\()#?(?=[0-9][^()]{0,40}\))|(?<!\w)#)(?P<bare>[0-9]{1,6}(?:(?:, ?|\s?&\s?|/| or "
-    r"|,? and | und |、)[0-9]{1,6}){0,8})(?![\w]|\.[0-9])"
+    r"|,? and | und |、)[0-9]{1,6}){0,8})(?=\s?(?:[,;:)/\]]|[x×]\s?\d|\Z)|(?<=#\d)(?!\w)|(?<=#\d\d)(?!\w))(?!\.[0-9])"
     r"|(?P<cjk>[0-9]{1,6}(?:(?:、|,|和|-|至|到)[0-9]{1,6}){0,20})(?=\s?(?:号|號|番))",
     re.IGNORECASE,
 )
@@ -100,7 +100,7 @@ _TIMES = re.compile(
     r"[x×]\s?(?P<a>\d{1,2})(?!\d)|(?P<b>\d{1,2})\s?(?:[x×](?!\w)"
     r"|of (?:them|these)\b|copies\b|pieces\b"
     r"|times\b|mal\b|fois\b|veces\b|次)"
-    r"|(?P<twice>twice|zweimal|deux fois|dos veces|两次|二次)|(?P<thrice>thrice|dreimal|三次)"
+    r"|(?P<twice>twice|zweimal|deux fois|dos veces|两次|二次)|(?P<thrice>thrice|dreimal|三次)|[号號番]?(?P<cjk>[两二三四五六])[个块個塊]"
     r"|(?P<word>[^\W\d_]{2,8})\s(?:times|mal|fois|veces)\b"
     rf"|(?:(?P<each>\d{{1,2}})|(?P<each_word>one|two|eine[rn]?|zwei))\s(?:\w{{2,8}}\s)?{_EACH})",
     re.IGNORECASE,
@@ -309,8 +309,8 @@ def _moved(piece: str, rest: _Rest) -> list[int]:
             continue
         if support:
             support_end = mention.end()
-            if not _INSTEAD.match(support[0]) and mention["noun"]:
-                rest.supports.update(_counted(mention, piece, mention["noun"]))
+            if not _INSTEAD.match(support[0]) and (mention["noun"] or mention["cjk"]):
+                rest.supports.update(_counted(mention, piece, mention["noun"] or ""))
             continue
         goes_on = mention["then"] or (last and mention["call"] and last["call"])
         if last is not None and not goes_on:
@@ -376,7 +376,7 @@ def _times(text: str, mention: re.Match[str]) -> int:
             n = int(after["each"] or number_of_word(after["each_word"]) or 1)
             places = 4 if _CORNER.search(after[0]) else 2
             return min(n * places, MOST_AT_ONCE)
-        word = number_of_word(after["word"] or "")
+        word = number_of_word(after["word"] or after["cjk"] or "")
         return min(word or int(after["a"] or after["b"] or 1), MOST_AT_ONCE)
     before = _SO_MANY.search(text[max(0, mention.start() - 60) : mention.start()])
     if before is None:
