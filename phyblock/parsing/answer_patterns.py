@@ -91,7 +91,8 @@ COUNTED = re.compile(
 CONCLUDED = re.compile(
     r"\b(?i:(?:it|this|that|which|answer|option|choice|picture|image|place)"
     r"(?: must be| has to be| should be| is|['\u2019]s| leaves| matches| corresponds to)"
-    r"(?: (?:the |with )?(?:option|picture|image|choice|place))?)[ *_`]{0,4}"
+    r"(?: (?:the |with )?(?:option|picture|image|choice|place))?"
+    r"|(?:so|therefore|thus|hence|also|daher|donc|alors|entonces)[:,]?)[ *_`]{0,4}"
     r"(?P<value>\(?[A-Z]\)?)[*_`]{0,3}(?=[\s.!,;]{0,3}(?:\Z|\n|[.!;]))",
 )
 CORRECTED = re.compile(

@@ -151,7 +151,8 @@ def _choose(answer: str) -> _Read:
     after = [] if plan.option else found[found.index(plan.lists[-1]) + 1 :]
     if is_cut_off:
         after = after[:-1]
-    if is_doubtful(plan.lists, plan.below, after):
+    before = found[: found.index(plan.lists[0])]
+    if is_doubtful(plan.lists, plan.below, before, after):
         return "ambiguous"
     form = plan.lists[-1].form
     numbers = plan.numbers * (2 if any(map(AGAIN.search, below)) else 1)

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from phyblock.parsing.listing import Listing
-from phyblock.parsing.plan_patterns import EXPLANATION
+from phyblock.parsing.plan_patterns import EXPLANATION, REVISION
 from phyblock.parsing.plan_rank import LAST, NO, rank_of
 from phyblock.parsing.statement import named_blocks
 
@@ -59,8 +59,16 @@ _MOST_LEFT_OUT = 4
 """A list that begins later than this numbers its steps in a way of its own (10, 20, ...)."""
 
 
-def is_doubtful(lists: Sequence[Listing], below: Sequence[str], later: Sequence[Listing]) -> bool:
-    """Whether the lists of a plan are no sure reading, by what stands in, below and after them."""
+def is_doubtful(
+    lists: Sequence[Listing],
+    below: Sequence[str],
+    before: Sequence[Listing],
+    later: Sequence[Listing],
+) -> bool:
+    """Whether the lists of a plan are no sure reading.
+
+    What says so stands in them, in the lines `below`, or in the lists `before` and `later`.
+    """
     numbers = {number for listing in lists for number in listing.numbers}
     if any(listing.loose for listing in lists):
         return True
@@ -69,6 +77,8 @@ def is_doubtful(lists: Sequence[Listing], below: Sequence[str], later: Sequence[
     if is_whole and any(listing.supports - numbers for listing in lists):
         return True
     if any(listing.form in _LOOSE_FORMS and _leaves_numbers(listing) for listing in lists):
+        return True
+    if rank_of(lists[0]) == LAST and any(_is_beside(listing, lists[0]) for listing in before[-1:]):
         return True
     own = lists[0].own
     if own and 1 < own[0] <= _MOST_LEFT_OUT:
@@ -81,10 +91,19 @@ def is_doubtful(lists: Sequence[Listing], below: Sequence[str], later: Sequence[
     )
 
 
+def _is_beside(before: Listing, listing: Listing) -> bool:
+    """Whether labels of one kind stand line by line, of which one alone was taken."""
+    is_next = listing.first_line - before.last_line <= 1
+    return before.form == listing.form == "labeled" and is_next and not REVISION.search(listing.label)
+
+
 def _leaves_numbers(listing: Listing) -> bool:
     """Whether the lines of a list hold numbers that are no blocks of it and nothing else, either."""
     text = _BRACKETS.sub(_unless_aside, "\n".join(listing.lines))
-    said = Counter(map(int, _WHOLE.findall(_ROLE.sub(" ", text))))
+    found = list(map(int, _WHOLE.findall(_ROLE.sub(" ", text))))
+    if found in (listing.numbers * 2, [*listing.numbers, *listing.numbers[::-1]]):
+        return False
+    said = Counter(found)
     return any(
         number not in listing.supports and n > listing.numbers.count(number)
         for number, n in said.items()

@@ -91,7 +91,7 @@ _MENTION = re.compile(
     rf"|(?P<then>{_NEXT}\s?#?)(?P<next>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})"
     r"(?=\s{0,3}(?:\Z|[.,;:()，。；\u2014\u2013]|(?:on|onto|at|next|and|then|in|beside|over|above|as|goes)\b))"
     r"|(?:(?<=\()#?(?=[0-9][^()]{0,40}\))|(?<!\w)#)(?P<bare>[0-9]{1,6}(?:(?:, ?|\s?&\s?|/| or "
-    r"|,? and | und |、)[0-9]{1,6}){0,8})(?=\s?(?:[,;:)/\]]|[x×]\s?\d|\Z)|(?<=#\d)(?!\w)|(?<=#\d\d)(?!\w))(?!\.[0-9])"
+    r"|,? and | und |、)[0-9]{1,6}){0,8})(?=\s?(?:[,;:)/\]×]|\Z)|\sx\s?\d|(?<=#\d)(?!\w)|(?<=#\d\d)(?!\w))(?!\.[0-9])"
     r"|(?P<cjk>[0-9]{1,6}(?:(?:、|,|和|-|至|到)[0-9]{1,6}){0,20})(?=\s?(?:号|號|番))",
     re.IGNORECASE,
 )
@@ -192,15 +192,17 @@ _AND_THEN = re.compile(
     re.I,
 )
 _IS_WHOLE = re.compile(
-    rf"[\s#(\[]{{0,4}}{_GROUP}[\s)\]]{{0,3}}(?=\Z|[(:,;.\-\u2013\u2014|x×])", re.IGNORECASE
+    rf"(?:[^\d:：,.;]{{1,40}}[:：→]\s)?[\s#(\[]{{0,4}}{_GROUP}[\s)\]]{{0,3}}(?=\Z|[(:,;.\-\u2013\u2014|x×])", re.IGNORECASE
 )
 _CHAIN = re.compile(
     r"[\s(\[{<]{0,4}(?:(?:blocks?|index|indices|candidates?|积木|#)[\s:#]{0,3})?(?P<list>\d{1,6}(?:\s{0,3}"
-    r"(?P<sign>,|、|;|\||->|→|>|=>|-|\u2013|/|then|and|\s)(?:\s?(?:and|then|block|index"
+    r"(?P<sign>,|、|;|·|\||->|→|>|=>|-|\u2013|/|then|and|\s)(?:\s?(?:and|then|block|index"
     r"|#)){0,2}[\s#]{0,3}\d{1,6}){0,63})"
     r"[\s)\]}>.]{0,4}\Z",
     re.IGNORECASE,
 )
+_REMARKS = re.compile(r"\s{0,3}\([^()\d\n]{0,80}\)|\s(?:→|->|=>|\u2014|\u2013)\s[^\d\n]{1,200}\Z")
+"""What a list says of its blocks, or behind its end, without a number."""
 _NUMBER = re.compile(r"\d{1,6}")
 _CORNER = re.compile(r"corner|ecke", re.IGNORECASE)
 _SAYS_NUMBER = re.compile(rf"\d|{_WORD_NUMBER}", re.IGNORECASE)
@@ -256,7 +258,7 @@ def read_statement(text: str, *, is_item: bool) -> Statement:
 
 def chain(text: str) -> tuple[tuple[int, ...], bool]:
     """The numbers of a text of numbers alone ("3, 5, 12"), and whether arrows say the order."""
-    found = _CHAIN.match(text)
+    found = _CHAIN.match(_REMARKS.sub(" ", text))
     if found is None:
         return (), False
     return tuple(map(int, _NUMBER.findall(found["list"]))), (found["sign"] or "") in (
