@@ -89,7 +89,7 @@ COUNTED = re.compile(
 )
 """How many there are in all."""
 CONCLUDED = re.compile(
-    r"\b(?i:(?:it|this|that|which|answer|option|choice|picture|image|place)"
+    r"\b(?i:(?:it|this|that|which|what(?: is)? left|what remains|answer|option|choice|picture|image|place)"
     r"(?: must be| has to be| should be| is|['\u2019]s| leaves| matches| corresponds to)"
     r"(?: (?:the |with )?(?:option|picture|image|choice|place))?"
     r"|(?:so|therefore|thus|hence|also|daher|donc|alors|entonces)[:,]?)[ *_`]{0,4}"

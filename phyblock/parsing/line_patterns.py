@@ -43,7 +43,7 @@ STEP = re.compile(
     re.IGNORECASE,
 )
 NUMBERED = re.compile(
-    r"[\s>+\-#({|•·]{0,8}(?P<number>\d{1,3})(?:st|nd|rd|th)?\s?(?:[.):、](?!\d)|\)\.?)\s{0,4}(?=\D|\d)"
+    r"[\s>+\-#({|•·]{0,8}(?P<number>\d{1,3})(?:st|nd|rd|th)?(?:[-\u2013](?P<last>\d{1,3}))?\s?(?:[.):、](?!\d)|\)\.?)\s{0,4}(?=\D|\d)"
 )
 MARKED = re.compile(r"\s{0,40}(?:[-+•·▪–]|>)\s{1,4}(?=\S)|\s{0,40}(?:[a-h][.)]|\d{1,2}(?:\.\d{1,2}){1,2}[.):]?)\s")
 STARTS_MOVING = re.compile(

@@ -63,6 +63,7 @@ class Listing:
     leaves: bool = False
     loose: set[int] = field(default_factory=set)
     supports: set[int] = field(default_factory=set)
+    denied: set[int] = field(default_factory=set)
     between: list[str] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
 
@@ -157,9 +158,11 @@ class _Reader:
         n = int(head["number"])
         last = int(head.groupdict().get("last") or n)
         body = line[head.end() :].replace("{", " ").replace("}", " ")
-        if name == "_steps" and not head["sign"] and body.strip() and not _is_move(body):
-            return False
         current: Listing | None = getattr(self, name)
+        if name == "_steps" and not head["sign"] and body.strip():
+            is_next = n == 1 or current is None or n > max(current.own, default=0)
+            if not (is_next and _is_move(body)):
+                return False
         if current is None or not 0 < n - (current.own[-1] if current.own else 0) <= 3:
             if n > 1 and not (name == "_steps" and _is_move(body)):
                 return False
@@ -305,6 +308,7 @@ class _Reader:
         to.ends_named = bool(listed)
         to.supports |= statement.supports
         to.loose |= statement.loose
+        to.denied |= statement.denied
         if not listed:
             return False
         if to.n_named:

@@ -78,6 +78,12 @@ _MORE = re.compile(
     rf"[\s,;&+`*]{{1,4}}(?:(?:and|then|or)\s{{1,3}}){{0,2}}{_named(_CALL, 'call')}", re.IGNORECASE
 )
 """A further operation behind one, with nothing said between them."""
+_NOT_MEANT = re.compile(
+    r"\b(?:undo|remov\w+|revert\w*|take back|don['\u2019]t|do not|never|cannot|can['\u2019]t|after"
+    r"|since|because|last|previous\w*|prior|earlier|instead of|rather than)\b[^.;:,!?]{0,60}\Z",
+    re.IGNORECASE,
+)
+"""What stands before an operation in its clause that is not the one to do now."""
 _MANY = re.compile(
     r"(?<!\w)move\s{0,3}[(\[]\s{0,9}(?P<list>[0-9]{1,6}"
     r"(?:\s{0,3}(?:[,;/&]|and|or)\s{0,3}[0-9]{1,6}){1,31})(?![0-9])",
@@ -193,6 +199,8 @@ def _labeled(_: str, lines: list[str]) -> list[_Operation]:
     found: list[_Operation] = []
     for line in lines:
         for match in _LABELED.finditer(line):
+            if _NOT_MEANT.search(line[: match.start()]):
+                continue
             found.append(_operation(match))
             while match and (match := _MORE.match(line, match.end())):
                 found.append(_operation(match))
@@ -200,7 +208,11 @@ def _labeled(_: str, lines: list[str]) -> list[_Operation]:
 
 
 def _mentions(line: str) -> list[_Operation]:
-    found = [_operation(match) for match in _MENTION.finditer(line)]
+    found = [
+        _operation(match)
+        for match in _MENTION.finditer(line)
+        if not _NOT_MEANT.search(line[: match.start()])
+    ]
     for many in _MANY.finditer(line):
         found += [int(digits) for digits in re.findall("[0-9]+", many["list"])]
     return found
@@ -222,6 +234,8 @@ def _loose(_: str, lines: list[str]) -> list[int]:
 
 
 def _moved(line: str) -> list[int]:
+    if _MENTION.search(line) and not _mentions(line):
+        return []
     statement = read_statement(line.replace("_", " "), is_item=False)
     return list(statement.numbers) if statement.has_verb or _CHOSEN.search(line) else []
 

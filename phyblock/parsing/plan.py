@@ -197,8 +197,9 @@ def _relation(passed: list[str], plans: list[_Plan], listing: Listing) -> str:
     if listing.form == "labeled" and not any(passed):
         return "other"
     if len(lines) > 1 or len(title) > HEADING_CHARS or REVISION.search(title) or "" in passed:
-        return "explanation" if any(EXPLANATION.search(line) for line in lines[:1]) else "other"
-    if EXPLANATION.search(title):
+        is_explained = any(EXPLANATION.search(line) for line in lines[:1])
+        return "explanation" if is_explained and listing.form != "json" else "other"
+    if EXPLANATION.search(title) and listing.form != "json":
         return "explanation"
     part = PART.search(title) if title else before.numbers != listing.numbers
     if not (part and before.ends_named):

@@ -105,7 +105,7 @@ def _leaves_numbers(listing: Listing) -> bool:
         return False
     said = Counter(found)
     return any(
-        number not in listing.supports and n > listing.numbers.count(number)
+        number not in listing.supports | listing.denied and n > listing.numbers.count(number)
         for number, n in said.items()
     )
 

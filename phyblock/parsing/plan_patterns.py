@@ -142,7 +142,7 @@ NOT_REVERSED = re.compile(
     re.IGNORECASE,
 )
 DOWNWARD = re.compile(
-    r"top[- ](?:to|down)[- ]?(?:bottom)?\b|von oben nach unten|从上到下|de haut en bas"
+    r"top[- ](?:to|down)[- ]?(?:bottom)?\b|\b(?:from|at) the top\W*\Z|von oben nach unten|从上到下|de haut en bas"
     r"|de arriba (?:a"
     r"|hacia) abajo",
     re.IGNORECASE,

@@ -91,7 +91,7 @@ _MENTION = re.compile(
     rf"|(?P<then>{_NEXT}\s?#?)(?P<next>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})"
     r"(?=\s{0,3}(?:\Z|[.,;:()，。；\u2014\u2013]|(?:on|onto|at|next|and|then|in|beside|over|above|as|goes)\b))"
     r"|(?:(?<=\()#?(?=[0-9][^()]{0,40}\))|(?<!\w)#)(?P<bare>[0-9]{1,6}(?:(?:, ?|\s?&\s?|/| or "
-    r"|,? and | und |、)[0-9]{1,6}){0,8})(?=\s?(?:[,;:)/\]×]|\Z)|\sx\s?\d|(?<=#\d)(?!\w)|(?<=#\d\d)(?!\w))(?!\.[0-9])"
+    r"|,? and | und |、)[0-9]{1,6}){0,8})(?=\s?(?:[,;:)/\]×→]|\Z)|\sx\s?\d|(?<=#\d)(?!\w)|(?<=#\d\d)(?!\w))(?!\.[0-9])"
     r"|(?P<cjk>[0-9]{1,6}(?:(?:、|,|和|-|至|到)[0-9]{1,6}){0,20})(?=\s?(?:号|號|番))",
     re.IGNORECASE,
 )
@@ -214,7 +214,7 @@ class Statement:
 
     `leaves` tells that it names others, too, of which it does not say so; `loose` are blocks that
     it names and of which the grammar does not tell whether they are moved, `supports` those on or
-    beside which others are put.
+    beside which others are put, `denied` those that are not.
     """
 
     numbers: tuple[int, ...]
@@ -222,6 +222,7 @@ class Statement:
     leaves: bool = False
     loose: frozenset[int] = frozenset()
     supports: frozenset[int] = frozenset()
+    denied: frozenset[int] = frozenset()
 
 
 @dataclass
@@ -230,6 +231,7 @@ class _Rest:
 
     loose: set[int] = field(default_factory=set)
     supports: set[int] = field(default_factory=set)
+    denied: set[int] = field(default_factory=set)
 
 
 def read_statement(text: str, *, is_item: bool) -> Statement:
@@ -249,7 +251,8 @@ def read_statement(text: str, *, is_item: bool) -> Statement:
             rest.loose.update({*found} - {*bare})
         else:
             bare = tuple(found)
-    beside = {"loose": frozenset(rest.loose), "supports": frozenset(rest.supports)}
+    beside = {
+        "loose": frozenset(rest.loose), "supports": frozenset(rest.supports), "denied": frozenset(rest.denied)}
     if moved:
         return Statement(tuple(moved), True, not {*bare} <= {*moved}, **beside)
     whole = _IS_WHOLE.match(text) if is_item else None
@@ -303,6 +306,7 @@ def _moved(piece: str, rest: _Rest) -> list[int]:
             continue
         before = piece[max(0, start - 120) : start]
         if _NEGATED.search(before):
+            rest.denied.update(_counted(mention, piece, mention["noun"] or ""))
             continue
         support = None if is_call else _SUPPORT.search(before)
         if support_end and _ALSO_SUPPORT.fullmatch(piece, support_end, start):
@@ -311,8 +315,9 @@ def _moved(piece: str, rest: _Rest) -> list[int]:
             continue
         if support:
             support_end = mention.end()
-            if not _INSTEAD.match(support[0]) and (mention["noun"] or mention["cjk"]):
-                rest.supports.update(_counted(mention, piece, mention["noun"] or ""))
+            kind = rest.denied if _INSTEAD.match(support[0]) else rest.supports
+            if mention["noun"] or mention["cjk"]:
+                kind.update(_counted(mention, piece, mention["noun"] or ""))
             continue
         goes_on = mention["then"] or (last and mention["call"] and last["call"])
         if last is not None and not goes_on:
