@@ -22,6 +22,7 @@ _RANKS = f"({'|'.join(_PLACES)}|last)"
 _CLAUSE = re.compile(r"[.;!?\n](?=\s)")
 _DENIED = re.compile(r"\b(?:not|nicht)\W{0,3}\Z|不是\s?\Z", re.IGNORECASE)
 _ARROW = re.compile(r"\\(?:long)?(?:right)?(?:arrow|to)\b")
+_REMARK = re.compile(r"\s?\((?![A-Za-z1-9]\))[^()\n]{1,40}\)|(?<=[A-Z])\s?\(\d{1,2}\)")
 _THING = r"(?:(?:picture|image|option|figure|stage|step|photo|frame|img)\s{0,2}[(\[<]{0,1})?"
 
 
@@ -65,7 +66,7 @@ class OrderReader:
 
     def orders(self, text: str) -> list[str]:
         """All orders in a text, each naming every option once."""
-        value = unmarked(_ARROW.sub(" > ", text))
+        value = _REMARK.sub("", unmarked(_ARROW.sub(" > ", text)))
         found = []
         for match in self._order.finditer(value):
             before = _CLAUSE.split(value[max(0, match.start() - 60) : match.start()])[-1]

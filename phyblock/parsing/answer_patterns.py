@@ -62,6 +62,7 @@ CHOSEN = re.compile(
     r"|\bmy (?:choice|pick|guess|selection) (?:is|would be)"
     r"|\b(?:correct|right|best) (?:option|choice|one|picture|image|letter|place|match)"
     r" (?:is|would be|must be|should be)"
+    r"|\b(?:nehme|wähle)(?: aber| daher| also)?"
     r"|我认为(?:答案)?是?|应?(?:该)?选(?:择|项)?(?:是|为)?)[ \t*_`:]{0,6}(?=(?P<value>[^\n]{1,80}))",
     re.IGNORECASE,
 )
@@ -126,7 +127,7 @@ TURNED = re.compile(
 )
 """A turn away from the stated answer: "I would answer A, but the picture shows that it is D"."""
 VERDICT = re.compile(
-    r"(?:^|[.;,]\s"
+    r"(?:^|[.;,:]\s|(?<=[✓✔✅✗✘❌×])\s"
     r"|\n)[\s*\-_(\[]{0,6}(?:option )?(?P<letter>[A-Z])[*_)\]]{0,3}\s?[:.\-\u2013\u2014]?\s{0,3}"
     r"(?:(?P<yes>✓|✔|✅|☑|(?:yes|correct|matches|fits|right|true)\b)|(?:✗|✘|❌|×|☒|(?:no|wrong"
     r"|incorrect|false|does not|doesn't|not)\b))",

@@ -74,6 +74,7 @@ class Listing:
 
 
 _ABOVE = 12
+_LEAVES_OUT = re.compile(r"\s{0,9}(?:\.{3,9}|…|⋮|\[\.{3}\])\s{0,9}")
 
 
 def listings(text: str) -> tuple[list[Listing], list[str]]:
@@ -142,6 +143,8 @@ class _Reader:
     def read(self, number: int, raw: str) -> None:
         """Add a line: an item of a list, what belongs to an item, or what stands between lists."""
         line = plain_line(raw).rstrip()
+        if _LEAVES_OUT.fullmatch(line):
+            self.above = [*self.above[-_ABOVE:], line.strip()]
         if FENCE.match(raw) or not line.strip(" \t[]{}()|,.:;#-=~"):
             return
         for pattern, name in ((STEP, "_steps"), (NUMBERED, "_numbered")):

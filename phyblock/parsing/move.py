@@ -94,7 +94,7 @@ _DONE_SENTENCE = re.compile(
     re.IGNORECASE,
 )
 _CHOSEN = re.compile(r"\b(?:choose|select|pick|wähle|elijo|choisis)\b|选择?", re.IGNORECASE)
-_BARE = re.compile(rf"(?:{_LABEL})?[#(\[]?{_INTEGER}[)\].]?", re.IGNORECASE)
+_BARE = re.compile(rf"(?:{_LABEL})?(?:(?:candidate|block)\s)?[#(\[]?{_INTEGER}[)\].]?", re.IGNORECASE)
 _OBJECT = re.compile(r"\{[^{}]{0,600}\}")
 _FENCE = re.compile(r"(?:`{3,}|~{3,})\s{0,3}[\w+-]{0,16}")
 _MARKUP = re.compile(r"</?(?:final_)?answer>|[*`_~]{1,3}|\\boxed\{|[{}]")

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 from phyblock.parsing.listing import Listing
 from phyblock.parsing.plan_patterns import EXPLANATION, REVISION
@@ -19,7 +20,7 @@ from phyblock.parsing.statement import named_blocks
 __all__ = ["is_doubtful"]
 
 _CORRECTS = re.compile(
-    r"\b(?:wait|correction|corrected|oops|scratch that|should (?:be|have been|read)|must be|i meant"
+    r"\b(?:wait|correction|corrected|oops|scratch that|(?:should|must|has to|needs to) be|should (?:have been|read)|i meant"
     r"|swap(?:ped)?|my mistake|moment|korrektur|sondern|muss|corrección|korrigier\w*)\b"
     r"|\b(?:actually|no|rather)\b[,:]|等等|应该是|更正|改为|訂正|正しくは",
     re.IGNORECASE,
@@ -83,6 +84,10 @@ def is_doubtful(
     own = lists[0].own
     if own and 1 < own[0] <= _MOST_LEFT_OUT:
         return True
+    if any(1 < b.own[0] <= a.own[-1] for a, b in pairwise(lists) if a.own and b.own):
+        return True
+    if any(not re.search(r"\w", line) for listing in lists for line in listing.between):
+        return True  # An ellipsis stands for steps.
     beside = [line for listing in lists for line in listing.between]
     for listing in later:
         beside += listing.above
@@ -116,15 +121,15 @@ def _unless_aside(brackets: re.Match[str]) -> str:
 
 def _is_corrected(lines: Sequence[str], numbers: set[int]) -> bool:
     """Whether lines beside a plan take a step back, or name blocks that it lacks."""
+    is_explained = False
     for line in lines:
-        if EXPLANATION.search(line):
-            return False
+        is_explained = is_explained or bool(EXPLANATION.search(line))
         if _CORRECTS.search(line) and _NUMBER.search(line):
             return True
         again = _STEP_AGAIN.search(line)
         if again and (again["then"] or not again[0].lower().startswith("step")):
             return True
-        for sentence in _SENTENCE.split(line):
+        for sentence in () if is_explained else _SENTENCE.split(line):
             if not _ASIDE.search(sentence) and named_blocks(sentence) - numbers:
                 return True
     return False

@@ -196,12 +196,16 @@ _IS_WHOLE = re.compile(
 )
 _CHAIN = re.compile(
     r"[\s(\[{<]{0,4}(?:(?:blocks?|index|indices|candidates?|积木|#)[\s:#]{0,3})?(?P<list>\d{1,6}(?:\s{0,3}"
-    r"(?P<sign>,|、|;|·|\||->|→|>|=>|-|\u2013|/|then|and|\s)(?:\s?(?:and|then|block|index"
+    r"(?P<sign>,|、|;|·|\||->|→|>|=>|-|\u2013|/|then|and|dann|und|puis|luego|\s)(?:\s?(?:and|then|dann|puis|luego|block|index"
     r"|#)){0,2}[\s#]{0,3}\d{1,6}){0,63})"
     r"[\s)\]}>.]{0,4}\Z",
     re.IGNORECASE,
 )
-_REMARKS = re.compile(r"\s{0,3}\([^()\d\n]{0,80}\)|\s(?:→|->|=>|\u2014|\u2013)\s[^\d\n]{1,200}\Z")
+_REMARKS = re.compile(
+    r"(?<=\d)[号號番]|\b(?:zuerst|first|d'abord|primero)\b|"
+    r"\s{0,3}\([^()\d\n]{0,80}\)|\s(?:→|->|=>|\u2014|\u2013)\s[^\d\n]{1,200}\Z",
+    re.IGNORECASE,
+)
 """What a list says of its blocks, or behind its end, without a number."""
 _NUMBER = re.compile(r"\d{1,6}")
 _CORNER = re.compile(r"corner|ecke", re.IGNORECASE)

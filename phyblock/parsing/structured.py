@@ -202,9 +202,8 @@ def _ordered(fields: Fields, *, is_plan: bool) -> list[int]:
         ]
         return next((_read(v, is_plan=True) for n, v in choices if n.lower() in chosen), [])
     if plans and not steps:
-        return next(
-            (found for value in reversed(plans) if (found := _read(value, is_plan=True))), []
-        )
+        read = [_read(value, is_plan=True) for value in plans]
+        return next((found for found in reversed(read) if len(found) > 1), max(read, key=len))
     if steps:
         if len({int(m["n"] or m["bare"]) for m, _ in steps}) == len(steps):
             steps.sort(key=lambda step: int(step[0]["n"] or step[0]["bare"]))
