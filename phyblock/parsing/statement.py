@@ -58,11 +58,12 @@ _EACH = (
     r"(?:(?:on|at|for|in)\s)?(?:each|either|both|every|auf jeder|an jeder)\s(?:of\s)?(?:the\s)?"
     r"(?:sides?|ends?|seite|corners?|ecke)\b"
 )
-_UNIT = (
-    r"(?!\s?(?:[x×]\s|times?\b|mal\b|fois|veces|cm|mm|m\b|°|degrees?\b|%|次|个|块|more\b"
-    rf"|per\b|{_EACH}))"
-)
-_DIGITS = rf"[0-9]{{1,6}}(?![0-9]|\.[0-9]|[a-wyz]){_UNIT}"
+_UNIT = r"(?!\s?(?:[x×]\s|times?\b|mal\b|fois|veces|cm|mm|m\b|°|degrees?\b|%|次|个|块|more\b))"
+_SHARED_OUT = rf"\s?(?:per\b|{_EACH})"
+"""What stands behind a number that says how many; a number that is called a block's is none."""
+_SO_MANY_EACH = re.compile(_SHARED_OUT, re.IGNORECASE)
+_NAMED = rf"[0-9]{{1,6}}(?![0-9]|\.[0-9]|[a-wyz]){_UNIT}"
+_DIGITS = rf"{_NAMED}(?!{_SHARED_OUT})"
 _TO = r"\s{0,2}(?:-|\u2013|\u2014|~|\bto\b|\bthrough\b|\bthru\b|\bbis\b|至|到)\s{0,2}"
 _OR = r"\s{0,3},?\s{0,3}(?:\bor\b|\boder\b|\bou\b|/|或者?)\s{0,3}"
 _AND = (
@@ -72,7 +73,7 @@ _AND = (
     r"\s{0,3}"
 )
 _LINK = rf"(?:{_OR}|{_TO}|{_AND})#?"
-_GROUP = rf"(?P<first>{_DIGITS}|{_WORD_NUMBER})(?P<more>(?:{_LINK}{_DIGITS}){{0,40}})"
+_GROUP = rf"(?P<first>{_NAMED}|{_WORD_NUMBER})(?P<more>(?:{_LINK}{_DIGITS}|\s(?:and|und|et|y|和)\s{_NAMED}){{0,40}})"
 _NEXT = (
     r"(?:\b(?:then|finally|lastly|afterwards|followed by|dann|danach|zuletzt|puis|ensuite|enfin"
     r"|luego|después)\b|然后|接着|最后)"
@@ -148,7 +149,8 @@ _INSTEAD = re.compile(
 _ALSO_CALLED = re.compile(r"[\s(\[:=\u2013\u2014-]{0,4}")
 """What stands between two names of one block."""
 _ALSO_SUPPORT = re.compile(
-    r"[\s)\]号番]{0,3}(?:,|&|\+|and|und|et|y|和|与|、)[\s,(]{0,3}(?:and\s)?(?:the\s|den\s|le\s|el\s)?", re.IGNORECASE
+    r"[\s)\]号番]{0,3}(?:,|&|\+|and|und|et|y|和|与|、)[\s,(]{0,3}(?:and\s)?(?:the\s|den\s|le\s|el\s)?",
+    re.IGNORECASE,
 )
 _STANDS = re.compile(
     r"[\s)]{0,3}(?:\([^()\n]{0,40}\)\s?)?(?:as (?:a |the |its )?(?:support|reference|anchor)\b"
@@ -192,7 +194,8 @@ _AND_THEN = re.compile(
     re.I,
 )
 _IS_WHOLE = re.compile(
-    rf"(?:[^\d:：,.;]{{1,40}}[:：→]\s)?[\s#(\[]{{0,4}}{_GROUP}[\s)\]]{{0,3}}(?=\Z|[(:,;.\-\u2013\u2014|x×])", re.IGNORECASE
+    rf"(?:[^\d:：,.;]{{1,40}}[:：→]\s)?[\s#(\[]{{0,4}}{_GROUP}[\s)\]]{{0,3}}(?=\Z|[(:,;.\-\u2013\u2014|x×])",
+    re.IGNORECASE,
 )
 _CHAIN = re.compile(
     r"[\s(\[{<]{0,4}(?:(?:blocks?|index|indices|candidates?|积木|#)[\s:#]{0,3})?(?P<list>\d{1,6}(?:\s{0,3}"
@@ -256,7 +259,10 @@ def read_statement(text: str, *, is_item: bool) -> Statement:
         else:
             bare = tuple(found)
     beside = {
-        "loose": frozenset(rest.loose), "supports": frozenset(rest.supports), "denied": frozenset(rest.denied)}
+        "loose": frozenset(rest.loose),
+        "supports": frozenset(rest.supports),
+        "denied": frozenset(rest.denied),
+    }
     if moved:
         return Statement(tuple(moved), True, not {*bare} <= {*moved}, **beside)
     whole = _IS_WHOLE.match(text) if is_item else None
@@ -345,8 +351,12 @@ def _counted(mention: re.Match[str], text: str, noun: str) -> list[int]:
     plain = next(filter(None, (groups.get(name) for name in _PLAIN)), "")
     first = groups.get("first") or ""
     word = number_of_word(first)
-    given = plain or (first if word is None else str(word)) + (groups.get("more") or "")
-    numbers = _group(given, is_plural=bool(_PLURAL.search(noun)) or bool(groups.get("cjk")))
+    more = groups.get("more") or ""
+    given = plain or (first if word is None else str(word)) + more
+    is_plural = bool(_PLURAL.search(noun))
+    if is_plural and not more and _SO_MANY_EACH.match(text, mention.end()):
+        return []
+    numbers = _group(given, is_plural=is_plural or bool(groups.get("cjk")))
     times = _times(text, mention)
     return numbers * times if len(numbers) == 1 else numbers
 

@@ -212,8 +212,13 @@ def _ordered(fields: Fields, *, is_plan: bool) -> list[int]:
     tiers = [_tier(key) for key, _ in kept]
     if kept and all(tier is not None for tier in tiers):
         kept = [kept[i] for i in sorted(range(len(kept)), key=lambda i: tiers[i] or 0)]
-    # Beside what holds blocks, a number alone says something of it.
-    holders = [value for _, value in kept if isinstance(value, list)]
+    # Beside what holds blocks, a number alone says something of it, but under a place's name.
+    is_held = any(isinstance(value, list) for _, value in kept)
+    holders = [
+        value
+        for key, value in kept
+        if is_held and (isinstance(value, list) or _tier(key) is not None)
+    ]
     values = holders or [value for _, value in kept if is_plan]
     return [number for value in values for number in _read(value, is_plan=is_plan)]
 
