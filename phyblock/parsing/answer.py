@@ -23,6 +23,7 @@ from phyblock.parsing.answer_patterns import (
     CONCLUDED,
     CONDITIONAL,
     CORRECTED,
+    COUNTED,
     DANGLES,
     IS_REJECTED,
     IS_RIGHT,
@@ -35,6 +36,7 @@ from phyblock.parsing.answer_patterns import (
     QUOTED,
     REJECTS,
     SENTENCE,
+    SO,
     TAG,
     UNSURE,
     VERDICT,
@@ -207,12 +209,27 @@ def _only_text(text: str, reader: Reader) -> str | None:
     last = _last_line(text)
     if DANGLES.search(last):
         return None
+    so = [match["value"] for match in SO.finditer(last)]
+    if so and (found := reader.option_text(so[-1])):
+        return found
+    last = _ASIDE.sub(" ", last).strip() or last
     for piece in (last, text[:_LINE_CHARS]) if len(text) <= _LINE_CHARS else (last,):
         found = CONTRADICTION if reader.letter(piece) == CONTRADICTION else None
         found = reader.option_text(piece) if found is None else found
         if found is not None:
             return found
     return reader.number(last)
+
+
+_ASIDE = re.compile(r"\([^()\n]{0,120}\)")
+
+
+def _counted(text: str, reader: Reader) -> str | None:
+    """The number of which a reply says that it is the total, where the options are numbers."""
+    if not isinstance(reader, ChoiceReader) or _is_open(text):
+        return None
+    named = {reader.option_text(match["a"] or match["b"]) for match in COUNTED.finditer(text)}
+    return (named.pop() if len(named) == 1 else CONTRADICTION) if named - {None} else None
 
 
 def _only_order(text: str, reader: Reader) -> str | None:
@@ -255,6 +272,7 @@ _CHOICE_RULES: tuple[_Rule, ...] = (
     ("leading", _leading),
     ("concluded", _concluded),
     ("only_one_named", _only_one_named),
+    ("counted", _counted),
     ("only_text", _only_text),
 )
 _ORDER_RULES: tuple[_Rule, ...] = (

@@ -13,10 +13,16 @@ _BETWEEN = (
     r"(?:[\s,;>|/.:()\[\]{}<=\-\u2010-\u2015→⇒➔➜、\uff0c]"
     r"|\b(?:and|then|to|first|next|finally|lastly|followed|by|comes|goes)\b){1,16}"
 )
-_RANKS = "(first|second|third|fourth|last)"
+_PLACES = {
+    name: place
+    for place, names in enumerate(("first 1st", "second 2nd", "third 3rd", "fourth 4th"), start=1)
+    for name in names.split()
+}
+_RANKS = f"({'|'.join(_PLACES)}|last)"
 _CLAUSE = re.compile(r"[.;!?\n](?=\s)")
 _DENIED = re.compile(r"\b(?:not|nicht)\W{0,3}\Z|不是\s?\Z", re.IGNORECASE)
 _ARROW = re.compile(r"\\(?:long)?(?:right)?(?:arrow|to)\b")
+_REMARK = re.compile(r"\s?\((?![A-Za-z1-9]\))[^()\n]{1,40}\)|(?<=[A-Z])\s?\(\d{1,2}\)")
 _THING = r"(?:(?:picture|image|option|figure|stage|step|photo|frame|img)\s{0,2}[(\[<]{0,1})?"
 
 
@@ -60,7 +66,7 @@ class OrderReader:
 
     def orders(self, text: str) -> list[str]:
         """All orders in a text, each naming every option once."""
-        value = unmarked(_ARROW.sub(" > ", text))
+        value = _REMARK.sub("", unmarked(_ARROW.sub(" > ", text)))
         found = []
         for match in self._order.finditer(value):
             before = _CLAUSE.split(value[max(0, match.start() - 60) : match.start()])[-1]
@@ -71,10 +77,7 @@ class OrderReader:
 
     def ranked(self, text: str) -> str | None:
         """The order that the places of all pictures say: "B is first, A second", "A: 2, B: 1"."""
-        places = {
-            "last": len(self.letters),
-            **dict(zip(("first", "second", "third", "fourth"), range(1, 5), strict=True)),
-        }
+        places = {**_PLACES, "last": len(self.letters)}
         named = [
             (int(m[3]) if m[3] else places[m[2]], m[1])
             for m in self._ranked.finditer(unmarked(text))

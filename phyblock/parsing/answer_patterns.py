@@ -13,6 +13,7 @@ __all__ = [
     "CONCLUDED",
     "CONDITIONAL",
     "CORRECTED",
+    "COUNTED",
     "DANGLES",
     "IS_REJECTED",
     "IS_RIGHT",
@@ -26,6 +27,7 @@ __all__ = [
     "REJECTS",
     "REVISED",
     "SENTENCE",
+    "SO",
     "TAG",
     "TURNED",
     "UNSURE",
@@ -56,11 +58,12 @@ SENTENCE = re.compile(
 )
 CHOSEN = re.compile(
     r"(?:\bI(?:['\u2019]ll|['\u2019]d| will| would| am going to)?"
-    r" (?:choose|pick|select|prefer|go with|answer)"
+    r" (?:choose|pick|select|prefer|go with|answer|say|lean (?:more )?(?:to|towards?))"
     r"|\bmy (?:choice|pick|guess|selection) (?:is|would be)"
     r"|\b(?:correct|right|best) (?:option|choice|one|picture|image|letter|place|match)"
     r" (?:is|would be|must be|should be)"
-    r"|应?(?:该)?选(?:择|项)?(?:是|为)?)[ \t*_`:]{0,6}(?=(?P<value>[^\n]{1,80}))",
+    r"|\b(?:nehme|wähle)(?: aber| daher| also)?"
+    r"|我认为(?:答案)?是?|应?(?:该)?选(?:择|项)?(?:是|为)?)[ \t*_`:]{0,6}(?=(?P<value>[^\n]{1,80}))",
     re.IGNORECASE,
 )
 IS_RIGHT = re.compile(
@@ -74,10 +77,23 @@ ORDER = re.compile(
     rf"(?::|=|\bis\b|\bwould be\b|\bshould be\b|\bmust be\b)[ \t*_`:]{{0,6}}{_VALUE}",
     re.IGNORECASE,
 )
+SO = re.compile(
+    r"(?:(?:^|[.;,:]\s|\s[\u2013\u2014]\s)(?:and )?(?:so|therefore|thus|hence|but then|also|daher|donc)\b,?"
+    r"|\bnot\b[^.;,\n]{1,60}\bbut\b)\s(?=(?P<value>[^\n.;]{1,120}))",
+    re.IGNORECASE,
+)
+"""Behind this stands what follows from the rest of a sentence."""
+COUNTED = re.compile(
+    r"(?:\b(?:I count|(?:in|a) total(?: of|:| is)|total(?: number)?(?: of \w{1,12})?(?::| is)|which (?:gives|makes)|gives))"
+    r"\s{1,2}(?P<a>\d{1,3})\b(?!\s?[+*x×/.\-]\s?\d)|(?<![+*/.\d] )\b(?P<b>\d{1,3})(?:\s\w{1,12}){0,2}\s(?:in total|altogether|overall)\b",
+    re.IGNORECASE,
+)
+"""How many there are in all."""
 CONCLUDED = re.compile(
-    r"\b(?i:(?:it|this|that|which|answer|option|choice|picture|image|place)"
+    r"\b(?i:(?:it|this|that|which|what(?: is)? left|what remains|answer|option|choice|picture|image|place)"
     r"(?: must be| has to be| should be| is|['\u2019]s| leaves| matches| corresponds to)"
-    r"(?: (?:the |with )?(?:option|picture|image|choice|place))?)[ *_`]{0,4}"
+    r"(?: (?:the |with )?(?:option|picture|image|choice|place))?"
+    r"|(?:so|therefore|thus|hence|also|daher|donc|alors|entonces)[:,]?)[ *_`]{0,4}"
     r"(?P<value>\(?[A-Z]\)?)[*_`]{0,3}(?=[\s.!,;]{0,3}(?:\Z|\n|[.!;]))",
 )
 CORRECTED = re.compile(
@@ -111,7 +127,7 @@ TURNED = re.compile(
 )
 """A turn away from the stated answer: "I would answer A, but the picture shows that it is D"."""
 VERDICT = re.compile(
-    r"(?:^|[.;,]\s"
+    r"(?:^|[.;,:]\s|(?<=[✓✔✅✗✘❌×])\s"
     r"|\n)[\s*\-_(\[]{0,6}(?:option )?(?P<letter>[A-Z])[*_)\]]{0,3}\s?[:.\-\u2013\u2014]?\s{0,3}"
     r"(?:(?P<yes>✓|✔|✅|☑|(?:yes|correct|matches|fits|right|true)\b)|(?:✗|✘|❌|×|☒|(?:no|wrong"
     r"|incorrect|false|does not|doesn't|not)\b))",

@@ -28,6 +28,7 @@ class Stated:
 
 
 _SENTENCE_CHARS = 240
+_ASKS = re.compile(r"[^.!?。！\n]{1,120}[?？]")  # noqa: RUF001
 _REVISION_CHARS = 4000
 _MOST_STATEMENTS = 100
 """Of each kind, from the end: a reply that repeats itself for pages is still read at once."""
@@ -38,6 +39,8 @@ def statements(
 ) -> Iterator[Stated]:
     """The statements that a pattern finds in a text, the last hundred of them."""
     for match in deque(pattern.finditer(text), maxlen=_MOST_STATEMENTS):
+        if _ASKS.match(match["value"]):
+            continue
         letters = read(match["value"])
         if letters is not None:
             lead = match.groupdict().get("lead") or ""

@@ -25,10 +25,11 @@ _NOUN = r"(?:option|choice|answer|letter|alternative|picture|image|figure|place|
 _LEAD = re.compile(
     rf"(?:(?:(?:the|la|correct|best|right|definitely|clearly|likely|most|selected)\s{{1,3}}){{0,3}}"
     rf"(?P<noun>{_NOUN})\s{{0,3}}(?P<is>is\s{{1,3}})?:?\s{{0,3}}"
+    rf"|(?:la|le|el|die|il)\s(?=\(?[A-Z]\)?(?:[\s.,:]|\Z))"
     rf"|(?:la\s|a\s)?(?:选项|选|選択肢|вариант|opción|opção)\s{{0,3}})",
     re.IGNORECASE,
 )
-_LETTER = re.compile(r"(?P<open>[(\[<{]{0,2})\s?(?P<letter>[A-Za-z])(?![A-Za-z0-9\-])")
+_LETTER = re.compile(r"(?P<open>[(\[<{]{0,2})\s?(?P<letter>[A-Za-z])(?![A-Za-z0-9\-]|['\u2019][a-z])")
 _CLOSERS = re.compile(r"[\s)\]}>.:,;!。\uff0e、]*")
 _ALSO = re.compile(
     r"[\s)\]}.]{0,4}(?:(?:,|/|&|\+|\bor\b|\band\b|\bund\b|\boder\b|\bou\b|\bo\b|\by\b|或|和|、)"

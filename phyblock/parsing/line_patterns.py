@@ -37,15 +37,15 @@ INLINE_STEP = re.compile(
 )
 STEP = re.compile(
     rf"[\s>+\-#({{|\[\d.)•·]{{0,16}}(?:[^\n:.]{{0,40}}?[ :_-]{{1,2}})??"
-    rf"{_STEP_WORD}[\s_#]{{0,3}}(?P<number>\d{{1,3}})(?!\d)\s?步?"
-    r"(?: ?(?:&|and|to|-|\u2013) ?(?P<last>\d{1,3})(?![\w.]))?"
+    rf"{_STEP_WORD}[\s_#]{{0,3}}(?P<number>\d{{1,3}})(?!\d)(?:\s?/\s?\d{{1,3}})?\s?步?"
+    r"(?:(?:, ?\d{1,3}){0,9} ?(?:&|and|to|-|\u2013) ?(?P<last>\d{1,3})(?![\w.]))?"
     r"\s{0,3}(?:\([^()\n]{0,60}\)\s?)?(?P<sign>[:.)=\-\u2013\u2014→、,\]}>]|(?=\s)|\Z)",
     re.IGNORECASE,
 )
 NUMBERED = re.compile(
-    r"[\s>+\-#({|•·]{0,8}(?P<number>\d{1,3})(?:st|nd|rd|th)?\s?(?:[.):、](?!\d)|\)\.?)\s{0,4}(?=\D|\d)"
+    r"[\s>+\-#({|•·]{0,8}(?P<number>\d{1,3})(?:st|nd|rd|th)?(?:[-\u2013](?P<last>\d{1,3}))?\s?(?:[.):、](?!\d)|\)\.?)\s{0,4}(?=\D|\d)"
 )
-MARKED = re.compile(r"\s{0,40}(?:[-+•·▪–]|>)\s{1,4}(?=\S)|\s{0,40}[a-h][.)]\s")
+MARKED = re.compile(r"\s{0,40}(?:[-+•·▪–]|>)\s{1,4}(?=\S)|\s{0,40}(?:[a-h][.)]|\d{1,2}(?:\.\d{1,2}){1,2}[.):]?)\s")
 STARTS_MOVING = re.compile(
     rf"[\s>\[{{(]{{0,12}}(?:(?:first|then|next|finally|now|please|und|dann|zuerst),?\s)?(?:robot\.)?(?:{VERB})",
     re.I,
@@ -62,7 +62,12 @@ LABELED = re.compile(
 ARRAY = re.compile(
     r"\[\s{0,9}(?:[\"']?\d{1,6}[\"']?\s{0,9},\s{0,9}){1,63}[\"']?\d{1,6}[\"']?\s{0,9}\]"
 )
-TAG = re.compile(r"</?[a-z_]{1,20}(?:\s[^<>\n]{0,80})?>", re.IGNORECASE)
+TAG = re.compile(
+    r"<(?:step|move|place|action)\b[^<>\n]{0,80}?\b(?:block|candidate)(?:[_-]?(?:id|index))?="
+    r"[\"'](?P<block>\d{1,6})[\"'][^<>\n]{0,80}/>"
+    r"|<\|[a-z_]{1,30}\|>|</?[a-z_]{1,20}(?:\s[^<>\n]{0,80})?>",
+    re.IGNORECASE,
+)
 NOUN_LABEL = re.compile(
     r"[-\s]{0,4}(?:block|index|id|candidate|piece|number)(?: (?:index|id|number))?\s*", re.I
 )

@@ -31,6 +31,7 @@ from phyblock.parsing.plan_patterns import (
     PART,
     PLAN_WORD,
     REVISION,
+    SUPPOSED_SENTENCE,
 )
 from phyblock.parsing.statement import MOST_AT_ONCE, chain, read_statement
 from phyblock.parsing.structured import Found, find_json, find_tables
@@ -60,6 +61,11 @@ class Listing:
     heading: str = ""
     ends_named: bool = True
     leaves: bool = False
+    loose: set[int] = field(default_factory=set)
+    supports: set[int] = field(default_factory=set)
+    denied: set[int] = field(default_factory=set)
+    between: list[str] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
 
     @property
     def is_firm(self) -> bool:
@@ -68,11 +74,12 @@ class Listing:
 
 
 _ABOVE = 12
+_LEAVES_OUT = re.compile(r"\s{0,9}(?:\.{3,9}|…|⋮|\[\.{3}\])\s{0,9}")
 
 
 def listings(text: str) -> tuple[list[Listing], list[str]]:
     """The lists of a text in order, and the lines that stand below the last one."""
-    text = INLINE_STEP.sub("\n", TAG.sub("\n", text))
+    text = INLINE_STEP.sub("\n", TAG.sub(_of_tag, _ROWS.sub(_in_line, text)))
     reader = _Reader()
     forms = sorted(_apart(text), key=lambda found: found.start)
     starts = [found.start for found in forms]
@@ -90,6 +97,20 @@ def listings(text: str) -> tuple[list[Listing], list[str]]:
                 reader.read(number, line[inside.end - at :])
         at += len(line)
     return reader.done, reader.above
+
+
+_ROWS = re.compile(r"\[\s{0,9}(?:\d{1,6},?[ \t]{0,9}(?:(?:#|//)[^\n]{0,200})?\n\s{0,40}){1,63}\]")
+_ROW = re.compile(r"^\W{0,40}(\d{1,6})", re.MULTILINE)
+
+
+def _in_line(rows: re.Match[str]) -> str:
+    """An array of numbers without its line ends and comments."""
+    return f"[{', '.join(_ROW.findall(rows[0]))}]"
+
+
+def _of_tag(tag: re.Match[str]) -> str:
+    """The move that an empty element holds in its attributes; of others, that a line ends."""
+    return f"\nMove block {tag['block']}\n" if tag["block"] else "\n"
 
 
 def _apart(text: str) -> list[Found]:
@@ -122,6 +143,8 @@ class _Reader:
     def read(self, number: int, raw: str) -> None:
         """Add a line: an item of a list, what belongs to an item, or what stands between lists."""
         line = plain_line(raw).rstrip()
+        if _LEAVES_OUT.fullmatch(line):
+            self.above = [*self.above[-_ABOVE:], line.strip()]
         if FENCE.match(raw) or not line.strip(" \t[]{}()|,.:;#-=~"):
             return
         for pattern, name in ((STEP, "_steps"), (NUMBERED, "_numbered")):
@@ -138,9 +161,11 @@ class _Reader:
         n = int(head["number"])
         last = int(head.groupdict().get("last") or n)
         body = line[head.end() :].replace("{", " ").replace("}", " ")
-        if name == "_steps" and not head["sign"] and body.strip() and not _is_move(body):
-            return False
         current: Listing | None = getattr(self, name)
+        if name == "_steps" and not head["sign"] and body.strip():
+            is_next = n == 1 or current is None or n > max(current.own, default=0)
+            if not (is_next and _is_move(body)):
+                return False
         if current is None or not 0 < n - (current.own[-1] if current.own else 0) <= 3:
             if n > 1 and not (name == "_steps" and _is_move(body)):
                 return False
@@ -188,6 +213,7 @@ class _Reader:
                 2,
                 1 if by_arrows else 0,
             )
+            listing.lines.append(body)
             self._open = None
             return True
         if not statement.numbers:
@@ -195,6 +221,8 @@ class _Reader:
         if marked is None and not statement.has_verb:
             return False
         form = "marked" if marked or STARTS_MOVING.match(line) else "sentences"
+        if form == "sentences" and SUPPOSED_SENTENCE.search(line):
+            return False
         return self._extend(form, at, body, is_item=marked is not None)
 
     def _is_nested(self, at: int, marked: re.Match[str] | None) -> bool:
@@ -256,6 +284,7 @@ class _Reader:
             if not arrays:
                 return False
             listed, label = chain(arrays[-1][0])[0], line[: arrays[-1].start()]
+            value = line[arrays[-1].start() :]
         else:
             label = labeled["label"] if labeled else ""
         last = self.done[-1] if self.done else None
@@ -267,6 +296,7 @@ class _Reader:
         else:
             last = self._new("labeled", at)
             last.numbers, last.label, last.n_named = list(listed), label, 2
+        last.lines.append(value)
         if rest:
             self.read(at, rest)
         return True
@@ -277,9 +307,15 @@ class _Reader:
         statement = read_statement(body, is_item=is_item)
         listed = statement.numbers or (chain(body)[0] if is_item else ())
         to.last_line = at
+        to.lines.append(body)
         to.ends_named = bool(listed)
+        to.supports |= statement.supports
+        to.loose |= statement.loose
+        to.denied |= statement.denied
         if not listed:
             return False
+        if to.n_named:
+            to.between += self.above
         to.numbers += list(listed) * (self._times if len(listed) == 1 and is_item else 1)
         to.n_named += 1
         to.n_moves += statement.has_verb

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from phyblock.parsing.answer_form import FormProblem
+from phyblock.parsing.answer_patterns import CONDITIONAL
 from phyblock.parsing.statement import read_statement
 from phyblock.parsing.text_forms import answer_of
 
@@ -69,10 +70,20 @@ _LABEL = (
 )
 _OPERATION = rf"(?:{_named(_CALL, 'call')}|{_named(_PHRASE, 'phrase')}|(?P<done>{_DONE}))"
 _ANSWER_LINE = re.compile(rf"(?:{_LABEL}:?\s{{0,3}})?{_OPERATION}\s{{0,3}}[.!;]?", re.IGNORECASE)
-_LABELED = re.compile(rf"(?<![\w]){_LABEL}[`*\"'_ ]{{0,6}}{_OPERATION}(?!\w)", re.IGNORECASE)
+_LABELED = re.compile(rf"(?<![\w]){_LABEL}[`*\"'_ ]{{0,6}}{_OPERATION}(?![\w?])", re.IGNORECASE)
 _MENTION = re.compile(
     rf"(?<![\w]){_named(_CALL, 'call')}|(?<![\w]){_named(_PHRASE, 'phrase')}", re.IGNORECASE
 )
+_MORE = re.compile(
+    rf"[\s,;&+`*]{{1,4}}(?:(?:and|then|or)\s{{1,3}}){{0,2}}{_named(_CALL, 'call')}", re.IGNORECASE
+)
+"""A further operation behind one, with nothing said between them."""
+_NOT_MEANT = re.compile(
+    r"\b(?:undo|remov\w+|revert\w*|take back|don['\u2019]t|do not|never|cannot|can['\u2019]t|after"
+    r"|since|because|last|previous\w*|prior|earlier|instead of|rather than)\b[^.;:,!?]{0,60}\Z",
+    re.IGNORECASE,
+)
+"""What stands before an operation in its clause that is not the one to do now."""
 _MANY = re.compile(
     r"(?<!\w)move\s{0,3}[(\[]\s{0,9}(?P<list>[0-9]{1,6}"
     r"(?:\s{0,3}(?:[,;/&]|and|or)\s{0,3}[0-9]{1,6}){1,31})(?![0-9])",
@@ -83,7 +94,7 @@ _DONE_SENTENCE = re.compile(
     re.IGNORECASE,
 )
 _CHOSEN = re.compile(r"\b(?:choose|select|pick|wähle|elijo|choisis)\b|选择?", re.IGNORECASE)
-_BARE = re.compile(rf"(?:{_LABEL})?[#(\[]?{_INTEGER}[)\].]?", re.IGNORECASE)
+_BARE = re.compile(rf"(?:{_LABEL})?(?:(?:candidate|block)\s)?[#(\[]?{_INTEGER}[)\].]?", re.IGNORECASE)
 _OBJECT = re.compile(r"\{[^{}]{0,600}\}")
 _FENCE = re.compile(r"(?:`{3,}|~{3,})\s{0,3}[\w+-]{0,16}")
 _MARKUP = re.compile(r"</?(?:final_)?answer>|[*`_~]{1,3}|\\boxed\{|[{}]")
@@ -91,7 +102,7 @@ _EDGES = " \t\r\f\v>#-*+\u2022|\"'"
 _INDEX_KEYS = ("index", "block_index", "id", "block_id", "block", "candidate", "number")
 _INDEX_ALONE = _INDEX_KEYS[:4]
 """Keys that are enough without an action."""
-_ACTION_KEYS = ("action", "operation", "next_plan", "next plan", "plan", "answer", "move", "step")
+_ACTION_KEYS = ("action", "operation", "next_plan", "next plan", "plan", "answer", "move", "step", "op")
 
 
 def parse_move(text: str) -> ParsedMove:
@@ -102,6 +113,8 @@ def parse_move(text: str) -> ParsedMove:
         return ParsedMove(problem="no_move" if text.strip() else "empty")
     for rule, find in _RULES:
         if found := find(answer, lines):
+            if rule in _LENIENT and CONDITIONAL.search(lines[-1]):
+                break
             return _verdict(found, rule)
     return ParsedMove(problem="no_move")
 
@@ -183,11 +196,23 @@ def _whole(value: object) -> int | None:
 
 
 def _labeled(_: str, lines: list[str]) -> list[_Operation]:
-    return [_operation(match) for line in lines for match in _LABELED.finditer(line)]
+    found: list[_Operation] = []
+    for line in lines:
+        for match in _LABELED.finditer(line):
+            if _NOT_MEANT.search(line[: match.start()]):
+                continue
+            found.append(_operation(match))
+            while match and (match := _MORE.match(line, match.end())):
+                found.append(_operation(match))
+    return found
 
 
 def _mentions(line: str) -> list[_Operation]:
-    found = [_operation(match) for match in _MENTION.finditer(line)]
+    found = [
+        _operation(match)
+        for match in _MENTION.finditer(line)
+        if not _NOT_MEANT.search(line[: match.start()])
+    ]
     for many in _MANY.finditer(line):
         found += [int(digits) for digits in re.findall("[0-9]+", many["list"])]
     return found
@@ -209,6 +234,8 @@ def _loose(_: str, lines: list[str]) -> list[int]:
 
 
 def _moved(line: str) -> list[int]:
+    if _MENTION.search(line) and not _mentions(line):
+        return []
     statement = read_statement(line.replace("_", " "), is_item=False)
     return list(statement.numbers) if statement.has_verb or _CHOSEN.search(line) else []
 
@@ -228,5 +255,7 @@ _RULES: tuple[tuple[str, _Find], ...] = (
     ("loose", _loose),
     ("bare_number", _bare),
 )
+_LENIENT = ("last_line_mention", "mention", "loose")
+"""Rules that read sentences, which may tie a move to a condition."""
 MOVE_RULES: tuple[str, ...] = tuple(name for name, _ in _RULES)
 """Rules in the order in which they are tried."""

@@ -18,6 +18,7 @@ from typing import Literal, get_args
 from phyblock.domain import Plan
 from phyblock.parsing.answer_form import FormProblem
 from phyblock.parsing.listing import Listing, listings
+from phyblock.parsing.plan_doubt import is_doubtful
 from phyblock.parsing.plan_patterns import (
     AGAIN,
     CHOICE,
@@ -27,6 +28,7 @@ from phyblock.parsing.plan_patterns import (
     NOT_REVERSED,
     OPTION,
     OR_ELSE,
+    ORDINALS,
     PART,
     REFUSAL,
     REVISION,
@@ -39,7 +41,7 @@ from phyblock.words import PlanParser
 __all__ = ["PLAN_PROBLEMS", "ParsedPlan", "PlanProblem", "kept_plan", "parse_plan"]
 
 PlanProblem = Literal[
-    "empty", "thoughts_only", "refusal", "catalogue", "two_plans", "no_plan", FormProblem
+    "empty", "thoughts_only", "refusal", "catalogue", "two_plans", "ambiguous", "no_plan", FormProblem
 ]
 PLAN_PROBLEMS: tuple[PlanProblem, ...] = get_args(PlanProblem)
 
@@ -142,9 +144,16 @@ def _choose(answer: str) -> _Read:
     plan = _chosen(plans, answer)
     if plan is None:
         return "two_plans"
-    if plan is plans[-1] and _is_cut_off(answer, found, below):
+    is_cut_off = _is_cut_off(answer, found, below)
+    if plan is plans[-1] and is_cut_off:
         firm = plans if len(plans) > 1 else [*_plans(named, ranks, MOVES, found), plan]
         plan = firm[-2] if len(firm) > 1 else plan
+    after = [] if plan.option else found[found.index(plan.lists[-1]) + 1 :]
+    if is_cut_off:
+        after = after[:-1]
+    before = found[: found.index(plan.lists[0])]
+    if is_doubtful(plan.lists, plan.below, before, after):
+        return "ambiguous"
     form = plan.lists[-1].form
     numbers = plan.numbers * (2 if any(map(AGAIN.search, below)) else 1)
     return form, numbers[::-1] if _is_reversed(plan, form) else numbers
@@ -188,8 +197,9 @@ def _relation(passed: list[str], plans: list[_Plan], listing: Listing) -> str:
     if listing.form == "labeled" and not any(passed):
         return "other"
     if len(lines) > 1 or len(title) > HEADING_CHARS or REVISION.search(title) or "" in passed:
-        return "explanation" if any(EXPLANATION.search(line) for line in lines[:1]) else "other"
-    if EXPLANATION.search(title):
+        is_explained = any(EXPLANATION.search(line) for line in lines[:1])
+        return "explanation" if is_explained and listing.form != "json" else "other"
+    if EXPLANATION.search(title) and listing.form != "json":
         return "explanation"
     part = PART.search(title) if title else before.numbers != listing.numbers
     if not (part and before.ends_named):
@@ -204,10 +214,10 @@ def _chosen(plans: list[_Plan], answer: str) -> _Plan | None:
     if options and last.option:
         if len({tuple(plan.numbers) for plan in plans}) == 1:
             return last
-        chosen = [
-            match["a"] or match["b"] or match["c"] or match["d"]
-            for match in CHOICE.finditer(answer)
-        ]
+        chosen = [match[match.lastgroup or 0] for match in CHOICE.finditer(answer)]
+        ordinal = ORDINALS.get(chosen[-1].lower()) if chosen and len(plans) == 2 else None
+        if ordinal is not None:
+            return plans[ordinal]
         named = [plan for plan in plans if chosen and plan.option == chosen[-1].lower()]
         return named[-1] if named else (last if len(plans) == 1 else None)
     return last

@@ -21,12 +21,14 @@ __all__ = [
     "NOT_MEANT",
     "NOT_REVERSED",
     "OPTION",
+    "ORDINALS",
     "OR_ELSE",
     "PART",
     "PLAN_WORD",
     "REFUSAL",
     "REVISION",
     "SUPPOSED",
+    "SUPPOSED_SENTENCE",
 ]
 
 PLAN_WORD = re.compile(
@@ -90,9 +92,13 @@ CHOICE = re.compile(
     r"|right|stable|preferred|chosen|answer|one|besser|richtig)"
     r"|\b(?:plan|option|alternative|variant|solution|version)\s?#?(?P<c>[A-D]|[1-4])\s?[(,:\-\u2013]{1,2}\s?"
     r"(?:better|best|chosen|final|recommended|preferred)\b"
-    r"|\b(?:decision|choice|winner|entscheidung|wahl)\W{1,4}(?:is\s)?(?P<d>[A-D])\b(?!\w)",
+    r"|\b(?:decision|choice|winner|entscheidung|wahl)\W{1,4}(?:is\s)?(?P<d>[A-D])\b(?!\w)"
+    r"|\b(?:choose|pick|select|prefer|recommend|go(?:ing)? with|submit|take)\s(?:the\s)"
+    r"(?P<e>first|former|second|latter)\b",
     re.IGNORECASE,
 )
+ORDINALS = {"first": 0, "former": 0, "second": 1, "latter": 1}
+"""Which of two options a choice by place takes."""
 REVISION = re.compile(
     r"final|correct|revis|updat|actual|summar|complete|overall|optimi|improv|korrigier|attempt|error|mistake|oops"
     r"|\btry\b|new plan"
@@ -121,6 +127,9 @@ SUPPOSED = re.compile(
     r"would|could|generic|hypothetical|in general|typical|illustrat|placeholder|candidates",
     re.IGNORECASE,
 )
+SUPPOSED_SENTENCE = re.compile(
+    r"\b(?:if|unless|could|might|let me know|falls|wenn|könnte|si|peut|podría)\b|如果|可以", re.IGNORECASE
+)
 AGAIN = re.compile(
     r"\brepeat (?:the |this |these )?(?:above |same |whole )?(?:assembly |building )?(?:order|steps"
     r"|sequence|plan|instructions)\b"
@@ -133,7 +142,7 @@ NOT_REVERSED = re.compile(
     re.IGNORECASE,
 )
 DOWNWARD = re.compile(
-    r"top[- ](?:to|down)[- ]?(?:bottom)?\b|von oben nach unten|从上到下|de haut en bas"
+    r"top[- ](?:to|down)[- ]?(?:bottom)?\b|\b(?:from|at) the top\W*\Z|von oben nach unten|从上到下|de haut en bas"
     r"|de arriba (?:a"
     r"|hacia) abajo",
     re.IGNORECASE,

@@ -53,7 +53,7 @@ _OPPOSITE_KEY = re.compile(
     r"|remain|left[ _-]?over|spare|available|candidate(?:s|_list)|ignor|skip|avoid|wrong|draft"
     r"|example|attempt"
     r"|alternativ|initial|previous|old|count|total|number_of|num_|confidence|layers?_count|reason"
-    r"|thought|analysis"
+    r"|thought|analysis|^(?:to|onto?|target|under|location|destination|next[ _]to)$"
     r"|explanation|descri|comment|note|supports?$|depend|on[ _]?top|below|position|coord|rotation"
     r"|orient|size"
     r"|color|colour|shape|type|blocks?[ _](?:needed|required|used)|required|needed|selected"
@@ -66,6 +66,10 @@ _INDEX_KEY = re.compile(
     r"|place|baustein|积木|编号",
     re.IGNORECASE,
 )
+_BLOCK_KEY = re.compile(
+    r"(?:block|candidate|piece)(?:[ _-]?(?:index|idx|id|number|no))?|积木", re.IGNORECASE
+)
+"""Keys that outweigh an `id` or `number`, which may be that of the step."""
 _ACTION_KEY = re.compile(
     r"action|instruction|operation|description|move|text|do|command", re.IGNORECASE
 )
@@ -198,9 +202,8 @@ def _ordered(fields: Fields, *, is_plan: bool) -> list[int]:
         ]
         return next((_read(v, is_plan=True) for n, v in choices if n.lower() in chosen), [])
     if plans and not steps:
-        return next(
-            (found for value in reversed(plans) if (found := _read(value, is_plan=True))), []
-        )
+        read = [_read(value, is_plan=True) for value in plans]
+        return next((found for found in reversed(read) if len(found) > 1), max(read, key=len))
     if steps:
         if len({int(m["n"] or m["bare"]) for m, _ in steps}) == len(steps):
             steps.sort(key=lambda step: int(step[0]["n"] or step[0]["bare"]))
@@ -209,8 +212,13 @@ def _ordered(fields: Fields, *, is_plan: bool) -> list[int]:
     tiers = [_tier(key) for key, _ in kept]
     if kept and all(tier is not None for tier in tiers):
         kept = [kept[i] for i in sorted(range(len(kept)), key=lambda i: tiers[i] or 0)]
-    # Beside what holds blocks, a number alone says something of it.
-    holders = [value for _, value in kept if isinstance(value, list)]
+    # Beside what holds blocks, a number alone says something of it, but under a place's name.
+    is_held = any(isinstance(value, list) for _, value in kept)
+    holders = [
+        value
+        for key, value in kept
+        if is_held and (isinstance(value, list) or _tier(key) is not None)
+    ]
     values = holders or [value for _, value in kept if is_plan]
     return [number for value in values for number in _read(value, is_plan=is_plan)]
 
@@ -232,7 +240,15 @@ def _items(items: list[Any]) -> list[int]:
         if None not in places and len(set(places)) == len(places):
             steps.sort(key=lambda step: _place(step) or 0)
         return [n for step in steps for n in _step(step)]
-    return [number for item in items for number in _read(item, is_plan=True)]
+    found = [_read(item, is_plan=True) for item in items]
+    if any(len(numbers) > 1 and _is_flat(item) for item, numbers in zip(items, found, strict=True)):
+        return []
+    return [number for numbers in found for number in numbers]
+
+
+def _is_flat(item: Any) -> bool:
+    """Whether an object holds plain values alone: of several numbers no key says which is meant."""
+    return isinstance(item, Fields) and not any(isinstance(v, (list, str)) for _, v in item)
 
 
 def _is_step(fields: Fields) -> bool:
@@ -258,7 +274,7 @@ def _place(fields: Fields) -> int | None:
 def _step(fields: Fields) -> list[int]:
     """The blocks of one step: by its index, else by a list of them, else by what it does."""
     found: list[int] = []
-    for pattern in (_INDEX_KEY, _MANY_KEY, _ACTION_KEY):
+    for pattern in (_BLOCK_KEY, _INDEX_KEY, _MANY_KEY, _ACTION_KEY):
         for key, value in fields:
             if not found and pattern.fullmatch(key.strip()):
                 found = _read(value, is_plan=True)
@@ -274,6 +290,7 @@ _STEP_COLUMN = re.compile(
     r"step|order|seq|^#$|^no\.?$|^nr\.?$|schritt|reihenfolge|paso|étape|步骤|顺序|序号|手順",
     re.IGNORECASE,
 )
+_LAYER_COLUMN = re.compile(r"layer|level|ebene|schicht|couche|nivel|层", re.IGNORECASE)
 _BLOCK_COLUMN = re.compile(
     r"block|ind(?:ex|ice)|idx|candidate|piece|move|action|^id$|baustein|bloc|bloque|aktion|积木|编号|块"
     r"|ブロック",
@@ -298,6 +315,9 @@ def _cells(line: str) -> list[str]:
 def _of_rows(head: list[str], rows: list[list[str]]) -> list[int]:
     steps = next((i for i, name in enumerate(head) if _STEP_COLUMN.search(name)), None)
     times = next((i for i, name in enumerate(head) if _TIMES_KEY.fullmatch(name)), None)
+    is_layers = steps is None
+    if steps is None:
+        steps = next((i for i, name in enumerate(head) if _LAYER_COLUMN.search(name)), None)
     if steps is None:
         return []
     columns = [i for i, name in enumerate(head) if i != steps and _BLOCK_COLUMN.search(name)]
@@ -310,6 +330,8 @@ def _of_rows(head: list[str], rows: list[list[str]]) -> list[int]:
         ]
     for column in columns:
         named = [list(_line(row[column])) for row in rows]
+        if is_layers and max(map(len, named), default=0) < 2:  # It may say how many.
+            continue
         if rows and all(named):
             many = [(whole_number(row[times]) if times is not None else None) or 1 for row in rows]
             return [

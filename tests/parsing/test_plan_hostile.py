@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from phyblock.parsing import parse_plan
 
@@ -381,3 +383,38 @@ def test_replies_that_were_written_first_are_read_as_noted_or_not_at_all(
 @pytest.mark.parametrize(("text", "plan"), ALIKE)
 def test_counts_are_no_blocks_and_sequences_go_on(text: str, plan: tuple[int, ...] | None) -> None:
     assert reading(text) == plan
+
+
+@given(
+    st.lists(st.integers(1, 16), min_size=2, max_size=6),
+    st.sampled_from(
+        ["Put block {}", "Move block with index {}", "Block {}", "Place the block #{}"]
+    ),
+    st.sampled_from(
+        [
+            "on each side",
+            "at both ends",
+            "for every corner",
+            "on either side of it",
+            "per the picture",
+        ]
+    ),
+)
+def test_a_number_that_is_called_a_block_is_never_a_count(
+    blocks: list[int], move: str, where: str
+) -> None:
+    lines = [f"{n}. {move.format(block)} {where}" for n, block in enumerate(blocks, start=1)]
+    assert parse_plan("\n".join(lines), 16).plan.steps == tuple(blocks)
+
+
+@pytest.mark.parametrize(
+    ("text", "plan"),
+    [
+        ("1. Place blocks 2 and 3 on either side\n2. Place block 4", (2, 3, 4)),
+        ('{"plan":{"base":[1,2],"top":5}}', (1, 2, 5)),
+        ('{"final_plan":{"bottom":3,"middle":[4,5],"top":6}}', (3, 4, 5, 6)),
+        ('{"plan":{"count":3,"layer":1,"blocks":[4,5]}}', (4, 5)),
+    ],
+)
+def test_blocks_beside_lists_are_kept_and_counts_are_not(text: str, plan: tuple[int, ...]) -> None:
+    assert parse_plan(text, 16).plan.steps == plan

@@ -1,0 +1,148 @@
+"""What a reply says of its plan that a reading does not account for: then the reading is a guess.
+
+Patterns say what a list is, and no set of patterns is complete. So what they leave over decides
+whether a reading stands: a block that an item names and that is neither moved nor a support, a
+correction beside the list, a list without its beginning, another list after it that says otherwise.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from phyblock.parsing.listing import Listing
+from phyblock.parsing.plan_patterns import EXPLANATION, REVISION
+from phyblock.parsing.plan_rank import LAST, NO, rank_of
+from phyblock.parsing.statement import named_blocks
+
+__all__ = ["is_doubtful"]
+
+_CORRECTS = re.compile(
+    r"\b(?:wait|correction|corrected|oops|scratch that|(?:should|must|has to|needs to) be|should (?:have been|read)|i meant"
+    r"|swap(?:ped)?|my mistake|moment|korrektur|sondern|muss|corrección|korrigier\w*)\b"
+    r"|\b(?:actually|no|rather)\b[,:]|等等|应该是|更正|改为|訂正|正しくは",
+    re.IGNORECASE,
+)
+_NUMBER = re.compile(r"\d")
+_SENTENCE = re.compile(r"[.;!?](?=\s|\Z)|[。；！？]")
+_ASIDE = re.compile(
+    r"\b(?:not?|never|none|un\w+|distract\w*|decoy\w*|similar|alternativ\w*|could|would|might|may|if|other"
+    r"|left|remaining|example|extra|nicht|kein\w*|ähnlich\w*|autres?|otros?|no)\b|n['\u2019]t\b|不|未|没",
+    re.IGNORECASE,
+)
+"""Words of a sentence about blocks that are no part of the plan."""
+_LOOSE_FORMS = ("labeled", "chain", "numbers", "sentences", "marked")
+_WHOLE = re.compile(r"(?<![\d.])\d{1,6}(?![\d]|\.\d)")
+_ROLE = re.compile(
+    r"\b(?:steps?|layers?|levels?|rows?|col(?:umn)?s?|schritte?|ebene|schicht|plan|option|attempt|structure|part|phase|stage)[ #_]?\d+"
+    r"|\d+(?:\.\d+)?\s?(?:%|°|cm|mm|m\b|percent|degrees?|[x×](?![a-z])|times|mal\b)|[x×]\s?\d+"
+    r"|\(\s?-?\d+(?:\.\d+)?(?:\s?,\s?-?\d+(?:\.\d+)?){1,2}\s?\)|\d+(?:st|nd|rd|th)\b"
+    r"|第\d+[层步]|\d+\s?[个块层步]|^\W*[a-z]{0,4}\d{1,3}(?:/\d{1,3})?\s?[.):-]\s|#\s\d{1,3}$"
+    r"|(?<!block )(?<!index )\b\d+\s(?:\w+\s)?(?:blocks?|layers?|levels?|steps?|moves?|pieces?|pillars?|copies|rows?|sides?)\b"
+    r"|\d+\s(?:more|further|other)\b",
+    re.IGNORECASE | re.MULTILINE,
+)
+"""Numbers that are no block's: places, sizes, counts, coordinates."""
+_BRACKETS = re.compile(r"\([^()\n]{0,200}\)|\[[^\[\]\n]{0,200}\]")
+_STEP_AGAIN = re.compile(
+    r"(?:\b(?:swap\w*|skip|remov\w+|drop|wrong|replac\w+|should|must|has to|needs? to|exchange"
+    r"|delete|ignore|unnecessary|(?:not|n't) (?:needed|required|necessary))\b.{0,60})?"
+    r"\bsteps?\s?\d(?P<then>.{0,60}\b(?:swap\w*|skip\w*|remov\w+|drop\w*|wrong|replac\w+|should|must"
+    r"|has to|needs? to|exchange\w*|unnecessary|(?:not|n't) (?:needed|required|necessary)))?",
+    re.IGNORECASE,
+)
+"""A step named again, to take it back."""
+_FRAGMENT = 3
+"""Steps of a list that may go on from what stands there already."""
+_MOST_LEFT_OUT = 4
+"""A list that begins later than this numbers its steps in a way of its own (10, 20, ...)."""
+
+
+def is_doubtful(
+    lists: Sequence[Listing],
+    below: Sequence[str],
+    before: Sequence[Listing],
+    later: Sequence[Listing],
+) -> bool:
+    """Whether the lists of a plan are no sure reading.
+
+    What says so stands in them, in the lines `below`, or in the lists `before` and `later`.
+    """
+    numbers = {number for listing in lists for number in listing.numbers}
+    if any(listing.loose for listing in lists):
+        return True
+    n_steps = sum(len(listing.numbers) for listing in lists)
+    is_whole = n_steps > _FRAGMENT or lists[0].form == "sentences"
+    if is_whole and any(listing.supports - numbers for listing in lists):
+        return True
+    if any(listing.form in _LOOSE_FORMS and _leaves_numbers(listing) for listing in lists):
+        return True
+    if rank_of(lists[0]) == LAST and any(_is_beside(listing, lists[0]) for listing in before[-1:]):
+        return True
+    own = lists[0].own
+    if own and 1 < own[0] <= _MOST_LEFT_OUT:
+        return True
+    if any(1 < b.own[0] <= a.own[-1] for a, b in pairwise(lists) if a.own and b.own):
+        return True
+    if any(not re.search(r"\w", line) for listing in lists for line in listing.between):
+        return True  # An ellipsis stands for steps.
+    beside = [line for listing in lists for line in listing.between]
+    for listing in later:
+        beside += listing.above
+    return _is_corrected([*beside, *below], numbers) or any(
+        _says_otherwise(listing, numbers) for listing in _unexplained(later)
+    )
+
+
+def _is_beside(before: Listing, listing: Listing) -> bool:
+    """Whether labels of one kind stand line by line, of which one alone was taken."""
+    is_next = listing.first_line - before.last_line <= 1
+    return before.form == listing.form == "labeled" and is_next and not REVISION.search(listing.label)
+
+
+def _leaves_numbers(listing: Listing) -> bool:
+    """Whether the lines of a list hold numbers that are no blocks of it and nothing else, either."""
+    text = _BRACKETS.sub(_unless_aside, "\n".join(listing.lines))
+    found = list(map(int, _WHOLE.findall(_ROLE.sub(" ", text))))
+    if found in (listing.numbers * 2, [*listing.numbers, *listing.numbers[::-1]]):
+        return False
+    said = Counter(found)
+    return any(
+        number not in listing.supports | listing.denied and n > listing.numbers.count(number)
+        for number, n in said.items()
+    )
+
+
+def _unless_aside(brackets: re.Match[str]) -> str:
+    return " " if _ASIDE.search(brackets[0]) else brackets[0]
+
+
+def _is_corrected(lines: Sequence[str], numbers: set[int]) -> bool:
+    """Whether lines beside a plan take a step back, or name blocks that it lacks."""
+    is_explained = False
+    for line in lines:
+        is_explained = is_explained or bool(EXPLANATION.search(line))
+        if _CORRECTS.search(line) and _NUMBER.search(line):
+            return True
+        again = _STEP_AGAIN.search(line)
+        if again and (again["then"] or not again[0].lower().startswith("step")):
+            return True
+        for sentence in () if is_explained else _SENTENCE.split(line):
+            if not _ASIDE.search(sentence) and named_blocks(sentence) - numbers:
+                return True
+    return False
+
+
+def _unexplained(later: Sequence[Listing]) -> Iterator[Listing]:
+    """The lists up to the one that an explanation begins with."""
+    for listing in later:
+        if any(EXPLANATION.search(line) for line in listing.above):
+            return
+        yield listing
+
+
+def _says_otherwise(listing: Listing, numbers: set[int]) -> bool:
+    is_plan = rank_of(listing) > (NO if listing.n_moves else LAST)
+    return is_plan and bool({*listing.numbers} - numbers)
