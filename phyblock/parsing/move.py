@@ -84,6 +84,7 @@ _NOT_MEANT = re.compile(
     re.IGNORECASE,
 )
 """What stands before an operation in its clause that is not the one to do now."""
+_ASKED = re.compile(r"[^.!?;\n]{0,80}\?")
 _MANY = re.compile(
     r"(?<!\w)move\s{0,3}[(\[]\s{0,9}(?P<list>[0-9]{1,6}"
     r"(?:\s{0,3}(?:[,;/&]|and|or)\s{0,3}[0-9]{1,6}){1,31})(?![0-9])",
@@ -212,6 +213,7 @@ def _mentions(line: str) -> list[_Operation]:
         _operation(match)
         for match in _MENTION.finditer(line)
         if not _NOT_MEANT.search(line[: match.start()])
+        and not _ASKED.match(line, match.end())
     ]
     for many in _MANY.finditer(line):
         found += [int(digits) for digits in re.findall("[0-9]+", many["list"])]

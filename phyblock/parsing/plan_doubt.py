@@ -13,7 +13,12 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from phyblock.parsing.listing import Listing
-from phyblock.parsing.plan_patterns import EXPLANATION, REVISION
+from phyblock.parsing.plan_patterns import (
+    CATALOGUE_WORD,
+    EXPLANATION,
+    NOT_MEANT,
+    REVISION,
+)
 from phyblock.parsing.plan_rank import LAST, NO, rank_of
 from phyblock.parsing.statement import named_blocks
 
@@ -54,6 +59,11 @@ _STEP_AGAIN = re.compile(
     re.IGNORECASE,
 )
 """A step named again, to take it back."""
+_TOTAL = re.compile(
+    r"\b(?:total(?: number)?(?: of)?|number of) ?(?:blocks?|steps?|moves?)?(?: used)?\W{1,4}(\d{1,2})\b(?! (?:layers|levels|kinds|types|colou?rs))",
+    re.IGNORECASE,
+)
+"""A count of the steps, said behind them."""
 _FRAGMENT = 3
 """Steps of a list that may go on from what stands there already."""
 _MOST_LEFT_OUT = 4
@@ -91,8 +101,16 @@ def is_doubtful(
     beside = [line for listing in lists for line in listing.between]
     for listing in later:
         beside += listing.above
+    for total in _TOTAL.finditer("\n".join(below)):
+        if int(total[1]) != n_steps:
+            return True
+    after = list(_unexplained(later))
+    for listing in after:
+        if listing.form == "labeled" and not _ASIDE.search(listing.label):
+            beside += listing.lines
+    order = [number for listing in lists for number in listing.numbers]
     return _is_corrected([*beside, *below], numbers) or any(
-        _says_otherwise(listing, numbers) for listing in _unexplained(later)
+        _says_otherwise(listing, order) for listing in after
     )
 
 
@@ -143,6 +161,13 @@ def _unexplained(later: Sequence[Listing]) -> Iterator[Listing]:
         yield listing
 
 
-def _says_otherwise(listing: Listing, numbers: set[int]) -> bool:
+def _says_otherwise(listing: Listing, order: list[int]) -> bool:
+    """Whether a later list names further blocks, or the same in another order."""
+    if sorted(listing.numbers) == sorted(order) and not _is_no_plan(listing.label):
+        return listing.numbers not in (order, sorted(order))
     is_plan = rank_of(listing) > (NO if listing.n_moves else LAST)
-    return is_plan and bool({*listing.numbers} - numbers)
+    return is_plan and bool({*listing.numbers} - {*order})
+
+
+def _is_no_plan(label: str) -> bool:
+    return bool(CATALOGUE_WORD.search(label) or NOT_MEANT.search(f"{label}:"))
