@@ -30,6 +30,7 @@ _CORRECTS = re.compile(
     r"|\b(?:actually|no|rather)\b[,:]|等等|应该是|更正|改为|訂正|正しくは",
     re.IGNORECASE,
 )
+_DROPS = re.compile(r"\b(?:forget|scrap|disregard|vergiss)\s(?:the|that|this|it|what|d\w\w)\b", re.IGNORECASE)
 _NUMBER = re.compile(r"\d")
 _SENTENCE = re.compile(r"[.;!?](?=\s|\Z)|[。；！？]")
 _ASIDE = re.compile(
@@ -142,7 +143,7 @@ def _is_corrected(lines: Sequence[str], numbers: set[int]) -> bool:
     is_explained = False
     for line in lines:
         is_explained = is_explained or bool(EXPLANATION.search(line))
-        if _CORRECTS.search(line) and _NUMBER.search(line):
+        if (_CORRECTS.search(line) and _NUMBER.search(line)) or _DROPS.search(line):
             return True
         again = _STEP_AGAIN.search(line)
         if again and (again["then"] or not again[0].lower().startswith("step")):
