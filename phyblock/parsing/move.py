@@ -95,7 +95,9 @@ _DONE_SENTENCE = re.compile(
     re.IGNORECASE,
 )
 _CHOSEN = re.compile(r"\b(?:choose|select|pick|wähle|elijo|choisis)\b|选择?", re.IGNORECASE)
-_BARE = re.compile(rf"(?:{_LABEL})?(?:(?:candidate|block)\s)?[#(\[]?{_INTEGER}[)\].]?", re.IGNORECASE)
+_BARE = re.compile(
+    rf"(?:{_LABEL})?(?:(?:candidate|block)\s)?[#(\[]?{_INTEGER}[)\].]?", re.IGNORECASE
+)
 _OBJECT = re.compile(r"\{[^{}]{0,600}\}")
 _FENCE = re.compile(r"(?:`{3,}|~{3,})\s{0,3}[\w+-]{0,16}")
 _MARKUP = re.compile(r"</?(?:final_)?answer>|[*`_~]{1,3}|\\boxed\{|[{}]")
@@ -103,7 +105,17 @@ _EDGES = " \t\r\f\v>#-*+\u2022|\"'"
 _INDEX_KEYS = ("index", "block_index", "id", "block_id", "block", "candidate", "number")
 _INDEX_ALONE = _INDEX_KEYS[:4]
 """Keys that are enough without an action."""
-_ACTION_KEYS = ("action", "operation", "next_plan", "next plan", "plan", "answer", "move", "step", "op")
+_ACTION_KEYS = (
+    "action",
+    "operation",
+    "next_plan",
+    "next plan",
+    "plan",
+    "answer",
+    "move",
+    "step",
+    "op",
+)
 
 
 def parse_move(text: str) -> ParsedMove:
@@ -202,9 +214,10 @@ def _labeled(_: str, lines: list[str]) -> list[_Operation]:
         for match in _LABELED.finditer(line):
             if _NOT_MEANT.search(line[: match.start()]):
                 continue
-            found.append(_operation(match))
-            while match and (match := _MORE.match(line, match.end())):
-                found.append(_operation(match))
+            more: re.Match[str] | None = match
+            while more is not None:
+                found.append(_operation(more))
+                more = _MORE.match(line, more.end())
     return found
 
 
@@ -212,8 +225,7 @@ def _mentions(line: str) -> list[_Operation]:
     found = [
         _operation(match)
         for match in _MENTION.finditer(line)
-        if not _NOT_MEANT.search(line[: match.start()])
-        and not _ASKED.match(line, match.end())
+        if not _NOT_MEANT.search(line[: match.start()]) and not _ASKED.match(line, match.end())
     ]
     for many in _MANY.finditer(line):
         found += [int(digits) for digits in re.findall("[0-9]+", many["list"])]

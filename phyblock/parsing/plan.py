@@ -41,7 +41,14 @@ from phyblock.words import PlanParser
 __all__ = ["PLAN_PROBLEMS", "ParsedPlan", "PlanProblem", "kept_plan", "parse_plan"]
 
 PlanProblem = Literal[
-    "empty", "thoughts_only", "refusal", "catalogue", "two_plans", "ambiguous", "no_plan", FormProblem
+    "empty",
+    "thoughts_only",
+    "refusal",
+    "catalogue",
+    "two_plans",
+    "ambiguous",
+    "no_plan",
+    FormProblem,
 ]
 PLAN_PROBLEMS: tuple[PlanProblem, ...] = get_args(PlanProblem)
 

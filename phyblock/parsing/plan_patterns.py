@@ -128,7 +128,8 @@ SUPPOSED = re.compile(
     re.IGNORECASE,
 )
 SUPPOSED_SENTENCE = re.compile(
-    r"\b(?:if|unless|could|might|let me know|falls|wenn|könnte|si|peut|podría)\b|如果|可以", re.IGNORECASE
+    r"\b(?:if|unless|could|might|let me know|falls|wenn|könnte|si|peut|podría)\b|如果|可以",
+    re.IGNORECASE,
 )
 AGAIN = re.compile(
     r"\brepeat (?:the |this |these )?(?:above |same |whole )?(?:assembly |building )?(?:order|steps"
@@ -142,7 +143,8 @@ NOT_REVERSED = re.compile(
     re.IGNORECASE,
 )
 DOWNWARD = re.compile(
-    r"top[- ](?:to|down)[- ]?(?:bottom)?\b|\b(?:from|at) the top\W*\Z|von oben nach unten|从上到下|de haut en bas"
+    r"top[- ](?:to|down)[- ]?(?:bottom)?\b|\b(?:from|at) the top\W*\Z|von oben nach unten"
+    r"|从上到下|de haut en bas"
     r"|de arriba (?:a"
     r"|hacia) abajo",
     re.IGNORECASE,
