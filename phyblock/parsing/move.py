@@ -65,7 +65,7 @@ def _named(pattern: str, name: str) -> str:
 
 _LABEL = (
     r"(?:(?:my|the|your|final|next|chosen|selected|single)\s{1,3}){0,3}"
-    r"(?:plan|step(?:\s{0,2}#?[0-9]{1,3})?|answer|action|operation|move|output|decision|choice|attempt|next)"
+    r"(?:plan|step(?:\s{0,2}#?[0-9]{1,3})?|answer|action|operation|move|output|decision|choice|attempt|next|correction)"
     r"\s{0,3}(?:is|:|=|->|\u2192)\s{0,3}"
 )
 _OPERATION = rf"(?:{_named(_CALL, 'call')}|{_named(_PHRASE, 'phrase')}|(?P<done>{_DONE}))"

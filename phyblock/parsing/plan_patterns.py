@@ -101,7 +101,7 @@ ORDINALS = {"first": 0, "former": 0, "second": 1, "latter": 1}
 """Which of two options a choice by place takes."""
 REVISION = re.compile(
     r"final|correct|revis|updat|actual|summar|complete|overall|optimi|improv|korrigier|attempt|error|mistake|oops"
-    r"|\btry\b|new plan"
+    r"|\btry\b|new plan|second thought|reconsider|on reflection"
     r"|\b(?:instead|answer|again|better|so|thus|therefore|wait|output)\b",
     re.IGNORECASE,
 )

@@ -10,7 +10,7 @@ from tests.parsing.fresh_replies import KINDS, fresh_replies, tally
 
 PLANS = st.lists(st.integers(1, 16), min_size=3, max_size=12)
 BLOCKS = st.integers(1, 16)
-MOST_FAILED = {1: 8, 2: 15, 3: 7, 4: 11, 5: 12, 6: 20, 7: 8}
+MOST_FAILED = {1: 8, 2: 15, 3: 7, 4: 11, 5: 12, 6: 20, 7: 8, 8: 12}
 """Of each round, how many replies are not read."""
 
 
@@ -28,7 +28,7 @@ def test_every_round_holds_all_kinds_and_replies_without_an_answer() -> None:
     assert {reply.kind for reply in replies} == set(KINDS)
     for number in MOST_FAILED:
         meant = [reply.meant for reply in replies if reply.round == number]
-        assert len(meant) >= 60
+        assert len(meant) >= 40
         assert None in meant
 
 
