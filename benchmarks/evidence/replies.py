@@ -3,16 +3,18 @@
     python -m benchmarks.evidence.replies
 
 Run from the root of a checkout. A reading is wrong where it is not what was meant, and a failure
-where nothing is read of a reply that holds a plan. The last two tables were written before any
-parser read them; what the parser of that day made of them stands beside.
+where nothing is read of a reply that holds a plan. Two tables and seven rounds (of plans, answers
+and moves) were written before any reader read them; what was read at first sight stands beside.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 
 from phyblock.parsing import parse_plan
 from phyblock.words import PlanParser
+from tests.parsing.fresh_replies import tally
 from tests.parsing.test_plan_hostile import ALIKE, LAST, LATER, NONE, PLANS
 from tests.parsing.test_plan_manners import FAILURES, READ
 
@@ -48,11 +50,17 @@ def main() -> None:
         parsers: tuple[PlanParser, ...] = ("official", "steps")
         for parser in parsers:
             counts = Counter(verdict(text, meant, parser) for text, meant in rows)
-            parts = (f"{kind} {counts[kind]}" for kind in ("right", "failed", "wrong"))
-            print(f"  {parser:9} {', '.join(parts)}")
+            print(f"  {parser:9} {_shown(counts)}")
         if name in EARLIER:
-            parts = (f"{kind} {n}" for kind, n in EARLIER[name].items())
-            print(f"  then      {', '.join(parts)}")
+            print(f"  then      {_shown(EARLIER[name])}")
+    for number, rounds in tally().items():
+        print(f"round {number}: {sum(rounds['now'].values())} replies")
+        print(f"  then      {_shown(rounds['first'])}")
+        print(f"  now       {_shown(rounds['now'])}")
+
+
+def _shown(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{kind} {counts[kind]}" for kind in ("right", "failed", "wrong"))
 
 
 if __name__ == "__main__":

@@ -63,7 +63,8 @@ CHOSEN = re.compile(
     r"|\b(?:correct|right|best) (?:option|choice|one|picture|image|letter|place|match)"
     r" (?:is|would be|must be|should be)"
     r"|\b(?:nehme|wähle)(?: aber| daher| also)?"
-    r"|我认为(?:答案)?是?|应?(?:该)?选(?:择|项)?(?:是|为)?)[ \t*_`:]{0,6}(?=(?P<value>[^\n]{1,80}))",
+    r"|我认为(?:答案)?是?|应?(?:该)?选(?:择|项)?(?:是"
+    r"|为)?)[ \t*_`:]{0,6}(?=(?P<value>[^\n]{1,80}))",
     re.IGNORECASE,
 )
 IS_RIGHT = re.compile(
@@ -78,19 +79,23 @@ ORDER = re.compile(
     re.IGNORECASE,
 )
 SO = re.compile(
-    r"(?:(?:^|[.;,:]\s|\s[\u2013\u2014]\s)(?:and )?(?:so|therefore|thus|hence|but then|also|daher|donc)\b,?"
+    r"(?:(?:^|[.;,:]\s|\s[\u2013\u2014]\s)(?:and )?(?:so|therefore|thus|hence|but then|also|daher"
+    r"|donc)\b,?"
     r"|\bnot\b[^.;,\n]{1,60}\bbut\b)\s(?=(?P<value>[^\n.;]{1,120}))",
     re.IGNORECASE,
 )
 """Behind this stands what follows from the rest of a sentence."""
 COUNTED = re.compile(
-    r"(?:\b(?:I count|(?:in|a) total(?: of|:| is)|total(?: number)?(?: of \w{1,12})?(?::| is)|which (?:gives|makes)|gives))"
-    r"\s{1,2}(?P<a>\d{1,3})\b(?!\s?[+*x×/.\-]\s?\d)|(?<![+*/.\d] )\b(?P<b>\d{1,3})(?:\s\w{1,12}){0,2}\s(?:in total|altogether|overall)\b",
+    r"(?:\b(?:I count|(?:in|a) total(?: of|:| is)|total(?: number)?(?: of \w{1,12})?(?::| is)"
+    r"|which (?:gives|makes)|gives))"
+    r"\s{1,2}(?P<a>\d{1,3})\b(?!\s?[+*x×/.\-]\s?\d)"
+    r"|(?<![+*/.\d] )\b(?P<b>\d{1,3})(?:\s\w{1,12}){0,2}\s(?:in total|altogether|overall)\b",
     re.IGNORECASE,
 )
 """How many there are in all."""
 CONCLUDED = re.compile(
-    r"\b(?i:(?:it|this|that|which|what(?: is)? left|what remains|answer|option|choice|picture|image|place)"
+    r"\b(?i:(?:it|this|that|which|what(?: is)? left|what remains|answer|option|choice|picture"
+    r"|image|place)"
     r"(?: must be| has to be| should be| is|['\u2019]s| leaves| matches| corresponds to)"
     r"(?: (?:the |with )?(?:option|picture|image|choice|place))?"
     r"|(?:so|therefore|thus|hence|also|daher|donc|alors|entonces)[:,]?)[ *_`]{0,4}"

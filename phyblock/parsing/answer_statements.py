@@ -28,6 +28,10 @@ class Stated:
 
 
 _SENTENCE_CHARS = 240
+_AFTERTHOUGHT = re.compile(
+    r"\b(?i:on second thought|wait|correction|oops|scratch that)\b[^\n]{0,40}?\b(?P<letter>[B-Z])\b"
+)
+_PART_OF_LINE = re.compile(r"\u2192|=>|;|\.\s")
 _ASKS = re.compile(r"[^.!?。！\n]{1,120}[?？]")  # noqa: RUF001
 _REVISION_CHARS = 4000
 _MOST_STATEMENTS = 100
@@ -73,12 +77,16 @@ def forward(text: str, stated: Stated) -> Stated:
     line = text[
         max(text.rfind("\n", 0, stated.start) + 1, stated.end - _SENTENCE_CHARS) : stated.end
     ]
+    line = _PART_OF_LINE.split(line)[-1]
     return replace(stated, letters=stated.letters[::-1]) if BACKWARD.search(line) else stated
 
 
 def turned(text: str, stated: Sequence[Stated], reader: Reader) -> str | None:
     """What statements come to, unless the text turns to another option behind the last of them."""
     settled = settle(text, stated)
+    after = _AFTERTHOUGHT.search(text, stated[-1].end) if stated else None
+    if settled and after and after["letter"] != settled and len(settled) == 1:
+        return CONTRADICTION
     turn = TURNED.search(text, stated[-1].end) if stated else None
     if not settled or turn is None or turn["value"].upper() in ("", settled):
         return settled

@@ -29,7 +29,9 @@ _LEAD = re.compile(
     rf"|(?:la\s|a\s)?(?:选项|选|選択肢|вариант|opción|opção)\s{{0,3}})",
     re.IGNORECASE,
 )
-_LETTER = re.compile(r"(?P<open>[(\[<{]{0,2})\s?(?P<letter>[A-Za-z])(?![A-Za-z0-9\-]|['\u2019][a-z])")
+_LETTER = re.compile(
+    r"(?P<open>[(\[<{]{0,2})\s?(?P<letter>[A-Za-z])(?![A-Za-z0-9\-]|['\u2019][a-z])"
+)
 _CLOSERS = re.compile(r"[\s)\]}>.:,;!。\uff0e、]*")
 _ALSO = re.compile(
     r"[\s)\]}.]{0,4}(?:(?:,|/|&|\+|\bor\b|\band\b|\bund\b|\boder\b|\bou\b|\bo\b|\by\b|或|和|、)"

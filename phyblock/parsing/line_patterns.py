@@ -45,7 +45,9 @@ STEP = re.compile(
 NUMBERED = re.compile(
     r"[\s>+\-#({|•·]{0,8}(?P<number>\d{1,3})(?:st|nd|rd|th)?(?:[-\u2013](?P<last>\d{1,3}))?\s?(?:[.):、](?!\d)|\)\.?)\s{0,4}(?=\D|\d)"
 )
-MARKED = re.compile(r"\s{0,40}(?:[-+•·▪–]|>)\s{1,4}(?=\S)|\s{0,40}(?:[a-h][.)]|\d{1,2}(?:\.\d{1,2}){1,2}[.):]?)\s")
+MARKED = re.compile(
+    r"\s{0,40}(?:[-+•·▪–]|>)\s{1,4}(?=\S)|\s{0,40}(?:[a-h][.)]|\d{1,2}(?:\.\d{1,2}){1,2}[.):]?)\s"
+)
 STARTS_MOVING = re.compile(
     rf"[\s>\[{{(]{{0,12}}(?:(?:first|then|next|finally|now|please|und|dann|zuerst),?\s)?(?:robot\.)?(?:{VERB})",
     re.I,

@@ -163,7 +163,7 @@ class _Reader:
         body = line[head.end() :].replace("{", " ").replace("}", " ")
         current: Listing | None = getattr(self, name)
         if name == "_steps" and not head["sign"] and body.strip():
-            is_next = n == 1 or current is None or n > max(current.own, default=0)
+            is_next = current is None or n > max(current.own, default=0)
             if not (is_next and _is_move(body)):
                 return False
         if current is None or not 0 < n - (current.own[-1] if current.own else 0) <= 3:

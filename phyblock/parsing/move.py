@@ -65,7 +65,7 @@ def _named(pattern: str, name: str) -> str:
 
 _LABEL = (
     r"(?:(?:my|the|your|final|next|chosen|selected|single)\s{1,3}){0,3}"
-    r"(?:plan|step(?:\s{0,2}#?[0-9]{1,3})?|answer|action|operation|move|output|decision|choice)"
+    r"(?:plan|step(?:\s{0,2}#?[0-9]{1,3})?|answer|action|operation|move|output|decision|choice|attempt|next|correction)"
     r"\s{0,3}(?:is|:|=|->|\u2192)\s{0,3}"
 )
 _OPERATION = rf"(?:{_named(_CALL, 'call')}|{_named(_PHRASE, 'phrase')}|(?P<done>{_DONE}))"
@@ -84,6 +84,7 @@ _NOT_MEANT = re.compile(
     re.IGNORECASE,
 )
 """What stands before an operation in its clause that is not the one to do now."""
+_ASKED = re.compile(r"[^.!?;\n]{0,80}\?")
 _MANY = re.compile(
     r"(?<!\w)move\s{0,3}[(\[]\s{0,9}(?P<list>[0-9]{1,6}"
     r"(?:\s{0,3}(?:[,;/&]|and|or)\s{0,3}[0-9]{1,6}){1,31})(?![0-9])",
@@ -94,7 +95,9 @@ _DONE_SENTENCE = re.compile(
     re.IGNORECASE,
 )
 _CHOSEN = re.compile(r"\b(?:choose|select|pick|wähle|elijo|choisis)\b|选择?", re.IGNORECASE)
-_BARE = re.compile(rf"(?:{_LABEL})?(?:(?:candidate|block)\s)?[#(\[]?{_INTEGER}[)\].]?", re.IGNORECASE)
+_BARE = re.compile(
+    rf"(?:{_LABEL})?(?:(?:candidate|block)\s)?[#(\[]?{_INTEGER}[)\].]?", re.IGNORECASE
+)
 _OBJECT = re.compile(r"\{[^{}]{0,600}\}")
 _FENCE = re.compile(r"(?:`{3,}|~{3,})\s{0,3}[\w+-]{0,16}")
 _MARKUP = re.compile(r"</?(?:final_)?answer>|[*`_~]{1,3}|\\boxed\{|[{}]")
@@ -102,7 +105,17 @@ _EDGES = " \t\r\f\v>#-*+\u2022|\"'"
 _INDEX_KEYS = ("index", "block_index", "id", "block_id", "block", "candidate", "number")
 _INDEX_ALONE = _INDEX_KEYS[:4]
 """Keys that are enough without an action."""
-_ACTION_KEYS = ("action", "operation", "next_plan", "next plan", "plan", "answer", "move", "step", "op")
+_ACTION_KEYS = (
+    "action",
+    "operation",
+    "next_plan",
+    "next plan",
+    "plan",
+    "answer",
+    "move",
+    "step",
+    "op",
+)
 
 
 def parse_move(text: str) -> ParsedMove:
@@ -201,9 +214,10 @@ def _labeled(_: str, lines: list[str]) -> list[_Operation]:
         for match in _LABELED.finditer(line):
             if _NOT_MEANT.search(line[: match.start()]):
                 continue
-            found.append(_operation(match))
-            while match and (match := _MORE.match(line, match.end())):
-                found.append(_operation(match))
+            more: re.Match[str] | None = match
+            while more is not None:
+                found.append(_operation(more))
+                more = _MORE.match(line, more.end())
     return found
 
 
@@ -211,7 +225,7 @@ def _mentions(line: str) -> list[_Operation]:
     found = [
         _operation(match)
         for match in _MENTION.finditer(line)
-        if not _NOT_MEANT.search(line[: match.start()])
+        if not _NOT_MEANT.search(line[: match.start()]) and not _ASKED.match(line, match.end())
     ]
     for many in _MANY.finditer(line):
         found += [int(digits) for digits in re.findall("[0-9]+", many["list"])]
@@ -237,6 +251,8 @@ def _moved(line: str) -> list[int]:
     if _MENTION.search(line) and not _mentions(line):
         return []
     statement = read_statement(line.replace("_", " "), is_item=False)
+    if statement.loose - {*statement.numbers}:
+        return []
     return list(statement.numbers) if statement.has_verb or _CHOSEN.search(line) else []
 
 

@@ -41,7 +41,14 @@ from phyblock.words import PlanParser
 __all__ = ["PLAN_PROBLEMS", "ParsedPlan", "PlanProblem", "kept_plan", "parse_plan"]
 
 PlanProblem = Literal[
-    "empty", "thoughts_only", "refusal", "catalogue", "two_plans", "ambiguous", "no_plan", FormProblem
+    "empty",
+    "thoughts_only",
+    "refusal",
+    "catalogue",
+    "two_plans",
+    "ambiguous",
+    "no_plan",
+    FormProblem,
 ]
 PLAN_PROBLEMS: tuple[PlanProblem, ...] = get_args(PlanProblem)
 
@@ -118,6 +125,7 @@ class _Plan:
     title: str
     option: str = ""
     explained: bool = False
+    is_unclear: bool = False
     below: list[str] = field(default_factory=list)
 
     @property
@@ -152,7 +160,7 @@ def _choose(answer: str) -> _Read:
     if is_cut_off:
         after = after[:-1]
     before = found[: found.index(plan.lists[0])]
-    if is_doubtful(plan.lists, plan.below, before, after):
+    if plan.is_unclear or is_doubtful(plan.lists, plan.below, before, after):
         return "ambiguous"
     form = plan.lists[-1].form
     numbers = plan.numbers * (2 if any(map(AGAIN.search, below)) else 1)
@@ -178,7 +186,7 @@ def _plans(named: list[Listing], ranks: list[int], best: int, found: list[Listin
             plans[-1].explained = True
         elif relation != "skip":
             name = option["name"].lower() if option else ("or" if relation == "option" else "")
-            plans.append(_Plan([listing], title, name))
+            plans.append(_Plan([listing], title, name, is_unclear=relation == "unclear"))
         passed = []
     return plans
 
@@ -203,7 +211,8 @@ def _relation(passed: list[str], plans: list[_Plan], listing: Listing) -> str:
         return "explanation"
     part = PART.search(title) if title else before.numbers != listing.numbers
     if not (part and before.ends_named):
-        return "other"
+        is_other = before.form == listing.form != "steps" and before.numbers != listing.numbers
+        return "unclear" if title and is_other else "other"
     return "skip" if plans[-1].explained else "part"
 
 

@@ -5,6 +5,8 @@ whether a reading stands: a block that an item names and that is neither moved n
 correction beside the list, a list without its beginning, another list after it that says otherwise.
 """
 
+# ruff: noqa: RUF001 -- replies come in other scripts
+
 from __future__ import annotations
 
 import re
@@ -13,22 +15,32 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from phyblock.parsing.listing import Listing
-from phyblock.parsing.plan_patterns import EXPLANATION, REVISION
+from phyblock.parsing.plan_patterns import (
+    CATALOGUE_WORD,
+    EXPLANATION,
+    NOT_MEANT,
+    REVISION,
+)
 from phyblock.parsing.plan_rank import LAST, NO, rank_of
 from phyblock.parsing.statement import named_blocks
 
 __all__ = ["is_doubtful"]
 
 _CORRECTS = re.compile(
-    r"\b(?:wait|correction|corrected|oops|scratch that|(?:should|must|has to|needs to) be|should (?:have been|read)|i meant"
+    r"\b(?:wait|correction|corrected|oops|scratch that|(?:should|must|has to|needs to) be"
+    r"|should (?:have been|read)|i meant"
     r"|swap(?:ped)?|my mistake|moment|korrektur|sondern|muss|corrección|korrigier\w*)\b"
     r"|\b(?:actually|no|rather)\b[,:]|等等|应该是|更正|改为|訂正|正しくは",
     re.IGNORECASE,
 )
+_DROPS = re.compile(
+    r"\b(?:forget|scrap|disregard|vergiss)\s(?:the|that|this|it|what|d\w\w)\b", re.IGNORECASE
+)
 _NUMBER = re.compile(r"\d")
 _SENTENCE = re.compile(r"[.;!?](?=\s|\Z)|[。；！？]")
 _ASIDE = re.compile(
-    r"\b(?:not?|never|none|un\w+|distract\w*|decoy\w*|similar|alternativ\w*|could|would|might|may|if|other"
+    r"\b(?:not?|never|none|un\w+|distract\w*|decoy\w*|similar|alternativ\w*|could|would|might|may|if"
+    r"|other"
     r"|left|remaining|example|extra|nicht|kein\w*|ähnlich\w*|autres?|otros?|no)\b|n['\u2019]t\b|不|未|没",
     re.IGNORECASE,
 )
@@ -36,11 +48,13 @@ _ASIDE = re.compile(
 _LOOSE_FORMS = ("labeled", "chain", "numbers", "sentences", "marked")
 _WHOLE = re.compile(r"(?<![\d.])\d{1,6}(?![\d]|\.\d)")
 _ROLE = re.compile(
-    r"\b(?:steps?|layers?|levels?|rows?|col(?:umn)?s?|schritte?|ebene|schicht|plan|option|attempt|structure|part|phase|stage)[ #_]?\d+"
+    r"\b(?:steps?|layers?|levels?|rows?|col(?:umn)?s?|schritte?|ebene|schicht|plan|option|attempt"
+    r"|structure|part|phase|stage)[ #_]?\d+"
     r"|\d+(?:\.\d+)?\s?(?:%|°|cm|mm|m\b|percent|degrees?|[x×](?![a-z])|times|mal\b)|[x×]\s?\d+"
     r"|\(\s?-?\d+(?:\.\d+)?(?:\s?,\s?-?\d+(?:\.\d+)?){1,2}\s?\)|\d+(?:st|nd|rd|th)\b"
     r"|第\d+[层步]|\d+\s?[个块层步]|^\W*[a-z]{0,4}\d{1,3}(?:/\d{1,3})?\s?[.):-]\s|#\s\d{1,3}$"
-    r"|(?<!block )(?<!index )\b\d+\s(?:\w+\s)?(?:blocks?|layers?|levels?|steps?|moves?|pieces?|pillars?|copies|rows?|sides?)\b"
+    r"|(?<!block )(?<!index )\b\d+\s(?:\w+\s)?(?:blocks?|layers?|levels?|steps?|moves?|pieces?"
+    r"|pillars?|copies|rows?|sides?)\b"
     r"|\d+\s(?:more|further|other)\b",
     re.IGNORECASE | re.MULTILINE,
 )
@@ -54,6 +68,12 @@ _STEP_AGAIN = re.compile(
     re.IGNORECASE,
 )
 """A step named again, to take it back."""
+_TOTAL = re.compile(
+    r"\b(?:total(?: number)?(?: of)?|number of) ?(?:blocks?|steps?"
+    r"|moves?)?(?: used)?\W{1,4}(\d{1,2})\b(?! (?:layers|levels|kinds|types|colou?rs))",
+    re.IGNORECASE,
+)
+"""A count of the steps, said behind them."""
 _FRAGMENT = 3
 """Steps of a list that may go on from what stands there already."""
 _MOST_LEFT_OUT = 4
@@ -70,49 +90,75 @@ def is_doubtful(
 
     What says so stands in them, in the lines `below`, or in the lists `before` and `later`.
     """
-    numbers = {number for listing in lists for number in listing.numbers}
-    if any(listing.loose for listing in lists):
-        return True
-    n_steps = sum(len(listing.numbers) for listing in lists)
-    is_whole = n_steps > _FRAGMENT or lists[0].form == "sentences"
-    if is_whole and any(listing.supports - numbers for listing in lists):
-        return True
-    if any(listing.form in _LOOSE_FORMS and _leaves_numbers(listing) for listing in lists):
-        return True
-    if rank_of(lists[0]) == LAST and any(_is_beside(listing, lists[0]) for listing in before[-1:]):
-        return True
+    return (
+        _names_more(lists)
+        or _is_torn(lists)
+        or (rank_of(lists[0]) == LAST and any(_is_beside(b, lists[0]) for b in before[-1:]))
+        or _is_contradicted(lists, below, later)
+    )
+
+
+def _numbers(lists: Sequence[Listing]) -> list[int]:
+    return [number for listing in lists for number in listing.numbers]
+
+
+def _names_more(lists: Sequence[Listing]) -> bool:
+    """Whether items name blocks that are neither moved nor carry others."""
+    numbers = _numbers(lists)
+    is_whole = len(numbers) > _FRAGMENT or lists[0].form == "sentences"
+    return any(
+        listing.loose
+        or (is_whole and listing.supports - {*numbers})
+        or (listing.form in _LOOSE_FORMS and _leaves_numbers(listing))
+        for listing in lists
+    )
+
+
+def _is_torn(lists: Sequence[Listing]) -> bool:
+    """Whether steps are lacking before or within a list, or stand there twice."""
     own = lists[0].own
-    if own and 1 < own[0] <= _MOST_LEFT_OUT:
+    return (
+        bool(own and 1 < own[0] <= _MOST_LEFT_OUT)
+        or any(1 < b.own[0] <= a.own[-1] for a, b in pairwise(lists) if a.own and b.own)
+        or any(not re.search(r"\w", line) for listing in lists for line in listing.between)
+    )
+
+
+def _is_contradicted(
+    lists: Sequence[Listing], below: Sequence[str], later: Sequence[Listing]
+) -> bool:
+    """Whether lines and lists beside or behind the plan say otherwise."""
+    order = _numbers(lists)
+    known = {*order}
+    if any(int(total[1]) != len(order) for total in _TOTAL.finditer("\n".join(below))):
         return True
-    if any(1 < b.own[0] <= a.own[-1] for a, b in pairwise(lists) if a.own and b.own):
-        return True
-    if any(not re.search(r"\w", line) for listing in lists for line in listing.between):
-        return True  # An ellipsis stands for steps.
     beside = [line for listing in lists for line in listing.between]
-    for listing in later:
-        beside += listing.above
-    return _is_corrected([*beside, *below], numbers) or any(
-        _says_otherwise(listing, numbers) for listing in _unexplained(later)
+    beside += [line for listing in later for line in listing.above]
+    after = list(_unexplained(later))
+    for listing in after:
+        if listing.form == "labeled" and not _ASIDE.search(listing.label):
+            beside += listing.lines
+    return _is_corrected([*beside, *below], known) or any(
+        _says_otherwise(listing, order, known) for listing in after
     )
 
 
 def _is_beside(before: Listing, listing: Listing) -> bool:
     """Whether labels of one kind stand line by line, of which one alone was taken."""
     is_next = listing.first_line - before.last_line <= 1
-    return before.form == listing.form == "labeled" and is_next and not REVISION.search(listing.label)
+    return (
+        before.form == listing.form == "labeled" and is_next and not REVISION.search(listing.label)
+    )
 
 
 def _leaves_numbers(listing: Listing) -> bool:
-    """Whether the lines of a list hold numbers that are no blocks of it and nothing else, either."""
+    """Whether the lines of a list hold numbers that are none of its blocks and nothing else."""
     text = _BRACKETS.sub(_unless_aside, "\n".join(listing.lines))
     found = list(map(int, _WHOLE.findall(_ROLE.sub(" ", text))))
     if found in (listing.numbers * 2, [*listing.numbers, *listing.numbers[::-1]]):
         return False
-    said = Counter(found)
-    return any(
-        number not in listing.supports | listing.denied and n > listing.numbers.count(number)
-        for number, n in said.items()
-    )
+    left = Counter(found) - Counter(listing.numbers)
+    return bool({*left} - listing.supports - listing.denied)
 
 
 def _unless_aside(brackets: re.Match[str]) -> str:
@@ -124,7 +170,7 @@ def _is_corrected(lines: Sequence[str], numbers: set[int]) -> bool:
     is_explained = False
     for line in lines:
         is_explained = is_explained or bool(EXPLANATION.search(line))
-        if _CORRECTS.search(line) and _NUMBER.search(line):
+        if (_CORRECTS.search(line) and _NUMBER.search(line)) or _DROPS.search(line):
             return True
         again = _STEP_AGAIN.search(line)
         if again and (again["then"] or not again[0].lower().startswith("step")):
@@ -143,6 +189,16 @@ def _unexplained(later: Sequence[Listing]) -> Iterator[Listing]:
         yield listing
 
 
-def _says_otherwise(listing: Listing, numbers: set[int]) -> bool:
+def _says_otherwise(listing: Listing, order: list[int], known: set[int]) -> bool:
+    """Whether a later list names further blocks, or the same in another order."""
+    is_as_long = len(listing.numbers) == len(order)
+    if is_as_long and sorted(listing.numbers) == sorted(order) and not _is_no_plan(listing.label):
+        return listing.numbers not in (order, sorted(order))
+    if listing.form == "steps" and rank_of(listing) > NO:
+        return listing.numbers != order
     is_plan = rank_of(listing) > (NO if listing.n_moves else LAST)
-    return is_plan and bool({*listing.numbers} - numbers)
+    return is_plan and bool({*listing.numbers} - known)
+
+
+def _is_no_plan(label: str) -> bool:
+    return bool(CATALOGUE_WORD.search(label) or NOT_MEANT.search(f"{label}:"))

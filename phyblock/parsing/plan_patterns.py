@@ -101,7 +101,7 @@ ORDINALS = {"first": 0, "former": 0, "second": 1, "latter": 1}
 """Which of two options a choice by place takes."""
 REVISION = re.compile(
     r"final|correct|revis|updat|actual|summar|complete|overall|optimi|improv|korrigier|attempt|error|mistake|oops"
-    r"|\btry\b|new plan"
+    r"|\btry\b|new plan|second thought|reconsider|on reflection"
     r"|\b(?:instead|answer|again|better|so|thus|therefore|wait|output)\b",
     re.IGNORECASE,
 )
@@ -128,7 +128,8 @@ SUPPOSED = re.compile(
     re.IGNORECASE,
 )
 SUPPOSED_SENTENCE = re.compile(
-    r"\b(?:if|unless|could|might|let me know|falls|wenn|könnte|si|peut|podría)\b|如果|可以", re.IGNORECASE
+    r"\b(?:if|unless|could|might|let me know|falls|wenn|könnte|si|peut|podría)\b|如果|可以",
+    re.IGNORECASE,
 )
 AGAIN = re.compile(
     r"\brepeat (?:the |this |these )?(?:above |same |whole )?(?:assembly |building )?(?:order|steps"
@@ -142,7 +143,8 @@ NOT_REVERSED = re.compile(
     re.IGNORECASE,
 )
 DOWNWARD = re.compile(
-    r"top[- ](?:to|down)[- ]?(?:bottom)?\b|\b(?:from|at) the top\W*\Z|von oben nach unten|从上到下|de haut en bas"
+    r"top[- ](?:to|down)[- ]?(?:bottom)?\b|\b(?:from|at) the top\W*\Z|von oben nach unten"
+    r"|从上到下|de haut en bas"
     r"|de arriba (?:a"
     r"|hacia) abajo",
     re.IGNORECASE,

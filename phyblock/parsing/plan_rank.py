@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from phyblock.parsing.line_patterns import LAYER
 from phyblock.parsing.listing import Listing
 from phyblock.parsing.plan_patterns import (
     BLOCK_WORD,
@@ -74,7 +75,11 @@ def _rank_of_label(listing: Listing, heading: str, *, is_catalogue: bool) -> int
         or (PLAN_WORD.search(heading) and not is_catalogue)
     ):
         return MARKED if many else NO
+    parts = label.split(", ")
     is_short = len(label) < LABEL_CHARS and not BLOCK_WORD.search(label)
+    is_layer = [bool(LAYER.search(part) or LAYERS.match(part)) for part in parts]
+    if len(parts) > 1 and not all(is_layer) and "[" not in label:
+        return NO
     return LAST if many and not is_catalogue and (is_short or LAYERS.match(label)) else NO
 
 

@@ -93,7 +93,8 @@ _MENTION = re.compile(
     rf"|(?P<then>{_NEXT}\s?#?)(?P<next>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})"
     r"(?=\s{0,3}(?:\Z|[.,;:()，。；\u2014\u2013]|(?:on|onto|at|next|and|then|in|beside|over|above|as|goes)\b))"
     r"|(?:(?<=\()#?(?=[0-9][^()]{0,40}\))|(?<!\w)#)(?P<bare>[0-9]{1,6}(?:(?:, ?|\s?&\s?|/| or "
-    r"|,? and | und |、)[0-9]{1,6}){0,8})(?=\s?(?:[,;:)/\]×→]|\Z)|\sx\s?\d|(?<=#\d)(?!\w)|(?<=#\d\d)(?!\w))(?!\.[0-9])"
+    r"|,? and | und |、)[0-9]{1,6}){0,8})(?=\s?(?:[,;:)/\]×→]|\Z)|\sx\s?\d|(?<=#\d)(?!\w)"
+    r"|(?<=#\d\d)(?!\w))(?!\.[0-9])"
     r"|(?P<cjk>[0-9]{1,6}(?:(?:、|,|和|-|至|到)[0-9]{1,6}){0,20})(?=\s?(?:号|號|番))",
     re.IGNORECASE,
 )
@@ -102,13 +103,15 @@ _TIMES = re.compile(
     r"[x×]\s?(?P<a>\d{1,2})(?!\d)|(?P<b>\d{1,2})\s?(?:[x×](?!\w)"
     r"|of (?:them|these)\b|copies\b|pieces\b"
     r"|times\b|mal\b|fois\b|veces\b|次)"
-    r"|(?P<twice>twice|zweimal|deux fois|dos veces|两次|二次)|(?P<thrice>thrice|dreimal|三次)|[号號番]?(?P<cjk>[两二三四五六])[个块個塊]"
+    r"|(?P<twice>twice|zweimal|deux fois|dos veces|两次|二次)|(?P<thrice>thrice|dreimal|三次)"
+    r"|[号號番]?(?P<cjk>[两二三四五六])[个块個塊]"
     r"|(?P<word>[^\W\d_]{2,8})\s(?:times|mal|fois|veces)\b"
     rf"|(?:(?P<each>\d{{1,2}})|(?P<each_word>one|two|eine[rn]?|zwei))\s(?:\w{{2,8}}\s)?{_EACH})",
     re.IGNORECASE,
 )
 _SO_MANY = re.compile(
-    r"(?:(?P<twice>\b(?:twice|zweimal|deux fois|dos veces)\s|两次)|(?P<n>\d{1,2})\s?(?:[x×]|times|mal|个|块)\s{0,2}|(?P<cjk_word>[二两三四五六])(?:个|块)"
+    r"(?:(?P<twice>\b(?:twice|zweimal|deux fois|dos veces)\s|两次)|(?P<n>\d{1,2})\s?(?:[x×]|times"
+    r"|mal|个|块)\s{0,2}|(?P<cjk_word>[二两三四五六])(?:个|块)"
     r"|\b(?P<word>two|three|four|five|six|zwei|drei|vier|deux|trois"
     r"|dos|tres)"
     r"\s(?:\w{2,12}\s){0,3}?)\(?\Z",
@@ -132,11 +135,13 @@ _SUPPORT = re.compile(
     r"|connect\w{0,3}"
     r"|bridg\w{1,3}|span(?:s|ning)?|across|alongside|to|toward|(?:align\w{0,3}|flush|level|contact"
     r"|parallel) with"
-    r"|instead of|rather than|not|never|don't|without|except|like|as with|same as|before|after|once(?! ?[,;]| and)"
+    r"|instead of|rather than|not|never|don't|without|except|like|as with|same as|before|after"
+    r"|once(?! ?[,;]| and)"
     r"|until|when|if"
     r"|since|because|while|so that|auf|über|unter|neben|zwischen|hinter|vor|statt|nicht|ohne"
     r"|kein\w{0,2}|sobre"
-    r"|encima del?|sur|dessus d\w|à côté d\w|entre|debajo de|sopra|accanto|su(?! lado| izq| der)|на|над|рядом с|не)\b"
+    r"|encima del?|sur|dessus d\w|à côté d\w|entre|debajo de|sopra|accanto|su(?! lado| izq| der)"
+    r"|на|над|рядом с|не)\b"
     r"|在|到|于|不要?|上的|の上)"
     rf"(?:[\s(,]{{0,3}}(?!{VERB}|(?:it|them)\b)[^\W\d]{{1,16}}){{0,7}}[\s(#]{{0,3}}\Z",
     re.IGNORECASE,
@@ -264,15 +269,12 @@ def _read(text: str, is_item: bool) -> Statement:
             rest.loose.update({*found} - {*bare})
         else:
             bare = tuple(found)
-    beside = {
-        "loose": frozenset(rest.loose),
-        "supports": frozenset(rest.supports),
-        "denied": frozenset(rest.denied),
-    }
+    beside = (frozenset(rest.loose), frozenset(rest.supports), frozenset(rest.denied))
     if moved:
-        return Statement(tuple(moved), True, not {*bare} <= {*moved}, **beside)
+        return Statement(tuple(moved), True, not {*bare} <= {*moved}, *beside)
     whole = _IS_WHOLE.match(text) if is_item else None
-    return Statement(tuple(_counted(whole, text, "s")) if whole else bare, **beside)
+    named = tuple(_counted(whole, text, "s")) if whole else bare
+    return Statement(named, False, False, *beside)
 
 
 def chain(text: str) -> tuple[tuple[int, ...], bool]:
