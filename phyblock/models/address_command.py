@@ -15,6 +15,7 @@ from typing import IO
 from phyblock.errors import Problem, SpecError, said
 from phyblock.models.address_file import LARGEST_BYTES, addresses_in
 from phyblock.models.events import Tell
+from phyblock.models.keys import environment_secrets, hidden
 from phyblock.models.limits import Clock
 from phyblock.plain_text import one_line
 
@@ -85,10 +86,12 @@ class _Runs:
                 process.wait()
                 self._process = None
         if code != 0:
-            words = one_line(complaint.decode("utf-8", "replace").strip())[-_LONGEST_SAID:]
+            said_by_it = hidden(complaint.decode("utf-8", "replace"), environment_secrets())
+            words = one_line(said_by_it.strip())[-_LONGEST_SAID:]
             raise ValueError(f"ends with code {code}" + (f": {words}" if words else ""))
         try:
-            return printed.decode("utf-8")
+            # It has all keys of the environment at hand, and what it prints stands in messages.
+            return hidden(printed.decode("utf-8"), environment_secrets(), guess=False)
         except UnicodeDecodeError:
             raise ValueError("prints what is no UTF-8") from None
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from phyblock.addresses import address_fault
@@ -16,6 +17,7 @@ __all__ = [
     "KeyStatus",
     "api_key",
     "api_key_status",
+    "environment_secrets",
     "hidden",
     "secrets_of",
     "server_address",
@@ -128,6 +130,7 @@ _SECRET_VARIABLES: Mapping[str, tuple[str, ...]] = {
 """Variables beside those of the key in which litellm looks for what it signs in with."""
 
 _PLACEHOLDER = "no-key"
+_CALLED_SECRET = re.compile("KEY|TOKEN|SECRET|PASSW|CREDENTIAL", re.IGNORECASE)
 _SHORTEST_SECRET = 4
 _PLACEHOLDERS = (_PLACEHOLDER, "empty", "none", "null", "dummy", "test")
 """What people write where a server needs no key, in lower case: no secrets."""
@@ -203,6 +206,18 @@ def secrets_of(config: ModelConfig) -> tuple[str, ...]:
     text would ruin the text and hide nothing.
     """
     variables = (*_variables(config), *_SECRET_VARIABLES.get(config.provider, ()))
+    return _secret_values(variables)
+
+
+def environment_secrets() -> tuple[str, ...]:
+    """Values of all variables that are called keys, tokens, secrets, passwords or credentials.
+
+    Programs of the user's that are started here have all of them, whichever model they are for.
+    """
+    return _secret_values(name for name in os.environ if _CALLED_SECRET.search(name))
+
+
+def _secret_values(variables: Iterable[str]) -> tuple[str, ...]:
     values = {os.environ.get(name, "").strip() for name in variables}
     return tuple(
         sorted(

@@ -74,7 +74,10 @@ _AND = (
     r"\s{0,3}"
 )
 _LINK = rf"(?:{_OR}|{_TO}|{_AND})#?"
-_GROUP = rf"(?P<first>{_NAMED}|{_WORD_NUMBER})(?P<more>(?:{_LINK}{_DIGITS}|\s(?:and|und|et|y|和)\s{_NAMED}){{0,40}})"
+_GROUP = (
+    rf"(?P<first>{_NAMED}|{_WORD_NUMBER})"
+    rf"(?P<more>(?:{_LINK}{_DIGITS}|\s(?:and|und|et|y|和)\s{_NAMED}){{0,40}})"
+)
 _NEXT = (
     r"(?:\b(?:then|finally|lastly|afterwards|followed by|dann|danach|zuletzt|puis|ensuite|enfin"
     r"|luego|después)\b|然后|接着|最后)"

@@ -31,6 +31,17 @@ BAD = [
 ]
 
 
+@pytest.mark.parametrize("script", ['echo "Bearer $MY_KEY" >&2; exit 2', 'echo "$MY_KEY"'])
+def test_what_it_prints_of_keys_stands_in_no_message(
+    script: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MY_KEY", "a-long-word-of-mine")
+    with pytest.raises(SpecError) as caught:
+        addresses_by(["sh", "-c", script])
+    assert "a-long-word-of-mine" not in str(caught.value)
+    assert "[key]" in str(caught.value)
+
+
 @pytest.mark.parametrize(("words", "message"), BAD, ids=[words[0] for words, _ in BAD])
 def test_what_cannot_be_used_is_said_in_words(words: list[str], message: str) -> None:
     with pytest.raises(SpecError) as caught:
