@@ -69,6 +69,8 @@ def command(ctx: click.Context, models_file: str | None, retiring: bool) -> None
     console.print(
         f"{counted(len(ctx.obj), 'model')} in {shown_path(path)}", soft_wrap=True, markup=False
     )
+    if console.width < _WIDE:
+        console.print(f"Kinds and prices need a window of {_WIDE} columns.", soft_wrap=True)
 
 
 def _by_group(known: dict[str, ModelSpec]) -> Iterator[tuple[str, Sequence[str]]]:
