@@ -113,16 +113,23 @@ def _level(scene: Scene) -> int:
 
 
 def _other(given: GivenScene, scene: Scene) -> list[str]:
-    """Dependencies and layers that were given and are others by contact."""
-    by_order = {block.order: block for block in scene.blocks}
+    """Dependencies and layers that were given and are others by contact.
+
+    Where no block says its `order`, numbers that were given are places in the list.
+    """
+    listed = [one.block(number) for number, one in enumerate(given.blocks, 1)]
+    by_place = {_place(block): block for block in scene.blocks}
+    order_of = {block.order: by_place[_place(block)].order for block in listed}
     told = []
-    for one in given.blocks:
-        if one.order is None:
-            continue
-        block = by_order[one.order]
-        depend = list(block.depend) or [0]
-        if one.depend is not None and one.depend != depend:
-            told.append(f"block {block.order} depends on {depend} by contact, not {one.depend}")
+    for one, block in zip(given.blocks, (by_place[_place(block)] for block in listed), strict=True):
+        depend = sorted(block.depend) or [0]
+        said = None if one.depend is None else sorted(order_of.get(n, n) for n in one.depend)
+        if said is not None and said != depend:
+            told.append(f"block {block.order} depends on {depend} by contact, not {said}")
         if one.layer is not None and one.layer != block.layer:
             told.append(f"block {block.order} is on layer {block.layer}, not {one.layer}")
     return told
+
+
+def _place(block: Block) -> tuple[object, ...]:
+    return block.type, block.color, block.position_m, block.euler_deg

@@ -88,8 +88,11 @@ def test_what_cannot_be_built_is_refused(blocks: list[Any], said: str) -> None:
     assert all(problem.where == "mine.yaml:3:1" for problem in caught.value.problems)
 
 
-def test_what_is_given_and_wrong_is_noted_and_what_is_unusual() -> None:
-    blocks = [{**block, "order": n} for n, block in enumerate(GABLES, 1)]
+@pytest.mark.parametrize("is_numbered", [True, False])
+def test_what_is_given_and_wrong_is_noted_and_what_is_unusual(is_numbered: bool) -> None:
+    blocks = [
+        {**block, **({"order": n} if is_numbered else {})} for n, block in enumerate(GABLES, 1)
+    ]
     blocks[2] |= {"depend": [1], "layer": 3}
     done = complete(ReadScene("mine", of(*blocks, levels=[1]), "here"))
     assert done.scene.levels == (1,)
