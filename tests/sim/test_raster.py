@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -199,10 +199,21 @@ def test_with_even_light_every_pixel_has_the_color_of_what_it_shows(blocks, view
     assert (raster.rgb[raster.prop >= 0] == colors[raster.prop[raster.prop >= 0]]).all()
 
 
+GAP = [
+    Block(1, "cuboid1", "red", (0.5, -0.43359375, 1.1), (0.0, 0.0, 0.0), (), 1),
+    Block(2, "cylinder", "red", (0.25, -0.2421875, 0.5375), (38.0, 0.0, 0.0), (), 1),
+    Block(3, "cuboid1", "red", (-0.5, -0.4375, 0.5375), (73.0, 0.0, 1.0), (), 1),
+]
+
+
 @given(clouds(), views)
+@example(GAP, (0.0, 37.0))
 @settings(max_examples=20, deadline=None)
 def test_half_a_pixel_to_the_side_changes_edges_alone(blocks, view) -> None:
-    """Every pixel that is not at an edge of the whole keeps showing a block, or the ground."""
+    """Every pixel that is not at an edge of a block keeps showing a block, or the ground.
+
+    Between two blocks there may be a gap that is narrower than a pixel, and shows in one alone.
+    """
     props = props_of(blocks)
     camera = camera_on(props, view)
     depth_m = float(np.mean([(p.pose.position_m - camera.eye_m) @ camera.axes[2] for p in props]))
@@ -210,8 +221,8 @@ def test_half_a_pixel_to_the_side_changes_edges_alone(blocks, view) -> None:
     one, other = draw(props, camera), draw(props, replace(camera, eye_m=camera.eye_m + shift_m))
     shown = one.prop >= 0
     near = range(-2, 3)
-    around = np.stack([np.roll(shown, (i, j), (0, 1)) for i in near for j in near])
-    inside = (around == shown).all(axis=0)
+    around = np.stack([np.roll(one.prop, (i, j), (0, 1)) for i in near for j in near])
+    inside = (around == one.prop).all(axis=0)
     assert (shown[inside] == (other.prop >= 0)[inside]).all()
 
 
