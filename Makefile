@@ -13,7 +13,7 @@ FAULTS ?= 510
 KILLS ?= 36
 
 # `make test-pythons`: a part of the tests on the oldest and the newest other Python that is here.
-.PHONY: run test test-all test-pythons fuzz check lock clean
+.PHONY: run test test-all test-pythons fuzz check docs lock clean
 
 $(RUNS): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; \
@@ -49,6 +49,10 @@ check: $(TESTS)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# The documentation site; a broken link is an error.
+docs: $(TESTS)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
+
 LOCK := $(BIN)/uv pip compile pyproject.toml --universal --python-version 3.10 \
 	  --generate-hashes --no-emit-index-url --no-emit-find-links --no-annotate --no-header --quiet
 
@@ -58,4 +62,4 @@ lock: $(TESTS)
 	$(LOCK) --constraint requirements-dev.lock --output-file requirements.lock
 
 clean:
-	rm -rf $(VENV) .venv-* build dist *.egg-info
+	rm -rf $(VENV) .venv-* build dist site *.egg-info
