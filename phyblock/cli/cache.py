@@ -26,7 +26,7 @@ def command() -> None:
 
 @command.command("stats")
 def stats() -> None:
-    """Replies kept, by model, and the size of the file; plans that floors learned."""
+    """Show how many replies are kept of each model, and how large the file is."""
     console = make_console()
     with ReplyCache(reply_cache_file()) as cache:
         found = cache.stats()
@@ -41,25 +41,25 @@ def stats() -> None:
 
 
 @command.command("clear")
-@click.option("--model", metavar="ID", help="Forget the replies of this model id alone.")
+@click.option("--model", metavar="ID", help="Delete the replies of this model id alone.")
 @click.option(
     "--learned",
     is_flag=True,
-    help="Remove what floors learned in place of replies: learning it again costs seconds.",
+    help="Delete what floors learned, not replies; it takes seconds to learn again.",
 )
 @click.option("--yes", is_flag=True, help="Do not ask.")
 def clear(model: str | None, learned: bool, yes: bool) -> None:
-    """Forget replies; they cost money again when they are needed again."""
+    """Delete cached replies; repeated calls will be billed."""
     if learned:
         if model is not None:
-            raise click.UsageError("--learned is of no model: leave --model out")
+            raise click.UsageError("--learned deletes nothing of a model: leave --model out")
         _clear_learned()
         return
     which = f"replies of {model}" if model else "all replies"
     if not yes:
-        click.confirm(f"Forget {which}? Asking again costs money.", abort=True)
+        click.confirm(f"Delete {which}? Repeated calls will be billed.", abort=True)
     with ReplyCache(reply_cache_file()) as cache:
-        make_console().print(f"Forgot {cache.clear(model):,} replies.")
+        make_console().print(f"Deleted {cache.clear(model):,} replies.")
 
 
 def _clear_learned() -> None:
@@ -70,7 +70,7 @@ def _clear_learned() -> None:
         except OSError as error:
             raise InputError(Problem(str(path), f"cannot be removed: {said(error)}")) from error
         removed.append(size)
-    make_console().print(f"Removed {_told(removed)}.")
+    make_console().print(f"Deleted {_told(removed)}.")
 
 
 def _learned() -> dict[Path, int]:
