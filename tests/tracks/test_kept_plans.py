@@ -93,7 +93,7 @@ def test_what_was_learned_is_told_and_removed_by_the_user(
     told = CliRunner().invoke(command, ["stats"])
     assert "2 files of learned plans" in told.output
     assert CliRunner().invoke(command, ["clear", "--learned", "--model", "m"]).exit_code == 2
-    assert "Removed 2 files" in CliRunner().invoke(command, ["clear", "--learned"]).output
+    assert "Deleted 2 files" in CliRunner().invoke(command, ["clear", "--learned"]).output
     assert files(tmp_path) == [mine]
     assert "learned plans" not in CliRunner().invoke(command, ["stats"]).output
     kept_plans(SCENES, SETS, "A")
