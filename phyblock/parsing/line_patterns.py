@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 
-from phyblock.parsing.statement import VERB
+from phyblock.parsing.mention import VERB
 
 __all__ = [
     "ARRAY",

@@ -9,6 +9,7 @@ import re
 from bisect import bisect_left
 from dataclasses import dataclass, field
 
+from phyblock.parsing.chain import chain
 from phyblock.parsing.line_patterns import (
     ARRAY,
     FENCE,
@@ -24,6 +25,7 @@ from phyblock.parsing.line_patterns import (
     STEP,
     TAG,
 )
+from phyblock.parsing.mention import MOST_AT_ONCE
 from phyblock.parsing.plan_patterns import (
     LABEL_CHARS,
     NOT_MEANT,
@@ -33,7 +35,7 @@ from phyblock.parsing.plan_patterns import (
     REVISION,
     SUPPOSED_SENTENCE,
 )
-from phyblock.parsing.statement import MOST_AT_ONCE, chain, read_statement
+from phyblock.parsing.statement import read_statement
 from phyblock.parsing.structured import Found, find_json, find_tables
 from phyblock.parsing.text_forms import plain_line
 

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from phyblock.parsing.listing import Listing
+from phyblock.parsing.mention import named_blocks
 from phyblock.parsing.plan_patterns import (
     CATALOGUE_WORD,
     EXPLANATION,
@@ -22,7 +23,6 @@ from phyblock.parsing.plan_patterns import (
     REVISION,
 )
 from phyblock.parsing.plan_rank import LAST, NO, rank_of
-from phyblock.parsing.statement import named_blocks
 
 __all__ = ["is_doubtful"]
 

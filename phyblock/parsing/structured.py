@@ -8,7 +8,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from phyblock.parsing.statement import MOST_AT_ONCE, chain, read_statement
+from phyblock.parsing.chain import chain
+from phyblock.parsing.mention import MOST_AT_ONCE
+from phyblock.parsing.statement import read_statement
 from phyblock.parsing.text_forms import BACKWARD, plain_line
 
 __all__ = [
