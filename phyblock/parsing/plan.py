@@ -1,7 +1,7 @@
 """Reply text -> Plan, with the rule that matched, or a named failure.
 
 `official` is the released code's rule: every `block with index N` of the whole reply, in order.
-`steps`, the default, finds the lists of a reply (`listing`), joins those that are parts of one
+`steps`, the default, finds the lists of a reply (`reply_lists`), joins those that are parts of one
 plan, and takes the last plan that is complete. It reads nothing where a careful reader would not:
 a catalogue of the candidates, a refusal, thoughts without an answer, two plans and no choice.
 
@@ -17,7 +17,7 @@ from typing import Literal, get_args
 
 from phyblock.domain import Plan
 from phyblock.parsing.answer_form import FormProblem
-from phyblock.parsing.listing import Listing, listings
+from phyblock.parsing.listing import Listing
 from phyblock.parsing.plan_doubt import is_doubtful
 from phyblock.parsing.plan_patterns import (
     AGAIN,
@@ -35,6 +35,7 @@ from phyblock.parsing.plan_patterns import (
     SUPPOSED,
 )
 from phyblock.parsing.plan_rank import LAST, MOVES, rank_of
+from phyblock.parsing.reply_lists import listings
 from phyblock.parsing.text_forms import BACKWARD, answer_of
 from phyblock.words import PlanParser
 

@@ -1,4 +1,4 @@
-"""Lists in a form of their own: JSON, read by its keys, and tables, read by their columns."""
+"""Lists in a form of their own: JSON, read by its keys."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from phyblock.parsing.text_forms import BACKWARD, plain_line
 
 __all__ = [
     "LONGEST_NUMBER",
+    "TIMES_KEY",
     "Fields",
     "Found",
     "find_json",
-    "find_tables",
+    "line_numbers",
     "objects",
     "whole_number",
 ]
@@ -75,7 +76,7 @@ _BLOCK_KEY = re.compile(
 _ACTION_KEY = re.compile(
     r"action|instruction|operation|description|move|text|do|command", re.IGNORECASE
 )
-_TIMES_KEY = re.compile(r"count|times|quantity|qty|repeat|copies|anzahl|数量", re.IGNORECASE)
+TIMES_KEY = re.compile(r"count|times|quantity|qty|repeat|copies|anzahl|数量", re.IGNORECASE)
 _PLACE_KEY = re.compile(
     r"step|order|sequence|layer|level|position_in_order|schritt|步骤", re.IGNORECASE
 )
@@ -170,12 +171,17 @@ def _read(value: Any, *, is_plan: bool) -> list[int]:
     if isinstance(value, list):
         return _items(value)
     if isinstance(value, str):
-        return [number for line in value.splitlines() for number in _line(line)] if is_plan else []
+        return (
+            [number for line in value.splitlines() for number in line_numbers(line)]
+            if is_plan
+            else []
+        )
     number = whole_number(value)
     return [number] if is_plan and number is not None else []
 
 
-def _line(text: str) -> Sequence[int]:
+def line_numbers(text: str) -> Sequence[int]:
+    """The blocks that a line of a value or the cell of a table names."""
     line = plain_line(text)
     return chain(line)[0] or read_statement(line, is_item=True).numbers
 
@@ -280,65 +286,5 @@ def _step(fields: Fields) -> list[int]:
         for key, value in fields:
             if not found and pattern.fullmatch(key.strip()):
                 found = _read(value, is_plan=True)
-    times = next((whole_number(v) for k, v in fields if _TIMES_KEY.fullmatch(k.strip())), None)
+    times = next((whole_number(v) for k, v in fields if TIMES_KEY.fullmatch(k.strip())), None)
     return found * min(times or 1, MOST_AT_ONCE) if len(found) == 1 else found
-
-
-_TABLE = re.compile(
-    r"^[ \t]*\|?[^|\n]*\|[^\n]*\n[ \t]*\|?[ \t:|-]*-[ \t:|-]*\n(?:[^\n]*\|[^\n]*(?:\n|\Z))+",
-    re.MULTILINE,
-)
-_STEP_COLUMN = re.compile(
-    r"step|order|seq|^#$|^no\.?$|^nr\.?$|schritt|reihenfolge|paso|étape|步骤|顺序|序号|手順",
-    re.IGNORECASE,
-)
-_LAYER_COLUMN = re.compile(r"layer|level|ebene|schicht|couche|nivel|层", re.IGNORECASE)
-_BLOCK_COLUMN = re.compile(
-    r"block|ind(?:ex|ice)|idx|candidate|piece|move|action|^id$|baustein|bloc|bloque|aktion|积木|编号|块"
-    r"|ブロック",
-    re.IGNORECASE,
-)
-_TABLE_CHARS = 20_000
-
-
-def find_tables(text: str) -> list[Found]:
-    """The tables of a text; one without a column of steps is a catalogue."""
-    found = []
-    for table in _TABLE.finditer(text) if "|" in text else ():
-        rows = [_cells(line) for line in table[0][:_TABLE_CHARS].strip().splitlines()]
-        found.append(Found(table.start(), table.end(), "table", tuple(_of_rows(rows[0], rows[2:]))))
-    return found
-
-
-def _cells(line: str) -> list[str]:
-    return [plain_line(cell).strip() for cell in line.strip().strip("|").split("|")]
-
-
-def _of_rows(head: list[str], rows: list[list[str]]) -> list[int]:
-    steps = next((i for i, name in enumerate(head) if _STEP_COLUMN.search(name)), None)
-    times = next((i for i, name in enumerate(head) if _TIMES_KEY.fullmatch(name)), None)
-    is_layers = steps is None
-    if steps is None:
-        steps = next((i for i, name in enumerate(head) if _LAYER_COLUMN.search(name)), None)
-    if steps is None:
-        return []
-    columns = [i for i, name in enumerate(head) if i != steps and _BLOCK_COLUMN.search(name)]
-    columns.sort(key=lambda i: not re.search("ind|no|id|编号", head[i], re.IGNORECASE))
-    rows = [row for row in rows if len(row) == len(head)]
-    order = [whole_number(re.sub(r"\D", "", row[steps])) for row in rows]
-    if None not in order and len(set(order)) == len(order):
-        rows = [
-            row for _, row in sorted(zip(order, rows, strict=True), key=lambda pair: pair[0] or 0)
-        ]
-    for column in columns:
-        named = [list(_line(row[column])) for row in rows]
-        if is_layers and max(map(len, named), default=0) < 2:  # It may say how many.
-            continue
-        if rows and all(named):
-            many = [(whole_number(row[times]) if times is not None else None) or 1 for row in rows]
-            return [
-                n
-                for numbers, k in zip(named, many, strict=True)
-                for n in numbers * min(k, MOST_AT_ONCE)
-            ]
-    return []

@@ -1,0 +1,50 @@
+"""Numbers behind a label: "Order: 3, 5, 12", or an array somewhere in a line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from phyblock.parsing.chain import chain
+from phyblock.parsing.line_patterns import ARRAY, LABELED, NOUN_LABEL, SENTENCE_END
+from phyblock.parsing.statement import read_statement
+
+__all__ = ["LabeledNumbers", "labeled_numbers"]
+
+_LABEL_CHARS = 30
+"""A label is shorter, where words stand beside the numbers behind it."""
+
+
+@dataclass(frozen=True)
+class LabeledNumbers:
+    """The numbers of a line, their label, the text that they stand in, and what stands behind."""
+
+    numbers: tuple[int, ...]
+    label: str
+    value: str
+    rest: str
+
+
+def labeled_numbers(line: str) -> LabeledNumbers | None:
+    """The numbers that a line names behind a label, or in an array; None where it names none."""
+    labeled = LABELED.match(line)
+    if labeled and (
+        labeled["label"].count("(") > labeled["label"].count(")")
+        or NOUN_LABEL.fullmatch(labeled["label"])
+    ):
+        labeled = None
+    value, rest = "", ""
+    if labeled:
+        value, _, rest = SENTENCE_END.sub("\n", labeled["value"], count=1).partition("\n")
+        value = value.rstrip(" .}")
+        numbers, _ = chain(value)
+        is_short = len(labeled["label"]) < _LABEL_CHARS
+        if not numbers and is_short and not read_statement(line, is_item=False).has_verb:
+            numbers = read_statement(value, is_item=True).numbers
+        if numbers:
+            return LabeledNumbers(numbers, labeled["label"], value, rest)
+    arrays = list(ARRAY.finditer(line))
+    if not arrays:
+        return None
+    start = arrays[-1].start()
+    numbers, _ = chain(arrays[-1][0])
+    return LabeledNumbers(numbers, line[:start], line[start:], rest)
