@@ -14,6 +14,7 @@ __all__ = [
     "LEVEL1_CRITERIA",
     "MATCHERS",
     "PLAN_PARSERS",
+    "REFUSED_ENDS",
     "SETTINGS",
     "STEP_ENDS",
     "AnswerFormat",
@@ -84,6 +85,8 @@ others. `falls`: it is not. `knocks_over`: others are not where they were. `over
 `under_floor`: it was refused. `no_block`: there is no candidate of its number.
 """
 STEP_ENDS: tuple[StepEnd, ...] = get_args(StepEnd)
+REFUSED_ENDS: tuple[StepEnd, ...] = ("overlaps", "under_floor", "no_block")
+"""Steps after which their block is not there."""
 
 DataFormat = Literal["builtin", "official"]
 """Layouts of data sets and question sets."""

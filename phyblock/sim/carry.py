@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ from phyblock.sim.support import (
 from phyblock.sim.world import World
 from phyblock.words import StepEnd
 
-__all__ = ["Carried", "CarriedStep", "CarryLimits", "carry_out"]
+__all__ = ["Carried", "CarriedStep", "CarryLimits", "Carrying", "carry_out"]
 
 _SETTLE_S, _COLLAPSE_S = 2.0, 3.0
 _TRIES = 16
@@ -95,33 +96,58 @@ def carry_out(
     """
     steps: list[CarriedStep] = []
     worlds: list[tuple[Block, ...]] = []
-    with World(engine=engine) as world:
-        table = _Table(world, limits or CarryLimits())
-        for number, block in enumerate(blocks, 1):
-            put = None if block is None else replace(block, order=number)
-            steps.append(CarriedStep("no_block") if put is None else table.put(put))
-            worlds.append(tuple(table.resting.values()))
+    with Carrying(limits, engine) as carrying:
+        for block in blocks:
+            steps.append(carrying.step(block))
+            worlds.append(carrying.blocks)
     return Carried(tuple(steps), tuple(worlds))
 
 
-class _Table:
-    """Where blocks are put; `resting` is where each came to rest, by the order of its step.
+class Carrying:
+    """A plan that is carried out step by step, as by `carry_out`; a context manager.
 
     Where a step moves no block past the limits by which a state stands (`DEFAULT_TRIAL`), all is
     set back, so that no step is judged by the drift of the ones before it.
     """
 
-    def __init__(self, world: World, limits: CarryLimits) -> None:
-        self.resting: dict[int, Block] = {}
-        self._world, self._limits = world, limits
+    def __init__(
+        self, limits: CarryLimits | None = None, engine: PhysicsEngine | None = None
+    ) -> None:
+        self._limits = limits or CarryLimits()
+        self._world = World(engine=engine)
+        self._resting: dict[int, Block] = {}
+        self._steps = 0
 
-    def put(self, block: Block) -> CarriedStep:
+    def __enter__(self) -> Carrying:
+        self._world.__enter__()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._world.__exit__(kind, error, trace)
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """Where blocks lie now, each with the number of its step as its order."""
+        return tuple(self._resting.values())
+
+    def step(self, block: Block | None) -> CarriedStep:
         """Put a block where it is, if there is room for it, and let it go."""
+        self._steps += 1
+        if block is None:
+            return CarriedStep("no_block")
+        return self._put(replace(block, order=self._steps))
+
+    def _put(self, block: Block) -> CarriedStep:
         depth_cm = -float(bounds_m(block)[0, 2]) * _CM
         if depth_cm > self._limits.overlap_cm:
             return CarriedStep("under_floor", overlap_cm=round(depth_cm, _DIGITS))
         before = self._world.poses()
-        others = tuple(pose.put(self.resting[order]) for order, pose in before.items())
+        others = tuple(pose.put(self._resting[order]) for order, pose in before.items())
         most_m = self._limits.overlap_cm / _CM
         free, given_m = _out_of_others(block, others, most_m)
         if free is None:
@@ -149,14 +175,14 @@ class _Table:
         if not wait(self._world, _SETTLE_S):
             wait(self._world, _COLLAPSE_S)
         after = self._world.poses()
-        self.resting[block.order] = block
-        if movement(tuple(self.resting.values()), after, DEFAULT_TRIAL).fallen:
+        self._resting[block.order] = block
+        if movement(tuple(self._resting.values()), after, DEFAULT_TRIAL).fallen:
             for order, pose in after.items():
-                self.resting[order] = pose.put(self.resting[order])
+                self._resting[order] = pose.put(self._resting[order])
         else:
             for order in after:
                 self._world.remove(order)
-            self._world.place_all(self.resting.values())
+            self._world.place_all(self._resting.values())
         return after
 
     def _is_still(self, moved_cm: float, turned_deg: float) -> bool:

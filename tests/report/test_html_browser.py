@@ -333,6 +333,31 @@ def test_an_episode_turn_by_turn(visit: Visit) -> None:
     assert "Turn 1" in page.inner_text(".said")
 
 
+def test_a_plan_with_poses_as_it_was_given_and_carried_out(
+    browser: Browser, workspace: Workspace
+) -> None:
+    workspace.write_suite(tracks=["pose_planning"], models=["oracle", "oracle-2d"], limit=1)
+    assert workspace.run(page=True).code == 0
+    page = browser.new_page(viewport={"width": 1400, "height": 1000})
+    visit = Visit(page, workspace.out / "report.html")
+    # The second block is refused: it would stand in the first.
+    for model, n_carried in (("oracle", "2 blocks"), ("oracle-2d", "1 block")):
+        visit.show(f"pose_planning/{model}/t1/s0")
+        titles = page.locator(".sides figcaption").all_inner_texts()
+        assert titles == ["Goal 2 blocks, levels 1 and 2", "As given", "Carried out"]
+        labels = [canvas.get_attribute("aria-label") for canvas in page.locator(".stage").all()]
+        assert labels == ["As given: 2 blocks", f"Carried out: {n_carried}"]
+    assert painted(page, ".built canvas") > 1000
+    assert page.locator(".strip button.right").count() == 1
+    page.locator(".strip button.wrong").click()
+    said = page.inner_text(".said")
+    assert "Off in height, no room" in said
+    assert "5.0 cm too low" in said
+    assert "Refused: it would share space with others" in said
+    page.close()
+    assert visit.complaints == []
+
+
 def test_a_hostile_reply_does_nothing(visit: Visit) -> None:
     visit.show(HOSTILE_SAMPLE)
     page = visit.page

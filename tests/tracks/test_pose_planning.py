@@ -25,17 +25,21 @@ from phyblock.run.records import begun, judged
 from phyblock.run.rescore import rescore
 from phyblock.scoring import Goal, PoseFit
 from phyblock.scoring.pose_errors import POSE_ERRORS, pose_errors
-from phyblock.sim.carry import CarryLimits
+from phyblock.sim.carry import CarryLimits, carry_out
+from phyblock.sim.placing import center_cm, put
+from phyblock.sim.pose import Pose
 from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
 from phyblock.tracks.pose_planning import judging
 from phyblock.tracks.pose_planning.baselines import POSE_RULES, PoseSubject, written
-from phyblock.tracks.pose_planning.frame import center_cm, put
+from phyblock.tracks.pose_planning.film import pose_film
 from phyblock.tracks.pose_planning.judging import PoseRules
+from phyblock.tracks.pose_planning.record import PoseRecord, kept_rests
+from phyblock.tracks.pose_planning.resting import worlds_of
 from phyblock.tracks.pose_planning.spec import PoseSpec
 from phyblock.tracks.pose_planning.track import PosePlanning
 from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.tracks.showing import ShownTask
-from phyblock.words import STEP_ENDS, StepEnd
+from phyblock.words import REFUSED_ENDS, STEP_ENDS, StepEnd
 from tests.datasets.broken import write_scenes
 from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.openai_chat import OpenAIChat
@@ -134,6 +138,31 @@ def test_a_reply_is_read_scored_and_carried_out(
     assert known_records().validate_json(record.as_json()) == record
     again = asyncio.run(track.judge_apart(task, text, record))
     assert judged({**fields, **track.about(task)}, task, again) == record
+
+
+@pytest.mark.parametrize("baseline", ["oracle-noise-1cm", "stack", "oracle-2d"])
+def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
+    built_in: list[AssemblyTask], baseline: str
+) -> None:
+    item = built_in[0]
+    track = PosePlanning(RULES)
+    subject = PoseSubject(item.scene, item.candidates, is_free=False)
+    found = track.judge(item, POSE_RULES[baseline](subject, np.random.default_rng(1)))
+    blocks = [put(step, item.candidates) for step in found.parsed.plan.steps]
+    worlds = carry_out(blocks, RULES.limits).worlds
+    record = judged(begun("s", track.name, "m", item, 0, None), item, found)
+    assert isinstance(record, PoseRecord)
+    assert record.pose is not None
+    kept = [kept_rests(step) or () for step in record.pose.steps]
+    stays = [step.end not in REFUSED_ENDS for step in record.pose.steps]
+    for world, again in zip(worlds, worlds_of(blocks, stays, kept), strict=True):
+        assert [block.order for block in again] == [block.order for block in world]
+        for one, other in zip(world, again, strict=True):
+            start, end = Pose.goal(one), Pose.goal(other)
+            assert start.distance_m(end) < 0.0012
+            assert start.angle_deg(end) < 1.1
+    last = list(pose_film(record, item))[-1].blocks
+    assert [block.order for block in last] == [block.order for block in worlds[-1]]
 
 
 @settings(max_examples=12, deadline=None)

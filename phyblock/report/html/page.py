@@ -17,8 +17,8 @@ from phyblock.tables.text_table import Column, TextTable
 __all__ = ["Figure", "render_page"]
 
 _SCRIPTS = (
-    *("dom.js", "data.js", "solid.js", "list.js", "steps.js", "stage.js", "detail.js"),
-    *("tracks.js", "app.js"),
+    *("dom.js", "data.js", "solid.js", "list.js", "steps.js", "poses.js", "stage.js"),
+    *("detail.js", "tracks.js", "app.js"),
 )
 _STYLES = ("base.css", "results.css", "samples.css")
 

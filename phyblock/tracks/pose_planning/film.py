@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from phyblock.datasets import AssemblyTask
-from phyblock.domain import PoseStep
+from phyblock.domain import Block, PoseStep
 from phyblock.sim.carry import CarryLimits, carry_out
 from phyblock.sim.film import FilmStep, Tone
+from phyblock.sim.placing import put, upright
 from phyblock.sim.registry import told_engine
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
-from phyblock.tracks.pose_planning.frame import put, upright
 from phyblock.tracks.pose_planning.measures import ERROR_NAMES
-from phyblock.tracks.pose_planning.record import PoseOutcome, PoseRecord, StepOutcome
-from phyblock.words import StepEnd
+from phyblock.tracks.pose_planning.record import PoseOutcome, PoseRecord, StepOutcome, kept_rests
+from phyblock.tracks.pose_planning.resting import worlds_of
+from phyblock.words import REFUSED_ENDS, StepEnd
 
 __all__ = ["pose_film", "pose_table"]
 
@@ -54,7 +55,8 @@ def pose_table(record: PoseRecord) -> TextTable:
 def pose_film(record: PoseRecord, task: AssemblyTask) -> Iterator[FilmStep]:
     """A frame for the plan as it was given, one for the world after each step, and one for the end.
 
-    It is carried out again, in the engine that is chosen now.
+    A plan of which the record does not keep where blocks came to lie is carried out again, in the
+    engine that is chosen now.
     """
     given = record.parse.steps if record.parse else ()
     pose, candidates = record.pose, task.candidates
@@ -68,15 +70,32 @@ def pose_film(record: PoseRecord, task: AssemblyTask) -> Iterator[FilmStep]:
         f"{record.model}, {task.scene.id}: the plan as given", "plain", None,
         tuple(block for block in blocks if block is not None),
     )  # fmt: skip
-    tolerances = pose.limits
-    limits = CarryLimits(tolerances.overlap_cm, tolerances.stand_cm, tolerances.stand_deg)
-    done = carry_out(blocks, limits)
-    for n, (one, step, world) in enumerate(zip(given, pose.steps, done.worlds, strict=True), 1):
+    worlds = _kept_worlds(blocks, pose.steps)
+    by = ""
+    if worlds is None:
+        tolerances = pose.limits
+        limits = CarryLimits(tolerances.overlap_cm, tolerances.stand_cm, tolerances.stand_deg)
+        worlds = carry_out(blocks, limits).worlds
+        by = (
+            ""
+            if pose.engine == told_engine()
+            else f" (shown in {told_engine()}, not {pose.engine})"
+        )
+    for n, (one, step, world) in enumerate(zip(given, pose.steps, worlds, strict=True), 1):
         tone: Tone = "good" if step.end == "stands" else "bad"
         yield FilmStep(f"{n}. block {one.block}: {_ended(step)}", tone, one.block, world)
-    by = "" if pose.engine == told_engine() else f" (shown in {told_engine()}, not {pose.engine})"
     tone = "good" if pose.completed else "bad"
-    yield FilmStep(f"{_came_to(record, pose)}{by}", tone, None, done.blocks)
+    yield FilmStep(f"{_came_to(record, pose)}{by}", tone, None, worlds[-1] if worlds else ())
+
+
+def _kept_worlds(
+    blocks: Sequence[Block | None], steps: Sequence[StepOutcome]
+) -> tuple[tuple[Block, ...], ...] | None:
+    """The blocks after each step, None where that was not kept."""
+    kept = [rests for step in steps if (rests := kept_rests(step)) is not None]
+    if len(kept) < len(steps):
+        return None
+    return worlds_of(blocks, [step.end not in REFUSED_ENDS for step in steps], kept)
 
 
 def _ended(step: StepOutcome) -> str:

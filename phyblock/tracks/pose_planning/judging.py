@@ -35,10 +35,12 @@ from phyblock.scoring import (
     pose_errors,
 )
 from phyblock.sim.carry import Carried, CarriedStep, CarryLimits, carry_out
+from phyblock.sim.placing import put
 from phyblock.sim.registry import told_engine
 from phyblock.sim.voxels import voxel_iou
 from phyblock.tracks.plans import score_fields
-from phyblock.tracks.pose_planning.frame import laid, pieces_of, put
+from phyblock.tracks.pose_planning.bodies import laid, pieces_of
+from phyblock.tracks.pose_planning.resting import Rest, rests_of
 from phyblock.tracks.showing import file_plan
 from phyblock.words import AnswerFormat, Matcher, PoseRotation, Setting
 
@@ -85,12 +87,13 @@ class PoseRules:
 
 @dataclass(frozen=True)
 class Ended:
-    """What became of a plan that was carried out: its steps, the blocks of the goal that were
-    reached, all that stands beside the goal, whether that is the whole goal and nothing else, and
-    the engine with its version.
+    """What became of a plan that was carried out: its steps, what each of them moved (None where
+    that was not kept), the blocks of the goal that were reached, all that stands beside the goal,
+    whether that is the whole goal and nothing else, and the engine with its version.
     """
 
     steps: tuple[CarriedStep, ...]
+    rests: tuple[tuple[Rest, ...] | None, ...]
     reached: int
     iou: float
     completed: bool
@@ -156,13 +159,13 @@ class PoseJudgement:
 
     def _outcome(self) -> dict[str, Any]:
         motion = self.poses[-1].motion
-        both = zip(self.fits, self.ended.steps, self.errors, strict=True)
+        whole = zip(self.fits, self.ended.steps, self.ended.rests, self.errors, strict=True)
         return {
             "rotation": self.rules.rotation,
             "right": {score.frame: list(score.right) for score in self.poses},
             "shift_cm": [round(part, _DIGITS) + 0.0 for part in motion.shift_cm],
             "turn_deg": round(math.degrees(motion.turn_rad), _DIGITS) + 0.0,
-            "steps": [_step(fit, end, error) for fit, end, error in both],
+            "steps": [_step(*step) for step in whole],
             "reached": self.ended.reached,
             "iou": self.ended.iou,
             "completed": self.ended.completed,
@@ -213,7 +216,8 @@ def _carried(item: AssemblyTask, given: Sequence[PoseStep], rules: PoseRules) ->
     reached = blocks_reached(goal, done.blocks, rules.reached_cm, rules.reached_deg)
     is_whole = reached == len(goal) == len(done.blocks)
     iou = round(voxel_iou(goal, done.blocks), _DIGITS)
-    return Ended(done.steps, reached, iou, is_whole, told_engine())
+    rests = rests_of(blocks, done.worlds)
+    return Ended(done.steps, rests, reached, iou, is_whole, told_engine())
 
 
 @functools.lru_cache(maxsize=_KEPT)
@@ -263,7 +267,12 @@ def _given(step: PoseStep) -> dict[str, Any]:
     return {"block": step.candidate, "center_cm": list(step.center_cm), **turned}
 
 
-def _step(fit: PoseFit | None, end: CarriedStep, error: PoseError | None) -> dict[str, Any]:
+def _step(
+    fit: PoseFit | None,
+    end: CarriedStep,
+    rests: tuple[Rest, ...] | None,
+    error: PoseError | None,
+) -> dict[str, Any]:
     told: dict[str, Any] = {"vertex": None}
     if fit is not None:
         told = {
@@ -283,4 +292,5 @@ def _step(fit: PoseFit | None, end: CarriedStep, error: PoseError | None) -> dic
         "overlap_cm": end.overlap_cm,
         "knocked": list(end.knocked),
         "error": error,
+        **({} if rests is None else {"rests": [asdict(rest) for rest in rests]}),
     }

@@ -9,9 +9,19 @@ from phyblock.records import Line, Record
 from phyblock.records.line import Amount, Whole
 from phyblock.scoring import PoseError
 from phyblock.tracks.plans import PLAN_COLUMNS, PlanParse, plan_row
+from phyblock.tracks.pose_planning.resting import Rest
 from phyblock.words import PoseRotation, StepEnd
 
-__all__ = ["CarryTolerances", "GivenStep", "PoseOutcome", "PoseParse", "PoseRecord", "StepOutcome"]
+__all__ = [
+    "CarryTolerances",
+    "GivenStep",
+    "PoseOutcome",
+    "PoseParse",
+    "PoseRecord",
+    "RestingBlock",
+    "StepOutcome",
+    "kept_rests",
+]
 
 
 class GivenStep(Line):
@@ -49,6 +59,17 @@ class CarryTolerances(Line):
     """Farthest that it was turned [degrees]."""
 
 
+class RestingBlock(Line):
+    """Where a block came to lie."""
+
+    step: Whole
+    """Number of the step, from 1, that put it."""
+    center_cm: tuple[Amount, Amount, Amount]
+    """x, y and z of the middle of its box [cm]."""
+    euler_deg: tuple[Amount, Amount, Amount]
+    """Its rotation, extrinsic x-y-z angles [degrees]."""
+
+
 class StepOutcome(Line):
     """What a step is worth by geometry, and how it ended when it was carried out."""
 
@@ -78,6 +99,16 @@ class StepOutcome(Line):
     """Numbers of the steps, from 1, whose blocks it moved."""
     error: PoseError | None = None
     """What was wrong, null where nothing was."""
+    rests: tuple[RestingBlock, ...] | None = None
+    """The blocks that lie elsewhere after it than before, its own than where it was put, by more
+    than 1 mm or 1 degree; null: not kept."""
+
+
+def kept_rests(step: StepOutcome) -> tuple[Rest, ...] | None:
+    """What a step moved, None where that was not kept."""
+    if step.rests is None:
+        return None
+    return tuple(Rest(one.step, one.center_cm, one.euler_deg) for one in step.rests)
 
 
 class PoseOutcome(Line):

@@ -20,10 +20,10 @@ from phyblock.models.base import Image, Request
 from phyblock.parsing import POSE_READER_VERSION
 from phyblock.records import Record
 from phyblock.sim.carry import CarriedStep
+from phyblock.sim.placing import upright
 from phyblock.sim.registry import REFERENCE_ENGINE, physics_engine
 from phyblock.tracks.base import ENGINE, READER
 from phyblock.tracks.pose_planning.baselines import PoseSubject
-from phyblock.tracks.pose_planning.frame import upright
 from phyblock.tracks.pose_planning.judging import (
     Earlier,
     Ended,
@@ -32,7 +32,7 @@ from phyblock.tracks.pose_planning.judging import (
     judge_poses,
 )
 from phyblock.tracks.pose_planning.pictures import PosePictures
-from phyblock.tracks.pose_planning.record import PoseRecord
+from phyblock.tracks.pose_planning.record import PoseRecord, kept_rests
 from phyblock.tracks.prompts import Prompt, form_facts, response_format
 from phyblock.tracks.showing import Showing, ShownTask, TaskShowing, told_of
 
@@ -181,6 +181,7 @@ def _earlier(record: Record | None) -> Earlier | None:
         CarriedStep(s.end, s.moved_cm, s.turned_deg, s.gap_cm, s.overlap_cm, s.knocked)
         for s in record.pose.steps
     )
+    rests = tuple(kept_rests(step) for step in record.pose.steps)
     pose = record.pose
-    ended = Ended(steps, pose.reached, pose.iou, pose.completed, pose.engine)
+    ended = Ended(steps, rests, pose.reached, pose.iou, pose.completed, pose.engine)
     return Earlier(given, pose.limits.fields(), ended)

@@ -28,7 +28,7 @@ const Detail = (() => {
   }
 
   function build(loaded, inFile, question) {
-    const scene = inFile && asShown(inFile, loaded[0].record.shown);
+    const scene = inFile && asShown(inFile, loaded[0].record);
     const several = loaded.length > 1;
     const all = columns(loaded.map((sample) => [
       several ? heading(sample) : null, question ? Question.answer(sample) : null, ...texts(sample)]));
@@ -40,28 +40,34 @@ const Detail = (() => {
   }
 
   /** The scene with its candidates in the order in which the samples' seed showed them. */
-  function asShown(scene, shown) {
+  function asShown(scene, { shown, pose }) {
     if (!shown) return scene;
-    const number = (inFile) => inFile && shown.order.indexOf(inFile) + 1;
-    return { ...scene, candidates: shown.order.map((n) => scene.candidates[n - 1]),
-      blocks: scene.blocks.map((block) => ({ ...block, candidate: number(block.candidate) })) };
+    const isUpright = pose?.rotation === "free";
+    const candidates = shown.order.map((n) => scene.candidates[n - 1])
+      .map((one) => (isUpright ? { ...one, euler: [0, 0, 0] } : one));
+    const number = (block) => (isUpright ? candidates.findIndex((one) => Words.block(one) === Words.block(block))
+      : shown.order.indexOf(block.candidate)) + 1;
+    return { ...scene, candidates,
+      blocks: scene.blocks.map((block) => ({ ...block, candidate: number(block) })) };
   }
 
   /** Goal and what was built side by side, under one clock; the steps below. */
   function assembly(loaded, scene, several) {
     const runs = loaded.map((sample) => stepsOf(sample, scene));
-    const longest = Math.max(...runs.map((steps) => steps.length));
+    const longest = Math.max(...runs.map(({ steps }) => steps.length));
     const noun = loaded[0].record.turns ? "Turn" : "Step";
     player = new Stage.Player(longest + 1);
-    const panels = loaded.map((sample, i) => (runs[i].length ? Stage.panel(scene, runs[i], player, noun) : null));
+    const panels = loaded.map((sample, i) => (runs[i].steps.length ? Stage.panel(runs[i], player, noun) : null));
     const stages = panels.map((panel, i) => [
       several ? heading(loaded[i]) : null, verdict(loaded[i]), panel ? panel.said : nothing(loaded[i])]);
+    const wide = Math.max(...runs.map(({ titles }) => titles.length)) > 1 ? " wide" : "";
     const built = panels.flatMap((panel, i) => [
-      el("figure", { class: "built" }, el("figcaption", {}, several ? loaded[i].model : "Built"), panel ? panel.canvas : null),
+      runs[i].titles.map((title, k) => el("figure", { class: "built" },
+        el("figcaption", {}, captionOf(loaded[i], title, several, wide)), panel?.pictures[k]?.canvas)),
       several ? null : el("div", { class: "about-step" }, stages[i])]);
     return el("section", { class: "card" },
       scene ? null : el("p", { class: "notice" }, Data.index.no_scenes || "The data set has no such scene."),
-      el("div", { class: several ? "sides two" : "sides" }, scene ? goal(scene, loaded[0]) : null,
+      el("div", { class: `sides${several ? " two" : ""}${wide}` }, scene ? goal(scene, loaded[0]) : null,
         scene ? built : stages.map((parts) => el("div", {}, parts))),
       several && scene ? el("div", { class: "columns two" }, stages.map((parts) => el("div", {}, parts))) : null,
       longest ? Stage.controls(player, noun) : null,
@@ -73,14 +79,18 @@ const Detail = (() => {
       contents.map((children) => el("div", {}, children)));
   }
 
+  const captionOf = ({ model }, title, several, wide) =>
+    (several ? `${model}${wide && `: ${title.toLowerCase()}`}` : title);
+
   const heading = (sample) => el("h4", { class: "model-name" }, sample.model);
 
   function stepsOf(sample, scene) {
     const { record, setting } = sample;
     if (record.turns) return Steps.ofTurns(scene, setting, record.turns);
+    if (record.pose) return Poses.of(scene, record);
     const score = headline(record.scores, setting);
-    const plan = record.parse ? record.parse.plan : [];
-    return score && score.placed ? Steps.ofPlan(scene, setting, plan, score) : [];
+    const plan = record.parse && score ? record.parse.plan : [];
+    return Steps.ofPlan(scene, setting, plan, score);
   }
 
   const headline = (scores, setting) => scores.find((score) =>
@@ -88,8 +98,9 @@ const Detail = (() => {
 
   function nothing(sample) {
     const { record } = sample;
+    const problem = record.parse?.problem ? `: ${Words.named(record.parse.problem)}` : "";
     const why = record.error ? record.error.message
-      : record.reply ? "Nothing could be read out of the reply." : "There is no reply.";
+      : record.reply ? `Nothing could be read out of the reply${problem}.` : "There is no reply.";
     return el("p", { class: "notice" }, why);
   }
 
@@ -104,6 +115,9 @@ const Detail = (() => {
         facts.push(el("span", { class: "fact" }, `${name} `, el("b", { class: "number" }, String(value))));
       }
       facts.push(el("span", { class: "fact muted" }, `Setting ${sample.setting}`));
+    }
+    for (const [name, value] of record.pose ? Poses.facts(record) : []) {
+      facts.push(el("span", { class: "fact" }, `${name} `, el("b", { class: "number" }, value)));
     }
     if (record.ending) facts.push(el("span", { class: "fact muted" }, `Ended: ${Words.named(record.ending)}`));
     return el("p", { class: "facts" }, facts);

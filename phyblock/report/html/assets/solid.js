@@ -106,6 +106,16 @@ const Solid = (() => {
     return { ...lifted, position: [0, 0, -lowest] };
   }
 
+  /** Where the middle of its box is at `center` [m]. */
+  function boxedAt(block, center) {
+    const { points } = placed({ ...block, position: [0, 0, 0] });
+    const position = center.map((middle, i) => {
+      const along = points.map((point) => point[i]);
+      return middle - (Math.min(...along) + Math.max(...along)) / 2;
+    });
+    return { ...block, position };
+  }
+
   function project(camera, size, point) {
     const from = minus(point, camera.eye);
     const depth = dot(camera.axes[2], from);
@@ -336,5 +346,5 @@ const Solid = (() => {
     context.fillText(mark.letter, x, y + radius * 0.08);
   }
 
-  return { setKit, draw, onTheFloor };
+  return { setKit, draw, onTheFloor, boxedAt };
 })();

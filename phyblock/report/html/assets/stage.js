@@ -80,106 +80,84 @@ const Stage = (() => {
       step(1, "›", "One step on"), slider, where);
   }
 
-  /** The parts of one sample's panel: drawing, what the step did, filmstrip. */
-  function panel(scene, steps, player, noun = "Step") {
-    const canvas = el("canvas", { class: "stage", role: "img" });
+  /** The parts of one sample's panel: drawings with titles, what the step did, filmstrip. */
+  function panel(run, player, noun = "Step") {
+    const pictures = run.titles.map((title) => (
+      { title, canvas: el("canvas", { class: "stage", role: "img" }) }));
     const said = el("div", { class: "said", "aria-live": "polite" });
     const strip = el("ol", { class: "strip" });
-    const end = steps.length + 1;
+    const end = run.steps.length + 1;
     const local = () => (player.at >= player.last ? end : Math.min(player.at, end));
-    steps.forEach((step, i) => strip.append(frame(scene, step, i, player, noun)));
-    if (scene) turnable(canvas, player);
+    run.steps.forEach((step, i) => strip.append(frame(step, i, player, noun)));
+    pictures.forEach(({ canvas }) => turnable(canvas, player));
     player.listeners.push(() => {
       const at = local();
       strip.querySelectorAll("button").forEach((button, i) =>
         button.setAttribute("aria-current", String(i + 1 === at)));
       follow(strip, at);
-      say(said, scene, steps, at, noun);
-      if (scene) paint(canvas, scene, steps, at, player.view);
+      say(said, run, at, noun);
+      pictures.forEach((picture, i) => paint(picture, run, i, at, player.view));
     });
-    if (scene) lazily(strip, scene, steps);
-    return { canvas, said, strip };
+    lazily(strip, run.steps);
+    return { pictures: run.framed ? pictures : [], said, strip };
   }
 
-  function frame(scene, step, i, player, noun) {
+  function frame(step, i, player, noun) {
     const mark = step.why ? "✗" : "✓";
-    const what = step.why ? Words.named(step.why) : "Correct";
-    const name = scene && scene.candidates[step.number - 1] ? `, ${Words.block(scene.candidates[step.number - 1])}` : "";
+    const name = step.name ? `, ${step.name}` : "";
     return el("li", {}, el("button", {
       type: "button", class: step.why ? "wrong" : "right", "data-step": i + 1,
-      "aria-label": `${noun} ${i + 1}: candidate ${step.number}${name}, ${what}`,
+      "aria-label": `${noun} ${i + 1}: candidate ${step.number}${name}, ${step.verdict}`,
       onclick: () => {
         player.stop();
         player.seek(i + 1);
       },
     },
-    scene ? el("canvas", { class: "thumb", "aria-hidden": "true" }) : null,
+    step.thumb ? el("canvas", { class: "thumb", "aria-hidden": "true" }) : null,
     el("span", { class: "strip-head" }, el("span", { class: "number" }, String(i + 1)),
       el("span", { class: "mark" }, mark)),
-    el("span", { class: "strip-what" }, step.why ? Words.named(step.why) : `Candidate ${step.number}`)));
+    el("span", { class: "strip-what" }, step.label)));
   }
 
-  /** Frames are drawn when they come into sight: what stood after the step, or the wrong block. */
-  function lazily(strip, scene, steps) {
+  /** Frames are drawn when they come into sight. */
+  function lazily(strip, steps) {
     const watch = new IntersectionObserver((seen) => {
       for (const { target, isIntersecting } of seen) {
         if (!isIntersecting) continue;
         watch.unobserve(target);
-        const step = steps[Number(target.dataset.step) - 1];
-        const offered = scene.candidates[step.number - 1];
-        const canvas = target.querySelector("canvas");
-        if (!step.why) {
-          Solid.draw(canvas, blocksOf(scene, step.after), {
-            view: HOME, framed: scene.blocks, size: THUMB_PX, accent: accent(),
-            fresh: scene.blocks[step.vertex] || null,
-          });
-        } else if (offered) {
-          Solid.draw(canvas, [Solid.onTheFloor(offered)], { view: HOME, size: THUMB_PX, minDistance: 0.4 });
-        }
+        const { blocks, ...options } = steps[Number(target.dataset.step) - 1].thumb;
+        Solid.draw(target.querySelector("canvas"), blocks, { ...options, view: HOME, size: THUMB_PX, accent: accent() });
       }
     }, { rootMargin: "200px" });
-    strip.querySelectorAll("button").forEach((button) => watch.observe(button));
+    strip.querySelectorAll("button").forEach((button) => button.querySelector("canvas") && watch.observe(button));
   }
 
-  const blocksOf = (scene, set) => scene.blocks.filter((_, v) => set.has(v));
-
-  function paint(canvas, scene, steps, at, view) {
-    const step = steps[Math.min(at, steps.length) - 1];
-    const isEnd = at > steps.length;
-    const now = step && at > 0 ? step.after : new Set();
-    const rest = isEnd ? scene.blocks.map((_, v) => v).filter((v) => !now.has(v))
-      : at > 0 && step ? step.ready : [];
-    const fresh = !isEnd && at > 0 && step && step.vertex !== null ? scene.blocks[step.vertex] : null;
-    canvas.setAttribute("aria-label", `The structure with ${now.size} of ${scene.blocks.length} blocks placed`);
-    Solid.draw(canvas, blocksOf(scene, now), {
-      view, framed: scene.blocks, ghosts: rest.map((v) => scene.blocks[v]), fresh,
-      accent: accent(), grid: style("--grid"),
+  function paint({ canvas, title }, run, place, at, view) {
+    const state = run.states[at] && run.states[at][place];
+    if (!state) return;
+    canvas.setAttribute("aria-label", `${title}: ${Words.count(state.blocks.length, "block")}`);
+    Solid.draw(canvas, state.blocks, {
+      ...state, view, framed: run.framed, accent: accent(), grid: style("--grid"),
     });
   }
 
-  function say(said, scene, steps, at, noun) {
+  function say(said, run, at, noun) {
     if (at === 0) {
       said.replaceChildren(el("p", { class: "muted" }, "Nothing is placed yet."));
       return;
     }
-    if (at > steps.length) {
-      const now = steps.length ? steps[steps.length - 1].after : new Set();
-      const wrong = steps.filter((step) => step.why).length;
-      const left = scene ? scene.blocks.length - now.size : 0;
-      const end = scene ? `${now.size} of ${scene.blocks.length} blocks placed` : `${now.size} blocks placed`;
-      const errors = wrong ? `, ${Words.count(wrong, `wrong ${noun.toLowerCase()}`)}` : "";
-      said.replaceChildren(el("p", {}, el("strong", {}, "End"), ` ${end}${errors}.`));
-      if (left) said.append(el("p", { class: "muted" }, "Outlined: what was not placed."));
+    if (at > run.steps.length) {
+      said.replaceChildren(el("p", {}, el("strong", {}, "End"), ` ${run.end}`));
+      if (run.ghosts) said.append(el("p", { class: "muted" }, run.ghosts));
       return;
     }
-    const step = steps[at - 1];
-    const candidate = scene && Number.isInteger(step.number) ? Steps.label(scene, step.number) : step.number;
-    const verdict = step.why ? Words.named(step.why) : "Correct";
+    const step = run.steps[at - 1];
+    const candidate = step.name ? `${step.number} (${step.name})` : step.number;
     const rows = [el("p", {}, el("strong", {}, `${noun} ${at}`),
       step.number === null || step.number === undefined ? " " : ` Candidate ${candidate} `,
-      el("span", { class: step.why ? "verdict wrong" : "verdict right" }, `${step.why ? "✗" : "✓"} ${verdict}`))];
+      el("span", { class: step.why ? "verdict wrong" : "verdict right" }, `${step.why ? "✗" : "✓"} ${step.verdict}`))];
     if (step.text) rows.push(el("p", {}, step.text));
-    if (step.expected) rows.push(el("p", { class: "muted" }, `Possible here (outlined): ${step.expected}.`));
+    if (step.note) rows.push(el("p", { class: "muted" }, step.note));
     said.replaceChildren(...rows);
   }
 

@@ -14,10 +14,10 @@ const Steps = (() => {
     return scene.candidates.map((_, i) => i + 1).filter((n) => sameKind(scene.candidates[n - 1], block));
   }
 
-  const label = (scene, n) => {
-    const candidate = scene.candidates[n - 1];
-    return candidate ? `${n} (${Words.block(candidate)})` : String(n);
-  };
+  /** What candidate `n` is, in words; nothing where there is none. */
+  const nameOf = (scene, n) => (scene && scene.candidates[n - 1] ? Words.block(scene.candidates[n - 1]) : "");
+
+  const label = (scene, n) => (nameOf(scene, n) ? `${n} (${nameOf(scene, n)})` : String(n));
 
   function listed(scene, setting, vertices) {
     const said = new Map();
@@ -55,45 +55,82 @@ const Steps = (() => {
   }
 
   /**
-   * The states of a plan: [{number, vertex, why, before, after, text, expected}], one a step.
+   * What the stage shows of a plan or an episode:
    *
-   * `placed` and `why` stand for each step as in the record; `before` and `after` are sets of
-   * goal blocks.
+   * `titles` of the pictures of a state; `framed`, the blocks that the camera is framed on;
+   * `steps`: [{number, why, verdict, text, note, label, thumb}], one a frame of the strip;
+   * `states`: nothing, each step, and the end, of each a picture {blocks, ghosts, fresh} a title;
+   * `end`: what it came to, in words, and `ghosts` what its outlines are.
    */
+  const run = (scene, titles, steps, states, end, ghosts, framed = scene && scene.blocks) =>
+    ({ titles, steps, states, end, ghosts, framed });
+
+  /** A run that places blocks of the goal where they belong: `steps` with sets `before` and `after`. */
+  function ofSets(scene, steps, noun) {
+    const last = steps.length ? steps[steps.length - 1].after : new Set();
+    const wrong = steps.filter((step) => step.why).length;
+    const of = scene ? ` of ${scene.blocks.length} blocks placed` : " blocks placed";
+    const end = `${last.size}${of}${wrong ? `, ${Words.count(wrong, `wrong ${noun}`)}` : ""}.`;
+    if (!scene) return run(scene, ["Built"], steps, [], end, "");
+    const blocksOf = (set) => scene.blocks.filter((_, v) => set.has(v));
+    const left = scene.blocks.filter((_, v) => !last.has(v));
+    const shown = steps.map((step) => [{
+      blocks: blocksOf(step.after), fresh: scene.blocks[step.vertex] || null,
+      ghosts: step.ready.map((v) => scene.blocks[v]),
+    }]);
+    const drawn = steps.map((step, i) => ({ ...step, thumb: thumbOf(scene, step, shown[i][0]) }));
+    const states = [[{ blocks: [] }], ...shown, [{ blocks: blocksOf(last), ghosts: left }]];
+    return run(scene, ["Built"], drawn, states, end, left.length ? "Outlined: what was not placed." : "");
+  }
+
+  /** What stood after a step, or the wrong block alone. */
+  function thumbOf(scene, step, state) {
+    if (!step.why) return { blocks: state.blocks, fresh: state.fresh, framed: scene.blocks };
+    return alone(scene.candidates[step.number - 1]);
+  }
+
+  const alone = (offered) => (offered ? { blocks: [Solid.onTheFloor(offered)], minDistance: 0.4 } : null);
+
+  /** A plan: `placed` and `why` stand for each step as in the record. */
   function ofPlan(scene, setting, plan, score) {
     let now = new Set();
-    return plan.map((number, i) => {
+    const steps = plan.map((number, i) => {
       const vertex = score.placed[i], why = score.why[i];
       const step = { number, vertex, why, before: now };
       if (vertex !== null) now = new Set([...now, vertex]);
       return describe(scene, setting, { ...step, after: now });
     });
+    return ofSets(scene, steps, "step");
   }
 
-  /** The states of an episode: one for each step, by the reply that decided it. */
+  /** An episode: a step for each, by the reply that decided it. */
   function ofTurns(scene, setting, turns) {
     let now = new Set();
-    return turns.filter((turn) => turn.outcome !== null).map((turn) => {
+    const steps = turns.filter((turn) => turn.outcome !== null).map((turn) => {
       const isPlaced = turn.outcome === "placed";
       const step = { number: turn.parse ? turn.parse.move : null, before: now, turn };
       now = new Set(turn.world || now);
       const vertex = isPlaced ? turn.placed : null;
       return describe(scene, setting, { ...step, vertex, why: isPlaced ? null : turn.outcome, after: now });
     });
+    return ofSets(scene, steps, "turn");
   }
 
   function describe(scene, setting, step) {
-    if (!scene) return { ...step, text: "", expected: "", ready: [] };
-    const ready = step.why ? readyIn(scene, step.before) : [];
+    const verdict = step.why ? Words.named(step.why) : "Correct";
+    const said = { ...step, verdict, name: nameOf(scene, step.number),
+      label: step.why ? verdict : `Candidate ${step.number}`, ready: [] };
+    if (!scene) return { ...said, text: "", note: "" };
+    said.ready = step.why ? readyIn(scene, step.before) : [];
     const isNumber = Number.isInteger(step.number);
     let text = "";
     if (step.vertex !== null) text = `Placed as block ${scene.blocks[step.vertex].order} of the goal.`;
     else if (isNumber && step.why) text = reason(scene, setting, step.number, step.why, step.before);
     if (step.turn?.swapped?.length) text += " Blocks that look alike changed places for it.";
     if (step.turn?.fallen?.length) text += ` Let go, these blocks fall: ${step.turn.fallen.join(", ")}.`;
-    const expected = ready.length && step.why !== "done" ? listed(scene, setting, ready) : "";
-    return { ...step, text, expected, ready };
+    const expected = said.ready.length && step.why !== "done" ? listed(scene, setting, said.ready) : "";
+    return { ...said, text, note: expected && `Possible here (outlined): ${expected}.` };
   }
 
-  return { ofPlan, ofTurns, label };
+  return { ofPlan, ofTurns, run, alone, nameOf };
 })();

@@ -8,25 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain import Block, BlockType, Candidate, CandidateSet, Euler, PoseStep
-from phyblock.scoring import Laid
-from phyblock.scoring.solids import Piece
-from phyblock.sim.geometry import collision_pieces, corners_m
+from phyblock.sim.geometry import corners_m
 
-__all__ = ["box_height_cm", "center_cm", "laid", "pieces_of", "put", "upright"]
+__all__ = ["box_height_cm", "box_middle_m", "center_cm", "origin_m", "put", "upright"]
 
 _CM = 100.0
 UPRIGHT: Euler = (0.0, 0.0, 0.0)
 
 
-@functools.cache
-def pieces_of(block_type: BlockType) -> tuple[Piece, ...]:
-    """The convex pieces of a block in its body frame."""
-    return tuple(Piece(p.vertices_m, p.face_normals) for p in collision_pieces(block_type))
-
-
 def center_cm(block: Block) -> tuple[float, float, float]:
     """The middle of the box round a block where it is [cm]."""
-    x, y, z = (np.array(block.position_m) + _middle_m(block.type, block.euler_deg)) * _CM
+    x, y, z = (np.array(block.position_m) + box_middle_m(block.type, block.euler_deg)) * _CM
     return float(x), float(y), float(z)
 
 
@@ -36,20 +28,25 @@ def box_height_cm(block: Block) -> float:
     return float(np.ptp(heights)) * _CM
 
 
-def laid(step: PoseStep, candidate: Candidate) -> Laid:
-    """A step as a rigid body; without a rotation of its own it has that of its candidate."""
-    euler = candidate.euler_deg if step.euler_deg is None else step.euler_deg
-    x, y, z = np.array(step.center_cm) / _CM - _middle_m(candidate.type, euler)
-    return Laid(step.candidate, (float(x), float(y), float(z)), euler)
+def origin_m(
+    block_type: BlockType, euler_deg: Euler, center_cm: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Where the body frame of a block is [m] whose box has its middle at a place [cm]."""
+    x, y, z = np.array(center_cm) / _CM - box_middle_m(block_type, euler_deg)
+    return float(x), float(y), float(z)
 
 
 def put(step: PoseStep, candidates: CandidateSet) -> Block | None:
-    """The block that a step puts, None for a number that no candidate has."""
+    """The block that a step puts, None for a number that no candidate has.
+
+    Without a rotation of its own it has that of its candidate.
+    """
     if not 1 <= step.candidate <= len(candidates):
         return None
     candidate = candidates[step.candidate]
-    body = laid(step, candidate)
-    return Block(1, candidate.type, candidate.color, body.position_m, body.euler_deg, (), 1)
+    euler = candidate.euler_deg if step.euler_deg is None else step.euler_deg
+    place = origin_m(candidate.type, euler, step.center_cm)
+    return Block(1, candidate.type, candidate.color, place, euler, (), 1)
 
 
 def upright(candidates: CandidateSet) -> tuple[CandidateSet, tuple[int, ...]]:
@@ -63,7 +60,7 @@ def upright(candidates: CandidateSet) -> tuple[CandidateSet, tuple[int, ...]]:
 
 
 @functools.lru_cache(maxsize=4096)
-def _middle_m(block_type: BlockType, euler_deg: Euler) -> NDArray[np.float64]:
+def box_middle_m(block_type: BlockType, euler_deg: Euler) -> NDArray[np.float64]:
     """The middle of the box round a block whose body frame is at the origin, shape (3,) [m]."""
     corners = corners_m(block_type, (0.0, 0.0, 0.0), euler_deg)
     middle: NDArray[np.float64] = (corners.min(axis=0) + corners.max(axis=0)) / 2
