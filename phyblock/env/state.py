@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from phyblock.domain import BLOCK_TYPES, COLORS, MAX_CANDIDATES, Block, Candidate
 
-__all__ = ["LARGEST", "MOST_BLOCKS", "TRAITS", "candidate_rows", "goal_rows"]
+__all__ = ["LARGEST", "MOST_BLOCKS", "TRAITS", "block_rows", "candidate_rows", "goal_rows"]
 
 MOST_BLOCKS = 64
 """Rows of a goal; built-in ones have 22 blocks at most."""
@@ -31,6 +31,11 @@ def goal_rows(blocks: Sequence[Block]) -> NDArray[np.float32]:
     """
     if len(blocks) > MOST_BLOCKS:
         raise ValueError(f"a goal of {len(blocks)} blocks; at most {MOST_BLOCKS} fit in a state")
+    return block_rows(blocks)
+
+
+def block_rows(blocks: Sequence[Block]) -> NDArray[np.float32]:
+    """Blocks where they are, the first `MOST_BLOCKS` of them, shape (MOST_BLOCKS, TRAITS)."""
     return _rows(blocks, MOST_BLOCKS)
 
 

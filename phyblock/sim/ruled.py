@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from phyblock.domain.scene import Scene
+from phyblock.domain.scene import Block, Scene
 from phyblock.sim.camera import Camera, Window, frame, view_axes
 from phyblock.sim.compose import ink_on, to_png
 from phyblock.sim.exact import rounded
 from phyblock.sim.pictures import PictureStyle, drawn, picture_key
 from phyblock.sim.render import SUPERSAMPLE, DrawnBlock, empty_ground, picture
 
-__all__ = ["RULED_VERSION", "ruled_key", "ruled_png"]
+__all__ = ["RULED_VERSION", "RuledFloor", "ruled_key", "ruled_png"]
 
 RULED_VERSION = 1
 """Raised whenever the rules come out otherwise, so that stored pictures are made again."""
@@ -67,11 +67,24 @@ class _Field:
 
 def ruled_png(scene: Scene, style: PictureStyle) -> bytes:
     """PNG of the goal on a ruled floor, seen as the style says; the scene must have a block."""
-    blocks = drawn(scene)
-    field = _field(blocks, style)
-    camera = _camera(blocks, field, style)
-    ground = _ruled(empty_ground(style.background, camera, style.size_px), field, camera, style)
-    return to_png(picture(blocks, camera, style.background, style.size_px, ground))
+    return to_png(RuledFloor(scene, style).image(scene.blocks))
+
+
+class RuledFloor:
+    """The ruled floor of a scene, which must have a block: draws blocks seen as its goal is."""
+
+    def __init__(self, scene: Scene, style: PictureStyle) -> None:
+        blocks = drawn(scene)
+        field = _field(blocks, style)
+        self._camera, self._style = _camera(blocks, field, style), style
+        empty = empty_ground(style.background, self._camera, style.size_px)
+        self._ground = _ruled(empty, field, self._camera, style)
+
+    def image(self, blocks: Sequence[Block]) -> Image.Image:
+        """The blocks on the floor, an RGB image of the style's size."""
+        shown = [DrawnBlock(b.type, b.color, b.position_m, b.euler_deg) for b in blocks]
+        style = self._style
+        return picture(shown, self._camera, style.background, style.size_px, self._ground)
 
 
 def ruled_key(scene: Scene, style: PictureStyle) -> str:

@@ -14,9 +14,12 @@ from gymnasium.utils.env_checker import check_env
 
 import phyblock.env
 from phyblock.datasets import AssemblyTask, read_builtin
-from phyblock.domain import BLOCK_TYPES, COLORS, Block, Candidate, CandidateSet, Scene
+from phyblock.domain import BLOCK_TYPES, COLORS, Block, Candidate, CandidateSet, PoseStep, Scene
 from phyblock.env import DONE, PhyBlockEnv, read_tasks
 from phyblock.errors import DataError
+from phyblock.scoring import blocks_reached
+from phyblock.sim.carry import carry_out
+from phyblock.sim.placing import put
 from phyblock.words import SETTINGS, Setting
 
 ROOT = Path(__file__).parents[2]
@@ -49,8 +52,14 @@ def solve(env: PhyBlockEnv, info: dict[str, Any]) -> tuple[float, dict[str, Any]
 
 @pytest.mark.parametrize(
     "options",
-    [{"size_px": 32}, {"observe": "state"}, {"observe": "state", "physics": "strict"}],
-    ids=["pictures", "state", "strict"],
+    [
+        {"size_px": 32},
+        {"observe": "state"},
+        {"observe": "state", "physics": "strict"},
+        {"action": "pose", "size_px": 32},
+        {"action": "pose", "rotation": "free", "observe": "state", "physics": "strict"},
+    ],
+    ids=["pictures", "state", "strict", "poses", "free poses"],
 )
 def test_gymnasium_finds_nothing_wrong(options: dict[str, Any]) -> None:
     env = gymnasium.make(phyblock.env.ENV_ID, render_mode="rgb_array", **options)
@@ -224,6 +233,10 @@ def test_an_invalid_candidate_is_told() -> None:
         ({"max_steps": 0}, "max_steps is 0"),
         ({"max_failures": -1}, "max_failures is -1"),
         ({"data": ()}, "no tasks"),
+        ({"action": "poses"}, "allowed: block, pose"),
+        ({"rotation": "free"}, "needs action='pose'"),
+        ({"action": "pose", "physics": "off"}, "allowed: settle, strict"),
+        ({"action": "pose", "setting": "B"}, "leave them out"),
         ({"levels": (9,)}, r"no tasks of levels \[9\]"),
     ],
 )
@@ -271,6 +284,59 @@ def test_scenes_come_from_folders_and_checkouts(official_checkout: Path) -> None
     assert len(read_tasks(official_checkout)) == 400
 
 
+@pytest.mark.parametrize("rotation", ["candidate", "free"])
+def test_who_knows_the_poses_reaches_every_block(rotation: Any) -> None:
+    tasks = [task for task in SOME if len(task.scene) < 9][:3]
+    env = PhyBlockEnv(tasks, action="pose", rotation=rotation, observe="state", physics="strict")
+    for task in tasks:
+        _, info = env.reset(options={"scene": task.scene.id})
+        total, info = solve(env, info)
+        assert (info["is_complete"], info["outcome"]) == (True, "stands")
+        assert total == info["reached"] == info["step"] == len(task.scene)
+    env.close()
+
+
+def test_poses_are_carried_out_as_a_plan_is() -> None:
+    """Blocks that fall or are refused, too; the return is how many are reached."""
+    env = PhyBlockEnv([seesaw()], action="pose", observe="state", max_steps=20)
+    kit = seesaw().candidates
+    plan = [
+        PoseStep(1, (0.0, 0.0, 2.5)), PoseStep(3, (5.5, 0.0, 6.25)), PoseStep(2, (11.0, 0.0, 2.5)),
+        PoseStep(16, (0.0, 0.0, 2.5)), PoseStep(2, (0.0, 0.3, 2.5)), PoseStep(2, (0.0, 0.0, 30.0)),
+    ]  # fmt: skip
+    done = carry_out([put(step, kit) for step in plan])
+    env.reset()
+    total = 0.0
+    for step, ended in zip(plan, done.steps, strict=True):
+        action = {"block": step.candidate, "center_m": np.array(step.center_cm) / 100}
+        observation, reward, _, _, info = env.step(action)
+        assert info["outcome"] == ended.end
+        assert (info["moved_cm"], info["knocked"]) == (ended.moved_cm, ended.knocked)
+        assert observation in env.observation_space
+        total += reward
+    assert {"stands", "falls", "no_block", "overlaps"} <= {step.end for step in done.steps}
+    assert total == blocks_reached(seesaw().scene.blocks, done.blocks, 1.0, 10.0)
+    assert int(observation["world"][:, 0].sum()) == len(done.blocks)
+    env.close()
+
+
+def test_an_action_that_is_no_pose_is_said() -> None:
+    env = PhyBlockEnv([seesaw()], action="pose", observe="state")
+    env.reset()
+    for wrong, message in (
+        (1, "a mapping of block, center_m"),
+        ({"block": 17, "center_m": (0, 0, 0)}, "outside 0..16"),
+        ({"block": 1, "center_m": (0, 0, float("nan"))}, "action center_m is"),
+        ({"block": 1, "center_m": (0, 0, 1.01)}, "allowed: 3 numbers"),
+        ({"block": 1, "center_m": (0, 0)}, "allowed: 3 numbers"),
+        ({"block": 1}, "a mapping of"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            env.step(wrong)
+    assert env.step({"block": DONE, "center_m": (0, 0, 0)})[2]
+    env.close()
+
+
 def makers(count: int, **options: Any) -> list[partial[PhyBlockEnv]]:
     tasks = read_tasks("phyblock-400")[:count]
     return [partial(PhyBlockEnv, [task], **options) for task in tasks]
@@ -286,6 +352,19 @@ def test_sixty_four_scenes_run_as_a_vector() -> None:
         total += rewards
     assert observations["placed"].shape == (64, 16)
     assert (total >= 4).all()
+    envs.close()
+
+
+def test_scenes_with_poses_run_as_a_vector() -> None:
+    envs = gymnasium.vector.SyncVectorEnv(makers(3, observe="state", action="pose"))
+    _, infos = envs.reset(seed=0)
+    total = np.zeros(3)
+    for _ in range(3):
+        moves = [of_one[0] for of_one in infos["right_moves"]]
+        actions = {name: np.array([move[name] for move in moves]) for name in moves[0]}
+        _, rewards, _, _, infos = envs.step(actions)
+        total += rewards
+    assert (total == 3).all()
     envs.close()
 
 
@@ -310,6 +389,6 @@ def test_what_the_docs_show_runs(place: int, capsys: pytest.CaptureFixture[str])
     body = [line for line in code.splitlines() if line and not line.startswith(("import", "from"))]
     assert len(body) <= 10
     exec(compile(code, f"docs/environment.md block {place}", "exec"), {})
-    if place == 1:
+    if "right_moves" in code:
         complete, total, blocks = capsys.readouterr().out.split()
         assert (complete, float(total)) == ("True", float(blocks))
