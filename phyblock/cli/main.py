@@ -23,6 +23,8 @@ _VERBS = {
     "figures": "Draw a run's figures, as SVG and PNG.",
     "compare": "Compare models on the same samples: difference, interval, verdict.",
     "export": "Write a run for Inspect AI, Hugging Face datasets, or as CSV or Parquet.",
+    "bundle": "Write a run as one file that others can score again.",
+    "verify-bundle": "Score a bundle again and say whether it comes out the same.",
     "episode": "Show an episode step by step, as text or as a GIF.",
     "export-data": "Write questions with pictures for VLMEvalKit or Hugging Face.",
     "models": "List models with kinds, prices and keys; check one.",

@@ -21,7 +21,7 @@ from phyblock.tracks import Episode, Item, Judgement
 from phyblock.tracks.counting import count_sample
 from phyblock.words import Outcome
 
-__all__ = ["about_prompt", "begun", "judged"]
+__all__ = ["about_item", "about_prompt", "begun", "judged"]
 
 
 def begun(
@@ -33,16 +33,12 @@ def begun(
     answer: Reply | ModelError | None,
 ) -> dict[str, Any]:
     """The fields of a record before it is judged; None is a reply that a recording lacks."""
-    scene = item.scene
     return {
         "sample": sample,
         "track": track,
         "model": model,
         "key": item.key,
-        "scene": scene.id,
-        "levels": scene.levels,
-        "parents": scene.parents,
-        "n_blocks": len(scene),
+        **about_item(item),
         "seed": seed,
         "reply": stored(answer) if isinstance(answer, Reply) else None,
         "error": _error(answer) if isinstance(answer, ModelError) else None,
@@ -50,6 +46,17 @@ def begun(
         "parse": None,
         "scores": (),
         "time": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+    }
+
+
+def about_item(item: Item) -> dict[str, Any]:
+    """What a record says of the scene of its item."""
+    scene = item.scene
+    return {
+        "scene": scene.id,
+        "levels": scene.levels,
+        "parents": scene.parents,
+        "n_blocks": len(scene),
     }
 
 

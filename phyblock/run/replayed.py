@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from phyblock.errors import Problem, StoreError
 from phyblock.models.stored import reply_of
 from phyblock.records import Record
@@ -12,22 +15,33 @@ __all__ = ["counted_again"]
 
 
 async def counted_again(
-    track: EpisodeTrack[Item], item: Item, record: Record, where: str
+    track: EpisodeTrack[Item],
+    item: Item,
+    record: Record,
+    where: str,
+    about: Mapping[str, Any] | None = None,
 ) -> Record:
     """A record of an episode with what measures count of it now; all else stays as it is.
 
-    Raises StoreError, which names `where`, for an episode that goes otherwise than it did.
+    Where `about`, what it should say of its item, is given, that and every turn are held against
+    it, too. Raises StoreError, which names `where`, for an episode that goes otherwise than it did.
     """
     episode = await _played(track, item, record)
-    given = record.as_given()
+    given = {**record.as_given(), **(about or {})}
     turns = {"turns": given["turns"]} if "turns" in given else {}
-    again = judged(given, item, episode, turns)
+    again = judged(given, item, episode, turns if about is None else _turns(episode, record))
     was, now = record.fields(), again.fields()
     changed = [name for name in was if name != "counts" and was[name] != now.get(name)]
     if changed:
         message = "goes otherwise than it did, in another version"
         raise StoreError(Problem(where, message, changed[0], record.sample))
     return record.model_copy(update={"counts": again.counts})
+
+
+def _turns(episode: Episode, record: Record) -> dict[str, Any]:
+    """The turns of a record with what became of them now."""
+    asked, now = record.asked_turns, episode.fields()["turns"]
+    return {"turns": [{**was.fields(), **more} for was, more in zip(asked, now, strict=False)]}
 
 
 async def _played(track: EpisodeTrack[Item], item: Item, record: Record) -> Episode:

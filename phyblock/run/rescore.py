@@ -3,30 +3,32 @@
 from __future__ import annotations
 
 import asyncio
-import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import yaml
 from pydantic import ValidationError
 
 from phyblock.errors import Problem, SpecError, StoreError
-from phyblock.files import atomic_write, writing
 from phyblock.parsing import reader_version
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
 from phyblock.records.reading import read_records
 from phyblock.run.data import recorded_dataset
 from phyblock.run.folder import check_place, run_folder
-from phyblock.run.records import judged
+from phyblock.run.records import about_item, judged
 from phyblock.run.reopen import reopen_tracks
 from phyblock.run.replayed import counted_again
+from phyblock.run.rewritten import write_run
 from phyblock.specs import SuiteSpec, suite_model
 from phyblock.tracks import AnyTrack, EpisodeTrack, judgement_of, kind_of, shown_item
 from phyblock.tracks.counting import counts_samples
 from phyblock.variants import Variant
 from phyblock.words import Matcher, PlanParser
 
-__all__ = ["rescore"]
+if TYPE_CHECKING:
+    from phyblock.run.floors import FloorValues
+
+__all__ = ["judged_anew", "rescore"]
 
 
 def rescore(
@@ -55,6 +57,35 @@ def rescore(
         run_folder(folder).check([f"{name}/"])
     _check_target(target, identity)
     names = [name for name in suite.tracks if kind_of(name).rescored or counts_samples(name)]
+    records, floors = _scored(folder, manifest, suite, names, data)
+    told = {"identity": identity, "suite": suite.model_dump(mode="json"), "floors": floors}
+    write_run(target, manifest.model_copy(update=told), records)
+    return target
+
+
+def judged_anew(folder: Path, data: Path | None = None) -> tuple[Manifest, list[Record]]:
+    """The manifest and the newest records of a run, made again of its replies and its data.
+
+    All tracks are judged, and what records say of their items is taken from the data. Physics is
+    not: what became of blocks that were let go is taken from the records. Nothing is written.
+    Raises as `rescore`.
+    """
+    manifest = read_manifest(folder)
+    suite = _suite(folder, manifest, None, None)
+    records, floors = _scored(folder, manifest, suite, suite.tracks, data, anew=True)
+    return manifest.model_copy(update={"floors": floors}), records
+
+
+def _scored(
+    folder: Path,
+    manifest: Manifest,
+    suite: SuiteSpec,
+    names: Collection[str],
+    data: Path | None,
+    *,
+    anew: bool = False,
+) -> tuple[list[Record], FloorValues]:
+    """The records of a run, those of the tracks in `names` judged again, and what floors reach."""
     dataset = recorded_dataset(folder, manifest, suite.levels, data)
 
     def reopened(name: str, one: SuiteSpec) -> AnyTrack:
@@ -64,21 +95,22 @@ def rescore(
         variant.key: reopen_tracks(folder, manifest, suite.at(variant), names, dataset)
         for variant in dict.fromkeys(variant.shown for variant in suite.vary.variants)
     }
-    records = asyncio.run(_judged_again(folder, manifest, tracks))
-    told = {"identity": identity, "suite": suite.model_dump(mode="json")}
-    scored = manifest.model_copy(update=told)
+    records = asyncio.run(_judged_again(folder, manifest, tracks, anew=anew))
     # Tables are made of pandas, which `--help` and a run that goes on do without.
     from phyblock.run.floors import floor_values
 
-    floors = floor_values(scored, suite, reopened)
-    _write(target, scored.model_copy(update={"floors": floors}), records)
-    return target
+    told = {"suite": suite.model_dump(mode="json")}
+    return records, floor_values(manifest.model_copy(update=told), suite, reopened)
 
 
 async def _judged_again(
-    folder: Path, manifest: Manifest, variants: Mapping[str, Mapping[str, AnyTrack]]
+    folder: Path,
+    manifest: Manifest,
+    variants: Mapping[str, Mapping[str, AnyTrack]],
+    *,
+    anew: bool,
 ) -> list[Record]:
-    """The records of a run, those of the tracks of `variants` judged anew."""
+    """The records of a run, those of the tracks of `variants` judged again; see `judged_anew`."""
     where = str(folder / RECORDS)
     tracks = variants[""]
     items = {(name, item.key): item for name, track in tracks.items() for item in track.items}
@@ -93,12 +125,13 @@ async def _judged_again(
             message, hint = "names an item that the run has not", "restore the file from a copy"
             raise StoreError(Problem(where, message, "key", record.item, hint=hint))
         item = shown_item(track, item, record.seed)
+        about = {**about_item(item), **track.about(item)} if anew else None
         if isinstance(track, EpisodeTrack):
-            records.append(await counted_again(track, item, record, where))
+            records.append(await counted_again(track, item, record, where, about))
             continue
         text = None if record.reply is None else record.reply.text
         judgement = await judgement_of(track, item, text, record)
-        given = record.as_given()
+        given = {**record.as_given(), **(about or {})}
         if record.error is not None and record.error.kind == "unjudged":
             given["error"] = None
         records.append(judged(given, item, judgement))
@@ -145,15 +178,3 @@ def _suite(
         message = "asked for JSON, which the official expression does not read"
         raise SpecError(Problem(str(folder), message, "--parser", parser, "steps"))
     return suite
-
-
-def _write(folder: Path, manifest: Manifest, records: Sequence[Record]) -> None:
-    lines = (json.dumps(r.fields(), ensure_ascii=False, separators=(",", ":")) for r in records)
-    texts = {
-        MANIFEST: yaml.safe_dump(manifest.fields(), sort_keys=False, allow_unicode=True, width=100),
-        RECORDS: "".join(line + "\n" for line in lines),
-    }
-    run_folder(folder).begin()
-    with writing(folder):
-        for name, text in texts.items():
-            atomic_write(folder / name, text)

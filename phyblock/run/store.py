@@ -13,8 +13,6 @@ from collections.abc import Callable, Collection, Container, Iterator
 from pathlib import Path
 from typing import IO, Any, TypeVar
 
-import yaml
-
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, writing
 from phyblock.records import (
@@ -33,6 +31,7 @@ from phyblock.records.reading import any_records, collect_turns, run_records
 from phyblock.run.appending import AppendFile
 from phyblock.run.folder import LOCK, check_place, run_folder
 from phyblock.run.prompts import PromptFile
+from phyblock.run.rewritten import manifest_text
 from phyblock.run.standing import Standing
 from phyblock.sim.registry import PHYSICS_VARIABLE, REFERENCE_ENGINE
 from phyblock.tracks.base import ENGINE
@@ -141,8 +140,7 @@ class RunStore:
         if holds_run(self._folder, manifest):
             return
         path = self._folder / MANIFEST
-        text = yaml.safe_dump(manifest.fields(), sort_keys=False, allow_unicode=True, width=100)
-        atomic_write(path, text, sync=True)
+        atomic_write(path, manifest_text(manifest), sync=True)
 
 
 def holds_run(folder: Path, manifest: Manifest) -> bool:

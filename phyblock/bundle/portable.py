@@ -1,0 +1,137 @@
+"""A run without what is of one machine, and a run from elsewhere with the data of this one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
+
+from phyblock.bundle.about import BundledData, data_of
+from phyblock.errors import DataError, Problem
+from phyblock.records import Manifest, Record
+from phyblock.resources import bundled
+from phyblock.run.data import asked_about, open_dataset
+
+__all__ = ["localized", "portable_manifest", "portable_records"]
+
+_SERVED_AT = "served_at"
+_ROOT = "root"
+
+
+def portable_manifest(manifest: Manifest) -> Manifest:
+    """The manifest with the last part of every path, and without the addresses of servers."""
+    fields = _without_paths(manifest.fields())
+    for model in fields.get("models", ()):
+        model.pop(_SERVED_AT, None)
+    for part in ("dataset", "questions"):
+        held = getattr(manifest, part)
+        if held is not None and held.root:
+            fields[part][_ROOT] = Path(held.root).resolve().name
+    return Manifest.model_validate(fields)
+
+
+def portable_records(
+    records: Iterable[Record], manifest: Manifest, folder: Path
+) -> Iterator[Record]:
+    """Records whose errors name no path of this machine; nothing else of them is changed."""
+    named = map(Path, _paths(manifest.fields()))
+    homes = {folder.resolve().parent, Path.home(), Path.cwd(), *named}
+    roots = sorted((str(path) for path in homes if len(path.parts) > 1), key=len, reverse=True)
+    for record in records:
+        if record.error is None:
+            yield record
+            continue
+        message = record.error.message
+        for root in roots:
+            message = message.replace(root, PurePosixPath(root).name)
+        error = record.error.model_copy(update={"message": message})
+        yield record if error == record.error else record.model_copy(update={"error": error})
+
+
+def _without_paths(value: Any) -> Any:
+    if isinstance(value, str):
+        return _last_part(value) if _is_path(value) else value
+    if isinstance(value, Mapping):
+        return {key: _without_paths(below) for key, below in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_without_paths(below) for below in value]
+    return value
+
+
+def _paths(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        if _is_path(value):
+            yield value
+    elif isinstance(value, Mapping):
+        for below in value.values():
+            yield from _paths(below)
+    elif isinstance(value, (list, tuple)):
+        for below in value:
+            yield from _paths(below)
+
+
+def _is_path(text: str) -> bool:
+    """Whether a text is a path that begins at the root of a machine, or at somebody's home."""
+    if "\n" in text:
+        return False
+    return text.startswith(("/", "~/")) or PureWindowsPath(text).is_absolute()
+
+
+def _last_part(text: str) -> str:
+    return (PurePosixPath(text) if "/" in text else PureWindowsPath(text)).name
+
+
+def localized(manifest: Manifest, folders: Sequence[Path], where: str) -> Manifest:
+    """The manifest with the places of its data on this machine.
+
+    They are looked for in `folders`, by name first, and among the sets that come with phyblock.
+    Raises DataError that names what is missing, or what is there in another version.
+    """
+    fields = manifest.fields()
+    problems = []
+    taken: list[Path] = []
+    for part, needed in data_of(manifest).items():
+        left = [path for path in folders if path not in taken]
+        places = [path for path in _places(needed.name, left) if path.is_dir()]
+        if part == "dataset":
+            places = [path for path in places if _is_dataset(path, manifest)]
+        if places:
+            fields[part] = {**fields[part], _ROOT: str(places[0])}
+            taken.append(places[0])
+        else:
+            problems.append(_missing(where, part, needed, folders))
+    if problems:
+        raise DataError(problems)
+    return Manifest.model_validate(fields)
+
+
+def _places(name: str, folders: Sequence[Path]) -> list[Path]:
+    named = [path for path in folders if path.resolve().name == name]
+    plain = PurePosixPath(name).name == name and name not in ("", ".", "..")
+    own = [bundled("benchmarks", "data", name)] if plain else []
+    return [*named, *own, *(path for path in folders if path not in named)]
+
+
+def _is_dataset(path: Path, manifest: Manifest) -> bool:
+    """Whether the scenes that the run asked about stand in a folder as they were then."""
+    assert manifest.dataset is not None
+    try:
+        dataset = open_dataset(manifest.dataset.format, path)
+    except DataError:
+        return False
+    levels = manifest.suite.get("levels") or ()
+    return asked_about(manifest, levels, dataset).sha256 == manifest.dataset.sha256
+
+
+def _missing(where: str, part: str, needed: BundledData, folders: Sequence[Path]) -> Problem:
+    noun = "questions" if part == "questions" else "data set"
+    looked = ", ".join(map(str, folders)) or "the sets that come with phyblock"
+    digest = f", digest {needed.sha256[:12]}" if needed.sha256 else ""
+    return Problem(
+        where,
+        f"needs the {noun} {needed.name}, which a bundle does not hold",
+        f"data.{part}",
+        f"not in {looked}",
+        f"{needed.name}, version {needed.version}, layout {needed.format}{digest}",
+        "name the folder where it is with --data",
+    )

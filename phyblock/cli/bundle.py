@@ -1,0 +1,42 @@
+"""`phyblock bundle`: a run as one file that others can score again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from phyblock.bundle import BUNDLE_FILE, bundle_run
+from phyblock.cli.console import counted, make_console, shown_path
+from phyblock.cli.paths import UserPath
+
+__all__ = ["command"]
+
+_MB = 1e6
+
+
+@click.command("bundle")
+@click.argument("run", type=UserPath())
+@click.option("--out", type=UserPath(), help=f"The file. [default: RUN/{BUNDLE_FILE}]")
+@click.option(
+    "--data",
+    type=UserPath(),
+    multiple=True,
+    help="A folder of data, where they have moved; may be given again.",
+)
+def command(run: Path, out: Path | None, data: tuple[Path, ...]) -> None:
+    """Write the folder RUN as one file: manifest, records, digests.
+
+    It holds no keys, no pictures, no prompts and no paths of this machine. Its replies are scored
+    again first, where the data are at hand: a run whose scores do not come out again is refused.
+    """
+    console = make_console()
+    made = bundle_run(run, out, data)
+    console.print(f"The bundle is {shown_path(made.path)} ({made.size_bytes / _MB:.1f} MB)")
+    if made.verified is None:
+        console.print(f"It was not verified here: {made.lacking}")
+        return
+    console.print(
+        f"Verified: {counted(made.verified.records, 'record')} scored again and "
+        f"{counted(made.verified.tables, 'table file')} come out the same."
+    )

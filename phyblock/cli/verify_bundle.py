@@ -1,0 +1,40 @@
+"""`phyblock verify-bundle`: a bundle scored again, offline."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from phyblock.bundle import opened_bundle
+from phyblock.cli.console import counted, make_console, shown_path
+from phyblock.cli.paths import UserPath
+
+__all__ = ["command"]
+
+
+@click.command("verify-bundle")
+@click.argument("file", type=UserPath())
+@click.option(
+    "--data",
+    type=UserPath(),
+    multiple=True,
+    help="A folder of data that the run needs; may be given again.",
+)
+def command(file: Path, data: tuple[Path, ...]) -> None:
+    """Score the replies in the bundle FILE again, and say whether its records and tables come out
+    as the same bytes. Exit code 2 where they do not.
+
+    Nothing is asked of anyone. Bundles hold no data: sets that come with phyblock are found, others
+    are named with --data.
+    """
+    console = make_console()
+    with opened_bundle(file, data) as found:
+        models = [model.name for model in found.manifest.models]
+        console.print(f"{shown_path(file)} verifies.")
+        console.print(
+            f"{counted(found.records, 'record')} of {counted(len(models), 'model')}, scored again, "
+            f"and {counted(found.tables, 'table file')} come out as the same bytes."
+        )
+        console.print(f"Run {found.manifest.run}, made with phyblock {found.about.phyblock}.")
+        console.print("That the models gave these replies, no bundle can show.")

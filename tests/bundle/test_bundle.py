@@ -1,0 +1,226 @@
+"""A bundle of a run: scored again elsewhere it says the same; changed, it is refused."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from phyblock.bundle import bundle_run, opened_bundle
+from phyblock.bundle.about import about_text, describe
+from phyblock.bundle.archive import ABOUT, MEMBERS, pack, unpack
+from phyblock.errors import DataError, StoreError
+from phyblock.records import MANIFEST, RECORDS, read_manifest
+from tests.vqa_set import questions, write_questions
+from tests.workspace import Raw, Workspace
+
+SUBTASKS = ["SH", "OR"]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+    """Two baselines in three tracks, and the bundle of the run beside it."""
+    workspace = Workspace(tmp_path_factory.mktemp("bundled"), pictures_dir)
+    workspace.write_scenes()
+    write_questions(workspace.root / "questions", questions(per_subtask=2, subtasks=SUBTASKS))
+    workspace.write_suite(
+        tracks=["full_planning", "vqa", "step_planning"],
+        vqa={"path": "./questions", "subtasks": SUBTASKS},
+        steps={"physics": "off"},
+        seeds=[0],
+    )
+    done = workspace.run()
+    assert done.code == 0, done.err
+    done = workspace.phyblock("bundle", "out")
+    assert done.code == 0, done.err
+    assert "Verified: 28 records scored again" in done.out
+    return workspace
+
+
+def folders(made: Workspace) -> list[Path]:
+    return [made.root / "data", made.root / "questions"]
+
+
+def contents(made: Workspace, folder: Path) -> dict[str, bytes]:
+    folder.mkdir()
+    unpack(made.out / "bundle.zip", folder)
+    return {name: (folder / name).read_bytes() for name in MEMBERS}
+
+
+def forged(made: Workspace, folder: Path, change: Callable[[list[Raw], Raw], None]) -> Path:
+    """A bundle whose author changed records or manifest and made the digests of them anew."""
+    found = contents(made, folder)
+    records = [json.loads(line) for line in found[RECORDS].splitlines()]
+    manifest = yaml.safe_load(found[MANIFEST])
+    change(records, manifest)
+    text = "".join(json.dumps(r, ensure_ascii=False, separators=(",", ":")) + "\n" for r in records)
+    (folder / RECORDS).write_text(text, encoding="utf-8")
+    (folder / MANIFEST).write_text(yaml.safe_dump(manifest, sort_keys=False), encoding="utf-8")
+    read = read_manifest(folder)
+    tables = json.loads(found[ABOUT])["tables"]
+    files = {name: (folder / name).read_bytes() for name in (MANIFEST, RECORDS)}
+    about = about_text(describe(read, files, tables, "0.1.0"))
+    path = folder.with_suffix(".zip")
+    path.write_bytes(pack({**files, ABOUT: about.encode()}))
+    return path
+
+
+def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(
+    made: Workspace, tmp_path: Path
+) -> None:
+    held = contents(made, tmp_path / "held")
+    assert not any(str(made.root).encode() in data for data in held.values())
+    assert b"messages" not in held[MANIFEST]
+    about = json.loads(held[ABOUT])
+    assert about["data"]["questions"]["name"] == "questions"
+    assert set(about["tables"]) == {path.name for path in (made.out / "tables").iterdir()}
+    (tmp_path / "elsewhere").mkdir()
+    elsewhere = Workspace(tmp_path / "elsewhere", tmp_path / "pictures")
+    for folder in folders(made):
+        shutil.copytree(folder, elsewhere.root / folder.name)
+    shutil.copy(made.out / "bundle.zip", elsewhere.root / "b.zip")
+    known = ("--data", "data", "--data", "questions")
+    done = elsewhere.phyblock("verify-bundle", "b.zip", *known)
+    assert done.code == 0, done.err
+    assert "28 records of 2 models, scored again" in done.out
+    done = elsewhere.phyblock("verify-bundle", "b.zip", "--data", "data")
+    assert done.code == 2
+    assert "needs the questions questions, which a bundle does not hold" in done.err
+    done = elsewhere.phyblock("verify-bundle", "b.zip")
+    assert "needs the data set data" in done.err
+    assert "Traceback" not in done.err
+
+
+def test_the_same_run_gives_the_same_bytes(made: Workspace, tmp_path: Path) -> None:
+    again = bundle_run(made.out, tmp_path / "again.zip")
+    assert again.path.read_bytes() == (made.out / "bundle.zip").read_bytes()
+
+
+def test_a_run_without_its_data_is_bundled_and_said_to_be_unverified(
+    made: Workspace, tmp_path: Path
+) -> None:
+    moved = tmp_path / "moved"
+    shutil.copytree(made.out, moved)
+    text = (moved / MANIFEST).read_text(encoding="utf-8")
+    (moved / MANIFEST).write_text(text.replace(str(made.root), "/gone"), encoding="utf-8")
+    found = bundle_run(moved, tmp_path / "b.zip")
+    assert found.verified is None
+    assert "needs the data set data" in found.lacking
+    assert found.path.read_bytes() == (made.out / "bundle.zip").read_bytes()
+
+
+def of_track(records: list[Raw], track: str) -> Raw:
+    return next(r for r in records if r["track"] == track and r["model"] == "random")
+
+
+def _score(records: list[Raw], _: Raw) -> None:
+    score = of_track(records, "full_planning")["scores"][0]
+    score["tp"], score["fp"] = score["tp"] + score["fp"], 0
+
+
+def _answer(records: list[Raw], _: Raw) -> None:
+    wrong = next(r for r in records if r["track"] == "vqa" and not r["answer"]["correct"])
+    wrong["answer"] = {**wrong["answer"], "given": wrong["answer"]["right"], "correct": True}
+
+
+def _subtask(records: list[Raw], _: Raw) -> None:
+    of_track(records, "vqa")["question"]["subtask"] = "CO"
+
+
+def _level(records: list[Raw], _: Raw) -> None:
+    of_track(records, "full_planning")["levels"] = [4]
+
+
+def _parents(records: list[Raw], _: Raw) -> None:
+    of_track(records, "full_planning")["parents"] = ["t1", "t2"]
+
+
+def _turn(records: list[Raw], _: Raw) -> None:
+    record = next(
+        r
+        for r in records
+        if r["track"] == "step_planning" and any(t["outcome"] != "placed" for t in r["turns"])
+    )
+    turn = next(t for t in record["turns"] if t["outcome"] != "placed")
+    turn.update(outcome="placed", placed=0)
+
+
+def _plan(records: list[Raw], _: Raw) -> None:
+    of_track(records, "full_planning")["parse"]["plan"] = [1]
+
+
+def _twice(records: list[Raw], _: Raw) -> None:
+    records.append(records[0])
+
+
+def _floor(_: list[Raw], manifest: Raw) -> None:
+    floors = manifest["floors"]["full_planning"]["all-candidates"]
+    floors.update(dict.fromkeys(floors, 0.0))
+
+
+@pytest.mark.parametrize(
+    "change", [_score, _answer, _subtask, _level, _parents, _turn, _plan, _twice, _floor]
+)
+def test_what_does_not_follow_from_the_replies_is_refused(
+    made: Workspace, tmp_path: Path, change: Callable[[list[Raw], Raw], None]
+) -> None:
+    path = forged(made, tmp_path / "forged", change)
+    with pytest.raises(StoreError) as caught, opened_bundle(path, folders(made)):
+        pytest.fail("it was taken")
+    assert str(path) in str(caught.value)
+    assert "/run/" not in str(caught.value)
+
+
+def test_what_is_not_changed_is_made_here_to_the_byte(made: Workspace, tmp_path: Path) -> None:
+    """What refuses forgeries is what was changed, not how they are made."""
+    path = forged(made, tmp_path / "forged", lambda *_: None)
+    (tmp_path / "again").mkdir()
+    unpack(path, tmp_path / "again")
+    now = {name: (tmp_path / "again" / name).read_bytes() for name in (RECORDS, ABOUT)}
+    was = contents(made, tmp_path / "was")
+    assert now[RECORDS] == was[RECORDS]
+    assert json.loads(now[ABOUT])["tables"] == json.loads(was[ABOUT])["tables"]
+
+
+def _root(_: list[Raw], manifest: Raw) -> None:
+    manifest["dataset"]["root"] = "/proc"
+    manifest["dataset"]["name"] = "../../.."
+
+
+def test_data_are_never_looked_for_where_a_bundle_says(made: Workspace, tmp_path: Path) -> None:
+    path = forged(made, tmp_path / "forged", _root)
+    with pytest.raises(DataError, match="which a bundle does not hold"), opened_bundle(path):
+        pytest.fail("it was taken")
+
+
+def _changed_member(held: dict[str, bytes], name: str, old: bytes, new: bytes) -> dict[str, bytes]:
+    assert old in held[name]
+    return {**held, name: held[name].replace(old, new)}
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "said"),
+    [
+        (RECORDS, b'"seed":0', b'"seed":1', "files.records.jsonl"),
+        (MANIFEST, b"name: trial", b"name: other", "files.run.yaml"),
+        (ABOUT, b'"readers": ', b'"readers": 1e999, "x": ', "is no description"),
+        (ABOUT, b'"format": 1', b'"format": 2', "format"),
+        (ABOUT, b'"format": 1', b'"format": ' + b"9" * 400, "is no description of a bundle"),
+        (ABOUT, b'"version": 1', b'"version": 2', "data"),
+        (MANIFEST, b"seeds:", b"seeds: &a [*a]\nx:", "run.yaml"),
+    ],
+)
+def test_a_member_that_was_changed_is_named(
+    made: Workspace, tmp_path: Path, name: str, old: bytes, new: bytes, said: str
+) -> None:
+    held: dict[str, Any] = contents(made, tmp_path / "held")
+    path = tmp_path / "b.zip"
+    path.write_bytes(pack(_changed_member(held, name, old, new)))
+    with pytest.raises(StoreError) as caught, opened_bundle(path, folders(made)):
+        pytest.fail("it was taken")
+    assert said in str(caught.value)
