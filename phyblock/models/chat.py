@@ -19,26 +19,17 @@ from phyblock.models.base import Reply, Request
 from phyblock.models.breaker import shows_outage
 from phyblock.models.cache import known_keys, reply_key
 from phyblock.models.config import ModelConfig
-from phyblock.models.cost import (
-    Budget,
-    Estimate,
-    counted,
-    estimate,
-    may_be_billed,
-    reply_cost_usd,
-)
+from phyblock.models.cost import Budget, estimate
 from phyblock.models.events import EventKind, ModelEvent, Observer
-from phyblock.models.formats import FORMAT_HINT, refuses_format
 from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import hidden
 from phyblock.models.limits import ModelLimiter, Slot
 from phyblock.models.pace import Mark, is_late, says_too_much
-from phyblock.models.payload import wire_params
-from phyblock.models.prices import Prices, today
+from phyblock.models.prices import Prices
 from phyblock.models.replicas import Replica, Replicas
 from phyblock.models.retry import RetryPolicy, with_retries
+from phyblock.models.sender import Outlay, Sender
 from phyblock.models.shared_cache import SharedCache, Turn
-from phyblock.models.transport import Call, SeedRefusedError
 
 __all__ = ["ChatModel", "ChatParts"]
 
@@ -60,16 +51,13 @@ class ChatParts:
 
 @dataclass
 class _Question:
-    """A request with its key in the cache and its expected size, how often it was sent, what that
-    cost, its last failure and the server that failed, its reply. `by_force`: another asks the same
-    and takes too long.
+    """A request with its key in the cache and its outlay, its last failure and the server that
+    failed, its reply. `by_force`: another asks the same and takes too long.
     """
 
     request: Request
     key: str
-    expected: Estimate
-    sent: int = 0
-    billed_usd: float | None = None
+    outlay: Outlay
     failure: RetryableError | None = None
     failed_at: Replica | None = None
     reply: Reply | None = None
@@ -85,8 +73,7 @@ class ChatModel:
         self.name = config.name
         self._config = config
         self._parts = parts
-        self._takes_seed = config.sends_seed != "never"
-        self._took_format = False
+        self._sender = Sender(config, parts.budget, parts.prices, parts.halt, self._say_seedless)
         self._told_width = 0
         self._unavailable: UnavailableError | None = None
 
@@ -104,8 +91,9 @@ class ChatModel:
             with self._parts.halt.giving_up():
                 kept = await self._kept(cache, key, request)
             if kept is not None:
-                return replace(kept, cost_usd=self._cost(kept))
-        return await self._ask_new(_Question(request, key, estimate(self._config, request)))
+                return replace(kept, cost_usd=self._sender.cost_usd(kept))
+        outlay = Outlay(estimate(self._config, request))
+        return await self._ask_new(_Question(request, key, outlay))
 
     async def _kept(self, cache: SharedCache, key: str, request: Request) -> Reply | None:
         """The reply under the key, or under that of former versions, moved to today's."""
@@ -137,15 +125,15 @@ class ChatModel:
                 raise
             return question.reply
         except (UnavailableError, BudgetReachedError, HaltedError):
-            if not question.billed_usd:
+            if not question.outlay.billed_usd:
                 raise
             # These leave no record. The attempt that was billed needs one, and the next request
             # meets the same end.
             assert question.failure is not None, "only failures that may pass are billed"
-            question.failure.billed_usd = question.billed_usd
+            question.failure.billed_usd = question.outlay.billed_usd
             raise question.failure from None
         except ModelError as error:
-            error.billed_usd = question.billed_usd
+            error.billed_usd = question.outlay.billed_usd
             raise
 
     async def _attempt(self, question: _Question) -> Reply:
@@ -188,7 +176,7 @@ class ChatModel:
         return kept
 
     def _slot(self, question: _Question) -> AbstractAsyncContextManager[Slot]:
-        expected = question.expected
+        expected = question.outlay.expected
         return self._parts.limiter.slot(expected.prompt_tokens + expected.completion_tokens)
 
     def _asking(self, question: _Question) -> AbstractAsyncContextManager[Turn]:
@@ -206,7 +194,9 @@ class ChatModel:
         breaker, replicas = replica.breaker, self._parts.replicas
         try:
             with replica.asked() as mark:
-                reply = await self._send_seeded(question, replica)
+                reply = await self._sender.send(
+                    question.request, question.outlay, replica.transport
+                )
         except ModelError as error:
             sender = (self.name, question.request.key, question.request.seed)
             breaker.failed(error, sender, is_probe=is_probe)
@@ -245,79 +235,6 @@ class ChatModel:
             self._tell("concurrency", "", limit=width)
         return width
 
-    async def _send_seeded(self, question: _Question, replica: Replica) -> Reply:
-        """Send with the seed, or without where the provider is known or found to take none.
-
-        That an error speaks of a seed proves nothing, as some repeat the whole request: only a
-        reply to the same request without a seed does.
-        """
-        request = question.request
-        params = wire_params(self._config, request)
-        seed = request.seed if self._takes_seed else None
-        call = Call(request.messages, params, seed)
-        try:
-            reply = await self._send_formed(call, question, replica)
-        except SeedRefusedError as refusal:
-            question.sent -= not refusal.sent
-            if self._config.sends_seed == "always":
-                raise UnavailableError("the provider takes no seed, and seed is `always`") from None
-            call = replace(call, seed=None)
-            reply = await self._send_formed(call, question, replica)
-            if self._takes_seed:
-                self._takes_seed = False
-                self._tell("seed_unsupported", "takes no seed: seeds are independent repeats")
-        return replace(reply, seed_sent=call.seed is not None)
-
-    async def _send_formed(self, call: Call, question: _Question, replica: Replica) -> Reply:
-        """Send; a provider that refuses the format of the answer would refuse it every time.
-
-        One that has taken it once means something else, as where it repeats the whole request.
-        """
-        try:
-            reply = await self._send_paid(call, question, replica)
-        except ModelError as error:
-            is_sent = "response_format" in call.params and not self._took_format
-            if not is_sent or not refuses_format(error):
-                raise
-            why = f"{error} ({FORMAT_HINT})"
-            raise UnavailableError(why, status=error.status, sent=error.sent) from None
-        self._took_format = True
-        return reply
-
-    async def _send_paid(self, call: Call, question: _Question, replica: Replica) -> Reply:
-        """Send with the call's greatest cost reserved in the budget.
-
-        A failure that may have been billed counts in full; a model that is found unable before
-        anything is sent costs nothing.
-        """
-        budget, prices = self._parts.budget, self._parts.prices
-        if budget is None or prices is None:
-            question.sent += 1
-            return counted(await replica.transport.send(call), question.expected)
-        held: int | None = None
-        spent_usd: float | None = 0.0
-        try:
-            with self._parts.halt.giving_up():
-                held = await budget.reserve(
-                    lambda: budget.most_usd(self.name, prices, question.expected, today())
-                )
-            spent_usd = None
-            question.sent += 1
-            reply = counted(await replica.transport.send(call), question.expected)
-            spent_usd = self._cost(reply)
-            budget.learn(self.name, question.expected, reply.usage)
-            return reply
-        except (SeedRefusedError, UnavailableError):
-            spent_usd = 0.0
-            raise
-        except ModelError as error:
-            spent_usd = None if may_be_billed(error) else 0.0
-            raise
-        finally:
-            if held is not None:
-                counted_usd = budget.settle(held, spent_usd)
-                question.billed_usd = (question.billed_usd or 0.0) + counted_usd
-
     async def _pause(self, wait_s: float) -> None:
         with self._parts.halt.giving_up():
             await self._parts.policy.clock.sleep(wait_s)
@@ -326,9 +243,9 @@ class ChatModel:
         """A reply that another brought, with what attempts of our own had cost before."""
         return replace(
             kept,
-            cost_usd=self._cost(kept),
-            billed_usd=question.billed_usd,
-            attempts=question.sent,
+            cost_usd=self._sender.cost_usd(kept),
+            billed_usd=question.outlay.billed_usd,
+            attempts=question.outlay.sent,
         )
 
     def _finished(self, reply: Reply, question: _Question) -> Reply:
@@ -337,17 +254,16 @@ class ChatModel:
             reply,
             text=hidden(reply.text, secrets, guess=False),
             reasoning=hidden(reply.reasoning, secrets, guess=False),
-            cost_usd=self._cost(reply),
-            billed_usd=question.billed_usd,
-            attempts=question.sent,
+            cost_usd=self._sender.cost_usd(reply),
+            billed_usd=question.outlay.billed_usd,
+            attempts=question.outlay.sent,
         )
-
-    def _cost(self, reply: Reply) -> float | None:
-        """US dollars of a reply that comes today."""
-        return reply_cost_usd(self._parts.prices, reply, today())
 
     def _on_retry(self, error: RetryableError, wait_s: float) -> None:
         self._tell("retry", str(error), wait_s=wait_s, status=error.status)
+
+    def _say_seedless(self) -> None:
+        self._tell("seed_unsupported", "takes no seed: seeds are independent repeats")
 
     def _stop(self, error: UnavailableError) -> None:
         if self._unavailable is None:
