@@ -11,47 +11,16 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import subprocess
-import sys
-import time
 from contextlib import ExitStack
-from pathlib import Path
 
-from phyblock.models import Gate, Message, Model, ModelConfig, Reply, Request, build_model
+from local_servers import ask_all, served
 
-ROOT = Path(__file__).parents[2]
+from phyblock.models import Gate, ModelConfig, build_model
+
 STRAINS = ("slows", "refuses", "hangs")
 LATE = {"hangs": 10.0}
 PATIENT = 100.0
 """The time limit of a request, in latencies; what takes longer is asked again."""
-
-
-def served(stack: ExitStack, strain: str, bears: int, latency_s: float) -> str:
-    """The address of a new server."""
-    words = ["--strain", strain, "--bears", str(bears), "--latency", str(latency_s)]
-    server = subprocess.Popen(
-        [sys.executable, "-m", "tests.servers.strained", *words],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    stack.callback(server.wait)
-    stack.callback(server.terminate)
-    assert server.stdout is not None
-    return f"http://127.0.0.1:{int(server.stdout.readline())}/v1"
-
-
-async def ask_all(model: Model, calls: int) -> float:
-    """Ask so many questions; seconds until the last answer."""
-    requests = [
-        Request(str(n), 0, (Message("user", (f"Sample {n}",)),), {}, "", None) for n in range(calls)
-    ]
-    start = time.perf_counter()
-    replies = await asyncio.gather(*map(model.ask, requests))
-    seconds = time.perf_counter() - start
-    await model.aclose()
-    assert all(isinstance(reply, Reply) for reply in replies)
-    return seconds
 
 
 def rate(address: str, calls: int, timeout_s: float, most: int, *, adapts: bool) -> float:
@@ -82,13 +51,14 @@ def main() -> None:
     numbers = sorted({bears // 3, bears // 2, bears, 3 * bears // 2, 2 * bears, options.cap})
     for strain in STRAINS:
         rates = {}
+        server = ("--strain", strain, "--bears", str(bears), "--latency", str(options.latency))
         timeout_s = options.latency * LATE.get(strain, PATIENT)
         for number in numbers:
             with ExitStack() as stack:
-                address = served(stack, strain, bears, options.latency)
+                address = served(stack, "strained", *server)
                 rates[number] = rate(address, options.calls, timeout_s, number, adapts=False)
         with ExitStack() as stack:
-            address = served(stack, strain, bears, options.latency)
+            address = served(stack, "strained", *server)
             found = rate(address, options.calls, timeout_s, options.cap, adapts=True)
         best = max(rates, key=lambda number: rates[number])
         told = ", ".join(f"{number}: {answers:.1f}" for number, answers in rates.items())

@@ -11,45 +11,14 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import subprocess
-import sys
-import time
 from contextlib import ExitStack
-from pathlib import Path
 
-from phyblock.models import Gate, Message, Model, ModelConfig, Reply, Request, build_model
+from local_servers import ask_all, served
 
-ROOT = Path(__file__).parents[2]
+from phyblock.models import Gate, ModelConfig, build_model
+
 WAITING = 4
 """Requests under way for each server: one that is answered, and others that wait there."""
-
-
-def served(stack: ExitStack, latency_s: float) -> str:
-    """The address of a new server."""
-    arguments = ["--latency", str(latency_s), "--one-at-a-time"]
-    server = subprocess.Popen(
-        [sys.executable, "-m", "tests.servers.openai_chat", *arguments],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    stack.callback(server.wait)
-    stack.callback(server.terminate)
-    assert server.stdout is not None
-    return f"http://127.0.0.1:{int(server.stdout.readline())}/v1"
-
-
-async def ask_all(model: Model, calls: int) -> float:
-    """Ask so many questions; seconds until the last answer."""
-    requests = [
-        Request(str(n), 0, (Message("user", (f"Sample {n}",)),), {}, "", None) for n in range(calls)
-    ]
-    start = time.perf_counter()
-    replies = await asyncio.gather(*map(model.ask, requests))
-    seconds = time.perf_counter() - start
-    await model.aclose()
-    assert all(isinstance(reply, Reply) for reply in replies)
-    return seconds
 
 
 def seconds_at(addresses: list[str], calls: int) -> float:
@@ -68,7 +37,8 @@ def main() -> None:
     parser.add_argument("--latency", type=float, default=0.2, metavar="SECONDS")
     options = parser.parse_args()
     with ExitStack() as stack:
-        addresses = [served(stack, options.latency) for _ in range(options.servers)]
+        server = ("--latency", str(options.latency), "--one-at-a-time")
+        addresses = [served(stack, "openai_chat", *server) for _ in range(options.servers)]
         counts = [1, options.servers]
         rates = []
         for count in counts:

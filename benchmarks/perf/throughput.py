@@ -11,15 +11,15 @@ from __future__ import annotations
 
 import argparse
 import os
-import subprocess
 import sys
 import tempfile
+from contextlib import ExitStack
 from pathlib import Path
 
 import yaml
+from local_servers import served
 from measure import Cost, run_measured
 
-ROOT = Path(__file__).parents[2]
 SIZE_PX = 1100
 """Edge at which the rendered composites weigh about 150 KB."""
 
@@ -63,20 +63,10 @@ def main() -> None:
     parser.add_argument("--latency", type=float, default=0.2)
     parser.add_argument("--concurrency", type=int, default=64)
     options = parser.parse_args()
-    server = subprocess.Popen(
-        [sys.executable, "-m", "tests.servers.openai_chat", "--latency", str(options.latency)],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        assert server.stdout is not None
-        api_base = f"http://127.0.0.1:{int(server.stdout.readline())}/v1"
-        with tempfile.TemporaryDirectory() as name:
-            compare(Path(name), api_base, options)
-    finally:
-        server.terminate()
-        server.wait()
+    with ExitStack() as stack:
+        api_base = served(stack, "openai_chat", "--latency", str(options.latency))
+        name = stack.enter_context(tempfile.TemporaryDirectory())
+        compare(Path(name), api_base, options)
 
 
 def compare(folder: Path, api_base: str, options: argparse.Namespace) -> None:

@@ -19,7 +19,6 @@ _OWN = "https://api.anthropic.com/v1/messages/batches"
 class AnthropicBatches(BatchServer, AnthropicMessages):
     """/v1/messages/batches."""
 
-    page = 2
     is_archived = False
 
     def add_routes(self, app: web.Application) -> None:
@@ -27,7 +26,7 @@ class AnthropicBatches(BatchServer, AnthropicMessages):
         path = "/v1/messages/batches"
         app.router.add_post(path, self._create)
         app.router.add_get(path, self._list)
-        app.router.add_get(path + "/{id}", self._look)
+        app.router.add_get(path + "/{id}", self.look_at)
         app.router.add_get(path + "/{id}/results", self._results)
 
     def key_of(self, request: web.Request) -> str:
@@ -50,25 +49,13 @@ class AnthropicBatches(BatchServer, AnthropicMessages):
             requests = [(one["custom_id"], one["params"]) for one in body["requests"]]
             assert all(len(name) <= 64 for name, _ in requests)
             token = requests[0][0].rpartition("-")[0]
-            return web.json_response(self._told(self.make(token, requests, request)))
+            return web.json_response(self.told(self.make(token, requests, request)))
 
         return await self.guarded("create", request, work)
 
-    async def _look(self, request: web.Request) -> web.StreamResponse:
-        async def work() -> web.Response:
-            made = self.find(request.match_info["id"])
-            self.look(made)
-            return web.json_response(self._told(made))
-
-        return await self.guarded("look", request, work)
-
     async def _list(self, request: web.Request) -> web.StreamResponse:
         async def work() -> web.Response:
-            newest = [self._told(made) for made in reversed(self.made)]
-            after = request.query.get("after_id")
-            start = [one["id"] for one in newest].index(after) + 1 if after else 0
-            rows = newest[start : start + self.page]
-            more = start + self.page < len(newest)
+            rows, more = self.listed(self.after(request.query.get("after_id")))
             return web.json_response({"data": rows, "has_more": more, "last_id": ""})
 
         return await self.guarded("list", request, work)
@@ -82,7 +69,7 @@ class AnthropicBatches(BatchServer, AnthropicMessages):
 
         return await self.guarded("results", request, work)
 
-    def _told(self, made: Made) -> dict[str, Any]:
+    def told(self, made: Made) -> dict[str, Any]:
         has_ended = made.state != "running"
         kinds = [line.split('"type": "', 1)[-1].split('"', 1)[0] for line in made.lines]
         counts = {

@@ -60,6 +60,7 @@ class BatchServer(LocalServer):
     """One protocol's batches; `asked` counts each request that was worked on, by sample."""
 
     batch_faults: BatchFaults = BatchFaults()
+    page = 2
 
     def __init__(self, *args: Any, batch: BatchFaults | None = None, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -102,6 +103,31 @@ class BatchServer(LocalServer):
             return reset_connection(request)
         assert isinstance(response, web.StreamResponse)
         return response
+
+    def told(self, made: Made) -> dict[str, Any]:
+        """What the provider says of a batch."""
+        raise NotImplementedError
+
+    async def look_at(self, request: web.Request) -> web.StreamResponse:
+        """A call that looks at a batch."""
+
+        async def work() -> web.Response:
+            made = self.find(request.match_info["id"])
+            self.look(made)
+            return web.json_response(self.told(made))
+
+        return await self.guarded("look", request, work)
+
+    def listed(self, start: int) -> tuple[list[dict[str, Any]], bool]:
+        """A page of batches, the newest first, and whether there are more."""
+        end = start + self.page
+        newest = self.made[::-1][start:end]
+        return [self.told(made) for made in newest], end < len(self.made)
+
+    def after(self, batch_id: str | None) -> int:
+        """Where the page begins that follows on a batch."""
+        newest = [made.id for made in reversed(self.made)]
+        return newest.index(batch_id) + 1 if batch_id else 0
 
     def make(
         self, token: str, requests: list[tuple[str, dict[str, Any]]], call: web.Request

@@ -19,8 +19,6 @@ _CODES = {"400": 3, "429": 8, "500": 13, "cancelled": 1, "expired": 1}
 class GeminiBatches(BatchServer, GeminiGenerate):
     """/upload/v1beta/files, :batchGenerateContent, /v1beta/batches, /download/v1beta/files."""
 
-    page = 2
-
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         self.files: list[list[dict[str, Any]]] = []
@@ -30,7 +28,7 @@ class GeminiBatches(BatchServer, GeminiGenerate):
         app.router.add_post("/upload/v1beta/sent", self._upload)
         app.router.add_post("/v1beta/models/{name}:batchGenerateContent", self._create)
         app.router.add_get("/v1beta/batches", self._list)
-        app.router.add_get("/v1beta/batches/{id}", self._look)
+        app.router.add_get("/v1beta/batches/{id}", self.look_at)
         app.router.add_get("/download/v1beta/files/{id}:download", self._results)
         super().add_routes(app)
 
@@ -63,27 +61,17 @@ class GeminiBatches(BatchServer, GeminiGenerate):
             batch = (await request.json())["batch"]
             number = int(batch["input_config"]["file_name"].rpartition("-")[2])
             requests = [(line["key"], line["request"]) for line in self.files[number]]
-            return web.json_response(
-                self._told(self.make(batch["display_name"], requests, request))
-            )
+            return web.json_response(self.told(self.make(batch["display_name"], requests, request)))
 
         return await self.guarded("create", request, work)
 
-    async def _look(self, request: web.Request) -> web.StreamResponse:
-        async def work() -> web.Response:
-            made = self.find(request.match_info["id"])
-            self.look(made)
-            return web.json_response(self._told(made))
-
-        return await self.guarded("look", request, work)
-
     async def _list(self, request: web.Request) -> web.StreamResponse:
         async def work() -> web.Response:
-            newest = [self._told(made) for made in reversed(self.made)]
             start = int(request.query.get("pageToken", 0))
-            body: dict[str, Any] = {"operations": newest[start : start + self.page]}
-            if start + self.page < len(newest):
-                body["nextPageToken"] = str(start + self.page)
+            rows, more = self.listed(start)
+            body: dict[str, Any] = {"operations": rows}
+            if more:
+                body["nextPageToken"] = str(start + len(rows))
             return web.json_response(body)
 
         return await self.guarded("list", request, work)
@@ -96,7 +84,7 @@ class GeminiBatches(BatchServer, GeminiGenerate):
 
         return await self.guarded("results", request, work)
 
-    def _told(self, made: Made) -> dict[str, Any]:
+    def told(self, made: Made) -> dict[str, Any]:
         state = _WORDS.get(made.state, made.state.upper())
         has_results = made.state in ("ended", "cancelled") and made.lines
         created = datetime.fromtimestamp(made.created_s, timezone.utc).isoformat()

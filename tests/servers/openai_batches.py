@@ -21,7 +21,6 @@ class OpenAIBatches(BatchServer, OpenAIChat):
 
     forgets_names = False
     is_late = False
-    page = 2
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -33,7 +32,7 @@ class OpenAIBatches(BatchServer, OpenAIChat):
         app.router.add_get("/v1/files/{id}/content", self._content)
         app.router.add_post("/v1/batches", self._create)
         app.router.add_get("/v1/batches", self._list)
-        app.router.add_get("/v1/batches/{id}", self._look)
+        app.router.add_get("/v1/batches/{id}", self.look_at)
 
     def key_of(self, request: web.Request) -> str:
         return request.headers.get("Authorization", "").removeprefix("Bearer ")
@@ -73,26 +72,13 @@ class OpenAIBatches(BatchServer, OpenAIChat):
             }
             requests = [(line["custom_id"], line["body"]) for line in lines]
             made = self.make(body["metadata"]["phyblock"], requests, request)
-            return web.json_response(self._told(made))
+            return web.json_response(self.told(made))
 
         return await self.guarded("create", request, work)
 
-    async def _look(self, request: web.Request) -> web.StreamResponse:
-        async def work() -> web.Response:
-            made = self.find(request.match_info["id"])
-            self.look(made)
-            return web.json_response(self._told(made))
-
-        return await self.guarded("look", request, work)
-
     async def _list(self, request: web.Request) -> web.StreamResponse:
         async def work() -> web.Response:
-            newest = [self._told(made) for made in reversed(self.made)]
-            after = request.query.get("after")
-            ids = [one["id"] for one in newest]
-            start = ids.index(after) + 1 if after else 0
-            rows = newest[start : start + self.page]
-            more = start + self.page < len(newest)
+            rows, more = self.listed(self.after(request.query.get("after")))
             return web.json_response({"object": "list", "data": rows, "has_more": more})
 
         return await self.guarded("list", request, work)
@@ -105,7 +91,7 @@ class OpenAIBatches(BatchServer, OpenAIChat):
 
         return await self.guarded("results", request, work)
 
-    def _told(self, made: Made) -> dict[str, Any]:
+    def told(self, made: Made) -> dict[str, Any]:
         has_ended = made.state not in ("running", "refused")
         has_ended = has_ended and made.looks >= self.batch_faults.looks + self.is_late
         done = len(made.lines)
