@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["csv_cell", "one_line", "plain_lines", "well_formed"]
+__all__ = ["counted", "csv_cell", "one_line", "plain_lines", "well_formed"]
 
 _HALF = re.compile("[\ud800-\udfff]")
 _FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
@@ -31,6 +31,11 @@ def one_line(text: str) -> str:
 def plain_lines(text: str) -> str:
     """Text whose lines are each as `one_line` makes them."""
     return "\n".join(map(one_line, text.split("\n")))
+
+
+def counted(number: int, noun: str, several: str = "") -> str:
+    """A number with its noun: `1 call`, `2 calls`; `several` is a plural that takes no plain s."""
+    return f"{number:,} {noun if number == 1 else several or noun + 's'}"
 
 
 def csv_cell(value: object) -> object:

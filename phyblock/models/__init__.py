@@ -14,7 +14,7 @@ from phyblock.models.base import (
     Request,
     Usage,
 )
-from phyblock.models.batches import BatchFiles, under_way, waiting_keys
+from phyblock.models.batches import BatchFiles, remove_unfinished, under_way, waiting_keys
 from phyblock.models.breaker import Breakers
 from phyblock.models.build import build_model
 from phyblock.models.cache import CacheStats, ReplyCache, former_key, known_keys, reply_key
@@ -85,6 +85,7 @@ __all__ = [
     "most_usd",
     "prices_of",
     "read_raw_reply",
+    "remove_unfinished",
     "reply_key",
     "server_address",
     "takes_format",

@@ -20,6 +20,7 @@ from phyblock.models import (
     addresses_of,
     api_key_status,
     build_model,
+    remove_unfinished,
     under_way,
 )
 from phyblock.records import BATCHES
@@ -107,6 +108,7 @@ class Session:
             manifest = plan.manifest if is_there else plan.begun()
             self._store = RunStore(self._folder, manifest, plan.sample_ids())
             self._check_batches(self._store)
+            remove_unfinished(self._folder)
             if self._use_cache and any(m.config.kind == "litellm" for m in plan.models):
                 self._cache = SharedCache(reply_cache_file(), self._tell)
                 await self._cache.open()

@@ -24,6 +24,7 @@ from phyblock.models import (
     RetryPolicy,
     SharedCache,
     build_model,
+    remove_unfinished,
 )
 from phyblock.records import BatchLine
 from tests.models.factory import QUICK
@@ -71,6 +72,7 @@ async def command(
     cache = None if disk.cache is None else SharedCache(disk.cache)
     if cache is not None:
         await cache.open()
+    remove_unfinished(disk.folder)
     model = build_model(
         config,
         cache=cache,

@@ -5,8 +5,16 @@
 """
 
 from phyblock.models.batches.choice import batch_protocol
-from phyblock.models.batches.ledger import BatchFiles, under_way
+from phyblock.models.batches.ledger import BatchFiles, remove_unfinished, under_way
 from phyblock.models.batches.model import BatchModel, BatchParts
 from phyblock.models.batches.waiting import waiting_keys
 
-__all__ = ["BatchFiles", "BatchModel", "BatchParts", "batch_protocol", "under_way", "waiting_keys"]
+__all__ = [
+    "BatchFiles",
+    "BatchModel",
+    "BatchParts",
+    "batch_protocol",
+    "remove_unfinished",
+    "under_way",
+    "waiting_keys",
+]

@@ -108,7 +108,7 @@ class Follower:
     async def _fetch(self, batch: Batch, status: BatchStatus) -> None:
         """Have the answers on disk, whole."""
         path = self._files.answers(batch.token)
-        part = path.with_suffix(".part")
+        part = self._files.half_fetched(batch.token)
         path.parent.mkdir(parents=True, exist_ok=True)
         wire = self._protocol.wire
         await self._sender.patiently(lambda: wire.download(status.results, part))

@@ -8,18 +8,22 @@ its id, or one that can be looked for under our name.
 from __future__ import annotations
 
 import asyncio
+import re
 import secrets
 from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass, field
 from datetime import date, datetime, timezone
 from pathlib import Path
 
+from phyblock.files import writing
 from phyblock.models.batches.results import Results
 from phyblock.records.others import BatchEvent, BatchLine
 
-__all__ = ["Batch", "BatchFiles", "Ledger", "new_token", "under_way"]
+__all__ = ["Batch", "BatchFiles", "Ledger", "new_token", "remove_unfinished", "under_way"]
 
 _FOLDER = "batches"
+_UNFINISHED = re.compile(r"pb[0-9a-f]{24}\.(?:requests|candidate|answers\.part)")
+"""Names of the files that a batch is sent from, and is looked for and fetched into."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +43,21 @@ class BatchFiles:
         """Where requests and answers lie."""
         return self.run_folder / _FOLDER
 
+    def requests(self, token: str) -> Path:
+        """Where a batch is written before it is sent."""
+        return self.folder / f"{token}.requests"
+
+    def candidate(self, token: str) -> Path:
+        """The answers of one that may be a batch that is looked for."""
+        return self.folder / f"{token}.candidate"
+
     def answers(self, token: str) -> Path:
         """The answers of a batch, once it has ended."""
         return self.folder / f"{token}.answers.jsonl"
+
+    def half_fetched(self, token: str) -> Path:
+        """The answers of a batch while they are fetched."""
+        return self.folder / f"{token}.answers.part"
 
 
 @dataclass(eq=False)
@@ -165,6 +181,19 @@ class Ledger:
 def new_token() -> str:
     """A name that no other batch has; what the providers allow in names and boundaries."""
     return f"pb{secrets.token_hex(12)}"
+
+
+def remove_unfinished(run_folder: Path) -> None:
+    """Remove what killed commands left half written: it is written anew where it is needed.
+
+    Only for who holds the run folder, before it sends a batch. Raises StoreError where the disk
+    refuses.
+    """
+    folder = run_folder / _FOLDER
+    with writing(folder):
+        for path in folder.iterdir() if folder.is_dir() else ():
+            if _UNFINISHED.fullmatch(path.name):
+                path.unlink()
 
 
 def under_way(lines: Iterable[BatchLine]) -> dict[str, str]:

@@ -221,8 +221,8 @@ class BatchModel:
                 return False
             await self._purse.wait_for(most_usd, self._parts.halt)
         if self._draft is None:
-            folder = self._parts.files.folder
-            self._draft = Draft(self._parts.protocol, folder, seeded=written.seeded)
+            files = self._parts.files
+            self._draft = Draft(self._parts.protocol, files, seeded=written.seeded)
         self._draft.add(key, written, most_usd)
         self._draft.held = self._purse.hold(most_usd, self._draft.held)
         return True

@@ -22,6 +22,7 @@ from phyblock.models.batches.results import Results, custom_id
 from phyblock.models.batches.wording import Written
 from phyblock.models.events import Tell
 from phyblock.models.retry import RetryPolicy, with_retries
+from phyblock.plain_text import counted
 from phyblock.records import BATCHES
 
 __all__ = ["Draft", "Sender", "UnsureError"]
@@ -41,16 +42,16 @@ class Draft:
     can cost [US dollars], None where no price is known; `held` is its reservation in the budget.
     """
 
-    def __init__(self, protocol: BatchProtocol, folder: Path, *, seeded: bool) -> None:
+    def __init__(self, protocol: BatchProtocol, files: BatchFiles, *, seeded: bool) -> None:
         self.seeded = seeded
         self.token = new_token()
-        self.path = _requests_file(folder, self.token)
+        self.path = files.requests(self.token)
         self.keys: dict[str, float | None] = {}
         self.held: int | None = None
         self._protocol = protocol
         self._bytes = 0
         with writing(self.path, _HINT):
-            folder.mkdir(parents=True, exist_ok=True)
+            files.folder.mkdir(parents=True, exist_ok=True)
             self._file = self.path.open("wb")
         self._write(protocol.head(self.token))
 
@@ -92,10 +93,9 @@ class Draft:
     @property
     def size(self) -> str:
         """How much it is, in words."""
-        several = "s" * (len(self.keys) != 1)
         megabytes = self._bytes / 1e6
         weight = f"{megabytes:.1f} MB" if megabytes >= 0.1 else f"{1000 * megabytes:.0f} kB"
-        return f"{len(self.keys):,} request{several}, {weight}"
+        return f"{counted(len(self.keys), 'request')}, {weight}"
 
 
 class Sender:
@@ -152,7 +152,6 @@ class Sender:
 
         Raises UnavailableError where that cannot be found out.
         """
-        _requests_file(self._files.folder, batch.token).unlink(missing_ok=True)
         # A request that was cut off may still be worked on over there.
         status = await self._find(batch, time.time() + 2 * self._files.poll_s)
         if status is None:
@@ -258,7 +257,7 @@ class Sender:
 
     async def _answers(self, status: BatchStatus, batch: Batch) -> bool:
         """Whether a batch that has ended answers what this one asks."""
-        path = self._files.folder / f"{batch.token}.candidate"
+        path = self._files.candidate(batch.token)
         try:
             await self.patiently(lambda: self._protocol.wire.download(status.results, path))
             found = await asyncio.to_thread(
@@ -276,11 +275,6 @@ class Sender:
             raise
         except ModelError as error:
             raise UnavailableError(str(error), status=error.status, sent=error.sent) from None
-
-
-def _requests_file(folder: Path, token: str) -> Path:
-    """Where a batch is written before it is sent."""
-    return folder / f"{token}.requests"
 
 
 def _named(status: BatchStatus) -> BatchStatus:
