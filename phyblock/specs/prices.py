@@ -60,7 +60,8 @@ class TierSpec(RateSpec):
 def _check_rising(tiers: tuple[TierSpec, ...]) -> tuple[TierSpec, ...]:
     for index, (tier, following) in enumerate(pairwise(tiers), start=1):
         if following.above <= tier.above:
-            raise refuse("is not above the one before it", at=(index, "above"))
+            message, allowed = "is not above the one before it", f"more than {tier.above}"
+            raise refuse(message, at=(index, "above"), allowed=allowed)
     return tiers
 
 
@@ -97,9 +98,12 @@ class PriceSpec(RateSpec):
 
 def _check_days(prices: tuple[PriceSpec, ...]) -> tuple[PriceSpec, ...]:
     for index, (price, following) in enumerate(pairwise(prices), start=1):
-        if following.since is None or (price.since is not None and following.since <= price.since):
-            message = "does not say from which later day on it holds"
-            raise refuse(message, at=(index,), hint="for example from: 2026-12-01")
+        if following.since is None:
+            message = "does not say from which day on it holds"
+            raise refuse(message, at=(index,), hint="add from, for example from: 2026-12-01")
+        if price.since is not None and following.since <= price.since:
+            message, allowed = "is not later than the one before it", f"a day after {price.since}"
+            raise refuse(message, at=(index, "from"), allowed=allowed)
     return prices
 
 

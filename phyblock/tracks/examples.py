@@ -163,10 +163,20 @@ def examples_of(
     n, named = (wanted, ()) if isinstance(wanted, int) else (len(wanted), wanted)
     kept = list(pool) if n else []
     known = {one.scene.id for one in kept}
-    if lacking := [name for name in named if name not in known]:
-        message = f"no {noun} that can be an example is about this scene"
-        hint = did_you_mean(lacking[0], sorted(known))
-        raise SpecError(Problem(where, message, "examples", lacking[0], hint=hint))
+    if lacking := [(at, name) for at, name in enumerate(named) if name not in known]:
+        message = "is no scene that an example can be about"
+        allowed = f"names of scenes, such as {min(known)}" if known else "no scene of these data"
+        raise SpecError(
+            Problem(
+                loaded.where("examples", at),
+                message,
+                f"examples[{at}]",
+                name,
+                allowed,
+                did_you_mean(name, sorted(known)),
+            )
+            for at, name in lacking
+        )
     examples = Examples(kept, n, named, suite.seeds[0], sort_of, stand_ins)
     examples.check(items, noun, where)
     return examples

@@ -223,7 +223,11 @@ def test_before_the_first_day_that_is_named_the_map_holds(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("price", "said"),
     [
-        ("[{input: 1, output: 1}, {input: 2, output: 2}]", "models.yaml:1:.*from which later day"),
+        ("[{input: 1, output: 1}, {input: 2, output: 2}]", "models.yaml:1:.*from which day"),
+        (
+            "[{from: 2026-12-01, input: 1, output: 1}, {from: 2026-11-01, input: 2, output: 2}]",
+            r"price\[1\]\.from: is not later than the one before it.*a day after 2026-12-01",
+        ),
         ("{from: soon, input: 1, output: 1}", r"m\.price\.from: is no day.*soon"),
         ("{from: 2026-13-01, input: 1, output: 1}", "is no day"),
         ("{input: 1}", r"m\.price\.output.* is missing"),

@@ -214,7 +214,8 @@ def test_examples_are_a_part_of_what_a_run_is_only_where_there_are_some(tmp_path
     ("sets", "said"),
     [
         (("examples=17",), "examples"),
-        (("examples=[nowhere]",), "is about this scene"),
+        (("examples=[nowhere]",), "examples[0]: is no scene that an example can be about"),
+        (("examples=[l1-001-animals]",), "did you mean l1-001-animal?"),
         (("examples=1", "tracks=[step_planning]"), "episode of several turns"),
         (("examples=1", "tracks=[pose_planning]"), "the floor and the sheet of blocks"),
         (("vary.examples=[0, 2]", "tracks=[step_planning]"), "has no meaning in step_planning"),
@@ -245,6 +246,8 @@ def test_a_run_shows_examples_varies_them_and_says_which(workspace: Workspace) -
         again = workspace.run()
         assert len(running.server.seen) == 6
     assert (estimated.code, done.code, again.code) == (0, 0, 0), done.err
+    told = " ".join(estimated.out.split())
+    assert "2 ways of asking, 0 or 2 worked examples before each question" in told
     assert seen[:3] == [seen[0]] * 3
     assert seen[3] > 2 * seen[0]
     records = workspace.records()
