@@ -11,7 +11,7 @@ import click
 from rich.console import Console
 
 from phyblock.addresses import host_of
-from phyblock.cli.console import counted, make_console, plain_table, shown_path
+from phyblock.cli.console import make_console, plain_table, shown_path
 from phyblock.cli.files import find_models_file
 from phyblock.cli.paths import models_file_option
 from phyblock.errors import ModelError, Problem, SpecError
@@ -25,6 +25,7 @@ from phyblock.models import (
     prices_of,
     today,
 )
+from phyblock.plain_text import counted
 from phyblock.registry import baseline_names
 from phyblock.report import NO_VALUE
 from phyblock.run.check import check_model
@@ -42,6 +43,7 @@ from phyblock.specs import (
 __all__ = ["command"]
 
 _SOON_DAYS = 180
+_TIERS = " .. "
 _WIDE = 130
 """Characters from which kinds and prices fit beside names, ids and keys."""
 
@@ -64,13 +66,19 @@ def command(ctx: click.Context, models_file: str | None, retiring: bool) -> None
     if retiring:
         _show_retiring(console, [_config(name, ctx.obj) for name in ctx.obj])
         return
-    for title, names in _by_group(ctx.obj):
-        _show(console, title, [_row(name, _config(name, ctx.obj)) for name in names])
+    groups = {
+        title: [_row(name, _config(name, ctx.obj)) for name in names]
+        for title, names in _by_group(ctx.obj)
+    }
+    for title, rows in groups.items():
+        _show(console, title, rows)
     console.print(
         f"{counted(len(ctx.obj), 'model')} in {shown_path(path)}", soft_wrap=True, markup=False
     )
     if console.width < _WIDE:
         console.print(f"Kinds and prices need a window of {_WIDE} columns.", soft_wrap=True)
+    elif any(_TIERS in cell for rows in groups.values() for row in rows for cell in row[-2:]):
+        console.print(f"a{_TIERS}b: a for short prompts, b for the longest.", soft_wrap=True)
 
 
 def _by_group(known: dict[str, ModelSpec]) -> Iterator[tuple[str, Sequence[str]]]:
@@ -172,13 +180,16 @@ def _row(name: str, config: ModelConfig) -> tuple[str, ...]:
     else:
         key = f"needs {status.variables[0]}" if status.is_needed else "not needed"
     known = prices_of(config)
-    price = None if known is None else known.at(today())
-    prices = (
-        ("unknown", "unknown") if price is None else (_usd(price.input_usd), _usd(price.output_usd))
-    )
+    tariff = None if known is None else known.on(today())
+    prices = ("unknown", "unknown")
+    if tariff is not None:
+        tiers = [rate.price for rate in tariff.rates]
+        prices = (_usd(*(p.input_usd for p in tiers)), _usd(*(p.output_usd for p in tiers)))
     kind = "direct" if config.is_direct else "litellm"
     return (name, kind, config.id, key, *prices)
 
 
-def _usd(dollars: float) -> str:
-    return f"{dollars:.3f}".rstrip("0").rstrip(".")
+def _usd(*dollars: float) -> str:
+    """The price of short prompts, and that of the longest where it is another."""
+    shown = [f"{usd:.3f}".rstrip("0").rstrip(".") for usd in (dollars[0], dollars[-1])]
+    return _TIERS.join(dict.fromkeys(shown))

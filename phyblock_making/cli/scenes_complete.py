@@ -10,6 +10,8 @@ import click
 from phyblock.cli.console import shown_path
 from phyblock.cli.paths import UserPath
 from phyblock.errors import DataError, Problem
+from phyblock.plain_text import counted
+from phyblock_making.checks.set_checks import find_duplicates, find_orphans
 from phyblock_making.cli.working import jobs_option, tracked
 from phyblock_making.scenes.completing import Completed, complete, palette_of
 from phyblock_making.scenes.given_scenes import ReadScene, read_given
@@ -50,7 +52,8 @@ def command(data: Path, jobs: int, out: Path | None) -> None:
                 problems += one
     if problems:
         raise DataError(problems)
-    palette = palette_of([one.scene for one in done])
+    scenes = [one.scene for one in done]
+    palette = palette_of(scenes)
     made_by = f"phyblock scenes complete {shlex.quote(data.name)} --out {shlex.quote(folder.name)}"
     with open_writer(folder, palette) as writer:
         for one in done:
@@ -59,8 +62,10 @@ def command(data: Path, jobs: int, out: Path | None) -> None:
     for one in done:
         for note in one.notes:
             click.echo(f"note: scene {one.scene.id}: {note}")
-    noun = "scene" if len(done) == 1 else "scenes"
-    click.echo(f"{len(done)} {noun} completed: {shown_path(folder)}")
+    for finding in (*find_duplicates(scenes), *find_orphans(scenes)):
+        said = f"{finding.field} {finding.message}".strip()
+        click.echo(f"note: scene {finding.scene}: {said}")
+    click.echo(f"{counted(len(done), 'scene')} completed: {shown_path(folder)}")
     here = str(folder) if folder.is_absolute() else f"./{folder}"
     click.echo(f"Next: phyblock run quick --set dataset.path={shlex.quote(here)}")
 

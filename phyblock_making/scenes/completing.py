@@ -25,8 +25,8 @@ _GEOMETRY: tuple[CheckName, ...] = ("overlap", "floating", "order", "candidates"
 _STANDING: tuple[CheckName, ...] = ("unstable step", "unstable")
 _NOTED: tuple[CheckName, ...] = ("size", "hidden")
 _HINTS: dict[str, str] = {
-    "order": "list blocks in an order in which they can be built, or leave out order",
-    "unstable step": "list blocks in an order in which each of them stands when it is placed",
+    "order": "{} blocks in an order in which they can be built",
+    "unstable step": "{} blocks in an order in which each of them stands when it is placed",
 }
 
 
@@ -50,6 +50,7 @@ def complete(read: ReadScene) -> Completed:
     scene = derived(read.name, read.given, read.where)
     offered = None if read.given.candidates is None else candidate_set(read.given.candidates)
     facts = SceneFacts(scene, offered, OURS_IN_HASTE)
+    how = "number" if read.given.is_ordered else "list"
     # What overlaps or floats falls as well; that shall be told once.
     for names in (_GEOMETRY, _STANDING):
         if found := tuple(findings_of(facts, names)):
@@ -58,7 +59,7 @@ def complete(read: ReadScene) -> Completed:
                     one.problem,
                     where=read.where,
                     message=f"scene {read.name}: {one.message}",
-                    hint=_HINTS.get(one.check, ""),
+                    hint=_HINTS.get(one.check, "").format(how),
                 )
                 for one in found
             )
@@ -76,6 +77,11 @@ def derived(name: str, given: GivenScene, where: str) -> Scene:
     Where no block says its `order`, blocks are numbered as they are listed, each behind those that
     it rests on. Raises DataError where contacts name no order.
     """
+    unordered = [n for n, block in enumerate(given.blocks) if block.order is None]
+    if unordered and len(unordered) < len(given.blocks):
+        message = f"scene {name}: is missing, and other blocks have one"
+        allowed = "an order for every block, or for none"
+        raise DataError(Problem(where, message, f"blocks[{unordered[0]}].order", "", allowed))
     listed = [block.block(number) for number, block in enumerate(given.blocks, 1)]
     orders = [block.order for block in listed]
     if twice := sorted({order for order in orders if orders.count(order) > 1}):
@@ -83,7 +89,7 @@ def derived(name: str, given: GivenScene, where: str) -> Scene:
         raise DataError(Problem(where, message, "order", str(twice[0]), "unique orders"))
     try:
         scene = scene_of(name, (), listed, given.parents)
-        if all(block.order is None for block in given.blocks):
+        if not given.is_ordered:
             scene = scene_of(name, (), _buildable(scene), given.parents)
     except CycleError as error:
         cycle = " -> ".join(str(orders[v]) for v in (*error.vertices, error.vertices[0]))

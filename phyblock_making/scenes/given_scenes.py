@@ -69,6 +69,11 @@ class GivenScene(Line, extra="forbid"):
     candidates: CandidateList | None = None
     format: Format = 1
 
+    @property
+    def is_ordered(self) -> bool:
+        """Whether every block says its `order`."""
+        return all(block.order is not None for block in self.blocks)
+
 
 @dataclass(frozen=True)
 class ReadScene:

@@ -77,8 +77,9 @@ def moved(number: int, *by_m: float) -> list[Any]:
         (moved(4, 0, 0.08, 0), "floats"),
         ([GABLES[0], {**GABLES[2], "position": [0, 0.02, 0.0625]}], "block 2 falls"),
         ([{**GABLES[0], "order": 1}, {**GABLES[1], "order": 1}], "two blocks of the same order"),
+        ([GABLES[0], {**GABLES[1], "order": 1}], "blocks[0].order: scene mine: is missing"),
         ([{**GABLES[2], "order": 1}, {**GABLES[0], "order": 2}, {**GABLES[1], "order": 3}],
-         "before its support"),
+         "hint: number blocks in an order in which they can be built"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_built_is_refused(blocks: list[Any], said: str) -> None:
@@ -174,6 +175,25 @@ def test_what_is_completed_is_a_data_set_that_validates_and_runs(workspace: Work
     ran = workspace.run()
     assert ran.code == 0, ran.err
     assert {record["outcome"] for record in workspace.records()} == {"ok"}
+
+
+def test_scenes_that_are_alike_and_parents_that_are_not_there_are_noted(
+    workspace: Workspace,
+) -> None:
+    turned = [
+        {**block, "position": [-block["position"][1], block["position"][0], block["position"][2]],
+         "euler": [0, 0, (block.get("euler", [0, 0, 0])[2] + 90) % 360]}
+        for block in GABLES[:2]
+    ]  # fmt: skip
+    source = workspace.write_yaml("two.yaml", {"scenes": [
+        {"id": "pair", "blocks": GABLES[:2]},
+        {"id": "turned", "blocks": turned, "parents": ["nowhere"]},
+    ]})  # fmt: skip
+    done = workspace.phyblock("scenes", "complete", source.name, "--jobs", "1")
+    assert done.code == 0, done.err
+    assert "scene turned: is scene pair, turned, mirrored or shifted at most" in done.out
+    assert "scene turned: parents name no base scene of the set" in done.out
+    assert "2 scenes completed" in done.out
 
 
 def test_a_given_order_is_kept() -> None:
