@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.plain_text import csv_cell, one_line
+from phyblock.plain_text import counted, csv_cell, one_line
 
 STARTS = tuple("=+-@\t\r\n")
 risky = st.text(alphabet="'=+-@\t\r\n1.a") | st.text()
@@ -47,3 +47,12 @@ def test_one_line_is_one_line_that_can_be_written(text: str) -> None:
 def test_one_line_leaves_printable_text_alone() -> None:
     assert one_line("a ± b – 模型") == "a ± b – 模型"  # noqa: RUF001
     assert one_line("a\nb\x1b[31m\u202ec\ud800") == "a b [31m c\ufffd"
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [(0, "0 replies"), (1, "1 reply"), (2, "2 replies"), (1500, "1,500 replies")],
+)
+def test_one_thing_is_no_plural(number: int, said: str) -> None:
+    assert counted(number, "reply", "replies") == said
+    assert counted(number, "scene") == said.replace("replies", "scenes").replace("reply", "scene")

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import click
 
-from phyblock.cli.console import counted, make_console, plain_table
+from phyblock.cli.console import make_console, plain_table
 from phyblock.errors import InputError, Problem, said
 from phyblock.models import ReplyCache
+from phyblock.plain_text import counted
 from phyblock.resources import learned_dir, reply_cache_file
 
 __all__ = ["command"]
@@ -33,7 +34,7 @@ def stats() -> None:
     rows = [(model, f"{replies:,}") for model, replies in found.by_model.items()]
     console.print(plain_table(("model", "replies"), rows, numbers=1))
     size = f"{found.size_bytes / 1e6:,.1f} MB"
-    text = f"{found.replies:,} replies, {size}, in {found.path}"
+    text = f"{counted(found.replies, 'reply', 'replies')}, {size}, in {found.path}"
     console.print(text, soft_wrap=True, markup=False)
     if sizes := _learned():
         text = f"{_told(list(sizes.values()))}, in {learned_dir()}"
@@ -59,7 +60,7 @@ def clear(model: str | None, learned: bool, yes: bool) -> None:
     if not yes:
         click.confirm(f"Delete {which}? Repeated calls will be billed.", abort=True)
     with ReplyCache(reply_cache_file()) as cache:
-        make_console().print(f"Deleted {cache.clear(model):,} replies.")
+        make_console().print(f"Deleted {counted(cache.clear(model), 'reply', 'replies')}.")
 
 
 def _clear_learned() -> None:

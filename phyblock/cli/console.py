@@ -16,7 +16,7 @@ from phyblock.cli.layout import lay_out
 from phyblock.plain_text import one_line, plain_lines
 from phyblock.report import TextTable
 
-__all__ = ["counted", "make_console", "plain_table", "print_view", "shown_path"]
+__all__ = ["make_console", "plain_table", "print_view", "shown_path"]
 
 _PLAIN_WIDTH = 160
 
@@ -76,11 +76,6 @@ def plain_table(
     for row in rows:
         table.add_row(*map(Text, row))
     return table
-
-
-def counted(number: int, noun: str) -> str:
-    """A number with its noun: `1 call`, `2 calls`."""
-    return f"{number:,} {noun}" + ("" if number == 1 else "s")
 
 
 def shown_path(path: Path) -> str:

@@ -12,6 +12,7 @@ from phyblock.cli.paths import UserPath
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.files import write_named
+from phyblock.plain_text import counted
 from phyblock.records import MANIFEST, RECORDS, Record, read_manifest
 from phyblock.records.reading import newest_starts, run_records
 from phyblock.run.data import recorded_dataset
@@ -67,7 +68,7 @@ def command(
     for path, make in ((gif, episode_gif), (sheet, episode_sheet)):
         if path is not None:
             write_named(path, make(images))
-            console.print(f"{len(images)} frames in {shown_path(path)}", markup=False)
+            console.print(f"{counted(len(images), 'frame')} in {shown_path(path)}", markup=False)
 
 
 def _views() -> dict[str, EpisodeView]:

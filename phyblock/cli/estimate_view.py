@@ -8,6 +8,7 @@ from rich.console import Console
 
 from phyblock.cli.console import print_view
 from phyblock.models import Price
+from phyblock.plain_text import counted
 from phyblock.report import NO_VALUE, Column, TextTable
 from phyblock.run.estimate import Estimate
 from phyblock.run.plan import RunPlan
@@ -24,11 +25,11 @@ _TEXTS = ("model", "kind")
 
 def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> None:
     """Print what each model would take, and the sum."""
-    items = [_counted(len(track.items), kind_of(track.name).item) for track in plan.tracks]
+    items = [counted(len(track.items), kind_of(track.name).item) for track in plan.tracks]
     caption = (
         f"{plan.suite.name}: {', '.join(items)} of {plan.dataset.name}, "
-        f"{_counted(len(plan.suite.seeds), 'seed')}{_ways(plan)}, "
-        f"{_counted(len(plan.models), 'model')}"
+        f"{counted(len(plan.suite.seeds), 'seed')}{_ways(plan)}{_shots(plan)}, "
+        f"{counted(len(plan.models), 'model')}"
     )
     cells = tuple(
         (
@@ -52,7 +53,7 @@ def show_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> 
         console.print(text, soft_wrap=True, markup=False)
     for row in rows:
         if row.waiting:
-            asked = f"{_counted(row.waiting, 'call')} of {row.model} went out in batches before."
+            asked = f"{counted(row.waiting, 'call')} of {row.model} went out in batches before."
             console.print(asked, soft_wrap=True, markup=False)
     if any(row.batch for row in left):
         text = "batch: answers come within a day, at the price of batches; no call is sent twice."
@@ -78,8 +79,8 @@ def _sum(rows: Sequence[Estimate]) -> str:
         parts = f" (prompts {prompts}, replies {replies})" if known else ""
         costs = [f"about {whole}{parts}"]
     if unknown := len(rows) - len(known):
-        costs.append(f"unknown cost of {_counted(unknown, 'model')} (give a price in models.yaml)")
-    return f"{_counted(sum(row.calls for row in rows), 'call')}, {' and '.join(costs)}."
+        costs.append(f"unknown cost of {counted(unknown, 'model')} (give a price in models.yaml)")
+    return f"{counted(sum(row.calls for row in rows), 'call')}, {' and '.join(costs)}."
 
 
 def _prices(rows: Sequence[Estimate]) -> Iterator[str]:
@@ -124,8 +125,15 @@ def _ways(plan: RunPlan) -> str:
     return f", {n:,} ways of asking" if n > 1 else ""
 
 
-def _counted(number: int, word: str) -> str:
-    return f"{number:,} {word}{'' if number == 1 else 's'}"
+def _shots(plan: RunPlan) -> str:
+    """How many worked examples stand before a question, where there are any."""
+    wanted = [plan.suite.at(variant).examples for variant in plan.variants]
+    numbers = sorted({n if isinstance(n, int) else len(n) for n in wanted})
+    if numbers == [0]:
+        return ""
+    *fewer, most = numbers
+    words = " or ".join((*map(str, fewer), counted(most, "worked example")))
+    return f", {words} before each question"
 
 
 def _dollars(cost_usd: float | None) -> str:

@@ -11,7 +11,7 @@ import click
 
 from phyblock.cli.verbs import Verbs
 from phyblock.errors import InputError, PhyblockError, Problem, StoreError, said
-from phyblock.plain_text import plain_lines
+from phyblock.plain_text import counted, plain_lines
 
 __all__ = ["main", "show_problems"]
 
@@ -120,7 +120,8 @@ def show_problems(error: InputError) -> None:
             click.echo(plain_lines(f"{more}: {': '.join(filter(None, kind))}"), err=True)
     told = sum(alike[kind] if shown[kind] == _SHOWN_ALIKE else shown[kind] for kind in alike)
     if len(error.problems) > told:
-        click.echo(f"... and {len(error.problems) - told:,} more problems", err=True)
+        more = counted(len(error.problems) - told, "more problem")
+        click.echo(f"... and {more}", err=True)
 
 
 def _kind(problem: Problem) -> tuple[str, str]:

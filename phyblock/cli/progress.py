@@ -19,7 +19,7 @@ from rich.text import Text
 
 from phyblock.cli.remarks import Remarks
 from phyblock.cli.tally import Tally, failure_text
-from phyblock.plain_text import one_line
+from phyblock.plain_text import counted, one_line
 from phyblock.run.events import (
     ModelNotice,
     ModelStopped,
@@ -126,7 +126,7 @@ class ProgressView:
     def concurrency_text(self) -> str:
         """How many calls were under way at once where that was found out; "" where it was said."""
         return "; ".join(
-            f"{one_line(name)} had up to {tally.at_once} calls at once in the end, "
+            f"{one_line(name)} had up to {counted(tally.at_once, 'call')} at once in the end, "
             f"{tally.most_at_once} at most"
             for name, tally in self._tallies.items()
             if tally.at_once
@@ -135,7 +135,7 @@ class ProgressView:
     def _stopping_text(self, event: Stopping) -> str:
         if not event.in_flight:
             return f"Stopping: {event.reason}."
-        calls = f"{event.in_flight} call{'s' if event.in_flight > 1 else ''} under way"
+        calls = f"{counted(event.in_flight, 'call')} under way"
         return f"Stopping: {event.reason}; waiting for {calls} (Ctrl-C again to give them up)."
 
     def _plain_line(self) -> None:
@@ -160,7 +160,7 @@ class ProgressView:
         total = sum(tally.total for tally in self._tallies.values())
         fresh = sum(tally.fresh for tally in self._tallies.values())
         elapsed_s = self._now() - self._started
-        text = f"{done:,} of {total:,} samples"
+        text = f"{done:,} of {counted(total, 'sample')}"
         if fresh and elapsed_s > 0:
             text += f" · {fresh / elapsed_s:.1f} a second"
             # The slowest model decides; of one that has answered nothing no time is known.
@@ -169,7 +169,7 @@ class ProgressView:
             if done < total and len(known_s) == len(left_s):
                 text += f" · {_duration(max(known_s))} left"
         at_once = sum(tally.at_once for tally in self._tallies.values() if tally.total > tally.done)
-        return f"{text} · up to {at_once} calls at once" if at_once else text
+        return f"{text} · up to {counted(at_once, 'call')} at once" if at_once else text
 
     def _panel(self) -> RenderableType:
         done = sum(tally.done for tally in self._tallies.values())

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
+from phyblock.plain_text import counted
 from phyblock.run.events import ModelNotice
 
 __all__ = ["Remarks"]
@@ -37,8 +38,7 @@ class _Trouble:
             wait = f"waiting up to {self.longest_wait_s:.0f} s"
             parts.append(f"asking again {times} ({kinds}), {wait}; last: {self.said}")
         if self.limit:
-            calls = "1 call" if self.limit == 1 else f"{self.limit} calls"
-            parts.append(f"slowed down to {calls} at once")
+            parts.append(f"slowed down to {counted(self.limit, 'call')} at once")
         return f"{model}: {'; '.join(parts)}"
 
 

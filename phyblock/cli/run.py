@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from phyblock.cli.console import counted, make_console, shown_path
+from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.estimate_view import show_estimate
 from phyblock.cli.files import (
     bundled_suites,
@@ -26,7 +26,7 @@ from phyblock.cli.progress import ProgressView
 from phyblock.cli.report import show_made
 from phyblock.errors import Problem, SpecError
 from phyblock.models import is_billed
-from phyblock.plain_text import one_line
+from phyblock.plain_text import counted, one_line
 from phyblock.records import read_manifest
 from phyblock.report.made import names_to_write
 from phyblock.resources import bundled

@@ -15,6 +15,7 @@ from phyblock.models.breaker import Breaker, Breakers
 from phyblock.models.config import ModelConfig
 from phyblock.models.pace import FixedPace, Mark, Pace
 from phyblock.models.transport import Transport
+from phyblock.plain_text import counted
 
 __all__ = ["Replica", "Replicas"]
 
@@ -157,7 +158,7 @@ class Replicas:
         if self._changing is not None and self._changing.has_changed():
             self._list(self._changing.addresses)
             count = len(self._listed)
-            self._breakers.tell(f"{self._config.name} now has {count} server{'s' * (count > 1)}")
+            self._breakers.tell(f"{self._config.name} now has {counted(count, 'server')}")
 
     def _list(self, addresses: tuple[str | None, ...]) -> None:
         """Take these servers for the list; one that was listed before has another chance."""

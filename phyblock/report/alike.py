@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 
 from phyblock.errors import Problem, SpecError
+from phyblock.plain_text import counted
 from phyblock.records.manifest import ManifestDataset, ManifestQuestions
 from phyblock.tables.load import Run
 from phyblock.tracks.kind import kind_of
@@ -63,5 +64,5 @@ def _check_scenes(run: Run, first: Run) -> None:
     both = pd.concat(blocks, axis=1, join="inner", keys=["first", "other"])
     if len(differ := both[both["first"] != both["other"]]):
         message = f"is of other data than {first.path}"
-        found = f"other blocks in {len(differ)} scenes, the first {differ.index[0]}"
+        found = f"other blocks in {counted(len(differ), 'scene')}, the first {differ.index[0]}"
         raise SpecError(Problem(str(run.path), message, "scenes", found))

@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from phyblock.folders import OutFolder
+from phyblock.plain_text import counted
 from phyblock.report.compare import Comparison
 from phyblock.scoring.uncertainty import POWER
 from phyblock.tables.csv_text import to_csv
@@ -65,12 +66,13 @@ def _part_name(part: str) -> str:
 
 def _notes(found: Comparison) -> tuple[str, ...]:
     table = found.table
-    most = table.loc[table["n_scenes"].idxmax()] if len(table) else None
+    most = max(table.to_dict("records"), key=lambda row: row["n_scenes"], default=None)
     notes = [found.how]
     if most is not None:
         notes.append(
-            f"{most['n_samples']} samples of {most['n_scenes']} scenes from {most['n_clusters']} "
-            "base scenes; scenes that share one are not taken as independent."
+            f"{counted(most['n_samples'], 'sample')} of {counted(most['n_scenes'], 'scene')} from "
+            f"{counted(most['n_clusters'], 'base scene')}; scenes that share one are not taken as "
+            "independent."
         )
         notes.append(
             f"“finds”: the difference that this comparison would find in {POWER:.0%} of cases; "

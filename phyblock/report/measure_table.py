@@ -7,6 +7,7 @@ from dataclasses import asdict, fields
 
 import pandas as pd
 
+from phyblock.plain_text import counted
 from phyblock.tables.headline import Value, headline_rows, headline_values
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
@@ -104,8 +105,8 @@ def measures_view(table: pd.DataFrame, run: Run) -> TextTable:
         notes[measure.name] = f"{measure.heading}: {measure.meaning}; {measure.better} is better."
         if lacking := samples_lacking(run, row["track"], measure.counted):
             notes[measure.name] += (
-                f" {lacking} samples were judged before it was there and are not in it; "
-                "phyblock score counts them."
+                f" Not in it: {counted(lacking, 'sample')} judged before it was there, which "
+                "phyblock score counts."
             )
     columns = (
         Column("Model", is_text=True),

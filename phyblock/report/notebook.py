@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from phyblock.plain_text import counted
 from phyblock.report.compare import Comparison, compare_models, compare_runs
 from phyblock.report.measure_table import headline_of, main_heading
 from phyblock.report.write import make_tables, table_names
@@ -118,7 +119,7 @@ class LoadedRun(Run):
             )
         head = "".join(f"<th>{escape(text)}</th>" for text in heads)
         return (
-            f"<p><b>{escape(name)}</b>, {len(self.records):,} samples in "
+            f"<p><b>{escape(name)}</b>, {counted(len(self.records), 'sample')} in "
             f"<code>{escape(str(self.path))}</code></p>"
             f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
         )

@@ -15,6 +15,7 @@ from phyblock.datasets import SCENES_FILE
 from phyblock.datasets.named import find_data_set
 from phyblock.files import check_free, make_folder, write_named
 from phyblock.folders import OutFolder
+from phyblock.plain_text import counted
 from phyblock.sim import PictureStyle
 from phyblock.sim.marked import marked_png
 from phyblock_making.auditing.boosting import can_boost
@@ -80,10 +81,12 @@ def command(
     _print_candidates(console, salvaged)
     if table is not None:
         write_named(table, findings_csv(audit))
-        console.print(f"{len(audit.findings)} findings in {shown_path(table)}", markup=False)
+        console.print(
+            f"{counted(len(audit.findings), 'finding')} in {shown_path(table)}", markup=False
+        )
     if pictures is not None:
         count = _draw(pictures, worst_scenes(audit, worst))
-        console.print(f"{count} pictures in {shown_path(pictures)}", markup=False)
+        console.print(f"{counted(count, 'picture')} in {shown_path(pictures)}", markup=False)
     if fix is not None:
         sets = {task.scene.id: task.candidates for task in salvaged.tasks}
         print_changes(console, write_fixed(fix, audits, sets), shown_path(fix))

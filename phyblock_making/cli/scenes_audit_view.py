@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
-from phyblock.cli.console import counted, plain_table
+from phyblock.cli.console import plain_table
 from phyblock.domain import Scene
+from phyblock.plain_text import counted
 from phyblock_making.auditing.corrected_copy import Copied
 from phyblock_making.auditing.scene_audit import AUDITED, SceneAudit
 from phyblock_making.auditing.set_audit import Audit, shown_orders
@@ -99,7 +100,7 @@ def _print_worst(console: Console, audit: Audit, count: int) -> None:
         scene, first = scene_audit.scene, _first(scene_audit)
         facts = (first.check, first.message, _blocks(scene, first.blocks))
         rows.append((scene.id, str(scene.level), *facts, str(len(scene_audit.findings))))
-    console.print(f"The worst {len(rows)} scenes")
+    console.print("The worst scene" if len(rows) == 1 else f"The worst {len(rows)} scenes")
     headings = ("scene", "level", "check", "first finding", "blocks", "findings")
     console.print(plain_table(headings, rows, numbers=1))
 
@@ -121,7 +122,7 @@ def _print_totals(console: Console, audit: Audit) -> None:
     count = len(audit.scenes)
     steps, exact = audit.without(*_MOVING), _exact(audit)
     totals = [
-        f"{count} scenes read; {audit.without(*AUDITED)} with no finding",
+        f"{counted(count, 'scene')} read; {audit.without(*AUDITED)} with no finding",
         f"{audit.without('unstable')} stand when finished, {steps} at every step as well",
         f"{_share(audit.shared, audit.declared)} dependencies are contacts (precision)",
         f"{_share(audit.shared, audit.contacts)} contacts are declared (recall)",

@@ -9,6 +9,7 @@ import click
 
 from phyblock.cli.console import shown_path
 from phyblock.cli.paths import UserPath
+from phyblock.plain_text import counted
 from phyblock_making.auditing.given_away import MOST_SCENES, given_away_text
 from phyblock_making.cli.working import jobs_option, ray_option, seed_option, tracked
 from phyblock_making.scenes.scene_card import card
@@ -97,4 +98,4 @@ def command(
         made_by += f" --palette {palette} --out {out.name}"
         given_away = given_away_text(tasks)
         writer.finish(card(out.name, writer, made_by, _PALETTE_TEXT[kind], given_away))
-    click.echo(f"{count} scenes, all checks passed: {shown_path(out)}")
+    click.echo(f"{counted(count, 'scene')}, all checks passed: {shown_path(out)}")

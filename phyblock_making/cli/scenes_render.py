@@ -8,11 +8,12 @@ from pathlib import Path
 
 import click
 
-from phyblock.cli.console import counted, make_console, shown_path
+from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.datasets import AssemblyTask
 from phyblock.datasets.named import read_data_set
 from phyblock.folders import OutFolder
+from phyblock.plain_text import counted
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
 from phyblock.sim.assembly import animation, filmstrip_png
 from phyblock.sim.camera import VIEWS

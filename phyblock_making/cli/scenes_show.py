@@ -9,6 +9,7 @@ from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.datasets import AssemblyTask
 from phyblock.datasets.named import read_data_set
 from phyblock.domain import Block
+from phyblock.plain_text import counted
 from phyblock.sim import PictureStyle
 from phyblock.sim.visibility import visible_shares
 from phyblock_making.cli.scene_sets import find_scenes
@@ -29,8 +30,9 @@ def command(data: str, scene: str) -> None:
     console = make_console()
     levels = " and ".join(map(str, task.scene.levels))
     parents = ", ".join(task.scene.parents)
-    layers = max(task.scene.graph.layers)
-    heading = f"scene {task.scene.id} · level {levels} · {len(task.scene)} blocks · {layers} layers"
+    layers = counted(max(task.scene.graph.layers), "layer")
+    blocks = counted(len(task.scene), "block")
+    heading = f"scene {task.scene.id} · level {levels} · {blocks} · {layers}"
     console.print(f"{heading} · made from {parents}", markup=False, soft_wrap=True)
     headings = ("block", "type", "color", "on", "position mm", "euler deg")
     numbers = ("layer", "pick", "seen")

@@ -12,6 +12,7 @@ from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.datasets.named import read_data_set
 from phyblock.domain import BLOCK_TYPES, COLORS, Scene
+from phyblock.plain_text import counted
 
 __all__ = ["command"]
 
@@ -26,7 +27,8 @@ def command(data: str) -> None:
     """
     read = read_data_set(data)
     console = make_console()
-    console.print(f"{read.name}: {len(read.tasks)} scenes, {_bases(read)} base scenes")
+    scenes, bases = counted(len(read.tasks), "scene"), counted(_bases(read), "base scene")
+    console.print(f"{read.name}: {scenes}, {bases}")
     by_level = _by_level(read)
     headings = ("level", "scenes", "blocks", "layers", "types", "colors", "dependencies")
     console.print("A scene has, mean and most")

@@ -12,6 +12,7 @@ from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.datasets import SCENES_FILE, AssemblyTask, read_builtin
 from phyblock.datasets.named import find_data_set
 from phyblock.errors import DataError, Problem
+from phyblock.plain_text import counted
 from phyblock_making.auditing.set_verification import (
     LAWS,
     check_looks,
@@ -59,7 +60,7 @@ def command(data: str, jobs: int, ray_address: str | None, limit: int | None) ->
     failures = [*problems, *problems_of_set]
     for problem in failures:
         click.echo(f"failed: {problem}", err=True)
-    verdict = f"{len(failures)} failures" if failures else "all checks passed"
+    verdict = counted(len(failures), "failure") if failures else "all checks passed"
     console.print(f"{data}: {verdict}", markup=False, soft_wrap=True)
     if failures:
         raise click.exceptions.Exit(1)

@@ -10,7 +10,8 @@ from typing import Any
 
 from rich.console import Console
 
-from phyblock.cli.console import counted, plain_table
+from phyblock.cli.console import plain_table
+from phyblock.plain_text import counted
 from phyblock_making.attacks.attacks import Attacked, Rate
 from phyblock_making.attacks.observed import Observed
 from phyblock_making.questions.shortcuts import SubtaskAudit

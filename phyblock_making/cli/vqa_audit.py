@@ -8,11 +8,12 @@ from pathlib import Path
 
 import click
 
-from phyblock.cli.console import counted, make_console, shown_path
+from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.domain import SUBTASKS, Question
 from phyblock.files import make_folder, write_named
 from phyblock.folders import OutFolder
+from phyblock.plain_text import counted
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from phyblock.tracks.vqa.opening import select_questions

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
-from phyblock.cli.console import counted, plain_table
+from phyblock.cli.console import plain_table
 from phyblock.domain import LETTERS, SUBTASK_NAMES, Question
+from phyblock.plain_text import counted
 from phyblock_making.questions.letters import BALANCE
 from phyblock_making.questions.shortcuts import GUESSABLE, SubtaskAudit, duplicates_of
 

@@ -13,6 +13,7 @@ from phyblock.cli.paths import UserPath
 from phyblock.datasets.named import read_data_set
 from phyblock.domain import SUBTASKS, Question, Subtask
 from phyblock.errors import SpecError
+from phyblock.plain_text import counted
 from phyblock_making.attacks.attack_card import attack_card
 from phyblock_making.attacks.attacks import Attacked, all_attacks, attack
 from phyblock_making.attacks.observed import Observed, observe
@@ -82,7 +83,7 @@ def command(
     audits, attacked = _audited(questions, observed)
     told = attack_card(attacked, observed)
     write_questions(out, questions, originals, read.name, made_by, audits, told)
-    outcome = f"{len(questions)} questions in {len(subtasks)} subtasks"
+    outcome = f"{counted(len(questions), 'question')} in {counted(len(subtasks), 'subtask')}"
     click.echo(f"{outcome}: {shown_path(out)}")
 
 

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import click
 
-from phyblock.cli.console import counted, make_console, shown_path
+from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
 from phyblock.datasets import read_questions
 from phyblock.datasets.named import find_questions, read_data_set
 from phyblock.domain import Question
 from phyblock.errors import DataError, Problem
+from phyblock.plain_text import counted
 from phyblock_making.cli.question_sets import data_option, questions_option
 from phyblock_making.cli.working import jobs_option, seed_option, tracked
 from phyblock_making.questions.question_files import check_place, write_questions

@@ -8,6 +8,7 @@ import click
 
 from phyblock.cli.console import make_console, plain_table
 from phyblock.domain import SUBTASK_NAMES, SUBTASKS
+from phyblock.plain_text import counted
 from phyblock_making.auditing.set_verification import check_sums
 from phyblock_making.cli.question_sets import data_option, questions_argument, read_question_set
 from phyblock_making.cli.working import jobs_option, ray_option, tracked
@@ -50,8 +51,8 @@ def command(questions: str, data: str, jobs: int, ray_address: str | None) -> No
     console.print(plain_table(("subtask", "", "derived again", "of"), rows, numbers=2))
     for failure in sorted(failures):
         click.echo(f"failed: {failure}", err=True)
-    verdict = f"{len(failures)} failures" if failures else "all answers derived again"
-    summary = f"{questions}: {sum(good.values())} of {len(asked)} questions, {verdict}"
+    verdict = counted(len(failures), "failure") if failures else "all answers derived again"
+    summary = f"{questions}: {sum(good.values())} of {counted(len(asked), 'question')}, {verdict}"
     console.print(summary, markup=False, soft_wrap=True)
     if failures:
         raise click.exceptions.Exit(1)

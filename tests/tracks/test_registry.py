@@ -72,7 +72,7 @@ def test_samples_that_lack_counts_are_told_and_those_not_counted_are_not(tmp_pat
     written = write_tables(write_run(tmp_path / "run", records, manifest()))
     (row,) = written.frames["measures"].query("cell == 'overall'").to_dict("records")
     assert (row["value"], row["n"]) == (50, 1)
-    said = "1 samples were judged before it was there"
+    said = "1 sample judged before it was there"
     assert said in to_markdown(written.views["measures"])
 
 

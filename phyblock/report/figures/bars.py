@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from phyblock.plain_text import counted
 from phyblock.report.measure_table import main_heading
 from phyblock.tables.drawing import ACCENT, INK, MUTED, bare_axes, headed, new_figure
 from phyblock.tables.headline import headline_rows
@@ -105,4 +106,4 @@ def _subtitle(run: Run, track: str, clusters: int) -> str:
     suite = f"Suite {run.design.suite.name}; " if run.design.suite.name else ""
     notes = kind_of(track).report().notes(run)[:1]
     how = "".join(note.partition(". ")[0].rstrip(".") + "; " for note in notes)
-    return f"{suite}{how}lines: 95 % intervals over {clusters} base scenes"
+    return f"{suite}{how}lines: 95 % intervals over {counted(clusters, 'base scene')}"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from phyblock.plain_text import counted
 from phyblock.tables.design import OVERALL
 from phyblock.tables.drawing import ACCENT, COLORS, INK, PALE, bare_axes, headed, new_figure
 from phyblock.tables.load import Run
@@ -62,6 +63,6 @@ def dataset_levels(run: Run) -> Figure | None:
     left.set_ylim(len(levels) - 0.4, -0.6)
     bare_axes([left, right])
     name = f"Suite {run.design.suite.name}, " if run.design.suite.name else ""
-    what = f"{name}{len(scenes):,} scenes"
+    what = f"{name}{counted(len(scenes), 'scene')}"
     headed(figure, "Scenes by level", f"{what}; boxes: quartiles, a scene may count in several")
     return figure

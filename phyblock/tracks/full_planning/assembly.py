@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
+from phyblock.plain_text import counted
 from phyblock.tables.cells import METRICS, cell_scores, with_levels
 from phyblock.tables.design import OVERALL, Design
 from phyblock.tables.load import Run, made_once_copied
@@ -108,7 +109,7 @@ def _outcomes(run: Run) -> pd.DataFrame:
 def _seed_notes(run: Run) -> dict[str, str]:
     refused = run.records.loc[~run.records["seed_sent"].fillna(True).astype(bool), "model"]
     repeats = len(run.design.suite.seeds)
-    note = f"seed unsupported: {repeats} independent repeat{'s' if repeats != 1 else ''}"
+    note = f"seed unsupported: {counted(repeats, 'independent repeat')}"
     return dict.fromkeys(refused.unique(), note)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
+from phyblock.plain_text import counted
 from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run
 from phyblock.tables.paper_numbers import beside, published_table
@@ -116,7 +117,7 @@ def intervals_view(table: pd.DataFrame, run: Run) -> TextTable:
         tuple(rows),
         (
             f"Setting {design.setting}, matcher {design.matcher}; F1 is pooled over "
-            f"{len(design.suite.seeds)} seed{'s' if len(design.suite.seeds) > 1 else ''}.",
+            f"{counted(len(design.suite.seeds), 'seed')}.",
             *_sizes(table, run),
             "Intervals: each base scene left out in turn, micro averages taken anew.",
         ),

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block, PoseStep
+from phyblock.plain_text import counted
 from phyblock.sim.carry import CarryLimits, carry_out
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.placing import put, upright
@@ -109,4 +110,4 @@ def _ended(step: StepOutcome) -> str:
 def _came_to(record: PoseRecord, pose: PoseOutcome | None) -> str:
     if pose is None:
         return "nothing was carried out"
-    return f"{pose.reached} of {record.n_blocks} blocks reached, IoU {pose.iou:.2f}"
+    return f"{pose.reached} of {counted(record.n_blocks, 'block')} reached, IoU {pose.iou:.2f}"

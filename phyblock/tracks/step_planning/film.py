@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block
+from phyblock.plain_text import counted
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.registry import REFERENCE_ENGINE, told_engine
 from phyblock.sim.site import settle
@@ -67,7 +68,7 @@ def episode_film(record: EpisodeRecord, task: AssemblyTask) -> Iterator[FilmStep
             by = f" (falls in {now}, not {engine})"
     tone = "good" if record.ending == "completed" else "bad"
     placed = record.progress[-1] if record.progress else 0
-    caption = f"{_ending(record)}: {placed} of {record.n_blocks} blocks{by}"
+    caption = f"{_ending(record)}: {placed} of {counted(record.n_blocks, 'block')}{by}"
     yield FilmStep(caption, tone, None, blocks)
 
 
