@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Any
 
 from phyblock.datasets.base import AssemblyTask, Dataset
-from phyblock.datasets.raw import read_lines
+from phyblock.datasets.raw import read_lines, read_text
 from phyblock.records.faults import refuse, validated
 from phyblock.records.scene import StoredScene, candidate_set, missing_faults
 
@@ -22,8 +23,14 @@ _ALLOWED = f"a folder with {SCENES_FILE}, or the name of a bundled data set"
 def read_builtin(folder: Path) -> Dataset:
     """All scenes of a data set folder; raises DataError with everything that is wrong in it."""
     path = folder / SCENES_FILE
-    tasks = read_lines(path, "scene", _ALLOWED, _read_task, lambda task: task.key)
-    return Dataset(folder.name, folder, tuple(sorted(tasks, key=lambda task: task.key)))
+    return Dataset(folder.name, folder, _tasks(path, read_text(path, _ALLOWED)))
+
+
+@functools.lru_cache(maxsize=1)
+def _tasks(path: Path, text: str) -> tuple[AssemblyTask, ...]:
+    """The scenes in a file's text, which a run reads again for its report."""
+    tasks = read_lines(path, text, "scene", _read_task, lambda task: task.key)
+    return tuple(sorted(tasks, key=lambda task: task.key))
 
 
 def _read_task(raw: Any, where: str) -> AssemblyTask:

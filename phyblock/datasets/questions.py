@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from phyblock.datasets.base import Dataset, QuestionSet, QuestionTask
-from phyblock.datasets.raw import read_lines
+from phyblock.datasets.raw import read_lines, read_text
 from phyblock.errors import DataError, Problem
 from phyblock.records.faults import validated
 from phyblock.records.picture import About
@@ -39,7 +39,8 @@ def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
 
     path = folder / QUESTIONS_FILE
     try:
-        tasks = read_lines(path, "question", _ALLOWED, read_task, lambda task: task.key)
+        text = read_text(path, _ALLOWED)
+        tasks = read_lines(path, text, "question", read_task, lambda task: task.key)
     except DataError as error:
         if len(is_about) < _FEW or 2 * sum(is_about) > len(is_about):
             raise

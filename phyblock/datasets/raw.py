@@ -78,20 +78,24 @@ def parse_json(text: str, path: Path, line: int | None = None) -> Any:
 
 def lines_of(path: Path, allowed: str) -> list[str]:
     """The lines of a file; DataError, with what is allowed, when it cannot be read."""
-    text = read_text(path, allowed)
+    return _lines(read_text(path, allowed))
+
+
+def _lines(text: str) -> list[str]:
     # Not splitlines(): a JSON string may hold U+2028 and other line ends of Unicode.
     return text.removesuffix("\n").split("\n") if text else []
 
 
 def read_lines(
-    path: Path, noun: str, allowed: str, read: Callable[[Any, str], _T], name: Callable[[_T], str]
+    path: Path, text: str, noun: str, read: Callable[[Any, str], _T], name: Callable[[_T], str]
 ) -> list[_T]:
-    """Every line of a file as `read` makes it of its JSON value and its place.
+    """Every line of `text`, which is that of a file, as `read` makes it of its JSON value and its
+    place.
 
     Raises DataError with everything that is wrong: what `read` raises, a name that stands twice, a
-    file of no `noun`, or one that is not there, for which `allowed` says what could be.
+    file of no `noun`.
     """
-    lines = lines_of(path, allowed)
+    lines = _lines(text)
     first_line: dict[str, int] = {}
     found: list[_T] = []
     problems: list[Problem] = []

@@ -46,4 +46,5 @@ class CandidateSet:
 
     def missing(self, scene: Scene) -> tuple[int, ...]:
         """Orders of the scene's blocks that no candidate can stand for in setting A."""
-        return tuple(b.order for b in scene.blocks if self.index_of(b.look) is None)
+        looks = {candidate.look for candidate in self.candidates}
+        return tuple(block.order for block in scene.blocks if block.look not in looks)

@@ -8,6 +8,7 @@ import asyncio
 from collections.abc import Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, nullcontext
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from phyblock.errors import (
     BudgetReachedError,
@@ -17,7 +18,7 @@ from phyblock.errors import (
 )
 from phyblock.models.base import Reply, Request
 from phyblock.models.breaker import shows_outage
-from phyblock.models.cache import known_keys, reply_key
+from phyblock.models.cache import known_keys
 from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, estimate
 from phyblock.models.events import EventKind, ModelEvent, Observer
@@ -52,7 +53,8 @@ class ChatParts:
 @dataclass
 class _Question:
     """A request with its key in the cache and its outlay, its last failure and the server that
-    failed, its reply. `by_force`: another asks the same and takes too long.
+    failed, its reply. `is_free`: the cache has just said that nobody asks the same; `by_force`:
+    another does and takes too long.
     """
 
     request: Request
@@ -61,6 +63,7 @@ class _Question:
     failure: RetryableError | None = None
     failed_at: Replica | None = None
     reply: Reply | None = None
+    is_free: bool = False
     by_force: bool = False
 
 
@@ -85,24 +88,20 @@ class ChatModel:
         is sent.
         """
         cache = self._parts.cache
-        key = ""
+        key, is_free = "", False
         if cache is not None:
-            key = reply_key(self._config, request)
+            keys = known_keys(self._config, request)
+            key = next(keys)
             with self._parts.halt.giving_up():
-                kept = await self._kept(cache, key, request)
-            if kept is not None:
-                return replace(kept, cost_usd=self._sender.cost_usd(kept))
+                known = await cache.look(chain((key,), keys))
+                if known.reply is not None and known.key != key:
+                    # Under the key of a former version: moved to today's.
+                    await cache.keep(key, self._config.id, known.reply)
+            if known.reply is not None:
+                return replace(known.reply, cost_usd=self._sender.cost_usd(known.reply))
+            is_free = not known.is_asked
         outlay = Outlay(estimate(self._config, request))
-        return await self._ask_new(_Question(request, key, outlay))
-
-    async def _kept(self, cache: SharedCache, key: str, request: Request) -> Reply | None:
-        """The reply under the key, or under that of former versions, moved to today's."""
-        for known in known_keys(self._config, request):
-            if (kept := await cache.find(known)) is not None:
-                if known != key:
-                    await cache.keep(key, self._config.id, kept)
-                return kept
-        return None
+        return await self._ask_new(_Question(request, key, outlay, is_free=is_free))
 
     async def aclose(self) -> None:
         """Release connections."""
@@ -163,13 +162,14 @@ class ChatModel:
                 question.reply = reply
                 slot.settle(_total(reply))
                 if self._parts.cache is not None:
-                    await self._parts.cache.keep(question.key, self._config.id, reply)
+                    await self._parts.cache.keep(question.key, self._config.id, reply, turn.lease)
                 return reply
 
     async def _from_others(self, question: _Question) -> Reply | None:
         """Wait for others that ask the same, no longer than a request of our own would take."""
         cache = self._parts.cache
-        if cache is None or question.by_force:
+        is_free, question.is_free = question.is_free, False
+        if cache is None or question.by_force or is_free:
             return None
         with self._parts.halt.giving_up():
             kept, question.by_force = await cache.await_others(question.key, self._config.timeout_s)

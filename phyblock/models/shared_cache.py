@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import queue
 import random
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from phyblock.errors import StoreError
 from phyblock.models.base import Reply
@@ -25,7 +26,7 @@ from phyblock.models.leases import LEASE_S, Lease
 from phyblock.models.limits import Clock
 from phyblock.models.worker import Worker
 
-__all__ = ["SharedCache", "Turn"]
+__all__ = ["Known", "SharedCache", "Turn"]
 
 T = TypeVar("T")
 
@@ -34,7 +35,16 @@ _PATIENCE_S = 5.0
 _TRY_AGAIN_AFTER_S = 60.0
 _FIRST_LOOK_S = 0.05
 _LONGEST_LOOK_S = 1.0
-_NOTHING: tuple[Reply | None, bool] = (None, False)
+
+
+class Known(NamedTuple):
+    """What is known of a question: its reply with the key that it is kept under, and whether it is
+    being asked.
+    """
+
+    reply: Reply | None = None
+    key: str = ""
+    is_asked: bool = False
 
 
 @dataclass(frozen=True)
@@ -77,6 +87,7 @@ class SharedCache:
         self._is_told = False
         self._untold: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._keeping: set[asyncio.Future[None]] = set()
+        self._held: set[Lease] = set()
         self._is_closing = False
 
     async def __aenter__(self) -> SharedCache:
@@ -93,9 +104,11 @@ class SharedCache:
         except CacheBusyError as error:
             self._set_aside(error)
 
-    async def find(self, key: str) -> Reply | None:
-        """The reply kept under `key`."""
-        return await self._do(lambda file: file.get(key), None)
+    async def look(self, keys: Iterable[str]) -> Known:
+        """What is known of the question that is asked under the first of `keys`, and whose reply
+        may be kept under any of them; each is made when it is needed.
+        """
+        return await self._do(lambda file: _look(file, iter(keys)), Known())
 
     async def await_others(self, key: str, most_s: float) -> tuple[Reply | None, bool]:
         """Wait while another asks the same, `most_s` at most.
@@ -104,10 +117,10 @@ class SharedCache:
         """
         began_s, pause_s = self._clock.now(), _FIRST_LOOK_S
         while True:
-            reply, is_asked = await self._do(lambda file: _look(file, key), _NOTHING)
+            known = await self.look((key,))
             waited_s = self._clock.now() - began_s
-            if reply is not None or not is_asked or waited_s >= most_s:
-                return reply, is_asked
+            if known.reply is not None or not known.is_asked or waited_s >= most_s:
+                return known.reply, known.is_asked
             await self._clock.sleep(pause_s * random.uniform(0.5, 1.0))
             pause_s = min(_LONGEST_LOOK_S, 1.5 * pause_s)
 
@@ -120,21 +133,28 @@ class SharedCache:
             yield turn
             return
         renewing = asyncio.create_task(self._renew(lease))
+        self._held.add(lease)
         try:
             yield turn
         finally:
             renewing.cancel()
-            await self._do(lambda file: _give_back(file, lease), None)
+            if lease in self._held:
+                self._held.discard(lease)
+                await self._do(lambda file: _give_back(file, lease), None)
 
-    async def keep(self, key: str, model_id: str, reply: Reply) -> None:
-        """Keep a reply, if it is whole and the file takes it, also when the wait is given up."""
-        keeping = asyncio.ensure_future(self._keep(key, model_id, reply))
+    async def keep(self, key: str, model_id: str, reply: Reply, lease: Lease | None = None) -> None:
+        """Keep a reply, if it is whole and the file takes it, also when the wait is given up, and
+        give back the lease of its question.
+        """
+        keeping = asyncio.ensure_future(self._keep(key, model_id, reply, lease))
         self._keeping.add(keeping)
         keeping.add_done_callback(self._keeping.discard)
         await asyncio.shield(keeping)
 
-    async def _keep(self, key: str, model_id: str, reply: Reply) -> None:
-        is_kept = await self._do(lambda file: file.put(key, model_id, reply), False)
+    async def _keep(self, key: str, model_id: str, reply: Reply, lease: Lease | None) -> None:
+        is_kept = await self._do(lambda file: _keep(file, key, model_id, reply, lease), None)
+        if lease is not None and is_kept is not None:
+            self._held.discard(lease)
         # Not before it was written to: a full disk can be read all the same.
         if is_kept and self._is_told:
             self._is_told = False
@@ -235,13 +255,26 @@ class _AsideError(StoreError):
     """The cache was set aside while this operation waited for its turn."""
 
 
-def _look(file: ReplyCache, key: str) -> tuple[Reply | None, bool]:
-    """The reply, or whether the question is being asked. In this order: a reply is kept before
+def _look(file: ReplyCache, keys: Iterator[str]) -> Known:
+    """Whether the question is being asked, and the reply. In this order: a reply is kept before
     its lease is given back.
     """
+    first = next(keys)
     with file.leases() as leases:
-        is_asked = leases.is_taken(key)
-    return file.get(key), is_asked
+        is_asked = leases.is_taken(first)
+    for key in itertools.chain((first,), keys):
+        if (reply := file.get(key)) is not None:
+            return Known(reply, key, is_asked)
+    return Known(is_asked=is_asked)
+
+
+def _keep(
+    file: ReplyCache, key: str, model_id: str, reply: Reply, lease: Lease | None
+) -> bool | None:
+    is_kept = file.put(key, model_id, reply)
+    if lease is not None:
+        _give_back(file, lease)
+    return is_kept
 
 
 def _take(file: ReplyCache, key: str, *, by_force: bool) -> Turn:

@@ -25,13 +25,13 @@ class Worker:
         self._jobs: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
 
-    async def run(self, job: Callable[[], T]) -> T:
+    def run(self, job: Callable[[], T]) -> asyncio.Future[T]:
         """What the job returns or raises; one that has begun goes on when the wait is given up."""
         if not self._thread.is_alive():
             self._thread.start()
         done: Future[T] = Future()
         self._jobs.put((job, done))
-        return await asyncio.wrap_future(done)
+        return asyncio.wrap_future(done)
 
     def stop(self) -> None:
         """End the thread once its jobs are done; nothing is run afterwards."""

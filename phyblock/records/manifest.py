@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from pathlib import Path
 from typing import Annotated, Any
@@ -167,7 +168,7 @@ def read_manifest(folder: Path) -> Manifest:
     """The run's manifest; StoreError when there is none or it cannot be read."""
     path = folder / MANIFEST
     try:
-        found = load_yaml(read_text(path, _LARGEST_BYTES), _BOUNDS)
+        return _manifest(read_text(path, _LARGEST_BYTES))
     except (FileNotFoundError, NotADirectoryError) as error:
         allowed = "a folder that phyblock run wrote"
         raise StoreError(Problem(str(folder), f"holds no {MANIFEST}", allowed=allowed)) from error
@@ -179,18 +180,28 @@ def read_manifest(folder: Path) -> Manifest:
     except yaml.YAMLError as error:
         where = _at(path, getattr(error, "problem_mark", None))
         raise StoreError(Problem(where, "is not YAML", hint=_HINT)) from error
-    except ValueError as error:
-        raise StoreError(Problem(str(path), str(error), hint=_HINT)) from error
-    if not isinstance(found, dict) or "identity" not in found:
+    except LookupError as error:
         message, said = "is not a run manifest", "no such key"
-        raise StoreError(Problem(str(path), message, "identity", said, hint=_HINT))
-    try:
-        return Manifest.model_validate(found)
+        raise StoreError(Problem(str(path), message, "identity", said, hint=_HINT)) from error
     except ValidationError as error:
         raise StoreError(
             problem_of(one, str(path), "is not a run manifest", _HINT)
             for one in error.errors(include_url=False)
         ) from error
+    except ValueError as error:
+        raise StoreError(Problem(str(path), str(error), hint=_HINT)) from error
+
+
+@functools.lru_cache(maxsize=2)
+def _manifest(text: str) -> Manifest:
+    """A manifest, which one command reads several times; LookupError where it lacks what any has.
+
+    Raises as `load_yaml` and pydantic do.
+    """
+    found = load_yaml(text, _BOUNDS)
+    if not isinstance(found, dict) or "identity" not in found:
+        raise LookupError("identity")
+    return Manifest.model_validate(found)
 
 
 def _at(path: Path, mark: yaml.Mark | None) -> str:

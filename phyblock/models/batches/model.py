@@ -201,10 +201,7 @@ class BatchModel:
         if cache is None:
             return None
         with self._parts.halt.giving_up():
-            for known in known_keys(self._config, request):
-                if (kept := await cache.find(known)) is not None:
-                    return kept
-        return None
+            return (await cache.look(known_keys(self._config, request))).reply
 
     async def _add(self, key: str, request: Request, written: Written) -> bool:
         """Put a request into the draft, or into a new one where it is full; whether there was
