@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from tests.fork_server import end_fork_server
 from tests.workspace import Workspace
@@ -15,6 +16,10 @@ OFFICIAL_MISSING = (
     "official PhyBlock data not found: put it at ../shared or set PHYBLOCK_OFFICIAL to the folder "
     "that holds PhyBlock/ and expected/"
 )
+
+# No test asserts on time: what a machine takes for an example says what else it was doing.
+settings.register_profile("phyblock", deadline=None)
+settings.load_profile("phyblock")
 
 
 def official_root() -> Path | None:

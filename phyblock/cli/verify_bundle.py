@@ -7,8 +7,9 @@ from pathlib import Path
 import click
 
 from phyblock.bundle import opened_bundle
-from phyblock.cli.console import counted, make_console, shown_path
+from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
+from phyblock.plain_text import counted
 
 __all__ = ["command"]
 
