@@ -63,9 +63,10 @@ _LOOSE_END = re.compile(r"unexpected extra arguments? \(.*[]}]\)")
 
 def main() -> None:
     """Run the command line; exit code 2 for bad input, 1 for a failure, 130 for Ctrl-C."""
-    # What is made while modules load and data are read stays: looking through it for garbage at
-    # Python's own intervals takes a tenth of the time of a short command.
-    gc.set_threshold(100_000, 20, 50)
+    # What is made while modules load and data are read stays. Looking through it for garbage at
+    # Python's own intervals takes a tenth of a short command; at much longer ones, what calls to
+    # models leave behind piles up.
+    gc.set_threshold(5_000, 10, 10)
     for stream in (sys.stdout, sys.stderr):
         # A terminal that knows no plus-minus sign shall show a question mark, not fail.
         stream.reconfigure(errors="replace")  # type: ignore[union-attr]
