@@ -191,9 +191,13 @@ class TemplatePrompt:
             # A template is a program: what it computes can fail in any way.
             is_name = isinstance(error, jinja2.UndefinedError)
             known = "names that are there: " + ", ".join(sorted(facts)) if is_name else ""
-            message = f"cannot be rendered: {said(error)}"
-            where = self._place_of(error)
-            raise PromptError(Problem(where, message, f"block {block}", "", known)) from error
+            circle = self._sources.circle if isinstance(error, RecursionError) else ""
+            why = f"files include one another without an end, {circle}" if circle else said(error)
+            message, hint = f"cannot be rendered: {why}", ""
+            if is_name and any(f"'{fact}' is undefined" in why for fact in facts):
+                hint = "macros of another file see it by {% import ... with context %}"
+            where, field = self._place_of(error), f"block {block}"
+            raise PromptError(Problem(where, message, field, "", known, hint)) from error
 
     def _place_of(self, error: Exception) -> str:
         """The file and line at which rendering failed."""

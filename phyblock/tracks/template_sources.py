@@ -6,6 +6,7 @@ sent: an edit of a file that is included makes another prompt.
 
 from __future__ import annotations
 
+import graphlib
 import hashlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -52,6 +53,19 @@ class Sources:
             inner = hashlib.sha256(source.text.encode()).hexdigest()
             digest.update(f"\0{name}\0{inner}".encode())
         return digest.hexdigest()
+
+    @property
+    def circle(self) -> str:
+        """Files that include one another in a circle, as `a.j2 -> b.j2 -> a.j2`; "" for none."""
+        found = {
+            name: [inner for node in source.naming for inner in _names(node.template, name)]
+            for name, source in self.included.items()
+        }
+        try:
+            graphlib.TopologicalSorter(found).prepare()
+        except graphlib.CycleError as error:
+            return " -> ".join(reversed(error.args[1]))
+        return ""
 
     @property
     def all(self) -> tuple[Source, ...]:

@@ -105,7 +105,8 @@ LOOP = "{% for i in range(9999) %}{% include 'part.j2' %}{% endfor %}"
         ("{% set x = wrong ~ 1 %}\n{% block user %}a{% endblock %}", "", "mine.j2:1", "undefined"),
         ("{% import 'part.j2' as p %}{{ p.f() }}",
          "{% macro f() %}\n{{ 1 // 0 }}{% endmacro %}", "part.j2:2", "division"),
-        ("{% include 'part.j2' %}", "{% include 'part.j2' %}", "part.j2:1", "nested too deeply"),
+        ("{% include 'part.j2' %}", "{% include 'part.j2' %}", "part.j2:1",
+         "include one another without an end, part.j2 -> part.j2"),
         ("{% set x %}" + LOOP + "{% endset %}", "x" * 900, "", "more than 500,000 steps"),
         (LOOP, "x" * 900, "", "longer than 200,000 characters"),
         ("{% include 'part.j2' %}", "{{ 'x' * 10**9 }}", "part.j2:1", "more than 500,000 steps"),
@@ -130,6 +131,15 @@ def test_what_is_wrong_is_said_with_the_file_that_is_included(
     (problem,) = caught.value.problems
     assert said in problem.message
     assert problem.where.endswith(where)
+
+
+def test_a_macro_that_sees_no_facts_is_told_how(tmp_path: Path) -> None:
+    part = "{% macro f() %}{{ n_candidates }}{% endmacro %}"
+    body = "{% import 'part.j2' as p CONTEXT %}{{ p.f() }}"
+    with pytest.raises(PromptError, match=r"hint: .* with context"):
+        prompt(tmp_path, body.replace("CONTEXT", ""), part=part).messages((), FACTS)
+    told = prompt(tmp_path, body.replace("CONTEXT", "with context"), part=part)
+    assert str(FACTS["n_candidates"]) in str(told.messages((), FACTS)[-1].parts[-1])
 
 
 def test_no_more_than_some_files_are_included(tmp_path: Path) -> None:
