@@ -171,7 +171,7 @@ def test_two_runs_are_compared_by_the_models_they_share_or_by_two_named() -> Non
 def test_runs_that_cannot_be_compared_are_refused() -> None:
     first = one_seed(*plans("alpha", {"000": 4}), models=["alpha"])
     other = record("alpha", "000", scores=[score(4, 0, 5)]) | {"n_blocks": 9}
-    with pytest.raises(SpecError, match="other blocks in 1 scenes, the first 000"):
+    with pytest.raises(SpecError, match="other blocks in 1 scene, the first 000"):
         compare_runs(first, one_seed(other, models=["alpha"]))
     with pytest.raises(SpecError, match="was not scored as run was, by optimal"):
         compare_runs(first, one_seed(models=["alpha"], matchers=["paper"]))
