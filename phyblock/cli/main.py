@@ -18,6 +18,7 @@ __all__ = ["main", "show_problems"]
 
 _VERBS = {
     "run": "Run a suite, or go on where it stopped.",
+    "play": "Answer a suite yourself, in a browser, as models do.",
     "score": "Read and score stored replies again; calls no model.",
     "report": "Write a run's tables again from its records.",
     "tables": "Print a run's tables; beside the paper's with --paper.",

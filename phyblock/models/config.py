@@ -20,7 +20,7 @@ __all__ = [
     "ModelConfig",
 ]
 
-Kind = Literal["litellm", "replay", "baseline"]
+Kind = Literal["litellm", "replay", "baseline", "human"]
 
 DIRECT_PROVIDERS = ("openai", "hosted_vllm", "lm_studio")
 """Provider prefixes that mean the plain OpenAI protocol: litellm has nothing to translate."""

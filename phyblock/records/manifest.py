@@ -62,7 +62,8 @@ class ManifestModel(Line):
     served_at: tuple[str, ...] = ()
     """Addresses of the servers of one's own at which it was asked when the run began."""
     kind: str = ""
-    """`litellm`: asked over the network; `replay`: a recording; `baseline`: a rule."""
+    """`litellm`: asked over the network; `replay`: a recording; `baseline`: a rule; `human`: a
+    person."""
 
 
 class ManifestDataset(Line):

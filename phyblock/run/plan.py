@@ -17,7 +17,7 @@ from phyblock.run.manifest import make_manifest
 from phyblock.run.models import PlannedModel, plan_models, recorded_format, recorded_order
 from phyblock.run.samples import Sample
 from phyblock.specs import RECORDED, LoadedSuite, ModelSpec, SuiteSpec, with_members
-from phyblock.tracks import AnyTrack, EpisodeTrack, Opening, kind_of, open_tracks
+from phyblock.tracks import AnyTrack, EpisodeTrack, Item, Opening, kind_of, open_tracks
 from phyblock.tracks.selection import select_tasks
 from phyblock.variants import Variant
 
@@ -28,7 +28,8 @@ __all__ = ["RunPlan", "make_plan"]
 class RunPlan:
     """Everything a run needs; `manifest` is what `run.yaml` holds, but for what floors reach;
     `tracks` are those of the reference, `variants` all ways of asking with the tracks of each;
-    `reopened` opens a track under a suite, without prompts.
+    `reopened` opens a track under a suite, without prompts; `arranged` says in which order the
+    items of a track are asked about.
     """
 
     suite: SuiteSpec
@@ -37,6 +38,7 @@ class RunPlan:
     variants: Mapping[Variant, tuple[AnyTrack, ...]]
     manifest: Manifest
     reopened: Callable[[str, SuiteSpec], AnyTrack]
+    arranged: Callable[[Sequence[Item]], Sequence[Item]] = tuple
 
     @property
     def tracks(self) -> tuple[AnyTrack, ...]:
@@ -73,12 +75,12 @@ class RunPlan:
 
     def samples(self, model: str) -> Iterator[Sample]:
         """All samples of a model: seed by seed, in each the ways of asking, in each of these the
-        tracks in the suite's order.
+        tracks in the suite's order, of each its items as they are arranged.
         """
         for seed in self.suite.seeds:
             for variant, tracks in self.variants.items():
                 for track in tracks:
-                    for item in track.items:
+                    for item in self.arranged(track.items):
                         yield Sample(track, model, item, seed, variant)
 
     def close(self) -> None:
@@ -95,16 +97,18 @@ def make_plan(
     only: Sequence[str] = (),
     limit: int | None = None,
     informative: Path | None = None,
+    people: Sequence[PlannedModel] = (),
 ) -> RunPlan:
     """Resolve a suite against the known models.
 
-    `only` names models to run in place of the suite's; `limit`, else that of the suite, keeps
-    that many items of each track: scenes spread over levels, questions over subtasks; of
-    `informative`, the folder of a run, the scenes that tell its models apart best. Raises
+    `only` names models to run in place of the suite's, `people` are asked in their place; `limit`,
+    else that of the suite, keeps that many items of each track: scenes spread over levels,
+    questions over subtasks; of `informative`, the folder of a run, the scenes that tell its models
+    apart best. Raises
     SpecError, DataError, StoreError or PromptError with all that is wrong.
     """
     dataset = open_dataset(loaded.suite.dataset.format, loaded.dataset_path)
-    models = plan_models(loaded, known, only)
+    models = tuple(people) or plan_models(loaded, known, only)
     loaded = replace(loaded, suite=_with_plain_names(loaded.suite, known))
     suite = loaded.suite
     limit = suite.limit if limit is None else limit
@@ -211,6 +215,9 @@ def _check_models(
                 message = f"is asked in batches, and {track.name} plays episodes of several turns"
                 hint = "each turn waits for the one before: take batch: true out, or the track"
                 problems.append(Problem(where, message, "batch", track.name, hint=hint))
+            if model.config.kind == "human" and kind_of(track.name).by_hand is None:
+                message, hint = f"is a person, who cannot answer in {track.name}", "leave it out"
+                problems.append(Problem(where, message, "tracks", track.name, hint=hint))
             able = kind_of(track.name).baselines
             if model.config.kind != "baseline" or model.config.id in able:
                 continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -89,7 +90,10 @@ class Session:
         *,
         use_cache: bool,
         retry_failed: bool = False,
+        present: Mapping[str, Model] | None = None,
     ) -> None:
+        """`present` are models that are there already, by name; others are built."""
+        self._present = present or {}
         self._retry_failed = retry_failed
         self._plan = plan
         self._folder = folder
@@ -123,6 +127,9 @@ class Session:
             )
             breakers = Breakers(policy, self._tell)
             for model in plan.models:
+                if model.name in self._present:
+                    self._models[model.name] = self._present[model.name]
+                    continue
                 self._models[model.name] = build_model(
                     model.config,
                     cache=self._cache,

@@ -16,6 +16,7 @@ from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tables.measures import SampleCounts
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.base import AnyTrack
+from phyblock.tracks.by_hand import Picking
 from phyblock.tracks.studio import Workshop, render_workers
 
 __all__ = ["Opening", "TrackKind", "kind_of", "kinds"]
@@ -55,6 +56,7 @@ class TrackKind:
     `plays`, samples are episodes of several turns. `record` is the model of its records, where it
     adds something to them. `counted` is what its measures count of every sample as it is judged.
     `no_examples` says why it shows no worked examples, "" where it does.
+    `by_hand` says of a subject how a person answers, None where nothing can be picked.
     `varies` names the factors of a suite's `vary` that change what it asks.
     """
 
@@ -79,6 +81,7 @@ class TrackKind:
     rescored: bool = False
     counted: tuple[SampleCounts, ...] = ()
     no_examples: str = "it declares none"
+    by_hand: Callable[[Any], Picking] | None = None
     varies: tuple[str, ...] = ("repeats",)
 
     def data_folder(self, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:

@@ -3,6 +3,7 @@
 from phyblock.resources import bundled
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.full_planning.baselines import PLAN_RULES, PlanSubject
+from phyblock.tracks.full_planning.by_hand import pick_plan
 from phyblock.tracks.full_planning.opening import open_full_planning
 from phyblock.tracks.full_planning.record import PlanRecord
 from phyblock.tracks.full_planning.spec import PlanningSpec
@@ -28,6 +29,7 @@ TRACK = TrackKind(
     report=_report,
     subject=PlanSubject,
     baselines=PLAN_RULES,
+    by_hand=pick_plan,
     section=("full_planning", PlanningSpec, "How scenes are shown in the full_planning track."),
     record=PlanRecord,
     template=bundled("prompts", "full_planning.j2"),

@@ -10,6 +10,7 @@ from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.kind import TrackKind
 from phyblock.tracks.poses import POSE_COUNTS
 from phyblock.tracks.step_planning.baselines import STEP_RULES, StepSubject
+from phyblock.tracks.step_planning.by_hand import pick_step
 from phyblock.tracks.step_planning.opening import open_step_planning
 from phyblock.tracks.step_planning.record import EpisodeRecord
 from phyblock.tracks.step_planning.spec import StepsSpec
@@ -38,6 +39,7 @@ TRACK = TrackKind(
     report=_report,
     subject=StepSubject,
     baselines=STEP_RULES,
+    by_hand=pick_step,
     manifest=_manifest,
     plays=True,
     section=("steps", StepsSpec, "The rules of the step_planning track."),

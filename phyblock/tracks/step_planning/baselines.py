@@ -9,7 +9,7 @@ import numpy as np
 
 from phyblock.domain import CandidateSet, Plan, Scene
 
-__all__ = ["STEP_FLOORS", "STEP_RULES", "StepSubject"]
+__all__ = ["STEP_FLOORS", "STEP_RULES", "StepSubject", "step_text"]
 
 
 @dataclass(frozen=True)
@@ -32,13 +32,13 @@ class StepSubject:
 
 
 def _random_step(subject: StepSubject, rng: np.random.Generator) -> str:
-    return _step(int(rng.integers(1, len(subject.candidates) + 1)))
+    return step_text(int(rng.integers(1, len(subject.candidates) + 1)))
 
 
 def _oracle_step(subject: StepSubject, rng: np.random.Generator) -> str:
     """One of the right moves, so that every valid order can come; Done where there is none."""
     moves = subject.exact or subject.valid
-    return _step(moves[int(rng.integers(len(moves)))] if moves else None)
+    return step_text(moves[int(rng.integers(len(moves)))] if moves else None)
 
 
 def _unoriented_step(subject: StepSubject, rng: np.random.Generator) -> str:
@@ -53,22 +53,26 @@ def _unoriented_step(subject: StepSubject, rng: np.random.Generator) -> str:
         for n in range(1, len(candidates) + 1)
         if candidates[n].kind == kind and candidates[n].look not in looks
     ]
-    return _step(wrong[int(rng.integers(len(wrong)))] if wrong else index)
+    return step_text(wrong[int(rng.integers(len(wrong)))] if wrong else index)
 
 
 def _repeated_step(subject: StepSubject, rng: np.random.Generator) -> str:
     """Any move at random until one fails, then that one for ever."""
-    return _random_step(subject, rng) if subject.last_failed is None else _step(subject.last_failed)
+    return (
+        _random_step(subject, rng)
+        if subject.last_failed is None
+        else step_text(subject.last_failed)
+    )
 
 
 def _next_candidate(subject: StepSubject, _: np.random.Generator) -> str:
     """Every candidate once, in their order."""
-    return _step(subject.step + 1 if subject.step < len(subject.candidates) else None)
+    return step_text(subject.step + 1 if subject.step < len(subject.candidates) else None)
 
 
 def _next_guess(subject: StepSubject, _: np.random.Generator) -> str:
     plan = subject.guess().steps
-    return _step(plan[subject.step] if subject.step < len(plan) else None)
+    return step_text(plan[subject.step] if subject.step < len(plan) else None)
 
 
 def _first_pose(subject: StepSubject, rng: np.random.Generator) -> str:
@@ -76,10 +80,11 @@ def _first_pose(subject: StepSubject, rng: np.random.Generator) -> str:
     if not subject.exact:
         return _oracle_step(subject, rng)
     index = subject.exact[int(rng.integers(len(subject.exact)))]
-    return _step(subject.candidates.first_of(subject.candidates[index].kind))
+    return step_text(subject.candidates.first_of(subject.candidates[index].kind))
 
 
-def _step(index: int | None) -> str:
+def step_text(index: int | None) -> str:
+    """One operation in the benchmark's own reply form; None is the end."""
     return "Next plan: Done" if index is None else f"Next plan: Move({index})"
 
 

@@ -10,6 +10,7 @@ from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.kind import TrackKind
 from phyblock.tracks.vqa.baselines import CHOICE_RULES, ChoiceSubject
+from phyblock.tracks.vqa.by_hand import pick_answer
 from phyblock.tracks.vqa.opening import open_vqa
 from phyblock.tracks.vqa.record import ChoiceRecord
 from phyblock.tracks.vqa.spec import VqaSpec
@@ -49,6 +50,7 @@ TRACK = TrackKind(
     report=_report,
     subject=ChoiceSubject,
     baselines=CHOICE_RULES,
+    by_hand=pick_answer,
     section=("vqa", VqaSpec, "The questions of the vqa track, and how they are shown."),
     record=ChoiceRecord,
     template=bundled("prompts", "vqa.j2"),

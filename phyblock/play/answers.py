@@ -1,0 +1,121 @@
+"""The file of answers that a folder without a server gives, and its way into a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from phyblock.bounded import load_json, read_bytes
+from phyblock.errors import DataError, Problem, said
+from phyblock.models import HaltedError, Request
+from phyblock.play.person import Given, Person
+from phyblock.records.line import Amount
+from phyblock.run.plan import RunPlan
+from phyblock.tracks.by_hand import Picking
+
+__all__ = ["ANSWERS_FORMAT", "AnswersFile", "FileAnswers", "read_answers"]
+
+ANSWERS_FORMAT = 1
+_LARGEST_BYTES = 4 * 1024 * 1024
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class GivenAnswer(_Strict):
+    """An answer: the question's number from 1, places among its choices, seconds it took."""
+
+    number: int = Field(ge=1)
+    picks: list[int] = Field(max_length=1000)
+    took_s: Amount
+
+
+class AnswersFile(_Strict):
+    """Answers of one person: whose they are, to which run and under which text, and the answers."""
+
+    format: Literal[1]
+    run: str
+    model: str
+    consent: str
+    agreed: str
+    answers: list[GivenAnswer]
+
+
+def read_answers(path: Path, plan: RunPlan, person: Person) -> dict[int, Given]:
+    """The answers in a file by number.
+
+    Raises DataError for a file that is none, or is of another person or run.
+    """
+    try:
+        found = AnswersFile.model_validate(load_json(read_bytes(path, _LARGEST_BYTES), unique=True))
+    except OSError as error:
+        raise DataError(Problem(str(path), f"cannot be read: {said(error)}")) from error
+    except ValidationError as error:
+        raise DataError([_problem(path, fault) for fault in error.errors()]) from error
+    except ValueError as error:
+        raise DataError(Problem(str(path), f"is no file of answers: {error}")) from error
+    given: dict[int, Given] = {}
+    problems: list[Problem] = []
+    for field, value, wanted in (
+        ("model", found.model, person.model),
+        ("consent", found.consent, person.consent_sha256),
+        ("run", found.run, plan.manifest.identity),
+    ):
+        if value != wanted:
+            hint = "give the suite, --set, --limit, --name, --number and --consent of the export"
+            message = "is of another sitting than the one that is named"
+            problems.append(Problem(str(path), message, field, value, wanted, hint))
+            break
+    for place, answer in enumerate(found.answers):
+        field = f"answers[{place}].number"
+        if answer.number > plan.samples_per_model:
+            allowed = f"1 to {plan.samples_per_model}"
+            problems.append(
+                Problem(str(path), "is no question", field, str(answer.number), allowed)
+            )
+        if answer.number in given:
+            problems.append(Problem(str(path), "is there twice", field, str(answer.number)))
+        given[answer.number] = Given(tuple(answer.picks), answer.took_s)
+    if problems:
+        raise DataError(problems)
+    return given
+
+
+def _problem(path: Path, fault: Mapping[str, object]) -> Problem:
+    steps = fault["loc"]
+    assert isinstance(steps, tuple)
+    names = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps)
+    field = "".join(names).removeprefix(".")
+    return Problem(str(path), "is no file of answers", field, str(fault["msg"]))
+
+
+class FileAnswers:
+    """Answers requests out of a file, of a run that asks each item once."""
+
+    def __init__(self, path: Path, given: Mapping[int, Given], plan: RunPlan, model: str) -> None:
+        self._path = path
+        self._given = given
+        self._numbers = {
+            (sample.track.name, sample.item.key): number
+            for number, sample in enumerate(plan.samples(model), 1)
+        }
+
+    async def ask(self, request: Request, picking: Picking) -> Given:
+        """What was picked; HaltedError where nothing was.
+
+        Raises DataError for picks that make no answer.
+        """
+        number = self._numbers[request.track, request.key]
+        given = self._given.get(number)
+        if given is None:
+            raise HaltedError("has no answer in the file")
+        try:
+            picking.reply(given.picks)
+        except ValueError as error:
+            field, found = f"the answer to question {number}", ", ".join(map(str, given.picks))
+            raise DataError(Problem(str(self._path), str(error), field, found)) from error
+        return given

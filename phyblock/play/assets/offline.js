@@ -1,0 +1,75 @@
+/* The desk of a folder without a server: questions lie beside the page, answers in the browser until
+   they are saved as a file. */
+"use strict";
+
+const Desk = (() => {
+  const loaded = new Promise((done, failed) => {
+    const script = document.createElement("script");
+    script.src = "questions.js";
+    script.onload = () => done(SITTING);
+    script.onerror = failed;
+    document.head.append(script);
+  });
+  const state = { change: 0, phase: "consent", since: null, before: 0, agreed: "", answers: [] };
+  let wake = () => {};
+
+  const key = (sitting) => `phyblock ${sitting.head.run} ${sitting.head.model}`;
+  const ready = loaded.then((sitting) => {
+    const kept = JSON.parse(localStorage.getItem(key(sitting)) || "null");
+    if (kept) Object.assign(state, { agreed: kept.agreed, answers: kept.answers });
+    if (state.answers.length === sitting.questions.length) state.phase = "saved";
+    return sitting;
+  });
+  const elapsed = () => state.before + (state.since === null ? 0 : (performance.now() - state.since) / 1000);
+
+  function goTo(phase) {
+    state.phase = phase;
+    state.change += 1;
+    wake();
+  }
+
+  async function next(change) {
+    const sitting = await ready;
+    while (change === state.change) await new Promise((go) => { wake = go; });
+    const told = { change: state.change, phase: state.phase };
+    if (state.phase === "consent") {
+      told.about = { name: sitting.name, consent: sitting.text, done: state.answers.length, of: sitting.questions.length };
+    } else if (state.phase === "question") {
+      if (state.since === null) state.since = performance.now();
+      told.question = sitting.questions[state.answers.length];
+      told.elapsed_s = elapsed();
+    } else if (state.phase === "saved") {
+      told.sitting = { save: () => save(sitting) };
+    }
+    return told;
+  }
+
+  async function post(name, body) {
+    const sitting = await ready;
+    if (name === "agree") {
+      state.agreed = state.agreed || new Date().toISOString();
+      goTo("question");
+    } else if (name === "pause") {
+      state.before = elapsed();
+      state.since = null;
+      goTo("paused");
+    } else if (name === "resume") {
+      goTo("question");
+    } else if (name === "answer") {
+      const answer = { number: state.answers.length + 1, picks: body.picks, took_s: Math.round(1000 * elapsed()) / 1000 };
+      const answers = [...state.answers, answer];
+      localStorage.setItem(key(sitting), JSON.stringify({ agreed: state.agreed, answers }));
+      Object.assign(state, { answers, since: null, before: 0 });
+      goTo(answers.length === sitting.questions.length ? "saved" : "question");
+    }
+  }
+
+  function save(sitting) {
+    const content = { ...sitting.head, agreed: state.agreed, answers: state.answers };
+    const address = URL.createObjectURL(new Blob([JSON.stringify(content, null, 1)], { type: "application/json" }));
+    const name = `answers-${sitting.name}.json`;
+    el("a", { href: address, download: name }).click();
+  }
+
+  return { next, post };
+})();

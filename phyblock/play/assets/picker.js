@@ -1,0 +1,229 @@
+/* A question as a model is sent it, and an answer made by picking choices: by mouse, touch or keys. */
+"use strict";
+
+const Picker = (() => {
+  const MOST_BUTTONS = 6;
+
+  /** The picks so far, kept while the page lives, so that reloading it loses none. */
+  const draft = {
+    read(key) {
+      try {
+        const kept = JSON.parse(sessionStorage.getItem("draft"));
+        return kept && kept.key === key ? kept.picks : [];
+      } catch {
+        return [];
+      }
+    },
+    keep: (key, picks) => sessionStorage.setItem("draft", JSON.stringify({ key, picks })),
+  };
+
+  /** Show `question` in `main`; `submit` takes the picks. The answer is what takes keys. */
+  function show(main, question, submit) {
+    const key = `${location.pathname} ${question.number} ${question.turn}`;
+    const isOne = question.most === 1;
+    const picks = draft.read(key).filter((pick) => pick < question.choices.length);
+    const typed = { text: "" };
+    const spots = question.choices.map(() => []);
+    const pictures = question.messages.flatMap((one) => one.parts).filter((part) => part.picture);
+
+    const chips = el("ol", { class: "chips", "aria-label": isOne ? "Your answer" : "Your answer so far" });
+    const typing = el("span", { class: "typing muted number" });
+    const undo = el("button", { type: "button", class: "quiet", onclick: takeBack }, "Undo");
+    const clear = el("button", { type: "button", class: "quiet", onclick: takeAll }, "Clear");
+    const done = el("button", { type: "button", class: "primary", onclick: send });
+    const buttons = question.choices.map((choice, place) => {
+      const isShown = !choice.spots.length || question.choices.length <= MOST_BUTTONS;
+      return isShown ? choiceButton(choice, place) : null;
+    });
+
+    main.replaceChildren(
+      el("h1", { class: "visually-hidden" }, `Question ${question.number} of ${question.of}`),
+      el("div", { class: "asked" }, question.messages.map(message)),
+      el(
+        "section",
+        { class: "answer", "aria-label": "Your answer" },
+        el("div", { class: "choices" }, buttons),
+        el("div", { class: "given" }, chips, typing),
+        el("div", { class: "acts" }, isOne ? null : [undo, clear], done),
+      ),
+    );
+    paint("");
+    return onKey;
+
+    function message(one) {
+      const isText = (part) => part && part.text !== undefined;
+      const made = [];
+      one.parts.forEach((part, n) => {
+        const next = one.parts[n + 1];
+        if (isText(part)) {
+          // What stands before a picture is its caption.
+          if (!next || isText(next)) made.push(el("p", { class: "text" }, part.text));
+          return;
+        }
+        const before = isText(one.parts[n - 1]) ? one.parts[n - 1].text : "";
+        made.push(figure(part, before));
+      });
+      return el("div", { class: `message ${one.role}` }, made);
+    }
+
+    function figure(part, caption) {
+      const number = pictures.indexOf(part);
+      const here = question.choices.flatMap((choice, place) =>
+        choice.spots.filter((spot) => spot.picture === number).map((spot) => ({ ...spot, place })),
+      );
+      const left = Math.min(1, ...here.map((spot) => spot.box[0]));
+      // A goal beside its candidates comes apart on a narrow screen: the same picture, twice.
+      const cuts = here.length && left > 0.2 ? [[0, left], [left, 1]] : [[0, 1]];
+      const windows = cuts.map(([from, to]) => {
+        const share = to - from;
+        const image = el("img", { src: part.picture, alt: alternative(part), draggable: "false" });
+        const frame = el("div", { class: "window" }, image);
+        frame.style.flexGrow = share;
+        frame.style.aspectRatio = `${part.width * share} / ${part.height}`;
+        image.style.width = `${100 / share}%`;
+        image.style.left = `${(-100 * from) / share}%`;
+        for (const spot of here.filter((one) => one.box[0] >= from && one.box[0] < to)) {
+          const button = el("button", {
+            type: "button", class: "spot", "data-place": spot.place,
+            "aria-label": spotName(spot.place), onclick: () => pick(spot.place),
+          });
+          const [x, y, width, height] = spot.box;
+          Object.assign(button.style, {
+            left: `${(100 * (x - from)) / share}%`, top: `${100 * y}%`,
+            width: `${(100 * width) / share}%`, height: `${100 * height}%`,
+          });
+          spots[spot.place].push(button);
+          frame.append(button);
+        }
+        return frame;
+      });
+      const made = el("figure", {}, caption ? el("figcaption", {}, caption) : null,
+        el("div", { class: "windows" }, windows));
+      made.style.setProperty("--wide", part.width / part.height);
+      return made;
+    }
+
+    function alternative(part) {
+      return { composite: "The goal on the left, the candidates on the right" }[part.label]
+        || `Picture: ${part.label}`;
+    }
+
+    function spotName(place) {
+      return /^\d+$/.test(question.choices[place].name)
+        ? `Candidate ${question.choices[place].name}` : `Option ${question.choices[place].name}`;
+    }
+
+    function choiceButton(choice, place) {
+      return el("button", { type: "button", class: "choice", "data-place": place, onclick: () => pick(place) },
+        el("b", {}, choice.name), choice.text ? ` ${choice.text}` : null);
+    }
+
+    function pick(place) {
+      typed.text = "";
+      if (isOne) picks.splice(0, 1, place);
+      else if (!question.repeats && picks.includes(place)) return paint(`${question.choices[place].name} is picked already`);
+      else if (picks.length >= question.most) return paint("No more can be picked");
+      else picks.push(place);
+      paint(`${isOne ? "Picked" : `${question.noun} ${picks.length}:`} ${question.choices[place].name}`);
+    }
+
+    function takeBack() {
+      const last = picks.pop();
+      paint(last === undefined ? "Nothing to undo" : `Took back ${question.choices[last].name}`);
+    }
+
+    function takeAll() {
+      picks.length = 0;
+      paint("All taken back");
+    }
+
+    function send() {
+      if (picks.length < question.least) {
+        paint(`Pick ${question.least - picks.length} more first`);
+        return;
+      }
+      done.disabled = true;
+      done.textContent = "Saving …";
+      submit([...picks]);
+    }
+
+    function paint(words) {
+      draft.keep(key, picks);
+      // A single pick that a button shows already need not be said twice.
+      const isSaid = isOne && picks.every((place) => buttons[place]);
+      chips.replaceChildren(...(isSaid ? [] : picks.map((place, n) => chip(place, n))));
+      undo.disabled = clear.disabled = !picks.length;
+      done.disabled = picks.length < question.least;
+      done.textContent = isOne || !picks.length ? "Submit" : `Submit ${Words.count(picks.length, question.noun)}`;
+      typing.textContent = typed.text ? `${typed.text}_ Enter picks it` : "";
+      question.choices.forEach((_, place) => {
+        const at = picks.flatMap((one, n) => (one === place ? [n + 1] : []));
+        for (const spot of spots[place]) {
+          spot.classList.toggle("picked", at.length > 0);
+          spot.replaceChildren(...(at.length ? [el("span", { class: "badge number" }, isOne ? "✓" : at.join(", "))] : []));
+          spot.setAttribute("aria-label", spotName(place) + (at.length ? `, picked as ${at.join(", ")}` : ""));
+        }
+        buttons[place]?.setAttribute("aria-pressed", String(at.length > 0));
+      });
+      if (words) document.getElementById("said").textContent = words;
+    }
+
+    function chip(place, n) {
+      const choice = question.choices[place];
+      const spot = choice.spots[0];
+      const thumb = spot ? el("span", { class: "thumb", "aria-hidden": "true" }) : null;
+      if (thumb) {
+        const part = pictures[spot.picture];
+        const [x, y, width, height] = spot.box;
+        const at = (start, size) => (size < 1 ? `${(100 * start) / (1 - size)}%` : "0%");
+        thumb.style.backgroundImage = `url("${part.picture}")`;
+        thumb.style.backgroundSize = `${100 / width}% ${100 / height}%`;
+        thumb.style.backgroundPosition = `${at(x, width)} ${at(y, height)}`;
+      }
+      return el("li", {}, isOne ? null : el("span", { class: "muted number" }, `${n + 1}.`), thumb,
+        el("b", { class: "number" }, choice.name), isOne && choice.text ? ` ${choice.text}` : null);
+    }
+
+    /** Digits and letters name a choice; Enter ends a name that others begin with. */
+    function onKey(event) {
+      if (event.altKey || event.metaKey) return;
+      if (event.key === "Enter" && event.ctrlKey) return taken(event, send);
+      if (event.ctrlKey) return;
+      const spot = event.target.closest?.(".spot");
+      const move = { ArrowLeft: -1, ArrowRight: 1, ArrowUp: -4, ArrowDown: 4 }[event.key];
+      if (spot && move) {
+        const next = spots[Number(spot.dataset.place) + move]?.[0];
+        return taken(event, () => next?.focus());
+      }
+      if (event.key === "Backspace") {
+        return taken(event, () => (typed.text ? retype(typed.text.slice(0, -1)) : takeBack()));
+      }
+      if (event.key === "Escape" && typed.text) return taken(event, () => retype(""));
+      if (event.key === "Enter" && typed.text) return taken(event, () => name(typed.text, true));
+      if (/^[0-9a-z]$/i.test(event.key)) return taken(event, () => name(typed.text + event.key, false));
+    }
+
+    function taken(event, act) {
+      event.preventDefault();
+      act();
+    }
+
+    function retype(text) {
+      typed.text = text;
+      paint("");
+    }
+
+    function name(text, isWhole) {
+      const wanted = text.toUpperCase();
+      const names = question.choices.map((choice) => choice.name.toUpperCase());
+      const begun = names.filter((one) => one.startsWith(wanted));
+      const exact = names.indexOf(wanted);
+      if (exact >= 0 && (isWhole || begun.length === 1)) return pick(exact);
+      if (begun.length === 1 && (isWhole || wanted.length > 1)) return pick(names.indexOf(begun[0]));
+      retype(begun.length ? text : "");
+      if (!begun.length) paint(`${text} is no choice`);
+    }
+  }
+
+  return { show };
+})();

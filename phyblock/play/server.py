@@ -1,0 +1,227 @@
+"""The page's server: on the loopback address alone, behind a token, for pages of its own.
+
+Names other than 127.0.0.1 and localhost are refused as hosts, so that no foreign name that is made
+to mean this machine gets in; what changes anything must come from a page of this address. It reads
+from memory and from files that were named to it, and writes nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import mimetypes
+import re
+import secrets
+import threading
+from collections.abc import Callable, Mapping
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from phyblock.bounded import load_json
+from phyblock.errors import Problem, SpecError, said
+from phyblock.play.desk import Desk, NotNowError
+from phyblock.play.page import assets
+
+__all__ = ["LARGEST_BODY_BYTES", "Server"]
+
+HOST = "127.0.0.1"
+LARGEST_BODY_BYTES = 16 * 1024
+"""Of a request; an answer is some hundred bytes long."""
+_WAIT_S = 15.0
+_TIMEOUT_S = 30.0
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+_FRAMED_POLICY = "frame-ancestors 'none'"
+"""Of files that bring a policy of their own."""
+_STATE = re.compile(r"(?:after=(\d{1,9}))?")
+_PICTURE = re.compile(r"picture/(\d{1,9})/(\d{1,3})")
+
+
+class Server:
+    """Serves one sitting until it is closed; a context manager.
+
+    `address` is what a browser opens, with a token that nobody can guess. Raises SpecError for a
+    port that is taken.
+    """
+
+    def __init__(self, desk: Desk, port: int = 0) -> None:
+        self._desk = desk
+        self._token = secrets.token_urlsafe(24)
+        self._assets = assets("served.js")
+        self._files: Mapping[str, Path] = {}
+        self.finished = threading.Event()
+        """Set by the page when the person is through."""
+        handler = type("Handler", (_Handler,), {"sitting": self})
+        try:
+            self._http = _Listener((HOST, port), handler)
+        except OSError as error:
+            problem = Problem("--port", f"cannot be used: {said(error)}", found=str(port))
+            raise SpecError(problem) from error
+        self._thread = threading.Thread(target=self._http.serve_forever, daemon=True)
+
+    @property
+    def port(self) -> int:
+        """The port that it listens on."""
+        return int(self._http.server_address[1])
+
+    @property
+    def hosts(self) -> tuple[str, ...]:
+        """What a browser calls this server."""
+        return (f"{HOST}:{self.port}", f"localhost:{self.port}")
+
+    @property
+    def address(self) -> str:
+        """The address of the page."""
+        return f"http://{HOST}:{self.port}/{self._token}/"
+
+    def __enter__(self) -> Server:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._http.shutdown()
+        self._http.server_close()
+
+    def show_files(self, files: Mapping[str, Path]) -> None:
+        """Serve these files too, by their names below the address."""
+        self._files = dict(files)
+
+    def below(self, path: str) -> str | None:
+        """The rest of a path that begins with the token; None for any other."""
+        token, slash, rest = path.removeprefix("/").partition("/")
+        is_ours = secrets.compare_digest(token.encode(), self._token.encode()) and slash
+        return rest if is_ours else None
+
+    def get(self, name: str, query: str) -> tuple[str, bytes, str] | None:
+        """Type, content and policy of what stands under a name; None where nothing does."""
+        if name in self._assets:
+            kind, content = self._assets[name]
+            return kind, content, _POLICY
+        if name == "state" and (asked := _STATE.fullmatch(query)):
+            told = self._desk.state(int(asked[1] or -1), _WAIT_S)
+            return "application/json", json.dumps(told).encode(), _POLICY
+        if asked := _PICTURE.fullmatch(name):
+            picture = self._desk.picture(int(asked[1]), int(asked[2]))
+            return None if picture is None else ("image/png", picture.data, _POLICY)
+        if name in self._files:
+            kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
+            return kind, self._files[name].read_bytes(), _FRAMED_POLICY
+        return None
+
+    def post(self, name: str, body: Mapping[str, Any]) -> bool:
+        """Do what a page asks for; False for what there is not. Raises as the desk does."""
+        deeds: dict[str, Callable[[], None]] = {
+            "agree": self._desk.agree,
+            "pause": self._desk.pause,
+            "resume": self._desk.resume,
+            "finish": self.finished.set,
+            "answer": lambda: self._desk.answer(*_answer(body)),
+        }
+        if name in deeds:
+            deeds[name]()
+        return name in deeds
+
+
+def _answer(body: Mapping[str, Any]) -> tuple[int, list[int]]:
+    change, picks = body.get("change"), body.get("picks")
+    if type(change) is not int or not isinstance(picks, list):
+        raise ValueError("needs change and picks")
+    if not all(type(pick) is int for pick in picks):
+        raise ValueError("holds picks that are no whole numbers")
+    return change, picks
+
+
+class _Listener(ThreadingHTTPServer):
+    daemon_threads = True
+    allow_reuse_address = False
+
+
+class _Handler(BaseHTTPRequestHandler):
+    sitting: Server
+    timeout = _TIMEOUT_S
+    protocol_version = "HTTP/1.1"
+    server_version = "phyblock"
+    sys_version = ""
+
+    def do_GET(self) -> None:
+        """Give a file of the page, the state, or a picture."""
+        name, query = self._admitted(changes=False)
+        if name is None:
+            return
+        found = self.sitting.get(name, query)
+        if found is None:
+            self._refuse(404)
+            return
+        kind, content, policy = found
+        self._send(200, kind, content, policy)
+
+    def do_POST(self) -> None:
+        """Take an answer, a pause, an agreement, an end."""
+        name, _ = self._admitted(changes=True)
+        if name is None:
+            return
+        length = self.headers.get("Content-Length", "")
+        if not length.isascii() or not length.isdigit():
+            self._refuse(411)
+            return
+        if len(length) > 9 or int(length) > LARGEST_BODY_BYTES:
+            self._refuse(413)
+            return
+        try:
+            body = load_json(self.rfile.read(int(length)))
+            is_known = self.sitting.post(name, body if isinstance(body, dict) else {})
+        except NotNowError:
+            self._refuse(409)
+        except ValueError:
+            self._refuse(400)
+        else:
+            if is_known:
+                self._send(200, "application/json", b"{}", _POLICY)
+            else:
+                self._refuse(404)
+
+    def _admitted(self, *, changes: bool) -> tuple[str | None, str]:
+        """The name that is asked for and its query; None where the request was refused."""
+        split = urlsplit(self.path)
+        hosts, origin = self.headers.get_all("Host", []), self.headers.get("Origin")
+        origins = [f"http://{host}" for host in self.sitting.hosts]
+        name = self.sitting.below(split.path)
+        if len(hosts) != 1 or hosts[0] not in self.sitting.hosts:
+            self._refuse(421)
+        elif (origin is None and changes) or (origin is not None and origin not in origins):
+            self._refuse(403)
+        elif name is None:
+            self._refuse(404)
+        elif changes and self.headers.get("Content-Type") != "application/json":
+            self._refuse(415)
+        elif self.headers.get("Transfer-Encoding") is not None:
+            self._refuse(411)
+        else:
+            return name, split.query
+        return None, ""
+
+    def _refuse(self, status: int) -> None:
+        self.close_connection = True
+        self._send(status, "text/plain", b"", _POLICY)
+
+    def _send(self, status: int, kind: str, content: bytes, policy: str) -> None:
+        self.send_response(status)
+        is_text = kind.startswith("text/") or kind.endswith(("json", "javascript"))
+        self.send_header("Content-Type", f"{kind}; charset=utf-8" if is_text else kind)
+        self.send_header("Content-Length", str(len(content)))
+        self.send_header("Content-Security-Policy", policy)
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.send_header("Cross-Origin-Resource-Policy", "same-origin")
+        self.send_header("Cross-Origin-Opener-Policy", "same-origin")
+        self.send_header("Referrer-Policy", "no-referrer")
+        self.send_header("Cache-Control", "no-store")
+        if self.close_connection:
+            self.send_header("Connection", "close")
+        self.end_headers()
+        self.wfile.write(content)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Say nothing: the terminal is the run's."""
