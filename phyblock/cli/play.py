@@ -20,7 +20,7 @@ from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.cli.report import show_made
 from phyblock.errors import Problem, SpecError, said
 from phyblock.play.answers import FileAnswers, read_answers
-from phyblock.play.export import export_sitting
+from phyblock.play.export import check_offline, export_sitting
 from phyblock.play.page import default_consent
 from phyblock.play.person import Person, PersonModel, plan_sitting
 from phyblock.play.server import Server
@@ -71,6 +71,7 @@ _LARGEST_CONSENT_BYTES = 64 * 1024
 )
 @click.option("--out", type=UserPath(), help="Folder of the run. [default: results/SUITE-DIGEST]")
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="[default: any free one]")
+@click.option("--no-report", is_flag=True, help="With --import: tables alone, no page.")
 @click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
 @click.option("--export", type=UserPath(), metavar="DIR", help="Write a page without a server.")
 @click.option(
@@ -86,6 +87,7 @@ def command(
     beside: tuple[Path, ...],
     out: Path | None,
     port: int,
+    no_report: bool,
     no_browser: bool,
     export: Path | None,
     answers: Path | None,
@@ -103,13 +105,15 @@ def command(
     loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
     plan = plan_sitting(loaded, person, limit)
     console = make_console()
+    if export is not None or answers is not None:
+        check_offline(plan)
     if export is not None:
         return _export(console, plan, person, export)
     folder = out or Path("results") / plan.folder_name
     if holds_run(folder, plan.manifest):
         run_folder(folder).check(names_to_write(folder, page=True))
     if answers is not None:
-        return _import(console, plan, person, folder, answers)
+        return _import(console, plan, person, folder, answers, page=not no_report)
     return _sit(console, plan, person, folder, beside, port, opens=not no_browser)
 
 
@@ -152,9 +156,11 @@ def _without(words: Sequence[str], option: str) -> list[str]:
     return kept
 
 
-def _import(console: Console, plan: RunPlan, person: Person, folder: Path, file: Path) -> int:
+def _import(
+    console: Console, plan: RunPlan, person: Person, folder: Path, file: Path, *, page: bool
+) -> int:
     given = read_answers(file, plan, person)
-    model = PersonModel(person.model, FileAnswers(file, given, plan, person.model).ask)
+    model = PersonModel(person.model, FileAnswers(given, plan, person.model).ask)
 
     async def run() -> RunResult:
         present = {model.name: model}
@@ -164,7 +170,7 @@ def _import(console: Console, plan: RunPlan, person: Person, folder: Path, file:
             return await session.run()
 
     result = asyncio.run(run())
-    show_made(folder, plan.suite.tables, page=True)
+    show_made(folder, plan.suite.tables, page=page)
     done = f"{result.settled:,} of {counted(result.samples, 'answer')} are there"
     console.print(f"{done}. The run is in {shown_path(folder)}", soft_wrap=True)
     return 1 if result.left else 0

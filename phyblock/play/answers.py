@@ -11,9 +11,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from phyblock.bounded import load_json, read_bytes
 from phyblock.errors import DataError, Problem, said
 from phyblock.models import HaltedError, Request
-from phyblock.play.person import Given, Person
-from phyblock.records.line import Amount
+from phyblock.play.person import Given, Person, picking_of
 from phyblock.run.plan import RunPlan
+from phyblock.tracks.base import shown_item
 from phyblock.tracks.by_hand import Picking
 
 __all__ = ["ANSWERS_FORMAT", "AnswersFile", "FileAnswers", "read_answers"]
@@ -31,7 +31,7 @@ class GivenAnswer(_Strict):
 
     number: int = Field(ge=1)
     picks: list[int] = Field(max_length=1000)
-    took_s: Amount
+    took_s: float = Field(ge=0, le=1e9, allow_inf_nan=False)
 
 
 class AnswersFile(_Strict):
@@ -82,7 +82,26 @@ def read_answers(path: Path, plan: RunPlan, person: Person) -> dict[int, Given]:
         given[answer.number] = Given(tuple(answer.picks), answer.took_s)
     if problems:
         raise DataError(problems)
+    _check_picks(path, given, plan, person)
     return given
+
+
+def _check_picks(path: Path, given: Mapping[int, Given], plan: RunPlan, person: Person) -> None:
+    """Raise DataError for picks that make no answer to their question."""
+    problems: list[Problem] = []
+    for number, sample in enumerate(plan.samples(person.model), 1):
+        if number not in given:
+            continue
+        item = shown_item(sample.track, sample.item, sample.seed)
+        request, _ = next(iter(sample.track.outlines(item)))
+        picks = given[number].picks
+        try:
+            picking_of(request).reply(picks)
+        except ValueError as error:
+            field, found = f"the answer to question {number}", ", ".join(map(str, picks))
+            problems.append(Problem(str(path), str(error), field, found))
+    if problems:
+        raise DataError(problems)
 
 
 def _problem(path: Path, fault: Mapping[str, object]) -> Problem:
@@ -96,8 +115,7 @@ def _problem(path: Path, fault: Mapping[str, object]) -> Problem:
 class FileAnswers:
     """Answers requests out of a file, of a run that asks each item once."""
 
-    def __init__(self, path: Path, given: Mapping[int, Given], plan: RunPlan, model: str) -> None:
-        self._path = path
+    def __init__(self, given: Mapping[int, Given], plan: RunPlan, model: str) -> None:
         self._given = given
         self._numbers = {
             (sample.track.name, sample.item.key): number
@@ -105,17 +123,9 @@ class FileAnswers:
         }
 
     async def ask(self, request: Request, picking: Picking) -> Given:
-        """What was picked; HaltedError where nothing was.
-
-        Raises DataError for picks that make no answer.
-        """
-        number = self._numbers[request.track, request.key]
-        given = self._given.get(number)
+        """What was picked; HaltedError where nothing was."""
+        del picking
+        given = self._given.get(self._numbers[request.track, request.key])
         if given is None:
             raise HaltedError("has no answer in the file")
-        try:
-            picking.reply(given.picks)
-        except ValueError as error:
-            field, found = f"the answer to question {number}", ", ".join(map(str, given.picks))
-            raise DataError(Problem(str(self._path), str(error), field, found)) from error
         return given

@@ -20,23 +20,26 @@ from phyblock.run.plan import RunPlan
 from phyblock.tracks import SingleTrack
 from phyblock.tracks.base import shown_item
 
-__all__ = ["export_sitting"]
+__all__ = ["check_offline", "export_sitting"]
 
 _PAGE = "index.html"
 _PICTURES = "pictures"
 
 
-async def export_sitting(plan: RunPlan, person: Person, folder: Path) -> Path:
-    """Write the folder; the path of its page.
-
-    Raises SpecError for tracks whose next request depends on the answer to the last, StoreError
-    where something is in the way or the disk refuses.
-    """
+def check_offline(plan: RunPlan) -> None:
+    """Raise SpecError for tracks whose next request depends on the answer to the last."""
     turned = [track.name for track in plan.tracks if not isinstance(track, SingleTrack)]
     if turned:
         message = "goes turn by turn, which needs the server"
         hint = "leave it out: --set tracks=[...]"
         raise SpecError(Problem("--export", message, "tracks", ", ".join(turned), hint=hint))
+
+
+async def export_sitting(plan: RunPlan, person: Person, folder: Path) -> Path:
+    """Write the folder of a plan that passed `check_offline`; the path of its page.
+
+    Raises StoreError where something is in the way or the disk refuses.
+    """
     config = person.planned().config
     questions: list[dict[str, Any]] = []
     out = OutFolder(folder)

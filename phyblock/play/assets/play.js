@@ -61,6 +61,12 @@
     closed() {
       card(el("h1", {}, "The sitting was closed"), el("p", {}, "All that you submitted is kept."));
     },
+    lost() {
+      card(
+        el("h1", {}, "The program behind this page has stopped"),
+        el("p", {}, "All that you submitted is kept. Start it again with the same command, and open the address that it prints."),
+      );
+    },
     done({ results }) {
       progress.textContent = "Done";
       main.replaceChildren(Results.page(results, () => post("finish")));
@@ -101,22 +107,14 @@
         if (state.change === shown.change) continue;
         shown.change = state.change;
         show(state);
-        if (state.phase === "closed") return;
+        if (["closed", "done", "saved"].includes(state.phase)) return;
       } catch {
-        if (shown.phase === "done") return;
-        if (shown.phase !== "lost") {
-          show.call(null, { phase: "lost" });
-        }
+        if (shown.phase !== "lost") show({ phase: "lost" });
         shown.change = -1;
         await new Promise((go) => setTimeout(go, RETRY_MS));
       }
     }
   }
-
-  views.lost = () => card(
-    el("h1", {}, "The program behind this page has stopped"),
-    el("p", {}, "All that you submitted is kept. Start it again with the same command, and open the address that it prints."),
-  );
 
   pause.addEventListener("click", () => post("pause"));
   document.addEventListener("keydown", (event) => shown.keys?.(event));

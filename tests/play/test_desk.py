@@ -1,0 +1,116 @@
+"""The desk: one question at a time, nothing before consent, time without pauses."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+
+import pytest
+
+from phyblock.models import HaltedError, Image, Message, Request
+from phyblock.play.desk import Desk, NotNowError
+from phyblock.play.person import Given
+from phyblock.play.shown import Place
+from phyblock.tracks.by_hand import Choice, Picking, Spot
+
+PICTURE = Image(b"pixels", "candidates", 64, 64)
+PICKING = Picking(
+    (Choice("1", "", (Spot("candidates", 0),)), Choice("2", "", (Spot("candidates", 1),))),
+    least=1,
+    most=3,
+    repeats=True,
+    noun="step",
+    write=lambda picks: " ".join(map(str, picks)),
+)
+
+
+def request(key: str = "secret-scene") -> Request:
+    message = Message("user", ("Look:", PICTURE, "What comes first?"))
+    return Request(key, 0, (message,), {}, "v", {"answer": "secret-answer"})
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def desk_at(clock: Clock) -> Desk:
+    desk = Desk(lambda: Place(1, 2), clock)
+    desk.welcome({"name": "ada", "consent": "May we?", "done": 0, "of": 2})
+    return desk
+
+
+async def asked(desk: Desk) -> asyncio.Task[Given]:
+    task = asyncio.create_task(desk.ask(request(), PICKING))
+    await asyncio.sleep(0)
+    return task
+
+
+def test_nothing_is_shown_before_consent_and_no_name_or_answer_ever() -> None:
+    async def play() -> None:
+        desk = desk_at(Clock())
+        task = await asked(desk)
+        told = desk.state(-1)
+        assert told["phase"] == "consent"
+        assert "question" not in told
+        assert desk.picture(told["change"], 0) is None
+        desk.agree()
+        told = desk.state(-1)
+        parts = told["question"]["messages"][0]["parts"]
+        assert [part.get("text") for part in parts] == ["Look:", None, "What comes first?"]
+        assert "secret" not in json.dumps(told)
+        assert desk.picture(told["change"], 0) is PICTURE
+        assert desk.picture(told["change"], 1) is desk.picture(told["change"] - 1, 0) is None
+        desk.close()
+        with pytest.raises(HaltedError):
+            await task
+
+    asyncio.run(play())
+
+
+def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses() -> None:
+    async def play() -> Given:
+        clock = Clock()
+        desk = desk_at(clock)
+        task = await asked(desk)
+        clock.now = 100.0
+        desk.agree()
+        clock.now = 200.0
+        desk.state(-1)
+        clock.now = 203.0
+        desk.pause()
+        assert "question" not in desk.state(-1)
+        clock.now = 400.0
+        desk.resume()
+        clock.now = 401.0
+        assert desk.state(-1)["elapsed_s"] == 3.0
+        clock.now = 403.5
+        desk.answer(desk.state(-1)["change"], [1, 0, 1])
+        return await task
+
+    assert asyncio.run(play()) == Given((1, 0, 1), 5.5)
+
+
+def test_an_answer_counts_once_and_only_for_what_lies_there() -> None:
+    async def play() -> None:
+        desk = desk_at(Clock())
+        task = await asked(desk)
+        desk.agree()
+        change = desk.state(-1)["change"]
+        with pytest.raises(NotNowError):
+            desk.answer(change - 1, [0])
+        with pytest.raises(ValueError, match="holds 0 picks"):
+            desk.answer(change, [])
+        desk.answer(change, [0])
+        for late in (change, change + 1):
+            with pytest.raises(NotNowError):
+                desk.answer(late, [1])
+        assert (await task).picks == (0,)
+        assert desk.state(-1)["phase"] == "waiting"
+        with pytest.raises(NotNowError):
+            desk.pause()
+
+    asyncio.run(play())

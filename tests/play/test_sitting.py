@@ -1,0 +1,368 @@
+"""A scripted person at the page, in a real browser: mouse, keys, a phone, a kill, no server.
+
+What is answered here is a script's, to test the page: it says nothing of what people can do.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests.fork_server import Forked, fork_server
+from tests.report.test_html_browser import CHROMIUMS, FLAGS
+from tests.vqa_set import questions, write_questions
+from tests.workspace import SCENES, Raw, Workspace
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+SUBTASKS = ("SH", "OR", "AD", "VP")
+PHONE = {"width": 390, "height": 780}
+HOSTILE = "<img src=x onerror=alert(1)></script><script>alert(2)</script>"
+CONSENT = f"May we keep your answers?\n\n{HOSTILE}"
+ADA = ("play", "suite.yaml", "--name", "ada", "--number", "2", "--consent", "consent.txt")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A headless Chromium; skips where there is none."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    found = next(filter(None, map(shutil.which, CHROMIUMS)), None)
+    if found is None:
+        pytest.skip("no Chromium: apt-get install chromium")
+    with playwright.sync_playwright() as started:
+        running = started.chromium.launch(executable_path=found, args=FLAGS)
+        yield running
+        running.close()
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+    """Three scenes and four questions, hostile texts in these; a run of two baselines."""
+    made = Workspace(tmp_path_factory.mktemp("play"), pictures_dir)
+    scenes = SCENES[:3]
+    made.write_scenes(*scenes)
+    asked = questions(scenes[:2], 1, SUBTASKS)
+    for one in asked:
+        one["question"] += HOSTILE
+        one["options"] = [o if o.startswith("<img") else f"{o} {HOSTILE}" for o in one["options"]]
+    write_questions(made.root / "questions", asked)
+    made.write_suite(
+        tracks=["full_planning", "vqa"],
+        vqa={"path": "./questions", "subtasks": list(SUBTASKS)},
+        seeds=[3, 4],
+    )
+    (made.root / "consent.txt").write_text(CONSENT, encoding="utf-8")
+    done = made.run()
+    assert done.code == 0, done.err
+    return made
+
+
+@dataclass
+class Sat:
+    """A page at a running server."""
+
+    page: Page
+    process: Forked
+    complaints: list[str]
+
+
+@contextmanager
+def sitting(browser: Browser, workspace: Workspace, **options: Any) -> Iterator[Sat]:
+    command = [*ADA, "--out", "ada", "--beside", "out", "--no-browser"]
+    with fork_server().start(command, workspace.root, workspace.env) as process:
+        line = process.stdout.readline()
+        address = re.search(r"http://127\.0\.0\.1:\d+/\S+/", line)
+        assert address, line + process.stderr.read()
+        page, complaints = opened(browser, address[0], **options)
+        try:
+            yield Sat(page, process, complaints)
+        finally:
+            process.kill()
+            page.close()
+
+
+def opened(browser: Browser, address: str, **options: Any) -> tuple[Page, list[str]]:
+    page = browser.new_page(**{"viewport": {"width": 1300, "height": 900}, **options})
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("dialog", lambda dialog: complaints.append(dialog.message))
+    page.goto(address)
+    return page, complaints
+
+
+def task(page: Page, number: int) -> None:
+    page.get_by_text(f"Task {number} of 7").wait_for()
+    page.locator(".answer").wait_for()
+
+
+def answered(folder: Path) -> list[Raw]:
+    path = folder / "records.jsonl"
+    if not path.exists():
+        return []
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def said(record: Raw) -> str:
+    text: str = record["reply"]["text"]
+    return text
+
+
+def plan(*numbers: int) -> str:
+    return "\n".join(f"Step{n}: Move block with index {one}" for n, one in enumerate(numbers, 1))
+
+
+def test_a_sitting_by_mouse_keys_and_phone_over_a_kill(
+    browser: Browser, workspace: Workspace
+) -> None:
+    run = workspace.root / "ada"
+    with sitting(browser, workspace) as sat:
+        begin_with_mouse_and_keys(sat.page, run)
+        # Reloading loses no pick; a kill loses the task at hand alone.
+        sat.page.keyboard.press("5")
+        sat.page.reload()
+        task(sat.page, 3)
+        assert sat.page.locator(".chips li").count() == 1
+        assert not sat.complaints
+        sat.process.kill()
+        sat.page.get_by_text("has stopped").wait_for()
+    assert [*map(said, answered(run))] == [plan(3, 7), plan(12, 1, 7)]
+    with sitting(browser, workspace, viewport=PHONE, has_touch=True, color_scheme="dark") as sat:
+        end_on_a_phone(sat.page, run)
+        assert sat.process.wait() == 0
+        assert not sat.complaints
+    check_as_of_any_model(workspace, run)
+
+
+def begin_with_mouse_and_keys(page: Page, run: Path) -> None:
+    assert "May we keep your answers?" in page.inner_text("#main")
+    page.get_by_role("button", name="I agree").click()
+
+    task(page, 1)
+    for name in ("Candidate 3", "Candidate 7", "Candidate 12"):
+        page.get_by_role("button", name=name).first.click()
+    page.get_by_role("button", name="Undo").click()
+    assert page.locator(".chips li").all_inner_texts() == ["1.\n3", "2.\n7"]
+    assert not answered(run)
+    shown = sent_to(page)
+    page.get_by_role("button", name="Submit 2 steps").click()
+    task(page, 2)
+    (first,) = answered(run)
+    assert (said(first), first["model"], first["seed"]) == (plan(3, 7), "human:ada", 3)
+    assert 0 < first["reply"]["latency_s"] < 60
+    assert shown == stored_prompt(run, first)
+
+    # By keys alone: 1 might be the beginning of 12, so Enter ends it.
+    for key in ("1", "2", "1", "Enter", "9", "Backspace", "7", "Control+Enter"):
+        page.keyboard.press(key)
+    task(page, 3)
+    assert said(answered(run)[1]) == plan(12, 1, 7)
+
+
+def end_on_a_phone(page: Page, run: Path) -> None:
+    assert "Welcome back. 5 tasks of 7 are left" in page.inner_text("#main")
+    page.get_by_role("button", name="I agree").tap()
+    task(page, 3)
+    fits_the_phone(page)
+    page.get_by_role("button", name="Candidate 16").tap()
+    page.get_by_role("button", name="Pause").tap()
+    page.get_by_role("heading", name="Paused").wait_for()
+    assert page.locator("img").count() == 0
+    page.get_by_role("button", name="Go on").tap()
+    page.get_by_role("button", name="Submit 1 step").tap()
+    for number in range(4, 8):
+        task(page, number)
+        fits_the_phone(page)
+        if page.get_by_role("button", name="Clear").count():
+            page.keyboard.type("badc")
+        elif page.locator(".spot").count():
+            page.locator(".spot").nth(2).tap()
+        else:
+            page.locator(".choice").nth(1).tap()
+        page.get_by_role("button", name=re.compile("^Submit")).tap()
+    page.get_by_role("heading", name="How it went").wait_for()
+    assert len(answered(run)) == 7
+    assert {record["question"]["subtask"]: said(record) for record in answered(run)[3:]} == {
+        "SH": "Answer: B",
+        "AD": "Answer: B",
+        "VP": "Answer: C",
+        "OR": "Answer: B, A, D, C",
+    }
+    text = page.inner_text("#main")
+    assert "It first broke at step 1" in text
+    assert "oracle 100.0" in text
+    fits_the_phone(page)
+    with page.expect_popup() as popup:
+        page.get_by_role("link", name="Replay").first.click()
+    popup.value.wait_for_selector("#detail .card")
+    popup.value.close()
+    page.get_by_role("button", name="Finish").tap()
+
+
+def fits_the_phone(page: Page) -> None:
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+
+
+def sent_to(page: Page) -> list[object]:
+    """Texts that are shown, and digests of the bytes of the pictures."""
+    digest = """async image => {
+        const bytes = await (await fetch(image.src)).arrayBuffer();
+        const sum = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes));
+        return [...sum].map(one => one.toString(16).padStart(2, "0")).join("");
+    }"""
+    texts = page.locator(".message .text").evaluate_all("all => all.map(one => one.textContent)")
+    pictures = {image.evaluate(digest) for image in page.locator("figure img").all()}
+    return [*texts, *pictures]
+
+
+def stored_prompt(run: Path, record: Raw) -> list[object]:
+    lines = (run / "prompts.jsonl").read_text(encoding="utf-8").splitlines()
+    prompts = {line["sha256"]: line for line in map(json.loads, lines)}
+    messages = prompts[record["prompt"]["messages"]]["messages"]
+    parts = [part for message in messages for part in message["parts"]]
+    texts = [part for part in parts if isinstance(part, str)]
+    return [*texts, *(image["sha256"] for image in record["prompt"]["images"])]
+
+
+def check_as_of_any_model(workspace: Workspace, run: Path) -> None:
+    """Scoring again changes nothing, and replayed as a recording the replies are worth the same."""
+    before = (run / "records.jsonl").read_bytes()
+    done = workspace.phyblock("score", run)
+    assert done.code == 0, done.err
+    assert [strip(one) for one in map(json.loads, before.splitlines())] == [
+        strip(one) for one in answered(run)
+    ]
+    workspace.write_yaml("models.yaml", {"ada": {"replay": "./ada"}})
+    again = workspace.root / "again"
+    words = ("--models", "ada", "--set", "seeds=[3]", "--out", again, "--no-report")
+    done = workspace.phyblock("run", "suite.yaml", *words)
+    assert done.code == 0, done.err
+    replayed = {record["key"]: record for record in answered(again)}
+    for record in answered(run):
+        other = replayed[record["key"]]
+        assert (record["scores"], record["parse"]) == (other["scores"], other["parse"])
+    done = workspace.phyblock("compare", run, "out", "--models", "human:ada,oracle")
+    assert done.code == 0, done.err
+
+
+def strip(record: Raw) -> Raw:
+    return {name: value for name, value in record.items() if name != "time"}
+
+
+BOB = ("play", "suite.yaml", "--name", "bob", "--consent", "consent.txt")
+
+
+def test_a_folder_without_a_server_gives_its_answers_as_a_file(
+    browser: Browser, workspace: Workspace
+) -> None:
+    folder = workspace.root / "export"
+    done = workspace.phyblock(*BOB, "--export", folder)
+    assert done.code == 0, done.err
+    check_nothing_is_given_away(folder)
+    page, complaints = opened(browser, (folder / "index.html").as_uri())
+    page.get_by_role("button", name="I agree").click()
+    for number in range(1, 8):
+        task(page, number)
+        if number == 3:
+            page.reload()
+            assert "5 tasks of 7 are left" in page.inner_text("#main")
+            page.get_by_role("button", name="I agree").click()
+            task(page, number)
+        is_order = page.get_by_role("button", name="Clear").count() and number > 3
+        page.keyboard.type("cdab" if is_order else "4" if number < 4 else "d")
+        page.keyboard.press("Control+Enter")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save the answers").click()
+    file = workspace.root / "answers.json"
+    download.value.save_as(file)
+    page.close()
+    assert not complaints
+    content = json.loads(file.read_text(encoding="utf-8"))
+    check_bad_files(workspace, content)
+    done = workspace.phyblock(*BOB, "--import", file, "--out", "bob", "--no-report")
+    assert done.code == 0, done.err
+    records = answered(workspace.root / "bob")
+    assert {record["model"] for record in records} == {"human:bob"}
+    assert [*map(said, records[:3])] == [plan(4)] * 3
+    assert {*map(said, records[3:])} == {"Answer: D", "Answer: C, D, A, B"}
+    assert [record["reply"]["latency_s"] for record in records] == [
+        answer["took_s"] for answer in content["answers"]
+    ]
+    shutil.rmtree(folder)
+
+
+SHOWN = {
+    *("head", "format", "run", "model", "consent", "name", "text", "questions"),
+    *("number", "of", "turn", "messages", "role", "parts", "picture", "label", "width", "height"),
+    *("choices", "spots", "box", "least", "most", "repeats", "noun"),
+}
+
+
+def check_nothing_is_given_away(folder: Path) -> None:
+    """What is exported says what is shown, and neither names nor fields tell what is right."""
+    script = (folder / "questions.js").read_text(encoding="utf-8")
+    names: set[str] = set()
+
+    def fields(found: Raw) -> Raw:
+        names.update(found)
+        return found
+
+    json.loads(script.removeprefix("const SITTING = ").rstrip(";\n"), object_hook=fields)
+    assert names == SHOWN
+    files = [path.relative_to(folder).as_posix() for path in folder.rglob("*")]
+    assert not any(re.search(r"\bt[123]\b|-001", text) for text in (script, *files))
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        (["--name", "Ada Lovelace"], "--name: is no name"),
+        (["--name", "../x"], "--name: is no name"),
+        (["--name", HOSTILE], "--name: is no name"),
+        (["--name", "x", "--set", "tracks=[pose_planning]"], "cannot answer in pose_planning"),
+        (["--name", "x", "--set", "tracks=[step_planning]", "--export", "e"], "turn by turn"),
+        (["--name", "x", "--export", "e", "--import", "f"], "cannot be given with --import"),
+        (["--name", "x", "--import", "nowhere.json"], "nowhere.json: cannot be read"),
+        (["--name", "x", "--consent", "nowhere.txt"], "nowhere.txt: --consent: cannot be read"),
+        (["--name", "x", "--beside", "nowhere"], "nowhere"),
+        (["--name", "x", "--set", "vary.repeats=2"], "asks in several ways"),
+    ],
+)
+def test_what_cannot_be_played_is_said_before_anything_is_begun(
+    workspace: Workspace, words: list[str], error: str
+) -> None:
+    before = sorted(workspace.root.rglob("*"))
+    done = workspace.phyblock("play", "suite.yaml", "--no-browser", *words)
+    assert done.code == 2, done.out
+    assert error in done.err
+    assert "Traceback" not in done.err
+    assert sorted(workspace.root.rglob("*")) == before
+
+
+def check_bad_files(workspace: Workspace, content: dict[str, Any]) -> None:
+    """Files of another sitting, or that are broken, are refused as a whole."""
+    first = content["answers"][0]
+    for change, error in (
+        ({"model": "human:eve"}, "model: is of another sitting"),
+        ({"run": "0" * 64}, "run: is of another sitting"),
+        ({"answers": [{**first, "number": 8}]}, "answers[0].number: is no question"),
+        ({"answers": [first, first]}, "answers[1].number: is there twice"),
+        ({"answers": [{**first, "took_s": -1}]}, "answers[0].took_s: is no file of answers"),
+        ({"answers": [{**first, "picks": [99]}]}, "question 1: holds picks outside"),
+        ({"more": 1}, "more: is no file of answers"),
+    ):
+        file = workspace.root / "bad.json"
+        file.write_text(json.dumps({**content, **change}), encoding="utf-8")
+        done = workspace.phyblock(*BOB, "--import", file, "--out", "bad", "--no-report")
+        assert done.code == 2, done.out
+        assert error in done.err
+        assert not (workspace.root / "bad").exists()

@@ -1,0 +1,93 @@
+"""What a person picks is what the track reads, in whatever form the prompt asks for."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phyblock.domain import LETTERS, Question
+from phyblock.parsing import (
+    move_form,
+    parse_answer,
+    parse_asked_answer,
+    parse_asked_move,
+    parse_asked_plan,
+    parse_move,
+    parse_plan,
+)
+from phyblock.resources import bundled
+from phyblock.run.data import open_dataset
+from phyblock.sim.compose import joined_size_px
+from phyblock.tracks.by_hand import Picking, Spot
+from phyblock.tracks.full_planning.baselines import PlanSubject
+from phyblock.tracks.full_planning.by_hand import pick_plan
+from phyblock.tracks.step_planning.baselines import StepSubject
+from phyblock.tracks.step_planning.by_hand import pick_step
+from phyblock.tracks.vqa.baselines import ChoiceSubject
+from phyblock.tracks.vqa.by_hand import pick_answer
+
+DATA = open_dataset("builtin", bundled("benchmarks", "data", "phyblock-400"))
+TASK = DATA.tasks[0]
+N = len(TASK.candidates)
+TEXTS = ("a red cube", "place B", "Done", "the arch")
+PICTURES = tuple(f"<img{n}>" for n in range(1, 5))
+
+
+@given(st.lists(st.integers(0, N - 1), min_size=1, max_size=99))
+def test_a_plan_is_read_as_it_was_picked(picks: list[int]) -> None:
+    reply = pick_plan(PlanSubject(TASK.scene, TASK.candidates)).reply(picks)
+    steps = tuple(pick + 1 for pick in picks)
+    assert parse_plan(reply, N).plan.steps == steps
+    assert parse_plan(reply, N, "official").plan.steps == steps
+    assert parse_asked_plan(reply, N).plan.steps == steps
+
+
+@pytest.mark.parametrize("pick", range(N + 1))
+def test_a_step_is_read_as_it_was_picked(pick: int) -> None:
+    picking = pick_step(StepSubject(TASK.scene, TASK.candidates, (), ()))
+    reply, wanted = picking.reply([pick]), pick + 1 if pick < N else "Done"
+    for parsed in (parse_move(reply), parse_asked_move(reply, move_form(N))):
+        assert ("Done" if parsed.is_done else parsed.move) == wanted
+
+
+@given(st.permutations(range(4)), st.sampled_from([TEXTS, PICTURES]), st.booleans())
+def test_an_answer_is_read_as_it_was_picked(
+    order: list[int], options: tuple[str, ...], is_ordering: bool
+) -> None:
+    subtask = "OR" if is_ordering else "SH"
+    question = Question("q", subtask, TASK.scene, "Which?", options, (0,))
+    picks = order if is_ordering else order[:1]
+    reply = pick_answer(ChoiceSubject(question)).reply(picks)
+    letters = "".join(LETTERS[pick] for pick in picks)
+    for parse in (parse_answer, parse_asked_answer):
+        assert parse(reply, options, is_ordering).letters == letters
+
+
+def picking(least: int = 1, most: int = 3, *, repeats: bool = False) -> Picking:
+    choices = pick_plan(PlanSubject(TASK.scene, TASK.candidates)).choices[:4]
+    return Picking(choices, least, most, repeats, "step", lambda picks: "-".join(map(str, picks)))
+
+
+@settings(max_examples=50)
+@given(st.lists(st.integers(-2, 6), max_size=5), st.booleans())
+def test_picks_that_make_no_answer_are_refused(picks: list[int], repeats: bool) -> None:
+    is_right = 1 <= len(picks) <= 3 and all(0 <= pick < 4 for pick in picks)
+    is_right = is_right and (repeats or len(set(picks)) == len(picks))
+    if is_right:
+        assert picking(repeats=repeats).reply(picks) == "-".join(map(str, picks))
+    else:
+        with pytest.raises(ValueError, match="holds"):
+            picking(repeats=repeats).reply(picks)
+
+
+@pytest.mark.parametrize("side", [128, 511, 1024])
+def test_candidates_are_clicked_where_the_grid_is_drawn(side: int) -> None:
+    """Corners of cells, in pixels, in the composite and in the grid by itself."""
+    for width, start in ((joined_size_px(side)[0], joined_size_px(side)[0] - side), (side, 0)):
+        for cell in range(16):
+            left, top, wide, high = Spot("composite", cell).box(width, side)
+            row, column = divmod(cell, 4)
+            assert left * width == pytest.approx(start + column * side / 4)
+            assert top * side == pytest.approx(row * side / 4)
+            assert (wide * width, high * side) == pytest.approx((side / 4, side / 4))
