@@ -99,13 +99,8 @@ def _went(record: Record, design: Design) -> dict[str, Any]:
     """What was answered, step by step with why a step is wrong, or with what is right."""
     if record.is_correct is not None:
         return {"given": record.said, "right": record.target, "correct": record.is_correct}
-    told = [score for score in record.scores if score.why is not None]
-    headline = [score for score in told if score.matcher == design.matcher]
-    for score in (headline or told)[:1]:
-        names = (record.said or "").split()
-        steps = zip(names, score.why or (), strict=False)
-        return {
-            "steps": [{"name": name, "why": why} for name, why in steps],
-            "missing": score.fn,
-        }
-    return {}
+    course = record.course(design.matcher)
+    if course is None:
+        return {}
+    steps = [{"name": name, "why": why} for name, why in course.steps]
+    return {"steps": steps, "missing": course.missing}

@@ -20,6 +20,7 @@ from phyblock.records.others import BatchLine, PictureMark, Prompt, PromptMessag
 from phyblock.records.question import StoredQuestion
 from phyblock.records.record import (
     AskedTurn,
+    Course,
     Record,
     Recorded,
     Score,
@@ -42,6 +43,7 @@ __all__ = [
     "BatchLine",
     "BatchLines",
     "Belonging",
+    "Course",
     "Line",
     "Lines",
     "Manifest",

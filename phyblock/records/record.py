@@ -7,7 +7,7 @@ its own, with its name as the literal type of `track`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from pydantic import Field
 
@@ -18,6 +18,7 @@ from phyblock.words import AskedAs, Outcome
 
 __all__ = [
     "AskedTurn",
+    "Course",
     "Record",
     "Recorded",
     "Score",
@@ -80,6 +81,15 @@ class Score(Line):
     """Goal blocks by what became of them, where the criterion tells them apart."""
     kept: Whole | None = None
     """Steps that the nearest valid order keeps."""
+
+
+class Course(NamedTuple):
+    """How an assembly went: each step by what it names, with its error type (None: it is right),
+    and how many blocks of the goal are missing at the end.
+    """
+
+    steps: tuple[tuple[str, str | None], ...]
+    missing: int
 
 
 class AskedTurn(Line):
@@ -184,6 +194,15 @@ class Record(Line):
         """What was read in the reply, in short."""
         plan = getattr(self.parse, "plan", None)
         return None if plan is None else " ".join(map(str, plan))
+
+    def course(self, matcher: str) -> Course | None:
+        """How an assembly went, by a matcher where it was scored by that; None for what is none."""
+        told = [score for score in self.scores if score.why is not None]
+        score = next((one for one in told if one.matcher == matcher), next(iter(told), None))
+        if score is None:
+            return None
+        names = (self.said or "").split()
+        return Course(tuple(zip(names, score.why or (), strict=False)), score.fn)
 
     @property
     def asked_turns(self) -> tuple[AskedTurn, ...]:

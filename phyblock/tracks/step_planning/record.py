@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
-from phyblock.records import AskedTurn, Line, Record, StoredReply
+from phyblock.records import AskedTurn, Course, Line, Record, StoredReply
 from phyblock.records.line import Whole
 from phyblock.tracks.plans import PLAN_COLUMNS, PlanParse, plan_row
 from phyblock.tracks.step_planning.prompt import StepOutcome
@@ -89,6 +89,15 @@ class EpisodeRecord(Record):
     def export_row(self) -> Mapping[str, Any]:
         """How it ended."""
         return {"ending": self.ending}
+
+    def course(self, matcher: str) -> Course:
+        """What became of every step; no matcher has a part in it."""
+        del matcher
+        steps = (
+            (str(turn.parse.move), None if turn.outcome in ("placed", "done") else turn.outcome)
+            for turn in self.steps
+        )
+        return Course(tuple(steps), self.n_blocks - (self.progress[-1] if self.progress else 0))
 
     @property
     def asked_turns(self) -> tuple[AskedTurn, ...]:
