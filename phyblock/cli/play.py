@@ -9,6 +9,7 @@ import sys
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
+from threading import Thread
 
 import click
 from rich.console import Console
@@ -197,7 +198,8 @@ def _sit(
         console.print(f"Open {server.address}", soft_wrap=True, markup=False, highlight=False)
         console.print("Ctrl-C ends the sitting; the same command goes on.", style="dim")
         if opens:
-            webbrowser.open(server.address)
+            # A browser for terminals would not come back before it is closed.
+            Thread(target=webbrowser.open, args=(server.address,), daemon=True).start()
 
     sitting = Sitting(plan, person, folder, begun)
     with Server(sitting.desk, port) as server:
