@@ -161,7 +161,7 @@ def _import(
     console: Console, plan: RunPlan, person: Person, folder: Path, file: Path, *, page: bool
 ) -> int:
     given = read_answers(file, plan, person)
-    model = PersonModel(person.model, FileAnswers(given, plan, person.model).ask)
+    model = PersonModel(person.model, plan.suite, FileAnswers(given, plan, person.model).ask)
 
     async def run() -> RunResult:
         present = {model.name: model}

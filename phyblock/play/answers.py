@@ -96,7 +96,7 @@ def _check_picks(path: Path, given: Mapping[int, Given], plan: RunPlan, person: 
         request, _ = next(iter(sample.track.outlines(item)))
         picks = given[number].picks
         try:
-            picking_of(request).reply(picks)
+            picking_of(request, plan.suite).reply(picks)
         except ValueError as error:
             field, found = f"the answer to question {number}", ", ".join(map(str, picks))
             problems.append(Problem(str(path), str(error), field, found))

@@ -56,7 +56,7 @@ async def export_sitting(plan: RunPlan, person: Person, folder: Path) -> Path:
                 names.append(f"{_PICTURES}/{number:04d}-{place}.png")
                 (new / names[-1]).write_bytes(picture.data)
             place_of = Place(number, plan.samples_per_model)
-            questions.append(shown(request, picking_of(request), place_of, names))
+            questions.append(shown(request, picking_of(request, plan.suite), place_of, names))
         for name, (_, content) in assets("offline.js", _PAGE).items():
             (new / name).write_bytes(content)
         sitting = {

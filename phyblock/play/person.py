@@ -13,14 +13,13 @@ from phyblock.models import ModelConfig, Reply, Request, Usage
 from phyblock.play.order import arranged, row_of_name
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan, make_plan
-from phyblock.specs import LoadedSuite
+from phyblock.specs import HUMAN, LoadedSuite, SuiteSpec
 from phyblock.tracks.by_hand import Picking
 from phyblock.tracks.kind import kinds
 
 __all__ = ["Given", "Person", "PersonModel", "picking_of", "plan_sitting"]
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")
-_PREFIX = "human:"
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class Person:
     @property
     def model(self) -> str:
         """The name in records and tables."""
-        return f"{_PREFIX}{self.name}"
+        return f"{HUMAN}{self.name}"
 
     @property
     def row(self) -> int:
@@ -85,11 +84,15 @@ class Given:
     took_s: float
 
 
-def picking_of(request: Request) -> Picking:
-    """How a person answers a request."""
+def picking_of(request: Request, suite: SuiteSpec) -> Picking:
+    """How a person answers a request of a suite.
+
+    How grids are cut in pictures that a data set brings is not known: they are not clicked in.
+    """
     for kind in kinds().values():
         if type(request.subject) is kind.subject and kind.by_hand is not None:
-            return kind.by_hand(request.subject)
+            picking = kind.by_hand(request.subject)
+            return picking if suite.images.source == "render" else picking.without_cells()
     raise AssertionError("a plan has only tracks that can be answered by hand")
 
 
@@ -98,13 +101,16 @@ class PersonModel:
 
     needs_messages = True
 
-    def __init__(self, name: str, answer: Callable[[Request, Picking], Awaitable[Given]]) -> None:
+    def __init__(
+        self, name: str, suite: SuiteSpec, answer: Callable[[Request, Picking], Awaitable[Given]]
+    ) -> None:
         self.name = name
+        self._suite = suite
         self._answer = answer
 
     async def ask(self, request: Request) -> Reply:
         """The reply, in the form that the prompt asks for; raises what `answer` raises."""
-        picking = picking_of(request)
+        picking = picking_of(request, self._suite)
         given = await self._answer(request, picking)
         text = picking.reply(given.picks)
         return Reply(

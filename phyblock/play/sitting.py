@@ -43,7 +43,7 @@ class Sitting:
 
         Raises what the run meets.
         """
-        model = PersonModel(self._person.model, self.desk.ask)
+        model = PersonModel(self._person.model, self._plan.suite, self.desk.ask)
         session = Session(
             self._plan, self._folder, self._watch, use_cache=False, present={model.name: model}
         )

@@ -1,6 +1,6 @@
 """What a person may write in YAML: suites, models files and --set overrides."""
 
-from phyblock.specs.groups import GROUP, group_names, unknown_model, with_members
+from phyblock.specs.groups import GROUP, HUMAN, group_names, unknown_model, with_members
 from phyblock.specs.loading import LoadedSuite, load_suite, resolve_models, suite_tracks
 from phyblock.specs.model import ModelSpec
 from phyblock.specs.models_file import load_models
@@ -19,6 +19,7 @@ from phyblock.specs.words import did_you_mean
 __all__ = [
     "BUILTIN_DATASET",
     "GROUP",
+    "HUMAN",
     "RECORDED",
     "BatchRateSpec",
     "DatasetSpec",

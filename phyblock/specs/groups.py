@@ -6,10 +6,12 @@ from collections.abc import Mapping, Sequence
 
 from phyblock.specs.model import ModelSpec
 
-__all__ = ["GROUP", "group_names", "unknown_model", "with_members"]
+__all__ = ["GROUP", "HUMAN", "group_names", "unknown_model", "with_members"]
 
 GROUP = "group:"
 """What stands before the name of a group where models are named."""
+HUMAN = "human:"
+"""What stands before the name of a person where models are named."""
 
 
 def group_names(known: Mapping[str, ModelSpec]) -> tuple[str, ...]:
@@ -34,4 +36,6 @@ def unknown_model(name: str) -> str:
     """What is wrong with a name that is neither a model nor a group."""
     if name.startswith(GROUP):
         return "is no group of the models file"
+    if name.startswith(HUMAN):
+        return "is a person, who answers in `phyblock play`"
     return "is neither in the models file nor a built-in baseline"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from phyblock.sim.compose import GRID_COLUMNS
 
@@ -58,6 +58,14 @@ class Picking:
     repeats: bool
     noun: str
     write: Callable[[Sequence[int]], str]
+
+    def without_cells(self) -> Picking:
+        """The same with choices that are not looked for in grids."""
+        bare = (
+            replace(one, spots=tuple(spot for spot in one.spots if spot.cell is None))
+            for one in self.choices
+        )
+        return replace(self, choices=tuple(bare))
 
     def reply(self, picks: Sequence[int]) -> str:
         """The reply that picks make, given by their places in `choices`.

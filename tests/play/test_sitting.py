@@ -241,9 +241,9 @@ def check_as_of_any_model(workspace: Workspace, run: Path) -> None:
     assert [strip(one) for one in map(json.loads, before.splitlines())] == [
         strip(one) for one in answered(run)
     ]
-    workspace.write_yaml("models.yaml", {"ada": {"replay": "./ada"}})
+    workspace.write_yaml("models.yaml", {"human:ada": {"replay": "./ada"}})
     again = workspace.root / "again"
-    words = ("--models", "ada", "--set", "seeds=[3]", "--out", again, "--no-report")
+    words = ("--models", "human:ada", "--set", "seeds=[3]", "--out", again, "--no-report")
     done = workspace.phyblock("run", "suite.yaml", *words)
     assert done.code == 0, done.err
     replayed = {record["key"]: record for record in answered(again)}
@@ -346,6 +346,12 @@ def test_what_cannot_be_played_is_said_before_anything_is_begun(
     assert error in done.err
     assert "Traceback" not in done.err
     assert sorted(workspace.root.rglob("*")) == before
+
+
+def test_a_person_is_not_asked_by_run(workspace: Workspace) -> None:
+    done = workspace.run("--models", "human:eve")
+    assert done.code == 2
+    assert "is a person, who answers in `phyblock play`" in done.err
 
 
 def check_bad_files(workspace: Workspace, content: dict[str, Any]) -> None:

@@ -81,6 +81,15 @@ def test_picks_that_make_no_answer_are_refused(picks: list[int], repeats: bool) 
             picking(repeats=repeats).reply(picks)
 
 
+def test_in_pictures_of_a_data_set_nothing_is_clicked_but_whole_pictures() -> None:
+    plan = pick_plan(PlanSubject(TASK.scene, TASK.candidates))
+    assert all(choice.spots for choice in plan.choices)
+    assert not any(choice.spots for choice in plan.without_cells().choices)
+    question = Question("q", "VP", TASK.scene, "Which?", PICTURES, (0,))
+    shown = pick_answer(ChoiceSubject(question)).without_cells().choices
+    assert [choice.spots for choice in shown] == [(Spot(letter),) for letter in LETTERS]
+
+
 @pytest.mark.parametrize("side", [128, 511, 1024])
 def test_candidates_are_clicked_where_the_grid_is_drawn(side: int) -> None:
     """Corners of cells, in pixels, in the composite and in the grid by itself."""
