@@ -15,11 +15,12 @@ import click
 from rich.console import Console
 
 from phyblock.bounded import read_text
-from phyblock.cli.console import counted, make_console, shown_path
+from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.files import bundled_suites, find_suite, prompt_dirs
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.cli.report import show_made
 from phyblock.errors import Problem, SpecError, said
+from phyblock.plain_text import counted
 from phyblock.play.answers import FileAnswers, read_answers
 from phyblock.play.export import check_offline, export_sitting
 from phyblock.play.page import default_consent

@@ -27,8 +27,8 @@
       card(
         el("h1", {}, "Can you build this?"),
         el("p", { class: "lead" }, about.done
-          ? `Welcome back. ${Words.count(left, "task")} of ${about.of} are left.`
-          : `${Words.count(about.of, "task")} are waiting for ${about.name}.`),
+          ? `Welcome back. ${Words.count(left, "task")} of ${about.of} ${left === 1 ? "is" : "are"} left.`
+          : `${Words.count(about.of, "task")} for ${about.name}.`),
         el("div", { class: "consent", tabindex: "0", role: "region", "aria-label": "What you agree to" },
           about.consent.split(/\n{2,}/).map((text) => el("p", {}, text))),
         el("h2", {}, "How it works"),
