@@ -22,7 +22,7 @@ _VERBS = {
     "score": "Read and score stored replies again; calls no model.",
     "report": "Write a run's tables again from its records.",
     "tables": "Print a run's tables; beside the paper's with --paper.",
-    "figures": "Draw a run's figures, as SVG and PNG.",
+    "figures": "Draw a run's figures for a paper, as PDF and SVG.",
     "compare": "Compare models on the same samples: difference, interval, verdict.",
     "export": "Write a run for Inspect AI, Hugging Face datasets, or as CSV or Parquet.",
     "bundle": "Write a run as one file that others can score again.",

@@ -21,7 +21,14 @@ from phyblock.tables.load import Run
 from phyblock.tables.showing import varied_words
 from phyblock.tracks.kind import kind_of
 
-__all__ = ["Comparison", "Side", "compare", "compare_models", "compare_runs"]
+__all__ = [
+    "Comparison",
+    "Side",
+    "checked_models",
+    "compare",
+    "compare_models",
+    "compare_runs",
+]
 
 _FLIPPED = ["a", "b", "scene", "item", "seed", "variant", "right", "value_a", "value_b"]
 _AT_ONCE = 100
@@ -71,7 +78,7 @@ def compare_models(
     of the track, if they are not named. Raises SpecError for a name that the run has not, or when
     fewer than two are left.
     """
-    sides = [Side(name, name, run) for name in _checked(run, models)]
+    sides = [Side(name, name, run) for name in checked_models(run, models)]
     if len(sides) < 2:
         allowed = f"two of: {', '.join(run.design.model_names)}"
         raise SpecError(Problem(str(run.path), "needs two models to compare", allowed=allowed))
@@ -90,7 +97,7 @@ def compare_runs(
     SpecError for names that are not there.
     """
     if len(models) == 2:
-        names = [(*_checked(first, models[:1]), *_checked(second, models[1:]))]
+        names = [(*checked_models(first, models[:1]), *checked_models(second, models[1:]))]
     else:
         shared = [name for name in first.design.model_names if name in second.design.model_names]
         if unknown := [name for name in models if name not in shared]:
@@ -130,7 +137,10 @@ def _tags(first: Run, second: Run) -> tuple[str, str]:
     return next((pair for pair in (names, paths) if pair[0] != pair[1]), ("first", "second"))
 
 
-def _checked(run: Run, models: Sequence[str]) -> Sequence[str]:
+def checked_models(run: Run, models: Sequence[str]) -> Sequence[str]:
+    """The models that are named, all of the run where none are; SpecError for one that it has not,
+    or that is named twice.
+    """
     known = run.design.model_names
     if unknown := [name for name in models if name not in known]:
         where, found, allowed = str(run.path), ", ".join(unknown), ", ".join(known)

@@ -25,11 +25,13 @@ if TYPE_CHECKING:
 __all__ = [
     "WHOLE",
     "EpisodeView",
+    "FigureMaker",
     "HeadlineColumn",
     "ItemExport",
     "KeptPictures",
     "PageItems",
     "PaperTable",
+    "SceneFigure",
     "TableMaker",
     "TrackReport",
     "in_whole",
@@ -86,8 +88,9 @@ class PageItems:
 
 @dataclass(frozen=True)
 class EpisodeView:
-    """How `phyblock episode` shows a record: its steps as a table, and as frames of a film."""
+    """How a record of a track is shown step by step: as a table, and as frames of a film."""
 
+    track: str
     table: Callable[[Any], TextTable]
     frames: Callable[[Any, AssemblyTask], Iterable[FilmStep]]
 
@@ -126,6 +129,32 @@ class TableMaker:
     lines: Callable[[pd.DataFrame, Run], Sequence[str]] | None = None
 
 
+@dataclass(frozen=True)
+class FigureMaker:
+    """How a figure is drawn from numbers, and what people read in the place of its name.
+
+    `draw` gives None for a run that has no numbers for it. A report has those `in_report`; the
+    others are drawn on request alone.
+    """
+
+    title: str
+    draw: Callable[[Run], Figure | None]
+    in_report: bool = True
+
+
+@dataclass(frozen=True)
+class SceneFigure:
+    """How a figure is drawn that shows scenes, which is done on request alone.
+
+    `draw` takes the data set of the run, and the scene that is wanted, "" where that is left to
+    the figure. It gives None for a run that has nothing to show, and raises DataError for what
+    cannot be read.
+    """
+
+    title: str
+    draw: Callable[[Run, Dataset, str], Figure | None]
+
+
 WHOLE = Cell("overall", "Overall")
 """The one cell of a track that has no parts."""
 
@@ -151,14 +180,13 @@ class TrackReport:
     heading, and `reference_note` says what they are; `published` is what the paper prints of `main`
     for models of the run. `short` is the name of the column that stands for the track in a summary.
 
-    `tables`, `figures` and `paper_tables` (by their number in the paper) are its own; a figure is
-    None for a run that has no numbers for it. `bars` is the name of the figure of its first
-    measure. `check_alike` raises SpecError where the first run cannot be compared with the second
-    in these cells. `part_names` say what `Record.part` stands for. `items` opens, for the page of a
-    run, what was asked about where that is more than scenes; it raises DataError
-    where that is not what the run was made on. `episodes` shows records that are episodes, `export`
-    writes what is asked about. `showing` says, in words that end every caption, what is unusual
-    about how items were shown.
+    `tables`, `figures` and `paper_tables` (by their number in the paper) are its own. `main_figure`
+    is the name of the figure of its first measure. `check_alike` raises SpecError where the first
+    run cannot be compared with the second in these cells. `part_names` say what `Record.part`
+    stands for. `items` opens, for the page of a run, what was asked about where that is more than
+    scenes; it raises DataError where that is not what the run was made on. `episodes` shows records
+    that are episodes, `export` writes what is asked about. `showing` says, in words that end every
+    caption, what is unusual about how items were shown.
     """
 
     measures: tuple[Measure, ...]
@@ -172,9 +200,8 @@ class TrackReport:
     notes: Callable[[Run], Sequence[str]] = lambda _: ()
     reference_note: str = ""
     tables: Mapping[str, TableMaker] = field(default_factory=dict)
-    bars: str = ""
-    figures: Mapping[str, Callable[[Run], Figure | None]] = field(default_factory=dict)
-    figure_titles: Mapping[str, str] = field(default_factory=dict)
+    main_figure: str = ""
+    figures: Mapping[str, FigureMaker | SceneFigure] = field(default_factory=dict)
     paper_tables: Mapping[int, PaperTable] = field(default_factory=dict)
     check_alike: Callable[[Run, Run, Sequence[str]], None] | None = None
     part_names: Mapping[str, str] = field(default_factory=dict)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from phyblock.tables.drawing import WIDTH_IN, drawn_width_in
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -26,7 +28,10 @@ class Part(NamedTuple):
 def stack(
     ax: Axes, models: Sequence[str], parts: Iterable[Part], height: float, least_label: float
 ) -> None:
-    """Draw the parts one after another, the numbers in those of `least_label` [%] and more."""
+    """Draw the parts one after another, the numbers in those of `least_label` [%] and more where
+    the figure is as wide as the text; in a narrower one in larger parts.
+    """
+    least_label *= WIDTH_IN / drawn_width_in()
     places, start = np.arange(len(models)), np.zeros(len(models))
     for part in parts:
         ax.barh(

@@ -91,7 +91,17 @@ def test_compare_says_the_verdict_and_what_flipped(folder: Path, tmp_path: Path)
 def test_figures_and_exports_name_what_they_wrote(folder: Path) -> None:
     done = call("figures", folder, "--only", "f1-levels")
     assert done.output.split() == [
-        str(folder / "figures" / f"f1-levels.{e}") for e in ("svg", "png")
+        str(folder / "paper" / f"f1-levels.{e}") for e in ("pdf", "svg", "txt", "tex")
     ]
+    done = call(
+        "figures", folder, "--only", "f1-levels", "--models", "alpha", "--out", folder / "x"
+    )
+    assert (folder / "x" / "f1-levels.pdf").is_file()
+    for wrong in ("--width wide", "--width 20", "--width nan", "--font comic"):
+        refused = call("figures", folder, *wrong.split())
+        assert refused.exit_code == 2, wrong
+        assert "allowed" in refused.output or "is not one of" in refused.output
+    with pytest.raises(SpecError, match="no such model"):
+        call("figures", folder, "--models", "omega")
     done = call("export", folder, "--to", "csv")
     assert done.output.strip() == str(folder / "export" / "csv" / "records.csv")

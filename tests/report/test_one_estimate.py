@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from phyblock.domain import SUBTASKS
 from phyblock.report import Run, TextTable
 from phyblock.report.compare import compare_models
-from phyblock.report.figures.bars import measure_bars
+from phyblock.report.figures.dots import measure_dots
 from phyblock.report.floors import floors_frame
 from phyblock.report.html.headline import headlines
-from phyblock.report.measure_table import headline_columns, measures_frame
+from phyblock.report.measure_table import headline_columns, main_heading, measures_frame
 from phyblock.report.notebook import LoadedRun
 from phyblock.report.write import table_makers
 from phyblock.tables.design import OVERALL
@@ -277,28 +277,35 @@ def of_comparison(run: Run) -> Iterator[Shown]:
 
 
 def of_figures(run: Run) -> Iterator[Shown]:
-    drawn = {track: measure_bars(run, track=track) for track in run.design.suite.tracks}
+    drawn = {track: measure_dots(run, track=track) for track in run.design.suite.tracks}
     for track, figure in drawn.items():
         assert figure is not None
         measure = "accuracy" if track == "vqa" else "f1"
         columns = [c for c in headline_columns(run, track) if c.measure == measure]
         names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
-        for ax, column in zip(figure.axes, columns[-len(figure.axes) :], strict=True):
+        headings = [ax.get_title() for ax in figure.axes]
+        assert headings[0] == main_heading(run, track)
+        for ax in figure.axes:
+            column = next(c for c in columns if c.heading == ax.get_title())
             way = ("A", "", column.criterion) if column.criterion else ()
-            for name, bar in zip(names, ax.patches, strict=True):
-                yield f"bars of {track}", (name, measure, column.cell, *way), bar.get_width()
+            (dots,) = ax.lines
+            for name, value in zip(names, dots.get_xdata(), strict=True):
+                yield f"dots of {track}", (name, measure, column.cell, *way), float(value)
     radar, dots = f1_radar(run), settings_dots(run)
     assert radar is not None
     assert dots is not None
-    for line in radar.axes[0].lines:
-        for level, value in zip(run.design.levels, line.get_ydata(), strict=False):
-            yield "radar", (str(line.get_label()), "f1", level), float(value)
+    for setting, ax in zip("AB", radar.axes, strict=True):
+        for line in ax.lines:
+            for level, value in zip(run.design.levels[:-1], line.get_ydata(), strict=False):
+                way = (setting, *plan_way(level)[1:])
+                yield "radar", (str(line.get_label()), "f1", level, *way), float(value)
     yield from of_dots(run, dots)
 
 
 def of_dots(run: Run, figure: matplotlib.figure.Figure) -> Iterator[Shown]:
     names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
-    for ax, level in zip(figure.axes, run.design.levels, strict=True):
+    levels = run.design.levels
+    for ax, level in zip(figure.axes, (levels[-1], *levels[:-1]), strict=True):
         for setting, line in zip("AB", ax.lines, strict=True):
             for name, value in zip(names, line.get_xdata(), strict=True):
                 way = (setting, *plan_way(level)[1:])
@@ -316,7 +323,7 @@ def test_every_place_shows_the_estimate(run: Run) -> None:
         *("vqa figure", "radar", "settings figure"),
         *(
             f"{what} {track}"
-            for what in ("headline of", "bars of", "compare")
+            for what in ("headline of", "dots of", "compare")
             for track in run.design.suite.tracks
         ),
     }

@@ -8,7 +8,16 @@ import numpy as np
 
 from phyblock.plain_text import counted
 from phyblock.tables.design import OVERALL
-from phyblock.tables.drawing import ACCENT, COLORS, INK, PALE, bare_axes, headed, new_figure
+from phyblock.tables.drawing import (
+    ACCENT,
+    COLORS,
+    INK,
+    PALE,
+    bare_axes,
+    headed,
+    legend_below,
+    new_figure,
+)
 from phyblock.tables.load import Run
 from phyblock.tables.text_table import level_name
 
@@ -26,7 +35,7 @@ def dataset_levels(run: Run) -> Figure | None:
     levels = [level for level in levels if len(held[level])]
     if not levels:
         return None
-    figure = new_figure(1.4 + 0.34 * len(levels))
+    figure = new_figure(1.1 + 0.26 * len(levels))
     left, right = figure.subplots(1, 2, sharey=True)
     places = np.arange(len(levels))
     several = np.array([(held[n]["parents"].map(len) > 1).sum() for n in levels])
@@ -36,7 +45,7 @@ def dataset_levels(run: Run) -> Figure | None:
         left.barh(
             places, several, 0.6, left=total - several, color=COLORS[4], label="made of several"
         )
-        figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=2)
+        legend_below(figure, *left.get_legend_handles_labels())
     for place, count in enumerate(total):
         left.text(count + 0.02 * total.max(), place, f"{count:,}", va="center", fontsize=7)
     left.set(title="Scenes", xlabel="Number of scenes", xlim=(0, 1.14 * total.max()))

@@ -8,7 +8,15 @@ import numpy as np
 
 from phyblock.report.sensitivity import ITEMS, components_frame
 from phyblock.report.sensitivity_view import factor_name, sizes_text
-from phyblock.tables.drawing import ACCENT, COLORS, MARKERS, bare_axes, headed, new_figure
+from phyblock.tables.drawing import (
+    ACCENT,
+    COLORS,
+    MARKERS,
+    bare_axes,
+    headed,
+    legend_below,
+    new_figure,
+)
 from phyblock.tables.load import Run
 from phyblock.tracks.estimates import track_measures
 from phyblock.tracks.kind import kind_of
@@ -19,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["moved_dots"]
 
 _ROW_IN = 0.3
+_PANEL_IN = 0.6
 _APART = 0.16
 _PARTS = {"shift": ("shift of all items", ACCENT), "single": ("single items", COLORS[1])}
 
@@ -33,7 +42,7 @@ def moved_dots(run: Run, *, track: str) -> Figure | None:
         return None
     table = table[(table["track"] == track) & (table["factor"] != ITEMS)]
     factors, models = list(table["factor"].unique()), list(table["model"].unique())
-    figure = new_figure(1.5 + _ROW_IN * len(models))
+    figure = new_figure(1.2 + _ROW_IN * len(models), 1.7 + _PANEL_IN * len(factors))
     axes = figure.subplots(1, len(factors), sharey=True, sharex=True, squeeze=False)[0]
     for ax, factor in zip(axes, factors, strict=True):
         rows = table[table["factor"] == factor].set_index("model").loc[models]
@@ -55,7 +64,7 @@ def moved_dots(run: Run, *, track: str) -> Figure | None:
     axes[0].set_ylim(len(models) - 0.4, -0.6)
     axes[0].set_xlim(left=0)
     bare_axes(axes)
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=2)
+    legend_below(figure, *axes[0].get_legend_handles_labels())
     measure = track_measures(track)[0]
     unit = f" ({measure.unit})" if measure.unit else ""
     headed(

@@ -1,48 +1,124 @@
-"""All figures of a run, as SVG and PNG in its folder."""
+"""The figures of a run: those of its report, and those that a person asks for a paper."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from phyblock.report.figures.bars import main_measure, measure_bars
+from phyblock.folders import OutFolder
+from phyblock.report.figures.captions import caption_files
 from phyblock.report.figures.data import dataset_levels
+from phyblock.report.figures.dots import main_measure, measure_dots
+from phyblock.report.figures.forest import difference_forest
+from phyblock.report.figures.kit import block_kit
+from phyblock.report.figures.perturbations import perturbation_strip
 from phyblock.report.figures.sensitivity import moved_dots
+from phyblock.run.data import recorded_dataset
 from phyblock.run.folder import run_folder
-from phyblock.tables.drawing import png_bytes, styled, svg_bytes
+from phyblock.tables.drawing import (
+    PAGE_LOOK,
+    Look,
+    pdf_bytes,
+    png_bytes,
+    styled,
+    svg_bytes,
+)
 from phyblock.tables.load import Run
+from phyblock.tables.track_report import FigureMaker, SceneFigure
 from phyblock.tracks.kind import kind_of, kinds
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["figure_files", "figure_names", "figure_titles", "write_figures"]
+__all__ = [
+    "PAPER",
+    "Wanted",
+    "figure_files",
+    "figure_names",
+    "figure_titles",
+    "write_figures",
+    "write_paper_figures",
+]
 
+PAPER = "paper"
+"""The folder in a run's folder where figures for papers are, unless another is named."""
 _FOLDER = "figures"
-_FORMS = {"svg": svg_bytes, "png": png_bytes}
-
+_FORMS: Mapping[str, Callable[[Figure], bytes]] = {"svg": svg_bytes, "png": png_bytes}
+_PAPER_FORMS: Mapping[str, Callable[[Figure], bytes]] = {"pdf": pdf_bytes, "svg": svg_bytes}
 _SCENES = "scenes"
 
+_Maker = FigureMaker | SceneFigure
 
-def _makers(run: Run) -> dict[str, Callable[[Run], Figure | None]]:
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which figures are drawn, and of what.
+
+    `names` is empty for all but those that show scenes; `scene` is the one that these show, "" for
+    one that they choose; `data` is where the data set is now, None for where the run found it.
+    """
+
+    names: Sequence[str] = ()
+    scene: str = ""
+    data: Path | None = None
+
+
+def _makers(run: Run) -> dict[str, _Maker]:
     """Figures of a run by name: of its tracks, in their order, then of its scenes."""
-    makers: dict[str, Callable[[Run], Figure | None]] = {}
+    makers: dict[str, _Maker] = {}
     for track in run.design.suite.tracks:
-        makers[_bars_name(track)] = partial(measure_bars, track=track)
-        makers |= kind_of(track).report().figures
-        if run.design.suite.vary.factors:
-            makers[_moved_name(track)] = partial(moved_dots, track=track)
-    return {**makers, _SCENES: dataset_levels}
+        makers |= _of_track(track)
+        if not run.design.suite.vary.factors:
+            del makers[_moved_name(track)]
+    makers |= _OF_ANY_RUN
+    if not run.design.suite.vary.factors:
+        del makers[_PERTURBATIONS]
+    return makers
 
 
-def _bars_name(track: str) -> str:
-    return kind_of(track).report().bars or f"{track.replace('_', '-')}-{main_measure(track).name}"
+def _of_track(track: str) -> dict[str, _Maker]:
+    """Figures that a track may have."""
+    kind = kind_of(track)
+    title, measure = kind.title, main_measure(track).heading
+    return {
+        _main_name(track): FigureMaker(f"{title}: {measure}", partial(measure_dots, track=track)),
+        **kind.report().figures,
+        f"forest-{_dashed(track)}": FigureMaker(
+            f"{title}: differences between models",
+            partial(difference_forest, track=track),
+            in_report=False,
+        ),
+        _moved_name(track): FigureMaker(
+            f"{title}: what the way of asking changes", partial(moved_dots, track=track)
+        ),
+    }
+
+
+_PERTURBATIONS = "perturbations"
+_OF_ANY_RUN: Mapping[str, _Maker] = {
+    _SCENES: FigureMaker("The scenes of the run by level", dataset_levels),
+    "kit": FigureMaker("The blocks and their dimensions", block_kit, in_report=False),
+    _PERTURBATIONS: SceneFigure("A scene in all ways of asking", perturbation_strip),
+}
+
+
+def _main_name(track: str) -> str:
+    return kind_of(track).report().main_figure or f"{_dashed(track)}-{main_measure(track).name}"
 
 
 def _moved_name(track: str) -> str:
-    return f"sensitivity-{track.replace('_', '-')}"
+    return f"sensitivity-{_dashed(track)}"
+
+
+def _dashed(track: str) -> str:
+    return track.replace("_", "-")
+
+
+def _is_in_report(maker: _Maker) -> bool:
+    return isinstance(maker, FigureMaker) and maker.in_report
 
 
 def figure_names(run: Run) -> tuple[str, ...]:
@@ -52,50 +128,91 @@ def figure_names(run: Run) -> tuple[str, ...]:
 
 def figure_titles(run: Run) -> dict[str, str]:
     """What people read in the place of the names."""
-    titles = {_SCENES: "The scenes of the run by level"}
-    for track in run.design.suite.tracks:
-        report = kind_of(track).report()
-        titles[_bars_name(track)] = f"{kind_of(track).title}: {main_measure(track).heading}"
-        titles |= report.figure_titles
-        titles[_moved_name(track)] = f"{kind_of(track).title}: what the way of asking changes"
-    return titles
+    return {name: maker.title for name, maker in _makers(run).items()}
 
 
 def write_figures(run: Run, names: Sequence[str] | None = None) -> tuple[Path, ...]:
-    """Draw figures into `figures/` of the run's folder, NAME.svg and NAME.png; all by default.
+    """Draw figures of the report into `figures/` of the run's folder, NAME.svg and NAME.png; all
+    by default.
 
     Figures that the run has no numbers for are left out. The same records give the same bytes.
     Raises StoreError for a folder that cannot be written, and, before anything is drawn, naming
     every file in the way that we never wrote.
     """
-    makers = _makers(run)
+    makers = {name: maker for name, maker in _makers(run).items() if _is_in_report(maker)}
     wanted = [name for name in makers if names is None or name in names]
     if not wanted:
         return ()
     folder = run_folder(run.path)
     folder.check(figure_files(wanted))
     files: list[Path] = []
-    with styled():
+    with styled(PAGE_LOOK):
         for name in wanted:
-            figure = makers[name](run)
-            if figure is None:
-                continue
-            for ending, draw in _FORMS.items():
-                files += folder.write({f"{_FOLDER}/{name}.{ending}": draw(figure)})
-                # Laid out once: the next format takes what the first has found.
-                figure.set_layout_engine("none")
+            figure = _drawn(run, makers[name], Wanted())
+            if figure is not None:
+                drawn = _rendered(figure, _FORMS)
+                named = {f"{_FOLDER}/{name}.{form}": data for form, data in drawn.items()}
+                files += folder.write(named)
     return tuple(files)
 
 
+def write_paper_figures(
+    run: Run, wanted: Wanted, look: Look, out: Path | None = None
+) -> tuple[Path, ...]:
+    """Draw figures for a paper into `out`, else into `paper/` of the run's folder: NAME.pdf,
+    NAME.svg, and the caption as NAME.txt and as NAME.tex.
+
+    As `write_figures` else; raises DataError too, where scenes are to be shown and cannot be read.
+    """
+    makers = _makers(run)
+    names = (
+        [name for name in makers if name in wanted.names]
+        if wanted.names
+        else [name for name, maker in makers.items() if isinstance(maker, FigureMaker)]
+    )
+    folder = run_folder(run.path) if out is None else OutFolder(out)
+    below = f"{PAPER}/" if out is None else ""
+    endings = (*_PAPER_FORMS, "txt", "tex")
+    folder.check(f"{below}{name}.{ending}" for name in names for ending in endings)
+    files: list[Path] = []
+    with styled(look):
+        for name in names:
+            figure = _drawn(run, makers[name], wanted)
+            if figure is not None:
+                made: dict[str, bytes | str] = {**_rendered(figure, _PAPER_FORMS)}
+                made |= caption_files(run, name, figure)
+                files += folder.write(
+                    {f"{below}{name}.{form}": data for form, data in made.items()}
+                )
+    return tuple(files)
+
+
+def _drawn(run: Run, maker: _Maker, wanted: Wanted) -> Figure | None:
+    if isinstance(maker, FigureMaker):
+        return maker.draw(run)
+    dataset = recorded_dataset(run.path, run.manifest, run.design.suite.levels, wanted.data)
+    return maker.draw(run, dataset, wanted.scene)
+
+
+def _rendered(figure: Figure, forms: Mapping[str, Callable[[Figure], bytes]]) -> dict[str, bytes]:
+    drawn = {}
+    for ending, draw in forms.items():
+        drawn[ending] = draw(figure)
+        # Laid out once: the next format takes what the first has found.
+        figure.set_layout_engine("none")
+    return drawn
+
+
 def figure_files(names: Sequence[str] | None = None) -> tuple[str, ...]:
-    """Every file of these figures, by its name in a run folder; by default of all there are."""
-    known = [
-        name
-        for kind in kinds().values()
-        for name in (_bars_name(kind.name), *kind.report().figures, _moved_name(kind.name))
-    ]
+    """Every file of these figures, by its name in a run folder; by default of all that a report
+    may have.
+    """
+    makers = dict(_OF_ANY_RUN)
+    for track in kinds():
+        makers |= _of_track(track)
+    known = [name for name, maker in makers.items() if _is_in_report(maker)]
     return tuple(
         f"{_FOLDER}/{name}.{ending}"
-        for name in ((*known, _SCENES) if names is None else names)
+        for name in (known if names is None else names)
         for ending in _FORMS
     )

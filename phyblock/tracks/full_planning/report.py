@@ -13,13 +13,21 @@ from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run
 from phyblock.tables.paper_numbers import HUMAN_NOTE, published_table
 from phyblock.tables.showing import planning_words
-from phyblock.tables.track_report import HeadlineColumn, PaperTable, TableMaker, TrackReport
+from phyblock.tables.track_report import (
+    FigureMaker,
+    HeadlineColumn,
+    PaperTable,
+    SceneFigure,
+    TableMaker,
+    TrackReport,
+)
 from phyblock.tracks.full_planning.assembly import assembly_frame, table1_frame
 from phyblock.tracks.full_planning.errors import errors_frame
 from phyblock.tracks.full_planning.figures.errors import error_bars
 from phyblock.tracks.full_planning.figures.levels import f1_radar, settings_dots
 from phyblock.tracks.full_planning.figures.losses import loss_bars
 from phyblock.tracks.full_planning.figures.scatter import f1_by_cost, f1_by_size
+from phyblock.tracks.full_planning.film import PLAN_VIEW
 from phyblock.tracks.full_planning.losses import losses_frame, losses_view
 from phyblock.tracks.full_planning.measures import (
     NAME,
@@ -48,6 +56,7 @@ from phyblock.tracks.full_planning.views import (
     table1_in_terminal,
     table1_view,
 )
+from phyblock.tracks.inference import inference
 from phyblock.tracks.orders import order_frame, order_in_terminal, order_view
 from phyblock.tracks.scenes import scenes_frame, scenes_view
 
@@ -132,23 +141,15 @@ REPORT = TrackReport(
         "scenes": TableMaker(partial(scenes_frame, NAME), scenes_view, "table1"),
         "published": TableMaker(published_frame, published_view, lines=published_lines),
     },
-    bars="f1-levels",
+    main_figure="f1-levels",
     figures={
-        "f1-radar": f1_radar,
-        "settings": settings_dots,
-        "losses": loss_bars,
-        "error-types": error_bars,
-        "f1-size": f1_by_size,
-        "f1-cost": f1_by_cost,
-    },
-    figure_titles={
-        "f1-levels": "F1 by level",
-        "f1-radar": "F1 by level, as in the paper",
-        "settings": "Setting A against setting B",
-        "losses": "What became of the goals' blocks",
-        "error-types": "Wrong steps by type",
-        "f1-size": "F1 by model size",
-        "f1-cost": "F1 by cost",
+        "f1-radar": FigureMaker("F1 by level, as in the paper", f1_radar),
+        "settings": FigureMaker("Setting A against setting B", settings_dots),
+        "losses": FigureMaker("What became of the goals' blocks", loss_bars),
+        "error-types": FigureMaker("Wrong steps by type", error_bars),
+        "f1-size": FigureMaker("F1 by model size", f1_by_size),
+        "f1-cost": FigureMaker("F1 by cost", f1_by_cost),
+        "inference": SceneFigure("A plan and what it built", partial(inference, view=PLAN_VIEW)),
     },
     paper_tables={
         1: PaperTable(published_frame, published_view),

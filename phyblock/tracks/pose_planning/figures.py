@@ -16,6 +16,8 @@ from phyblock.tables.drawing import (
     PALE,
     bare_axes,
     headed,
+    legend_below,
+    names_width_in,
     new_figure,
 )
 from phyblock.tables.load import Run
@@ -76,7 +78,7 @@ def f1_by_tolerance(run: Run) -> Figure | None:
         return None
     ranks = table_c_frame(run).set_index("model")["f1_c"].dropna()
     models = ranks.sort_values(ascending=False, kind="stable").index
-    figure = new_figure(3.4)
+    figure = new_figure(3.1)
     ax = figure.subplots()
     for place, model in reversed(list(enumerate(models))):
         named = place < _NAMED
@@ -99,7 +101,7 @@ def f1_by_tolerance(run: Run) -> Figure | None:
     ax.spines["bottom"].set_color(GRID)
     ax.tick_params(colors=INK)
     handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles[::-1], labels[::-1], loc="outside right center")
+    legend_below(figure, handles[::-1], labels[::-1])
     name = f"Suite {run.design.suite.name}, " if run.design.suite.name else ""
     headed(figure, "F1 by tolerance", f"{name}15 degrees; dotted: the whole plan aligned first")
     return figure
@@ -113,7 +115,7 @@ def pose_error_bars(run: Run) -> Figure | None:
     shares = table.pivot(index="model", columns="error", values="value").dropna()
     ranks = table_c_frame(run).set_index("model")["f1_c"]
     models = [model for model in ranks.sort_values(ascending=False).index if model in shares.index]
-    figure = new_figure(1.75 + 0.28 * len(models))
+    figure = new_figure(1.05 + 0.2 * len(models), names_width_in(models) + 1.0)
     ax = figure.subplots()
     parts = (
         Part(ERROR_NAMES[error], shares.loc[models, error].to_numpy(float), *_LOOKS[error])
@@ -122,6 +124,6 @@ def pose_error_bars(run: Run) -> Figure | None:
     stack(ax, models, parts, 0.7, _LEAST_LABEL)
     ax.set(xlim=(0, 100), xlabel="Share of steps (%)", ylim=(len(models) - 0.4, -0.6))
     bare_axes([ax])
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    legend_below(figure, *ax.get_legend_handles_labels())
     headed(figure, "What was wrong with steps", "by the first error that each meets; all levels")
     return figure

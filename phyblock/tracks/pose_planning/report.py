@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run
 from phyblock.tables.showing import planning_words
-from phyblock.tables.track_report import EpisodeView, HeadlineColumn, TableMaker, TrackReport
+from phyblock.tables.track_report import (
+    EpisodeView,
+    FigureMaker,
+    HeadlineColumn,
+    SceneFigure,
+    TableMaker,
+    TrackReport,
+)
+from phyblock.tracks.inference import inference
 from phyblock.tracks.pose_planning.figures import f1_by_tolerance, pose_error_bars
 from phyblock.tracks.pose_planning.film import pose_film, pose_table
 from phyblock.tracks.pose_planning.measures import (
+    NAME,
     POSE_PLANNING_MEASURES,
     in_levels,
     level_cells,
@@ -26,6 +36,7 @@ from phyblock.tracks.pose_planning.tables import (
 __all__ = ["REPORT"]
 
 _MAIN = "Overall F1 in C"
+_VIEW = EpisodeView(NAME, pose_table, pose_film)
 
 
 def _headline(run: Run) -> tuple[HeadlineColumn, ...]:
@@ -59,13 +70,16 @@ REPORT = TrackReport(
         "table_c": TableMaker(table_c_frame, table_c_view, in_terminal=table_c_in_terminal),
         "pose_errors": TableMaker(pose_errors_frame, pose_errors_view),
     },
-    bars="f1-poses",
-    figures={"f1-tolerance": f1_by_tolerance, "pose-errors": pose_error_bars},
-    figure_titles={
-        "f1-poses": "F1 with poses, by level",
-        "f1-tolerance": "F1 with poses, by tolerance",
-        "pose-errors": "Steps with poses that were wrong, by what was wrong first",
+    main_figure="f1-poses",
+    figures={
+        "f1-tolerance": FigureMaker("F1 with poses, by tolerance", f1_by_tolerance),
+        "pose-errors": FigureMaker(
+            "Steps with poses that were wrong, by what was wrong first", pose_error_bars
+        ),
+        "inference-poses": SceneFigure(
+            "A plan with poses and what it built", partial(inference, view=_VIEW)
+        ),
     },
-    episodes=EpisodeView(pose_table, pose_film),
+    episodes=_VIEW,
     showing=lambda run: planning_words(run, "pose"),
 )

@@ -14,6 +14,7 @@ from phyblock.tables.drawing import (
     PALE,
     bare_axes,
     headed,
+    legend_below,
     new_figure,
 )
 from phyblock.tables.load import Run
@@ -48,7 +49,7 @@ def progress_by_turn(run: Run) -> Figure | None:
     if not len(table.columns):
         return None
     last = table.iloc[-1].sort_values(ascending=False, kind="stable")
-    figure = new_figure(3.6)
+    figure = new_figure(3.1)
     ax = figure.subplots()
     for place, model in reversed(list(enumerate(last.index))):
         named = place < _NAMED
@@ -68,7 +69,7 @@ def progress_by_turn(run: Run) -> Figure | None:
     ax.spines["bottom"].set_color(GRID)
     ax.tick_params(colors=INK)
     handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles[::-1], labels[::-1], loc="outside right center")
+    legend_below(figure, handles[::-1], labels[::-1])
     name = f"Suite {run.design.suite.name}, " if run.design.suite.name else ""
     headed(figure, "Progress by step", f"{name}mean over episodes; one that ended keeps its blocks")
     return figure

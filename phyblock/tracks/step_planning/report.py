@@ -12,12 +12,15 @@ from phyblock.tables.showing import planning_words
 from phyblock.tables.track_report import (
     WHOLE,
     EpisodeView,
+    FigureMaker,
     HeadlineColumn,
     PaperTable,
+    SceneFigure,
     TableMaker,
     TrackReport,
 )
 from phyblock.tracks.base import ENGINE
+from phyblock.tracks.inference import inference
 from phyblock.tracks.orders import order_frame, order_in_terminal, order_view
 from phyblock.tracks.scenes import scenes_frame, scenes_view
 from phyblock.tracks.step_planning.episode_views import (
@@ -49,6 +52,7 @@ from phyblock.tracks.step_planning.table3 import (
 
 __all__ = ["REPORT"]
 
+_VIEW = EpisodeView(NAME, episode_table, episode_film)
 _MAIN, _RECALL = "F1 of attempts", "Recall"
 _COLUMNS = (
     HeadlineColumn("completion", WHOLE.name, "Completed"),
@@ -112,10 +116,14 @@ REPORT = TrackReport(
         ),
         "step_scenes": TableMaker(partial(scenes_frame, NAME), scenes_view, "table3"),
     },
-    figures={"step-progress": progress_by_turn},
-    figure_titles={"step-progress": "Blocks placed, turn by turn"},
+    figures={
+        "step-progress": FigureMaker("Blocks placed, turn by turn", progress_by_turn),
+        "inference-steps": SceneFigure(
+            "An episode and what it built", partial(inference, view=_VIEW)
+        ),
+    },
     paper_tables={3: PaperTable(paper_table3_frame, paper_table3_view)},
     check_alike=_check_alike,
     showing=lambda run: planning_words(run, "steps"),
-    episodes=EpisodeView(episode_table, episode_film),
+    episodes=_VIEW,
 )

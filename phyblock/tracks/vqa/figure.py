@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["accuracy_by_subtask", "vqa_heat_map"]
 
 _DARK = 55.0
+_LEAST_IN = 5.5
 
 
 def accuracy_by_subtask(run: Run) -> pd.DataFrame:
@@ -45,7 +46,7 @@ def vqa_heat_map(run: Run) -> Figure | None:
         return None
     order = table.mean(axis=1).sort_values(ascending=False, kind="stable").index
     table = table.loc[order]
-    figure = new_figure(1.9 + 0.25 * len(table))
+    figure = new_figure(1.3 + 0.19 * len(table), _LEAST_IN)
     ax = figure.subplots()
     image = ax.imshow(table.to_numpy(), cmap="cividis", vmin=0, vmax=100, aspect="auto")
     for (row, column), value in np.ndenumerate(table.to_numpy()):

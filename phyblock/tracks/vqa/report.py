@@ -9,9 +9,17 @@ from phyblock.errors import Problem, SpecError
 from phyblock.tables.load import Run
 from phyblock.tables.paper_numbers import HUMAN_NOTE
 from phyblock.tables.showing import control_words
-from phyblock.tables.track_report import HeadlineColumn, PaperTable, TableMaker, TrackReport
+from phyblock.tables.track_report import (
+    FigureMaker,
+    HeadlineColumn,
+    PaperTable,
+    SceneFigure,
+    TableMaker,
+    TrackReport,
+)
 from phyblock.tracks.vqa.accuracy import questions_frame
 from phyblock.tracks.vqa.answers import OVERALL_CELL, letters_frame, question_digest, showing
+from phyblock.tracks.vqa.cards import subtask_cards
 from phyblock.tracks.vqa.export import QUESTION_EXPORT
 from phyblock.tracks.vqa.figure import vqa_heat_map
 from phyblock.tracks.vqa.measures import (
@@ -87,8 +95,10 @@ REPORT = TrackReport(
         "letters": TableMaker(letters_frame, letters_view, "table2"),
         "questions": TableMaker(questions_frame, None, "table2"),
     },
-    figures={"vqa-subtasks": vqa_heat_map},
-    figure_titles={"vqa-subtasks": "VQA accuracy by subtask"},
+    figures={
+        "vqa-subtasks": FigureMaker("VQA accuracy by subtask", vqa_heat_map),
+        "subtask-cards": SceneFigure("A question of each subtask", subtask_cards),
+    },
     paper_tables={2: PaperTable(paper_table2_frame, paper_table2_view)},
     check_alike=_check_alike,
     showing=_how_shown,

@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING
 
 from phyblock.scoring import ERROR_TYPES
 from phyblock.tables.design import OVERALL
-from phyblock.tables.drawing import COLORS, MUTED, bare_axes, headed, new_figure
+from phyblock.tables.drawing import (
+    COLORS,
+    MUTED,
+    bare_axes,
+    headed,
+    legend_below,
+    names_width_in,
+    new_figure,
+)
 from phyblock.tables.load import Run
 from phyblock.tracks.full_planning.errors import errors_frame
 from phyblock.tracks.full_planning.figures.levels import how_measured, ranked
@@ -32,7 +40,7 @@ def error_bars(run: Run) -> Figure | None:
         return None
     order = {model: place for place, model in enumerate(ranked(intervals_table(run), "f1"))}
     table = table.sort_values("model", key=lambda names: names.map(order), kind="stable")
-    figure = new_figure(1.35 + 0.26 * len(table))
+    figure = new_figure(1.1 + 0.2 * len(table), names_width_in(table["model"]) + 1.2)
     ax = figure.subplots()
     parts = (
         Part(ERROR_NAMES[name], 100 * table[f"{name}_share"].to_numpy(float), color, ink)
@@ -44,6 +52,6 @@ def error_bars(run: Run) -> Figure | None:
     ax.text(101.5, -0.72, "wrong steps", va="bottom", color=MUTED, fontsize=7)
     ax.set(xlim=(0, 100), xlabel="Share of wrong steps (%)", ylim=(len(table) - 0.4, -0.7))
     bare_axes([ax])
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    legend_below(figure, *ax.get_legend_handles_labels())
     headed(figure, "Why steps were wrong", f"{how_measured(run.design)}; all levels")
     return figure

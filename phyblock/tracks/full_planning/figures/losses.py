@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING
 
 from phyblock.scoring import BLOCK_OUTCOMES, BlockOutcome
 from phyblock.tables.design import OVERALL
-from phyblock.tables.drawing import COLORS, PALE, bare_axes, headed, new_figure
+from phyblock.tables.drawing import (
+    COLORS,
+    PALE,
+    bare_axes,
+    headed,
+    legend_below,
+    names_width_in,
+    new_figure,
+)
 from phyblock.tables.load import Run
 from phyblock.tracks.full_planning.figures.levels import how_measured, ranked
 from phyblock.tracks.full_planning.losses import losses_frame
@@ -41,7 +49,7 @@ def loss_bars(run: Run) -> Figure | None:
         return None
     shares = table.pivot(index="model", columns="outcome", values="value")
     models = [model for model in ranked(intervals_table(run), "f1") if model in shares.index]
-    figure = new_figure(1.75 + 0.28 * len(models))
+    figure = new_figure(1.05 + 0.2 * len(models), names_width_in(models) + 1.0)
     ax = figure.subplots()
     parts = (
         Part(BLOCK_NAMES[outcome], shares.loc[models, outcome].to_numpy(float), *_LOOKS[outcome])
@@ -50,6 +58,6 @@ def loss_bars(run: Run) -> Figure | None:
     stack(ax, models, parts, 0.7, _LEAST_LABEL)
     ax.set(xlim=(0, 100), xlabel="Share of the goals' blocks (%)", ylim=(len(models) - 0.4, -0.6))
     bare_axes([ax])
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    legend_below(figure, *ax.get_legend_handles_labels())
     headed(figure, "What became of the goals' blocks", f"{how_measured(run.design)}; all levels")
     return figure

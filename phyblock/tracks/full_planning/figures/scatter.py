@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+import math
+import re
 from typing import TYPE_CHECKING
 
 import pandas as pd
 
 from phyblock.tables.cost import cost_frame
 from phyblock.tables.design import OVERALL
-from phyblock.tables.drawing import ACCENT, INK, MUTED, PALE, bare_axes, headed, new_figure
+from phyblock.tables.drawing import (
+    ACCENT,
+    INK,
+    MUTED,
+    PALE,
+    bare_axes,
+    drawn_width_in,
+    headed,
+    new_figure,
+    text_width_in,
+)
 from phyblock.tables.load import Run
 from phyblock.tracks.full_planning.figures.levels import how_measured
 from phyblock.tracks.full_planning.measures import NAME
@@ -18,19 +30,36 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["f1_by_cost", "f1_by_size"]
+__all__ = ["f1_by_cost", "f1_by_size", "stated_size_b"]
 
 _LINE_POINTS = 8.5
 """Height of a label, with what it keeps free [points]."""
-_LETTER_POINTS = 4.4
+_LABEL_PT = 6.5
+_BESIDE_IN = 0.6
+"""What the axis of F1 takes beside the plot."""
+_DECADE_IN = 1.4
+"""From here on there is room for three numbers in a decade."""
+_STATED_SIZE = re.compile(r"(?<![A-Za-z0-9.])(\d+(?:\.\d+)?)[bB](?![A-Za-z0-9])")
 _SHIFTS = sorted((sign * 9.0 * n for n in range(60) for sign in (1, -1)), key=abs)
 """How far a label may be moved, the nearest first [points]."""
 
 
 def f1_by_size(run: Run) -> Figure | None:
-    """F1 against billions of parameters; None where the size of no model is known."""
-    sizes = {model.name: model.size_b for model in run.design.models}
+    """F1 against billions of parameters; None where the size of no model is known.
+
+    A size is what the models file says, else what the model's name does, as `-7B`.
+    """
+    sizes = {model.name: model.size_b or stated_size_b(model.name) for model in run.design.models}
     return _scatter(run, sizes, "F1 by model size", ("size", "Parameters (billions, log scale)"))
+
+
+def stated_size_b(name: str) -> float | None:
+    """The billions of parameters that a model's name tells, as `-7B`; None where it tells none.
+
+    Of several numbers the first counts, which is of all experts where some alone are active.
+    """
+    found = _STATED_SIZE.search(name)
+    return float(found[1]) if found else None
 
 
 def f1_by_cost(run: Run) -> Figure | None:
@@ -53,16 +82,18 @@ def _scatter(
     if table.empty:
         return None
     table = table.assign(x=table["model"].map(known)).sort_values(["f1", "model"])
-    figure = new_figure(3.9)
+    figure = new_figure(3.6)
     ax = figure.subplots()
     ends = table[["lo", "hi"]].to_numpy(float)
     ax.vlines(table["x"], ends[:, 0], ends[:, 1], color=PALE, linewidth=2.2)
     ax.plot(table["x"], table["f1"], "o", color=ACCENT, markersize=5)
     ax.set_xscale("log")
-    least, most = float(table["x"].min()), float(table["x"].max())
-    ax.set(xlim=(least / 1.7, most * 2.9), xlabel=axis[1], ylabel="F1 overall (%)")
+    start = float(table["x"].min()) / 1.7
+    end = _end(table, start)
+    ax.set(xlim=(start, end), xlabel=axis[1], ylabel="F1 overall (%)")
     ax.set_ylim(0, min(104.0, 8 + float(table["hi"].fillna(table["f1"]).max())))
-    ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    is_wide = drawn_width_in() / math.log10(end / start) > _DECADE_IN
+    ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if is_wide else (1,)))
     ax.xaxis.set_minor_locator(NullLocator())
     ax.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
     bare_axes([ax], "both")
@@ -74,15 +105,23 @@ def _scatter(
     return figure
 
 
+def _end(table: pd.DataFrame, start: float) -> float:
+    """Where a scale from `start` ends, so that every name fits beside its point."""
+    width = drawn_width_in() - _BESIDE_IN
+    ends = [math.log(float(table["x"].max()) * 1.3 / start)]
+    for name, x in zip(table["model"], table["x"], strict=True):
+        free = 1 - min((text_width_in(name, _LABEL_PT) + 0.15) / width, 0.7)
+        ends.append(math.log(x / start) / free)
+    return start * math.exp(max(ends))
+
+
 def _label(figure: Figure, ax: Axes, table: pd.DataFrame) -> None:
     """Names to the right of their points, moved up or down where they would cover another."""
-    from matplotlib.patheffects import withStroke
-
     figure.draw_without_rendering()
     points = ax.transData.transform(table[["x", "f1"]].to_numpy(float)) * 72 / figure.dpi
     taken = [(x - 4.0, x + 4.0, y) for x, y in points]
     for (x, y), name in zip(points, table["model"], strict=True):
-        start, end = x + 6.5, x + 7 + _LETTER_POINTS * len(name)
+        start, end = x + 6.5, x + 8 + 72 * text_width_in(name, _LABEL_PT)
         shift = next(
             shift
             for shift in _SHIFTS
@@ -98,12 +137,12 @@ def _label(figure: Figure, ax: Axes, table: pd.DataFrame) -> None:
             xycoords="figure points",
             xytext=(start, y + shift - 2.6),
             textcoords="figure points",
-            fontsize=7,
+            fontsize=_LABEL_PT,
             color=INK,
             annotation_clip=False,
             arrowprops={"arrowstyle": "-", "color": MUTED, "linewidth": 0.5, "relpos": (0, 0.5)}
             if shift
             else None,
-            path_effects=[withStroke(linewidth=2, foreground="white")],
+            bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.4},
             zorder=4,
         )
