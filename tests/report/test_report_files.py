@@ -17,6 +17,8 @@ from phyblock.folders import LIST
 from phyblock.report import Column, TextTable, load_run, to_latex, to_markdown, write_tables
 from phyblock.report.compare import compare_models
 from phyblock.report.compare_view import write_comparison
+from phyblock.report.figures import Wanted, write_paper_figures
+from phyblock.tables.drawing import Look
 from phyblock.tables.text_table import NO_VALUE, number, spread
 from tests.report.factory import laws, manifest, record, record_lists, score, write_run
 
@@ -244,14 +246,17 @@ def test_latex_compiles_inside_any_document(tmp_path: Path) -> None:
     )
     written = write_tables(folder)
     write_comparison(compare_models(load_run(folder)), folder / "tables")
-    inputs = "".join(
-        rf"\input{{tables/{file.stem}}}" for file in sorted((folder / "tables").glob("*.tex"))
-    )
-    assert inputs.count("input") == 9
+    write_paper_figures(load_run(folder), Wanted(("f1-levels", "forest-full-planning")), Look())
+    files = sorted(file.relative_to(folder) for file in folder.glob("*/*.tex"))
+    assert {"tables/comparison.tex", "tables/table1.tex", "paper/f1-levels.tex"} <= {
+        file.as_posix() for file in files
+    }
+    inputs = "".join(rf"\input{{{file.with_suffix('')}}}" for file in files)
     for number_of_columns in ("onecolumn", "twocolumn"):
         document = (
             rf"\documentclass[{number_of_columns}]{{article}}"
-            rf"\usepackage{{booktabs}}\usepackage{{graphicx}}\begin{{document}}"
+            rf"\usepackage{{booktabs}}\usepackage{{graphicx}}\graphicspath{{{{paper/}}}}"
+            rf"\begin{{document}}"
             rf"{inputs}\end{{document}}"
         )
         (folder / "paper.tex").write_text(document)

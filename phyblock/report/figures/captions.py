@@ -21,7 +21,7 @@ _ROUNDING_IN = 0.1
 def caption_files(run: Run, name: str, figure: Figure) -> dict[str, str]:
     """The caption of a figure by ending: `txt` alone, `tex` as a float that includes NAME.pdf.
 
-    What is wider than a column spans both.
+    What is wider than a column spans both, and is made narrower only where the text is.
     """
     heading = heading_of(figure)
     words = [*(word for track in run.design.suite.tracks for word in _showing(run, track))]
@@ -33,7 +33,8 @@ def caption_files(run: Run, name: str, figure: Figure) -> dict[str, str]:
         "% Needs \\usepackage{graphicx}.",
         rf"\begin{{figure{star}}}[t]",
         r"\centering",
-        rf"\includegraphics{{{name}.pdf}}",
+        r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
+        rf"\includegraphics{{{name}.pdf}}}}",
         rf"\caption{{{escape(text)}}}",
         rf"\label{{fig:phyblock-{name}}}",
         rf"\end{{figure{star}}}",
