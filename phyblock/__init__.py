@@ -1,20 +1,55 @@
 """phyblock: declarative runner for PhyBlock, 3D block assembly for vision-language models.
 
-`load_run(path)` opens a run folder for notebooks: `.records` is a DataFrame, a row a sample,
-`.tables` maps names to DataFrames, `.summary()` and `.compare(other)` say what came out.
+`load_suite(name)` reads a suite and its scenes, `render(scene)` draws one, `score(reply, scene)`
+says what a reply is worth, `run_suite(suite)` runs a suite. `load_run(path)` opens a run folder:
+`.records` is a DataFrame, a row a sample, `.estimates` every value with its interval, `.tables`
+maps names to DataFrames, `.summary()` and `.compare(other)` say what came out.
 """
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from phyblock.api.pictures import Picture, render
+    from phyblock.api.running import run_suite
+    from phyblock.api.scores import PlanScore, score
+    from phyblock.api.suites import SceneTask, Suite, load_suite
+    from phyblock.errors import PhyblockError
     from phyblock.report.notebook import LoadedRun as Run
     from phyblock.report.notebook import load_run
 
     __version__: str
 
-__all__ = ["Run", "__version__", "load_run"]
+__all__ = [
+    "PhyblockError",
+    "Picture",
+    "PlanScore",
+    "Run",
+    "SceneTask",
+    "Suite",
+    "__version__",
+    "load_run",
+    "load_suite",
+    "render",
+    "run_suite",
+    "score",
+]
+
+_HOMES = {
+    "PhyblockError": "phyblock.errors",
+    "Picture": "phyblock.api.pictures",
+    "PlanScore": "phyblock.api.scores",
+    "Run": "phyblock.report.notebook",
+    "SceneTask": "phyblock.api.suites",
+    "Suite": "phyblock.api.suites",
+    "load_run": "phyblock.report.notebook",
+    "load_suite": "phyblock.api.suites",
+    "render": "phyblock.api.pictures",
+    "run_suite": "phyblock.api.running",
+    "score": "phyblock.api.scores",
+}
 
 
 def __getattr__(name: str) -> object:
@@ -23,10 +58,9 @@ def __getattr__(name: str) -> object:
         from importlib.metadata import version
 
         return version("phyblock")
-    if name in __all__:
-        from phyblock.report import notebook
-
-        return notebook.LoadedRun if name == "Run" else notebook.load_run
+    if name in _HOMES:
+        module = importlib.import_module(_HOMES[name])
+        return getattr(module, "LoadedRun" if name == "Run" else name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

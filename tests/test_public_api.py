@@ -1,21 +1,34 @@
-"""What a notebook may import, and what it costs."""
+"""What a notebook may import, what it costs, and that the guide to it runs."""
 
 from __future__ import annotations
 
+import asyncio
+import re
 import subprocess
 import sys
+import typing
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 
 import phyblock
+from phyblock.errors import SpecError
+from tests.workspace import Workspace
+
+NAMES = ["PhyblockError", "Picture", "PlanScore", "Run", "SceneTask", "Suite", "__version__"]
+NAMES += ["load_run", "load_suite", "render", "run_suite", "score"]
+GUIDE = Path(__file__).parents[1] / "docs" / "api.md"
+PNG = b"\x89PNG\r\n\x1a\n"
 
 
 def test_public_names_are_these_and_completion_finds_them() -> None:
-    assert phyblock.__all__ == ["Run", "__version__", "load_run"]
+    assert phyblock.__all__ == NAMES
     assert all(getattr(phyblock, name).__doc__ for name in phyblock.__all__)
     assert set(phyblock.__all__) <= set(dir(phyblock))
     assert phyblock.__version__ == version("phyblock")
+    for name in ("load_suite", "render", "run_suite", "score", "load_run"):
+        assert "return" in typing.get_type_hints(getattr(phyblock, name)), name
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         _ = phyblock.nothing
 
@@ -35,3 +48,76 @@ def test_importing_phyblock_imports_nothing_heavy() -> None:
         "click",
     }
     assert not heavy & set(done.stdout.split())
+
+
+def test_the_guide_runs_and_every_object_shows_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```python\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)
+    assert len(blocks) == 6
+    names: dict[str, typing.Any] = {}
+    for block in blocks:
+        exec(compile(block, str(GUIDE), "exec"), names)
+    assert "levels[0]" in capsys.readouterr().out
+    assert (tmp_path / "front.png").read_bytes() == names["picture"].png
+    assert names["picture"]._repr_png_().startswith(PNG)
+    scene, found, run = names["scene"], names["found"], names["run"]
+    assert scene._repr_png_().startswith(PNG)
+    assert f"<scene {scene.key}: level 1" in repr(scene)
+    assert "F1" in found._repr_html_()
+    assert "quick" in names["suite"]._repr_html_()
+    assert "random" in run._repr_html_()
+    assert set(run.estimates["model"]) == {"random", "goal-blind"}
+    # What a reply is worth here is what it is worth in the run.
+    records = run.records.set_index("sample")
+    scores = run.scores[(run.scores["criterion"] == "aov") & (run.scores["setting"] == "A")]
+    scenes = names["suite"].scenes
+    for row in scores.head(40).to_dict("records"):
+        record = records.loc[row["sample"]]
+        alone = phyblock.score(record["text"], scenes[record["scene"]])
+        assert (alone.tp, alone.fp, alone.fn) == (row["tp"], row["fp"], row["fn"])
+
+
+def test_what_is_wrong_is_named() -> None:
+    suite = phyblock.load_suite("quick", "limit=2")
+    scene = next(iter(suite.scenes.values()))
+    wrong: dict[str, typing.Callable[[], object]] = {
+        "there is no such suite": lambda: phyblock.load_suite("quik"),
+        "--set limit=0": lambda: phyblock.load_suite("quick", "limit=0"),
+        "has no such scene": lambda: suite.scenes["l9"],
+        "render: show": lambda: phyblock.render(scene, show="all"),  # type: ignore[arg-type]
+        "background is 'sea'": lambda: phyblock.render(scene, background="sea"),  # type: ignore[arg-type]
+        "size_px is 5": lambda: phyblock.render(scene, size_px=5),
+        "score: setting": lambda: phyblock.score("", scene, setting="C"),  # type: ignore[arg-type]
+        "score: reply": lambda: phyblock.score(None, scene),  # type: ignore[arg-type]
+        "run_suite: limit": lambda: phyblock.run_suite(suite, limit=0),
+        "is no list of names": lambda: phyblock.run_suite(suite, models="random"),
+    }
+    for said, call in wrong.items():
+        with pytest.raises(SpecError, match=re.escape(said)):
+            call()
+    unread = phyblock.score("I cannot.", scene)
+    assert (unread.rule, unread.f1, unread.tp) == (None, 0, 0)
+    assert "Nothing could be read" in unread._repr_html_()
+
+
+def test_nothing_is_spent_unasked_and_a_loop_may_run(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(workspace.root)
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-nobody")
+    (workspace.root / "billed.yaml").write_text(
+        "paid: {id: openai/gpt-4o, api_base: 'http://127.0.0.1:9/v1', "
+        "price: {input: 1, output: 1}}\n"
+    )
+    out = workspace.root / "paid"
+    with pytest.raises(SpecError, match=r"nobody agreed(.|\n)*yes=True"):
+        phyblock.run_suite("quick", models=["paid"], limit=1, out=out, models_file="billed.yaml")
+    assert not out.exists()
+
+    async def in_a_notebook() -> phyblock.Run:
+        return phyblock.run_suite("quick", models=["random"], limit=2, out=out)
+
+    run = asyncio.run(in_a_notebook())
+    assert set(run.records["outcome"]) == {"ok"}

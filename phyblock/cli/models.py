@@ -12,7 +12,6 @@ from rich.console import Console
 
 from phyblock.addresses import host_of
 from phyblock.cli.console import make_console, plain_table, shown_path
-from phyblock.cli.files import find_models_file
 from phyblock.cli.paths import models_file_option
 from phyblock.errors import ModelError, Problem, SpecError
 from phyblock.models import (
@@ -29,6 +28,7 @@ from phyblock.plain_text import counted
 from phyblock.registry import baseline_names
 from phyblock.report import NO_VALUE
 from phyblock.run.check import check_model
+from phyblock.run.finding import find_models_file
 from phyblock.run.models import to_config
 from phyblock.specs import (
     GROUP,

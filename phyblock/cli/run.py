@@ -13,26 +13,25 @@ from rich.console import Console
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.estimate_view import show_estimate
-from phyblock.cli.files import (
+from phyblock.cli.names import split_names
+from phyblock.cli.paths import NAME_OR_PATH, UserPath, models_file_option
+from phyblock.cli.progress import ProgressView
+from phyblock.cli.report import show_made
+from phyblock.plain_text import counted, one_line
+from phyblock.records import read_manifest
+from phyblock.report.made import names_to_write
+from phyblock.resources import bundled
+from phyblock.run.asking import asking_remarks, choice_remarks, moved_remarks
+from phyblock.run.consent import spending_refused, unlimited_spending
+from phyblock.run.estimate import estimate
+from phyblock.run.execute import Cause, RunResult
+from phyblock.run.finding import (
     bundled_suites,
     check_commands,
     find_models_file,
     find_suite,
     prompt_dirs,
 )
-from phyblock.cli.names import split_names
-from phyblock.cli.paths import NAME_OR_PATH, UserPath, models_file_option
-from phyblock.cli.progress import ProgressView
-from phyblock.cli.report import show_made
-from phyblock.errors import Problem, SpecError
-from phyblock.models import is_billed
-from phyblock.plain_text import counted, one_line
-from phyblock.records import read_manifest
-from phyblock.report.made import names_to_write
-from phyblock.resources import bundled
-from phyblock.run.asking import asking_remarks, choice_remarks, moved_remarks
-from phyblock.run.estimate import estimate
-from phyblock.run.execute import Cause, RunResult
 from phyblock.run.folder import run_folder
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.session import Session, check_ready
@@ -153,26 +152,19 @@ def _agreed(console: Console, plan: RunPlan, folder: Path, *, use_cache: bool) -
 
     Where nobody can answer, a cost limit is the answer. Raises SpecError where there is none.
     """
-    is_terminal = sys.stdin.isatty()
-    is_limited = plan.suite.limits.max_cost_usd is not None
-    billed = {model.name for model in plan.models if is_billed(model.config)}
-    if not is_terminal and (is_limited or not billed):
-        return True
-    estimated = estimate(plan, folder, use_cache=use_cache)
-    costly = [row.model for row in estimated if row.may_cost]
-    if not costly:
-        return True
-    if is_terminal:
+    if sys.stdin.isatty():
+        estimated = estimate(plan, folder, use_cache=use_cache)
+        if not any(row.may_cost for row in estimated):
+            return True
         show_estimate(console, plan, estimated)
         return click.confirm("Go on?", default=True)
-    if not billed & set(costly):
+    costly = unlimited_spending(plan, folder, use_cache=use_cache)
+    if not costly:
         return True
-    show_estimate(console, plan, estimated)
+    show_estimate(console, plan, costly)
     message = "would cost money, and there is no terminal to ask on"
     hint = "agree with --yes, or set a limit: --set limits.max_cost_usd=5"
-    raise SpecError(
-        Problem(f"suite {plan.suite.name}", message, found=", ".join(costly), hint=hint)
-    )
+    raise spending_refused(plan, costly, message, hint)
 
 
 def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-import phyblock
 from phyblock.bounded import NotRegularError, open_regular
 from phyblock.records import MANIFEST, PROMPTS, RECORDS, read_manifest
 from phyblock.registry import has_additions
@@ -33,7 +32,7 @@ def code_digest() -> str | None:
     """
     if has_additions():
         return None
-    package = Path(phyblock.__file__).parent
+    package = Path(__file__).parents[1]
     state = _state(package)
     if state is None:
         return None

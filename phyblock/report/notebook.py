@@ -17,6 +17,7 @@ from phyblock.report.write import make_tables, table_names
 from phyblock.tables.load import Run
 from phyblock.tables.load import load_run as load_frames
 from phyblock.tables.text_table import TextTable, between, number
+from phyblock.tracks.estimates import all_estimates
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["LoadedRun", "Tables", "load_run"]
@@ -61,6 +62,14 @@ class LoadedRun(Run):
     def tables(self) -> Tables:
         """Data frames by table name, as the files in `tables/` hold them."""
         return Tables(self)
+
+    @property
+    def estimates(self) -> pd.DataFrame:
+        """Every value with its 95 % interval: a row a track, measure, way of counting, model, cell.
+
+        The frame behind all tables and figures; shares are in [0, 1]. A copy, to be changed freely.
+        """
+        return all_estimates(self)
 
     def summary(self) -> pd.DataFrame:
         """One row a model: samples, answered, and the headline of each track with its interval.

@@ -10,7 +10,6 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import make_console, shown_path
-from phyblock.cli.files import find_models_file
 from phyblock.cli.paths import UserPath, models_file_option
 from phyblock.domain import Question, Subtask
 from phyblock.errors import DataError, Problem, SpecError
@@ -18,6 +17,7 @@ from phyblock.files import check_free, make_folder, write_named
 from phyblock.models import Breakers, Gate, ModelConfig, RetryPolicy, SharedCache, build_model
 from phyblock.plain_text import counted
 from phyblock.resources import bundled, reply_cache_file
+from phyblock.run.finding import find_models_file
 from phyblock.run.models import to_config
 from phyblock.specs import SuiteSpec, did_you_mean, load_models
 from phyblock.tracks import TemplatePrompt

@@ -45,8 +45,8 @@ _MOST_PANELS = 6
 _LEAST_PANEL_IN, _LEAST_PLOT_IN = 0.82, 1.0
 _STEP = 20
 """Scales of shares end at a multiple of this [%]."""
-_NUMBERS = 0.3
-"""Room for numbers beside the dots, as a share of the scale."""
+_NUMBER_IN, _BETWEEN_IN = 0.36, 0.12
+"""Room for a number beside the dots, and between panels [inches]."""
 _NONE = (np.nan, np.nan, np.nan)
 
 
@@ -80,7 +80,8 @@ def measure_dots(run: Run, *, track: str) -> Figure | None:
     figure = new_figure(1.0 + _ROW_IN * len(models), names_in + _LEAST_PLOT_IN)
     axes = figure.subplots(1, n_panels, sharey=True, squeeze=False)[0]
     for ax, column, values in zip(axes, columns, shown, strict=False):
-        _dots(ax, values, longest, INK if column is columns[0] else ACCENT)
+        edge = longest * (1 + _NUMBER_IN / (room_in / n_panels - _NUMBER_IN - _BETWEEN_IN))
+        _dots(ax, values, edge, INK if column is columns[0] else ACCENT)
         unit = f" ({measure.unit})" if measure.unit else ""
         ax.set(title=column.heading, xlabel=f"{measure.heading}{unit}")
         if measure.unit == "%":
@@ -124,14 +125,13 @@ def _values(
     }
 
 
-def _dots(ax: Axes, values: NDArray[np.float64], longest: float, color: str) -> None:
+def _dots(ax: Axes, values: NDArray[np.float64], edge: float, color: str) -> None:
     """Draw a dot a row of `values` (value, low, high; NaN: not measured), its number beside it."""
     value, lo, hi = values.T
     places = np.arange(len(value))
     sure = ~np.isnan(value) & ~np.isnan(lo)
     ax.hlines(places[sure], lo[sure], hi[sure], color=color, linewidth=1.2)
     ax.plot(value, places, "o", color=color, markersize=3.6, clip_on=False)
-    edge = (1 + _NUMBERS) * longest
     for place in np.flatnonzero(~np.isnan(value)).tolist():
         ax.text(
             edge, place, f"{value[place]:.1f}", ha="right", va="center", fontsize=6.5, color=MUTED
