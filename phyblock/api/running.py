@@ -10,6 +10,7 @@ from pathlib import Path
 
 from phyblock.api.suites import Suite, load_suite
 from phyblock.errors import Problem, SpecError
+from phyblock.plain_text import counted
 from phyblock.report.notebook import LoadedRun, load_run
 from phyblock.run.consent import spending_refused, unlimited_spending
 from phyblock.run.events import RunEvent
@@ -90,8 +91,8 @@ def _tell(result: RunResult) -> None:
         warnings.warn(f"{model} was stopped: {reason}", stacklevel=3)
     if result.left:
         reason = f" ({result.stop.reason})" if result.stop else ""
-        said = f"{result.left:,} of {result.samples:,} samples are left{reason}"
+        said = f"{result.left:,} of {counted(result.samples, 'sample')} left{reason}"
         warnings.warn(f"{said}: the same call again goes on", stacklevel=3)
     if result.failed:
-        said = f"{result.failed:,} requests were rejected for good"
-        warnings.warn(f"{said}: ask them again with retry_failed=True", stacklevel=3)
+        said = f"{counted(result.failed, 'request')} rejected for good"
+        warnings.warn(f"{said}: ask again with retry_failed=True", stacklevel=3)

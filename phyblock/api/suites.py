@@ -11,6 +11,7 @@ from pathlib import Path
 from phyblock.api.pictures import render
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import Problem, SpecError
+from phyblock.plain_text import counted
 from phyblock.resources import bundled
 from phyblock.run.data import open_dataset
 from phyblock.run.finding import find_suite, prompt_dirs
@@ -27,9 +28,9 @@ class SceneTask(AssemblyTask):
     """A goal (`scene`) with its numbered `candidates`; a notebook shows both as a picture."""
 
     def __repr__(self) -> str:
-        n_blocks, n_candidates = len(self.scene.blocks), len(self.candidates)
-        level = f"level {self.scene.level}"
-        return f"<scene {self.key}: {level}, {n_blocks} blocks, {n_candidates} candidates>"
+        n_blocks = counted(len(self.scene.blocks), "block")
+        n_candidates = counted(len(self.candidates), "candidate")
+        return f"<scene {self.key}: level {self.scene.level}, {n_blocks}, {n_candidates}>"
 
     def _repr_png_(self) -> bytes:
         return render(self).png
@@ -60,7 +61,7 @@ class Scenes(Mapping[str, SceneTask]):
 
     def __repr__(self) -> str:
         first = ", ".join(list(self._tasks)[:3])
-        return f"<{len(self)} scenes: {first}{', ...' if len(self) > 3 else ''}>"
+        return f"<{counted(len(self), 'scene')}: {first}{', ...' if len(self) > 3 else ''}>"
 
 
 @dataclass(frozen=True, repr=False)
@@ -97,7 +98,7 @@ class Suite:
         suite = self.loaded.suite
         levels = ", ".join(map(str, suite.levels))
         return (
-            f"{', '.join(suite.tracks)}; levels {levels}; {len(suite.seeds)} seeds; "
+            f"{', '.join(suite.tracks)}; levels {levels}; {counted(len(suite.seeds), 'seed')}; "
             f"models {', '.join(self.models)}"
         )
 

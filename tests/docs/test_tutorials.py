@@ -83,7 +83,10 @@ def test_a_reader_gets_an_own_model_into_the_table(workspace: Workspace) -> None
     ("page", "left"),
     [
         ("first-scenes.md", ["mine-set/scenes.jsonl", "pictures", "results/mine-poses/tables"]),
-        ("paper-tables.md", ["results/comparison", "results/paper/figures", "rocket.gif"]),
+        (
+            "paper-tables.md",
+            ["results/comparison", "results/paper/figures", "results/paper/paper", "rocket.gif"],
+        ),
     ],
 )
 def test_a_reader_comes_to_the_end(page: str, left: list[str], workspace: Workspace) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from phyblock.plain_text import counted
 from phyblock.report.compare import compare_models
 from phyblock.report.figures.dots import main_measure
 from phyblock.tables.drawing import (
@@ -88,9 +89,9 @@ def difference_forest(run: Run, *, track: str) -> Figure | None:
     headed(
         figure,
         f"{kind_of(track).title}: paired differences of {found.name}",
-        f"{suite}{most['n_samples']} samples that both have; lines: 95 % intervals over "
-        f"{most['n_clusters']} base scenes; filled: p < {_LEVEL} after Holm's correction for "
-        f"{len(found.table)} tests",
+        f"{suite}{counted(int(most['n_samples']), 'sample')} that both have; lines: 95 % intervals over "
+        f"{counted(int(most['n_clusters']), 'base scene')}; filled: p < {_LEVEL} after Holm's "
+        f"correction for {counted(len(found.table), 'test')}",
     )
     return figure
 
