@@ -85,11 +85,12 @@ def difference_forest(run: Run, *, track: str) -> Figure | None:
     handles = ax.get_lines()[1:3]
     legend_below(figure, handles, [str(handle.get_label()) for handle in handles])
     most = table.loc[table["n_scenes"].idxmax()]
+    samples = counted(int(most["n_samples"]), "sample")
     suite = f"Suite {run.design.suite.name}; " if run.design.suite.name else ""
     headed(
         figure,
         f"{kind_of(track).title}: paired differences of {found.name}",
-        f"{suite}{counted(int(most['n_samples']), 'sample')} that both have; lines: 95 % intervals over "
+        f"{suite}{samples} that both have; lines: 95 % intervals over "
         f"{counted(int(most['n_clusters']), 'base scene')}; filled: p < {_LEVEL} after Holm's "
         f"correction for {counted(len(found.table), 'test')}",
     )
