@@ -103,5 +103,7 @@ def test_figures_and_exports_name_what_they_wrote(folder: Path) -> None:
         assert "allowed" in refused.output or "is not one of" in refused.output
     with pytest.raises(SpecError, match="no such model"):
         call("figures", folder, "--models", "omega")
+    with pytest.raises(SpecError, match="shown by none"):
+        call("figures", folder, "--only", "settings", "--scene", "000")
     done = call("export", folder, "--to", "csv")
     assert done.output.strip() == str(folder / "export" / "csv" / "records.csv")

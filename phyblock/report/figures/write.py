@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from phyblock.errors import Problem, SpecError
 from phyblock.folders import OutFolder
 from phyblock.report.figures.captions import caption_files
 from phyblock.report.figures.data import dataset_levels
@@ -162,7 +163,8 @@ def write_paper_figures(
     """Draw figures for a paper into `out`, else into `paper/` of the run's folder: NAME.pdf,
     NAME.svg, and the caption as NAME.txt and as NAME.tex.
 
-    As `write_figures` else; raises DataError too, where scenes are to be shown and cannot be read.
+    As `write_figures` else; raises DataError too, where scenes are to be shown and cannot be read,
+    and SpecError for a scene that the run has not or that no figure shows.
     """
     makers = _makers(run)
     names = (
@@ -170,6 +172,10 @@ def write_paper_figures(
         if wanted.names
         else [name for name, maker in makers.items() if isinstance(maker, FigureMaker)]
     )
+    of_scenes = [name for name, maker in makers.items() if isinstance(maker, SceneFigure)]
+    if wanted.scene and not set(names) & set(of_scenes):
+        message, hint = "is shown by none of these figures", f"name one: {', '.join(of_scenes)}"
+        raise SpecError(Problem(str(run.path), message, "--scene", wanted.scene, hint=hint))
     folder = run_folder(run.path) if out is None else OutFolder(out)
     below = f"{PAPER}/" if out is None else ""
     endings = (*_PAPER_FORMS, "txt", "tex")
