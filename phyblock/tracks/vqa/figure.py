@@ -24,6 +24,7 @@ __all__ = ["accuracy_by_subtask", "vqa_heat_map"]
 
 _DARK = 55.0
 _LEAST_IN = 5.5
+_SCALE_ROWS = 6
 
 
 def accuracy_by_subtask(run: Run) -> pd.DataFrame:
@@ -65,9 +66,11 @@ def vqa_heat_map(run: Run) -> Figure | None:
     ax.tick_params(length=0)
     for side in ax.spines.values():
         side.set_visible(False)
-    bar = figure.colorbar(image, ax=ax, pad=0.015, fraction=0.03)
-    bar.set_label("Right answers (%)")
-    bar.outline.set_visible(False)
+    # Every number is said; beside a few rows there is no room for the scale's name.
+    if len(table) >= _SCALE_ROWS:
+        bar = figure.colorbar(image, ax=ax, pad=0.015, fraction=0.03)
+        bar.set_label("Right answers (%)")
+        bar.outline.set_visible(False)
     name = f"Suite {run.design.suite.name}, " if run.design.suite.name else ""
     chance = (
         f"guessing gives {100 * guessing(run, 'SH'):.2g}, in OR {100 * guessing(run, 'OR'):.1g}"
