@@ -16,7 +16,6 @@ from rich.console import Console
 
 from phyblock.bounded import read_text
 from phyblock.cli.console import make_console, shown_path
-from phyblock.cli.files import bundled_suites, find_suite, prompt_dirs
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.cli.report import show_made
 from phyblock.errors import Problem, SpecError, said
@@ -30,6 +29,7 @@ from phyblock.play.sitting import Sitting, report_files
 from phyblock.report.made import names_to_write
 from phyblock.resources import bundled
 from phyblock.run.execute import RunResult
+from phyblock.run.finding import bundled_suites, find_suite, prompt_dirs
 from phyblock.run.folder import run_folder
 from phyblock.run.plan import RunPlan
 from phyblock.run.session import Session
