@@ -192,10 +192,17 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
             f"{counted(result.failed, 'request')} rejected for good; when the cause is mended,"
         )
         console.print(f"{rejected} ask again with --retry-failed", style="red", soft_wrap=True)
+    if result.unjudged:
+        told = f"{counted(result.unjudged, 'answer')} could not be judged:"
+        console.print(
+            f"{told} phyblock score {where} tries again, without a call",
+            style="red",
+            soft_wrap=True,
+        )
     if result.left:
         again = shlex.join(["phyblock", *sys.argv[1:]])
         how = "raise limits.max_cost_usd and give" if cause is Cause.COST else "give"
         console.print(f"To go on, {how} the same command again: {again}", soft_wrap=True)
     if cause is Cause.INTERRUPTED and result.left:
         return _INTERRUPTED
-    return 1 if result.left or result.failed else 0
+    return 1 if result.left or result.failed or result.unjudged else 0

@@ -222,7 +222,12 @@ class Record(Line):
     @property
     def is_answered(self) -> bool:
         """Whether the model answered, if only by refusing; a recording may have no reply."""
-        return self.error is None or self.error.kind == "refused"
+        return self.error is None or self.error.kind in ("refused", "unjudged")
+
+    @property
+    def is_judged(self) -> bool:
+        """Whether its reply was judged, where it has one."""
+        return self.error is None or self.error.kind != "unjudged"
 
     @property
     def is_final(self) -> bool:

@@ -47,13 +47,15 @@ class Stop:
 
 @dataclass
 class RunResult:
-    """How a run ended: how many of its samples have a final record, and how many of those are
-    requests that were rejected for good; `stopped` models and why.
+    """How a run ended: how many of its samples have a final record, how many of those are
+    requests that were rejected for good, and how many are replies that could not be judged;
+    `stopped` models and why.
     """
 
     samples: int
     settled: int = 0
     failed: int = 0
+    unjudged: int = 0
     stopped: dict[str, str] = field(default_factory=dict)
     stop: Stop | None = None
 
@@ -98,7 +100,9 @@ class Executor:
         self._watch = watch
         self._halt = halt
         self.result = RunResult(plan.samples_per_model * len(plan.models))
-        self.result.failed = sum(not summary.is_answered for summary in self.settled.values())
+        settled = self.settled.values()
+        self.result.failed = sum(not summary.is_answered for summary in settled)
+        self.result.unjudged = sum(not summary.is_judged for summary in settled)
         self._in_flight = 0
         self._failure: Exception | None = None
 
@@ -249,6 +253,7 @@ class Executor:
         await self._writer.put(record)
         self.result.settled += record.is_final
         self.result.failed += record.is_final and not record.is_answered
+        self.result.unjudged += not record.is_judged
         self._watch(SampleDone(record))
 
     def _stop_model(self, name: str, reason: str) -> None:

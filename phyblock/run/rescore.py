@@ -15,12 +15,13 @@ from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
 from phyblock.records.reading import read_records
 from phyblock.run.data import recorded_dataset
 from phyblock.run.folder import check_place, run_folder
-from phyblock.run.records import about_item, judged
+from phyblock.run.judging import judged_apart
+from phyblock.run.records import about_item
 from phyblock.run.reopen import reopen_tracks
 from phyblock.run.replayed import counted_again
 from phyblock.run.rewritten import write_run
 from phyblock.specs import SuiteSpec, suite_model
-from phyblock.tracks import AnyTrack, EpisodeTrack, judgement_of, kind_of, shown_item
+from phyblock.tracks import AnyTrack, EpisodeTrack, kind_of, shown_item
 from phyblock.tracks.counting import counts_samples
 from phyblock.variants import Variant
 from phyblock.words import Matcher, PlanParser
@@ -130,11 +131,12 @@ async def _judged_again(
             records.append(await counted_again(track, item, record, where, about))
             continue
         text = None if record.reply is None else record.reply.text
-        judgement = await judgement_of(track, item, text, record)
         given = {**record.as_given(), **(about or {})}
-        if record.error is not None and record.error.kind == "unjudged":
-            given["error"] = None
-        records.append(judged(given, item, judgement))
+        earlier: Record | None = record
+        if not record.is_judged:
+            # What it holds is of no plan that was carried out.
+            given["error"] = earlier = None
+        records.append(await judged_apart(track, item, text, given, earlier))
     return records
 
 

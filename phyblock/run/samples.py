@@ -8,10 +8,11 @@ from collections.abc import Awaitable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
-from phyblock.errors import BudgetReachedError, ModelError, SimulationError, UnavailableError
+from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
 from phyblock.models import Halt, Model, ModelConfig, Reply, Request, Usage
 from phyblock.models.stored import reply_of, stored
-from phyblock.records import Record, SentPrompt, StoredError, StoredReply, Turn
+from phyblock.records import Record, SentPrompt, StoredReply, Turn
+from phyblock.run.judging import judged_apart
 from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, begun, judged
 from phyblock.run.shielded import to_its_end
@@ -22,7 +23,6 @@ from phyblock.tracks import (
     EpisodeTrack,
     Item,
     SingleTrack,
-    judgement_of,
     shown_item,
 )
 from phyblock.variants import Variant
@@ -125,7 +125,7 @@ class SampleRunner:
         fields = self._begin(sample, answer) | _asked(config, request)
         fields["prompt"] = self._prompt(track, request)
         text = answer.text if isinstance(answer, Reply) else None
-        record, is_cancelled = await to_its_end(_judged(track, sample.item, text, fields))
+        record, is_cancelled = await to_its_end(judged_apart(track, sample.item, text, fields))
         task = asyncio.current_task()
         if is_cancelled and task is not None:
             # It ends at its next wait, which is that for its record.
@@ -199,20 +199,6 @@ class SampleRunner:
         if sample.variant.levels:
             fields["variant"] = dict(sample.variant.levels)
         return {**fields, "run": self._run, **sample.track.about(item)}
-
-
-async def _judged(
-    track: SingleTrack[Any], item: Item, text: str | None, fields: Mapping[str, Any]
-) -> Record:
-    """The record of a reply, also where no engine could carry it out: it can be scored again."""
-    try:
-        return judged(fields, item, await judgement_of(track, item, text))
-    except SimulationError as error:
-        if text is None:
-            raise
-        lacking = StoredError(kind="unjudged", message=str(error))
-        nothing = await judgement_of(track, item, None)
-        return judged({**fields, "error": lacking}, item, nothing)
 
 
 def _asked(config: ModelConfig, request: Request) -> dict[str, AskedAs]:

@@ -23,6 +23,7 @@ class Summary:
     outcome: str
     is_answered: bool
     is_final: bool
+    is_judged: bool
     counts: Counts | None
     cached: bool | None
     tokens: int
@@ -38,6 +39,7 @@ class Summary:
             record.outcome,
             record.is_answered,
             record.is_final,
+            record.is_judged,
             None if headline is None else Counts(headline.tp, headline.fp, headline.fn),
             None if reply is None else reply.cached,
             0 if reply is None else reply.tokens,

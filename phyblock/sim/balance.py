@@ -73,9 +73,14 @@ def surely_falls(blocks: Sequence[Block]) -> bool:
     return not any(_bears(forces, _weights(blocks, *case)) for case in _cases())
 
 
-def is_balanced(blocks: Sequence[Block], friction: float = FRICTION) -> bool:
-    """Whether contacts can bear all weights as they are."""
-    return _bears(_forces(blocks, friction), _weights(blocks, (0.0, 0.0), ()))
+def is_balanced(blocks: Sequence[Block], friction: float = FRICTION, margin_m: float = 0.0) -> bool:
+    """Whether contacts can bear all weights as they are, or, with a margin, all of them moved by so
+    much to each of four sides.
+    """
+    forces = _forces(blocks, friction)
+    sides = _SIDES[::2] if margin_m else _SIDES[:1]
+    shifts = ((margin_m * x, margin_m * y) for x, y in sides)
+    return all(_bears(forces, _weights(blocks, shift, ())) for shift in shifts)
 
 
 def _cases() -> Iterator[tuple[tuple[float, float], Masses]]:

@@ -8,6 +8,7 @@ what fell or was knocked over stays so for the steps that follow.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from types import TracebackType
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.scene import Block
+from phyblock.errors import SimulationError
 from phyblock.sim.convex import separating_axes
 from phyblock.sim.engine import PhysicsEngine
 from phyblock.sim.pose import Pose
@@ -31,9 +33,11 @@ from phyblock.sim.support import (
 from phyblock.sim.world import World
 from phyblock.words import StepEnd
 
-__all__ = ["Carried", "CarriedStep", "CarryLimits", "Carrying", "carry_out"]
+__all__ = ["LONGEST_S", "Carried", "CarriedStep", "CarryLimits", "Carrying", "carry_out"]
 
 _SETTLE_S, _COLLAPSE_S = 2.0, 3.0
+LONGEST_S = 600.0
+"""A plan that takes longer, by the clock, is given up: no result, whatever it did so far [s]."""
 _TRIES = 16
 _CM = 100.0
 _DIGITS = 3
@@ -92,12 +96,16 @@ def carry_out(
 
     Their orders are taken anew, from 1 by step. The same call gives the same result, whatever was
     carried out before; `engine` is the chosen one unless another is given. Raises SimulationError
-    where the engine cannot be used.
+    where the engine cannot be used, and for a plan that takes longer than `LONGEST_S`.
     """
+    give_up_s = time.monotonic() + LONGEST_S
     steps: list[CarriedStep] = []
     worlds: list[tuple[Block, ...]] = []
     with Carrying(limits, engine) as carrying:
-        for block in blocks:
+        for number, block in enumerate(blocks, 1):
+            if time.monotonic() > give_up_s:
+                told = f"carrying out a plan of {len(blocks)} steps took more than {LONGEST_S:g} s"
+                raise SimulationError(f"{told}; it was given up before step {number}")
             steps.append(carrying.step(block))
             worlds.append(carrying.blocks)
     return Carried(tuple(steps), tuple(worlds))

@@ -16,6 +16,7 @@ from phyblock.cli.main import phyblock
 from phyblock.errors import SimulationError
 from phyblock.run.rescore import rescore
 from phyblock.run.shielded import to_its_end
+from phyblock.sim import carry
 from phyblock.tracks.pose_planning.track import PosePlanning
 from phyblock.tracks.studio import Workshop
 from tests.run.killing import killed
@@ -59,12 +60,12 @@ def test_what_must_be_done_is_done_though_nobody_waits() -> None:
 
 
 def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(workspace.root)
     monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
     monkeypatch.setattr(sys, "argv", ["phyblock"])
-    workspace.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["top"]})
+    workspace.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["oblique"]})
     marks = workspace.root / "marks"
     marks.mkdir()
     whole = PosePlanning.judge_apart
@@ -82,7 +83,18 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
     assert lost["error"]["kind"] == "unjudged"
     assert lost["reply"]["text"].startswith("Step1")
     assert [record["outcome"] for record in others] == ["ok"]
+    told = capsys.readouterr().out
+    assert "1 answer could not be judged: phyblock score out tries again, without a call" in told
+    assert "rejected" not in told
+    # A plan that takes too long is given up, in a worker or without one, and says so.
     monkeypatch.setattr(PosePlanning, "judge_apart", whole)
+    monkeypatch.setattr(carry, "LONGEST_S", -1.0)
+    kept = workspace.records(rescore(workspace.out, None, None, workspace.root / "slow"))
+    given_up = next(record for record in kept if record["sample"] == lost["sample"])
+    assert given_up["error"]["kind"] == "unjudged"
+    assert "took more than -1 s; it was given up before step 1" in given_up["error"]["message"]
+    assert given_up["reply"] == lost["reply"]
+    monkeypatch.undo()
     again = workspace.records(rescore(workspace.out, None, None, workspace.root / "again"))
     assert {record["outcome"] for record in again} == {"ok"}
     assert all(record["pose"]["completed"] and record["error"] is None for record in again)
@@ -94,7 +106,7 @@ def test_a_reply_that_is_being_judged_at_a_second_interrupt_is_recorded(
     monkeypatch.chdir(workspace.root)
     monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
     monkeypatch.setattr(sys, "argv", ["phyblock"])
-    workspace.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["top"]})
+    workspace.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["oblique"]})
 
     async def slow(track: PosePlanning, item: Any, text: str | None, _: Any) -> Any:
         for _ in range(2):

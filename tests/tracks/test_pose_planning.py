@@ -17,6 +17,7 @@ from PIL import Image
 from phyblock.cli.main import phyblock
 from phyblock.datasets import AssemblyTask, read_builtin
 from phyblock.domain import Block, Candidate, CandidateSet, PoseStep
+from phyblock.errors import InputError
 from phyblock.models.base import Image as SentPicture
 from phyblock.parsing import POSE_READER_VERSION, pose_form
 from phyblock.records.known import known_records
@@ -31,7 +32,7 @@ from phyblock.sim.pose import Pose
 from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
 from phyblock.tracks.pose_planning import judging
 from phyblock.tracks.pose_planning.baselines import POSE_RULES, PoseSubject, written
-from phyblock.tracks.pose_planning.film import pose_film
+from phyblock.tracks.pose_planning.film import pose_film, pose_table
 from phyblock.tracks.pose_planning.judging import PoseRules
 from phyblock.tracks.pose_planning.record import PoseRecord, kept_rests
 from phyblock.tracks.pose_planning.resting import worlds_of
@@ -136,6 +137,10 @@ def test_a_reply_is_read_scored_and_carried_out(
     fields = begun("s", track.name, "m", task, 0, None)
     record = judged({**fields, **track.about(task)}, task, found)
     assert known_records().validate_json(record.as_json()) == record
+    assert isinstance(record, PoseRecord)
+    notes = " ".join(pose_table(record).notes)
+    assert ("There is no plan" in notes) == (not ends)
+    assert ("(no_plan)" in notes) == (text == "I cannot say.")
     again = asyncio.run(track.judge_apart(task, text, record))
     assert judged({**fields, **track.about(task)}, task, again) == record
 
@@ -238,7 +243,7 @@ def prepared(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> list[str]
     monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
     monkeypatch.setattr(sys, "argv", ["phyblock"])
     models = ["builder", "oracle"]
-    workspace.write_suite(tracks=["pose_planning"], models=models, pose={"views": ["top"]})
+    workspace.write_suite(tracks=["pose_planning"], models=models, pose={"views": ["oblique"]})
     return ["run", "suite.yaml", "--out", "out", "--no-report"]
 
 
@@ -321,6 +326,32 @@ def test_a_suite_says_how_poses_are_asked_for_and_what_is_wrong_with_it() -> Non
     ):
         with pytest.raises(ValueError, match="validation error"):
             PoseSpec.model_validate(wrong)
+
+
+@pytest.mark.parametrize(
+    ("views", "told"),
+    [
+        (["abov"], ["is not one of the choices"]),
+        ([{"azimuth": 30, "elevation_deg": 50}], ["is missing", "is not a known key"]),
+        ([{"azimuth_deg": 30, "elevation_deg": 0}], ["is out of range"]),
+        (["top"], ["the sheet of blocks is seen from the first view, and blocks look alike"]),
+        (["front", "oblique"], ["hint: put oblique first: views: [oblique, front]"]),
+        ([{"azimuth_deg": 95, "elevation_deg": 30}], ["look alike from there"]),
+        ([{"azimuth_deg": 55, "elevation_deg": 30}, "top"], []),
+    ],
+)
+def test_a_view_that_is_none_or_cannot_carry_the_sheet_is_said(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, views: list[Any], told: list[str]
+) -> None:
+    monkeypatch.chdir(workspace.root)
+    workspace.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": views})
+    problems: list[str] = []
+    try:
+        phyblock.main(["validate", "suite.yaml"], standalone_mode=False)
+    except InputError as error:
+        problems = [str(problem) for problem in error.problems]
+    assert len(problems) == len(told), problems
+    assert all(one in problem for one, problem in zip(told, problems, strict=True))
 
 
 def test_the_prompt_says_every_view_and_what_a_place_means() -> None:

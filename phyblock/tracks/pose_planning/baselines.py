@@ -10,6 +10,7 @@ import numpy as np
 from phyblock.domain import Block, CandidateSet, PoseStep, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.sim.placing import box_height_cm, center_cm
+from phyblock.tracks.pose_planning.buildable import buildable_order
 
 __all__ = ["POSE_FLOORS", "POSE_RULES", "PoseSubject"]
 
@@ -50,12 +51,13 @@ def _built(
 ) -> str:
     """The goal's blocks in a random valid order, each moved from its true place.
 
-    Layer by layer: a balance of which one arm is loaded to its top before the other topples, though
-    the order is a valid one.
+    Layer by layer where that is in balance, else as near to it as is: a balance of which one arm is
+    loaded to its top before the other topples, though the order is a valid one.
     """
     blocks, layers = subject.scene.blocks, subject.scene.graph.layers
     drawn = rng.random(len(blocks)).tolist()
-    order = sorted(range(len(blocks)), key=lambda vertex: (layers[vertex], drawn[vertex]))
+    wanted = sorted(range(len(blocks)), key=lambda vertex: (layers[vertex], drawn[vertex]))
+    order = buildable_order(subject.scene, wanted)
     return written(_step(subject, blocks[v], move(blocks[v], center_cm(blocks[v]))) for v in order)
 
 

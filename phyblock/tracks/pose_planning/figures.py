@@ -108,20 +108,27 @@ def f1_by_tolerance(run: Run) -> Figure | None:
 
 
 def pose_error_bars(run: Run) -> Figure | None:
-    """Shares of the errors in all steps of each model; None without a wrong step."""
+    """Shares of the errors in all steps of each model, of which one may have none; None without a
+    wrong step.
+    """
     table = pose_errors_frame(run)
     if not len(table) or not (table["value"] > 0).any():
         return None
-    shares = table.pivot(index="model", columns="error", values="value").dropna()
+    shares = table.pivot(index="model", columns="error", values="value")
     ranks = table_c_frame(run).set_index("model")["f1_c"]
-    models = [model for model in ranks.sort_values(ascending=False).index if model in shares.index]
+    models = list(ranks.sort_values(ascending=False, kind="stable").index)
     figure = new_figure(1.05 + 0.2 * len(models), names_width_in(models) + 1.0)
     ax = figure.subplots()
     parts = (
-        Part(ERROR_NAMES[error], shares.loc[models, error].to_numpy(float), *_LOOKS[error])
+        Part(
+            ERROR_NAMES[error], shares.loc[models, error].fillna(0).to_numpy(float), *_LOOKS[error]
+        )
         for error in POSE_ERRORS
     )
     stack(ax, models, parts, 0.7, _LEAST_LABEL)
+    for place, model in enumerate(models):
+        if shares.loc[model].isna().all():
+            ax.text(1, place, "no steps", va="center", fontsize=7, color=INK)
     ax.set(xlim=(0, 100), xlabel="Share of steps (%)", ylim=(len(models) - 0.4, -0.6))
     bare_axes([ax])
     legend_below(figure, *ax.get_legend_handles_labels())

@@ -50,6 +50,7 @@ def pose_table(record: PoseRecord) -> TextTable:
         f"{record.sample}: {_came_to(record, record.pose)}",
         tuple(Column(name, is_text=name in text) for name in columns),
         rows,
+        () if given else (_no_plan(record),),
     )
 
 
@@ -77,11 +78,8 @@ def pose_film(record: PoseRecord, task: AssemblyTask) -> Iterator[FilmStep]:
         tolerances = pose.limits
         limits = CarryLimits(tolerances.overlap_cm, tolerances.stand_cm, tolerances.stand_deg)
         worlds = carry_out(blocks, limits).worlds
-        by = (
-            ""
-            if pose.engine == told_engine()
-            else f" (shown in {told_engine()}, not {pose.engine})"
-        )
+        if pose.engine != (engine := told_engine()):
+            by = f" (shown in {engine}, not {pose.engine})"
     for n, (one, step, world) in enumerate(zip(given, pose.steps, worlds, strict=True), 1):
         tone: Tone = "good" if step.end == "stands" else "bad"
         yield FilmStep(f"{n}. block {one.block}: {_ended(step)}", tone, one.block, world)
@@ -97,6 +95,16 @@ def _kept_worlds(
     if len(kept) < len(steps):
         return None
     return worlds_of(blocks, [step.end not in REFUSED_ENDS for step in steps], kept)
+
+
+def _no_plan(record: PoseRecord) -> str:
+    """Why there is not one step."""
+    why = "there is no reply"
+    if record.error is not None:
+        why = record.error.message
+    elif record.parse is not None and record.parse.problem is not None:
+        why = f"nothing could be read out of the reply ({record.parse.problem})"
+    return f"There is no plan: {why}."
 
 
 def _ended(step: StepOutcome) -> str:

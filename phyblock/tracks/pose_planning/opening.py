@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from phyblock.errors import Problem, SpecError
 from phyblock.sim.carry import CarryLimits
-from phyblock.specs import SuiteSpec
+from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tracks.kind import Opening
 from phyblock.tracks.opening import picture_folder, picture_style, task_showing, template_prompt
 from phyblock.tracks.pose_planning.judging import PoseRules
-from phyblock.tracks.pose_planning.pictures import PosePictures
+from phyblock.tracks.pose_planning.pictures import PosePictures, shows_three_sides
 from phyblock.tracks.pose_planning.spec import PoseSpec
 from phyblock.tracks.pose_planning.track import PosePlanning
 from phyblock.tracks.selection import select_tasks
@@ -30,10 +30,29 @@ def open_pose_planning(opening: Opening) -> PosePlanning:
         message = "the floor is ruled in pictures that are drawn here"
         hint = "render the pictures: --set images.source=render"
         raise SpecError(Problem(where, message, "images.source", "dataset", hint=hint))
+    _check_sheet(loaded, poses)
     style = picture_style(suite.images)
     pictures = PosePictures(picture_folder(), style, poses.views, opening.shop)
     prompt = template_prompt(loaded, PosePlanning.name)
     return PosePlanning(rules, prompt, pictures, tasks, showing)
+
+
+def _check_sheet(loaded: LoadedSuite, poses: PoseSpec) -> None:
+    """Raise SpecError for a first view from which blocks of the sheet cannot be told apart."""
+    first = poses.views[0]
+    if shows_three_sides(first):
+        return
+    name = first if isinstance(first, str) else "a view along an axis, or too steep or too flat"
+    problem = Problem(
+        loaded.where("pose", "views"),
+        "the sheet of blocks is seen from the first view, and blocks look alike from there",
+        "pose.views[0]",
+        name,
+        "first oblique, or an azimuth 10 degrees off the axes and an elevation of 10 to 75; others "
+        "after it",
+        hint=f"put oblique first: views: [oblique, {name}]" if isinstance(first, str) else "",
+    )
+    raise SpecError(problem)
 
 
 def _rules(suite: SuiteSpec, poses: PoseSpec) -> PoseRules:

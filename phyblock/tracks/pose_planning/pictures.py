@@ -17,9 +17,10 @@ from phyblock.tracks.showing import ShownTask
 from phyblock.tracks.studio import Drawing, Studio, Workshop
 from phyblock.words import View
 
-__all__ = ["KIT_LABEL", "PosePictures"]
+__all__ = ["KIT_LABEL", "PosePictures", "shows_three_sides"]
 
 KIT_LABEL = "blocks"
+_LEAST_TURN_DEG, _LEAST_DEG, _MOST_DEG = 10.0, 10.0, 75.0
 
 
 class PosePictures(Studio):
@@ -33,7 +34,8 @@ class PosePictures(Studio):
         shop: Workshop | int,
     ) -> None:
         super().__init__(folder, shop)
-        self._style = style
+        # The prompt says that the sheet has one scale, whatever other pictures of candidates have.
+        self._style = replace(style, candidate_scale="common")
         self._views = views
 
     async def of(self, task: AssemblyTask) -> tuple[Image, ...]:
@@ -67,13 +69,25 @@ class PosePictures(Studio):
         return Drawing(f"goal, {name}", ruled_key(task.scene, style), make)
 
 
+def shows_three_sides(view: View | ViewSpec) -> bool:
+    """Whether a block that is seen so shows its top and two sides, as the sheet of blocks needs."""
+    azimuth_deg, elevation_deg = _direction(view)
+    off_axis_deg = abs((azimuth_deg + 45) % 90 - 45)
+    return off_axis_deg >= _LEAST_TURN_DEG and _LEAST_DEG <= elevation_deg <= _MOST_DEG
+
+
+def _direction(view: View | ViewSpec) -> tuple[float, float]:
+    if isinstance(view, ViewSpec):
+        return view.azimuth_deg, view.elevation_deg
+    return VIEWS[view]
+
+
 def _seen(style: PictureStyle, view: View | ViewSpec) -> tuple[str, PictureStyle]:
     """A view as words for people, and the style that looks from there."""
-    if isinstance(view, ViewSpec):
-        azimuth_deg, elevation_deg = view.azimuth_deg, view.elevation_deg
-        name = f"azimuth {azimuth_deg:g}°, elevation {elevation_deg:g}°"
-    else:
-        (azimuth_deg, elevation_deg), name = VIEWS[view], view
+    azimuth_deg, elevation_deg = _direction(view)
+    name = f"azimuth {azimuth_deg:g}°, elevation {elevation_deg:g}°"
+    if not isinstance(view, ViewSpec):
+        name = view
     return name, replace(style, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
 
 

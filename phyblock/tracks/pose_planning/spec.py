@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, get_args
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Discriminator, Field, Tag
 
 from phyblock.sim.carry import CarryLimits
 from phyblock.specs.fields import PictureControls, Section, TemplateName, UniqueSome, refuse
@@ -27,6 +28,16 @@ class ViewSpec(Section):
     )
 
 
+def _kind(view: object) -> str:
+    """What a view is meant as, so that it is said to be wrong as that alone."""
+    return "direction" if isinstance(view, Mapping | ViewSpec) else "name"
+
+
+AnyView = Annotated[
+    Annotated[View, Tag("name")] | Annotated[ViewSpec, Tag("direction")], Discriminator(_kind)
+]
+
+
 def _check_few(views: tuple[View | ViewSpec, ...]) -> tuple[View | ViewSpec, ...]:
     if len(views) <= MOST_VIEWS:
         return views
@@ -47,7 +58,7 @@ class PoseSpec(PictureControls):
         "rotation as well.",
     )
     views: Annotated[
-        UniqueSome[View | ViewSpec],
+        UniqueSome[AnyView],
         AfterValidator(_check_few),
         Field(max_length=MOST_VIEWS),
     ] = Field(
