@@ -15,7 +15,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.models.base import Image, Message
 from phyblock.specs import LoadedSuite, did_you_mean
 
-__all__ = ["Examples", "Shots", "WorkedExample", "examples_of"]
+__all__ = ["Examples", "Shots", "WorkedExample", "Working", "examples_of"]
 
 
 class _Asked(Protocol):
@@ -47,6 +47,17 @@ class WorkedExample:
             for part in self.question.parts
         )
         return Message("user", parts), Message("assistant", (self.answer,))
+
+
+@dataclass(frozen=True)
+class Working(Generic[AskedT]):
+    """How a track works an example: its pictures as they are sent, or as far as they are at hand
+    and whether all are, and the example that they are part of.
+    """
+
+    pictures: Callable[[AskedT], Awaitable[tuple[Image, ...]]]
+    outline: Callable[[AskedT], tuple[tuple[Image, ...], bool]]
+    example: Callable[[AskedT, tuple[Image, ...]], WorkedExample]
 
 
 @dataclass(frozen=True)
@@ -97,15 +108,24 @@ class Examples(Generic[AskedT]):
         """The examples of an item, fewer than `n` where there are no more."""
         return tuple(islice(self._others(item), self.n))
 
-    async def shots(
-        self, item: AskedT, show: Callable[[AskedT], Awaitable[WorkedExample]]
-    ) -> Shots:
-        """The examples of an item, each made once by `show`."""
+    async def shots(self, item: AskedT, work: Working[AskedT]) -> Shots:
+        """The examples of an item, each worked once."""
         chosen = self.of(item)
         for one in chosen:
             if one.key not in self._shown:
-                self._shown[one.key] = await show(one)
+                self._shown[one.key] = work.example(one, await work.pictures(one))
         return Shots(tuple(self._shown[one.key] for one in chosen))
+
+    def outlined(self, item: AskedT, work: Working[AskedT]) -> tuple[Shots, bool]:
+        """The examples of an item made without rendering, and whether all pictures are the real
+        ones.
+        """
+        examples, are_real = [], True
+        for one in self.of(item):
+            pictures, is_real = work.outline(one)
+            examples.append(work.example(one, pictures))
+            are_real = are_real and is_real
+        return Shots(tuple(examples)), are_real
 
     def used(self, items: Iterable[AskedT]) -> tuple[AskedT, ...]:
         """All that are examples of any of the items, by key."""

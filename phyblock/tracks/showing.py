@@ -93,6 +93,11 @@ class TaskShowing:
             goal = self._elsewhere.of(task, seed)
         return replace(in_order(task, numbers, goal), seed=seed)
 
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """The seeds of the suite, of those that show the same only the first."""
+        return self.how.seeds[:1] if self.how.is_plain else self.how.seeds
+
     def stand_ins(self, task: AssemblyTask) -> tuple[AssemblyTask, ...]:
         """The tasks whose goals are shown in the place of its own."""
         if self._elsewhere is None or self.how.blind:
@@ -101,8 +106,7 @@ class TaskShowing:
 
     def each(self, tasks: Sequence[AssemblyTask]) -> list[AssemblyTask]:
         """The tasks in every form in which the suite shows them."""
-        seeds = self.how.seeds[:1] if self.how.is_plain else self.how.seeds
-        return [self.of(task, seed) for seed in seeds for task in tasks]
+        return [self.of(task, seed) for seed in self.seeds for task in tasks]
 
 
 def in_order(

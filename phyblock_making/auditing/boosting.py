@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.tracks.full_planning.goal_blind import MOST_COPIES
-from phyblock.tracks.full_planning.lessons import Lesson
+from phyblock.tracks.goal_blind.learning import MOST_COPIES
+from phyblock.tracks.goal_blind.lessons import Lesson
 
 __all__ = ["boosted", "can_boost"]
 

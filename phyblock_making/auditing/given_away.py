@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
-from phyblock.tracks.full_planning.goal_blind import FREQUENCIES
+from phyblock.tracks.goal_blind.learning import FREQUENCIES
 from phyblock_making.auditing.tells import Blind, Part, Tells, blind_scores, find_tells
 
 __all__ = ["MOST_SCENES", "given_away_text"]

@@ -12,7 +12,7 @@ from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.plan import Plan
 from phyblock.domain.scene import Scene
 from phyblock.scoring import Goal, match_plan, micro
-from phyblock.tracks.full_planning.goal_blind import (
+from phyblock.tracks.goal_blind.learning import (
     CONSTANT,
     FREQUENCIES,
     Learner,

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from phyblock.domain import COLORS, KIT_PALETTE, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring import Goal, match_plan, micro
-from phyblock.tracks.full_planning.goal_blind import CONSTANT, FREQUENCIES, goal_blind_plans
-from phyblock.tracks.full_planning.lessons import lessons, related
-from phyblock.tracks.full_planning.offered import units
+from phyblock.tracks.goal_blind.learning import CONSTANT, FREQUENCIES, goal_blind_plans
+from phyblock.tracks.goal_blind.lessons import lessons, related
+from phyblock.tracks.goal_blind.offered import units
 from phyblock.words import Setting
 
 KIT = tuple(Candidate(*kind, (0.0, 0.0, 0.0)) for kind in KIT_PALETTE)

@@ -10,9 +10,9 @@ from click.testing import CliRunner
 
 from phyblock.cli.cache import command
 from phyblock.domain import CandidateSet, Plan, Scene
-from phyblock.tracks.full_planning import kept_plans as module
-from phyblock.tracks.full_planning.goal_blind import goal_blind_plans
-from phyblock.tracks.full_planning.kept_plans import kept_plans
+from phyblock.tracks.goal_blind import kept_plans as module
+from phyblock.tracks.goal_blind.kept_plans import kept_plans
+from phyblock.tracks.goal_blind.learning import goal_blind_plans
 from tests.tracks.test_goal_blind import KIT, scene
 
 SETS = {name: CandidateSet(KIT[at : at + 6]) for at, name in enumerate(("s0", "s1", "s2"))}

@@ -17,8 +17,8 @@ from phyblock.errors import DataError, SpecError
 from phyblock.models.base import Image, Reply, Usage
 from phyblock.sim import PictureStyle, candidates_png, goal_png
 from phyblock.tracks import PicturePolicy, Pictures
-from phyblock.tracks.full_planning.goal_blind import goal_blind_plans
 from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
+from phyblock.tracks.goal_blind.learning import goal_blind_plans
 from phyblock.tracks.showing import (
     Showing,
     ShownTask,

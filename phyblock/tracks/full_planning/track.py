@@ -21,10 +21,10 @@ from phyblock.parsing import (
     reader_version,
 )
 from phyblock.scoring import AssemblyScorer, Score
-from phyblock.tracks.examples import Examples, Shots, WorkedExample
+from phyblock.tracks.examples import Examples, Shots, WorkedExample, Working
 from phyblock.tracks.full_planning.baselines import PlanSubject
-from phyblock.tracks.full_planning.guessing import BlindGuesses
 from phyblock.tracks.full_planning.worked import worked_plan
+from phyblock.tracks.goal_blind.guessing import BlindGuesses
 from phyblock.tracks.pictures import Pictures
 from phyblock.tracks.plans import score_fields
 from phyblock.tracks.prompts import Prompt, form_facts, response_format
@@ -150,8 +150,7 @@ class FullPlanning:
         """The request of one sample; without messages for models that need none."""
         if not with_messages or self._prompt is None or self._pictures is None:
             return Request(item.key, seed, (), params, "", self._subject(item))
-        show = partial(self._worked, self._prompt, self._pictures)
-        shots = await self._examples.shots(item, show)
+        shots = await self._examples.shots(item, self._working(self._prompt, self._pictures))
         pictures = await self._pictures.of(item)
         return self._request(item, seed, params, self._prompt, pictures, shots)
 
@@ -161,17 +160,12 @@ class FullPlanning:
             yield Request(item.key, 0, (), {}, "", self._subject(item)), True
             return
         pictures, real = self._pictures.outline(item)
-        examples = []
-        for task in self._examples.of(item):
-            seen, is_real = self._pictures.outline(task)
-            examples.append(self._example(self._prompt, task, seen))
-            real = real and is_real
-        yield self._request(item, 0, {}, self._prompt, pictures, Shots(tuple(examples))), real
+        work = self._working(self._prompt, self._pictures)
+        shots, are_real = self._examples.outlined(item, work)
+        yield self._request(item, 0, {}, self._prompt, pictures, shots), real and are_real
 
-    async def _worked(
-        self, prompt: Prompt, pictures: Pictures, task: AssemblyTask
-    ) -> WorkedExample:
-        return self._example(prompt, task, await pictures.of(task))
+    def _working(self, prompt: Prompt, pictures: Pictures) -> Working[AssemblyTask]:
+        return Working(pictures.of, pictures.outline, partial(self._example, prompt))
 
     def _example(
         self, prompt: Prompt, task: AssemblyTask, pictures: tuple[Image, ...]

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from phyblock.domain import Block, Scene
 from phyblock.sim.balance import MARGIN_M, is_balanced
+from phyblock.sim.site import settle
 from phyblock.sim.steps import groups
 
 __all__ = ["buildable_order"]
@@ -18,9 +19,9 @@ def buildable_order(scene: Scene, wanted: Sequence[int]) -> list[int]:
     """The vertices of a scene in a valid order, as near to the `wanted` one, which is valid too, as
     balance lets it be.
 
-    Each step takes the first block of which what stands is in balance with every weight off by
-    `MARGIN_M`, else the first of which it is in balance at all; where there is none, an earlier
-    step is taken back. The wanted order where no other is found.
+    Each step takes the first block with which what stands is in balance with every weight off by
+    `MARGIN_M`, else the first with which it is in balance at all and stands in the physics engine;
+    where there is none, an earlier step is taken back. The wanted order where no other is found.
     """
     return _Search(scene, wanted).found() or list(wanted)
 
@@ -57,7 +58,8 @@ class _Search:
                 yield vertex
             elif is_balanced(touched):
                 doubtful.append(vertex)
-        yield from doubtful
+        # So near to an edge engines differ, and a structure may stand while its mirror image falls.
+        yield from (v for v in doubtful if settle(self._touched((*order, v))).stands)
 
     def _touched(self, order: tuple[int, ...]) -> tuple[Block, ...]:
         """The blocks that hang together with the last one."""

@@ -81,24 +81,16 @@ class PosePlanning:
         """Name and version of the prompt, a digest of all that decides the pictures, the
         version of the reader, and the physics engine where it is another one than PyBullet.
         """
-        engine = physics_engine()
-        other = {} if engine.name == REFERENCE_ENGINE else {"engine": engine.name}
-        told: dict[str, Any] = {READER: POSE_READER_VERSION}
-        if other:
-            told[ENGINE] = {**other, **engine.versions}
+        return {**self._asked_as(), READER: POSE_READER_VERSION, **_other_engine()}
+
+    def _asked_as(self) -> dict[str, Any]:
         if self._prompt is None or self._pictures is None:
-            return {"prompt": None, "pictures": None, **told}
-        seeds = self._showing.how.seeds[:1] if self._showing.how.is_plain else None
-        shown = [
-            self.shown(task, seed)
-            for seed in seeds or self._showing.how.seeds
-            for task in self.items
-        ]
+            return {"prompt": None, "pictures": None}
+        shown = [self.shown(task, seed) for seed in self._showing.seeds for task in self.items]
         keys = [self._pictures.keys(task) for task in shown]
         return {
             "prompt": {"name": self._prompt.name, "version": self._prompt.version},
             "pictures": hashlib.sha256(json.dumps(keys).encode()).hexdigest(),
-            **told,
         }
 
     async def request(
@@ -170,6 +162,14 @@ class PosePlanning:
         """Stop the worker processes."""
         if self._pictures is not None:
             self._pictures.close()
+
+
+def _other_engine() -> dict[str, Any]:
+    """The physics engine with its versions, where it is not the engine of reference."""
+    engine = physics_engine()
+    if engine.name == REFERENCE_ENGINE:
+        return {}
+    return {ENGINE: {"engine": engine.name, **engine.versions}}
 
 
 def _earlier(record: Record | None) -> Earlier | None:

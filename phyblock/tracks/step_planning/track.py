@@ -25,7 +25,7 @@ from phyblock.sim.registry import REFERENCE_ENGINE, physics_engine, told_engine
 from phyblock.sim.site import ONE_SETTING, Settled, settle, state_picture
 from phyblock.sim.stability import DEFAULT_TRIAL
 from phyblock.tracks.base import ENGINE
-from phyblock.tracks.full_planning.guessing import BlindGuesses
+from phyblock.tracks.goal_blind.guessing import BlindGuesses
 from phyblock.tracks.pictures import Pictures
 from phyblock.tracks.prompts import response_format
 from phyblock.tracks.showing import Showing, TaskShowing, told_of

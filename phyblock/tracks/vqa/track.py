@@ -17,7 +17,7 @@ from phyblock.models.base import Image, Request
 from phyblock.models.guesses import Guesses
 from phyblock.parsing import ParsedAnswer
 from phyblock.tracks.elsewhere import Elsewhere
-from phyblock.tracks.examples import Examples, Shots, WorkedExample
+from phyblock.tracks.examples import Examples, Shots, WorkedExample, Working
 from phyblock.tracks.prompts import Prompt, form_facts, response_format
 from phyblock.tracks.vqa.baselines import ChoiceSubject
 from phyblock.tracks.vqa.pictures import QuestionPictures, ShownQuestion
@@ -159,8 +159,8 @@ class Vqa:
         """The request of one sample; without messages for models that need none."""
         if not with_messages or self._prompt is None or self._pictures is None:
             return Request(item.key, seed, (), params, "", self._about(item))
-        show = partial(self._worked, self._prompt, self._pictures)
-        shots = await self._examples.shots(self._tasks[item.question.id], show)
+        work = self._working(self._prompt, self._pictures)
+        shots = await self._examples.shots(self._tasks[item.question.id], work)
         pictures: tuple[Image, ...] = ()
         if not self.rules.blind:
             pictures = await self._pictures.of(self._seen(item, seed))
@@ -172,30 +172,28 @@ class Vqa:
             yield Request(item.key, 0, (), {}, "", self._about(item)), True
             return
         pictures, are_real = self._outline(self._pictures, self._seen(item, 0))
-        examples = []
-        for task in self._examples.of(self._tasks[item.question.id]):
-            example = asked(task)
-            seen, is_real = self._outline(self._pictures, example.shown)
-            examples.append(self._example(self._prompt, example, seen))
-            are_real = are_real and is_real
-        shots = Shots(tuple(examples))
-        yield self._request(item, 0, {}, self._prompt, pictures, shots), are_real
+        work = self._working(self._prompt, self._pictures)
+        shots, is_real = self._examples.outlined(self._tasks[item.question.id], work)
+        yield self._request(item, 0, {}, self._prompt, pictures, shots), are_real and is_real
 
     def _outline(
         self, pictures: QuestionPictures, shown: ShownQuestion
     ) -> tuple[tuple[Image, ...], bool]:
         return ((), True) if self.rules.blind else pictures.outline(shown)
 
-    async def _worked(
-        self, prompt: Prompt, pictures: QuestionPictures, task: QuestionTask
-    ) -> WorkedExample:
-        example = asked(task)
-        seen = () if self.rules.blind else await pictures.of(example.shown)
-        return self._example(prompt, example, seen)
+    def _working(self, prompt: Prompt, pictures: QuestionPictures) -> Working[QuestionTask]:
+        async def of(task: QuestionTask) -> tuple[Image, ...]:
+            return () if self.rules.blind else await pictures.of(asked(task).shown)
+
+        def outline(task: QuestionTask) -> tuple[tuple[Image, ...], bool]:
+            return self._outline(pictures, asked(task).shown)
+
+        return Working(of, outline, partial(self._example, prompt))
 
     def _example(
-        self, prompt: Prompt, item: AskedQuestion, pictures: tuple[Image, ...]
+        self, prompt: Prompt, task: QuestionTask, pictures: tuple[Image, ...]
     ) -> WorkedExample:
+        item = asked(task)
         *_, question = prompt.messages(pictures, self.facts(item, pictures))
         return WorkedExample(item.key, question, self.rules.right_answer(item.question))
 

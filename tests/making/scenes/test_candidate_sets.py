@@ -15,7 +15,7 @@ from phyblock.datasets import read_builtin
 from phyblock.domain import KIT_PALETTE, MAX_CANDIDATES, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.errors import DataError
 from phyblock.scoring import Goal, match_plan, micro
-from phyblock.tracks.full_planning.goal_blind import CONSTANT, FREQUENCIES, goal_blind_plans
+from phyblock.tracks.goal_blind.learning import CONSTANT, FREQUENCIES, goal_blind_plans
 from phyblock.words import SETTINGS, Setting
 from phyblock_making.auditing.boosting import boosted
 from phyblock_making.auditing.tells import Part, find_tells

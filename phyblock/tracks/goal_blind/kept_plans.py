@@ -18,13 +18,13 @@ from phyblock.bounded import load_json, read_bytes
 from phyblock.domain import CandidateSet, Plan, Scene
 from phyblock.files import atomic_write
 from phyblock.resources import learned_dir
-from phyblock.tracks.full_planning.goal_blind import goal_blind_plans
+from phyblock.tracks.goal_blind.learning import goal_blind_plans
 from phyblock.words import Setting
 
 __all__ = ["kept_plans"]
 
 _PACKAGE = Path(__file__).parents[2]
-_DECIDE = ("domain", "scoring", "tracks/full_planning")
+_DECIDE = ("domain", "scoring", "tracks/goal_blind")
 """Packages whose code decides the plans."""
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from phyblock.domain import CandidateSet, Scene
 from phyblock.scoring import Goal
-from phyblock.tracks.full_planning.offered import Unit, units
+from phyblock.tracks.goal_blind.offered import Unit, units
 from phyblock.words import Setting
 
 __all__ = ["Lesson", "left_out", "lessons", "related"]

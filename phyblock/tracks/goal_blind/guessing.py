@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
-from phyblock.tracks.full_planning.kept_plans import kept_plans
+from phyblock.tracks.goal_blind.kept_plans import kept_plans
 from phyblock.tracks.showing import Showing, ShownTask, TaskShowing
 from phyblock.words import CandidateOrder, Setting
 

@@ -1,0 +1,1 @@
+"""Plans that are learned without the goal, which the tracks about scenes share."""
