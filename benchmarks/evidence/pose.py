@@ -7,8 +7,9 @@
 Every scene of a data set (a bundled name, a folder, or an official checkout) is answered by each
 baseline in so many valid orders, and judged as a run judges it. A row says how many plans and
 steps there were, how many of the steps stand and in how many plans all do, the least and the mean
-IoU of what stands in the end with the goal, F1 in C at every tolerance and aligned, and how long
-it took. `--list` names the plans of the oracle in which a step did not stand.
+IoU of what stands in the end with the goal, F1 in C at every tolerance and aligned, how long it
+took, and the most memory that a process had after a tenth of the plans and in the end. `--list`
+names the plans of the oracle in which a step did not stand.
 
 With `--engines` the same plans are carried out in every engine that is installed, and a row says
 how many steps end alike in both, each plan carried out from its beginning in each; `--list` names
@@ -19,6 +20,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import resource
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -59,6 +61,7 @@ class Verdict:
     iou: float
     right: tuple[int, ...]
     aligned: tuple[int, ...]
+    peak_mb: float
 
 
 def judged(plan: Plan, engine: str | None = None) -> Verdict:
@@ -73,7 +76,9 @@ def judged(plan: Plan, engine: str | None = None) -> Verdict:
     found: PoseJudgement = track.judge(item, text)
     absolute, aligned = found.poses
     ends = tuple(step.end for step in found.ended.steps)
-    return Verdict(item.key, len(item.scene), ends, found.ended.iou, absolute.right, aligned.right)
+    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    iou, n_blocks = found.ended.iou, len(item.scene)
+    return Verdict(item.key, n_blocks, ends, iou, absolute.right, aligned.right, peak_mb)
 
 
 def f1(verdicts: Sequence[Verdict], place: int, *, aligned: bool = False) -> float:
@@ -94,7 +99,11 @@ def row(verdicts: Sequence[Verdict], seconds: float) -> Iterator[str]:
     yield f"{sum(iou < 0.98 for iou in ious)} plans\n"
     curve = ", ".join(f"{f1(verdicts, place):.1f}" for place in range(4))
     moved = np.mean([f1(verdicts, place, aligned=True) for place in range(4)])
-    yield f"  F1 at 0.5, 1, 2, 4 cm: {curve}; aligned, mean: {moved:.1f}"
+    yield f"  F1 at 0.5, 1, 2, 4 cm: {curve}; aligned, mean: {moved:.1f}\n"
+    peaks = [verdict.peak_mb for verdict in verdicts]
+    first = max(peaks[: max(1, len(peaks) // 10)])
+    yield f"  most memory of a process: {first:.0f} MB after a tenth of the plans, "
+    yield f"{max(peaks):.0f} MB in the end"
 
 
 def agreement(plans: Sequence[Plan], processes: int, is_list: bool) -> None:

@@ -13,6 +13,8 @@ from phyblock.sim.steps import groups
 __all__ = ["buildable_order"]
 
 _MOST_TRIED = 200
+_MOST_SETTLED = 16
+"""States that the physics engine is asked about, each of which may take a second."""
 
 
 def buildable_order(scene: Scene, wanted: Sequence[int]) -> list[int]:
@@ -31,7 +33,7 @@ class _Search:
         self._blocks, self._needs = scene.blocks, scene.graph.depends_on
         self._wanted = wanted
         self._dead: set[frozenset[int]] = set()
-        self._left = _MOST_TRIED
+        self._left, self._settles_left = _MOST_TRIED, _MOST_SETTLED
 
     def found(self, order: tuple[int, ...] = ()) -> list[int]:
         """The rest of an order that begins so; empty where there is none."""
@@ -59,7 +61,11 @@ class _Search:
             elif is_balanced(touched):
                 doubtful.append(vertex)
         # So near to an edge engines differ, and a structure may stand while its mirror image falls.
-        yield from (v for v in doubtful if settle(self._touched((*order, v))).stands)
+        yield from (vertex for vertex in doubtful if self._settles((*order, vertex)))
+
+    def _settles(self, order: tuple[int, ...]) -> bool:
+        self._settles_left -= 1
+        return self._settles_left >= 0 and settle(self._touched(order)).stands
 
     def _touched(self, order: tuple[int, ...]) -> tuple[Block, ...]:
         """The blocks that hang together with the last one."""
