@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
-from phyblock.models.base import Image, Request
+from phyblock.models.base import Image
 from phyblock.parsing import (
     AnswerForm,
     ParsedPlan,
@@ -27,8 +25,9 @@ from phyblock.tracks.full_planning.worked import worked_plan
 from phyblock.tracks.goal_blind.guessing import BlindGuesses
 from phyblock.tracks.pictures import Pictures
 from phyblock.tracks.plans import score_fields
-from phyblock.tracks.prompts import Prompt, form_facts, response_format
-from phyblock.tracks.showing import Showing, TaskShowing, file_plan, told_of
+from phyblock.tracks.prompts import Prompt
+from phyblock.tracks.showing import TaskShowing, file_plan
+from phyblock.tracks.whole_plans import AS_IN_FILE, WholePlanTrack
 from phyblock.words import AnswerFormat, Level1Criterion, Matcher, PlanParser, Setting
 
 __all__ = ["FullPlanning", "PlanJudgement", "PlanningRules"]
@@ -92,10 +91,7 @@ class PlanJudgement:
         }
 
 
-_PLAIN = TaskShowing(Showing())
-
-
-class FullPlanning:
+class FullPlanning(WholePlanTrack[PlanningRules, Pictures]):
     """Prompt, parse and score of the track; pure but for the pictures it asks for."""
 
     name = "full_planning"
@@ -106,63 +102,41 @@ class FullPlanning:
         prompt: Prompt | None = None,
         pictures: Pictures | None = None,
         items: Sequence[AssemblyTask] = (),
-        showing: TaskShowing = _PLAIN,
+        showing: TaskShowing = AS_IN_FILE,
         pool: Sequence[AssemblyTask] = (),
         examples: Examples[AssemblyTask] | None = None,
     ) -> None:
         """`prompt` and `pictures` are None where every model is a recording; from `pool`, else
         `items`, baselines learn. `examples` are in the form in which they are shown.
         """
-        self.rules = rules
-        self.items = items
-        self.template = "" if prompt is None else prompt.name
-        self._prompt = prompt
-        self._pictures = pictures
-        self._showing = showing
+        super().__init__(rules, prompt, pictures, items, showing)
         self._examples = examples or Examples((), 0)
         self._guesses = BlindGuesses(showing, pool or items, rules.settings[0])
         self._scorers: dict[object, AssemblyScorer] = {}
 
-    def shown(self, item: AssemblyTask, seed: int) -> AssemblyTask:
-        """The scene as a seed shows it."""
-        return self._showing.of(item, seed)
-
-    def about(self, item: AssemblyTask) -> dict[str, Any]:
-        """How the scene is shown, where not as the file has it."""
-        return told_of(item)
-
     def identity(self) -> dict[str, Any]:
-        """Name and version of the prompt, and a digest of all that decides the pictures."""
-        if self._prompt is None or self._pictures is None:
-            return {"prompt": None, "pictures": None}
-        examples = self._examples.used(self.items)
-        shown = (*self._showing.each(self.items), *examples)
-        keys = [self._pictures.keys(task) for task in shown]
-        return {
-            "prompt": {"name": self._prompt.name, "version": self._prompt.version},
-            "pictures": hashlib.sha256(json.dumps(keys).encode()).hexdigest(),
-            **({"examples": [task.key for task in examples]} if examples else {}),
-        }
+        """Name and version of the prompt, a digest of all that decides the pictures, and the worked
+        examples where there are any.
+        """
+        examples = () if self._pictures is None else self._examples.used(self.items)
+        told = {"examples": [task.key for task in examples]} if examples else {}
+        return {**super().identity(), **told}
 
-    async def request(
-        self, item: AssemblyTask, seed: int, params: Mapping[str, object], *, with_messages: bool
-    ) -> Request:
-        """The request of one sample; without messages for models that need none."""
-        if not with_messages or self._prompt is None or self._pictures is None:
-            return Request(item.key, seed, (), params, "", self._subject(item))
-        shots = await self._examples.shots(item, self._working(self._prompt, self._pictures))
-        pictures = await self._pictures.of(item)
-        return self._request(item, seed, params, self._prompt, pictures, shots)
+    def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
+        """What templates may use; nothing in it gives an answer away."""
+        scale = None if self._pictures is None else self._pictures.candidate_scale
+        return {**super().facts(item, pictures), "candidate_scale": scale}
 
-    def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
-        """The one request, made without rendering, and whether its pictures are the real ones."""
-        if self._prompt is None or self._pictures is None:
-            yield Request(item.key, 0, (), {}, "", self._subject(item)), True
-            return
-        pictures, real = self._pictures.outline(item)
-        work = self._working(self._prompt, self._pictures)
-        shots, are_real = self._examples.outlined(item, work)
-        yield self._request(item, 0, {}, self._prompt, pictures, shots), real and are_real
+    def _pictured(self) -> list[AssemblyTask]:
+        return [*super()._pictured(), *self._examples.used(self.items)]
+
+    async def _shots(self, item: AssemblyTask, prompt: Prompt, pictures: Pictures) -> Shots:
+        return await self._examples.shots(item, self._working(prompt, pictures))
+
+    def _outlined_shots(
+        self, item: AssemblyTask, prompt: Prompt, pictures: Pictures
+    ) -> tuple[Shots, bool]:
+        return self._examples.outlined(item, self._working(prompt, pictures))
 
     def _working(self, prompt: Prompt, pictures: Pictures) -> Working[AssemblyTask]:
         return Working(pictures.of, pictures.outline, partial(self._example, prompt))
@@ -173,40 +147,9 @@ class FullPlanning:
         *_, question = prompt.messages(pictures, self.facts(task, pictures))
         return WorkedExample(task.key, question, worked_plan(task, self.rules.form(task)))
 
-    def _request(
-        self,
-        item: AssemblyTask,
-        seed: int,
-        params: Mapping[str, object],
-        prompt: Prompt,
-        pictures: tuple[Image, ...],
-        shots: Shots,
-    ) -> Request:
-        messages = prompt.messages(pictures, self.facts(item, pictures))
-        return Request(
-            item.key,
-            seed,
-            shots.before(messages),
-            params,
-            prompt.version,
-            self._subject(item),
-            response_format(self.rules.form(item)),
-            examples=shots.keys,
-        )
-
     def _subject(self, item: AssemblyTask) -> PlanSubject:
         guess = partial(self._guesses.plan, item)
         return PlanSubject(item.scene, item.candidates, guess)
-
-    def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
-        """What templates may use; nothing in it gives an answer away."""
-        return {
-            "pictures": [picture.label for picture in pictures],
-            "n_candidates": len(item.candidates),
-            "is_blind": self._showing.how.blind,
-            "candidate_scale": None if self._pictures is None else self._pictures.candidate_scale,
-            **form_facts(self.rules.form(item)),
-        }
 
     def judge(self, item: AssemblyTask, text: str | None) -> PlanJudgement:
         """Read and score a reply; None, where there is no reply, is scored as an empty plan."""
@@ -219,8 +162,3 @@ class FullPlanning:
         scores = scorer.score(parsed.plan, self.rules.matchers, self.rules.level1)
         in_file = file_plan(item, parsed.plan.steps)
         return PlanJudgement(self.rules.parser, parsed, scores, in_file)
-
-    def close(self) -> None:
-        """Stop the processes that draw pictures."""
-        if self._pictures is not None:
-            self._pictures.close()
