@@ -231,19 +231,27 @@ def test_a_step_has_one_error_the_first_in_time(
 
 
 class Builder(OpenAIChat):
+    turned = ""
+
     def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
         body = super().reply(seen, ending)
-        body["choices"][0]["message"]["content"] = f"I measured.\n\n{STANDS}"
+        plan = "\n".join(f"{line}{self.turned}" for line in STANDS.splitlines())
+        body["choices"][0]["message"]["content"] = f"I measured.\n\n{plan}"
         return body
 
 
-def prepared(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+class Turner(Builder):
+    turned = " turned (0, 0, 0)"
+
+
+def prepared(workspace: Workspace, monkeypatch: pytest.MonkeyPatch, **pose: str) -> list[str]:
     """A suite, and the words of the command that runs it."""
     monkeypatch.chdir(workspace.root)
     monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
     monkeypatch.setattr(sys, "argv", ["phyblock"])
     models = ["builder", "oracle"]
-    workspace.write_suite(tracks=["pose_planning"], models=models, pose={"views": ["oblique"]})
+    pose_section = {"views": ["oblique"], **pose}
+    workspace.write_suite(tracks=["pose_planning"], models=models, pose=pose_section)
     return ["run", "suite.yaml", "--out", "out", "--no-report"]
 
 
@@ -287,11 +295,13 @@ def test_a_run_with_faults_is_killed_resumed_and_scored_again(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("rotation", "server"), [("candidate", Builder), ("free", Turner)])
 def test_a_run_has_a_page_figures_a_film_and_is_compared(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    run = prepared(workspace, monkeypatch)
-    with Running(Builder()) as running:
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    rotation: str, server: type[Builder],
+) -> None:  # fmt: skip
+    run = prepared(workspace, monkeypatch, rotation=rotation)
+    with Running(server()) as running:
         workspace.write_models(running.url, "builder")
         assert not phyblock.main(run[:-1], standalone_mode=False)
     capsys.readouterr()

@@ -183,7 +183,7 @@ def _scenes(run: Run, tasks: Mapping[str, AssemblyTask]) -> Iterator[AssemblyTas
     for scene, form in dict.fromkeys(zip(asked["scene"], forms, strict=True)):
         task, shown = tasks.get(scene), json.loads(form)
         if task is not None and shown:
-            yield in_order(task, shown["order"], tasks.get(shown["goal"]))
+            yield in_order(task, shown["order"], tasks.get(shown["goal"]), some=True)
         elif task is not None:
             yield task
 

@@ -15,6 +15,7 @@ const Poses = (() => {
     stands: "stands", falls: "falls", knocks_over: "knocks others over", overlaps: "no room",
     under_floor: "under the floor", no_block: "no such block",
   };
+  const PHYSICAL = ["interpenetrating", "floating", "toppling"];
   const REFUSED = ["overlaps", "under_floor", "no_block"];
 
   const cm = (value) => `${value.toFixed(value < 10 ? 1 : 0)} cm`;
@@ -121,10 +122,11 @@ const Poses = (() => {
 
   function describe(scene, given, outcome, number) {
     const verdict = outcome.error ? ERRORS[outcome.error] : "Correct";
-    const label = `${ENDS[outcome.end]}`;
+    const end = ENDS[outcome.end];
+    const isSaid = !outcome.error || PHYSICAL.includes(outcome.error);
     return {
-      number: given.block, name: Steps.nameOf(scene, given.block), why: outcome.error, verdict: `${verdict}, ${ENDS[outcome.end]}`,
-      label: outcome.error ? `${verdict}, ${label}` : label,
+      number: given.block, name: Steps.nameOf(scene, given.block), why: outcome.error, verdict: `${verdict}, ${end}`,
+      label: isSaid ? end : `${verdict}, ${end}`,
       text: [placeOf(given), offOf(scene, outcome), endOf(outcome, number)].filter(Boolean).join(" "),
       note: scene && ghostOf(scene, outcome).length ? "Outlined: where it should be." : "",
     };
