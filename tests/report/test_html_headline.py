@@ -79,7 +79,7 @@ def test_headlines_of_questions_and_episodes(
         assert f1.value == pytest.approx(table.loc[row.name, "attempted_f1"])
         ends = intervals.loc[(row.name, "attempted"), ["lo", "hi"]]
         assert f1.below[0].startswith("{:.1f} to {:.1f}".format(*ends))
-    assert steps.columns[:2] == ("Completed", "F1 of attempts")
+    assert steps.columns[:2] == ("F1 of attempts", "Completed")
     assert {row.name: row.cells[0].value for row in steps.rows}["oracle"] == 100
     assert not any(
         "94.7" in cell.text

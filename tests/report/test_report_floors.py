@@ -95,7 +95,7 @@ def test_the_headline_has_the_floor_and_marks_what_is_not_above_it() -> None:
     (headline,) = headlines(run)
     rows = {row.name: row.cells[headline.main] for row in headline.rows}
     assert rows["Floor: goal-blind"].value == 30.0
-    assert rows["bad"].below[0].endswith(", not above the floor")
+    assert rows["bad"].below[0].endswith(" †")
     assert "floor" not in rows["good"].below[0]
 
 

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal
+from urllib.parse import urlencode
 
 from phyblock.report.floors import Floor, floors_run, headline_floors
+from phyblock.report.html.leads import samples_query
+from phyblock.report.html.ranked import kinds_of, main_measure, rank_texts
+from phyblock.report.html.standing import shortfalls
 from phyblock.report.measure_table import headline_of, main_heading
 from phyblock.tables.headline import Value
 from phyblock.tables.load import Run
@@ -22,30 +28,43 @@ Kind = Literal["model", "baseline", "reference"]
 
 @dataclass(frozen=True)
 class Cell:
-    """A number as shown, with the lines under it; `value` sorts, None where there is none."""
+    """A number as shown, with the lines under it; `value` sorts, None where there is none.
+
+    `query` is the address of the samples that it was made from, as the page reads it.
+    """
 
     text: str
     value: float | None = None
     below: tuple[str, ...] = ()
+    query: str = ""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A model, or a value to hold models against; `strip` is its overall value and interval [%]."""
+    """A model, or a value to hold models against; `strip` is its overall value and interval [%].
+
+    `rank` is the place that a model may have (`2`, or `1 to 3` where tests cannot tell), `lacking`
+    says how many samples have no reply and why.
+    """
 
     name: str
     kind: Kind
     cells: tuple[Cell, ...]
     strip: tuple[float, float, float] | None = None
+    rank: str = ""
+    lacking: str = ""
+    query: str = ""
 
 
 @dataclass(frozen=True)
 class Headline:
     """A headline table: `columns` head the cells, `references` [%] are marked in every strip.
 
-    The column with number `main`, from 0, is what the strips draw and is called `strip_name`.
+    The column with number `main`, from 0, is what models are ranked by and what the strips draw;
+    it is called `strip_name`. Models stand in the order of their rank.
     """
 
+    track: str
     title: str
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
@@ -54,12 +73,24 @@ class Headline:
     strip_name: str
     references: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def ranked(self) -> bool:
+        """Whether there are ranks at all."""
+        return any(row.rank for row in self.rows)
+
 
 _BELOW = "Below each value stands its 95 % interval, from leaving out each base scene in turn."
 _SEEDS = (
     "Values pool {} seeds; mean ± standard deviation over single seeds stands below the main one."
 )
-_FLOOR = "The floor is the most that is reached without seeing the goal."
+_RANKS = (
+    "Rank: the places that a model may have, by paired tests of all models with Holm's correction."
+)
+_NOT_ABOVE = "†"
+_FLOOR = (
+    "The floor is the most that is reached without seeing the goal; "
+    f"{_NOT_ABOVE} marks intervals that are not above it."
+)
 
 
 def headlines(run: Run) -> list[Headline]:
@@ -69,25 +100,41 @@ def headlines(run: Run) -> list[Headline]:
 
 def _headline(run: Run, track: str) -> Headline:
     kind = kind_of(track)
-    report, columns = kind.report(), headline_columns(run, track)
+    report = kind.report()
+    main = main_heading(run, track)
+    columns = sorted(headline_columns(run, track), key=lambda column: column.heading != main)
     values = headline_of(run, track)
     headings = [column.heading for column in columns]
+    queries = {column.heading: samples_query(run, track, column.cell) for column in columns}
     published = report.published(run)
     floors = headline_floors(run, track)
     own_floors = floors_run(run, track)
-    main = headings.index(main_heading(run, track))
+    ranks, lacking = rank_texts(run, track), shortfalls(run, track)
     rows = []
     for name, sort in kinds_of(run).items():
         found = [values.get((name, heading)) for heading in headings]
         held = {} if name in own_floors else floors
+        of_model = urlencode({"model": name})
         cells = [
             *(
-                _cell(value, held.get(head), seeds=place == main)
-                for place, (value, head) in enumerate(zip(found, headings, strict=True))
+                _cell(value, held.get(head), f"{queries[head]}&{of_model}", seeds=head == main)
+                for value, head in zip(found, headings, strict=True)
             ),
             *([_plain(published.get(name), NO_VALUE)] if published else []),
         ]
-        rows.append(Row(name, sort, tuple(cells), _strip(found[main])))
+        rows.append(
+            Row(
+                name,
+                sort,
+                tuple(cells),
+                _strip(found[0]),
+                ranks.get(name, ""),
+                lacking.get(name, ""),
+                f"{urlencode({'track': track})}&{of_model}",
+            )
+        )
+    is_ascending = main_measure(run, track).better == "lower"
+    rows.sort(key=partial(_place, is_ascending=is_ascending))
     if floors:
         own = {heading: floor.value for heading, floor in floors.items()}
         names = ", ".join(dict.fromkeys(floor.name for floor in floors.values()))
@@ -98,19 +145,15 @@ def _headline(run: Run, track: str) -> Headline:
     for name, numbers in references.items():
         cells = [_plain(numbers.get(heading)) for heading in headings]
         rows.append(Row(name, "reference", (*cells, *([Cell("")] if published else []))))
-    marked = {name: numbers.get(headings[main]) for name, numbers in references.items()}
-    seeds = len(run.design.suite.seeds)
-    mean = (_SEEDS.format(seeds),) if seeds > 1 else ()
-    floor_note = (_FLOOR,) if floors else ()
-    below = (_BELOW,) if any(cell.below for row in rows for cell in row.cells) else ()
-    about = (report.reference_note,) if report.reference_note else ()
+    marked = {name: numbers.get(main) for name, numbers in references.items()}
     return Headline(
+        track,
         captioned(kind.title, (*report.showing(run), *varied_words(run))),
         (*headings, *(["Published"] if published else [])),
         tuple(rows),
-        (" ".join((*report.notes(run), *about, *mean, *floor_note, *below)),),
+        (" ".join(_notes(run, track, rows, has_floors=bool(floors))),),
+        0,
         main,
-        headings[main],
         {
             name.partition(" ")[0].rstrip(","): value
             for name, value in marked.items()
@@ -119,15 +162,33 @@ def _headline(run: Run, track: str) -> Headline:
     )
 
 
-def _cell(value: Value | None, floor: Floor | None, *, seeds: bool) -> Cell:
+def _place(row: Row, *, is_ascending: bool) -> tuple[bool, bool, float]:
+    value = row.cells[0].value
+    number = 0.0 if value is None else value
+    return row.kind != "model", value is None, number if is_ascending else -number
+
+
+def _notes(run: Run, track: str, rows: Sequence[Row], *, has_floors: bool) -> list[str]:
+    report, seeds = kind_of(track).report(), len(run.design.suite.seeds)
+    return [
+        *report.notes(run),
+        *([report.reference_note] if report.reference_note else []),
+        *([_RANKS] if any(row.rank for row in rows) else []),
+        *([_SEEDS.format(seeds)] if seeds > 1 else []),
+        *([_FLOOR] if has_floors else []),
+        *([_BELOW] if any(cell.below for row in rows for cell in row.cells) else []),
+    ]
+
+
+def _cell(value: Value | None, floor: Floor | None, query: str, *, seeds: bool) -> Cell:
     if value is None or math.isnan(value.value):
-        return Cell(NO_VALUE)
+        return Cell(NO_VALUE, query=query)
     below = [] if math.isnan(value.lo) else [f"{number(value.lo)} to {number(value.hi)}"]
     if below and floor is not None and not floor.is_below(value.lo, value.hi):
-        below[0] += ", not above the floor"
+        below[0] += f" {_NOT_ABOVE}"
     if seeds and not math.isnan(value.sd):
         below.append(f"seeds {spread(value.mean, value.sd)}")
-    return Cell(number(value.value), value.value, tuple(below))
+    return Cell(number(value.value), value.value, tuple(below), query)
 
 
 def _strip(value: Value | None) -> tuple[float, float, float] | None:
@@ -140,11 +201,3 @@ def _strip(value: Value | None) -> tuple[float, float, float] | None:
 def _plain(value: float | None, blank: str = "") -> Cell:
     """A percentage with nothing under it."""
     return Cell(blank) if value is None else Cell(number(value), value)
-
-
-def kinds_of(run: Run) -> dict[str, Kind]:
-    """Which models are baselines; these come last."""
-    kinds = {model.name: model.kind for model in run.manifest.models}
-    baselines = [name for name in run.design.model_names if kinds.get(name) == "baseline"]
-    models = [name for name in run.design.model_names if name not in baselines]
-    return {**dict.fromkeys(models, "model"), **dict.fromkeys(baselines, "baseline")}

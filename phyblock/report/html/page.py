@@ -17,10 +17,11 @@ from phyblock.tables.text_table import Column, TextTable
 __all__ = ["Figure", "render_page"]
 
 _SCRIPTS = (
-    *("dom.js", "data.js", "solid.js", "list.js", "steps.js", "poses.js", "stage.js"),
-    *("detail.js", "tracks.js", "app.js"),
+    *("dom.js", "data.js", "solid.js", "filters.js", "search.js", "list.js", "steps.js"),
+    *("poses.js", "stage.js", "markdown.js", "quotes.js", "overlay.js", "why.js", "reply.js", "sent.js"),
+    *("detail.js", "tracks.js", "matrix.js", "results.js", "address.js", "app.js"),
 )
-_STYLES = ("base.css", "results.css", "samples.css")
+_STYLES = ("base.css", "results.css", "samples.css", "reply.css", "matrix.css", "print.css")
 
 
 @dataclass(frozen=True)
@@ -34,16 +35,18 @@ class Figure:
 def render_page(
     *,
     about: Mapping[str, Any],
+    cautions: Sequence[str],
     headlines: Sequence[Headline],
     figures: Sequence[Figure],
     tables: Sequence[TextTable],
+    models: Sequence[str],
     folder: str,
     build: str,
 ) -> str:
     """HTML of the report; every text is escaped, and only scripts of our own may run.
 
-    `about` says what the run was (title, facts: pairs of name and text); `folder` is where the
-    page finds its data.
+    `about` says what the run was (title, facts: pairs of name and text), `cautions` what it is
+    not; `folder` is where the page finds its data. Names of `models` lead to their samples.
     """
     environment = jinja2.Environment(
         autoescape=True,
@@ -56,6 +59,8 @@ def render_page(
     template = environment.from_string(_asset("page.html.j2"))
     return template.render(
         about=about,
+        cautions=cautions,
+        models=frozenset(models),
         headlines=headlines,
         figures=figures,
         tables=[(table, _groups(table.columns)) for table in tables],

@@ -18,12 +18,14 @@ from phyblock.records import MANIFEST, PROMPTS, RECORDS
 from phyblock.report.figures import figure_titles, write_figures
 from phyblock.report.html.headline import headlines
 from phyblock.report.html.index import Item, SampleIndex, read_places
+from phyblock.report.html.leads import part_groups
 from phyblock.report.html.pack import Pack, write_script
 from phyblock.report.html.page import Figure, render_page
 from phyblock.report.html.samples import items_shown, pack_prompts, pack_samples, pictures_sent
 from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.shown import images_of
 from phyblock.report.html.sources import Sources, open_sources
+from phyblock.report.html.standing import cautions, samples_done
 from phyblock.report.made import PAGE
 from phyblock.report.write import TablesWritten
 from phyblock.run.folder import run_folder
@@ -39,7 +41,7 @@ REPORT_FILE = PAGE
 _FOLDER = "report"
 _PICTURES = "pictures"
 _CHUNK_BYTES = 2**20
-_LAYOUT = 2
+_LAYOUT = 3
 """Version of the scripts' folder; those of the first were not listed as ours."""
 _NOT_SHOWN = ("table1",)
 """Tables that a headline table replaces."""
@@ -140,10 +142,12 @@ def _write_data(
         pack.close()
     content: dict[str, Any] = {
         **index.columns(questions),
+        "model_kinds": {model.name: model.kind for model in run.manifest.models},
         "starts": {kind: pack.starts for kind, pack in packs.items()},
         "kit": kit(),
         "no_scenes": sources.lacking,
         "subtask_names": _part_names(run),
+        "subtask_groups": _part_groups(run),
     }
     write_script(new, "index", build, content)
     return pictures, is_whole
@@ -174,6 +178,15 @@ def _part_names(run: Run) -> dict[str, str]:
     return names
 
 
+def _part_groups(run: Run) -> dict[str, dict[str, object]]:
+    """Means of parts of tracks: what they are called, and of which parts they are."""
+    return {
+        name: {"title": heading, "of": list(of)}
+        for track in run.design.suite.tracks
+        for name, (heading, of) in part_groups(run, track).items()
+    }
+
+
 def _scenes(run: Run, tasks: Mapping[str, AssemblyTask]) -> Iterator[AssemblyTask]:
     """Scenes that were asked about as such, in every form in which they were shown: their names
     are those of the items.
@@ -192,8 +205,10 @@ def _page(written: TablesWritten, figures: Sequence[Path], build: str) -> str:
     run = written.run
     return render_page(
         about=_about(run),
+        cautions=cautions(run),
         headlines=headlines(run),
         figures=_figures(run, figures),
+        models=run.design.model_names,
         tables=[view for name, view in written.views.items() if name not in _NOT_SHOWN],
         folder=f"{_FOLDER}/{build}",
         build=build,
@@ -207,14 +222,18 @@ def _about(run: Run) -> dict[str, Any]:
         "Scenes": f"{design.scenes:,}",
         "Models": f"{len(design.model_names)}",
         "Seeds": f"{len(design.suite.seeds)}",
-        "Samples": f"{len(run.records):,}",
+        "Samples": samples_done(run),
         "Made": manifest.created[:10],
         "phyblock": manifest.versions.get("phyblock"),
         "Run": manifest.identity[:12],
     }
+    description = design.suite.description
     return {
         "title": design.suite.name or run.path.name,
-        "description": design.suite.description,
+        # A suite that was cut short still speaks of all that is in it.
+        "description": f"The whole suite: {description}"
+        if description and manifest.limit
+        else description,
         "facts": [(name, text) for name, text in facts.items() if text],
     }
 

@@ -52,8 +52,10 @@ const Data = (() => {
       if (starts[middle] <= n) low = middle;
       else high = middle - 1;
     }
-    return (await load(`${kind}-${low}`))[n - starts[low]];
+    return (await chunk(kind, low))[n - starts[low]];
   }
+
+  const chunk = (kind, n) => load(`${kind}-${n}`);
 
   async function open() {
     index = await load("index");
@@ -89,13 +91,17 @@ const Data = (() => {
 
   /** The number of the sample with this id, or -1. */
   function find(id) {
-    const n = index.rows.item.length;
-    for (let row = 0; row < n; row++) if (sample(row).id === id) return row;
+    const { items, rows, scenes } = index;
+    const n = rows.item.length;
+    for (let row = 0; row < n; row++) {
+      // Most rows are told apart by their item, which is quicker than the whole name.
+      if (id.includes(items.key[rows.item[row]] || scenes[items.scene[rows.item[row]]]) && sample(row).id === id) return row;
+    }
     return -1;
   }
 
   return {
-    open, sample, find, entry,
+    open, sample, find, entry, chunk,
     get index() {
       return index;
     },

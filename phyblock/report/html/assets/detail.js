@@ -1,12 +1,20 @@
-/* One sample, whole: scene, assembly or answer, reply, prompt, and the same of another model. */
+/* One sample, whole: what the model saw, what it did, what it said, and the same of another. */
 "use strict";
 
 const Detail = (() => {
   let player = null;
   let shown = 0;
+  let place = null;
+  let tab = "";
+  let told = () => {};
 
-  /** Show sample `row`, beside it sample `other` of the same item where one is given. */
-  async function show(place, row, other, setting) {
+  /**
+   * Show sample `row`, beside it sample `other` of the same item where one is given.
+   *
+   * `at` may say the step, the view [degrees] and the tab of an address.
+   */
+  async function show(into, row, other, setting, at = {}) {
+    place = into;
     const turn = ++shown;
     player?.stop();
     const samples = [row, other].filter((n) => n >= 0).map(Data.sample);
@@ -19,9 +27,12 @@ const Detail = (() => {
       const question = sample.question >= 0 ? await Data.entry("questions", sample.question) : null;
       // A later choice may have been quicker.
       if (turn !== shown) return;
+      if (at.tab !== undefined) tab = at.tab;
       place.replaceChildren(...build(loaded, scene, question));
-      player?.tell();
-      drawPictures(place);
+      if (player && at.view) player.view = at.view;
+      if (player && at.step !== undefined) player.seek(at.step);
+      player?.listeners.push(() => told());
+      drawn();
     } catch (error) {
       if (turn === shown) place.replaceChildren(el("p", { class: "notice" }, error.message));
     }
@@ -30,13 +41,52 @@ const Detail = (() => {
   function build(loaded, inFile, question) {
     const scene = inFile && asShown(inFile, loaded[0].record);
     const several = loaded.length > 1;
-    const all = columns(loaded.map((sample) => [
+    player = null;
+    const did = question ? [Question.about(question, loaded)]
+      : [assembly(loaded, scene, several), scene ? candidates(scene) : null].filter(Boolean);
+    const saw = el("section", { class: "card" }, columns(loaded.map((sample) =>
+      [several ? heading(sample) : null, Sent.panel(sample)])));
+    const said = columns(loaded.map((sample) => [
       several ? heading(sample) : null, question ? Question.answer(sample) : null, ...texts(sample)]));
-    if (question) {
-      player = null;
-      return [Question.about(question, loaded[0]), all];
+    const title = question ? "The question" : "What it built";
+    return [tabs([["saw", "What the model saw", saw], ["did", title, did]], loaded), said];
+  }
+
+  /** What was sent is shown first where anything was; what a person chose stays. */
+  function tabs(all, loaded) {
+    const { record } = loaded[0];
+    const isSent = Boolean(record.prompt || record.turns?.some((turn) => turn.prompt));
+    const now = all.some(([name]) => name === tab) ? tab : isSent ? "saw" : "did";
+    const buttons = all.map(([name, title]) => el("button", {
+      type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, onclick: () => choose(name),
+    }, title));
+    const panels = all.map(([name, title, content]) => el("div", {
+      role: "tabpanel", id: `panel-${name}`, class: "panel", "aria-labelledby": `tab-${name}`,
+    }, el("h2", { class: "on-paper" }, title), content));
+    const mark = (chosen) => all.forEach(([name], i) => {
+      buttons[i].setAttribute("aria-selected", String(name === chosen));
+      buttons[i].tabIndex = name === chosen ? 0 : -1;
+      panels[i].hidden = name !== chosen;
+    });
+    function choose(name) {
+      tab = name;
+      mark(name);
+      drawn();
+      told();
     }
-    return [assembly(loaded, scene, several), scene ? candidates(scene) : null, all].filter(Boolean);
+    const list = el("div", {
+      role: "tablist", "aria-label": "Views of the sample",
+      onkeydown: (event) => {
+        const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+        if (!by) return;
+        event.preventDefault();
+        const i = (buttons.indexOf(document.activeElement) + by + all.length) % all.length;
+        choose(all[i][0]);
+        buttons[i].focus();
+      },
+    }, buttons);
+    mark(now);
+    return el("div", { class: "tabs" }, list, panels);
   }
 
   /** The scene with its candidates in the order in which the samples' seed showed them. */
@@ -59,7 +109,9 @@ const Detail = (() => {
     player = new Stage.Player(longest + 1);
     const panels = loaded.map((sample, i) => (runs[i].steps.length ? Stage.panel(runs[i], player, noun) : null));
     const stages = panels.map((panel, i) => [
-      several ? heading(loaded[i]) : null, verdict(loaded[i]), panel ? panel.said : nothing(loaded[i])]);
+      several ? heading(loaded[i]) : null, verdict(loaded[i]), panel ? panel.said : nothing(loaded[i]),
+      panel ? Why.note(loaded[i], scene, runs[i].steps, player) : null]);
+    if (scene) panels.forEach((panel, i) => panel && Overlay.over(panel.pictures, scene, runs[i], player));
     const wide = Math.max(...runs.map(({ titles }) => titles.length)) > 1 ? " wide" : "";
     const built = panels.flatMap((panel, i) => [
       runs[i].titles.map((title, k) => el("figure", { class: "built" },
@@ -82,7 +134,7 @@ const Detail = (() => {
   const captionOf = ({ model }, title, several, wide) =>
     (several ? `${model}${wide && `: ${title.toLowerCase()}`}` : title);
 
-  const heading = (sample) => el("h4", { class: "model-name" }, sample.model);
+  const heading = (sample) => el("p", { class: "model-name" }, sample.model);
 
   function stepsOf(sample, scene) {
     const { record, setting } = sample;
@@ -124,136 +176,74 @@ const Detail = (() => {
   }
 
   function goal(scene, sample) {
-    const { levels, record: { shown } } = sample;
-    const other = shown && shown.goal !== sample.scene
-      ? (shown.goal ? `; shown was the goal of ${shown.goal}` : "; no goal was shown") : "";
+    const { levels, record: { shown: as } } = sample;
+    const other = as && as.goal !== sample.scene
+      ? (as.goal ? `; shown was the goal of ${as.goal}` : "; no goal was shown") : "";
     return el("figure", {}, el("figcaption", {}, "Goal ", el("span", { class: "muted" },
       `${Words.count(scene.blocks.length, "block")}, level${levels.length > 1 ? "s" : ""} ${levels.join(" and ")}${other}`)),
-    picture("Goal", scene.blocks, { view: Stage.HOME, grid: true }, "goal"));
+    picture("Goal", scene.blocks, { view: Stage.HOME, grid: true, marks: Overlay.marks(scene) }, "goal"));
   }
 
   function candidates(scene) {
     const uses = new Map();
     for (const { candidate } of scene.blocks) uses.set(candidate, (uses.get(candidate) || 0) + 1);
     const cells = scene.candidates.map((candidate, i) => {
-      const n = i + 1, times = uses.get(n), name = `${n}: ${Words.block(candidate)}`;
-      const alone = [Solid.onTheFloor(candidate)];
-      return el("li", { class: times ? "needed" : "", title: `${name}, turned ${candidate.euler.join(", ")} degrees` },
+      const n = i + 1, times = uses.get(n), name = Words.block(candidate);
+      return el("li", { class: times ? "needed" : "", title: `Turned ${candidate.euler.join(", ")} degrees` },
         el("span", { class: "cell-head number" }, el("span", {}, String(n)),
           times ? el("span", { class: "cell-uses" }, `×${times}`) : null),
-        picture(`Candidate ${name}`, alone, { view: Stage.HOME, minDistance: 0 }, "cell"));
+        picture(`Candidate ${n}: ${name}`, [Solid.onTheFloor(candidate)], { view: Stage.HOME, minDistance: 0 }, "cell"),
+        el("span", { class: "cell-name" }, name));
     });
-    return el("section", { class: "card" }, el("h3", {}, "Candidates ",
+    return el("section", { class: "card" }, el("h2", {}, "Candidates ",
       el("span", { class: "muted" }, "framed: needed by the goal, and how often")),
     el("ol", { class: "cells" }, cells));
   }
 
-  /** A canvas that is drawn once it is in the page; see drawPictures. */
+  /** A canvas that is drawn once it is in the page; see drawn. */
   function picture(label, blocks, options, kind) {
     const canvas = el("canvas", { class: `picture ${kind}`, role: "img", "aria-label": label });
     canvas.drawing = [blocks, options];
     return canvas;
   }
 
-  /** Draw all canvases again, after a change of size or colors too. */
-  function drawPictures(place) {
-    for (const canvas of place.querySelectorAll("canvas.picture")) {
+  /** Draw everything in sight again, after a change of size or colors too. */
+  function drawn() {
+    for (const canvas of place?.querySelectorAll("canvas.picture") || []) {
+      if (!canvas.clientWidth) continue;
       const [blocks, options] = canvas.drawing;
       const grid = options.grid ? Stage.style("--grid") : null;
       Solid.draw(canvas, blocks, { ...options, grid, accent: Stage.accent() });
     }
+    player?.tell();
   }
 
   function texts(sample) {
     const { record } = sample;
-    if (record.turns) return [Turns.cards(record), facts(record)];
-    return [replyCard(record.reply, record.parse), promptCard(record.prompt), facts(record)];
+    if (record.turns) return [Turns.cards(record), Reply.facts(record)];
+    return [Reply.card(record.reply, record.parse), Reply.facts(record)];
   }
 
-  function replyCard(reply, parse) {
-    if (!reply) return null;
-    return el("section", { class: "card" }, el("h3", {}, "Reply"), parsed(parse),
-      reply.reasoning ? folded("Reasoning", el("pre", { class: "text" }, reply.reasoning)) : null,
-      el("pre", { class: "text reply" }, reply.text || "(empty)"));
-  }
-
-  function parsed(parse) {
-    if (!parse) return null;
-    const rule = parse.rule ? `read by the rule ${parse.rule}` : "nothing could be read";
-    const read = [parse.plan, parse.letters, parse.move].find((one) => one !== null && one !== undefined);
-    const values = Array.isArray(read) ? read.join(" → ") : String(read ?? "");
-    const dropped = parse.dropped && parse.dropped.length ? `; dropped, no such candidate: ${parse.dropped.join(", ")}` : "";
-    return el("p", { class: "parsed" }, values ? el("b", { class: "number plan" }, values) : null,
-      el("span", { class: "muted" }, ` ${rule}${dropped}${parse.parser ? `, parser ${parse.parser}` : ""}`));
-  }
-
-  function folded(title, ...children) {
-    return el("details", {}, el("summary", {}, title), children);
-  }
-
-  /** The prompt as it was sent, loaded when it is opened. */
-  function promptCard(prompt) {
-    if (!prompt) return null;
-    const body = el("div", { class: "prompt" });
-    const made = folded("Prompt as sent", body);
-    made.addEventListener("toggle", async () => {
-      if (!made.open || body.childNodes.length) return;
-      const images = new Map((prompt.images || []).map((image) => [image.label, image]));
-      if (prompt.n === null || prompt.n === undefined) {
-        body.append(el("p", { class: "muted" }, `Template ${prompt.template}; the text was not kept.`));
-        for (const image of images.values()) body.append(sent(image));
-        return;
-      }
-      for (const message of await Data.entry("prompts", prompt.n)) {
-        body.append(el("p", { class: "role" }, message.role));
-        for (const part of message.parts) {
-          if (typeof part === "string") body.append(el("pre", { class: "text" }, part));
-          else body.append(sent(images.get(part.image) || { label: part.image }));
-        }
-      }
-    });
-    return el("section", { class: "card" }, made);
-  }
-
-  function sent(image) {
-    const size = image.width_px ? `, ${image.width_px} × ${image.height_px} pixels` : "";
-    if (!image.file) return el("p", { class: "muted" }, `[picture: ${image.label}${size}]`);
-    return el("figure", {}, el("img", {
-      src: image.file, alt: `Picture as sent: ${image.label}`, loading: "lazy",
-      width: image.width_px, height: image.height_px,
-    }), el("figcaption", { class: "muted" }, `${image.label}${size}`));
-  }
-
-  function facts(record) {
-    const { reply, error } = record;
-    const rows = [];
-    const add = (name, value, unit = "") => {
-      if (value !== null && value !== undefined && value !== "") rows.push([name, `${value}${unit}`]);
+  /** What the address keeps of it: tab, step and camera, where they are not as at first. */
+  function asked() {
+    const isHome = !player || player.view.every((angle, i) => angle === Stage.HOME[i]);
+    return {
+      tab, step: player && player.at < player.last ? player.at : "",
+      view: isHome ? "" : player.view.map((angle) => Math.round(angle)).join(","),
     };
-    if (reply) {
-      add("Finish", reply.finish);
-      add("Tokens in", reply.usage?.prompt_tokens?.toLocaleString("en"));
-      add("Tokens out", reply.usage?.completion_tokens?.toLocaleString("en"));
-      add("Tokens reasoning", reply.usage?.reasoning_tokens?.toLocaleString("en"));
-      add("Cost", reply.cost_usd === null ? "unknown" : `$${Number(reply.cost_usd).toFixed(4)}`);
-      add("Latency", reply.attempts ? Number(reply.latency_s).toFixed(2) : null, " s");
-      add("Requests", reply.attempts);
-      add("From the cache", reply.cached ? "yes" : null);
-      add("Answered by", reply.provider_model);
-    }
-    if (error) {
-      add("Error", error.kind);
-      add("Status", error.status);
-      add("Message", error.message);
-    }
-    add("Template", record.prompt?.template);
-    add("Written", record.time);
-    return el("section", { class: "card" }, folded("Facts",
-      el("dl", {}, rows.map(([name, value]) => [el("dt", {}, name), el("dd", { class: "number" }, value)]))));
   }
 
   return {
-    show, picture, drawPictures, promptCard, parsed, folded,
+    show, picture, drawn, asked,
+    /** Show a sentence in the place of a sample. */
+    say: (text) => {
+      shown++;
+      player = null;
+      document.getElementById("detail").replaceChildren(el("p", { class: "notice" }, text));
+    },
+    onTold: (hear) => {
+      told = hear;
+    },
     get player() {
       return player;
     },

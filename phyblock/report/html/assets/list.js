@@ -1,203 +1,142 @@
-/* Filters, and the list of samples that pass them; only rows in sight exist. */
+/* The list of samples that pass the filters; only rows in sight exist. */
 "use strict";
 
 const List = (() => {
-  const ROW_PX = 46;
-  const SPARE = 6;
-  const SORTS = { scene: "Name", model: "Model", worst: "Worst first", best: "Best first" };
-  const state = { track: 0, setting: "", sort: "scene", chosen: -1 };
-  const filters = {};
+  const ROW_PX = 34;
+  const SPARE = 8;
+  const PAUSE_MS = 120;
+  let chosen = -1;
   let rows = [];
-  let box, inner, status, onChoose, form;
+  let lines = [];
+  let isGrouped = false;
+  let waiting = 0;
+  let box, inner, status, onChoose;
 
+  /** `choose(row, isNew)` is called when a sample is chosen; row -1: none is left. */
   function start(choose) {
     onChoose = choose;
     box = document.getElementById("list");
     inner = document.getElementById("list-rows");
     status = document.getElementById("list-status");
-    form = document.getElementById("filters");
-    state.setting = Data.index.settings[0] || "";
     box.addEventListener("scroll", () => requestAnimationFrame(paint), { passive: true });
     new ResizeObserver(paint).observe(box);
-    buildTracks();
-    buildFilters();
-    apply();
+    box.addEventListener("keydown", onKey);
+    Filters.start(changed);
   }
 
-  function buildTracks() {
-    const place = document.getElementById("tracks");
-    place.hidden = Data.index.tracks.length < 2;
-    Data.index.tracks.forEach((track, i) => {
-      const button = el("button", {
-        type: "button", "aria-pressed": String(i === state.track), "data-track": track,
-        onclick: () => {
-          setTrack(i);
-          apply();
-          choose(rows.length ? rows[0] : -1);
-        },
-      }, Data.index.track_titles[i]);
-      place.append(button);
-    });
+  /** Filters changed: where the sample shown does not pass them, the first that does is shown. */
+  function changed({ isNewTrack, isSetting }) {
+    sift();
+    const isKept = !isNewTrack && rows.includes(chosen);
+    if (!isKept) chosen = first();
+    lay();
+    clearTimeout(waiting);
+    if (isNewTrack) onChoose(chosen, true);
+    // While somebody types, only what they end at is shown.
+    else if (!isKept || isSetting) waiting = setTimeout(() => onChoose(chosen, false), PAUSE_MS);
+    else Address.soon();
   }
 
-  function setTrack(i) {
-    state.track = i;
-    document.querySelectorAll("#tracks button").forEach((button, k) =>
-      button.setAttribute("aria-pressed", String(k === i)));
-    buildFilters();
-  }
+  const first = () => (rows.length ? rows[0] : -1);
 
-  /** Whether a row of the chosen track has a value in a column. */
-  const hasValue = (column) => column.some((value, row) =>
-    value !== null && Data.index.rows.track[row] === state.track);
-
-  /** What the chosen track asks about, where that is more than a scene. */
-  function nounOfItems() {
-    const { rows: columns, items, scenes, track_items: nouns } = Data.index;
-    const isMore = columns.item.some((item, row) =>
-      columns.track[row] === state.track && items.key[item] !== scenes[items.scene[item]]);
-    const noun = nouns[state.track];
-    return isMore ? `${noun[0].toUpperCase()}${noun.slice(1)} or scene` : "Scene";
-  }
-
-  function buildFilters() {
-    const { index } = Data;
-    const of = (values, label) => values.map((value, i) => [i, label ? label(value) : value]);
-    Object.keys(filters).forEach((name) => delete filters[name]);
-    const levels = [...new Set(index.items.levels.flat())].sort();
-    const scores = index.rows.scores[state.setting];
-    const hasScores = scores !== undefined && hasValue(scores.tp);
-    const hasParts = hasValue(index.rows.item.map((item) => index.items.subtask[item]));
-    const fields = [
-      select("model", "Model", of(index.models)),
-      levels.length > 1 && select("level", "Level", levels.map((level) => [level, `Level ${level}`])),
-      hasParts && select("subtask", "Subtask", of(index.subtasks, (s) => `${s} ${index.subtask_names[s] || ""}`)),
-      hasValue(index.rows.correct) && select("answer", "Answer", [[1, "Right"], [0, "Wrong"]]),
-      select("outcome", "Outcome", of(index.outcomes, Words.named)),
-      hasScores && select("error", "Error type", of(index.error_types, Words.named)),
-      index.seeds.length > 1 && select("seed", "Seed", index.seeds.map((seed) => [seed, `Seed ${seed}`])),
-      index.variants.length > 1 && select("variant", "Asked", of(index.variants, (name) => name || "As the reference")),
-      hasScores && index.settings.length > 1 && settingField(),
-      sortField(),
-    ];
-    form.replaceChildren(searchField(), ...fields.filter(Boolean));
-  }
-
-  function searchField() {
-    return el("label", { class: "wide" }, el("span", {}, nounOfItems()),
-      el("input", {
-        type: "search", id: "search", placeholder: "Search", autocomplete: "off", spellcheck: "false",
-        oninput: (event) => {
-          filters.text = event.target.value.trim().toLowerCase();
-          apply();
-        },
-      }));
-  }
-
-  function select(name, label, options) {
-    const field = el("select", {
-      id: `filter-${name}`,
-      onchange: () => {
-        filters[name] = field.value === "" ? undefined : Number(field.value);
-        apply();
-      },
-    }, el("option", { value: "" }, "All"), options.map(([value, text]) => el("option", { value }, text)));
-    return el("label", {}, el("span", {}, label), field);
-  }
-
-  function settingField() {
-    const field = el("select", {
-      id: "filter-setting",
-      onchange: () => {
-        state.setting = field.value;
-        apply();
-        choose(state.chosen);
-      },
-    }, Data.index.settings.map((setting) =>
-      el("option", { value: setting, selected: setting === state.setting }, setting)));
-    return el("label", {}, el("span", {}, "Setting"), field);
-  }
-
-  function sortField() {
-    const field = el("select", {
-      id: "filter-sort",
-      onchange: () => {
-        state.sort = field.value;
-        apply();
-      },
-    }, Object.entries(SORTS).map(([value, text]) =>
-      el("option", { value, selected: value === state.sort }, text)));
-    return el("label", {}, el("span", {}, "Order"), field);
-  }
-
-  function passes(row) {
-    const { rows: columns, items } = Data.index;
-    const item = columns.item[row];
-    if (columns.track[row] !== state.track) return false;
-    if (filters.model !== undefined && columns.model[row] !== filters.model) return false;
-    if (filters.level !== undefined && !items.levels[item].includes(filters.level)) return false;
-    if (filters.outcome !== undefined && columns.outcome[row] !== filters.outcome) return false;
-    if (filters.seed !== undefined && columns.seed[row] !== filters.seed) return false;
-    if (filters.variant !== undefined && columns.variant[row] !== filters.variant) return false;
-    if (filters.subtask !== undefined && items.subtask[item] !== filters.subtask) return false;
-    if (filters.answer !== undefined && columns.correct[row] !== filters.answer) return false;
-    if (filters.error !== undefined) {
-      const scores = columns.scores[state.setting];
-      if (!scores || !((scores.wrong[row] || 0) >> filters.error & 1)) return false;
-    }
-    if (!filters.text) return true;
-    const scene = Data.index.scenes[items.scene[item]];
-    return `${items.key[item]} ${scene}`.toLowerCase().includes(filters.text);
-  }
-
-  /** How good a sample is under the setting shown, 0 to 1. */
+  /** How good a sample is under the setting shown, 0 to 1; null where nothing says. */
   function worth(row) {
     const { correct, scores } = Data.index.rows;
     if (correct[row] !== null) return correct[row];
-    const columns = scores[state.setting];
-    if (!columns || columns.tp[row] === null) return 0;
+    const columns = scores[Filters.state.setting];
+    if (!columns || columns.tp[row] === null) return null;
     const tp = columns.tp[row], whole = 2 * tp + columns.fp[row] + columns.fn[row];
     return whole ? (2 * tp) / whole : 0;
   }
 
-  function apply() {
+  /** Find the rows that pass, in their order. */
+  function sift() {
     const { rows: columns } = Data.index;
+    const { text, inReplies, order } = Filters.state;
+    const replies = inReplies ? Search.rows(text, heard) : null;
+    const passes = Filters.test(replies);
     rows = [];
     for (let row = 0; row < columns.item.length; row++) if (passes(row)) rows.push(row);
-    if (state.sort === "model") rows.sort((a, b) => columns.model[a] - columns.model[b] || a - b);
-    if (state.sort === "worst") rows.sort((a, b) => worth(a) - worth(b) || a - b);
-    if (state.sort === "best") rows.sort((a, b) => worth(b) - worth(a) || a - b);
-    status.textContent = rows.length ? Words.count(rows.length, "sample") : "No sample passes these filters.";
-    inner.style.height = `${rows.length * ROW_PX}px`;
-    inner.replaceChildren();
+    const value = (row) => worth(row) || 0;
+    if (order === "model") rows.sort((a, b) => columns.model[a] - columns.model[b] || a - b);
+    if (order === "worst") rows.sort((a, b) => value(a) - value(b) || a - b);
+    if (order === "best") rows.sort((a, b) => value(b) - value(a) || a - b);
+    group();
+  }
+
+  function lay() {
+    say();
+    inner.style.height = `${lines.length * ROW_PX}px`;
     reveal();
     paint();
   }
 
+  /** By name, a heading for each item stands above its samples; headings are -1 - item. */
+  function group() {
+    const { item } = Data.index.rows;
+    const items = new Set(rows.map((row) => item[row]));
+    isGrouped = Filters.state.order === "name" && rows.length > items.size;
+    if (!isGrouped) {
+      lines = rows;
+      return;
+    }
+    lines = [];
+    let last = -1;
+    for (const row of rows) {
+      if (item[row] !== last) lines.push(-1 - item[row]);
+      last = item[row];
+      lines.push(row);
+    }
+  }
+
+  /** More of the replies were read: what holds the text comes into the list. */
+  function heard(share) {
+    sift();
+    const isKept = rows.includes(chosen);
+    if (!isKept && share === 1) chosen = first();
+    lay();
+    if (share < 1) status.textContent += `; ${Math.round(100 * share)} % of the replies read`;
+    else if (!isKept) onChoose(chosen, false);
+  }
+
+  function say() {
+    const isOutside = chosen >= 0 && !rows.includes(chosen) ? " The sample shown does not pass them." : "";
+    status.textContent = rows.length ? `${Words.count(rows.length, "sample")}${isOutside && `.${isOutside}`}`
+      : `No sample passes these filters.${isOutside}`;
+  }
+
   function paint() {
     const first = Math.max(0, Math.floor(box.scrollTop / ROW_PX) - SPARE);
-    const last = Math.min(rows.length, Math.ceil((box.scrollTop + box.clientHeight) / ROW_PX) + SPARE);
+    const last = Math.min(lines.length, Math.ceil((box.scrollTop + box.clientHeight) / ROW_PX) + SPARE);
     const made = [];
-    for (let place = first; place < last; place++) made.push(line(place));
+    for (let place = first; place < last; place++) {
+      made.push(lines[place] < 0 ? heading(-1 - lines[place]) : line(lines[place]));
+      made[made.length - 1].style.top = `${place * ROW_PX}px`;
+    }
     inner.replaceChildren(...made);
-    const shown = rows.indexOf(state.chosen);
-    const isPainted = shown >= first && shown < last;
-    if (isPainted) box.setAttribute("aria-activedescendant", `row-${state.chosen}`);
+    const shown = lines.indexOf(chosen);
+    const isPainted = chosen >= 0 && shown >= first && shown < last;
+    if (isPainted) box.setAttribute("aria-activedescendant", `row-${chosen}`);
     else box.removeAttribute("aria-activedescendant");
   }
 
-  function line(place) {
-    const sample = Data.sample(rows[place]);
-    const made = el("div", {
-      class: "row", role: "option", id: `row-${sample.row}`, "data-row": sample.row,
-      "aria-selected": String(sample.row === state.chosen), "aria-posinset": place + 1,
-      "aria-setsize": rows.length, onclick: () => choose(sample.row),
+  function heading(item) {
+    const { items } = Data.index;
+    const levels = items.levels[item];
+    return el("div", { class: "row group", role: "presentation" }, el("span", { class: "row-name" }, items.key[item]),
+      levels.length ? el("span", { class: "muted" }, ` level ${levels.join(", ")}`) : null);
+  }
+
+  function line(row) {
+    const sample = Data.sample(row);
+    return el("div", {
+      class: isGrouped ? "row within" : "row", role: "option", id: `row-${row}`, "data-row": row,
+      "aria-selected": String(row === chosen), "aria-posinset": rows.indexOf(row) + 1,
+      "aria-setsize": rows.length, onclick: () => pick(row, true),
     },
-    el("span", { class: "row-name" }, sample.key),
-    mark(sample),
-    el("span", { class: "row-model" }, sample.asked));
-    made.style.top = `${place * ROW_PX}px`;
-    return made;
+    el("span", { class: isGrouped ? "row-name unseen" : "row-name" }, sample.key),
+    el("span", { class: "row-model" }, sample.asked),
+    mark(sample));
   }
 
   function mark(sample) {
@@ -205,9 +144,9 @@ const List = (() => {
       return el("span", { class: "row-mark muted" }, Words.named(sample.outcome));
     }
     if (sample.correct !== null) {
-      return el("span", { class: `row-mark ${sample.correct ? "right" : "wrong"}` }, sample.correct ? "✓" : "✗");
+      return el("span", { class: `row-mark ${sample.correct ? "right" : "wrong"}` }, sample.correct ? "✓ right" : "✗ wrong");
     }
-    const score = sample.scores[state.setting];
+    const score = sample.scores[Filters.state.setting];
     if (!score) return el("span", { class: "row-mark" }, "–");
     const bar = el("span", { class: "bar" }, el("span", {}));
     bar.firstChild.style.width = `${100 * (score.f1 || 0)}%`;
@@ -216,47 +155,54 @@ const List = (() => {
   }
 
   function reveal() {
-    const place = rows.indexOf(state.chosen);
-    if (place < 0) return;
-    const top = place * ROW_PX;
+    const place = lines.indexOf(chosen);
+    if (place < 0 || chosen < 0) return;
+    // The heading above comes into sight too.
+    const top = Math.max(0, place - Number(isGrouped)) * ROW_PX, bottom = (place + 1) * ROW_PX;
     if (top < box.scrollTop) box.scrollTop = top;
-    else if (top + ROW_PX > box.scrollTop + box.clientHeight) box.scrollTop = top + ROW_PX - box.clientHeight;
+    else if (bottom > box.scrollTop + box.clientHeight) box.scrollTop = bottom - box.clientHeight;
   }
 
-  function choose(row) {
-    state.chosen = row;
+  function pick(row, isNew) {
+    clearTimeout(waiting);
+    chosen = row;
+    say();
     reveal();
     paint();
-    onChoose(row);
+    onChoose(row, isNew);
   }
 
-  /** Go `by` samples on in the list. */
-  function move(by) {
+  /** Go `by` samples on in the list; a key that is held down leaves one place in the history. */
+  function move(by, isHeld = false) {
     if (!rows.length) return;
-    const place = rows.indexOf(state.chosen);
+    const place = rows.indexOf(chosen);
     const next = place < 0 ? 0 : Math.min(rows.length - 1, Math.max(0, place + by));
-    if (rows[next] !== state.chosen) choose(rows[next]);
+    if (rows[next] !== chosen) pick(rows[next], !isHeld);
   }
 
-  /** Show a sample, in whatever track it is; filters that hide it are left as they are. */
-  function show(row) {
-    const track = Data.index.rows.track[row];
-    if (track !== state.track) {
-      setTrack(track);
-      apply();
-    }
-    choose(row);
+  /** Arrows change the sample while the list has the focus, as in any list. */
+  function onKey(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const page = Math.max(1, Math.floor(box.clientHeight / ROW_PX) - 1);
+    const by = { ArrowDown: 1, ArrowUp: -1, PageDown: page, PageUp: -page, Home: -Infinity, End: Infinity }[event.key];
+    if (by === undefined) return;
+    event.preventDefault();
+    move(by, event.repeat);
+  }
+
+  /** List by the filters, with a sample marked that need not pass them; else maybe the first. */
+  function set(row, orFirst) {
+    clearTimeout(waiting);
+    sift();
+    chosen = row < 0 && orFirst ? first() : row;
+    lay();
+    return chosen;
   }
 
   return {
-    start, move, show, paint,
-    first: () => (rows.length ? rows[0] : -1),
+    start, move, pick, worth, set, first,
     get chosen() {
-      return state.chosen;
+      return chosen;
     },
-    get setting() {
-      return state.setting;
-    },
-    place: () => [rows.indexOf(state.chosen), rows.length],
   };
 })();

@@ -107,7 +107,7 @@ const Stage = (() => {
     const name = step.name ? `, ${step.name}` : "";
     return el("li", {}, el("button", {
       type: "button", class: step.why ? "wrong" : "right", "data-step": i + 1,
-      "aria-label": `${noun} ${i + 1}: candidate ${step.number}${name}, ${step.verdict}`,
+      title: `${noun} ${i + 1}: candidate ${step.number}${name}, ${step.verdict}`,
       onclick: () => {
         player.stop();
         player.seek(i + 1);
@@ -116,20 +116,24 @@ const Stage = (() => {
     step.thumb ? el("canvas", { class: "thumb", "aria-hidden": "true" }) : null,
     el("span", { class: "strip-head" }, el("span", { class: "number" }, String(i + 1)),
       el("span", { class: "mark" }, mark)),
-    el("span", { class: "strip-what" }, step.label)));
+    el("span", { class: "strip-what" }, step.label),
+    el("span", { class: "unseen" }, `, candidate ${step.number}${name}, ${step.verdict}`)));
   }
 
   /** Frames are drawn when they come into sight. */
   function lazily(strip, steps) {
     const watch = new IntersectionObserver((seen) => {
-      for (const { target, isIntersecting } of seen) {
-        if (!isIntersecting) continue;
-        watch.unobserve(target);
-        const { blocks, ...options } = steps[Number(target.dataset.step) - 1].thumb;
-        Solid.draw(target.querySelector("canvas"), blocks, { ...options, view: HOME, size: THUMB_PX, accent: accent() });
-      }
+      for (const { target, isIntersecting } of seen) if (isIntersecting) target.draw();
     }, { rootMargin: "200px" });
-    strip.querySelectorAll("button").forEach((button) => button.querySelector("canvas") && watch.observe(button));
+    strip.querySelectorAll("button").forEach((button, i) => {
+      if (!steps[i].thumb) return;
+      button.draw = () => {
+        watch.unobserve(button);
+        const { blocks, ...options } = steps[i].thumb;
+        Solid.draw(button.querySelector("canvas"), blocks, { ...options, view: HOME, size: THUMB_PX, accent: accent() });
+      };
+      watch.observe(button);
+    });
   }
 
   function paint({ canvas, title }, run, place, at, view) {

@@ -5,38 +5,81 @@ const Question = (() => {
   const LETTERS = "ABCD";
   const isPicture = (option) => /^<img[1-4]>$/.test(option);
 
-  function drawn(question, label) {
-    const one = question.pictures.find((candidate) => candidate.label === label);
-    if (!one) return null;
-    return Detail.picture(`Picture ${label}`, one.blocks,
-      { view: one.view, framed: one.framed.length ? one.framed : one.blocks, marks: one.marks, grid: true }, "goal");
+  /** A picture of the question: the one that was sent, where it is at hand, else drawn. */
+  function picture(question, label, sample) {
+    const sent = isAsEntered(question, sample) ? sample.record.prompt?.images.find((image) => image.label === label) : null;
+    if (sent?.file) return Sent.picture(sent);
+    const drawing = question.pictures.find((candidate) => candidate.label === label);
+    if (!drawing) return null;
+    const framed = drawing.framed.length ? drawing.framed : drawing.blocks;
+    return el("figure", {}, Detail.picture(`Picture ${label}`, drawing.blocks,
+      { view: drawing.view, framed, marks: drawing.marks, grid: true }, "goal"),
+    el("figcaption", { class: "muted" }, `${label}, drawn anew`));
   }
 
-  /** The question as it was shown: pictures, text, options, the right one; and its evidence. */
-  function about(question, sample) {
+  /** By how many places the letters of a sample are turned against those that are shown. */
+  function turned(question, sample) {
+    const right = sample.record.answer?.right;
+    return right ? LETTERS.indexOf(question.answer[0]) - LETTERS.indexOf(right[0]) : 0;
+  }
+
+  const isAsEntered = (question, sample) => turned(question, sample) === 0
+    && !sample.record.question?.wrong_image;
+
+  /** The letters that a sample gave, as the options are lettered here. */
+  function given(question, sample) {
+    const letters = sample.record.answer?.given;
+    if (!letters) return "";
+    const n = question.options.length, by = turned(question, sample);
+    return [...letters].map((letter) => LETTERS[(LETTERS.indexOf(letter) + by + n) % n] || "").join("");
+  }
+
+  /** The question as it was shown: text, pictures, options, the right one, those given. */
+  function about(question, samples) {
+    const [sample] = samples;
     const shown = question.pictures.filter((one) => !LETTERS.includes(one.label));
     return el("section", { class: "card question" },
       el("p", { class: "muted" }, `${question.subtask} ${Data.index.subtask_names[question.subtask] || ""} · scene ${sample.scene}`),
       el("p", { class: "asked" }, question.text),
-      shown.length ? el("div", { class: "pictures" }, shown.map((one) =>
-        el("figure", {}, drawn(question, one.label), shown.length > 1 ? el("figcaption", { class: "muted" }, one.label) : null))) : null,
-      options(question),
-      Detail.folded("Evidence", el("pre", { class: "text" }, JSON.stringify(question.evidence, null, 2))));
+      shown.length ? el("div", { class: "pictures" }, shown.map((one) => picture(question, one.label, sample))) : null,
+      options(question, samples),
+      Reply.folded("Evidence: what the right answer was worked out from", evidence(question.evidence)));
   }
 
-  function options(question) {
+  function options(question, samples) {
     const { answer } = question;
+    const isOrder = answer.length > 1;
+    const answers = samples.map((sample) => [samples.length > 1 ? sample.model : "", given(question, sample)]);
     return el("ol", { class: question.options.every(isPicture) ? "options pictured" : "options" }, question.options.map((option, i) => {
-      const place = answer.indexOf(LETTERS[i]);
-      const isRight = answer.length === 1 && place === 0;
-      const mark = answer.length > 1 ? `${place + 1}.` : "✓";
-      return el("li", { class: isRight ? "right" : "" },
-        el("span", { class: "letter" }, LETTERS[i]),
-        isPicture(option) ? drawn(question, LETTERS[i]) : el("span", {}, option),
-        isRight || answer.length > 1
-          ? el("span", { class: "mark", title: answer.length > 1 ? "Place in the right order" : "The right answer" }, mark)
-          : null);
+      const letter = LETTERS[i], isRight = !isOrder && answer === letter;
+      const marks = [isOrder ? `right place ${answer.indexOf(letter) + 1}` : isRight ? "✓ right" : null];
+      for (const [model, letters] of answers) {
+        const by = model ? ` by ${model}` : "";
+        if (isOrder && letters) marks.push(`${letters[answer.indexOf(letter)] === letter ? "✓" : "✗"} given${by} ${letters.indexOf(letter) + 1}`);
+        else if (letters === letter) marks.push(`${isRight ? "✓" : "✗"} given${by}`);
+      }
+      const isGiven = !isOrder && answers.some(([, letters]) => letters === letter);
+      return el("li", { class: [isRight && "right", isGiven && "given"].filter(Boolean).join(" ") },
+        el("span", { class: "letter" }, letter),
+        isPicture(option) ? picture(question, letter, samples[0]) : el("span", { class: "option" }, option),
+        el("span", { class: "marks" }, marks.filter(Boolean).map((mark) => el("span", { class: "mark" }, mark))));
     }));
+  }
+
+  const isPlain = (value) => value === null || typeof value !== "object";
+  const number = (value) => (typeof value === "number" && !Number.isInteger(value) ? String(Number(value.toPrecision(4)))
+    : value === null ? "none" : value === true ? "yes" : value === false ? "no" : String(value).replaceAll("_", " "));
+
+  /** Names and values as a list; what is nested is a list within. */
+  function evidence(value) {
+    if (isPlain(value)) return number(value);
+    if (Array.isArray(value)) {
+      if (value.every(isPlain)) return value.map(number).join(", ") || "none";
+      return el("ol", { class: "evidence" }, value.map((one) => el("li", {}, evidence(one))));
+    }
+    const rows = Object.entries(value);
+    return rows.length ? el("dl", { class: "evidence" }, rows.map(([name, one]) =>
+      [el("dt", {}, name.replaceAll("_", " ")), el("dd", {}, evidence(one))])) : "none";
   }
 
   function answer(sample) {
@@ -66,13 +109,12 @@ const Question = (() => {
 const Turns = (() => {
   /** Every reply of an episode, folded but for what became of it. */
   function cards(record) {
-    return el("section", { class: "card" }, el("h3", {}, "Turns"),
+    return el("section", { class: "card" }, el("h2", {}, "Turns"),
       el("ol", { class: "turns" }, record.turns.map((turn) => el("li", {}, el("details", {},
         el("summary", {}, ...head(turn)),
-        Detail.parsed(turn.parse),
-        turn.reply?.reasoning ? Detail.folded("Reasoning", el("pre", { class: "text" }, turn.reply.reasoning)) : null,
-        el("pre", { class: "text reply" }, turn.reply?.text || "(empty)"),
-        Detail.promptCard(turn.prompt))))));
+        Reply.parsed(turn.parse),
+        turn.reply?.reasoning ? Reply.folded("Reasoning", Reply.text(turn.reply.reasoning)) : null,
+        Reply.text(turn.reply?.text || "(empty)"))))));
   }
 
   function head(turn) {

@@ -1,0 +1,82 @@
+/* Where in a reply each step of a plan stands: the sentence that names its candidate. */
+"use strict";
+
+const Quotes = (() => {
+  const MOST_TRIES = 400;
+  const LONGEST = 240;
+  const LABEL = /^[\s>*_#|([{"'-]*(?:(?:step|move|action)[\s_]*#?)?\d{1,3}["'\s]*[.):|\]*]+/i;
+
+  /** Numbers of a text with their places, without those that only count steps. */
+  function numbers(text) {
+    const found = [];
+    let at = 0;
+    for (const line of text.split("\n")) {
+      const label = line.match(LABEL)?.[0].length || 0;
+      const rest = line.slice(label);
+      const skipped = /\d/.test(rest) ? label : 0;
+      for (const one of line.slice(skipped).matchAll(/\d{1,6}/g)) {
+        found.push({ n: Number(one[0]), at: at + skipped + one.index });
+      }
+      at += line.length + 1;
+    }
+    return found;
+  }
+
+  /** Places of a plan's numbers in the reply, in order and close together; null: they are not. */
+  function places(text, plan) {
+    const known = numbers(text);
+    let best = null;
+    let tries = 0;
+    for (let end = known.length - 1; end >= 0 && tries < MOST_TRIES; end--) {
+      if (known[end].n !== plan[plan.length - 1]) continue;
+      tries++;
+      const found = [];
+      let step = plan.length - 1;
+      for (let i = end; i >= 0 && step >= 0; i--) {
+        if (known[i].n === plan[step]) {
+          found.unshift(known[i].at);
+          step--;
+        }
+      }
+      if (step >= 0) continue;
+      const length = found[found.length - 1] - found[0];
+      if (!best || length < best.length) best = { length, found };
+    }
+    return best && best.found;
+  }
+
+  /** The sentence of a text that holds a place; a line ends a sentence too. */
+  function sentence(text, at) {
+    const from = text.lastIndexOf("\n", at - 1) + 1;
+    const end = text.indexOf("\n", at);
+    const line = text.slice(from, end < 0 ? text.length : end);
+    let start = 0;
+    for (const stop of line.matchAll(/[.!?]\s+(?=[A-Z*"“(])/g)) {
+      const next = stop.index + stop[0].length;
+      if (from + next > at) return cut(line.slice(start, next), at - from - start);
+      start = next;
+    }
+    return cut(line.slice(start), at - from - start);
+  }
+
+  function cut(said, place) {
+    const whole = said.trim();
+    if (whole.length <= LONGEST) return whole;
+    const from = Math.max(0, Math.min(place - LONGEST / 2, said.length - LONGEST));
+    return `${from ? "… " : ""}${said.slice(from, from + LONGEST).trim()}${from + LONGEST < said.length ? " …" : ""}`;
+  }
+
+  /** For each step of a plan the sentence that it was read in; null where none can be told. */
+  function ofPlan(text, plan) {
+    const found = text && plan.length ? places(text, plan) : null;
+    return plan.map((_, i) => (found ? sentence(text, found[i]) : null));
+  }
+
+  /** The last sentence that names a move. */
+  function ofMove(text, move) {
+    const [quote] = Number.isInteger(move) ? ofPlan(text || "", [move]) : [null];
+    return quote;
+  }
+
+  return { ofPlan, ofMove };
+})();

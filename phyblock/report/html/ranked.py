@@ -1,0 +1,52 @@
+"""The place of each model among those of a run, as far as tests can tell."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from phyblock.report.compare import compare_models
+from phyblock.report.measure_table import headline_of, main_heading
+from phyblock.tables.headline import Value
+from phyblock.tables.load import Run
+from phyblock.tables.measures import Measure
+from phyblock.tracks.estimates import track_measures
+from phyblock.tracks.headline import main_column
+
+__all__ = ["kinds_of", "main_measure", "rank_texts"]
+
+
+def main_measure(run: Run, track: str) -> Measure:
+    """The measure that models of a track are ranked by."""
+    name = main_column(run, track).measure
+    return next(measure for measure in track_measures(track) if measure.name == name)
+
+
+def rank_texts(run: Run, track: str) -> dict[str, str]:
+    """The place that each model may have by its main value; {} where there are not two."""
+    main, values = main_heading(run, track), headline_of(run, track)
+    known = {model for (model, heading), v in values.items() if heading == main and _is_known(v)}
+    models = [name for name, sort in kinds_of(run).items() if sort == "model" and name in known]
+    if len(models) < 2:
+        return {}
+    found = compare_models(run, models, track, main_measure(run, track).name)
+    texts = {}
+    for row in found.ranks.to_dict("records"):
+        best, worst = row["best"], row["worst"]
+        texts[str(row["model"])] = f"{best}" if best == worst else f"{best} to {worst}"
+    return texts
+
+
+def _is_known(value: Value) -> bool:
+    return not math.isnan(value.value)
+
+
+def kinds_of(run: Run) -> dict[str, Literal["model", "baseline"]]:
+    """Which models are baselines; these come last."""
+    kinds = {model.name: model.kind for model in run.manifest.models}
+    baselines = [name for name in run.design.model_names if kinds.get(name) == "baseline"]
+    models = [name for name in run.design.model_names if name not in baselines]
+    return {
+        **dict.fromkeys(models, "model"),
+        **dict.fromkeys(baselines, "baseline"),
+    }
