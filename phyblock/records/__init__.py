@@ -31,6 +31,7 @@ from phyblock.records.record import (
 from phyblock.records.record_lines import RecordedLines, RecordLines, record_adapter
 from phyblock.records.reply import StoredError, StoredReply, StoredUsage
 from phyblock.records.scene import StoredScene
+from phyblock.records.stopped import STOPPED, Stopped, read_stopped
 
 __all__ = [
     "BATCHES",
@@ -38,6 +39,7 @@ __all__ = [
     "MANIFEST",
     "PROMPTS",
     "RECORDS",
+    "STOPPED",
     "TURNS",
     "AskedTurn",
     "BatchLine",
@@ -59,6 +61,7 @@ __all__ = [
     "SentImage",
     "SentPrompt",
     "ShownScene",
+    "Stopped",
     "StoredError",
     "StoredQuestion",
     "StoredReply",
@@ -67,5 +70,6 @@ __all__ = [
     "Turn",
     "TurnLines",
     "read_manifest",
+    "read_stopped",
     "record_adapter",
 ]

@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from phyblock.bounded import NotRegularError, open_regular
-from phyblock.records import MANIFEST, PROMPTS, RECORDS, read_manifest
+from phyblock.records import MANIFEST, PROMPTS, RECORDS, STOPPED, read_manifest
 from phyblock.registry import has_additions
 from phyblock.resources import cache_dir
 from phyblock.tables.design import read_design
@@ -54,7 +54,7 @@ def inputs_digest(folder: Path, tables: Sequence[str] | None) -> str | None:
     if code is None or None in data:
         return None
     try:
-        held = [digest_of_file(folder / name) for name in (MANIFEST, RECORDS, PROMPTS)]
+        held = [digest_of_file(folder / name) for name in (MANIFEST, RECORDS, PROMPTS, STOPPED)]
     except (OSError, NotRegularError):
         return None
     variables = sorted(f"{k}={v}" for k, v in os.environ.items() if k.startswith(_VARIABLES))

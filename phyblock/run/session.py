@@ -174,7 +174,17 @@ class Session:
                 },
             )
         )
-        return await self.executor.run()
+        try:
+            return await self.executor.run()
+        finally:
+            self._note_stopped(self.executor.result)
+
+    def _note_stopped(self, result: RunResult) -> None:
+        reason = result.stop.reason if result.stop and result.left else ""
+        assert self._store is not None
+        self._store.note_stopped(
+            result.stopped, reason, [model.name for model in self._plan.models]
+        )
 
     def _check_batches(self, store: RunStore) -> None:
         """Raise SpecError for models that are asked singly and have a batch under way."""

@@ -8,8 +8,9 @@ sample replaces an earlier one.
 from __future__ import annotations
 
 import fcntl
+import json
 import os
-from collections.abc import Callable, Collection, Container, Iterator
+from collections.abc import Callable, Collection, Container, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any, TypeVar
 
@@ -17,15 +18,18 @@ from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, writing
 from phyblock.records import (
     MANIFEST,
+    STOPPED,
     BatchLines,
     Belonging,
     Line,
     Lines,
     Manifest,
     PromptLines,
+    Stopped,
     StoredReply,
     TurnLines,
     read_manifest,
+    read_stopped,
 )
 from phyblock.records.reading import any_records, collect_turns, run_records
 from phyblock.run.appending import AppendFile
@@ -104,6 +108,21 @@ class RunStore:
         if self._lock is not None:
             self._lock.close()
             self._lock = None
+
+    def note_stopped(self, models: Mapping[str, str], run: str, asked: Collection[str]) -> None:
+        """Keep why the models `asked` about, or the whole run, were stopped, for whoever reads it.
+
+        What an earlier session says of other models stays. Raises StoreError where the folder
+        cannot be written.
+        """
+        earlier = read_stopped(self._folder).models
+        kept = {name: why for name, why in earlier.items() if name not in asked}
+        stopped = Stopped(models={**kept, **models}, run=run)
+        folder = run_folder(self._folder)
+        if stopped.models or stopped.run:
+            folder.write({STOPPED: json.dumps(stopped.fields(), indent=2) + "\n"})
+        else:
+            folder.remove([STOPPED])
 
     def begun_turns(self, done: Container[str]) -> dict[str, list[StoredReply]]:
         """The replies of episodes that have begun and are not `done`, by sample id."""

@@ -12,23 +12,12 @@ import pytest
 import yaml
 
 from phyblock.report import write_report, write_tables
-from tests.report.browser import Visit, chromium, expect
-from tests.report.html_run import HOSTILE, HOSTILE_SAMPLE, make_run, many
+from tests.report.browser import Visit, expect
+from tests.report.html_run import HOSTILE, HOSTILE_SAMPLE, many
 from tests.workspace import Workspace
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
-    return make_run(tmp_path_factory.mktemp("page"), pictures_dir)
 
 
 @pytest.fixture

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from phyblock.report import Run, load_run
 from phyblock.report.html.headline import headlines
+from phyblock.report.html.standing import cautions, samples_done
 from phyblock.tracks.full_planning.assembly import assembly_frame
 from phyblock.tracks.step_planning.table3 import step_intervals, table3_frame
 from phyblock.tracks.vqa.accuracy import questions_frame
 from tests.report.factory import manifest, record, run_of, score
-from tests.report.html_run import make_run
+from tests.workspace import Workspace
 
 
 def planning_run() -> Run:
@@ -56,10 +55,45 @@ def test_a_run_has_headlines_of_its_own_tracks_alone() -> None:
     assert [headline.title for headline in headlines(planning_run())] == ["Full planning"]
 
 
-def test_headlines_of_questions_and_episodes(
-    tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path
-) -> None:
-    made = make_run(tmp_path_factory.mktemp("headline"), pictures_dir)
+def test_a_run_says_what_it_is_not() -> None:
+    whole = planning_run()
+    facts = {**manifest(models=["alpha", "beta"], seeds=[0]), "scenes": 3}
+    facts["items"] = {"full_planning": 3}
+    scenes = ("001", "002", "003")
+    answered = [record("alpha", scene, scores=[score(1, 1, 1)]) for scene in scenes]
+    failed = [record("beta", scene, outcome="api_error") for scene in scenes]
+    assert cautions(run_of(answered, {**facts, "models": facts["models"][:1]})) == ()
+    assert cautions(run_of([*answered, *failed], facts)) == (
+        "beta: all 3 calls failed (HTTP 429: busy).",
+    )
+    assert cautions(run_of([*answered, failed[0]], facts)) == (
+        "This run is not finished: 4 of 6 samples have a record.",
+        "beta: the one call failed (HTTP 429: busy); 2 of 3 samples were not asked.",
+    )
+    assert samples_done(run_of([*answered, *failed], facts)) == "3 of 6"
+    assert cautions(whole) != ()
+
+
+def test_models_stand_by_rank_with_the_places_that_tests_leave_open() -> None:
+    facts = {**manifest(models=["low", "high", "middle"], seeds=[0]), "scenes": 40}
+    names = [f"{n:03}" for n in range(40)]
+    values = {"high": (4, 0, 0), "middle": (2, 2, 2), "low": (2, 2, 2)}
+    records = [
+        {**record(model, name, scores=[score(*counts)]), "levels": [2], "parents": [name]}
+        for model, counts in values.items()
+        for name in names
+    ]
+    (headline,) = headlines(run_of(records, facts))
+    models = [row for row in headline.rows if row.kind == "model"]
+    assert models[0].name == "high"
+    assert {row.name: row.rank for row in models} == {
+        **{"high": "1", "middle": "2 to 3", "low": "2 to 3"},
+    }
+    level = dict(zip(headline.columns, models[0].cells, strict=True))["Level 2"]
+    assert level.query == "track=full_planning&level=2&model=high"
+
+
+def test_headlines_of_questions_and_episodes(made: Workspace) -> None:
     run = load_run(made.out, texts=False)
     by_title = {headline.title: headline for headline in headlines(run)}
     answers, steps = by_title["VQA"], by_title["Step planning"]

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from aiohttp import web
 
+from phyblock.records import STOPPED, read_stopped
 from tests.servers.chassis import ISSUE_MIX, Faults, Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Raw, Workspace
@@ -79,6 +80,12 @@ def test_a_model_that_cannot_answer_is_stopped_alone(workspace: Workspace) -> No
         assert "unknown was stopped: HTTP 404: The model unknown does not exist" in done.out
         assert "100 of 300 samples are done" in done.out
         assert "give the same command again" in done.out
+        # Reports made later, from the folder alone, know it too.
+        stopped = read_stopped(workspace.out).models
+        assert {name: why[:8] for name, why in stopped.items()} == {
+            "locked": "HTTP 401",
+            "unknown": "HTTP 404",
+        }
         assert max(servers[0].requests, servers[1].requests) <= 6
         assert servers[2].requests == 100
         told = coverage(workspace)
@@ -91,6 +98,7 @@ def test_a_model_that_cannot_answer_is_stopped_alone(workspace: Workspace) -> No
         again = workspace.run("--set", "limits.max_concurrency=6")
     assert again.code == 0
     assert "All 300 samples are done" in again.out
+    assert not (workspace.out / STOPPED).exists()
     assert [server.ended["ok"] for server in servers] == [100, 100, 100]
 
 

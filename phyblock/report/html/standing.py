@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import pandas as pd
 
+from phyblock.records import read_stopped
 from phyblock.tables.coverage import coverage_frame
 from phyblock.tables.load import Run
 from phyblock.tables.outcomes import WITHOUT_REPLY
@@ -35,6 +36,8 @@ def cautions(run: Run) -> tuple[str, ...]:
         said.insert(
             0, f"This run is not finished: {recorded:,} of {expected:,} samples have a record."
         )
+    if reason := read_stopped(run.path).run:
+        said.append(f"The last session was stopped: {_short(reason)}.")
     if run.is_cut:
         said.append("The last line of records.jsonl was cut off and is ignored.")
     return (*said, *_limits(run))
@@ -43,13 +46,14 @@ def cautions(run: Run) -> tuple[str, ...]:
 def shortfalls(run: Run, track: str) -> Mapping[str, str]:
     """By model that lacks replies in a track, how many it has and why it has no more."""
     table = coverage_frame(run)
-    reasons = _reasons(run, track)
+    reasons, stopped = _reasons(run, track), read_stopped(run.path).models
     found = {}
     for row in table[table["track"] == track].to_dict("records"):
         answered = row["recorded"] - sum(row[name] for name in WITHOUT_REPLY)
         if answered < row["expected"]:
-            why = reasons.get(row["model"])
-            ending = f": {why[0]}" if why else ""
+            failed = reasons.get(row["model"])
+            why = _short(stopped[row["model"]]) if row["model"] in stopped else failed and failed[0]
+            ending = f": {why}" if why else ""
             found[str(row["model"])] = f"{answered:,} of {row['expected']:,} answered{ending}"
     return found
 
@@ -57,7 +61,7 @@ def shortfalls(run: Run, track: str) -> Mapping[str, str]:
 def _unanswered(run: Run, table: pd.DataFrame) -> list[str]:
     """Sentences on models that lack replies: those without any first."""
     said: dict[str, tuple[float, str]] = {}
-    reasons = _reasons(run)
+    reasons, stopped = _reasons(run), read_stopped(run.path).models
     for model, rows in table.groupby("model", sort=False):
         expected, failed = int(rows["expected"].sum()), int(rows["api_error"].sum())
         missing, not_run = int(rows["missing"].sum()), int(rows["not_run"].sum())
@@ -65,6 +69,7 @@ def _unanswered(run: Run, table: pd.DataFrame) -> list[str]:
         if answered == expected:
             continue
         parts = [
+            *([f"stopped ({_short(stopped[str(model)])})"] if model in stopped else []),
             *([_failed(failed, answered, reasons.get(str(model)))] if failed else []),
             *([f"{missing:,} of {expected:,} replies are missing"] if missing else []),
             *([f"{not_run:,} of {expected:,} samples were not asked"] if not_run else []),
@@ -96,10 +101,14 @@ def _reasons(run: Run, track: str = "") -> Mapping[str, tuple[str, int]]:
         message = " ".join(str(row["error_message"] or row["error_kind"]).split())
         if not pd.isna(status) and str(status) not in message:
             message = f"HTTP {status}: {message}"
-        if len(message) > _MOST_CHARACTERS:
-            message = f"{message[:_MOST_CHARACTERS].rstrip()} …"
-        counted.setdefault(str(row["model"]), Counter())[message] += 1
+        counted.setdefault(str(row["model"]), Counter())[_short(message)] += 1
     return {model: reasons.most_common(1)[0] for model, reasons in counted.items()}
+
+
+def _short(message: str) -> str:
+    """In one line that is no paragraph, without the stop at its end."""
+    text = " ".join(message.split()).rstrip(".")
+    return text if len(text) <= _MOST_CHARACTERS else f"{text[:_MOST_CHARACTERS].rstrip()} …"
 
 
 def _limits(run: Run) -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any
 from phyblock.datasets import AssemblyTask
 from phyblock.files import writing
 from phyblock.folders import OutFolder
-from phyblock.records import MANIFEST, PROMPTS, RECORDS
+from phyblock.records import MANIFEST, PROMPTS, RECORDS, STOPPED
 from phyblock.report.figures import figure_titles, write_figures
 from phyblock.report.html.headline import headlines
 from phyblock.report.html.index import Item, SampleIndex, read_places
@@ -109,7 +109,7 @@ def page_files() -> tuple[str, ...]:
 def _build(run: Run, sources: Sources) -> str:
     """A name for what the page shows: the same run, written again, has the same files."""
     digest = hashlib.sha256(f"{_LAYOUT} {version('phyblock')} {sources.lacking}".encode())
-    for name in (MANIFEST, RECORDS, PROMPTS):
+    for name in (MANIFEST, RECORDS, PROMPTS, STOPPED):
         with contextlib.suppress(FileNotFoundError), (run.path / name).open("rb") as file:
             while chunk := file.read(_CHUNK_BYTES):
                 digest.update(chunk)

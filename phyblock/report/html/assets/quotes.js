@@ -50,8 +50,11 @@ const Quotes = (() => {
     const from = text.lastIndexOf("\n", at - 1) + 1;
     const end = text.indexOf("\n", at);
     const line = text.slice(from, end < 0 ? text.length : end);
+    const label = line.match(LABEL)?.[0].length || 0;
     let start = 0;
     for (const stop of line.matchAll(/[.!?]\s+(?=[A-Z*"“(])/g)) {
+      // The full stop behind a number of a list ends nothing.
+      if (stop.index < label) continue;
       const next = stop.index + stop[0].length;
       if (from + next > at) return cut(line.slice(start, next), at - from - start);
       start = next;
