@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
+from random import Random
 from typing import TYPE_CHECKING
 
 import pytest
@@ -282,6 +284,110 @@ def test_replies_are_markdown_that_can_do_nothing(visit: Visit) -> None:
     page.locator("summary", has_text="Raw text").click()
     assert page.locator("pre.reply").inner_text() == MARKUP
     assert page.evaluate("window.hacked") is None
+
+
+PARTS = [
+    *(
+        "\n",
+        "\n",
+        "\n\n",
+        " ",
+        "  ",
+        "    ",
+        "# ",
+        "- ",
+        "* ",
+        "1. ",
+        "> ",
+        "|",
+        "\n|---|---|\n",
+        "`",
+        "**",
+    ),
+    *(
+        "_",
+        "*",
+        "[",
+        "](http://x.y)",
+        "![",
+        "\n```\n",
+        "\n~~~\n",
+        "---",
+        "\\",
+        "<script>alert(1)</script>",
+    ),
+    *(
+        "<img src=x onerror=alert(1)>",
+        "</p>",
+        "&lt;",
+        "\t",
+        "javascript:alert(1)",
+        "\r\n",
+        "(",
+        ")",
+    ),
+]
+
+
+def test_markdown_of_any_text_loses_no_word_and_makes_no_element_of_its(visit: Visit) -> None:
+    draw = Random(7)
+    texts = []
+    for _ in range(400):
+        parts = [draw.choice(PARTS) for _ in range(draw.randrange(1, 40))]
+        texts.append(
+            "".join(f"{part}w{n}x" * draw.randrange(3) + part for n, part in enumerate(parts))
+        )
+    page = visit.open()
+    made = page.evaluate(
+        """texts => texts.map((text) => {
+            const place = document.createElement("div");
+            place.append(...Markdown.render(text));
+            const all = [...place.querySelectorAll("*")];
+            const names = all.flatMap((one) => [one.tagName, ...one.getAttributeNames()]);
+            return [place.textContent, [...new Set(names)]];
+        })""",
+        texts,
+    )
+    tags = ["P", "STRONG", "EM", "CODE", "PRE", "UL", "OL", "LI", "BLOCKQUOTE", "HR", "DIV"]
+    tags += ["TABLE", "THEAD", "TBODY", "TR", "TH", "TD"]
+    allowed = {*tags, "class", "value", "scope", "tabindex"}
+    for text, (shown, names) in zip(texts, made, strict=True):
+        assert set(names) <= allowed, text
+        assert set(re.findall(r"w\d+x", text)) <= set(re.findall(r"w\d+x", shown)), text
+
+
+def test_markdown_of_a_long_hostile_text_takes_no_time(visit: Visit) -> None:
+    page = visit.open()
+    took = page.evaluate(
+        """() => ["*", "**", "`", "[", "_", "> ", "1. ", "- ", "|", "\\\\"].map((part) => {
+            const begun = performance.now();
+            Markdown.render(part.repeat(4000));
+            Markdown.render(`${part}x\\n`.repeat(4000));
+            return performance.now() - begun;
+        })"""
+    )
+    assert max(took) < 2000
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "Step {i}: Move block with index {n}",
+        '"Step{i}": "Move block with index {n}",',
+        "{i}. Place block {n} on top.",
+        "**Step {i}**: take number {n}. It is wide.",
+        "{i}) Move({n})",
+    ],
+)
+def test_each_step_finds_its_sentence(visit: Visit, form: str) -> None:
+    draw = Random(form)
+    page = visit.open()
+    for _ in range(12):
+        plan = [draw.randrange(1, 17) for _ in range(draw.randrange(1, 9))]
+        said = [form.format(i=i, n=n) for i, n in enumerate(plan, 1)]
+        text = "\n".join(["There are 16 candidates, of which 3 are red.", "", *said, "", "Done."])
+        found = page.evaluate("([text, plan]) => Quotes.ofPlan(text, plan)", [text, plan])
+        assert all(one and one in line for one, line in zip(found, said, strict=True)), text
 
 
 def test_a_wrong_step_shows_the_block_that_was_tried_and_the_sentence(visit: Visit) -> None:

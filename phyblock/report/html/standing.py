@@ -62,6 +62,7 @@ def _unanswered(run: Run, table: pd.DataFrame) -> list[str]:
     """Sentences on models that lack replies: those without any first."""
     said: dict[str, tuple[float, str]] = {}
     reasons, stopped = _reasons(run), read_stopped(run.path).models
+    counted = "left out of its values" if run.design.outcomes_left_out else "counted as wrong"
     for model, rows in table.groupby("model", sort=False):
         expected, failed = int(rows["expected"].sum()), int(rows["api_error"].sum())
         missing, not_run = int(rows["missing"].sum()), int(rows["not_run"].sum())
@@ -71,7 +72,7 @@ def _unanswered(run: Run, table: pd.DataFrame) -> list[str]:
         parts = [
             *([f"stopped ({_short(stopped[str(model)])})"] if model in stopped else []),
             *([_failed(failed, answered, reasons.get(str(model)))] if failed else []),
-            *([f"{missing:,} of {expected:,} replies are missing"] if missing else []),
+            *([f"{missing:,} of {expected:,} replies are missing, {counted}"] if missing else []),
             *([f"{not_run:,} of {expected:,} samples were not asked"] if not_run else []),
         ]
         said[str(model)] = answered / expected, f"{model}: {'; '.join(parts)}."

@@ -6,7 +6,13 @@ const Quotes = (() => {
   const LONGEST = 240;
   const LABEL = /^[\s>*_#|([{"'-]*(?:(?:step|move|action)[\s_]*#?)?\d{1,3}["'\s]*[.):|\]*]+/i;
 
-  /** Numbers of a text with their places, without those that only count steps. */
+  const NAMED = /(?:\bindex|\bmove\()[\s"'#:=]*(\d{1,6})/gi;
+
+  /** Numbers that a text calls an index or moves, with their places. */
+  const named = (text) => [...text.matchAll(NAMED)].map((one) =>
+    ({ n: Number(one[1]), at: one.index + one[0].length - one[1].length }));
+
+  /** All numbers of a text with their places, without those that only count steps. */
   function numbers(text) {
     const found = [];
     let at = 0;
@@ -22,9 +28,8 @@ const Quotes = (() => {
     return found;
   }
 
-  /** Places of a plan's numbers in the reply, in order and close together; null: they are not. */
-  function places(text, plan) {
-    const known = numbers(text);
+  /** Places of a plan's numbers among `known`, in order and close together; null: they are not. */
+  function places(known, plan) {
     let best = null;
     let tries = 0;
     for (let end = known.length - 1; end >= 0 && tries < MOST_TRIES; end--) {
@@ -71,7 +76,7 @@ const Quotes = (() => {
 
   /** For each step of a plan the sentence that it was read in; null where none can be told. */
   function ofPlan(text, plan) {
-    const found = text && plan.length ? places(text, plan) : null;
+    const found = text && plan.length ? places(named(text), plan) || places(numbers(text), plan) : null;
     return plan.map((_, i) => (found ? sentence(text, found[i]) : null));
   }
 
