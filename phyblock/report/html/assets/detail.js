@@ -42,8 +42,8 @@ const Detail = (() => {
     const scene = inFile && asShown(inFile, loaded[0].record);
     const several = loaded.length > 1;
     player = null;
-    const did = question ? [Question.about(question, loaded)]
-      : [assembly(loaded, scene, several), scene ? candidates(scene) : null].filter(Boolean);
+    const did = question ? Question.about(question, loaded)
+      : [assembly(loaded, scene, several), scene ? candidates(scene) : []];
     const saw = el("section", { class: "card" }, columns(loaded.map((sample) =>
       [several ? heading(sample) : null, Sent.panel(sample)])));
     const said = columns(loaded.map((sample) => [
@@ -97,8 +97,7 @@ const Detail = (() => {
       .map((one) => (isUpright ? { ...one, euler: [0, 0, 0] } : one));
     const number = (block) => (isUpright ? candidates.findIndex((one) => Words.block(one) === Words.block(block))
       : shown.order.indexOf(block.candidate)) + 1;
-    return { ...scene, candidates,
-      blocks: scene.blocks.map((block) => ({ ...block, candidate: number(block) })) };
+    return { ...scene, candidates, blocks: scene.blocks.map((block) => ({ ...block, candidate: number(block) })) };
   }
 
   /** Goal and what was built side by side, under one clock; the steps below. */

@@ -74,9 +74,14 @@ const Quotes = (() => {
     return `${from ? "… " : ""}${said.slice(from, from + LONGEST).trim()}${from + LONGEST < said.length ? " …" : ""}`;
   }
 
-  /** For each step of a plan the sentence that it was read in; null where none can be told. */
-  function ofPlan(text, plan) {
-    const found = text && plan.length ? places(named(text), plan) || places(numbers(text), plan) : null;
+  /**
+   * For each step of a plan the sentence that it was read in; null where none can be told.
+   *
+   * `orAny`: numbers that the text does not call an index may be meant, too.
+   */
+  function ofPlan(text, plan, orAny = true) {
+    const found = text && plan.length
+      ? places(named(text), plan) || (orAny ? places(numbers(text), plan) : null) : null;
     return plan.map((_, i) => (found ? sentence(text, found[i]) : null));
   }
 

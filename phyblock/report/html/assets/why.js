@@ -4,7 +4,7 @@
 const Why = (() => {
   /** A note on the step that the player stands at. */
   function note(sample, scene, steps, player) {
-    const { reply, parse, turns } = sample.record;
+    const { reply, parse, turns, pose } = sample.record;
     const body = el("div", { class: "why" });
     let quotes = null;
     player.listeners.push(() => {
@@ -12,7 +12,7 @@ const Why = (() => {
       body.replaceChildren();
       if (!step) return;
       quotes = quotes || (turns ? steps.map((one) => Quotes.ofMove(one.turn.reply?.text, one.number))
-        : Quotes.ofPlan(reply?.text || "", parse?.plan || []));
+        : Quotes.ofPlan(reply?.text || "", parse?.plan || [], !pose));
       const where = step.why && scene ? Overlay.words(scene, step) : "";
       if (where) body.append(el("p", { class: "muted" }, where));
       const quote = quotes[player.at - 1];
