@@ -121,7 +121,7 @@ def test_pictures_that_are_not_kept_are_said(
     visit = Visit(page, folder / "report.html")
     sample = next(r["sample"] for r in troubled.records() if r["track"] == "full_planning")
     visit.show(sample, tab="saw")
-    expect(page.locator("#panel-saw .notice")).to_contain_text("is not in the picture cache")
+    expect(page.locator("#panel-saw .notice")).to_contain_text("is not kept beside this page")
     page.close()
 
 

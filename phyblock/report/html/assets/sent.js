@@ -47,7 +47,7 @@ const Sent = (() => {
   function picture(image) {
     const size = image.width_px ? `, ${image.width_px} × ${image.height_px} pixels` : "";
     if (!image.file) {
-      return el("p", { class: "notice" }, `Picture “${image.label}”${size}: it was sent, and is not in the picture cache of the machine that wrote this page.`);
+      return el("p", { class: "notice" }, `Picture “${image.label}”${size}: it was sent, and is not kept beside this page.`);
     }
     return el("figure", {}, el("img", {
       src: image.file, alt: `Picture as sent: ${image.label}`, width: image.width_px, height: image.height_px,
