@@ -88,11 +88,16 @@ class PageItems:
 
 @dataclass(frozen=True)
 class EpisodeView:
-    """How a record of a track is shown step by step: as a table, and as frames of a film."""
+    """How a record of a track is shown step by step: as a table, and as frames of a film.
+
+    `state_keys` name, in the cache, the pictures that its turns were sent beside those of the
+    scene.
+    """
 
     track: str
     table: Callable[[Any], TextTable]
     frames: Callable[[Any, AssemblyTask], Iterable[FilmStep]]
+    state_keys: Callable[[Any, AssemblyTask, PictureStyle], Iterable[str]] = lambda *_: ()
 
 
 @dataclass(frozen=True)

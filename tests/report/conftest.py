@@ -1,4 +1,4 @@
-"""One run and one browser for all tests of the page."""
+"""One run for all tests of the page, and a browser for each module of them."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
+    """A browser; its event loop runs while it does, so that it ends with its module."""
     with chromium() as running:
         yield running
 

@@ -101,6 +101,9 @@ def test_what_a_model_saw_is_the_first_tab_pixel_for_pixel(
     assert image["sha256"].startswith((picture.get_attribute("src") or "").split("/")[-1][:24])
     trouble.show(sent["step_planning"]["sample"])
     expect(page.locator("#panel-saw .turns .prompt pre").first).to_be_visible()
+    turns = sent["step_planning"]["turns"]
+    # Goal and candidates, and the assembly as it stood before each turn.
+    assert page.locator("#panel-saw img").count() == sum(len(t["prompt"]["images"]) for t in turns)
     page.get_by_role("tab", name="What it built").click()
     page.locator("#next").click()
     # What was chosen stays chosen.

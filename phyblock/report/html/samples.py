@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from phyblock.datasets import AssemblyTask
 from phyblock.records import PromptLines, Record, SentPrompt
 from phyblock.records.reading import any_records
 from phyblock.report.html.index import Item, Place, SampleIndex
 from phyblock.report.html.pack import Pack
+from phyblock.sim import PictureStyle
 from phyblock.tables.track_report import PageItems
+from phyblock.tracks.kind import kinds
 
-__all__ = ["items_shown", "pack_prompts", "pack_samples", "pictures_sent"]
+__all__ = ["items_shown", "pack_prompts", "pack_samples", "pictures_sent", "states_sent"]
 
 _IN_INDEX = frozenset(
     {
@@ -55,6 +58,20 @@ def pictures_sent(folder: Path, places: Sequence[Place]) -> bool:
         record.prompt is not None and record.prompt.images
         for record in _records(folder, first.values())
     )
+
+
+def states_sent(
+    folder: Path,
+    places: Iterable[Place],
+    tasks: Mapping[str, AssemblyTask],
+    style: PictureStyle,
+) -> Iterator[str]:
+    """Names in the cache of the pictures that single turns of episodes were sent."""
+    views = {name: kind.report().episodes for name, kind in kinds().items()}
+    for record in _records(folder, (place for place in places if views.get(place.track))):
+        view, task = views[record.track], tasks.get(record.scene)
+        if view is not None and task is not None and record.prompt is not None:
+            yield from view.state_keys(record, task, style)
 
 
 def items_shown(

@@ -15,6 +15,7 @@ from phyblock.resources import cache_dir
 from phyblock.sim import PictureStyle
 from phyblock.tables.track_report import PageItems
 from phyblock.tracks import PicturePolicy, Pictures
+from phyblock.tracks.studio import Drawing, Studio
 
 __all__ = ["PictureShelf"]
 
@@ -59,6 +60,15 @@ class PictureShelf:
             self.is_whole &= are_real
             if are_real:
                 self._keep(found, pictures.keys(shown))
+
+    def add_kept(self, keys: Iterable[str]) -> None:
+        """Keep pictures by their names in the cache; raises OSError where the disk refuses."""
+        studio = Studio(self._cache, 1)
+        for key in dict.fromkeys(keys):
+            found = studio.kept(Drawing("", key, bytes))
+            self.is_whole &= found is not None
+            if found is not None:
+                self._keep((found,), (key,))
 
     def _keep(self, images: Sequence[Image], keys: Sequence[str]) -> None:
         cached: list[Path | None] = [self._cache / key[:2] / f"{key}.png" for key in keys]

@@ -17,11 +17,17 @@ from phyblock.folders import OutFolder
 from phyblock.records import MANIFEST, PROMPTS, RECORDS, STOPPED
 from phyblock.report.figures import figure_titles, write_figures
 from phyblock.report.html.headline import headlines
-from phyblock.report.html.index import Item, SampleIndex, read_places
-from phyblock.report.html.leads import part_groups
+from phyblock.report.html.index import Item, Place, SampleIndex, read_places
+from phyblock.report.html.leads import mean_parts, part_names
 from phyblock.report.html.pack import Pack, write_script
 from phyblock.report.html.page import Figure, render_page
-from phyblock.report.html.samples import items_shown, pack_prompts, pack_samples, pictures_sent
+from phyblock.report.html.samples import (
+    items_shown,
+    pack_prompts,
+    pack_samples,
+    pictures_sent,
+    states_sent,
+)
 from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.shown import images_of
 from phyblock.report.html.sources import Sources, open_sources
@@ -31,7 +37,6 @@ from phyblock.report.write import TablesWritten
 from phyblock.run.folder import run_folder
 from phyblock.tables.load import Run
 from phyblock.tracks.drawable import kit, scene_entry
-from phyblock.tracks.kind import kind_of
 from phyblock.tracks.opening import picture_policy
 from phyblock.tracks.showing import in_order
 
@@ -127,7 +132,7 @@ def _write_data(
     pictures: dict[str, str] = {}
     is_whole = True
     if pictures_sent(run.path, places):
-        pictures, is_whole = _keep_pictures(run, sources, asked, out)
+        pictures, is_whole = _keep_pictures(run, sources, asked, places, out)
     prompts = pack_prompts(run.path, packs["prompts"])
     index = SampleIndex(run.design)
     pack_samples(run.path, places, index, packs["records"], prompts, pictures)
@@ -146,15 +151,19 @@ def _write_data(
         "starts": {kind: pack.starts for kind, pack in packs.items()},
         "kit": kit(),
         "no_scenes": sources.lacking,
-        "subtask_names": _part_names(run),
-        "subtask_groups": _part_groups(run),
+        "subtask_names": part_names(run),
+        "subtask_groups": mean_parts(run),
     }
     write_script(new, "index", build, content)
     return pictures, is_whole
 
 
 def _keep_pictures(
-    run: Run, sources: Sources, asked: Mapping[Item, Any], out: OutFolder
+    run: Run,
+    sources: Sources,
+    asked: Mapping[Item, Any],
+    places: Sequence[Place],
+    out: OutFolder,
 ) -> tuple[dict[str, str], bool]:
     """Addresses of the pictures at hand as seen from the page, by digest; whether all are."""
     place = f"{_FOLDER}/{_PICTURES}/"
@@ -164,27 +173,11 @@ def _keep_pictures(
             policy = picture_policy(images)
             if sources.tasks:
                 shelf.add_scenes(_scenes(run, sources.tasks), policy)
+                shelf.add_kept(states_sent(run.path, places, sources.tasks, policy.style))
             for track, items in sources.items.items():
                 shown = [one for item, one in asked.items() if item.track == track]
                 shelf.add_items(items, shown, policy.style)
     return {digest: f"{place}{name}" for digest, name in shelf.names.items()}, shelf.is_whole
-
-
-def _part_names(run: Run) -> dict[str, str]:
-    """What parts of tracks are called, by their short names."""
-    names: dict[str, str] = {}
-    for track in run.design.suite.tracks:
-        names |= kind_of(track).report().part_names
-    return names
-
-
-def _part_groups(run: Run) -> dict[str, dict[str, object]]:
-    """Means of parts of tracks: what they are called, and of which parts they are."""
-    return {
-        name: {"title": heading, "of": list(of)}
-        for track in run.design.suite.tracks
-        for name, (heading, of) in part_groups(run, track).items()
-    }
 
 
 def _scenes(run: Run, tasks: Mapping[str, AssemblyTask]) -> Iterator[AssemblyTask]:

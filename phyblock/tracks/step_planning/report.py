@@ -38,6 +38,7 @@ from phyblock.tracks.step_planning.episodes import (
 from phyblock.tracks.step_planning.figure import progress_by_turn
 from phyblock.tracks.step_planning.film import episode_film, episode_table
 from phyblock.tracks.step_planning.measures import STEP_MEASURES
+from phyblock.tracks.step_planning.states import state_keys
 from phyblock.tracks.step_planning.table3 import (
     paper_table3_frame,
     paper_table3_view,
@@ -52,7 +53,7 @@ from phyblock.tracks.step_planning.table3 import (
 
 __all__ = ["REPORT"]
 
-_VIEW = EpisodeView(NAME, episode_table, episode_film)
+_VIEW = EpisodeView(NAME, episode_table, episode_film, state_keys)
 _MAIN, _RECALL = "F1 of attempts", "Recall"
 _COLUMNS = (
     HeadlineColumn("completion", WHOLE.name, "Completed"),

@@ -8,7 +8,10 @@ const Results = (() => {
     document.querySelectorAll("table.sortable").forEach((table) => {
       for (const button of table.querySelectorAll("thead button")) {
         button.addEventListener("click", () => {
-          const isDown = button.closest("th").getAttribute("aria-sort") !== "descending";
+          // The best place is the least; of values the best is the most.
+          const first = button.dataset.first || "descending";
+          const isFirst = button.closest("th").getAttribute("aria-sort") !== first;
+          const isDown = (first === "descending") === isFirst;
           sort(table, Number(button.dataset.column), isDown);
           Address.note();
         });
