@@ -11,6 +11,7 @@ from pathlib import Path
 
 from phyblock.bundle.about import About, read_about
 from phyblock.bundle.archive import unpack
+from phyblock.bundle.naming import named
 from phyblock.bundle.portable import localized
 from phyblock.bundle.tables import written_with_tables
 from phyblock.errors import Problem, StoreError
@@ -49,7 +50,7 @@ def opened_bundle(path: Path, data: Sequence[Path] = (), name: str = "") -> Iter
     with tempfile.TemporaryDirectory(prefix="phyblock-") as scratch:
         folder = Path(scratch) / "run"
         folder.mkdir()
-        with _named(folder, where):
+        with named(folder, where):
             unpack(path, folder)
             manifest = read_manifest(folder)
             about = read_about(path, folder, manifest)
@@ -61,25 +62,6 @@ def opened_bundle(path: Path, data: Sequence[Path] = (), name: str = "") -> Iter
         tables = written_with_tables(Path(scratch) / "again", manifest, records)
         _check_tables(where, about, tables)
         yield Verified(about, manifest, folder, len(records), len(tables))
-
-
-@contextlib.contextmanager
-def _named(folder: Path, where: str) -> Iterator[None]:
-    """Problems name the bundle, not the place where it was unpacked."""
-    try:
-        yield
-    except StoreError as error:
-        raise StoreError(
-            Problem(
-                problem.where.replace(str(folder), where),
-                problem.message,
-                problem.field,
-                problem.found,
-                problem.allowed,
-                problem.hint,
-            )
-            for problem in error.problems
-        ) from error
 
 
 def _check_lines(where: str, about: About, told: Path, again: str) -> None:

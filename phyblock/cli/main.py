@@ -27,6 +27,7 @@ _VERBS = {
     "export": "Write a run for Inspect AI, Hugging Face datasets, or as CSV or Parquet.",
     "bundle": "Write a run as one file that others can score again.",
     "verify-bundle": "Score a bundle again and say whether it comes out the same.",
+    "site": "Put runs and bundles into a static leaderboard.",
     "episode": "Show an episode step by step, as text or as a GIF.",
     "export-data": "Write questions with pictures for VLMEvalKit or Hugging Face.",
     "models": "List models with kinds, prices and keys; check one.",

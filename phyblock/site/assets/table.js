@@ -1,0 +1,139 @@
+/* The ranked table: which columns it has, in which order its rows stand, and how a cell reads. */
+"use strict";
+
+const Table = (() => {
+  const DASH = "–";
+  const FACTS = [
+    ["solved", "Solved", (fact, track) => [fact.solved, `of ${fact.done.toLocaleString("en")}`, track]],
+    ["usd_per_solved", "USD a solved one", (fact) => [fact.usd_per_solved, "", null, "usd"]],
+    ["usd_per_100", "USD for 100 replies", (fact) => [fact.usd_per_100, "", null, "usd"]],
+    ["prompt_tokens", "Tokens in", (fact) => [fact.prompt_tokens]],
+    ["completion_tokens", "Tokens out", (fact) => [fact.completion_tokens]],
+    ["latency_s", "Seconds", (fact) => [fact.latency_s, "", null, "s"]],
+    ["done", "Samples done", (fact) => [fact.done, fact.done < fact.expected ? `of ${fact.expected.toLocaleString("en")}` : ""]],
+    ["failed", "Not read or failed", (fact) => [fact.failed]],
+  ];
+  const LOWER_FIRST = ["usd_per_solved", "usd_per_100", "prompt_tokens", "completion_tokens", "latency_s", "failed", "rank"];
+
+  const text = (value, digits = 1) => (value === null || value === undefined ? DASH
+    : value.toLocaleString("en", { minimumFractionDigits: digits, maximumFractionDigits: digits }));
+  const dollars = (value) => (value === null || value === undefined ? DASH
+    : value === 0 ? "0" : value >= 1 ? text(value, 2) : value.toPrecision(2));
+
+  /** A value column: what stands in a row, and how it is sorted. */
+  function valueColumn(column, track, several) {
+    const share = column.unit ? `${column.unit === "%" ? "%" : column.unit}` : "";
+    return {
+      id: column.id, heading: column.heading, group: several ? track.title : "", setting: column.setting,
+      about: [track.title, column.setting && `setting ${column.setting}`, share && `in ${share}`].filter(Boolean).join(", "),
+      isMain: column.heading === track.main, better: column.better,
+      value: (row) => (row.values[column.id] ? row.values[column.id][0] : null),
+      cell: (row) => {
+        const found = row.values[column.id];
+        if (!found) return { text: DASH };
+        const [value, lo, hi] = found;
+        return { text: text(value), below: lo === null ? "" : `${text(lo)} to ${text(hi)}`, strip: column.share ? found : null };
+      },
+    };
+  }
+
+  function factColumn([name, heading, of], track, several) {
+    return {
+      id: `${track.name}/${name}`, heading: heading.replace("one", track.item), group: several ? track.title : "",
+      setting: "", about: track.title, better: LOWER_FIRST.includes(name) ? "lower" : "higher",
+      value: (row) => (row.facts[track.name] ? of(row.facts[track.name])[0] ?? null : null),
+      cell: (row) => {
+        if (!row.facts[track.name]) return { text: DASH };
+        const [value, below = "", , form] = of(row.facts[track.name]);
+        const shown = form === "usd" ? dollars(value) : text(value, form === "s" ? 2 : 0);
+        return { text: shown, below };
+      },
+    };
+  }
+
+  function rowColumns(board) {
+    const plain = (id, heading, value, shown = value) => ({
+      id, heading, group: "", setting: "", about: "", better: "higher", value, cell: (row) => ({ text: shown(row) ?? DASH, isText: true }) });
+    const dates = (row) => [...new Set(Object.values(row.runs).map((n) => board.runs[n].date))].join(", ");
+    const of = (row, what) => [...new Set(Object.values(row.runs).map((n) => what(board.runs[n])).filter(Boolean))].join(", ");
+    return [
+      plain("size", "Size (B)", (row) => row.size_b, (row) => (row.size_b === null ? DASH : String(row.size_b))),
+      plain("date", "Date", dates),
+      plain("seeds", "Seeds", (row) => board.runs[Object.values(row.runs)[0]].seeds, (row) => of(row, (run) => String(run.seeds))),
+      plain("asked", "Asked how", (row) => of(row, (run) => run.asked.join(", ")), (row) => of(row, (run) => run.asked.join(", ")) || DASH),
+      plain("run", "Run", (row) => of(row, (run) => run.id), (row) => of(row, (run) => run.id)),
+      plain("verified", "Scored again", (row) => of(row, (run) => (run.verified ? "yes" : "no")),
+        (row) => of(row, (run) => (run.verified ? "yes" : "no"))),
+    ];
+  }
+
+  const mainFirst = (columns, track) => [...columns].sort((a, b) => (b.heading === track.main) - (a.heading === track.main));
+
+  /** Every column there is, in groups [{title, columns}]. */
+  function groups(board) {
+    const several = board.tracks.length > 1;
+    const found = board.tracks.flatMap((track) => {
+      const mine = board.columns.filter((column) => column.track === track.name);
+      const settings = [...new Set(mine.map((column) => column.setting))];
+      return [
+        ...settings.map((setting) => ({
+          title: track.title + (setting ? `, setting ${setting}` : ""),
+          columns: mainFirst(mine.filter((column) => column.setting === setting), track).map((column) => valueColumn(column, track, several)),
+        })),
+        { title: `${track.title}, samples and cost`, columns: FACTS.map((fact) => factColumn(fact, track, several)) },
+      ];
+    });
+    return [...found, { title: "Model and run", columns: rowColumns(board) }];
+  }
+
+  /** The columns that are shown unless others were chosen: the first track's, the others' main ones. */
+  function usual(board) {
+    const [first, ...others] = board.tracks;
+    const of = (track) => board.columns.filter((column) => column.track === track.name);
+    const main = (track) => of(track).find((column) => column.heading === track.main);
+    const priced = board.rows.some((row) => row.facts[first.name]?.usd_per_solved);
+    const told = board.rows.some((row) => row.facts[first.name]?.completion_tokens);
+    return [
+      ...mainFirst(of(first).filter((column) => column.setting === main(first).setting), first).map((column) => column.id),
+      `${first.name}/${priced ? "usd_per_solved" : "solved"}`, told ? `${first.name}/completion_tokens` : null,
+      ...others.map((track) => main(track).id), "date",
+    ].filter(Boolean);
+  }
+
+  /** Rows by a column, those without a value last, then by name. */
+  function sorted(rows, column, descending) {
+    const sign = descending ? -1 : 1;
+    return [...rows].sort((a, b) => {
+      const [x, y] = [column.value(a), column.value(b)];
+      const none = [x, y].map((value) => value === null || value === undefined || value === "");
+      if (none[0] || none[1]) return none[0] - none[1] || a.name.localeCompare(b.name);
+      const by = typeof x === "number" ? x - y : String(x).localeCompare(String(y));
+      return sign * by || a.name.localeCompare(b.name);
+    });
+  }
+
+  /** The ranks that a row may have, as text. */
+  function rank(row, track) {
+    const range = row.ranks[track];
+    if (!range) return DASH;
+    return range[0] === range[1] ? String(range[0]) : `${range[0]}–${range[1]}`;
+  }
+
+  function strip([value, lo, hi]) {
+    const spread = lo === null ? [value, value] : [Math.max(0, lo), Math.min(100, hi)];
+    return svg("svg", { viewBox: "0 0 104 12", class: "strip-plot", "aria-hidden": "true" },
+      svg("line", { class: "axis", x1: 2, x2: 102, y1: 6, y2: 6 }),
+      svg("line", { class: "interval", x1: 2 + spread[0], x2: 2 + spread[1], y1: 6, y2: 6 }),
+      svg("circle", { cx: 2 + value, cy: 6, r: 2.5 }));
+  }
+
+  return { groups, usual, sorted, rank, strip, text, dollars, DASH };
+})();
+
+/** An element of a drawing. */
+function svg(tag, attributes, ...children) {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [name, value] of Object.entries(attributes)) if (value !== null) made.setAttribute(name, value);
+  made.append(...children.flat());
+  return made;
+}

@@ -1,0 +1,121 @@
+"""What the models of a run are worth in a track: headline values, single samples, costs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from phyblock.report.comparable import Comparable, comparable
+from phyblock.tables.cost import cost_frame
+from phyblock.tables.coverage import coverage_frame
+from phyblock.tables.headline import Value, headline_values
+from phyblock.tables.load import Run
+from phyblock.tables.measures import Measure
+from phyblock.tracks.estimates import track_estimates, track_measures
+from phyblock.tracks.headline import headline_columns, main_column
+
+__all__ = ["Facts", "Key", "TrackValues", "main_comparable", "values_of"]
+
+Key = tuple[str, str, int, str]
+"""A sample of one model: scene, item, seed, variant."""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a model's samples of a track took and came to; None where it is not known.
+
+    `solved` samples are worth all that a sample can be. Costs [US dollars] are at the prices of the
+    replies, cached ones included.
+    """
+
+    expected: int
+    done: int
+    failed: int
+    solved: int
+    prompt_tokens: float | None
+    completion_tokens: float | None
+    latency_s: float | None
+    usd_per_100: float | None
+    usd_per_solved: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class TrackValues:
+    """A track of a run: `values` by setting, model and heading; `samples` what each sample is worth
+    by the main measure, in its unit, by model and `Key`; `facts` by model.
+
+    Settings are those of the run, or "" alone where the track knows none.
+    """
+
+    values: Mapping[str, Mapping[tuple[str, str], Value]]
+    samples: Mapping[str, Mapping[Key, float]]
+    facts: Mapping[str, Facts] = field(default_factory=dict)
+
+
+def main_comparable(run: Run, track: str) -> Comparable:
+    """The measure that models of a track are ranked by."""
+    return comparable(run, track, main_column(run, track).measure)
+
+
+def values_of(run: Run, track: str) -> TrackValues:
+    """All values of a track."""
+    what = main_comparable(run, track)
+    samples = {model: dict(pairs) for model, pairs in _samples(run, what)}
+    return TrackValues(
+        dict(_values(run, track)), samples, _facts(run, track, samples, what.measure)
+    )
+
+
+def _values(run: Run, track: str) -> Iterator[tuple[str, Mapping[tuple[str, str], Value]]]:
+    found, design = track_estimates(run, track), run.design
+    measures, columns = track_measures(track), headline_columns(run, track)
+    shown = found[found["measure"].isin([column.measure for column in columns])]
+    if not shown["setting"].astype(bool).any():
+        yield "", headline_values(found, design, measures, columns)
+        return
+    for setting in design.suite.settings:
+        suite = design.suite.model_copy(update={"settings": (setting,)})
+        in_setting = design.model_copy(update={"suite": suite})
+        yield setting, headline_values(found, in_setting, measures, columns)
+
+
+def _samples(run: Run, what: Comparable) -> Iterator[tuple[str, Iterator[tuple[Key, float]]]]:
+    part = what.parts[-1]
+    each = what.each(part)
+    for model, rows in what.samples(run, part, run.design).items():
+        values = what.measure.scale * np.nan_to_num(each(what.counts_of(rows, part)))
+        yield model, zip(rows.index, values.tolist(), strict=True)
+
+
+def _facts(
+    run: Run, track: str, samples: Mapping[str, Mapping[Key, float]], measure: Measure
+) -> dict[str, Facts]:
+    costs = cost_frame(run)
+    of_model = costs[costs["track"] == track].set_index("model").to_dict("index")
+    outcomes = coverage_frame(run)
+    outcomes = outcomes[outcomes["track"] == track].set_index("model")
+    found = {}
+    for model, row in outcomes.to_dict("index").items():
+        cost = of_model[model]
+        solved = sum(value == measure.best for value in samples.get(str(model), {}).values())
+        price = _known(cost["cost_per_100_usd"])
+        whole = None if price is None else price / 100 * int(row["replies"])
+        found[str(model)] = Facts(
+            int(row["expected"]),
+            int(row["recorded"]),
+            int(row["recorded"] - row["ok"]),
+            solved,
+            _known(cost["prompt_tokens"]),
+            _known(cost["completion_tokens"]),
+            _known(cost["latency_median_s"]),
+            price,
+            whole / solved if whole is not None and solved else None,
+        )
+    return found
+
+
+def _known(number: float) -> float | None:
+    return None if math.isnan(number) else float(number)

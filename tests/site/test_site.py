@@ -1,0 +1,230 @@
+"""Runs as a leaderboard: what stands in one table, what is refused, what is written where."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from phyblock.bundle import bundle_run
+from phyblock.errors import SpecError, StoreError
+from phyblock.report.compare import compare_models
+from phyblock.report.html.sources import Sources
+from phyblock.site import write_site
+from phyblock.site import write as site_write
+from phyblock.site.alike import check_runs_alike
+from phyblock.site.board import all_values, board_of
+from phyblock.site.entries import entries_of
+from phyblock.site.ranking import rank_ranges_of
+from phyblock.site.runs import SiteRun, open_runs
+from phyblock.tables.load import Run
+from tests.report.factory import LEVELS, manifest, record, run_of, score
+from tests.site.site_runs import make_runs
+from tests.workspace import Workspace
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+    return make_runs(tmp_path_factory.mktemp("site"), pictures_dir)
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def data_of(made: Workspace) -> list[Path]:
+    return [made.root / "data", made.root / "questions"]
+
+
+def test_runs_and_bundles_become_one_folder_the_same_every_time(
+    made: Workspace, tmp_path: Path
+) -> None:
+    paths = [made.root / "first", made.root / "later.zip"]
+    found = write_site(paths, tmp_path / "a", data_of(made))
+    assert (found.models, found.samples) == (4, 38)
+    assert not found.lacking
+    write_site(paths, tmp_path / "b", data_of(made))
+    assert tree(tmp_path / "a") == tree(tmp_path / "b")
+    write_site(paths[:1], tmp_path / "b", data_of(made))
+    names = {name.split("/")[1] for name in tree(tmp_path / "b") if name.startswith("data/")}
+    assert len(names) == 1
+    assert str(made.root).encode() not in b"".join(tree(tmp_path / "a").values())
+
+
+def test_the_board_says_what_tables_and_comparisons_say(made: Workspace) -> None:
+    with ExitStack() as kept:
+        runs = open_runs([made.root / "first"], (), kept)
+        entries = entries_of(runs)
+        board = board_of(runs, entries, all_values(runs))
+        compared = compare_models(runs[0].run, track="full_planning")
+    rows = {row["name"]: row for row in board["rows"]}
+    assert rows["oracle"]["values"]["full_planning/A/Overall F1"][0] == 100.0
+    facts = rows["oracle"]["facts"]["full_planning"]
+    assert (facts["expected"], facts["done"], facts["solved"]) == (5, 5, 5)
+    ranked = compared.ranks.set_index("model")[["best", "worst"]]
+    for name, row in rows.items():
+        assert row["ranks"]["full_planning"] == list(ranked.loc[name])
+    settings = {column["setting"] for column in board["columns"] if column["track"] == "vqa"}
+    assert settings == {""}
+
+
+def planned(model: str, seed: int, right: int) -> Run:
+    """A run of one model, `right` of four steps of every scene right."""
+    scores = [score(right, 4 - right, 4 - right, setting=setting) for setting in "AB"]
+    records = [record(model, scene, seed, scores) for scene in LEVELS]
+    return run_of(records, manifest(models=[model], seeds=[seed]))
+
+
+def test_models_without_a_common_sample_are_not_told_apart() -> None:
+    best, alike, elsewhere = planned("a", 0, 4), planned("b", 0, 1), planned("c", 9, 0)
+    runs = [SiteRun(run.path.name, run, False, Sources()) for run in (best, alike, elsewhere)]
+    ranges = rank_ranges_of("full_planning", entries_of(runs), runs)
+    assert ranges == {"a": (1, 2), "b": (2, 3), "c": (1, 3)}
+
+
+def site_run(where: str, **facts: Any) -> SiteRun:
+    return SiteRun(where, run_of([], manifest(**facts)), False, Sources())
+
+
+def in_track(track: str, **more: Any) -> dict[str, Any]:
+    """Facts of a run of one track alone, with its identity."""
+    facts = manifest()
+    suite = {**facts["suite"], "tracks": [track]}
+    data = {"name": "d", "sha256": "0" * 64, "version": 2}
+    return {
+        "suite": suite,
+        "dataset": data,
+        "tracks": {track: {"prompt": {"name": "p", "version": "a" * 64}}},
+        "created": "2026-11-22T10:00:00+00:00",
+        **more,
+    }
+
+
+def test_a_model_asked_different_things_is_one_row_and_the_same_things_two() -> None:
+    plan, vqa = (site_run(track, **in_track(track)) for track in ("full_planning", "vqa"))
+    one = entries_of([plan, vqa])
+    assert [entry.name for entry in one] == ["alpha", "beta"]
+    assert one[0].runs == {"full_planning": 0, "vqa": 1}
+    later = site_run("later", **in_track("full_planning", created="2026-11-23", identity="1" * 64))
+    two = entries_of([plan, later])
+    assert [entry.name for entry in two][::2] == ["alpha (2026-11-22)", "alpha (2026-11-23)"]
+    same_day = site_run("x", **in_track("full_planning", identity="1" * 64))
+    names = [entry.name for entry in entries_of([plan, same_day])]
+    assert names[0] == "alpha (2026-11-22, run 00000000)"
+    assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"dataset": {"name": "d", "sha256": "0" * 64, "version": 3}}, "dataset.version"),
+        ({"dataset": {"name": "e", "sha256": "0" * 64, "version": 2}}, "dataset.name"),
+        ({"dataset": {"name": "d", "sha256": "1" * 64, "version": 2}}, "dataset.sha256"),
+        (
+            {"tracks": {"full_planning": {"prompt": {"name": "p", "version": "b" * 64}}}},
+            "tracks.full_planning.prompt",
+        ),
+        (
+            {"suite": {**manifest(level1="membership")["suite"], "tracks": ["full_planning"]}},
+            "scoring.level1",
+        ),
+    ],
+)
+def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(
+    change: dict[str, Any], field: str
+) -> None:
+    first = site_run("one", **in_track("full_planning"))
+    other = site_run("two", **in_track("full_planning", **change))
+    with pytest.raises(SpecError) as caught:
+        check_runs_alike([first, other])
+    (problem,) = caught.value.problems
+    assert (problem.where, problem.field) == ("two", field)
+    assert "cannot stand in one table with one" in problem.message
+
+
+def test_a_recording_that_was_asked_elsewhere_stands_beside_any_prompt() -> None:
+    first = site_run("one", **in_track("full_planning"))
+    asked = {"full_planning": {"prompt": None, "pictures": None}}
+    check_runs_alike([first, site_run("two", **in_track("full_planning", tracks=asked))])
+
+
+def test_a_folder_of_somebody_else_is_refused_and_left_as_it_is(
+    made: Workspace, tmp_path: Path
+) -> None:
+    theirs = tmp_path / "thesis"
+    (theirs / "data").mkdir(parents=True)
+    (theirs / "data" / "a.js").write_text("mine")
+    with pytest.raises(StoreError, match="is not empty and holds no site"):
+        write_site([made.root / "first"], theirs)
+    assert tree(theirs) == {"data/a.js": b"mine"}
+    run = made.root / "first"
+    before = tree(run)
+    with pytest.raises(StoreError, match="holds no site"):
+        write_site([made.root / "first"], run)
+    assert tree(run) == before
+
+
+def test_what_is_ours_is_replaced_and_what_is_not_stays(made: Workspace, tmp_path: Path) -> None:
+    out = tmp_path / "site"
+    write_site([made.root / "first"], out, title="One")
+    (out / "CNAME").write_text("example.org")
+    write_site([made.root / "first"], out, title="Two")
+    assert (out / "CNAME").read_text() == "example.org"
+    assert "<title>Two" in (out / "index.html").read_text(encoding="utf-8")
+
+
+def test_a_build_that_was_stopped_never_looks_whole(
+    made: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "site"
+    whole = write_site([made.root / "first"], tmp_path / "whole")
+    write_site([made.root / "first"], out, title="Before")
+    before = tree(out)
+
+    def stopped(*_: object) -> str:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(site_write, "render_page", stopped)
+        with pytest.raises(KeyboardInterrupt):
+            write_site([made.root / "first"], tmp_path / "new")
+        with pytest.raises(KeyboardInterrupt):
+            write_site([made.root / "first"], out)
+    assert not (tmp_path / "new" / "index.html").exists()
+    left = tree(out)
+    assert {name: left[name] for name in before if name != ".generated"} == {
+        name: data for name, data in before.items() if name != ".generated"
+    }
+    write_site([made.root / "first"], tmp_path / "new")
+    assert tree(tmp_path / "new").keys() == tree(whole.path.parent).keys()
+
+
+def test_a_bundle_that_does_not_verify_is_refused_by_the_command(
+    made: Workspace, tmp_path: Path
+) -> None:
+    copy = tmp_path / "run"
+    shutil.copytree(made.root / "later", copy)
+    lines = (copy / "records.jsonl").read_text(encoding="utf-8").splitlines()
+    first = json.loads(lines[0])
+    first["scores"][0]["tp"] += 1
+    text = "\n".join([json.dumps(first), *lines[1:]]) + "\n"
+    (copy / "records.jsonl").write_text(text, encoding="utf-8")
+    with pytest.raises(StoreError, match="scored again, records come out otherwise"):
+        bundle_run(copy, tmp_path / "b.zip")
+    whole = (made.root / "later.zip").read_bytes()
+    (made.root / "cut.zip").write_bytes(whole[:-100])
+    done = made.phyblock("site", "first", "cut.zip", "--out", "refused")
+    assert done.code == 2
+    assert "cut.zip" in done.err
+    assert not (made.root / "refused").exists()
+
+
+def test_a_run_given_twice_is_refused(made: Workspace, tmp_path: Path) -> None:
+    paths = [made.root / "later", made.root / "later.zip"]
+    with pytest.raises(SpecError, match="is the same run as"):
+        write_site(paths, tmp_path / "s", data_of(made))
