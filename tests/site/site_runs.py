@@ -31,7 +31,7 @@ def make_runs(root: Path, pictures: Path) -> Workspace:
 
 
 def make_hostile(source: Path, folder: Path) -> Path:
-    """A copy of a run whose model `random` and scene `t3` are called `HOSTILE`, with such replies."""
+    """A copy of a run whose model `random` and scene `t3` are called `HOSTILE`."""
     folder.mkdir()
     named = json.dumps(HOSTILE)[1:-1]
     for name in ("run.yaml", "records.jsonl"):

@@ -14,22 +14,16 @@ from phyblock.bundle import bundle_run
 from phyblock.errors import SpecError, StoreError
 from phyblock.report.compare import compare_models
 from phyblock.report.html.sources import Sources
-from phyblock.site import write_site
 from phyblock.site import write as site_write
+from phyblock.site import write_site
 from phyblock.site.alike import check_runs_alike
 from phyblock.site.board import all_values, board_of
 from phyblock.site.entries import entries_of
 from phyblock.site.ranking import rank_ranges_of
 from phyblock.site.runs import SiteRun, open_runs
 from phyblock.tables.load import Run
-from tests.report.factory import LEVELS, manifest, record, run_of, score
-from tests.site.site_runs import make_runs
+from tests.report.factory import manifest, record, run_of, score
 from tests.workspace import Workspace
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
-    return make_runs(tmp_path_factory.mktemp("site"), pictures_dir)
 
 
 def tree(folder: Path) -> dict[str, bytes]:
@@ -76,7 +70,7 @@ def test_the_board_says_what_tables_and_comparisons_say(made: Workspace) -> None
 def planned(model: str, seed: int, right: int) -> Run:
     """A run of one model, `right` of four steps of every scene right."""
     scores = [score(right, 4 - right, 4 - right, setting=setting) for setting in "AB"]
-    records = [record(model, scene, seed, scores) for scene in LEVELS]
+    records = [record(model, scene, seed, scores) for scene in map(str, range(12))]
     return run_of(records, manifest(models=[model], seeds=[seed]))
 
 

@@ -41,8 +41,7 @@ var Site = (() => {
     const [name, query] = location.hash.slice(1).split(/\?(.*)/s);
     const view = name || "board";
     const place = document.getElementById("content");
-    const focused = document.activeElement?.id;
-    const columns = document.activeElement?.dataset?.column || document.activeElement?.value;
+    const focused = keyOf(document.activeElement);
     Replay.stop();
     let parts;
     try {
@@ -64,8 +63,16 @@ var Site = (() => {
     if (!isSame) {
       window.scrollTo(0, 0);
       if (mine > 1) place.focus({ preventScroll: true });
-    } else if (focused && focused !== "content") document.getElementById(focused)?.focus();
-    else if (columns) [...place.querySelectorAll("[data-column], input[type=checkbox]")].find((one) => (one.dataset.column || one.value) === columns)?.focus();
+    } else if (focused) {
+      [...place.querySelectorAll("button, input, select")].find((one) => keyOf(one) === focused)?.focus();
+    }
+  }
+
+  /** What tells a control from others, also once it was made again; "" for anything else. */
+  function keyOf(one) {
+    if (one?.dataset?.column) return `column ${one.dataset.column}`;
+    if (one?.type === "checkbox") return `box ${one.value}`;
+    return one?.matches("input, select") ? one.id : "";
   }
 
   function theme(name) {

@@ -1,0 +1,247 @@
+"""A site in a real browser, opened from disk: every view, the keyboard, hostile names."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote, urlencode
+
+import pytest
+
+from tests.site.site_runs import HOSTILE, make_hostile
+from tests.workspace import Workspace
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Locator, LocatorAssertions, Page
+
+FLAGS = [
+    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update"),
+]
+CHROMIUMS = ("chromium", "chromium-browser", "google-chrome")
+PHONE = {"width": 390, "height": 844}
+
+
+def expect(locator: Locator) -> LocatorAssertions:
+    """What is waited for; the page forbids the `eval` that other ways of waiting need."""
+    from playwright.sync_api import expect as expected
+
+    return expected(locator)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A headless Chromium; skips where there is none."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    found = next(filter(None, map(shutil.which, CHROMIUMS)), None)
+    if found is None:
+        pytest.skip("no Chromium: apt-get install chromium")
+    with playwright.sync_playwright() as started:
+        running = started.chromium.launch(executable_path=found, args=FLAGS)
+        yield running
+        running.close()
+
+
+@pytest.fixture(scope="module")
+def site(made: Workspace) -> Path:
+    """A site of a bundle and a run with hostile names."""
+    make_hostile(made.root / "first", made.root / "hostile")
+    data = ("--data", "data", "--data", "questions")
+    named = ("--title", f"A site {HOSTILE}", "--out", "site")
+    done = made.phyblock("site", "hostile", "later.zip", *data, *named)
+    assert done.code == 0, done.err
+    assert "4 models, 38 samples" in done.out
+    return made.root / "site" / "index.html"
+
+
+class Visit:
+    """A page that was opened from disk, and all that it complained of or asked for."""
+
+    def __init__(self, page: Page, path: Path) -> None:
+        self.page, self.path = page, path
+        self.complaints: list[str] = []
+        page.on("console", lambda message: self.complaints.append(message.text))
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("dialog", lambda dialog: self.complaints.append(dialog.message))
+        page.on("request", lambda request: self._asked(request.url))
+
+    def _asked(self, url: str) -> None:
+        if not url.startswith(self.path.parent.as_uri()):
+            self.complaints.append(url)
+
+    def open(self, view: str = "", **words: str) -> Page:
+        """Open a view and wait until it is shown."""
+        query = f"?{urlencode(words, quote_via=quote)}" if words else ""
+        self.page.goto("about:blank")
+        self.page.goto(f"{self.path.as_uri()}#{view}{query}")
+        expect(self.page.locator("html")).to_have_attribute("data-shown", view or "board")
+        return self.page
+
+
+@pytest.fixture(params=["light", "dark"])
+def visit(request: pytest.FixtureRequest, browser: Browser, site: Path) -> Iterator[Visit]:
+    page = browser.new_page(viewport={"width": 1400, "height": 1000}, color_scheme=request.param)
+    visit = Visit(page, site)
+    yield visit
+    hacked = page.evaluate("window.hacked")
+    page.close()
+    assert visit.complaints == []
+    assert hacked is None
+
+
+def replay(**more: str) -> dict[str, str]:
+    return {"m": "oracle", "t": "full_planning", "i": "t5", "n": "0", **more}
+
+
+VIEWS: dict[str, tuple[str, dict[str, str]]] = {
+    "board": ("board", {}),
+    "model": ("model", {"m": HOSTILE}),
+    "scenes": ("scenes", {}),
+    "scene": ("scene", {"s": "t5"}),
+    "lost scene": ("scene", {"s": HOSTILE}),
+    "replay": ("replay", replay(m=HOSTILE, b="oracle")),
+    "question": ("replay", {"m": HOSTILE, "t": "vqa", "i": "sh-000", "n": "0"}),
+}
+
+CONTRAST = """() => {
+  const parse = (text) => text.match(/[\\d.]+/g).map(Number);
+  const over = (top, below) => {
+    const a = top[3] ?? 1;
+    return [0, 1, 2].map((i) => a * top[i] + (1 - a) * below[i]);
+  };
+  const light = (rgb) => rgb.map((x) => x / 255)
+    .map((x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4))
+    .reduce((sum, x, i) => sum + x * [0.2126, 0.7152, 0.0722][i], 0);
+  const ownText = (one) => [...one.childNodes].filter((n) => n.nodeType === 3)
+    .map((n) => n.data.trim()).join("");
+  const wrong = [];
+  for (const one of document.querySelectorAll("body *")) {
+    const isSeen = one.getBoundingClientRect().width > 3;
+    if (!ownText(one) || !isSeen || one.closest("svg, script, style, noscript")) continue;
+    const layers = [];
+    for (let at = one; at; at = at.parentElement) {
+      layers.unshift(parse(getComputedStyle(at).backgroundColor));
+    }
+    const ground = layers.reduce((below, top) => over(top, below), [255, 255, 255]);
+    const ink = over(parse(getComputedStyle(one).color), ground);
+    const [a, b] = [light(ink), light(ground)].sort((x, y) => y - x);
+    const ratio = (a + 0.05) / (b + 0.05);
+    if (ratio < 4.5) wrong.push(`${ownText(one).slice(0, 30)}: ${ratio.toFixed(2)}`);
+  }
+  return wrong;
+}"""
+"""Texts that stand out too little from what is behind them, with their ratio (WCAG AA: 4.5)."""
+STRUCTURE = """() => {
+  const all = (selector) => [...document.querySelectorAll(selector)];
+  const named = (one) => one.getAttribute("aria-label") || one.textContent.trim()
+    || one.labels?.[0]?.textContent.trim();
+  const levels = all("h1, h2, h3, h4").map((one) => Number(one.tagName[1]));
+  const ids = all("[id]").map((one) => one.id);
+  return {
+    nameless: all("a, button, input, select, summary, canvas[role=img]")
+      .filter((one) => !named(one)).map((one) => one.outerHTML.slice(0, 80)),
+    h1: levels.filter((level) => level === 1).length,
+    first: levels[0],
+    jumps: levels.filter((level, i) => i && level > levels[i - 1] + 1),
+    twice: ids.filter((id, i) => ids.indexOf(id) !== i),
+  };
+}"""
+
+
+@pytest.mark.parametrize("name", VIEWS)
+def test_every_view_can_be_read_and_hostile_names_do_nothing(visit: Visit, name: str) -> None:
+    view, words = VIEWS[name]
+    page = visit.open(view, **words)
+    found: dict[str, Any] = page.evaluate(STRUCTURE)
+    assert found == {"nameless": [], "h1": 1, "first": 1, "jumps": [], "twice": []}
+    assert page.evaluate(CONTRAST) == []
+    page.set_viewport_size(PHONE)
+    wide = page.evaluate("document.documentElement.scrollWidth")
+    assert wide <= PHONE["width"]
+    if "m" in words:
+        assert words["m"] in page.inner_text("main")
+
+
+@pytest.fixture
+def desk(browser: Browser, site: Path) -> Iterator[Visit]:
+    page = browser.new_page(viewport={"width": 1400, "height": 1000}, color_scheme="light")
+    visit = Visit(page, site)
+    yield visit
+    page.close()
+    assert visit.complaints == []
+
+
+def names(page: Page) -> list[str]:
+    return page.locator(".board tbody th a").all_inner_texts()
+
+
+def test_the_table_is_sorted_and_its_columns_are_chosen_by_keyboard(desk: Visit) -> None:
+    page = desk.open()
+    assert names(page)[0] == "oracle"
+    page.locator(".board th button").first.focus()
+    page.keyboard.press("Enter")
+    expect(page.locator("th[aria-sort=ascending]")).to_have_count(1)
+    assert names(page)[-1] == "oracle"
+    # What was pressed keeps the focus, so that it can be pressed again.
+    page.keyboard.press("Enter")
+    expect(page.locator("th[aria-sort=descending]")).to_have_count(1)
+    before = page.locator(".board thead button").all_inner_texts()
+    page.locator("summary").press("Enter")
+    box = page.get_by_role("group", name="Full planning, setting B").get_by_label("Overall F1")
+    box.focus()
+    page.keyboard.press("Space")
+    expect(page.locator(".board thead button")).to_have_count(len(before) + 1)
+    assert page.locator("details[open]").count() == 1
+    page.go_back()
+    expect(page.locator(".board thead button")).to_have_count(len(before))
+    page.select_option("#by", label="VQA: Overall")
+    expect(page.locator("caption")).to_have_text("Models ranked by VQA, Overall")
+    assert page.locator(".board tbody tr").first.locator(".rank").inner_text() == "1\u20132"
+
+
+def test_from_the_table_to_a_replay_and_back(desk: Visit) -> None:
+    page = desk.open()
+    page.get_by_role("link", name="oracle").first.click()
+    expect(page.locator("h1")).to_have_text("oracle")
+    assert page.evaluate("document.activeElement.id") == "content"
+    page.get_by_role("link", name="t5").first.click()
+    expect(page.locator(".stage")).to_have_count(1)
+    expect(page.locator("output")).to_have_text("End")
+    page.keyboard.press("ArrowLeft")
+    expect(page.locator("output")).to_have_text("Step 4 of 4")
+    page.keyboard.press("Space")
+    expect(page.get_by_role("button", name="Pause")).to_be_visible()
+    page.select_option("#beside", label=HOSTILE)
+    expect(page.locator(".sides.two .stage")).to_have_count(2)
+    page.select_option("#setting", index=1)
+    expect(page.locator("#setting")).to_have_value("B")
+    for _ in range(2):
+        page.go_back()
+    expect(page.locator(".stage")).to_have_count(1)
+    page.get_by_role("link", name="t5").click()
+    expect(page.locator("h1")).to_have_text("t5")
+    assert page.locator(".answers li").count() >= 4
+    page.get_by_role("link", name="Ranking").last.click()
+    expect(page.locator(".board")).to_have_count(1)
+
+
+def test_a_question_says_what_is_right_and_what_was_given(desk: Visit) -> None:
+    page = desk.open("replay", m="oracle", t="vqa", i="sh-000", n="0")
+    assert "✓ right, given" in page.inner_text(".options")
+    assert "Answered" in page.inner_text("main")
+
+
+@pytest.mark.parametrize("view", ["model", "scene", "replay", "nothing"])
+def test_what_is_not_there_is_said(desk: Visit, view: str) -> None:
+    page = desk.open(view, m="<b>x", s="<b>y", i="z")
+    expect(page.locator("h1")).to_contain_text("There is no such")
+
+
+def test_a_page_without_its_data_says_so(browser: Browser, site: Path, tmp_path: Path) -> None:
+    shutil.copy(site, tmp_path / "index.html")
+    page = browser.new_page()
+    page.goto((tmp_path / "index.html").as_uri())
+    expect(page.locator(".notice")).to_contain_text("belongs beside this page")
+    page.close()
