@@ -111,11 +111,14 @@ def write_samples(
 
 
 def _records(run: Run) -> Iterator[Record]:
-    """The newest record of every sample that is of the suite."""
-    places = read_places(run.path, run.design)
+    """The newest record of every sample that is of the suite, model by model: what one model says
+    packs best together.
+    """
+    order = {name: place for place, name in enumerate(run.design.model_names)}
     known = set(run.design.suite.tracks)
-    starts = [place.start for place in places if place.track in known]
-    yield from any_records(run.path).at(starts)
+    places = [place for place in read_places(run.path, run.design) if place.track in known]
+    places.sort(key=lambda place: order.get(place.model, len(order)))
+    yield from any_records(run.path).at(place.start for place in places)
 
 
 def _scene(scene: str, runs: Sequence[SiteRun]) -> dict[str, Any] | None:
