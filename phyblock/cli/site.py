@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
-from phyblock.cli.console import counted, make_console, shown_path
+from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
+from phyblock.plain_text import counted
 from phyblock.site import write_site
 
 __all__ = ["command"]

@@ -17,28 +17,29 @@ from phyblock.bundle.archive import ABOUT, MEMBERS, pack, unpack
 from phyblock.errors import DataError, StoreError
 from phyblock.records import MANIFEST, RECORDS, read_manifest
 from tests.vqa_set import questions, write_questions
-from tests.workspace import Raw, Workspace
+from tests.workspace import SCENES, Raw, Workspace
 
 SUBTASKS = ["SH", "OR"]
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
-    """Two baselines in three tracks, and the bundle of the run beside it."""
+    """A baseline in three tracks, and the bundle of the run beside it."""
     workspace = Workspace(tmp_path_factory.mktemp("bundled"), pictures_dir)
-    workspace.write_scenes()
+    workspace.write_scenes(*SCENES[:3])
     write_questions(workspace.root / "questions", questions(per_subtask=2, subtasks=SUBTASKS))
     workspace.write_suite(
         tracks=["full_planning", "vqa", "step_planning"],
         vqa={"path": "./questions", "subtasks": SUBTASKS},
         steps={"physics": "off"},
         seeds=[0],
+        models=["random"],
     )
     done = workspace.run()
     assert done.code == 0, done.err
     done = workspace.phyblock("bundle", "out")
     assert done.code == 0, done.err
-    assert "Verified: 28 records scored again" in done.out
+    assert "Verified: 10 records scored again" in done.out
     return workspace
 
 
@@ -87,7 +88,7 @@ def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(
     known = ("--data", "data", "--data", "questions")
     done = elsewhere.phyblock("verify-bundle", "b.zip", *known)
     assert done.code == 0, done.err
-    assert "28 records of 2 models, scored again" in done.out
+    assert "10 records of 1 model, scored again" in done.out
     done = elsewhere.phyblock("verify-bundle", "b.zip", "--data", "data")
     assert done.code == 2
     assert "needs the questions questions, which a bundle does not hold" in done.err
@@ -96,12 +97,7 @@ def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(
     assert "Traceback" not in done.err
 
 
-def test_the_same_run_gives_the_same_bytes(made: Workspace, tmp_path: Path) -> None:
-    again = bundle_run(made.out, tmp_path / "again.zip")
-    assert again.path.read_bytes() == (made.out / "bundle.zip").read_bytes()
-
-
-def test_a_run_without_its_data_is_bundled_and_said_to_be_unverified(
+def test_a_run_without_its_data_is_bundled_to_the_same_bytes_and_said_to_be_unverified(
     made: Workspace, tmp_path: Path
 ) -> None:
     moved = tmp_path / "moved"

@@ -99,7 +99,7 @@ def test_a_hostile_archive_is_refused_and_writes_nothing_elsewhere(
     assert all(p.stat().st_size < 2**21 and not p.is_symlink() for p in folder.iterdir())
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(length=st.integers(0, len(SOUND) - 1))
 def test_a_bundle_that_was_cut_short_is_refused(
     tmp_path_factory: pytest.TempPathFactory, length: int
@@ -110,7 +110,7 @@ def test_a_bundle_that_was_cut_short_is_refused(
         unpack(folder / "b.zip", folder)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(at=st.integers(0, len(SOUND) - 1), byte=st.integers(0, 255))
 def test_a_byte_that_was_changed_is_refused_or_changes_nothing(
     tmp_path_factory: pytest.TempPathFactory, at: int, byte: int
