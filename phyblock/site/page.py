@@ -13,7 +13,7 @@ __all__ = ["render_page"]
 
 _REPORT, _OWN = "phyblock.report.html", "phyblock.site"
 _SCRIPTS = (
-    *((_REPORT, name) for name in ("dom.js", "solid.js", "steps.js", "stage.js")),
+    *((_REPORT, name) for name in ("dom.js", "solid.js", "steps.js", "poses.js", "stage.js")),
     *((_OWN, name) for name in ("store.js", "table.js", "chart.js", "views.js", "replay.js")),
     (_OWN, "site.js"),
 )

@@ -36,7 +36,7 @@ const Replay = (() => {
     const question = sample.question >= 0 ? await Store.entry("questions", sample.question) : null;
     const settings = [...new Set(records.flatMap((record) => (record.scores || []).map((score) => score.setting)))];
     const setting = settings.includes(words.get("g")) ? words.get("g") : settings[0] || "A";
-    const scene = inFile && asShown(inFile, records[0].shown);
+    const scene = inFile && asShown(inFile, records[0]);
     stop();
     return [
       Views.crumbs([["board", {}, "Ranking"], ["scenes", {}, "Scenes"], ["scene", { s: sample.scene }, sample.scene]]),
@@ -81,34 +81,45 @@ const Replay = (() => {
   }
 
   /** The scene with its candidates in the order in which they were shown. */
-  function asShown(scene, shown) {
+  function asShown(scene, { shown, pose }) {
     if (!shown) return scene;
-    const number = (inFile) => inFile && shown.order.indexOf(inFile) + 1;
-    return { ...scene, candidates: shown.order.map((n) => scene.candidates[n - 1]),
-      blocks: scene.blocks.map((block) => ({ ...block, candidate: number(block.candidate) })) };
+    const isUpright = pose?.rotation === "free";
+    const candidates = shown.order.map((n) => scene.candidates[n - 1])
+      .map((one) => (isUpright ? { ...one, euler: [0, 0, 0] } : one));
+    const number = (block) => (isUpright ? candidates.findIndex((one) => Words.block(one) === Words.block(block))
+      : shown.order.indexOf(block.candidate)) + 1;
+    return { ...scene, candidates, blocks: scene.blocks.map((block) => ({ ...block, candidate: number(block) })) };
   }
 
   const scoreOf = (record, setting) => (record.scores || []).find((score) => score.setting === setting && score.placed);
 
+  /** What the stage shows of a record. */
+  function runOf(scene, record, setting) {
+    if (record.turns) return Steps.ofTurns(scene, setting, record.turns);
+    if (record.pose) return Poses.of(scene, record);
+    const score = scoreOf(record, setting);
+    return Steps.ofPlan(scene, setting, record.parse && score ? record.parse.plan : [], score);
+  }
+
   function assembly(samples, records, scene, setting) {
     const several = samples.length > 1;
-    const runs = records.map((record) => {
-      if (record.turns) return Steps.ofTurns(scene, setting, record.turns);
-      const score = scoreOf(record, setting);
-      return score && record.parse ? Steps.ofPlan(scene, setting, record.parse.plan, score) : [];
-    });
-    const longest = Math.max(...runs.map((steps) => steps.length));
+    const runs = records.map((record) => runOf(scene, record, setting));
+    const longest = Math.max(...runs.map(({ steps }) => steps.length));
     const noun = records[0].turns ? "Turn" : "Step";
     player = new Stage.Player(longest + 1);
-    const panels = runs.map((steps) => (steps.length ? Stage.panel(scene, steps, player, noun) : null));
+    const panels = runs.map((run) => (run.steps.length ? Stage.panel(run, player, noun) : null));
+    const isWide = runs.some(({ titles }) => titles.length > 1);
+    const caption = (i, title) => (several ? `${samples[i].entry.name}${isWide ? `: ${title.toLowerCase()}` : ""}` : title);
+    const told = panels.map((panel, i) => [several ? el("h2", { class: "model-name" }, samples[i].entry.name) : null,
+      facts(samples[i], records[i], setting), panel ? panel.said : nothing(records[i])]);
     return el("section", { class: "card", "aria-label": "Replay" },
       scene ? null : el("p", { class: "notice" }, Store.index.lacking || "The scene is not at hand, so that nothing can be drawn."),
-      el("div", { class: several ? "sides two" : "sides" },
+      el("div", { class: ["sides", several && "two", isWide && "wide"].filter(Boolean).join(" ") },
         scene ? el("figure", {}, el("figcaption", {}, "Goal"), picture("Goal", scene.blocks, { grid: true })) : null,
         panels.map((panel, i) => [
-          scene && panel ? el("figure", { class: "built" }, el("figcaption", {}, several ? samples[i].entry.name : "Built"), panel.canvas) : null,
-          several ? null : el("div", { class: "about-step" }, facts(samples[i], records[i], setting), panel ? panel.said : nothing(records[i]))])),
-      several ? el("div", { class: "columns two" }, panels.map((panel, i) => el("div", {}, el("h2", { class: "model-name" }, samples[i].entry.name), facts(samples[i], records[i], setting), panel ? panel.said : nothing(records[i])))) : null,
+          (panel?.pictures || []).map(({ title, canvas }) => el("figure", { class: "built" }, el("figcaption", {}, caption(i, title)), canvas)),
+          several ? null : el("div", { class: "about-step" }, told[i])])),
+      several ? el("div", { class: "columns two" }, told.map((parts) => el("div", {}, parts))) : null,
       longest ? Stage.controls(player, noun) : null,
       panels.map((panel, i) => panel && [several ? el("p", { class: "muted strip-of" }, samples[i].entry.name) : null, panel.strip]).flat());
   }
@@ -122,6 +133,7 @@ const Replay = (() => {
       const all = [["F1", Words.percent(whole ? (2 * score.tp) / whole : null)], ["Right", score.tp], ["Wrong", score.fp], ["Left out", score.fn]];
       known.push(...all.map(([name, value]) => el("span", { class: "fact" }, `${name} `, el("b", { class: "number" }, String(value)))));
     } else if (sample.score !== null) known.push(el("span", { class: "fact" }, "Score ", el("b", { class: "number" }, Table.text(sample.score))));
+    for (const [name, value] of record.pose ? Poses.facts(record) : []) known.push(el("span", { class: "fact" }, `${name} `, el("b", { class: "number" }, value)));
     if (record.ending) known.push(el("span", { class: "fact muted" }, `Ended: ${Words.named(record.ending)}`));
     return el("p", { class: "facts" }, known);
   }
