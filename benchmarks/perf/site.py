@@ -3,8 +3,8 @@
     python benchmarks/perf/site.py [--models 30] [--samples 100000] [--from RUN] [--keep FOLDER]
 
 Runs are made up by repeating the records of a real one (--from, as a run of recordings; without it,
-the baselines are run on the bundled scenes) under further names of models and further seeds, the
-words of replies in another order each time, so that no reply is packed as a copy of another. Then
+the baselines are run on the bundled scenes) under further names of models and further seeds, each
+time with the replies to other scenes, so that none is packed as a copy of its neighbor. Then
 `phyblock site` puts them into one folder, and headless Chromium opens it from disk, where
 playwright and a Chromium are installed. Prints seconds, memory and sizes.
 """
@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import random
 import shutil
 import sys
 import tempfile
@@ -32,6 +31,8 @@ CHROMIUMS = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = ["--no-sandbox", "--disable-gpu", "--no-first-run"]
 PHYBLOCK = (sys.executable, "-m", "phyblock")
 WAIT_MS = 60_000
+APART = 47
+"""How many scenes lie between one reply and the one that takes its place."""
 
 
 def by_model(source: Path) -> dict[str, list[dict[str, Any]]]:
@@ -47,23 +48,13 @@ def by_model(source: Path) -> dict[str, list[dict[str, Any]]]:
 def repeated(records: list[dict[str, Any]], name: str, run: str) -> Iterator[dict[str, Any]]:
     """Records of one model again and again, under another name and with further seeds."""
     seeds = len({record["seed"] for record in records})
-    rng = random.Random(name)
     for again in count():
-        for record in records:
+        for place, record in enumerate(records):
             seed = record["seed"] + again * seeds
             sample = f"{record['track']}/{name}/{record['key']}/s{seed}"
             about = {"sample": sample, "model": name, "seed": seed, "run": run}
-            yield {**record, **about, "reply": reworded(record["reply"], rng)}
-
-
-def reworded(reply: dict[str, Any] | None, rng: random.Random) -> dict[str, Any] | None:
-    """A reply with its words in another order."""
-    if reply is None:
-        return None
-    texts = {name: reply[name].split(" ") for name in ("text", "reasoning")}
-    for words in texts.values():
-        rng.shuffle(words)
-    return {**reply, **{name: " ".join(words) for name, words in texts.items()}}
+            reply = records[(place + again * APART) % len(records)]["reply"]
+            yield {**record, **about, "reply": reply}
 
 
 def write_runs(source: Path, folder: Path, models: int, samples: int, runs: int) -> list[Path]:

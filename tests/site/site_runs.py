@@ -14,12 +14,13 @@ HOSTILE_TEXT = "</pre></script><script>window.hacked = 2</script>\u2028'\\');win
 
 
 def make_runs(root: Path, pictures: Path) -> Workspace:
-    """`first`: two baselines, two tracks; `later.zip`: a bundle of two baselines in one of them."""
+    """`first`: two baselines in four tracks; `later.zip`: a bundle of two in one of them."""
     workspace = Workspace(root, pictures)
     workspace.write_scenes()
     write_questions(root / "questions", questions(per_subtask=2, subtasks=SUBTASKS))
     fields = {"vqa": {"path": "./questions", "subtasks": SUBTASKS}, "seeds": [0]}
-    workspace.write_suite(tracks=["full_planning", "vqa"], **fields)
+    tracks = ["full_planning", "vqa", "step_planning", "pose_planning"]
+    workspace.write_suite(tracks=tracks, steps={"physics": "off"}, **fields)
     workspace.out = root / "first"
     assert workspace.run().code == 0
     workspace.write_suite(name="later", models=["random", "all-candidates"], seeds=[0, 1])

@@ -40,7 +40,7 @@ def test_runs_and_bundles_become_one_folder_the_same_every_time(
 ) -> None:
     paths = [made.root / "first", made.root / "later.zip"]
     found = write_site(paths, tmp_path / "a", data_of(made))
-    assert (found.models, found.samples) == (4, 38)
+    assert (found.models, found.samples) == (4, 58)
     assert not found.lacking
     write_site(paths, tmp_path / "b", data_of(made))
     assert tree(tmp_path / "a") == tree(tmp_path / "b")
