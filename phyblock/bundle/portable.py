@@ -11,6 +11,7 @@ from phyblock.errors import DataError, Problem
 from phyblock.records import Manifest, Record
 from phyblock.resources import bundled
 from phyblock.run.data import asked_about, open_dataset
+from phyblock.tables.design import read_design
 
 __all__ = ["localized", "portable_manifest", "portable_records"]
 
@@ -85,8 +86,9 @@ def localized(manifest: Manifest, folders: Sequence[Path], where: str) -> Manife
     """The manifest with the places of its data on this machine.
 
     They are looked for in `folders`, by name first, and among the sets that come with phyblock.
-    Raises DataError that names what is missing, or what is there in another version.
+    Raises DataError that names what is missing, StoreError for a manifest that names no plan.
     """
+    levels = read_design(manifest.fields(), where).suite.levels
     fields = manifest.fields()
     problems = []
     taken: list[Path] = []
@@ -94,7 +96,7 @@ def localized(manifest: Manifest, folders: Sequence[Path], where: str) -> Manife
         left = [path for path in folders if path not in taken]
         places = [path for path in _places(needed.name, left) if path.is_dir()]
         if part == "dataset":
-            places = [path for path in places if _is_dataset(path, manifest)]
+            places = [path for path in places if _is_dataset(path, manifest, levels)]
         if places:
             fields[part] = {**fields[part], _ROOT: str(places[0])}
             taken.append(places[0])
@@ -112,14 +114,13 @@ def _places(name: str, folders: Sequence[Path]) -> list[Path]:
     return [*named, *own, *(path for path in folders if path not in named)]
 
 
-def _is_dataset(path: Path, manifest: Manifest) -> bool:
+def _is_dataset(path: Path, manifest: Manifest, levels: Sequence[int]) -> bool:
     """Whether the scenes that the run asked about stand in a folder as they were then."""
     assert manifest.dataset is not None
     try:
         dataset = open_dataset(manifest.dataset.format, path)
     except DataError:
         return False
-    levels = manifest.suite.get("levels") or ()
     return asked_about(manifest, levels, dataset).sha256 == manifest.dataset.sha256
 
 

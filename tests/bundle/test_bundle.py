@@ -194,6 +194,16 @@ def test_data_are_never_looked_for_where_a_bundle_says(made: Workspace, tmp_path
         pytest.fail("it was taken")
 
 
+def _levels(_: list[Raw], manifest: Raw) -> None:
+    manifest["suite"]["levels"][0] = [1]
+
+
+def test_a_manifest_that_names_no_plan_is_refused(made: Workspace, tmp_path: Path) -> None:
+    path = forged(made, tmp_path / "forged", _levels)
+    with pytest.raises(StoreError, match=r"suite\.levels"), opened_bundle(path, folders(made)):
+        pytest.fail("it was taken")
+
+
 def _changed_member(held: dict[str, bytes], name: str, old: bytes, new: bytes) -> dict[str, bytes]:
     assert old in held[name]
     return {**held, name: held[name].replace(old, new)}

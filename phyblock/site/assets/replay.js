@@ -36,6 +36,7 @@ const Replay = (() => {
     const question = sample.question >= 0 ? await Store.entry("questions", sample.question) : null;
     const settings = [...new Set(records.flatMap((record) => (record.scores || []).map((score) => score.setting)))];
     const setting = settings.includes(words.get("g")) ? words.get("g") : settings[0] || "A";
+    const isQuestion = sample.part !== null;
     const scene = inFile && asShown(inFile, records[0]);
     stop();
     return [
@@ -43,8 +44,8 @@ const Replay = (() => {
       el("h1", {}, sample.key, " ", el("span", { class: "muted" }, sample.entry.name)),
       tools(words, sample, other, settings, setting),
       question ? asked(question, sample, records[0]) : null,
-      question ? null : assembly(shown, records, scene, setting),
-      el("div", { class: shown.length > 1 ? "columns two" : "columns" }, shown.map((one, i) => el("div", {}, said(one, records[i], Boolean(question), shown.length > 1)))),
+      isQuestion ? null : assembly(shown, records, scene, setting),
+      el("div", { class: shown.length > 1 ? "columns two" : "columns" }, shown.map((one, i) => el("div", {}, said(one, records[i], isQuestion, shown.length > 1)))),
     ].filter(Boolean);
   }
 

@@ -61,8 +61,8 @@ const Views = (() => {
       el("summary", {}, `Columns (${state.wanted.length} of ${state.all.size})`),
       el("div", { class: "column-groups" }, boxes),
       el("button", { type: "button", class: "quiet", onclick: () => go(state, { cols: "" }) }, "The usual columns"));
-    menu.open = Site.kept("columns-open") === "yes";
-    menu.addEventListener("toggle", () => Site.kept("columns-open", menu.open ? "yes" : "no"));
+    menu.open = Site.kept("phyblock-site-columns") === "yes";
+    menu.addEventListener("toggle", () => Site.kept("phyblock-site-columns", menu.open ? "yes" : "no"));
     return el("div", { class: "tools" }, choice, menu);
   }
 
