@@ -123,6 +123,8 @@ def read_about(path: Path, folder: Path, manifest: Manifest) -> About:
     except ValueError as error:
         raise StoreError(Problem(where, f"{_IS_NOT}: {error}", hint=_HINT)) from error
     assert isinstance(about, About)
+    if not manifest.models:
+        raise StoreError(Problem(f"{path}: {MANIFEST}", "names no model", "models", hint=_HINT))
     found = {
         **{f"files.{name}": digest_of(folder / name) for name in (MANIFEST, RECORDS)},
         "run": manifest.identity,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -198,9 +199,17 @@ def _levels(_: list[Raw], manifest: Raw) -> None:
     manifest["suite"]["levels"][0] = [1]
 
 
-def test_a_manifest_that_names_no_plan_is_refused(made: Workspace, tmp_path: Path) -> None:
-    path = forged(made, tmp_path / "forged", _levels)
-    with pytest.raises(StoreError, match=r"suite\.levels"), opened_bundle(path, folders(made)):
+def _models(records: list[Raw], manifest: Raw) -> None:
+    manifest["models"] = []
+    records.clear()
+
+
+@pytest.mark.parametrize(("change", "field"), [(_levels, "suite.levels"), (_models, "models")])
+def test_a_manifest_that_names_no_plan_is_refused(
+    made: Workspace, tmp_path: Path, change: Callable[[list[Raw], Raw], None], field: str
+) -> None:
+    path = forged(made, tmp_path / "forged", change)
+    with pytest.raises(StoreError, match=re.escape(field)), opened_bundle(path, folders(made)):
         pytest.fail("it was taken")
 
 

@@ -124,6 +124,7 @@ _PLACES = st.sampled_from(
 )
 _VERBS = (
     *("run", "score", "report", "tables", "figures", "compare", "export", "episode", "export-data"),
+    *("bundle", "verify-bundle", "site"),
     *("models", "validate", "scenes", "vqa", "cache", "init", "--help", "-V", "nope", ""),
 )
 _WORDS = (
