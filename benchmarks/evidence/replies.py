@@ -3,8 +3,9 @@
     python -m benchmarks.evidence.replies
 
 Run from the root of a checkout. A reading is wrong where it is not what was meant, and a failure
-where nothing is read of a reply that holds a plan. Two tables and seven rounds (of plans, answers
-and moves) were written before any reader read them; what was read at first sight stands beside.
+where nothing is read of a reply that holds a plan. Two tables and the rounds (of plans, answers and
+moves) were written before any reader read them; what was read at first sight stands beside, and
+for the rounds its parts by kind.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ from collections.abc import Mapping
 
 from phyblock.parsing import parse_plan
 from phyblock.words import PlanParser
-from tests.parsing.fresh_replies import tally
+from tests.parsing.fresh_replies import KINDS, fresh_replies, tally
 from tests.parsing.test_plan_hostile import ALIKE, LAST, LATER, NONE, PLANS
 from tests.parsing.test_plan_manners import FAILURES, READ
 
 Rows = list[tuple[str, tuple[int, ...] | None]]
 N_CANDIDATES = 16
+LATE = 10
+"""Rounds from this one on were read at first sight by version 4, or by what became it."""
 EARLIER = {
     "written first": {"right": 31, "failed": 4, "wrong": 5},
     "written then": {"right": 14, "failed": 3, "wrong": 3},
@@ -57,6 +60,11 @@ def main() -> None:
         print(f"round {number}: {sum(rounds['now'].values())} replies")
         print(f"  then      {_shown(rounds['first'])}")
         print(f"  now       {_shown(rounds['now'])}")
+    for kind in KINDS:
+        late = [reply for reply in fresh_replies() if reply.kind == kind and reply.round >= LATE]
+        counts = Counter(reply.verdict(reply.first) for reply in late)
+        holding = sum(reply.meant is not None for reply in late)
+        print(f"rounds {LATE} and later, {kind}, then: {_shown(counts)}; {holding} hold an answer")
 
 
 def _shown(counts: Mapping[str, int]) -> str:

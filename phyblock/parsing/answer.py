@@ -22,6 +22,7 @@ from phyblock.parsing.answer_patterns import (
     CHOSEN,
     CONCLUDED,
     CONDITIONAL,
+    CONFIRMED,
     CORRECTED,
     COUNTED,
     DANGLES,
@@ -31,6 +32,7 @@ from phyblock.parsing.answer_patterns import (
     LABEL,
     LEADING,
     LINE,
+    MAKES,
     NOT_BUT,
     ORDER,
     QUOTED,
@@ -50,6 +52,7 @@ from phyblock.parsing.answer_statements import (
     turned,
 )
 from phyblock.parsing.answer_value import CONTRADICTION, ChoiceReader
+from phyblock.parsing.slips import without_letter_slips
 from phyblock.parsing.text_forms import answer_of
 
 __all__ = ["ParsedAnswer", "parse_answer"]
@@ -70,7 +73,8 @@ class ParsedAnswer:
 
 def parse_answer(text: str, options: Sequence[str], is_ordering: bool) -> ParsedAnswer:
     """Read the answer out of a reply to a question that shows `options`, the first one as A."""
-    answer = NOT_BUT.sub(r"\g<value>", QUOTED.sub(" ", answer_of(text) or "")).strip()
+    answer = without_letter_slips(QUOTED.sub(" ", answer_of(text) or ""))
+    answer = NOT_BUT.sub(r"\g<value>", answer).strip()
     reader = OrderReader(len(options)) if is_ordering else ChoiceReader(options)
     for rule, find in _ORDER_RULES if is_ordering else _CHOICE_RULES:
         found = find(answer, reader)
@@ -109,6 +113,7 @@ def _stated(text: str, reader: Reader) -> str | None:
     if isinstance(reader, ChoiceReader):
         stated += statements(text, CHOSEN, reader.letter, 0)
         stated += statements(text, IS_RIGHT, reader.exact, 0)
+        stated += statements(text, CONFIRMED, reader.exact, 0)
     else:
         stated += statements(text, ORDER, reader.read, 0)
         stated = [forward(text, statement) for statement in stated]
@@ -137,6 +142,9 @@ _MANY = 3
 def _outer_line(text: str, reader: Reader) -> str | None:
     """The last or the first line, where it is an answer and nothing else."""
     found = [reader.exact(line) for line in (_first_line(text), _last_line(text))]
+    if isinstance(reader, ChoiceReader) and found == [None, None]:
+        last = _LAST_SENTENCE.search(_last_line(text))
+        found[1] = reader.exact(last["letter"]) if last else None
     named = {letters for letters in found if letters is not None}
     if not named:
         return None
@@ -145,6 +153,7 @@ def _outer_line(text: str, reader: Reader) -> str | None:
     return named.pop() if len(named) == 1 else CONTRADICTION
 
 
+_LAST_SENTENCE = re.compile(r"[.!?]\s(?P<letter>[A-Z])[.!]?\Z")
 _WAIT = re.compile(r"\b(?:wait|correction|on second thought|mistake)\b", re.IGNORECASE)
 
 
@@ -152,6 +161,8 @@ def _leading(text: str, reader: Reader) -> str | None:
     """A letter that the reply begins with, when no other option is labeled so."""
     head = LEADING.match(text)
     if head is None or not isinstance(reader, ChoiceReader):
+        return None
+    if head["letter"] == "I" and "I" not in reader.letters:
         return None
     if IS_REJECTED.match(text, head.end("letter")):
         return None
@@ -213,6 +224,9 @@ def _only_text(text: str, reader: Reader) -> str | None:
     if so and (found := reader.option_text(so[-1])):
         return found
     last = _ASIDE.sub(" ", last).strip() or last
+    makes = MAKES.search(last.rstrip(" ."))
+    if makes and (found := reader.option_text(makes["value"], exact=True)):
+        return found
     for piece in (last, text[:_LINE_CHARS]) if len(text) <= _LINE_CHARS else (last,):
         found = CONTRADICTION if reader.letter(piece) == CONTRADICTION else None
         found = reader.option_text(piece) if found is None else found

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, NoReturn, TypeVar
 
-from phyblock.parsing.structured import LONGEST_NUMBER, Fields, objects
+from phyblock.parsing.json_values import LONGEST_NUMBER, Fields, objects
 from phyblock.parsing.text_forms import answer_of
 
 __all__ = ["EXACT_RULE", "KEY_RULE", "AnswerForm", "FormProblem", "FormReading"]

@@ -19,6 +19,7 @@ _PLACES = {
     for name in names.split()
 }
 _RANKS = f"({'|'.join(_PLACES)}|last)"
+_ORDINAL = re.compile(r"\b(?:first|second|third|fourth)\b", re.IGNORECASE)
 _CLAUSE = re.compile(r"[.;!?\n](?=\s)")
 _DENIED = re.compile(r"\b(?:not|nicht)\W{0,3}\Z|不是\s?\Z", re.IGNORECASE)
 _ARROW = re.compile(r"\\(?:long)?(?:right)?(?:arrow|to)\b")
@@ -42,7 +43,7 @@ class OrderReader:
         ]
         self._order = re.compile(rf"{guard}(?:{'|'.join(ways)}){stop}", re.IGNORECASE)
         self._item = re.compile(
-            rf"^[\s>*+\-|]{{0,6}}(?:step\s)?([1-{n}])(?:st|nd|rd|th)?\s?[.):\-|]{{1,2}}\s{{0,3}}"
+            rf"^[\s>*+\-|]{{0,6}}(?:step\s)?([1-{n}])(?:st|nd|rd|th)?(?:\s(?:picture|image|step|place))?\s?[.):\-|]{{1,2}}\s{{0,3}}"
             rf"[(\[]?{_THING}([{self.letters}])(?![A-Za-z0-9'])",
             re.IGNORECASE | re.MULTILINE,
         )
@@ -88,7 +89,8 @@ class OrderReader:
 
     def listed(self, text: str) -> str | None:
         """The order in the last numbered list of letters."""
-        items = [(int(m[1]), m[2].upper()) for m in self._item.finditer(unmarked(text))]
+        counted = _ORDINAL.sub(lambda word: str(_PLACES[word[0].lower()]), unmarked(text))
+        items = [(int(m[1]), m[2].upper()) for m in self._item.finditer(counted)]
         last = items[-len(self.letters) :]
         numbers = "".join(letter for _, letter in last)
         in_turn = [number for number, _ in last] == list(range(1, len(self.letters) + 1))

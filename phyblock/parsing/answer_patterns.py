@@ -12,6 +12,7 @@ __all__ = [
     "CHOSEN",
     "CONCLUDED",
     "CONDITIONAL",
+    "CONFIRMED",
     "CORRECTED",
     "COUNTED",
     "DANGLES",
@@ -21,6 +22,7 @@ __all__ = [
     "LABEL",
     "LEADING",
     "LINE",
+    "MAKES",
     "NOT_BUT",
     "ORDER",
     "QUOTED",
@@ -36,9 +38,12 @@ __all__ = [
 
 _WORDS = (
     r"answer|antwort|l(?:ö|oe)sung|respuesta|resposta|r[ée]ponse|risposta|ответ|答案|回答|答え|解答|正解"
-    r"|정답|답|jawaban|cevap|odpowied[źz]|antwoord|svar|đáp án"
+    r"|정답|답|jawaban|cevap|odpowied[źz]|antwoord|svar|đáp án|الإجابة|απάντηση"
 )
-_IS = r"(?::|=|\bis\b|\bist\b|\bes\b|\best\b|\bè\b|\bé\b|是|为|為|は|은|는|[\-\u2013\u2014](?=\s))"
+_IS = (
+    r"(?::|=|\bis\b|\bist\b|\bes\b|\best\b|\bè\b|\bé\b|είναι|是|为|為|は|은|는"
+    r"|[\-\u2013\u2014](?=\s))"
+)
 _QUALIFIED = (
     r"(?:(?:my|the|your|final|correct|best|right|so|thus|therefore|overall|la|le|die|el|a)"
     r"\s{1,3}){0,4}"
@@ -62,11 +67,18 @@ CHOSEN = re.compile(
     r"|\bmy (?:choice|pick|guess|selection) (?:is|would be)"
     r"|\b(?:correct|right|best) (?:option|choice|one|picture|image|letter|place|match)"
     r" (?:is|would be|must be|should be)"
-    r"|\b(?:nehme|wähle)(?: aber| daher| also)?"
+    r"|\b(?:nehme|wähle)(?: aber| daher| also)?|^(?:it )?looks like|\bje choisis|\b(?:elijo"
+    r"|escolho|scelgo)"
     r"|我认为(?:答案)?是?|应?(?:该)?选(?:择|项)?(?:是"
     r"|为)?)[ \t*_`:]{0,6}(?=(?P<value>[^\n]{1,80}))",
     re.IGNORECASE,
 )
+CONFIRMED = re.compile(
+    r"(?<![A-Za-z0-9])(?P<value>[A-Z])\)?\?\s{1,2}(?:yes|yep|correct"
+    r"|right)\b",
+    re.I,
+)
+"""A question that the reply itself says yes to."""
 IS_RIGHT = re.compile(
     r"(?<![A-Za-z0-9'\-])(?P<value>[A-Z])[)\]*_`\"]{0,4}(?:\s?[(:][^()\n]{1,60}\))?"
     r"\s{1,2}(?:is|must be|seems|appears to be) (?:therefore |clearly |definitely |likely )?"
@@ -85,21 +97,31 @@ SO = re.compile(
     re.IGNORECASE,
 )
 """Behind this stands what follows from the rest of a sentence."""
+MAKES = re.compile(
+    r"[,;]\s(?:(?:but|yet|so)\b[^,;\n]{0,80}?\b(?:is|are|be|makes it|it['\u2019]s)|it is"
+    r"|it['\u2019]s)\s"
+    r"(?:\w+ly\s){0,2}(?P<value>[^,;\n]{1,80})\Z",
+    re.IGNORECASE,
+)
+"""The clause that a reply ends with, that says what the thing asked for is."""
 COUNTED = re.compile(
     r"(?:\b(?:I count|(?:in|a) total(?: of|:| is)|total(?: number)?(?: of \w{1,12})?(?::| is)"
-    r"|which (?:gives|makes)|gives))"
+    r"|which (?:gives|makes)|gives|makes?))"
     r"\s{1,2}(?P<a>\d{1,3})\b(?!\s?[+*x×/.\-]\s?\d)"
     r"|(?<![+*/.\d] )\b(?P<b>\d{1,3})(?:\s\w{1,12}){0,2}\s(?:in total|altogether|overall)\b",
     re.IGNORECASE,
 )
 """How many there are in all."""
 CONCLUDED = re.compile(
-    r"\b(?i:(?:it|this|that|which|what(?: is)? left|what remains|answer|option|choice|picture"
+    r"(?:\b|(?<=[\s.;]))(?i:(?:\u2192|=>)\s?|(?:it|this|that|which|what(?: is)? left"
+    r"|what remains|answer|option|choice|picture"
     r"|image|place)"
     r"(?: must be| has to be| should be| is|['\u2019]s| leaves| matches| corresponds to)"
     r"(?: (?:the |with )?(?:option|picture|image|choice|place))?"
-    r"|(?:so|therefore|thus|hence|also|daher|donc|alors|entonces)[:,]?)[ *_`]{0,4}"
-    r"(?P<value>\(?[A-Z]\)?)[*_`]{0,3}(?=[\s.!,;]{0,3}(?:\Z|\n|[.!;]))",
+    r"|(?:so|therefore|thus|hence|also|daher|donc|alors|entonces)[:,]?|leaves(?: only)?"
+    r"|(?:verdict|remaining|conclusion)\s?(?:is|:|=|->|\u2192)|(?:choose|pick|select)|[;,] then"
+    r")[ *_`]{0,4}"
+    r"(?P<value>\(?[A-Z]\)?)[*_`]{0,3}(?: it is)?(?=[\s.!,;]{0,3}(?:\Z|\n|[.!;]))",
 )
 CORRECTED = re.compile(
     rf"\b(?P<lead>correction|edit|korrektur|final(?: decision| choice)?|更正)\s?[:：]{_VALUE}",
@@ -160,7 +182,7 @@ UNSURE = re.compile(
     r"\b(?:cannot|can['\u2019]?t|could not|couldn['\u2019]t|unable to|not able to|impossible to"
     r"|not possible to|insufficient|not enough|don['\u2019]t know|do not know"
     r"|i['\u2019]m sorry|i am sorry|i apologi[sz]e|no (?:image|picture)|not sure|unclear"
-    r"|none of the|neither)\b|无法|抱歉|не могу",
+    r"|none of the|neither(?![^.;\n]{1,60}\bnor\b))\b|无法|抱歉|не могу",
     re.IGNORECASE,
 )
 BRANDED = re.compile(

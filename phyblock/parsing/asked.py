@@ -14,9 +14,9 @@ from phyblock.parsing.answer import ParsedAnswer, parse_answer
 from phyblock.parsing.answer_form import AnswerForm
 from phyblock.parsing.answer_order import OrderReader
 from phyblock.parsing.answer_value import ChoiceReader
+from phyblock.parsing.json_values import LONGEST_NUMBER, Fields, whole_number
 from phyblock.parsing.move import ParsedMove, parse_move
 from phyblock.parsing.plan import ParsedPlan, kept_plan, parse_plan
-from phyblock.parsing.structured import LONGEST_NUMBER, Fields, whole_number
 
 __all__ = [
     "choice_form",

@@ -15,7 +15,8 @@ _CHAIN = re.compile(
 )
 _REMARKS = re.compile(
     r"(?<=\d)[号號番]|\b(?:zuerst|first|d'abord|primero)\b|"
-    r"\s{0,3}\([^()\d\n]{0,80}\)|\s(?:→|->|=>|\u2014|\u2013)\s[^\d\n]{1,200}\Z",
+    r"\s{0,3}\([^()\d\n]{0,80}\)|\s(?:→|->|=>|\u2014|\u2013)\s[^\d\n]{1,200}\Z"
+    r"|(?:(?<=[→>] \d)|(?<=[→>] \d\d))\.\s[^\d\n]{1,120}\Z",
     re.IGNORECASE,
 )
 """What a list says of its blocks, or behind its end, without a number."""

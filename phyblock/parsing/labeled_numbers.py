@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from phyblock.parsing.chain import chain
 from phyblock.parsing.line_patterns import ARRAY, LABELED, NOUN_LABEL, SENTENCE_END
+from phyblock.parsing.plan_patterns import PLAN_WORD
 from phyblock.parsing.statement import read_statement
 
 __all__ = ["LabeledNumbers", "labeled_numbers"]
 
+_NAMED_LIST = re.compile(
+    r"\s{0,20}[-#>]{0,4}\s{0,3}(?P<label>[^:\d\n]{1,80}?):\s{1,3}(?P<value>[^\W\d][^:\n]{1,300})"
+)
+_APART = re.compile(r",?\s(?:and\s)?then\s|,\s(?:and\s)?|;\s|\s(?:→|->|>)\s", re.IGNORECASE)
+_PIECE = re.compile(
+    r"(?!.*\b(?:on|onto|over|under|beside|to|with|at|of|not|no|without|except|steps?|layers?|x"
+    r"|two|three|four|twice|times|both|zwei|drei|zweimal|deux|trois|fois|dos|tres|veces)\b)"
+    r"[^\W\d][^\d()]{0,30}\s\(?#?(?P<number>\d{1,3})\)?",
+    re.IGNORECASE,
+)
+"""A block by its looks and its number, as "red arch (3)" or "slab 2"."""
 _LABEL_CHARS = 30
 """A label is shorter, where words stand beside the numbers behind it."""
 
@@ -42,6 +55,12 @@ def labeled_numbers(line: str) -> LabeledNumbers | None:
             numbers = read_statement(value, is_item=True).numbers
         if numbers:
             return LabeledNumbers(numbers, labeled["label"], value, rest)
+    if named := _NAMED_LIST.match(line):
+        pieces = _APART.split(named["value"].strip(" ."))
+        blocks = [_PIECE.fullmatch(piece.strip()) for piece in pieces]
+        if len(blocks) > 1 and PLAN_WORD.search(named["label"]) and None not in blocks:
+            numbers = tuple(int(block["number"]) for block in blocks if block)
+            return LabeledNumbers(numbers, named["label"], " ".join(map(str, numbers)), "")
     arrays = list(ARRAY.finditer(line))
     if not arrays:
         return None

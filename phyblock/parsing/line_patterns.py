@@ -49,7 +49,8 @@ MARKED = re.compile(
     r"\s{0,40}(?:[-+•·▪–]|>)\s{1,4}(?=\S)|\s{0,40}(?:[a-h][.)]|\d{1,2}(?:\.\d{1,2}){1,2}[.):]?)\s"
 )
 STARTS_MOVING = re.compile(
-    rf"[\s>\[{{(]{{0,12}}(?:(?:first|then|next|finally|now|please|und|dann|zuerst),?\s)?(?:robot\.)?(?:{VERB})",
+    rf"[\s>\[{{(]{{0,12}}(?:(?:first|then|next|finally|now|please|und|dann"
+    rf"|zuerst),?\s)?(?:robot\.)?(?:{VERB})",
     re.I,
 )
 NAMES_FIRST = re.compile(
@@ -57,8 +58,9 @@ NAMES_FIRST = re.compile(
 )
 LABELED = re.compile(
     r"\s{0,20}[-#>]{0,4}\s{0,3}(?:\d{1,2}[.)]\s)?(?P<label>[^:=：\[\n]{1,80}?)\s{0,3}(?:[:=：]"
-    r"|\b(?:is|are|would be|ist|lautet|est|es)\b:?|是|为)\s{0,3}"
-    r"(?P<value>[\s(\[{<#]{0,4}(?:(?:blocks?|index|indices|积木)\s)?\d[^\n]{0,400})",
+    r"|(?<=[^\W\d]\s)(?:→|->)(?=\s)|\b(?:is|are|would be|ist|lautet|est|es)\b:?|是|为)\s{0,3}"
+    r"(?P<value>[\s(\[{<#]{0,4}(?:(?:first|zuerst|erst|d'abord|primero)\s)?(?:(?:blocks?|index"
+    r"|indices|积木)\s)?\d[^\n]{0,400})",
     re.IGNORECASE,
 )
 ARRAY = re.compile(
@@ -80,4 +82,4 @@ LAYER = re.compile(
     r"layer|level|step|stage|phase|part|ebene|schicht|层|structure|base|bottom|middle|top|then|next",
     re.I,
 )
-SENTENCE_END = re.compile(r"(?<=[\d)\]])[.;]\s{1,4}(?=\S)")
+SENTENCE_END = re.compile(r"(?<=[\d)\]])(?:\.\s{1,4}(?=\S)|;\s{1,4}(?=[^\s\d]))")

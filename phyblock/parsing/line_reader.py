@@ -21,6 +21,7 @@ from phyblock.parsing.line_patterns import (
 from phyblock.parsing.listing import Listing
 from phyblock.parsing.mention import MOST_AT_ONCE
 from phyblock.parsing.plan_patterns import (
+    FINAL_LABEL,
     LABEL_CHARS,
     NOT_MEANT,
     OPTION,
@@ -79,6 +80,8 @@ class LineReader:
         last = int(head.groupdict().get("last") or n)
         body = line[head.end() :].replace("{", " ").replace("}", " ")
         current: Listing | None = getattr(self, name)
+        if name == "_steps" and _says_plan(body):
+            return self._take_labeled(at, body)
         if name == "_steps" and not head["sign"] and body.strip():
             is_next = current is None or n > max(current.own, default=0)
             if not (is_next and _is_move(body)):
@@ -235,6 +238,14 @@ class LineReader:
         self.above = []
         self.done.append(listing)
         return listing
+
+
+def _says_plan(body: str) -> bool:
+    """Whether the text of a step says the whole plan: "Step 3 - Order: 4, 4, 11, 2"."""
+    labeled = labeled_numbers(body) if ":" in body else None
+    return (
+        labeled is not None and len(labeled.numbers) > 1 and bool(FINAL_LABEL.search(labeled.label))
+    )
 
 
 def _goes_on(last: Listing, label: str) -> bool:

@@ -37,4 +37,4 @@ class Listing:
     @property
     def is_firm(self) -> bool:
         """Whether its form says that it is a plan: steps, moves, JSON, a table with steps."""
-        return self.form in ("steps", "json", "table") or 2 * self.n_moves >= self.n_named
+        return self.form in ("steps", "json", "table", "layers") or 2 * self.n_moves >= self.n_named

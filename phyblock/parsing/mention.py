@@ -60,7 +60,8 @@ _WORD_NUMBER = (
     r"|sixteen|eins|zwei|drei|vier|fünf|sechs|sieben|acht|neun|zehn|elf|zwölf|un|deux|trois|quatre"
     r"|cinq|sept|huit|neuf|dix|uno|dos|tres|cuatro|cinco|seis|siete|ocho|nueve|diez|десять|один|два"
     r"|три|четыре|пять|шесть|семь|восемь|девять)(?!\w"
-    r"|\s(?!(?:on|onto|to|at|and|then|next|in|beside|above|over|as|is|goes|or|first|auf|und|et|y)\b)[^\W\d])|[一二三四五六七八九十]{1,2}(?![号號番\w])"
+    r"|\s(?!(?:on|onto|to|at|and|then|next|in|beside|above|over|as|is|goes|or|first|auf|und|et"
+    r"|y)\b)[^\W\d])|[一二三四五六七八九十]{1,2}(?![号號番\w])"
 )
 _EACH = (
     r"(?:(?:on|at|for|in)\s)?(?:each|either|both|every|auf jeder|an jeder)\s(?:of\s)?(?:the\s)?"
@@ -101,7 +102,8 @@ MENTION = re.compile(
     rf"(?=\s{{0,3}}(?:\Z|[.,;:()\u2014\u2013]|(?:on|onto|to|at|next|and|then|in|beside|over|above"
     rf"|auf)\b))"
     rf"|(?P<then>{_NEXT}\s?#?)(?P<next>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})"
-    r"(?=\s{0,3}(?:\Z|[.,;:()，。；\u2014\u2013]|(?:on|onto|at|next|and|then|in|beside|over|above|as|goes)\b))"
+    r"(?=\s{0,3}(?:\Z|[.,;:()，。；\u2014\u2013]|(?:on|onto|at|next|and|then|in|beside|over|above"
+    r"|as|goes)\b))"
     r"|(?:(?<=\()#?(?=[0-9][^()]{0,40}\))|(?<!\w)#)(?P<bare>[0-9]{1,6}(?:(?:, ?|\s?&\s?|/| or "
     r"|,? and | und |、)[0-9]{1,6}){0,8})(?=\s?(?:[,;:)/\]×→]|\Z)|\sx\s?\d|(?<=#\d)(?!\w)"
     r"|(?<=#\d\d)(?!\w))(?!\.[0-9])"
@@ -122,8 +124,8 @@ TIMES = re.compile(
 _SO_MANY = re.compile(
     r"(?:(?P<twice>\b(?:twice|zweimal|deux fois|dos veces)\s|两次)|(?P<n>\d{1,2})\s?(?:[x×]|times"
     r"|mal|个|块)\s{0,2}|(?P<cjk_word>[二两三四五六])(?:个|块)"
-    r"|\b(?P<word>two|three|four|five|six|zwei|drei|vier|deux|trois"
-    r"|dos|tres)"
+    r"|\b(?P<word>two|three|four|five|six|zwei|drei|vier|deux|trois|quatre|dos|tres|cuatro|due|tre"
+    r"|quattro|dois|duas|três|quatro|два|две|три|четыре)"
     r"\s(?:\w{2,12}\s){0,3}?)\(?\Z",
     re.IGNORECASE,
 )

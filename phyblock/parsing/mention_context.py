@@ -23,6 +23,7 @@ __all__ = [
     "PIECE_VERB",
     "STANDS",
     "SUPPORT",
+    "WHEN_PLACED",
 ]
 
 HERE = re.compile(
@@ -73,8 +74,12 @@ STANDS = re.compile(
     re.IGNORECASE,
 )
 """What stands behind a block that is there already."""
+WHEN_PLACED = re.compile(
+    rf"\b(?:after|once|having|before|nachdem|bevor)\s(?:\w{{1,12}}\s){{0,2}}?{VERB}[^,;]{{0,40}}\Z",
+    re.IGNORECASE,
+)
+"""What stands before a block that another step places."""
 NEGATED = re.compile(
-    rf"\b(?:after|once|having|before|nachdem|bevor)\s(?:\w{{1,12}}\s){{0,2}}?{VERB}[^,;]{{0,40}}\Z|"
     rf"(?:\b(?:not|never|avoid|without|cannot|nicht|no|ne|не)\b|n't\b|不要?"
     rf"|别)\s{{0,2}}(?:\w{{1,12}}\s){{0,2}}{VERB}"
     r"[^,;]{0,60}\Z|\b(?:remov\w{1,3}|discard|ignor\w{1,3}|skip|exclud\w{1,3}|reject|leave out"
@@ -89,11 +94,13 @@ PIECES = re.compile(
 PIECE_VERB = re.compile(
     rf"{VERB}|\b(?:then|next(?! to)|finally|lastly|afterwards|dann|danach|zuletzt|darauf"
     r"|daneben|obendrauf|ganz oben|zum schluss|schließlich|puis|ensuite|enfin|luego|por último"
+    r"|después|otr[oa]|encore|poi|infine|dopo|depois|por fim|затем|потом"
     r"|finalmente|and (?:another|one more))\b|然后|最后",
     re.IGNORECASE,
 )
 JOINS = re.compile(
-    rf"(?:[\s,()\]\-→>&+、，。]|[号號番](?=[和与及])|\([^()\n]{{0,80}}\)|\b(?:and|then|und|dann|et|puis|y|luego"
+    rf"(?:[\s,()\]\-→>&+、，。]|[号號番](?=[和与及])|\([^()\n]{{0,80}}\)|\b(?:and|then|und|dann|et|puis"
+    rf"|y|luego"
     r"|followed by"
     rf"|finally|also|next"
     rf"|another|again|more|the|a|one|an|(?:red|blue|green|yellow|orange|purple|long|small|large"

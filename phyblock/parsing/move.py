@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from phyblock.parsing.answer_form import FormProblem
 from phyblock.parsing.answer_patterns import CONDITIONAL
+from phyblock.parsing.json_values import Fields, objects
+from phyblock.parsing.slips import without_slips
 from phyblock.parsing.statement import read_statement
 from phyblock.parsing.text_forms import answer_of
 
@@ -64,8 +66,11 @@ def _named(pattern: str, name: str) -> str:
 
 
 _LABEL = (
-    r"(?:(?:my|the|your|final|next|chosen|selected|single)\s{1,3}){0,3}"
-    r"(?:plan|step(?:\s{0,2}#?[0-9]{1,3})?|answer|action|operation|move|output|decision|choice|attempt|next|correction)"
+    r"(?:(?:my|the|your|final|next|chosen|selected|single|best|nächste[rs]?|siguiente"
+    r"|prochaine?)\s{1,3}){0,3}"
+    r"(?:plan|best|zug|schritt|paso|acción|step(?:\s{0,2}#?[0-9]{1,3})?|answer|action|operation"
+    r"|move|output|decision|choice"
+    r"|attempt|next|correction)"
     r"\s{0,3}(?:is|:|=|->|\u2192)\s{0,3}"
 )
 _OPERATION = rf"(?:{_named(_CALL, 'call')}|{_named(_PHRASE, 'phrase')}|(?P<done>{_DONE}))"
@@ -84,7 +89,19 @@ _NOT_MEANT = re.compile(
     re.IGNORECASE,
 )
 """What stands before an operation in its clause that is not the one to do now."""
+_TAKES_BACK = re.compile(
+    r"\b(?:wait|no[,:.]|actually|correction|sorry|oops|hmm+|mistake|revised|on second thought"
+    r"|instead)(?!\w)",
+    re.IGNORECASE,
+)
+_CONCLUDES = re.compile(
+    rf"\b(?:so|therefore|thus|hence)\b[:,]?\s(?:[^\d\n.;]{{0,30}}\s)?{_named(_CALL, 'call')}"
+    r"(?:\s(?:is\s)?(?:next|now))?\W{0,3}\Z",
+    re.IGNORECASE,
+)
+_CLAUSE_CHARS = 100
 _ASKED = re.compile(r"[^.!?;\n]{0,80}\?")
+_COUNTED = re.compile(r"\d{1,2}[.)]\s")
 _MANY = re.compile(
     r"(?<!\w)move\s{0,3}[(\[]\s{0,9}(?P<list>[0-9]{1,6}"
     r"(?:\s{0,3}(?:[,;/&]|and|or)\s{0,3}[0-9]{1,6}){1,31})(?![0-9])",
@@ -94,6 +111,14 @@ _DONE_SENTENCE = re.compile(
     rf"(?:\A|[.!?:\u2014]\s{{1,3}}|;\s{{0,3}}|(?:->|\u2192|\bthen)\s{{0,3}}){_DONE}\s{{0,2}}[.!]?\Z",
     re.IGNORECASE,
 )
+_UNSURE = re.compile(
+    r"\b(?:or|either|perhaps|maybe|not sure|later|afterwards|then)\b", re.IGNORECASE
+)
+_OTHER_CALL = re.compile(
+    rf"(?:{_LABEL})(?!move|place|put|done)[a-z_]{{3,20}}\s?\([^()\n]{{0,20}}\)\W{{0,3}}",
+    re.IGNORECASE,
+)
+"""An answer that is another operation than those there are."""
 _CHOSEN = re.compile(r"\b(?:choose|select|pick|wähle|elijo|choisis)\b|选择?", re.IGNORECASE)
 _BARE = re.compile(
     rf"(?:{_LABEL})?(?:(?:candidate|block)\s)?[#(\[]?{_INTEGER}[)\].]?", re.IGNORECASE
@@ -102,7 +127,7 @@ _OBJECT = re.compile(r"\{[^{}]{0,600}\}")
 _FENCE = re.compile(r"(?:`{3,}|~{3,})\s{0,3}[\w+-]{0,16}")
 _MARKUP = re.compile(r"</?(?:final_)?answer>|[*`_~]{1,3}|\\boxed\{|[{}]")
 _EDGES = " \t\r\f\v>#-*+\u2022|\"'"
-_INDEX_KEYS = ("index", "block_index", "id", "block_id", "block", "candidate", "number")
+_INDEX_KEYS = ("index", "block_index", "id", "block_id", "block", "candidate", "number", "n")
 _INDEX_ALONE = _INDEX_KEYS[:4]
 """Keys that are enough without an action."""
 _ACTION_KEYS = (
@@ -115,12 +140,15 @@ _ACTION_KEYS = (
     "move",
     "step",
     "op",
+    "name",
+    "function",
+    "tool",
 )
 
 
 def parse_move(text: str) -> ParsedMove:
     """Read the one operation that a reply names."""
-    answer = answer_of(text) or ""
+    answer = without_slips(answer_of(text) or "")
     lines = [line for line in map(_plain, answer.splitlines()) if line]
     if not lines:
         return ParsedMove(problem="no_move" if text.strip() else "empty")
@@ -175,7 +203,18 @@ def _last_lines(_: str, lines: list[str]) -> list[_Operation]:
 
 def _json(answer: str, _: list[str]) -> list[_Operation]:
     found = [_from_object(match.group()) for match in _OBJECT.finditer(answer)]
+    if not any(operation is not None for operation in found):
+        found = [_of_fields(dict(_flat(value))) for _, _, value in objects(answer)]
     return [operation for operation in found if operation is not None]
+
+
+def _flat(value: Any) -> Iterator[tuple[str, Any]]:
+    """The fields of an object and of those within it, as a call of a function has them."""
+    for key, held in value if isinstance(value, Fields) else ():
+        yield str(key).strip().lower(), held
+        is_text = isinstance(held, str) and held.lstrip().startswith("{")
+        for inner in [v for *_, v in objects(held)] if is_text else [held]:
+            yield from _flat(inner)
 
 
 def _from_object(text: str) -> _Operation | None:
@@ -184,7 +223,11 @@ def _from_object(text: str) -> _Operation | None:
         content = json.loads(text)
     except (ValueError, RecursionError):
         return None
-    fields = {str(key).strip().lower(): value for key, value in content.items()}
+    return _of_fields({str(key).strip().lower(): value for key, value in content.items()})
+
+
+def _of_fields(fields: Mapping[str, Any]) -> _Operation | None:
+    """The operation that the fields of an object name, or None."""
     index = next((_whole(fields[key]) for key in _INDEX_KEYS if key in fields), None)
     for key in _ACTION_KEYS:
         value = fields.get(key)
@@ -209,31 +252,48 @@ def _whole(value: object) -> int | None:
 
 
 def _labeled(_: str, lines: list[str]) -> list[_Operation]:
+    """What labels name; behind words that take it back ("no", "wait") the last of them alone."""
+    text = "\n".join(lines)
     found: list[_Operation] = []
-    for line in lines:
-        for match in _LABELED.finditer(line):
-            if _NOT_MEANT.search(line[: match.start()]):
-                continue
-            more: re.Match[str] | None = match
-            while more is not None:
-                found.append(_operation(more))
-                more = _MORE.match(line, more.end())
+    end = 0
+    for match in _LABELED.finditer(text):
+        if _is_not_meant(text, match.start()):
+            continue
+        if found and _TAKES_BACK.search(text[end : match.start()]):
+            found = []
+        more: re.Match[str] | None = match
+        while more is not None:
+            found.append(_operation(more))
+            end = more.end()
+            more = _MORE.match(text, end)
     return found
+
+
+def _is_not_meant(text: str, start: int) -> bool:
+    before = text[max(0, start - _CLAUSE_CHARS) : start]
+    return bool(_NOT_MEANT.search(before[before.rfind("\n") + 1 :]))
 
 
 def _mentions(line: str) -> list[_Operation]:
     found = [
         _operation(match)
         for match in _MENTION.finditer(line)
-        if not _NOT_MEANT.search(line[: match.start()]) and not _ASKED.match(line, match.end())
+        if not _is_not_meant(line, match.start()) and not _ASKED.match(line, match.end())
     ]
     for many in _MANY.finditer(line):
         found += [int(digits) for digits in re.findall("[0-9]+", many["list"])]
     return found
 
 
+def _concluded(_: str, lines: list[str]) -> list[_Operation]:
+    """The operation that the last sentence comes to: "Move(3) failed, so Move(5)"."""
+    concludes = _CONCLUDES.search(lines[-1]) if len({*_mentions(lines[-1])}) > 1 else None
+    return [_operation(concludes)] if concludes and not _UNSURE.search(lines[-1]) else []
+
+
 def _in_last_line(_: str, lines: list[str]) -> list[_Operation]:
-    done: list[_Operation] = ["done"] if _DONE_SENTENCE.search(lines[-1]) else []
+    is_item = _COUNTED.match(lines[-1])
+    done: list[_Operation] = ["done"] if _DONE_SENTENCE.search(lines[-1]) and not is_item else []
     return [*_mentions(lines[-1]), *done]
 
 
@@ -243,6 +303,8 @@ def _anywhere(_: str, lines: list[str]) -> list[_Operation]:
 
 def _loose(_: str, lines: list[str]) -> list[int]:
     """What sentences move or choose, those of the last line first."""
+    if _OTHER_CALL.fullmatch(lines[-1]):
+        return []
     last = _moved(lines[-1])
     return last or [number for line in lines for number in _moved(line)]
 
@@ -266,12 +328,13 @@ _RULES: tuple[tuple[str, _Find], ...] = (
     ("last_lines", _last_lines),
     ("json", _json),
     ("label", _labeled),
+    ("concluded", _concluded),
     ("last_line_mention", _in_last_line),
     ("mention", _anywhere),
     ("loose", _loose),
     ("bare_number", _bare),
 )
-_LENIENT = ("last_line_mention", "mention", "loose")
+_LENIENT = ("concluded", "last_line_mention", "mention", "loose")
 """Rules that read sentences, which may tie a move to a condition."""
 MOVE_RULES: tuple[str, ...] = tuple(name for name, _ in _RULES)
 """Rules in the order in which they are tried."""

@@ -11,12 +11,15 @@ Both drop numbers that no candidate has and report them. Neither raises on any t
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from phyblock.domain import Plan
+from phyblock.parsing.alike_lines import as_steps, as_unknown_steps
 from phyblock.parsing.answer_form import FormProblem
+from phyblock.parsing.edits import edited
+from phyblock.parsing.legend import with_numbers
 from phyblock.parsing.listing import Listing
 from phyblock.parsing.plan_doubt import is_doubtful
 from phyblock.parsing.plan_patterns import (
@@ -24,8 +27,10 @@ from phyblock.parsing.plan_patterns import (
     CHOICE,
     DOWNWARD,
     EXPLANATION,
+    FINAL_LABEL,
     HEADING_CHARS,
     NOT_REVERSED,
+    OFFER,
     OPTION,
     OR_ELSE,
     ORDINALS,
@@ -35,8 +40,8 @@ from phyblock.parsing.plan_patterns import (
     SUPPOSED,
 )
 from phyblock.parsing.plan_rank import LAST, MOVES, rank_of
-from phyblock.parsing.reply_lists import listings
-from phyblock.parsing.text_forms import BACKWARD, answer_of
+from phyblock.parsing.reply_lists import reply_lists
+from phyblock.parsing.text_forms import BACKWARD, answer_of, plain_line
 from phyblock.words import PlanParser
 
 __all__ = ["PLAN_PROBLEMS", "ParsedPlan", "PlanProblem", "kept_plan", "parse_plan"]
@@ -112,10 +117,29 @@ def _steps(text: str) -> _Read:
         )
         if not isinstance(read, str):
             return name, read[1]
-    return _choose(answer) if answer else "empty"
+    if not answer:
+        return "empty"
+    read = _choose(answer)
+    ways = {
+        "no_plan": (with_numbers, as_steps),
+        "catalogue": (with_numbers,),
+        "ambiguous": (as_unknown_steps,),
+    }
+    for other_way in ways.get(read, ()) if isinstance(read, str) else ():
+        rewritten = other_way(answer)
+        other = _choose(rewritten) if rewritten else "no_plan"
+        if not isinstance(other, str):
+            return other
+    return read
 
 
 _MOST_FRAMES = 8
+_OTHER_WAYS: dict[str, tuple[Callable[[str], str | None], ...]] = {
+    "no_plan": (with_numbers, as_steps),
+    "catalogue": (with_numbers,),
+    "ambiguous": (as_unknown_steps,),
+}
+"""How a reply is rewritten to be read again where nothing was read."""
 
 
 @dataclass
@@ -136,7 +160,8 @@ class _Plan:
 
 def _choose(answer: str) -> _Read:
     """The plan among the lists of an answer."""
-    found, below = listings(answer)
+    reply = reply_lists(answer)
+    found, below = reply.lists, reply.below
     named = [listing for listing in found if listing.numbers]
     ranks = [rank_of(listing) for listing in named]
     best = max(ranks, default=0)
@@ -148,6 +173,8 @@ def _choose(answer: str) -> _Read:
         )
     if REFUSAL.search(answer) and (best == LAST or _is_declined(named)):
         return "refusal"
+    if best == LAST and OFFER.search(answer):
+        return "no_plan"
     plans = _plans(named, ranks, best, found)
     plans[-1].below = below
     plan = _chosen(plans, answer)
@@ -161,11 +188,29 @@ def _choose(answer: str) -> _Read:
     if is_cut_off:
         after = after[:-1]
     before = found[: found.index(plan.lists[0])]
-    if plan.is_unclear or is_doubtful(plan.lists, plan.below, before, after):
+    end = plan.lists[-1].last_line
+    numbers, edits = edited(plan.numbers, _behind(reply.lines, end))
+    after = [listing for listing in after if listing.first_line - end not in edits]
+    edit_lines = {plain_line(reply.lines[end + at]).strip() for at in edits}
+    for listing in after:
+        listing.above = [line for line in listing.above if line not in edit_lines]
+    beside = [line for line in plan.below if line not in edit_lines]
+    if numbers is None or plan.is_unclear or is_doubtful(plan.lists, beside, before, after):
         return "ambiguous"
     form = plan.lists[-1].form
-    numbers = plan.numbers * (2 if any(map(AGAIN.search, below)) else 1)
-    return form, numbers[::-1] if _is_reversed(plan, form) else numbers
+    if any(map(AGAIN.search, below)):
+        numbers = numbers * 2
+    is_reversed = _is_reversed(plan, form) and all(b.numbers[::-1] != numbers for b in before)
+    return form, numbers[::-1] if is_reversed else numbers
+
+
+def _behind(lines: Sequence[str], end: int) -> list[str]:
+    """What stands behind the last line of a plan, and in that line behind its first sentence."""
+    rest = _SENTENCE_END.split(lines[end], maxsplit=1)[1:] if end < len(lines) else []
+    return [rest[0] if rest else "", *lines[end + 1 :]]
+
+
+_SENTENCE_END = re.compile(r"(?<=[\d)\]])[.;]\s{1,4}(?=[^\W\d])")
 
 
 def _plans(named: list[Listing], ranks: list[int], best: int, found: list[Listing]) -> list[_Plan]:
@@ -207,7 +252,8 @@ def _relation(passed: list[str], plans: list[_Plan], listing: Listing) -> str:
         return "other"
     if len(lines) > 1 or len(title) > HEADING_CHARS or REVISION.search(title) or "" in passed:
         is_explained = any(EXPLANATION.search(line) for line in lines[:1])
-        return "explanation" if is_explained and listing.form != "json" else "other"
+        is_last_word = _is_announced(lines, listing)
+        return "explanation" if is_explained and not is_last_word else "other"
     if EXPLANATION.search(title) and listing.form != "json":
         return "explanation"
     part = PART.search(title) if title else before.numbers != listing.numbers
@@ -215,6 +261,13 @@ def _relation(passed: list[str], plans: list[_Plan], listing: Listing) -> str:
         is_other = before.form == listing.form != "steps" and before.numbers != listing.numbers
         return "unclear" if title and is_other else "other"
     return "skip" if plans[-1].explained else "part"
+
+
+def _is_announced(lines: list[str], listing: Listing) -> bool:
+    """Whether a list behind an explanation is said to be the plan after all."""
+    if listing.form == "json" or (listing.form == "labeled" and FINAL_LABEL.search(listing.label)):
+        return True
+    return len(lines) > 1 and len(lines[-1]) < HEADING_CHARS and bool(REVISION.search(lines[-1]))
 
 
 def _chosen(plans: list[_Plan], answer: str) -> _Plan | None:

@@ -29,19 +29,27 @@ __all__ = ["is_doubtful"]
 _CORRECTS = re.compile(
     r"\b(?:wait|correction|corrected|oops|scratch that|(?:should|must|has to|needs to) be"
     r"|should (?:have been|read)|i meant"
+    r"|sorry|i (?:forgot|missed|overlooked)"
     r"|swap(?:ped)?|my mistake|moment|korrektur|sondern|muss|corrección|korrigier\w*)\b"
-    r"|\b(?:actually|no|rather)\b[,:]|等等|应该是|更正|改为|訂正|正しくは",
+    r"|(?:^|[.;:!,]\s)(?:replace|insert|change)\s|\b(?:actually|no|rather)\b[,:]|等等|应该是|更正|改为"
+    r"|訂正|正しくは",
     re.IGNORECASE,
 )
 _DROPS = re.compile(
-    r"\b(?:forget|scrap|disregard|vergiss)\s(?:the|that|this|it|what|d\w\w)\b", re.IGNORECASE
+    r"\b(?:forget|scrap|disregard|vergiss|(?:don['\u2019]t|do not) (?:use|trust|take))"
+    r"\s(?:the|that|this|it|what|any|d\w\w)\b"
+    r"|\b(?:not sure|unsure|uncertain|don['\u2019]t know) which\b"
+    r"|\bnot (?:at all )?sure (?:about|of) (?:any|all|this|these|the plan)",
+    re.IGNORECASE,
 )
 _NUMBER = re.compile(r"\d")
 _SENTENCE = re.compile(r"[.;!?](?=\s|\Z)|[。；！？]")
 _ASIDE = re.compile(
-    r"\b(?:not?|never|none|un\w+|distract\w*|decoy\w*|similar|alternativ\w*|could|would|might|may|if"
-    r"|other"
-    r"|left|remaining|example|extra|nicht|kein\w*|ähnlich\w*|autres?|otros?|no)\b|n['\u2019]t\b|不|未|没",
+    r"\b(?:not?|never|none|un\w+|distract\w*|decoy\w*|similar|alternativ\w*|could|would|might"
+    r"|may|if"
+    r"|other|looks? like|mirror\w*|resembl\w*"
+    r"|left|remaining|example|extra|nicht|kein\w*|ähnlich\w*|autres?|otros?|no)\b|n['\u2019]t\b"
+    r"|不|未|没",
     re.IGNORECASE,
 )
 """Words of a sentence about blocks that are no part of the plan."""
@@ -63,17 +71,33 @@ _BRACKETS = re.compile(r"\([^()\n]{0,200}\)|\[[^\[\]\n]{0,200}\]")
 _STEP_AGAIN = re.compile(
     r"(?:\b(?:swap\w*|skip|remov\w+|drop|wrong|replac\w+|should|must|has to|needs? to|exchange"
     r"|delete|ignore|unnecessary|(?:not|n't) (?:needed|required|necessary))\b.{0,60})?"
-    r"\bsteps?\s?\d(?P<then>.{0,60}\b(?:swap\w*|skip\w*|remov\w+|drop\w*|wrong|replac\w+|should|must"
+    r"\bsteps?\s?\d(?P<then>.{0,60}\b(?:swap\w*|skip\w*|remov\w+|drop\w*|wrong|replac\w+|should"
+    r"|must"
     r"|has to|needs? to|exchange\w*|unnecessary|(?:not|n't) (?:needed|required|necessary)))?",
     re.IGNORECASE,
 )
 """A step named again, to take it back."""
+_PLACE_OR_TIMES = re.compile(
+    r"(?<![\d.])(?P<block>\d{1,2})\s(?:must|has to|needs to|should|is|comes?|goes)\s?(?:be|come"
+    r"|go)?\s?"
+    r"(?:(?:placed|used|needed)\s)?(?:(?P<place>first|last)|(?P<times>once|twice|three times"
+    r"|two times)"
+    r"|(?P<relation>before|after)\s(?:block\s|candidate\s)?(?P<other>\d{1,2}))\b",
+    re.IGNORECASE,
+)
+"""What is said of a block behind the plan that the plan itself shows to be so or not."""
 _TOTAL = re.compile(
     r"\b(?:total(?: number)?(?: of)?|number of) ?(?:blocks?|steps?"
     r"|moves?)?(?: used)?\W{1,4}(\d{1,2})\b(?! (?:layers|levels|kinds|types|colou?rs))",
     re.IGNORECASE,
 )
 """A count of the steps, said behind them."""
+_ONCE_MORE = re.compile(
+    r"\bstep\W{0,3}\d{1,2}\W.{0,20}\b(?:repeat|again|same|another|likewise|also|mirror"
+    r"|duplicate|copy)\b",
+    re.IGNORECASE,
+)
+"""A step that names no block but moves one."""
 _FRAGMENT = 3
 """Steps of a list that may go on from what stands there already."""
 _MOST_LEFT_OUT = 4
@@ -120,7 +144,11 @@ def _is_torn(lists: Sequence[Listing]) -> bool:
     return (
         bool(own and 1 < own[0] <= _MOST_LEFT_OUT)
         or any(1 < b.own[0] <= a.own[-1] for a, b in pairwise(lists) if a.own and b.own)
-        or any(not re.search(r"\w", line) for listing in lists for line in listing.between)
+        or any(
+            not re.search(r"\w", line) or _ONCE_MORE.search(line)
+            for listing in lists
+            for line in listing.between
+        )
     )
 
 
@@ -138,7 +166,10 @@ def _is_contradicted(
     for listing in after:
         if listing.form == "labeled" and not _ASIDE.search(listing.label):
             beside += listing.lines
-    return _is_corrected([*beside, *below], known) or any(
+    said = "\n".join([*beside, *below, *(line for listing in after for line in listing.lines)])
+    if not all(_holds(match, order) for match in _PLACE_OR_TIMES.finditer(said)):
+        return True
+    return _is_corrected([*beside, *below], order) or any(
         _says_otherwise(listing, order, known) for listing in after
     )
 
@@ -165,10 +196,12 @@ def _unless_aside(brackets: re.Match[str]) -> str:
     return " " if _ASIDE.search(brackets[0]) else brackets[0]
 
 
-def _is_corrected(lines: Sequence[str], numbers: set[int]) -> bool:
+def _is_corrected(lines: Sequence[str], order: Sequence[int]) -> bool:
     """Whether lines beside a plan take a step back, or name blocks that it lacks."""
     is_explained = False
+    numbers = {*order}
     for line in lines:
+        line = _PLACE_OR_TIMES.sub(" ", line)
         is_explained = is_explained or bool(EXPLANATION.search(line))
         if (_CORRECTS.search(line) and _NUMBER.search(line)) or _DROPS.search(line):
             return True
@@ -179,6 +212,22 @@ def _is_corrected(lines: Sequence[str], numbers: set[int]) -> bool:
             if not _ASIDE.search(sentence) and named_blocks(sentence) - numbers:
                 return True
     return False
+
+
+def _holds(said: re.Match[str], order: Sequence[int]) -> bool:
+    """Whether what a line says of a block's place or number of times is so in the plan."""
+    block = int(said["block"])
+    if said["times"]:
+        times = said["times"].lower()
+        return order.count(block) == {"once": 1, "twice": 2, "three times": 3}.get(times, 2)
+    if block not in order:
+        return False
+    if said["other"]:
+        earlier = said["relation"].lower() == "before"
+        other = int(said["other"])
+        first, then = (block, other) if earlier else (other, block)
+        return other in order and order.index(first) < order.index(then)
+    return order[0 if said["place"].lower() == "first" else -1] == block
 
 
 def _unexplained(later: Sequence[Listing]) -> Iterator[Listing]:

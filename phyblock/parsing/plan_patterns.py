@@ -20,6 +20,7 @@ __all__ = [
     "LAYERS",
     "NOT_MEANT",
     "NOT_REVERSED",
+    "OFFER",
     "OPTION",
     "ORDINALS",
     "OR_ELSE",
@@ -33,7 +34,7 @@ __all__ = [
 
 PLAN_WORD = re.compile(
     r"order|sequence|plan\b|assembl|build|\bsteps?\b|instruction|answer|solution|\bmoves?\b"
-    r"|placement|construct|result"
+    r"|placement|construct|result|final list"
     r"|reihenfolge|anleitung|antwort|schritt|aufbau|ordre|étapes|réponse|orden|pasos|respuesta"
     r"|secuencia|ordine"
     r"|bottom[- ](?:to|up)|from the (?:bottom|ground)|von unten|从下到上|порядок|план|ответ"
@@ -51,7 +52,7 @@ CATALOGUE_WORD = re.compile(
 )
 FINAL_LABEL = re.compile(
     r"(?:final|answer|plan|order|sequence|antwort|reihenfolge|respuesta|réponse|ответ|答案|顺序"
-    r"|步骤)\W*\Z",
+    r"|步骤|\b(?:so|thus|hence|therefore))\W*\Z",
     re.IGNORECASE,
 )
 EXAMPLE = re.compile(
@@ -90,7 +91,8 @@ CHOICE = re.compile(
     r"|[1-4]|one|two|three|I{1,3})\b"
     r"\s(?:is|seems|looks|ist|wins)\s?(?:the |my |more |clearly |a )?(?:better|best|final|correct"
     r"|right|stable|preferred|chosen|answer|one|besser|richtig)"
-    r"|\b(?:plan|option|alternative|variant|solution|version)\s?#?(?P<c>[A-D]|[1-4])\s?[(,:\-\u2013]{1,2}\s?"
+    r"|\b(?:plan|option|alternative|variant|solution|version)\s?#?(?P<c>[A-D]"
+    r"|[1-4])\s?[(,:\-\u2013]{1,2}\s?"
     r"(?:better|best|chosen|final|recommended|preferred)\b"
     r"|\b(?:decision|choice|winner|entscheidung|wahl)\W{1,4}(?:is\s)?(?P<d>[A-D])\b(?!\w)"
     r"|\b(?:choose|pick|select|prefer|recommend|go(?:ing)? with|submit|take)\s(?:the\s)"
@@ -100,7 +102,8 @@ CHOICE = re.compile(
 ORDINALS = {"first": 0, "former": 0, "second": 1, "latter": 1}
 """Which of two options a choice by place takes."""
 REVISION = re.compile(
-    r"final|correct|revis|updat|actual|summar|complete|overall|optimi|improv|korrigier|attempt|error|mistake|oops"
+    r"final|correct|revis|updat|actual|summar|complete|overall|optimi|improv|korrigier|attempt"
+    r"|error|mistake|oops"
     r"|\btry\b|new plan|second thought|reconsider|on reflection"
     r"|\b(?:instead|answer|again|better|so|thus|therefore|wait|output)\b",
     re.IGNORECASE,
@@ -123,6 +126,14 @@ REFUSAL = re.compile(
     r"|抱歉|不能确定|lo siento|désolé|не могу",
     re.IGNORECASE,
 )
+OFFER = re.compile(
+    r"\b(?:would you like|do you want|shall i|should i|may i|let me know (?:if|whether) (?:i"
+    r"|you want me)"
+    r"|soll ich|möchten sie)\b[^?.\n]{0,80}\b(?:order|plan|steps?|sequence|list|reihenfolge"
+    r"|schritte)\b",
+    re.IGNORECASE,
+)
+"""That the plan itself would come only if it is asked for."""
 SUPPOSED = re.compile(
     r"would|could|generic|hypothetical|in general|typical|illustrat|placeholder|candidates",
     re.IGNORECASE,

@@ -35,8 +35,12 @@ def rank_of(listing: Listing) -> int:
         is_list = len(listing.numbers) > 1 and (not heading or PLAN_WORD.search(heading))
         return LAST if is_list else NO
     is_catalogue = _names_catalogue(heading)
+    if listing.form == "layers":
+        return NO if is_catalogue else MARKED
     if listing.form == "labeled":
         return _rank_of_label(listing, heading, is_catalogue=is_catalogue)
+    if listing.form == "steps" and 2 * listing.n_named <= len(listing.own) > 1:
+        return LAST
     if listing.form in ("json", "table") or (listing.form == "steps" and listing.n_moves):
         return ASKED
     if listing.form == "steps":

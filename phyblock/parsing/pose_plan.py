@@ -15,6 +15,7 @@ from typing import Any, Literal, get_args
 
 from phyblock.domain import PosePlan, PoseStep
 from phyblock.parsing.answer_form import AnswerForm, FormProblem
+from phyblock.parsing.json_values import Fields
 from phyblock.parsing.pose_step import (
     OTHER_UNIT,
     StepProblem,
@@ -22,7 +23,6 @@ from phyblock.parsing.pose_step import (
     read_step,
     step_label,
 )
-from phyblock.parsing.structured import Fields
 from phyblock.parsing.text_forms import answer_of, plain_line
 
 __all__ = [

@@ -25,6 +25,7 @@ from phyblock.parsing.mention_context import (
     PIECES,
     STANDS,
     SUPPORT,
+    WHEN_PLACED,
 )
 
 __all__ = ["Statement", "read_statement"]
@@ -112,6 +113,9 @@ def _moved(piece: str, rest: _Rest) -> list[int]:
         if not is_call and STANDS.match(piece, mention.end()):
             continue
         before = piece[max(0, start - 120) : start]
+        if WHEN_PLACED.search(before):
+            rest.supports.update(counted(mention, piece))
+            continue
         if NEGATED.search(before):
             rest.denied.update(counted(mention, piece))
             continue

@@ -47,7 +47,7 @@ _NUMBER_WORDS = {
     for number, words in enumerate(
         (
             "one eins un une uno uno um один 一",
-            "two zwei deux dos due dois два 二 两",
+            "two zwei deux dos due dois duas два две 二 两",
             "three drei trois tres tre três три 三",
             "four vier quatre cuatro quattro quatro четыре 四",
             "five fünf cinq cinco cinque пять 五",

@@ -1,8 +1,9 @@
 """Replies that were written with what they mean before any reader read them, round by round.
 
 `fresh_replies.jsonl` holds a reply a line: its round, what kind of answer it holds, its text, what
-is meant (null: nothing may be read), and what was read at first sight, before anything was mended.
-After a round the causes of what was misread were mended, and the next round was written.
+is meant (null: nothing may be read), what was read at first sight, before anything was mended, and
+whether it is `hard`: a person reads it, a reader may admit that it does not. After a round the
+causes of what was misread were mended, and the next round was written.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ class Fresh:
     meant: Any
     first: Any
     options: tuple[str, ...] = ()
+    hard: bool = False
 
     def now(self) -> Any:
         """What is read of it today."""

@@ -6,12 +6,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from phyblock.parsing import parse_plan
-from tests.parsing.fresh_replies import KINDS, fresh_replies, tally
+from tests.parsing.fresh_replies import KINDS, fresh_replies
 
 PLANS = st.lists(st.integers(1, 16), min_size=3, max_size=12)
 BLOCKS = st.integers(1, 16)
-MOST_FAILED = {1: 8, 2: 15, 3: 7, 4: 11, 5: 12, 6: 20, 7: 8, 8: 12}
-"""Of each round, how many replies are not read."""
+ROUNDS = range(1, 13)
+MOST_HARD = 0.12
+"""The part of the replies that hold an answer of which a reader may admit that it fails."""
 
 
 def asked_form(steps: list[int]) -> str:
@@ -26,16 +27,77 @@ def reading(text: str) -> list[int] | None:
 def test_every_round_holds_all_kinds_and_replies_without_an_answer() -> None:
     replies = list(fresh_replies())
     assert {reply.kind for reply in replies} == set(KINDS)
-    for number in MOST_FAILED:
+    for number in ROUNDS:
         meant = [reply.meant for reply in replies if reply.round == number]
         assert len(meant) >= 40
         assert None in meant
 
 
-def test_no_reply_is_silently_misread_and_few_are_not_read() -> None:
-    now = {number: counts["now"] for number, counts in tally().items()}
-    assert {number: counts["wrong"] for number, counts in now.items()} == dict.fromkeys(now, 0)
-    assert {number: counts["failed"] for number, counts in now.items()} == MOST_FAILED
+def test_every_reply_is_read_as_a_person_reads_it_but_for_hard_ones_that_may_fail() -> None:
+    unlike = [
+        (reply.round, reply.kind, reply.text, read, reply.meant)
+        for reply in fresh_replies()
+        if (read := reply.now()) != reply.meant and not (read is None and reply.hard)
+    ]
+    assert unlike == []
+
+
+def test_few_replies_are_hard() -> None:
+    held = [reply for reply in fresh_replies() if reply.meant is not None]
+    assert sum(reply.hard for reply in held) <= MOST_HARD * len(held)
+
+
+@settings(deadline=None, max_examples=40)
+@given(steps=PLANS, block=BLOCKS, data=st.data())
+def test_an_edit_behind_a_plan_is_done_or_the_reading_fails(
+    steps: list[int], block: int, data: st.DataObject
+) -> None:
+    a, b = sorted(
+        data.draw(st.lists(st.integers(1, len(steps)), min_size=2, max_size=2, unique=True))
+    )
+    swapped = [*steps[: a - 1], steps[b - 1], *steps[a : b - 1], steps[a - 1], *steps[b:]]
+    edits = {
+        f"Swap steps {a} and {b}.": swapped,
+        f"Remove step {b}.": [*steps[: b - 1], *steps[b:]],
+        f"Insert block {block} after step {a}.": [*steps[:a], block, *steps[a:]],
+        f"Step {b} should be {block}, not {steps[b - 1]}.": [*steps[: b - 1], block, *steps[b:]],
+    }
+    for said, meant in edits.items():
+        assert reading(f"{asked_form(steps)}\n\nWait. {said}") == meant, said
+    behind = f"Replace block {block} by block 16."
+    meant = [16 if step == block else step for step in steps]
+    assert reading(f"{asked_form(steps)}\n\n{behind}") in (None, meant)
+
+
+@settings(deadline=None, max_examples=40)
+@given(steps=PLANS)
+def test_a_plan_means_the_same_in_every_layout(steps: list[int]) -> None:
+    numbered = list(enumerate(steps, 1))
+    rows = "".join(f"<tr><td>{i}</td><td>{n}</td></tr>" for i, n in numbered)
+    layouts = {
+        "yaml": "plan:\n" + "\n".join(f"  - step: {i}\n    block: {n}" for i, n in numbered),
+        "commas": "step,block\n" + "\n".join(f"{i},{n}" for i, n in numbered),
+        "tabs": "Step\tBlock\n" + "\n".join(f"{i}\t{n}" for i, n in numbered),
+        "html": f"<table><tr><th>Step</th><th>Block</th></tr>{rows}</table>",
+        "calls": "\n".join(f"move_block({n}, on='floor')" for n in steps),
+        "tools": "\n".join(f'{{"name": "move", "arguments": {{"index": {n}}}}}' for n in steps),
+        "objects": "\n".join(f'{{"step": {i}, "block": {n}}}' for i, n in numbered),
+        "a word that no pattern knows": "\n".join(f"Bước {i}: khối {n}" for i, n in numbered),
+    }
+    assert {name: reading(text) for name, text in layouts.items()} == dict.fromkeys(layouts, steps)
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    layers=st.lists(st.lists(BLOCKS, min_size=2, max_size=3), min_size=2, max_size=4),
+    is_down=st.booleans(),
+)
+def test_layers_are_built_from_the_ground_however_they_stand(
+    layers: list[list[int]], is_down: bool
+) -> None:
+    lines = [f"Layer {i}: {', '.join(map(str, blocks))}" for i, blocks in enumerate(layers, 1)]
+    text = "\n".join(lines[::-1] if is_down else lines)
+    assert reading(text) == [block for blocks in layers for block in blocks]
 
 
 @settings(deadline=None, max_examples=40)

@@ -21,6 +21,7 @@ _EXPONENTS = re.compile("[²³¹\u2070-\u209f\u2150-\u2189¼-¾]")
 REPLIES: tuple[tuple[str, Outcome], ...] = (
     # The forms that are asked for, and how models write them.
     ("Move(3)", 3),
+    ("Move(3) failed, therefore Move(5)", 5),
     ("Move( 3 )", 3),
     ("Next plan: Move( 3 )", 3),
     ("Next plan:Move(3)", 3),

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.parsing import parse_plan
@@ -13,6 +13,7 @@ from phyblock.parsing import parse_plan
 PLANS: list[tuple[str, tuple[int, ...]]] = [
     ('Step 1: I would move block 3 first, because block 5 rests on it.\nStep 2: Then block 5 follows.', (3, 5)),
     ('The answer is: block 3, then block 5, then block 12.', (3, 5, 12)),
+    ('Top layer: [12]\nMiddle: [9]\nBottom: [3, 4]', (3, 4, 9, 12)),
     ('**Step 1** – `Move block with index 3`\n**Step 2** – `Move block with index 5`', (3, 5)),
     ('Plan (5 steps): 3, 5, 12, 1, 1', (3, 5, 12, 1, 1)),
     ('1. Block 3 ×2\n2. Block 5', (3, 3, 5)),
@@ -243,7 +244,6 @@ NONE = [
     'The needed blocks are 3, 5 and 12, but I do not know the order.',
     'Layer 1: 2 blocks\nLayer 2: 1 block',
     'Goal blocks: 5\nUsed blocks: 3',
-    'Top layer: [12]\nMiddle: [9]\nBottom: [3, 4]',
     'Step1: Move block with index 3\nStep2: Move block with index 5\n\nAlternatively:\nStep1: Move block with index 5\nStep2: Move block with index 3',
     "I'm sorry, but I cannot help with that request.",
     "As an AI, I can't see images. Typical: Step1: Move block with index 1",
@@ -339,8 +339,13 @@ LAST: list[tuple[str, tuple[int, ...] | None]] = [
 """Twenty more, written in the same way when those were mended: 14 were read rightly then, 3 failed,
 3 were misread."""
 
-FAILING = {"later": 2, "last": 3}
-"""Of those that hold a plan, how many are not read: rather than wrongly."""
+HARD = {
+    'Place 10 twice for the pillars, bridge them with 4, and finish with 16.': "bare numbers behind verbs of all kinds",
+    'Ich beginne mit Block 5. Danach kommt Block 11 darauf. Zum Schluss lege ich Block 2 oben auf.': "verbs of another language",
+    "I'm honestly not sure, but I'd go: 2 → 2 → 14 → 7.": "a chain behind doubts",
+    'Left tower: 2, 5, 8\nRight tower: 2, 5, 9\nBridge: 13': "parts without a height",
+}  # fmt: skip
+"""Plans that a person reads and that may fail, and what is hard about them; all others are read."""
 
 ALIKE: list[tuple[str, tuple[int, ...] | None]] = [
     ('Blocks 1-4 form the base, then 9.', (1, 2, 3, 4, 9)),
@@ -371,13 +376,12 @@ def reading(text: str) -> tuple[int, ...] | None:
     return None if parsed.rule is None else parsed.plan.steps
 
 
-@pytest.mark.parametrize(("name", "rows"), [("later", LATER), ("last", LAST)])
-def test_replies_that_were_written_first_are_read_as_noted_or_not_at_all(
-    name: str, rows: list[tuple[str, tuple[int, ...] | None]]
+@pytest.mark.parametrize(("text", "plan"), [*LATER, *LAST])
+def test_replies_that_were_written_first_are_read_as_a_person_reads_them(
+    text: str, plan: tuple[int, ...] | None
 ) -> None:
-    readings = [(reading(text), plan) for text, plan in rows]
-    assert [got for got, plan in readings if got not in (plan, None)] == []
-    assert sum(got is None and plan is not None for got, plan in readings) == FAILING[name]
+    read = reading(text)
+    assert read == plan or (read is None and text in HARD)
 
 
 @pytest.mark.parametrize(("text", "plan"), ALIKE)
@@ -385,6 +389,7 @@ def test_counts_are_no_blocks_and_sequences_go_on(text: str, plan: tuple[int, ..
     assert reading(text) == plan
 
 
+@settings(deadline=None)
 @given(
     st.lists(st.integers(1, 16), min_size=2, max_size=6),
     st.sampled_from(

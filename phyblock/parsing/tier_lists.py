@@ -1,0 +1,86 @@
+"""Layers of a structure with their blocks, line by line or in one line, from the ground up."""
+
+# ruff: noqa: RUF001 -- replies come in other scripts
+
+from __future__ import annotations
+
+import re
+
+from phyblock.parsing.structured import Found, line_numbers
+from phyblock.parsing.text_forms import plain_line
+from phyblock.parsing.tiers import lowest_first, tier_of
+
+__all__ = ["find_tier_lists"]
+
+_PART = (
+    r"(?P<{0}label>[^\d\n:=→|.;]{{0,24}}\d{{0,2}}[^\d\n:=→|.;]{{0,24}}?)\s{{0,3}}(?::|=|→|->)"
+    r"\s{{0,3}}(?P<{0}value>[^\n|;:]{{1,160}})"
+)
+_LINE = re.compile(r"[ \t>*+•\-#]{0,8}(?:\d{1,2}[.)]\s)?" + _PART.format(""))
+_NUMBERS_AHEAD = re.compile(
+    r"(?P<value>\d{1,3}(?:(?:,\s?|\s?\+\s?|\sand\s)\d{1,3}){0,9})\s?\((?P<label>[^()\d\n]{2,30})\)"
+)
+_APART = re.compile(r"\s?[|;]\s?|(?<=\w)\.\s(?=\S)")
+_COUNTED = re.compile(
+    r"\d\s(?:\w+\s){0,2}?(?:blocks|cubes|arches|cylinders|cuboids|prisms|cones|pieces|bricks)\b|\d\s?cm\b|%",
+    re.IGNORECASE,
+)
+_NAMED = re.compile(
+    r"\d\D{1,4}\d|\b(?:blocks?|index|candidates?|baustein)\b|#\d|\(\d|号", re.IGNORECASE
+)
+_IS_PLAN = re.compile(r"\b(?:option|plan|order|sequence|attempt|version|answer|steps?)\b", re.I)
+"""A label of a whole plan, not of a part of it."""
+_LINE_CHARS = 240
+_Part = tuple[str, list[int]]
+
+
+def find_tier_lists(text: str) -> list[Found]:
+    """The lists of layers in a text; the blocks of each layer stand in the order in which it does.
+
+    A list counts where its labels say how high its parts stand, and some value names blocks for
+    certain: numbers alone may say how many there are.
+    """
+    found: list[Found] = []
+    run: list[tuple[int, int, _Part, bool]] = []
+    at = 0
+    for line in [*text.splitlines(keepends=True), ""]:
+        bare = plain_line(line).strip()
+        part = _part(bare)
+        if part is None or not (run or tier_of(part[0][0])):
+            found += _rising(run)
+            run = []
+            in_line = (
+                [_part(piece) for piece in _APART.split(bare)] if len(bare) < _LINE_CHARS else []
+            )
+            if len(in_line) > 1 and None not in in_line:
+                found += _rising([(at, at + len(line), *p) for p in in_line if p is not None])
+        else:
+            run.append((at, at + len(line), *part))
+        at += len(line)
+    return found
+
+
+def _part(text: str) -> tuple[_Part, bool] | None:
+    """A label with the blocks behind it, and whether they are blocks for certain."""
+    text = text.rstrip("。")
+    if (ahead := _NUMBERS_AHEAD.fullmatch(text)) and tier_of(ahead["label"]):
+        return (ahead["label"], list(line_numbers(ahead["value"]))), True
+    match = _LINE.fullmatch(text) if text[-1:].isalnum() or text[-1:] in ".)]" else None
+    if match is None or _COUNTED.search(match["value"]) or _IS_PLAN.search(match["label"]):
+        return None
+    numbers = list(line_numbers(match["value"].rstrip(". ")))
+    digits = [int(n) for n in re.findall(r"(?<![x×\d])\d{1,3}(?!\s?[x×\d])", match["value"])]
+    is_whole = bool(numbers) and {*digits} <= {*numbers}
+    return ((match["label"], numbers), bool(_NAMED.search(match["value"]))) if is_whole else None
+
+
+def _rising(run: list[tuple[int, int, _Part, bool]]) -> list[Found]:
+    while run and tier_of(run[-1][2][0]) is None:
+        run.pop()
+    if len(run) < 2 or not any(is_sure for *_, is_sure in run):
+        return []
+    order = lowest_first([label for _, _, (label, _), _ in run])
+    if order is None:
+        return []
+    numbers = tuple(n for i in order for n in run[i][2][1])
+    return [Found(run[0][0], run[-1][1], "layers", numbers)]
