@@ -2,18 +2,24 @@
 
 Blocks stand when forces in their contacts can bear every weight: each force inside the cone of
 friction, all forces and moments of a block in balance. That is a set of linear equations in
-forces that only push, solved by non-negative least squares (Lawson and Hanson, 1974) or, where that
-finds no end, by linear programming, with each cone as a pyramid of four edges. Where such forces
-exist, rigid bodies may stand; where none exist, they cannot. `surely_stands` and `surely_falls` ask
-so with every weight moved by `MARGIN_M` to
-one side after another, so that no verdict hangs on an edge that a weight is nearly over.
+forces that only push, each cone as a pyramid of four edges. Where such forces exist, rigid bodies
+may stand; where none exist, they cannot.
+
+Non-negative least squares (Lawson and Hanson, 1974) look for the forces. What they say is checked,
+for a solver may stop early and may misstate what is left over: forces that it gives are put into
+the equations, and that there are none is believed only where what is left over proves it (Farkas'
+lemma). Linear programming settles the rest.
+
+`surely_stands` and `surely_falls` ask so with all weights off by up to `MARGIN_M` to any side and
+long blocks heavier or lighter by `MASS_FACTORS`, with all that lies between, so that no verdict
+hangs on an edge that a weight is nearly over.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -32,20 +38,25 @@ from phyblock.sim.support import CONTACT_TOLERANCE_M, bounds_m, boxes_near, piec
 __all__ = ["FRICTIONS", "MARGIN_M", "MASSES", "is_balanced", "surely_falls", "surely_stands"]
 
 MARGIN_M = 0.005
-"""How far every weight is moved to one side [m]."""
+"""How far off its place every weight may be [m]."""
 FRICTIONS = (0.28, 0.45)
 """The least and the most friction that a verdict has to hold under."""
 _LONG: tuple[BlockType, ...] = ("cuboid2", "cuboid3", "arch")
 Masses = tuple[tuple[BlockType, float], ...]
 """Types of which every block has so many times its mass."""
-MASSES: tuple[Masses, ...] = (
-    tuple((one, 1.15) for one in _LONG),
-    tuple((one, 0.87) for one in _LONG),
+MASS_FACTORS = (0.87, 1.15)
+"""Long blocks may have so many times their mass at the least, and at the most."""
+MASSES: tuple[Masses, ...] = tuple(
+    tuple((one, factor) for one in _LONG) for factor in reversed(MASS_FACTORS)
 )
-"""Factors of mass that a verdict has to hold under: long blocks heavier, and lighter."""
-_SIDES = tuple((math.cos(a), math.sin(a)) for a in np.arange(8) * math.pi / 4)
+"""Factors of mass at the ends of that range: long blocks heavier, and lighter."""
+_SIDES = np.array([(math.cos(a), math.sin(a)) for a in np.arange(8) * math.pi / 4])
+_CORNER_M = MARGIN_M / math.cos(math.pi / 8)
+"""How far out the corners of an octagon are that has all shifts of `MARGIN_M` inside [m]."""
 _LEAST_VERTICAL = 0.15
 _TOLERANCE = 1e-5
+_PROOF = 1e4
+"""What is left over is a proof for forces that add up to so many times all weights, no more."""
 _UP = np.array([0.0, 0.0, 1.0])
 _STEEP = 0.9
 _SAME_GAP_M = 1e-4
@@ -62,15 +73,40 @@ class _Contact(NamedTuple):
 
 
 def surely_stands(blocks: Sequence[Block]) -> bool:
-    """Whether blocks stand with every weight up to `MARGIN_M` off, little friction, any masses."""
+    """Whether blocks stand with weights off by up to `MARGIN_M`, little friction, any masses.
+
+    Asked at the corners of an octagon of shifts, at both ends of the range of masses. What lies
+    between two shifts, or two masses, that can be borne is borne by the mean of their forces.
+    """
     forces = _forces(blocks, FRICTIONS[0])
-    return all(_bears(forces, _weights(blocks, *case)) for case in _cases())
+    return all(
+        _bears(forces, _weights(blocks, (x, y), masses))
+        for x, y in (_CORNER_M * _SIDES).tolist()
+        for masses in MASSES
+    )
 
 
 def surely_falls(blocks: Sequence[Block]) -> bool:
-    """Whether blocks fall with every weight up to `MARGIN_M` off, much friction, any masses."""
+    """Whether blocks fall with weights off by up to `MARGIN_M`, much friction, any masses.
+
+    One linear program has forces, shifts and the mass of long blocks as its unknowns, and no
+    solution. Its unknown shifts are those of all long blocks and of all others, each anywhere in
+    the octagon round the margin, so that it has every balance that is asked about and some more.
+    """
     forces = _forces(blocks, FRICTIONS[1])
-    return not any(_bears(forces, _weights(blocks, *case)) for case in _cases())
+    if not forces.size:
+        return bool(blocks)
+    is_long = np.array([block.type in _LONG for block in blocks])
+    loads = [_loads(blocks, ~is_long), _loads(blocks, is_long)]
+    count = forces.shape[1]
+    # A mass, and the mass times each part of its shift: the shift alone would not be linear.
+    octagon = np.column_stack([-np.ones(len(_SIDES)), _SIDES])
+    shifts = sparse.hstack([sparse.csr_matrix((16, count)), sparse.block_diag([octagon, octagon])])
+    free = (None, None)
+    bounds = [(0, None)] * count + [(1.0, 1.0), free, free, MASS_FACTORS, free, free]
+    unknown = np.hstack([forces, *(-load for load in loads)])
+    left = _least_residual(unknown, np.zeros(len(unknown)), bounds, shifts)
+    return left >= _TOLERANCE
 
 
 def is_balanced(blocks: Sequence[Block], friction: float = FRICTION, margin_m: float = 0.0) -> bool:
@@ -83,34 +119,45 @@ def is_balanced(blocks: Sequence[Block], friction: float = FRICTION, margin_m: f
     return all(_bears(forces, _weights(blocks, shift, ())) for shift in shifts)
 
 
-def _cases() -> Iterator[tuple[tuple[float, float], Masses]]:
-    """A way in which all weights are off [m], and masses, to try one after another."""
-    for number, (x, y) in enumerate(_SIDES):
-        yield (MARGIN_M * x, MARGIN_M * y), MASSES[number % len(MASSES)]
-
-
 def _bears(forces: NDArray[np.float64], weights: NDArray[np.float64]) -> bool:
     """Whether some sum of the forces, each as large as need be, balances all weights."""
     if not forces.size:
         return not weights.size
     try:
-        _, residual = nnls(forces, weights)
+        pushes, _ = nnls(forces, weights)
     except RuntimeError:  # It found no end, which says nothing of whether there is a balance.
-        residual = _least_residual(forces, weights)
-    return bool(residual < _TOLERANCE)
+        return _least_residual(forces, weights) < _TOLERANCE
+    left = weights - forces @ pushes
+    if float(np.linalg.norm(left)) < _TOLERANCE:
+        return True
+    # A sum of forces, each of which `left` is at odds with, does nothing that `left` asks for.
+    if _PROOF * float((left @ forces).max()) < float(left @ weights):
+        return False
+    return _least_residual(forces, weights) < _TOLERANCE
 
 
-def _least_residual(forces: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
-    """The least sum of what is left of all weights, by linear programming, which always ends.
+def _least_residual(
+    unknown: NDArray[np.float64],
+    target: NDArray[np.float64],
+    bounds: Sequence[tuple[float | None, float | None]] | None = None,
+    at_most_zero: sparse.spmatrix | None = None,
+) -> float:
+    """The least sum of what is left of a target, by linear programming, which always ends.
 
-    Raises PhyblockError where it does not.
+    Unknowns are not negative, or within their bounds, and such that the rows of `at_most_zero` are.
+    Raises PhyblockError where it does not end.
     """
-    rows, count = forces.shape
+    rows, count = unknown.shape
     left_over = sparse.identity(rows)
+    slack = [(0.0, None)] * (2 * rows)
+    within = sparse.csr_matrix((0, count)) if at_most_zero is None else at_most_zero
     found = linprog(
         np.concatenate([np.zeros(count), np.ones(2 * rows)]),
-        A_eq=sparse.hstack([sparse.csr_matrix(forces), left_over, -left_over]),
-        b_eq=weights,
+        A_eq=sparse.hstack([sparse.csr_matrix(unknown), left_over, -left_over]),
+        b_eq=target,
+        A_ub=sparse.hstack([within, sparse.csr_matrix((within.shape[0], 2 * rows))]),
+        b_ub=np.zeros(within.shape[0]),
+        bounds=[*(bounds or [(0.0, None)] * count), *slack],
         method="highs",
     )
     if found.status != 0:
@@ -122,10 +169,28 @@ def _weights(
     blocks: Sequence[Block], shift_m: tuple[float, float], masses: Masses
 ) -> NDArray[np.float64]:
     """The force up that each block needs, and its moment, shape (6 n,), of a whole weight of 1."""
-    if not blocks:
-        return np.empty(0)
     factors = dict(masses)
     weights = np.array([SHAPES[b.type].mass_kg * factors.get(b.type, 1.0) for b in blocks])
+    return _needs(blocks, weights / weights.sum(), shift_m)
+
+
+def _loads(blocks: Sequence[Block], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """What the chosen blocks need, and how much more for `MARGIN_M` along x, and y: (6 n, 3)."""
+    weights = np.array([SHAPES[block.type].mass_kg for block in blocks])
+    weights = np.where(chosen, weights, 0.0) / weights.sum()
+    needs = _needs(blocks, weights)
+    steps = [_needs(blocks, weights, step) - needs for step in ((MARGIN_M, 0.0), (0.0, MARGIN_M))]
+    return np.column_stack([needs, *steps])
+
+
+def _needs(
+    blocks: Sequence[Block],
+    weights: NDArray[np.float64],
+    shift_m: tuple[float, float] = (0.0, 0.0),
+) -> NDArray[np.float64]:
+    """The force up that each block of some weight needs, and its moment, shape (6 n,)."""
+    if not blocks:
+        return np.empty(0)
     centers = np.array(
         [
             np.array(b.position_m)
@@ -134,7 +199,7 @@ def _weights(
         ]
     )
     centers[:, :2] += shift_m
-    return _wrenches(centers, np.outer(weights / weights.sum(), _UP)).ravel()
+    return _wrenches(centers, np.outer(weights, _UP)).ravel()
 
 
 def _forces(blocks: Sequence[Block], friction: float) -> NDArray[np.float64]:

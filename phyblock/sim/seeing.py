@@ -66,8 +66,13 @@ def seen(recipe: QuestionPicture) -> Shot:
 
 
 @functools.lru_cache(maxsize=48)
+def _camera(recipe: QuestionPicture) -> Camera:
+    return question_camera(recipe, _STYLE)
+
+
+@functools.lru_cache(maxsize=48)
 def _seen(recipe: QuestionPicture, drawn_by: Renderer) -> Shot:
-    return shoot(drawn_blocks(recipe), question_camera(recipe, _STYLE), SEEN_PX, drawn_by)
+    return shoot(drawn_blocks(recipe), _camera(recipe), SEEN_PX, drawn_by)
 
 
 def differing_pixels(one: Shot, other: Shot) -> int:
@@ -97,7 +102,7 @@ def shown_pixels(recipe: QuestionPicture, shot: Shot) -> dict[int, int]:
 
 def is_inside(recipe: QuestionPicture) -> bool:
     """Whether no block or mark comes near the picture's edge."""
-    camera = question_camera(recipe, _STYLE)
+    camera = _camera(recipe)
     points = [block.vertices_m for block in drawn_blocks(recipe)]
     points += [np.array([mark.position_m]) for mark in recipe.marks]
     return bool(np.abs(camera.project(np.vstack(points))).max() < _EDGE)
@@ -116,7 +121,7 @@ def block_mark(
     if depth < least_depth_px:
         return None
     block = drawn_blocks(recipe)[vertex]
-    hit = _hit(block, question_camera(recipe, _STYLE), pixel)
+    hit = _hit(block, _camera(recipe), pixel)
     return None if hit is None else Mark(letter, hit.position_m)
 
 
@@ -126,7 +131,7 @@ def visible_tops(recipe: QuestionPicture, shot: Shot, step_px: int, least_rise: 
     Facing up means that the unit normal's z is `least_rise` or more; pixels at the edge of what
     shows of a block are left out.
     """
-    camera, blocks = question_camera(recipe, _STYLE), drawn_blocks(recipe)
+    camera, blocks = _camera(recipe), drawn_blocks(recipe)
     found = []
     for row in range(step_px // 2, SEEN_PX - 2, step_px):
         for column in range(step_px // 2, SEEN_PX - 2, step_px):
@@ -142,7 +147,7 @@ def visible_tops(recipe: QuestionPicture, shot: Shot, step_px: int, least_rise: 
 
 def mark_pixel(recipe: QuestionPicture, position_m: tuple[float, float, float]) -> tuple[int, int]:
     """The pixel (row, column) of `SEEN_PX` at a point of the world, the nearest one inside."""
-    camera = question_camera(recipe, _STYLE)
+    camera = _camera(recipe)
     column, row = camera.to_pixels(np.array([position_m]), SEEN_PX)[0]
     return int(np.clip(row, 0, SEEN_PX - 1)), int(np.clip(column, 0, SEEN_PX - 1))
 
@@ -163,14 +168,14 @@ def surface_at(
     vertex = int(shot.block[pixel])
     if vertex < 0:
         return None
-    return _hit(drawn_blocks(recipe)[vertex], question_camera(recipe, _STYLE), pixel)
+    return _hit(drawn_blocks(recipe)[vertex], _camera(recipe), pixel)
 
 
 def is_apart(
     recipe: QuestionPicture, mark: Mark, others: Sequence[Mark], least_px: float = MARKS_APART_PX
 ) -> bool:
     """Whether a mark's target is so many pixels of `SEEN_PX` away from all the others'."""
-    camera = question_camera(recipe, _STYLE)
+    camera = _camera(recipe)
     places = np.array([one.position_m for one in (mark, *others)])
     pixels = camera.to_pixels(places, SEEN_PX)
     apart = np.linalg.norm(pixels[1:] - pixels[0], axis=1)

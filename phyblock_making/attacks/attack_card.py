@@ -44,6 +44,24 @@ VERSION_2: Mapping[str, Mapping[str, int]] = {
     },
 }
 """The same on the second version, which was held against them."""
+VERSION_3: Mapping[str, Mapping[str, int]] = {
+    "area": {"VP": 26, "CF": 25, "PD": 19, "OR": 4},
+    "colors": {"VP": 26, "CF": 27, "PD": 27},
+    "change": {"VP": 24, "CF": 31, "PD": 30},
+    "odd one out": {"VP": 25, "CF": 28, "PD": 33, "OR": 0},
+    "central": {"AD": 28},
+    "central and flat": {"AD": 28},
+    "linear probe": {"VP": 27, "CF": 25, "PD": 49, "OR": 4, "AD": 26},
+    "boosted probe": {"VP": 25, "CF": 38, "PD": 45, "OR": 8, "AD": 34},
+    "support": {"CF": 38},
+    "sole support": {"CF": 43},
+    "text, within the set": {
+        **{"": 26, "SH": 26, "CO": 26, "SI": 20, "NU": 28, "RP": 30, "AP": 25, "RD": 23, "RR": 29},
+        **{"OC": 26, "LC": 31, "TC": 37, "VP": 26, "CF": 29, "PD": 29, "AD": 42},
+    },
+}
+"""The same on the third version, whose next steps, outcomes and places could hang on an edge."""
+_BEFORE = (VERSION_1, VERSION_2, VERSION_3)
 _CUTS_1 = "59 in 47 questions, 47 of them to be seen"
 
 _TEXT = """
@@ -53,8 +71,8 @@ From `phyblock vqa audit`; docs/vqa.md says what each goes by. Accuracy [%] of t
 ways to read an attack, with a 95 % interval; the last columns are what it reached on earlier
 versions of `phyblock-vqa`.
 
-| attack | subtask | n | chance | reached | 95 % | aim | aim is | version 1 | version 2 |
-|---|---|---|---|---|---|---|---|---|---|
+| attack | subtask | n | chance | reached | 95 % | aim | aim is | {versions} |
+|---|---|---|---|---|---|---|---|---|---|---|
 {rows}
 
 Pictures with a block before the camera's near plane or beyond its far one: {cuts} (version 1:
@@ -67,13 +85,14 @@ def attack_card(attacked: Sequence[Attacked], observed: Sequence[Observed]) -> s
     rows = [_row(one) for one in attacked if not one.kind]
     if not rows:
         return ""
+    versions = " | ".join(f"version {number}" for number in range(1, len(_BEFORE) + 1))
     cuts = [cut for one in observed for cut in one.cuts]
     told = "none"
     if cuts:
         questions = sum(bool(one.cuts) for one in observed)
         shown = sum(cut.pixels > 0 for cut in cuts)
         told = f"{len(cuts)} in {questions} questions, {shown} of them to be seen"
-    return _TEXT.format(rows="\n".join(rows), cuts=told, cuts_1=_CUTS_1)
+    return _TEXT.format(rows="\n".join(rows), cuts=told, cuts_1=_CUTS_1, versions=versions)
 
 
 def _row(one: Attacked) -> str:
@@ -82,6 +101,6 @@ def _row(one: Attacked) -> str:
     cells = [
         *(one.attack.name, one.subtask or "all", one.n, f"{100 * one.chance:.0f}"),
         *(f"{100 * rate.value:.0f}", interval, f"{100 * aim:.0f}", one.verdict),
-        *(old.get(one.attack.name, {}).get(one.subtask, "") for old in (VERSION_1, VERSION_2)),
+        *(old.get(one.attack.name, {}).get(one.subtask, "") for old in _BEFORE),
     ]
     return f"| {' | '.join(map(str, cells))} |"

@@ -124,6 +124,7 @@ _STAYS = (
     "Which of the places A to D bears the block in the second picture? It is let down straight,"
     " turned as shown, its middle over the mark, and released at the first touch.",
 )
+_SIZE = " As it is turned there it measures {size}; the side of a cube is 5 cm."
 _TARGET = " The small target of a mark lies on the block that is meant."
 _MARKED_STEMS = ("cf-count", "cf-color", "pd-push")
 _STEMS: Mapping[str, tuple[str, ...]] = {
@@ -133,7 +134,7 @@ _STEMS: Mapping[str, tuple[str, ...]] = {
     "cf-color": _COLORED,
     "pd-next": _NEXT,
     "pd-push": _PUSHED,
-    "ad-place": _STAYS,
+    "ad-place": tuple(text + _SIZE for text in _STAYS),
 }
 
 DYNAMIC_TEMPLATES: Mapping[str, str] = {

@@ -23,7 +23,7 @@ from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.margins import group_of
 from phyblock_making.questions.picture_view import COUNTED, View, are_seen, drawn_view
 from phyblock_making.questions.pictured_drafts import draft, same_blocks, with_room
-from phyblock_making.questions.placing import lowered, surely_stays, verdict
+from phyblock_making.questions.placing import lowered, stays_round, verdict
 from phyblock_making.questions.question_draft import Draft, UnfairError
 
 __all__ = ["can_follow", "next_drafts"]
@@ -36,7 +36,8 @@ _STEP_M, _MOST_STEPS = 0.0125, 6
 _LEAST_HEIGHT_M = 0.02
 _LEAST_SHOWN = 250
 _ELEVATIONS_DEG = (34, 48)
-_SHIFTS_M = ((0.01, 0.0), (-0.01, 0.0), (0.0, 0.01), (0.0, -0.01))
+RINGS_M = (0.0025, 0.005, 0.01)
+"""The verdict on a next step holds all round it, this far off [m]."""
 _ABOVE_M = 0.03
 _ENOUGH, _MOST_OF_A_SORT = 4, 8
 _RIGHTS_TRIED = 6
@@ -64,9 +65,9 @@ def next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
             wrong = alike_wrong(shown, right, falling, rng, {AREA: rank})
             if not all(are_seen(one, (block.order,), COUNTED) for one in (right, *wrong)):
                 continue
-            if wrong and _are_sure([right, *wrong], block.order):
+            options = [right, *wrong]
+            if wrong and _are_sure(stage, options):
                 facts = {"placed": [one.order for one in stage], "next": block.order}
-                options = [right, *wrong]
                 yield draft(scene, rng, "pd-next", options, [shown], f"area {rank}", facts=facts)
                 return
 
@@ -78,7 +79,7 @@ def can_follow(shown: QuestionPicture, option: QuestionPicture) -> bool:
     kept = [block for block in option.blocks if block.order in placed]
     if len(added) != 1 or not same_blocks(kept, shown.blocks):
         raise UnfairError(f"picture {option.label} does not add one block")
-    stays = verdict(option.blocks, added[0].order)
+    stays = _stays(kept, added[0])
     if stays is None:
         raise UnfairError(f"it is not sure whether all stays in picture {option.label}")
     return stays
@@ -120,7 +121,7 @@ def _places(
         likely = is_balanced(group_of(picture.blocks, put.order))
         if len(found[likely]) == _MOST_OF_A_SORT:
             continue
-        stays = _clearly_stays(shown.blocks, put)
+        stays = stays_round(put, shown.blocks, RINGS_M[-1:])
         if stays is None:
             continue
         if shown_pixels(picture, seen(picture))[put.order] >= _LEAST_SHOWN:
@@ -136,19 +137,12 @@ def _view(rng: np.random.Generator) -> View:
     return (drawn_view(rng)[0], float(rng.integers(low, high + 1)))
 
 
-def _clearly_stays(stage: Sequence[Block], put: Block) -> bool | None:
-    """Whether the block stays, and likewise 1 cm off to any side; None where unsure."""
-    stays = surely_stays((*stage, put), put.order)
-    if stays is None:
-        return None
-    x, y, _ = bounds_m(put).mean(axis=0)
-    for dx, dy in _SHIFTS_M:
-        moved = lowered(put, stage, float(x) + dx, float(y) + dy)
-        if is_balanced(group_of((*stage, moved), moved.order)) is not stays:
-            return None
-    return stays
+def _are_sure(stage: Sequence[Block], options: Sequence[QuestionPicture]) -> bool:
+    """Whether, by simulation too, the first stays and the others do not."""
+    return all(_stays(stage, one.blocks[-1]) is (i == 0) for i, one in enumerate(options))
 
 
-def _are_sure(options: Sequence[QuestionPicture], order: int) -> bool:
-    """Whether simulation agrees that the first stays and the others do not."""
-    return all(verdict(one.blocks, order) is (i == 0) for i, one in enumerate(options))
+def _stays(stage: Sequence[Block], put: Block) -> bool | None:
+    """Whether a block put down stays, by simulation too, and likewise up to 1 cm off; or None."""
+    stays = stays_round(put, stage, RINGS_M)
+    return stays if verdict((*stage, put), put.order) is stays else None

@@ -14,7 +14,7 @@ from phyblock.domain.question import Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.camera import view_axes
 from phyblock.sim.pictures import PictureStyle, drawn, goal_camera
-from phyblock.sim.render import shoot
+from phyblock.sim.render import DrawnBlock, shoot
 from phyblock.sim.support import bounds_m
 from phyblock.sim.visibility import visible_shares
 from phyblock_making.questions.question_draft import UnfairError
@@ -38,6 +38,7 @@ __all__ = [
     "shares",
     "shown_picture",
     "shows_profile",
+    "shows_solid",
 ]
 
 View = tuple[float, float]
@@ -61,6 +62,8 @@ _PROFILE_AXES: Mapping[BlockType, int] = {
     "cylinder": 2,
 }
 """Body axes along which these types look like what they are, and from elsewhere like boxes."""
+_MOST_OF_A_FACE = 0.8
+"""The most that one face of a block by itself may be of all that shows of it."""
 _LEAST_PROFILE = 0.26
 """The sine of 15 degrees: so far the face across that axis is turned to the viewer."""
 _SIZE_PX = 256
@@ -180,6 +183,18 @@ def shows_profile(block: Block, view: View) -> bool:
         return True
     along = euler_deg_to_matrix(block.euler_deg)[:, axis]
     return bool(abs(along @ view_axes(*view)[2]) >= _LEAST_PROFILE)
+
+
+def shows_solid(block: Block, view: View) -> bool:
+    """Whether a view shows its profile, and no one face is nearly all that shows of the block."""
+    along = view_axes(*view)[2]
+    corners = DrawnBlock(block.type, block.color, block.position_m, block.euler_deg).triangles_m
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    shown = np.maximum(-normals @ along, 0.0)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    _, faces = np.unique(np.round(normals / lengths, 2), axis=0, return_inverse=True)
+    largest = np.bincount(faces.ravel(), shown).max() / shown.sum()
+    return shows_profile(block, view) and bool(largest <= _MOST_OF_A_FACE)
 
 
 def require_shapes_seen(picture: QuestionPicture) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from phyblock.domain.scene import Block
@@ -11,9 +12,10 @@ from phyblock.sim.outcomes import holds
 from phyblock.sim.support import bounds_m, drop_height_m
 from phyblock_making.questions.margins import group_of
 
-__all__ = ["lowered", "surely_stays", "verdict"]
+__all__ = ["lowered", "lowered_round", "stays_round", "surely_stays", "verdict"]
 
 _LIFT_M = 0.6
+_DIRECTIONS = 8
 
 
 def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Block:
@@ -27,6 +29,26 @@ def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Bloc
     lifted = replace(block, position_m=(x, y, block.position_m[2] + _LIFT_M))
     fall = drop_height_m(lifted, onto)
     return replace(lifted, position_m=(x, y, round(lifted.position_m[2] - fall, 6)))
+
+
+def lowered_round(put: Block, onto: Sequence[Block], rings_m: Sequence[float]) -> Iterator[Block]:
+    """The block let down anew all round where it is, in eight directions for each ring [m]."""
+    x, y, _ = bounds_m(put).mean(axis=0).tolist()
+    for radius_m in rings_m:
+        for number in range(_DIRECTIONS):
+            angle = 2 * math.pi * number / _DIRECTIONS
+            at = (x + radius_m * math.cos(angle), y + radius_m * math.sin(angle))
+            yield lowered(put, onto, *at)
+
+
+def stays_round(put: Block, onto: Sequence[Block], rings_m: Sequence[float]) -> bool | None:
+    """Whether, by statics, a block let down stays, and likewise all round; None where unsure."""
+    stays = surely_stays((*onto, put), put.order)
+    is_alike = stays is not None and all(
+        is_balanced(group_of((*onto, moved), moved.order)) is stays
+        for moved in lowered_round(put, onto, rings_m)
+    )
+    return stays if is_alike else None
 
 
 def surely_stays(blocks: Sequence[Block], order: int) -> bool | None:

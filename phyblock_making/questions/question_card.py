@@ -88,8 +88,9 @@ What was unfair became a rule for all:
 * outcomes are tried under four settings (time step, solver, friction from 0.28 to 0.45, masses 15 %
   off, and a floor that leans by 2 degrees to three sides); all must name the same blocks, each
   either clearly moved or clearly still;
-* nothing hangs on an edge: by statics, the blocks that stay stand, and those that go cannot be
-  borne, with every weight 5 mm off to any of eight sides, those frictions and those masses;
+* statics leave room for weights that are up to 5 mm off to any side, all to the same one, for long
+  blocks of 0.87 to 1.15 times their mass and for those frictions: the blocks that stay stand with
+  all of that, and those that go are borne with none of it, at no place in between either;
 * of removals four in ten follow the rule that what rests on a block falls with it; in the others a
   support is one too many, or a weight holds what it stands on. Planks with weights or a column are
   added for them (`add`), on structures of which some upper blocks may be left out (`without`);
@@ -106,10 +107,15 @@ What was unfair became a rule for all:
   area, and about its ranks in seven other measures of pixels, are drawn;
 * stages of building are colored in pictures of the whole structure, so that none is larger for
   being early; a cut in four is refused where number, area or height of the blocks sorts it;
-* places for a block are all on flat faces; one that holds and three that do not are taken so that
-  the right one's ranks in eight measures (distance from the middle of its block, room round it,
+* places for a block are all on flat faces, and at each the block comes down on the very face that
+  is marked, not on a neighbor; one that holds and three that do not are taken so that the right
+  one's ranks in eight measures (distance from the middle of its block, room round it,
   height, where it is, how much shows of its block) are about those of any place; they hold, or do
-  not, also 5 mm off in four directions, and blocks without a clear middle are not put down;
+  not, also 1.25, 2.5 and 5 mm off in eight directions (next steps: 2.5, 5 and 10 mm), and blocks
+  without a clear middle, or that roll, are not put down;
+* every block of a structure that another is put down on shows {counted:.0%} of itself; the block
+  alone shows its profile, no face of it is more than four fifths of what shows, and its size stands
+  in the text, because its picture has another scale;
 * of places chance leaves out drafts, too, until these measures tell nothing of
   what is right (rejection sampling as for texts);
 * an arch, a triangular prism, a half cylinder or a cylinder is called that, and its shape asked

@@ -20,7 +20,7 @@ __all__ = ["QUESTIONS_FILE", "check_place", "write_questions"]
 QUESTIONS_FILE = "questions.jsonl"
 _CARD_FILE = "CARD.md"
 _SUMS_FILE = "SHA256SUMS"
-SET_VERSION = 3
+SET_VERSION = 4
 """Raised whenever questions of a name ask something else, so that no results are mixed."""
 
 

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import nnls  # type: ignore[import-untyped]
 
 from phyblock.datasets import read_builtin
+from phyblock.domain import Block, BlockType
 from phyblock.resources import bundled
 from phyblock.sim import balance
-from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
+from phyblock.sim.balance import (
+    FRICTIONS,
+    MARGIN_M,
+    MASSES,
+    is_balanced,
+    surely_falls,
+    surely_stands,
+)
 from phyblock.sim.steps import groups
 from tests.sim.structures import block, counterweighted_beam, tower, turned
 
@@ -41,6 +50,72 @@ def test_nothing_both_stands_and_falls_for_sure(offset_m: float) -> None:
     plank = [*tower(2), block(3, "cuboid3", (offset_m, 0, 0.1125))]
     assert not (surely_stands(plank) and surely_falls(plank))
     assert is_balanced(plank) or not surely_stands(plank)
+
+
+@pytest.mark.parametrize(
+    ("plank", "plank_m", "weight_m"),
+    [("cuboid3", -0.0625, -0.025), ("cuboid2", 0.05, 0.0125), ("cuboid2", -0.0375, -0.05)],
+)
+def test_a_solver_that_says_too_little_is_left_over_bears_nothing(
+    plank: BlockType, plank_m: float, weight_m: float
+) -> None:
+    """Each tips for sure, and least squares say that nothing is left over (scipy 1.15 to 1.17)."""
+    tipping = [
+        *tower(1),
+        block(2, plank, (0, plank_m, 0.0625), (0, 0, 90)),
+        block(3, "cylinder", (0, weight_m, 0.125)),
+    ]
+    assert not is_balanced(tipping)
+    assert not surely_stands(tipping)
+
+
+@st.composite
+def loaded_planks(draw: st.DrawFn) -> list[Block]:
+    """A plank across a cube, on the grid that scenes are built on, with up to two weights."""
+    places = st.integers(-5, 5).map(lambda steps: 0.0125 * steps)
+    plank = draw(st.sampled_from(["cuboid3", "cuboid2"]))
+    blocks = [*tower(1), block(2, plank, (0, draw(places), 0.0625), (0, 0, 90))]
+    if draw(st.booleans()):
+        blocks.append(block(3, "cylinder", (0, draw(places), 0.125)))
+    if draw(st.booleans()):
+        blocks.append(block(4, "cube", (draw(places), 0.2, 0.025)))
+    return blocks
+
+
+@settings(max_examples=40)
+@given(loaded_planks())
+def test_least_squares_and_linear_programming_agree(blocks: list[Block]) -> None:
+    def verdicts() -> tuple[bool, bool]:
+        return is_balanced(blocks), surely_stands(blocks)
+
+    def gives_up(*_: object) -> None:
+        raise RuntimeError
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(balance, "nnls", gives_up)
+        by_programming = verdicts()
+    assert verdicts() == by_programming
+
+
+@given(loaded_planks(), st.floats(0, MARGIN_M), angles_deg.map(lambda a: 4 * a), st.floats(0, 1))
+def test_a_sure_verdict_holds_for_all_shifts_and_masses_between(
+    blocks: list[Block], radius_m: float, angle_deg: float, share: float
+) -> None:
+    angle, (light, heavy) = math.radians(angle_deg), balance.MASS_FACTORS
+    shift_m = (radius_m * math.cos(angle), radius_m * math.sin(angle))
+    factor = light + share * (heavy - light)
+    weights = balance._weights(blocks, shift_m, tuple((kind, factor) for kind, _ in MASSES[0]))
+    little, much = (balance._forces(blocks, friction) for friction in FRICTIONS)
+    assert balance._bears(little, weights) or not surely_stands(blocks)
+    assert not (balance._bears(much, weights) and surely_falls(blocks))
+
+
+@pytest.mark.parametrize(("off_m", "falls"), [(0.002, False), (0.0035, False), (0.007, True)])
+def test_a_balance_nearer_than_the_margin_is_no_sure_fall(off_m: float, falls: bool) -> None:
+    """On a ridge a slab balances at one place alone, which is on no ring round another."""
+    ridge_m = 0.05 / 2**0.5
+    ridge = [block(1, "triangle", (0, 0, 0)), block(2, "cuboid1", (off_m, off_m, ridge_m + 0.0125))]
+    assert surely_falls(ridge) is falls
 
 
 def test_a_weight_that_holds_a_plank_is_needed() -> None:
