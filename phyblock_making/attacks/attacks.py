@@ -134,6 +134,7 @@ ATTACKS: tuple[Attack, ...] = (
     Attack("odd one out", "pixels that differ from other options", by_cue("unlike the others")),
     Attack("central", "the mark's distance from the middle of its block", by_cue("off center")),
     Attack("central and flat", "the same, on level faces first", by_cue("off center or not level")),
+    Attack("alone", "the mark's distance from the other three", by_cue("apart from the others")),
     Attack("linear probe", "ridge regression on all cues, by folds", linear_cues),
     Attack("boosted probe", "gradient boosting on all cues, by folds", boosted_cues),
     Attack("support", "what rests on X moves, nothing else", by_rule("support"), _NAIVE, None),

@@ -172,6 +172,12 @@ def _size(spot: Spot, look: Look) -> float:
     return float((look.scene.block == vertex).sum()) if vertex >= 0 else 0.0
 
 
+def _alone(spot: Spot, look: Look) -> float:
+    """Pixels to the marks of the other options together."""
+    places = [np.subtract(spot.pixel, other.pixel) for other in look.spots]
+    return float(np.linalg.norm(places, axis=1).sum())
+
+
 def _from_others(spot: Spot, look: Look) -> float:
     """Pixels to the nearest further mark, such as X; 0 where there is none."""
     places = [np.subtract(spot.pixel, other.pixel) for other in look.other_spots]
@@ -187,6 +193,7 @@ MARK_CUES: Mapping[str, Cue] = {
     "off the middle": _of_marks(_from_middle),
     "room round the mark": _of_marks(_room),
     "size of the marked block": _of_marks(_size),
+    "apart from the others": _of_marks(_alone),
     "from other marks": _of_marks(_from_others),
 }
 """Of options that are marks in the scene's picture."""

@@ -1,8 +1,8 @@
 """AD: at which of four marked places a block stays when it is put down there, by simulation.
 
-All places are on flat faces, and no more central where the block stays than elsewhere. At every one
-of them the block comes down on the face that is marked, so that what decides is what it does to the
-blocks below: a plank that tips, or is held by what else lies on it.
+All places are on flat faces, and no more central where the block stays than elsewhere. Where it
+stays it comes down on the face that is marked. Elsewhere a plank tips under it, as far as such
+places are found, or it meets a neighbor first.
 """
 
 from __future__ import annotations
@@ -30,7 +30,12 @@ from phyblock.sim.seeing import Top, seen, seen_order, visible_tops
 from phyblock.sim.steps import groups
 from phyblock.sim.support import bounds_m
 from phyblock_making.poses import POSES
-from phyblock_making.questions.affordance_places import Place, alike_places, looks_of, stays_at
+from phyblock_making.questions.affordance_places import (
+    Place,
+    alike_places,
+    looks_of,
+    stays_at,
+)
 from phyblock_making.questions.annexes import with_annex
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.picture_view import (
@@ -77,7 +82,7 @@ class AffordanceMaker:
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    scenes_tried = 320
+    scenes_tried = 400
     drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -89,9 +94,9 @@ class AffordanceMaker:
             tops = visible_tops(plain, seen(plain), _STEP_PX, _FLAT_RISE)
             for _ in range(_BLOCKS_TRIED):
                 block = _drawn_block(plain, rng)
-                places = alike_places(plain, block, shuffled(rng, tops), rng)
+                places, sort = alike_places(plain, block, shuffled(rng, tops), rng)
                 if places:
-                    yield _drafted(scene, plain, block, places, rng)
+                    yield _drafted(scene, plain, block, places, sort, rng)
                     return
 
     def rederive(self, question: Question) -> tuple[int, ...]:
@@ -133,12 +138,14 @@ def _drafted(
     plain: QuestionPicture,
     block: Block,
     places: Sequence[Top],
+    sort: str,
     rng: np.random.Generator,
 ) -> Draft:
     alone = QuestionPicture(BLOCK_LABEL, (block,), plain.view_deg)
     facts = {"block": block.type, "euler": list(block.euler_deg)}
     marks = [Mark("A", top.position_m) for top in places]
-    made = draft(scene, rng, "ad-place", marks, [plain, alone], "", {"size": _size(block)}, facts)
+    slots = {"size": _size(block)}
+    made = draft(scene, rng, "ad-place", marks, [plain, alone], sort, slots, facts)
     return replace(made, looks=tuple(looks_of(plain, top) for top in places))
 
 

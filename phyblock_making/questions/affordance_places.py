@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,71 +24,109 @@ from phyblock_making.questions.placing import (
     verdict,
 )
 
-__all__ = ["Place", "alike_places", "looks_of", "stays_at"]
+__all__ = ["Place", "alike_places", "is_on_face", "looks_of", "stays_at"]
 
 RINGS_M = (0.00125, 0.0025, 0.005)
 """The verdict on a place holds all round it, this far off [m]."""
 _PLACES_TRIED, _GIVEN_UP = 90, 24
-_WRONG, _MOST_FALLING, _MOST_STAYING = 3, 14, 8
-_SAME_HEIGHT_M = 0.001
-_APART_PX = 15.0
+_WRONG = 3
+_MOST_STAYING, _MOST_FALLING, _MOST_HINDERED = 8, 8, 8
+_RANKS = (1, 0, 2, 3)
+"""How many wrong places lie nearer to the others than the right one does, what is rare first.
+
+Places where a plank tips lie side by side, so that the right one tends to be alone; what is found
+is evened out when questions are chosen.
+"""
+_SAME_HEIGHT_M, _CLEARLY_HIGHER_M = 0.001, 0.01
+_APART_PX = 28.0
 _FOURS_TRIED = 5
 Place = tuple[float, float, float]
 """A point of the world [m]."""
 
 
+class _Found(NamedTuple):
+    """Places where a block surely stays by statics, on the face that is marked, and others.
+
+    `falling` are on that face as well; at `hindered` it meets a neighbor first, and does not stay.
+    """
+
+    staying: list[Top]
+    falling: list[Top]
+    hindered: list[Top]
+
+
 def alike_places(
     plain: QuestionPicture, block: Block, tops: Sequence[Top], rng: np.random.Generator
-) -> list[Top]:
-    """The right place and three wrong ones, apart in the picture; none where there are too few."""
-    staying, falling = _by_statics(plain, block, tops)
-    if not staying or len(falling) < _WRONG:
-        return []
-    together = [*staying, *falling]
+) -> tuple[list[Top], str]:
+    """The right place and three wrong ones, apart in the picture; none where there are too few.
+
+    Also of which sort the four are: how many wrong ones are nearer to the other three than the
+    right one is, and at how many the block meets a neighbor first.
+    """
+    found = _by_statics(plain, block, tops)
+    together = [*found.staying, *found.falling, *found.hindered]
+    if not found.staying:
+        return [], ""
     marks = [Mark("A", top.position_m) for top in together]
+    inside = np.array([is_inside(replace(plain, marks=(mark,))) for mark in marks])
     apart = np.array([[is_apart(plain, a, [b], _APART_PX) for b in marks] for a in marks])
+    apart &= inside & inside[:, None]
     measures = np.array([looks_of(plain, top) for top in together])
-    for _ in range(_FOURS_TRIED):
-        four = four_alike(measures, apart, rng, rights=len(staying)).chosen
-        unsure = [
-            i
-            for number, i in enumerate(four)
-            if not is_inside(replace(plain, marks=(marks[i],)))
-            or stays_at(plain, block, together[i].position_m) is not (number == 0)
-        ]
-        if not unsure:
-            return [together[i] for i in four]
-        apart[unsure] = False
-    return []
+    pixels = np.array([mark_pixel(plain, mark.position_m) for mark in marks], dtype=np.float64)
+    unlike = np.linalg.norm(pixels[:, None] - pixels, axis=2)
+    first_hindered = len(together) - len(found.hindered)
+    known: dict[int, bool | None] = {}
+    for rank in _RANKS:
+        for _ in range(_FOURS_TRIED):
+            four = four_alike(
+                measures,
+                apart,
+                rng,
+                rights=len(found.staying),
+                unlike=unlike,
+                unlike_rank=rank,
+            ).chosen
+            for i in four:
+                if i not in known:
+                    known[i] = stays_at(plain, block, together[i].position_m)
+            unsure = [i for n, i in enumerate(four) if known[i] is not (n == 0)]
+            if four and not unsure:
+                hindered = sum(i >= first_hindered for i in four)
+                return [together[i] for i in four], f"alone {rank}, hindered {hindered}"
+            apart[unsure] = False
+    return [], ""
 
 
-def _by_statics(
-    plain: QuestionPicture, block: Block, tops: Sequence[Top]
-) -> tuple[list[Top], list[Top]]:
-    """Some places apart where the block surely stays by statics, and some where it does not.
+def _by_statics(plain: QuestionPicture, block: Block, tops: Sequence[Top]) -> _Found:
+    """Some places of each sort, apart; no staying ones where there are not enough of the others.
 
     What takes longer to find out is only asked where there may be enough of both.
     """
-    likely: dict[bool, list[tuple[Top, Block]]] = {True: [], False: []}
+    sorts: dict[tuple[bool, bool], list[tuple[Top, Block]]] = {
+        (on, stays): [] for on in (True, False) for stays in (True, False)
+    }
     marks: list[Mark] = []
     for number, top in enumerate(tops[:_PLACES_TRIED]):
         mark = Mark("A", top.position_m)
-        if number == _GIVEN_UP and not all(likely.values()):
-            return [], []
-        put = _on_its_face(plain, block, top.position_m)
-        if put is not None and is_apart(plain, mark, marks, _APART_PX / 2):
+        if number == _GIVEN_UP and not sorts[True, True]:
+            break
+        put = lowered(block, plain.blocks, *top.position_m[:2])
+        is_on = _is_on_face(plain, put, top.position_m)
+        if is_on is not None and is_apart(plain, mark, marks, _APART_PX / 2):
             marks.append(mark)
-            likely[is_balanced(group_of((*plain.blocks, put), put.order))].append((top, put))
-    found: dict[bool, list[Top]] = {True: [], False: []}
-    for stays, least, most in ((False, _WRONG, _MOST_FALLING), (True, 1, _MOST_STAYING)):
-        for top, put in likely[stays] if len(likely[stays]) >= least else ():
-            if surely_stays((*plain.blocks, put), put.order) is stays:
-                found[stays].append(top)
-            if len(found[stays]) == most:
-                break
-        if len(found[stays]) < least:
-            return [], []
-    return found[True], found[False]
+            stays = is_balanced(group_of((*plain.blocks, put), put.order))
+            sorts[is_on, stays].append((top, put))
+
+    def sure(is_on: bool, stays: bool, most: int) -> list[Top]:
+        likely = ((top, (*plain.blocks, put)) for top, put in sorts[is_on, stays])
+        found = (top for top, all_of in likely if surely_stays(all_of, block.order) is stays)
+        return list(islice(found, most))
+
+    if not sorts[True, True]:
+        return _Found([], [], [])
+    falling, hindered = sure(True, False, _MOST_FALLING), sure(False, False, _MOST_HINDERED)
+    has_enough = len(falling) + len(hindered) >= _WRONG
+    return _Found(sure(True, True, _MOST_STAYING) if has_enough else [], falling, hindered)
 
 
 def looks_of(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
@@ -113,33 +153,42 @@ def looks_of(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
     )
 
 
-def _on_its_face(plain: QuestionPicture, block: Block, at: Place) -> Block | None:
-    """The block let down over a place; None where it comes down on another than the marked face.
-
-    On the block that shows there alone it would come to lie as high.
-    """
-    put = lowered(block, plain.blocks, *at[:2])
-    if not _is_as_high(put, at):
-        return None
-    under = seen_order(plain, seen(replace(plain, marks=())), at)
-    alone = [one for one in plain.blocks if one.order == under]
-    return put if _is_as_high(lowered(block, alone, *at[:2]), at) else None
-
-
-def _is_as_high(put: Block, at: Place) -> bool:
-    return bool(abs(bounds_m(put)[0, 2] - at[2]) < _SAME_HEIGHT_M)
-
-
 def stays_at(plain: QuestionPicture, block: Block, at: Place) -> bool | None:
     """Whether the block stays at a place, by simulation too, and likewise up to 5 mm off.
 
-    None where that is not sure, or where it does not come down on the marked face everywhere there.
+    None where that is not sure, where it is not sure on which face it comes down, and where it
+    stays on another than the one that is marked.
     """
-    put = _on_its_face(plain, block, at)
-    if put is None:
-        return None
+    put = lowered(block, plain.blocks, *at[:2])
     around = lowered_round(put, plain.blocks, RINGS_M[-1:])
-    if not all(_is_as_high(one, at) for one in around):
+    is_on = is_on_face(plain, block, at)
+    if is_on is None or any(_is_as_high(one, at) is not is_on for one in around):
         return None
     stays = stays_round(put, plain.blocks, RINGS_M)
-    return stays if verdict((*plain.blocks, put), put.order) is stays else None
+    if verdict((*plain.blocks, put), put.order) is not stays or (stays and not is_on):
+        return None
+    return stays
+
+
+def is_on_face(plain: QuestionPicture, block: Block, at: Place) -> bool | None:
+    """Whether the block let down at a place comes down on the marked face, as it would without the
+    other blocks, or meets a neighbor clearly before; None where neither is so.
+    """
+    return _is_on_face(plain, lowered(block, plain.blocks, *at[:2]), at)
+
+
+def _is_on_face(plain: QuestionPicture, put: Block, at: Place) -> bool | None:
+    is_as_high = _is_as_high(put, at)
+    if not is_as_high:
+        return is_as_high
+    under = seen_order(plain, seen(replace(plain, marks=())), at)
+    alone = [one for one in plain.blocks if one.order == under]
+    return True if _is_as_high(lowered(put, alone, *at[:2]), at) else None
+
+
+def _is_as_high(put: Block, at: Place) -> bool | None:
+    """Whether a block has come down as far as a place; None where it is lower, or hardly higher."""
+    above_m = float(bounds_m(put)[0, 2]) - at[2]
+    if abs(above_m) < _SAME_HEIGHT_M:
+        return True
+    return False if above_m > _CLEARLY_HIGHER_M else None

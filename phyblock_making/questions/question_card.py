@@ -107,12 +107,14 @@ What was unfair became a rule for all:
   area, and about its ranks in seven other measures of pixels, are drawn;
 * stages of building are colored in pictures of the whole structure, so that none is larger for
   being early; a cut in four is refused where number, area or height of the blocks sorts it;
-* places for a block are all on flat faces, and at each the block comes down on the very face that
-  is marked, not on a neighbor; one that holds and three that do not are taken so that the right
-  one's ranks in eight measures (distance from the middle of its block, room round it,
-  height, where it is, how much shows of its block) are about those of any place; they hold, or do
-  not, also 1.25, 2.5 and 5 mm off in eight directions (next steps: 2.5, 5 and 10 mm), and blocks
-  without a clear middle, or that roll, are not put down;
+* places for a block are all on flat faces; at the right one the block comes down on the very face
+  that is marked, at the others it does, or clearly meets a neighbor first; three wrong ones are
+  taken so that the right one's ranks in eight measures (distance from the middle of its block, room
+  round it, height, where it is, how much shows of its block) are about those of any place, and
+  questions so that its rank in distance from the other three, and the number of neighbors that are
+  met, are each as frequent as can be; they hold, or do not, also 1.25, 2.5 and 5 mm off in eight
+  directions (next steps: 2.5, 5 and 10 mm), and blocks without a clear middle, or that roll, are
+  not put down;
 * every block of a structure that another is put down on shows {counted:.0%} of itself; the block
   alone shows its profile, no face of it is more than four fifths of what shows, and its size stands
   in the text, because its picture has another scale;

@@ -9,7 +9,7 @@ import pytest
 from phyblock.domain import QuestionPicture
 from phyblock.domain.question import Mark
 from phyblock.sim.support import bounds_m
-from phyblock_making.questions.affordance_places import stays_at
+from phyblock_making.questions.affordance_places import is_on_face, stays_at
 from phyblock_making.questions.picture_view import shows_solid
 from phyblock_making.questions.placing import lowered, lowered_round, stays_round
 from tests.sim.structures import block, tower
@@ -25,14 +25,29 @@ VIEW = (300.0, 35.0)
 
 @pytest.mark.parametrize(
     ("place_m", "stays"),
-    [((0, 0), True), ((0, -0.068), False), ((0, 0.05), None), ((0, -0.053), None)],
+    [((0, 0), True), ((0, -0.068), False), ((0, 0.05), False), ((0, -0.053), None)],
 )
 def test_a_block_stays_where_the_plank_does_not_tip(
     place_m: tuple[float, float], stays: bool | None
 ) -> None:
-    """Unsure where it comes down on the wall, and where the weights are nearly over the edge."""
+    """It falls off the wall as well; unsure is where the weights are nearly over the edge."""
     plain = QuestionPicture("scene", (*PLANK, WALL), VIEW, marks=(Mark("A", (*place_m, TOP_M)),))
     assert stays_at(plain, PUT, (*place_m, TOP_M)) is stays
+    assert is_on_face(plain, PUT, (*place_m, TOP_M)) is (place_m[1] <= 0)
+
+
+def test_a_place_where_the_block_stays_on_its_neighbors_is_none() -> None:
+    posts = [
+        block(n, "cube", (x, 0, z))
+        for n, (x, z) in enumerate(((-0.055, 0.025), (-0.055, 0.075), (0.055, 0.025)), 5)
+    ]
+    between = (*tower(1), *posts, block(8, "cube", (0.055, 0, 0.075)))
+    at = (0.0, 0.0, 0.05)
+    plain = QuestionPicture("scene", between, VIEW, marks=(Mark("A", at),))
+    put = lowered(PUT, between, 0.0, 0.0)
+    assert stays_round(put, between, (0.005,)) is True
+    assert is_on_face(plain, PUT, at) is False
+    assert stays_at(plain, PUT, at) is None
 
 
 def test_a_block_is_let_down_all_round_as_far_off_as_told() -> None:
