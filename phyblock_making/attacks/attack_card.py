@@ -34,6 +34,7 @@ VERSION_2: Mapping[str, Mapping[str, int]] = {
     "odd one out": {"VP": 27, "CF": 64, "PD": 33, "OR": 0},
     "central": {"CF": 41, "AD": 40},
     "central and flat": {"CF": 42, "AD": 40},
+    "alone": {"AD": 50},
     "linear probe": {"VP": 27, "CF": 78, "PD": 49, "OR": 4, "AD": 48},
     "boosted probe": {"VP": 25, "CF": 71, "PD": 45, "OR": 8, "AD": 58},
     "support": {"CF": 36},
@@ -51,6 +52,7 @@ VERSION_3: Mapping[str, Mapping[str, int]] = {
     "odd one out": {"VP": 25, "CF": 28, "PD": 33, "OR": 0},
     "central": {"AD": 28},
     "central and flat": {"AD": 28},
+    "alone": {"AD": 38},
     "linear probe": {"VP": 27, "CF": 25, "PD": 49, "OR": 4, "AD": 26},
     "boosted probe": {"VP": 25, "CF": 38, "PD": 45, "OR": 8, "AD": 34},
     "support": {"CF": 38},
@@ -72,7 +74,7 @@ ways to read an attack, with a 95 % interval; the last columns are what it reach
 versions of `phyblock-vqa`.
 
 | attack | subtask | n | chance | reached | 95 % | aim | aim is | {versions} |
-|---|---|---|---|---|---|---|---|---|---|---|
+|---|---|---|---|---|---|---|---|{rules}|
 {rows}
 
 Pictures with a block before the camera's near plane or beyond its far one: {cuts} (version 1:
@@ -86,13 +88,16 @@ def attack_card(attacked: Sequence[Attacked], observed: Sequence[Observed]) -> s
     if not rows:
         return ""
     versions = " | ".join(f"version {number}" for number in range(1, len(_BEFORE) + 1))
+    rules = "|".join(["---"] * len(_BEFORE))
     cuts = [cut for one in observed for cut in one.cuts]
     told = "none"
     if cuts:
         questions = sum(bool(one.cuts) for one in observed)
         shown = sum(cut.pixels > 0 for cut in cuts)
         told = f"{len(cuts)} in {questions} questions, {shown} of them to be seen"
-    return _TEXT.format(rows="\n".join(rows), cuts=told, cuts_1=_CUTS_1, versions=versions)
+    return _TEXT.format(
+        rows="\n".join(rows), cuts=told, cuts_1=_CUTS_1, versions=versions, rules=rules
+    )
 
 
 def _row(one: Attacked) -> str:

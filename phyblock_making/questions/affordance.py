@@ -34,12 +34,12 @@ from phyblock_making.questions.affordance_places import (
     Place,
     alike_places,
     looks_of,
+    sort_of,
     stays_at,
 )
 from phyblock_making.questions.annexes import with_annex
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.picture_view import (
-    COUNTED,
     are_seen,
     drawn_view,
     require_seen,
@@ -52,13 +52,14 @@ from phyblock_making.questions.wording import slots_of
 
 __all__ = ["AffordanceMaker"]
 
-_ANNEXED = 0.85
-_STRUCTURES_TRIED = 6
+_ANNEXED = 0.6
+_STRUCTURES_TRIED = 4
 _VIEWS_TRIED = 3
 _BLOCKS_TRIED = 3
 _STEP_PX = 5
 _FLAT_RISE = 0.99
 _OFF_CENTER_M = 0.001
+_ALL_SEEN = 0.12
 
 
 @functools.cache
@@ -82,7 +83,7 @@ class AffordanceMaker:
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    scenes_tried = 400
+    scenes_tried = 180
     drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -94,9 +95,9 @@ class AffordanceMaker:
             tops = visible_tops(plain, seen(plain), _STEP_PX, _FLAT_RISE)
             for _ in range(_BLOCKS_TRIED):
                 block = _drawn_block(plain, rng)
-                places, sort = alike_places(plain, block, shuffled(rng, tops), rng)
+                places = alike_places(plain, block, shuffled(rng, tops), rng)
                 if places:
-                    yield _drafted(scene, plain, block, places, sort, rng)
+                    yield _drafted(scene, plain, block, places, rng)
                     return
 
     def rederive(self, question: Question) -> tuple[int, ...]:
@@ -108,7 +109,7 @@ class AffordanceMaker:
         block = alone.blocks[0]
         if slots.get("size") != _size(block) or not shows_solid(block, alone.view_deg):
             raise UnfairError("the block is not as large as told, or does not show its shape")
-        require_seen(shown, [one.order for one in shown.blocks], COUNTED)
+        require_seen(shown, [one.order for one in shown.blocks], _ALL_SEEN)
         stays = []
         for letter in LETTERS:
             found = stays_at(shown, block, _marked(shown, letter))
@@ -128,7 +129,7 @@ def _pictured(scene: Scene, rng: np.random.Generator) -> QuestionPicture | None:
     if all(map(surely_stands, groups(blocks))):
         for view in views:
             plain = QuestionPicture("scene", blocks, view)
-            if are_seen(plain, [block.order for block in blocks], COUNTED):
+            if are_seen(plain, [block.order for block in blocks], _ALL_SEEN):
                 return plain
     return None
 
@@ -138,13 +139,13 @@ def _drafted(
     plain: QuestionPicture,
     block: Block,
     places: Sequence[Top],
-    sort: str,
     rng: np.random.Generator,
 ) -> Draft:
     alone = QuestionPicture(BLOCK_LABEL, (block,), plain.view_deg)
     facts = {"block": block.type, "euler": list(block.euler_deg)}
     marks = [Mark("A", top.position_m) for top in places]
     slots = {"size": _size(block)}
+    sort = sort_of(plain, places)
     made = draft(scene, rng, "ad-place", marks, [plain, alone], sort, slots, facts)
     return replace(made, looks=tuple(looks_of(plain, top) for top in places))
 

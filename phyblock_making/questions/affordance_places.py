@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -24,22 +24,18 @@ from phyblock_making.questions.placing import (
     verdict,
 )
 
-__all__ = ["Place", "alike_places", "is_on_face", "looks_of", "stays_at"]
+__all__ = ["Place", "alike_places", "is_on_face", "looks_of", "sort_of", "stays_at"]
 
 RINGS_M = (0.00125, 0.0025, 0.005)
 """The verdict on a place holds all round it, this far off [m]."""
 _PLACES_TRIED, _GIVEN_UP = 90, 24
 _WRONG = 3
-_MOST_STAYING, _MOST_FALLING, _MOST_HINDERED = 8, 8, 8
-_RANKS = (1, 0, 2, 3)
-"""How many wrong places lie nearer to the others than the right one does, what is rare first.
-
-Places where a plank tips lie side by side, so that the right one tends to be alone; what is found
-is evened out when questions are chosen.
-"""
+_MOST_STAYING, _MOST_FALLING, _MOST_HINDERED = 10, 10, 12
+_OFF_CENTER, _ROW = 0, 4
+"""Places of two of the measures of `looks_of`."""
 _SAME_HEIGHT_M, _CLEARLY_HIGHER_M = 0.001, 0.01
-_APART_PX = 28.0
-_FOURS_TRIED = 5
+_APART_PX = 18.0
+_FOURS_TRIED = 4
 Place = tuple[float, float, float]
 """A point of the world [m]."""
 
@@ -57,16 +53,12 @@ class _Found(NamedTuple):
 
 def alike_places(
     plain: QuestionPicture, block: Block, tops: Sequence[Top], rng: np.random.Generator
-) -> tuple[list[Top], str]:
-    """The right place and three wrong ones, apart in the picture; none where there are too few.
-
-    Also of which sort the four are: how many wrong ones are nearer to the other three than the
-    right one is, and at how many the block meets a neighbor first.
-    """
+) -> list[Top]:
+    """The right place and three wrong ones, apart in the picture; none where there are too few."""
     found = _by_statics(plain, block, tops)
     together = [*found.staying, *found.falling, *found.hindered]
     if not found.staying:
-        return [], ""
+        return []
     marks = [Mark("A", top.position_m) for top in together]
     inside = np.array([is_inside(replace(plain, marks=(mark,))) for mark in marks])
     apart = np.array([[is_apart(plain, a, [b], _APART_PX) for b in marks] for a in marks])
@@ -74,27 +66,18 @@ def alike_places(
     measures = np.array([looks_of(plain, top) for top in together])
     pixels = np.array([mark_pixel(plain, mark.position_m) for mark in marks], dtype=np.float64)
     unlike = np.linalg.norm(pixels[:, None] - pixels, axis=2)
-    first_hindered = len(together) - len(found.hindered)
-    known: dict[int, bool | None] = {}
-    for rank in _RANKS:
-        for _ in range(_FOURS_TRIED):
-            four = four_alike(
-                measures,
-                apart,
-                rng,
-                rights=len(found.staying),
-                unlike=unlike,
-                unlike_rank=rank,
-            ).chosen
-            for i in four:
-                if i not in known:
-                    known[i] = stays_at(plain, block, together[i].position_m)
-            unsure = [i for n, i in enumerate(four) if known[i] is not (n == 0)]
-            if four and not unsure:
-                hindered = sum(i >= first_hindered for i in four)
-                return [together[i] for i in four], f"alone {rank}, hindered {hindered}"
-            apart[unsure] = False
-    return [], ""
+    is_sure: dict[int, bool] = {}
+    for _ in range(_FOURS_TRIED):
+        rights = len(found.staying)
+        four = four_alike(measures, apart, rng, rights=rights, unlike=unlike).chosen
+        for place, i in enumerate(four):
+            if i not in is_sure:
+                is_sure[i] = stays_at(plain, block, together[i].position_m) is (place == 0)
+        unsure = [i for i in four if not is_sure[i]]
+        if four and not unsure:
+            return [together[i] for i in four]
+        apart[unsure] = apart[:, unsure] = False
+    return []
 
 
 def _by_statics(plain: QuestionPicture, block: Block, tops: Sequence[Top]) -> _Found:
@@ -120,7 +103,7 @@ def _by_statics(plain: QuestionPicture, block: Block, tops: Sequence[Top]) -> _F
     def sure(is_on: bool, stays: bool, most: int) -> list[Top]:
         likely = ((top, (*plain.blocks, put)) for top, put in sorts[is_on, stays])
         found = (top for top, all_of in likely if surely_stays(all_of, block.order) is stays)
-        return list(islice(found, most))
+        return list(itertools.islice(found, most))
 
     if not sorts[True, True]:
         return _Found([], [], [])
@@ -151,6 +134,19 @@ def looks_of(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
         abs(column - float(columns.mean())) / 30,
         5 * float(under.sum() / len(rows)),
     )
+
+
+def sort_of(plain: QuestionPicture, places: Sequence[Top]) -> str:
+    """By how many of the wrong places the right one, which is first, is outdone in three ways.
+
+    How many are nearer to the middle of their block, how many higher up in the picture, and how
+    many nearer to the others: by these the right one of any four would stand out.
+    """
+    looks = np.array([looks_of(plain, top) for top in places])
+    pixels = np.array([mark_pixel(plain, top.position_m) for top in places], dtype=np.float64)
+    far = np.linalg.norm(pixels[:, None] - pixels, axis=2).sum(axis=1)
+    measured = (("central", looks[:, _OFF_CENTER]), ("up", looks[:, _ROW]), ("alone", far))
+    return ", ".join(f"{name} {int((one[1:] < one[0]).sum())}" for name, one in measured)
 
 
 def stays_at(plain: QuestionPicture, block: Block, at: Place) -> bool | None:

@@ -20,7 +20,6 @@ __all__ = ["Four", "four_alike"]
 _WRONG = 3
 _MOST_OFF = 1.0
 """How many ranks the right option may be off, on average over the measures."""
-_HELD_OFF = 0.5
 _EQUAL = 0.02
 _UNLIKE_STEPS = 5.0
 
@@ -46,14 +45,12 @@ def four_alike(
     *,
     rights: int = 1,
     unlike: NDArray[np.float64] | None = None,
-    unlike_rank: int | None = None,
 ) -> Four:
     """A right row and three wrong ones, all apart, among which it has about the ranks drawn.
 
     `measures` has shape (n, k), its first `rights` rows are of options that are right. `apart` and
     `unlike` have shape (n, n); where `unlike` is given, the sum over the other three is one more
-    measure, the last, of which the rank is just `unlike_rank` where that is given. No four where
-    none come near.
+    measure. No four where none come near.
     """
     if not 0 < rights <= len(measures) - _WRONG:
         return Four()
@@ -68,8 +65,6 @@ def four_alike(
             continue
         ranks = _ranks(measures, right, fitting, unlike)
         off = np.abs(ranks - wanted).mean(axis=1)
-        if unlike_rank is not None:
-            off[np.abs(ranks[:, -1] - unlike_rank) >= _HELD_OFF] = np.inf
         place = int(off.argmin())
         if off[place] < nearest:
             nearest = float(off[place])

@@ -108,18 +108,18 @@ What was unfair became a rule for all:
 * stages of building are colored in pictures of the whole structure, so that none is larger for
   being early; a cut in four is refused where number, area or height of the blocks sorts it;
 * places for a block are all on flat faces; at the right one the block comes down on the very face
-  that is marked, at the others it does, or clearly meets a neighbor first; three wrong ones are
-  taken so that the right one's ranks in eight measures (distance from the middle of its block, room
-  round it, height, where it is, how much shows of its block) are about those of any place, and
-  questions so that its rank in distance from the other three, and the number of neighbors that are
-  met, are each as frequent as can be; they hold, or do not, also 1.25, 2.5 and 5 mm off in eight
-  directions (next steps: 2.5, 5 and 10 mm), and blocks without a clear middle, or that roll, are
-  not put down;
-* every block of a structure that another is put down on shows {counted:.0%} of itself; the block
-  alone shows its profile, no face of it is more than four fifths of what shows, and its size stands
-  in the text, because its picture has another scale;
-* of places chance leaves out drafts, too, until these measures tell nothing of
-  what is right (rejection sampling as for texts);
+  that is marked, at the others it does, or clearly meets a neighbor first; one that holds and three
+  that do not are taken so that the right one's ranks in nine measures (distance from the middle of
+  its block and from the other three, room round it, height, where it is, how much shows of its
+  block) are about those of any place, and questions so that its ranks in three of them are each
+  about as frequent (nearest to the middle of its block, highest in the picture, farthest from the
+  others); they hold, or do not, also 1.25, 2.5 and 5 mm off in eight directions (next steps: 2.5, 5
+  and 10 mm), and blocks without a clear middle, or that roll, are not put down;
+* every block of a structure that another is let down on shows 12 % of itself; the block alone
+  shows its profile, no face of it is more than four fifths of what shows, and its size stands in
+  the text, because its picture has another scale;
+* of places chance leaves out drafts that these measures tell most of (rejection sampling, as for
+  texts);
 * an arch, a triangular prism, a half cylinder or a cylinder is called that, and its shape asked
   for, only where its profile is turned to the viewer by 15 degrees: from behind an arch looks like
   a box;

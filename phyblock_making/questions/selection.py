@@ -26,7 +26,7 @@ _LOOKED_AT = 100
 _SPREAD = 20
 """So many times the drafts that are wanted of a sort are looked at, where the pool has them,"""
 _SPARE = 2
-"""and so many times the drafts that are wanted are kept at the least, where options are texts."""
+"""and so many times the drafts that are wanted are kept at the least."""
 _WEIGHTS = {"kind": 6.0, "wording": 2.0, "options": 0.2, "value": 4.0, "scene": 3.0, "level": 0.3}
 
 
@@ -91,8 +91,7 @@ def _kept(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list[
     """The drafts that chance leaves; more likely ones as well where they would be too few."""
     odds = np.array(keeping_odds([one.texts for one in pool]))
     rank = rng.random(len(pool)) / np.maximum(odds, 1e-9)
-    spare = _SPARE if any(one.option_texts for one in pool) else 1
-    least = float(np.sort(rank)[: spare * count][-1]) if len(pool) else 0.0
+    least = float(np.sort(rank)[: _SPARE * count][-1]) if len(pool) else 0.0
     return [one for one, place in zip(pool, rank, strict=True) if place <= max(1.0, least)]
 
 
@@ -128,7 +127,8 @@ def _even(one: Pooled) -> Iterator[tuple[Hashable, Hashable, float]]:
     if one.option_texts:
         yield ("options", draft.kind), frozenset(one.option_texts), _WEIGHTS["options"]
         return
-    yield ("value", draft.kind), draft.value, _WEIGHTS["value"]
+    for place, part in enumerate(draft.value.split(", ")):
+        yield ("value", draft.kind, place), part, _WEIGHTS["value"]
     yield "scene", draft.scene.id, _WEIGHTS["scene"]
     yield "level", draft.scene.level, _WEIGHTS["level"]
 

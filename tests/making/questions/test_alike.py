@@ -69,22 +69,6 @@ def test_four_are_a_right_one_and_three_wrong_ones_all_apart(seed: int, rights: 
         assert np.abs(np.array(four.ranks) - ranks).max() <= 0.5
 
 
-@given(seed=seeds, rank=st.integers(0, 3))
-def test_how_far_from_the_others_a_right_one_is_can_be_chosen(seed: int, rank: int) -> None:
-    rng, measures = drawn(seed, n=12)
-    places = rng.random((12, 2))
-    unlike = np.linalg.norm(places[:, None] - places, axis=2)
-    four = four_alike(
-        *(measures, everywhere(12), rng),
-        rights=4,
-        unlike=unlike,
-        unlike_rank=rank,
-    ).chosen
-    if four:
-        sums = unlike[np.ix_(four, four)].sum(axis=1)
-        assert abs(int((sums[1:] < sums[0]).sum()) - rank) <= 1
-
-
 def test_a_right_one_that_stands_out_in_the_pool_has_any_rank_among_four() -> None:
     """It would be the most of four in 47 cases of a hundred."""
     ranks = []
