@@ -83,7 +83,7 @@ class AffordanceMaker:
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    scenes_tried = 180
+    scenes_tried = 160
     drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
