@@ -8,8 +8,9 @@ import pytest
 
 from phyblock.domain import QuestionPicture
 from phyblock.domain.question import Mark
+from phyblock.sim.seeing import Top
 from phyblock.sim.support import bounds_m
-from phyblock_making.questions.affordance_places import is_on_face, stays_at
+from phyblock_making.questions.affordance_places import is_on_face, sort_of, stays_at
 from phyblock_making.questions.picture_view import shows_solid
 from phyblock_making.questions.placing import lowered, lowered_round, stays_round
 from tests.sim.structures import block, tower
@@ -81,3 +82,13 @@ def test_a_block_shows_its_profile_and_more_than_one_face_or_not(
 ) -> None:
     roof, slab = block(1, "triangle", (0, 0, 0)), block(1, "cuboid3", (0, 0, 0), (0, 90, 0))
     assert shows_solid(roof if shape == "roof" else slab, (azimuth_deg, 30.0)) is shows
+
+
+def test_four_places_are_of_a_sort_by_three_ranks_of_the_right_one() -> None:
+    """Highest in the picture and apart from three on a low plank, not over its block's middle."""
+    post = [block(n, "cube", (-0.3, 0, 0.025 + 0.05 * (n - 3))) for n in (3, 4, 5)]
+    plain = QuestionPicture("scene", (*PLANK, *post), VIEW)
+    right = Top((-0.31, 0.0, 0.15), 1.0, 0.01)
+    wrong = [Top((0.0, y, TOP_M), 1.0, abs(y)) for y in (0.0, 0.005, 0.05)]
+    assert sort_of(plain, [right, *wrong]) == "central 2, up 0, alone 3"
+    assert sort_of(plain, [*wrong, right]) == "central 0, up 3, alone 1"

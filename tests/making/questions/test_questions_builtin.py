@@ -6,11 +6,13 @@ import hashlib
 from collections import Counter
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from phyblock.datasets import QuestionSet, read_builtin, read_questions
 from phyblock.domain import LETTERS, SUBTASKS
 from phyblock.resources import bundled
+from phyblock.sim.seeing import mark_pixel
 from phyblock_making.questions.question_production import PER_SUBTASK
 from phyblock_making.questions.rederiving import problem_of
 from phyblock_making.questions.shortcuts import duplicates_of
@@ -49,6 +51,17 @@ def test_the_files_are_those_of_the_checksums() -> None:
 def test_a_sample_of_the_answers_is_derived_again(built_in: QuestionSet) -> None:
     for task in built_in.tasks[SAMPLE]:
         assert problem_of(task.question) is None, task.key
+
+
+def test_the_right_place_is_apart_from_the_others_as_often_as_any(built_in: QuestionSet) -> None:
+    ranks: Counter[int] = Counter()
+    for question in (t.question for t in built_in.tasks if t.question.subtask == "AD"):
+        shown = question.pictures[0]
+        places = np.array([mark_pixel(shown, mark.position_m) for mark in shown.marks])
+        apart = np.linalg.norm(places[:, None] - places, axis=2).sum(axis=1)
+        ranks[int((apart < apart[question.answer[0]]).sum())] += 1
+    assert ranks.keys() == set(range(len(LETTERS)))
+    assert max(ranks.values()) <= 17
 
 
 def test_a_place_that_is_not_marked_is_found_out(built_in: QuestionSet) -> None:
