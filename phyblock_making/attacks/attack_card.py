@@ -69,9 +69,9 @@ _CUTS_1 = "59 in 47 questions, 47 of them to be seen"
 _TEXT = """
 ## Attacks
 
-From `phyblock vqa audit`; docs/vqa.md says what each goes by. Accuracy [%] of the better of both
-ways to read an attack, with a 95 % interval; the last columns are what it reached on earlier
-versions of `phyblock-vqa`.
+From `phyblock vqa audit`; docs/vqa.md says what each goes by, and why aims of the built-in set are
+missed. Accuracy [%] of the better of both ways to read an attack, with a 95 % interval; the last
+columns are what it reached on earlier versions of `phyblock-vqa`.
 
 | attack | subtask | n | chance | reached | 95 % | aim | aim is | {versions} |
 |---|---|---|---|---|---|---|---|{rules}|
