@@ -28,7 +28,7 @@ const Poses = (() => {
   function put(scene, given) {
     const candidate = scene.candidates[given.block - 1];
     if (!candidate) return null;
-    const turned = { ...candidate, euler: given.euler_deg || candidate.euler };
+    const turned = { ...candidate, candidate: given.block, euler: given.euler_deg || candidate.euler };
     return Solid.boxedAt(turned, inMeters(given.center_cm));
   }
 
