@@ -127,10 +127,12 @@ def of_plans(run: Run) -> Iterator[Shown]:
 
 def of_headlines(run: Run) -> Iterator[Shown]:
     for track, headline in zip(run.design.suite.tracks, headlines(run), strict=True):
-        columns = headline_columns(run, track)
+        columns = {column.heading: column for column in headline_columns(run, track)}
         for row in headline.rows:
             if row.kind != "reference":
-                for column, cell in zip(columns, row.cells, strict=False):
+                for heading, cell in zip(headline.columns, row.cells, strict=True):
+                    if (column := columns.get(heading)) is None:
+                        continue
                     key = (row.name, column.measure, column.cell)
                     if column.criterion:
                         key = (*key, "A", "", column.criterion)

@@ -10,7 +10,6 @@ import numpy as np
 from phyblock.domain import Block, CandidateSet, PoseStep, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.sim.placing import box_height_cm, center_cm
-from phyblock.tracks.pose_planning.buildable import buildable_order
 
 __all__ = ["POSE_FLOORS", "POSE_RULES", "PoseSubject"]
 
@@ -57,6 +56,9 @@ def _built(
     blocks, layers = subject.scene.blocks, subject.scene.graph.layers
     drawn = rng.random(len(blocks)).tolist()
     wanted = sorted(range(len(blocks)), key=lambda vertex: (layers[vertex], drawn[vertex]))
+    # It needs scipy, which takes a while to import: only those who build pay for it.
+    from phyblock.tracks.pose_planning.buildable import buildable_order
+
     order = buildable_order(subject.scene, wanted)
     return written(_step(subject, blocks[v], move(blocks[v], center_cm(blocks[v]))) for v in order)
 
