@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.fork_server import Forked, fork_server
-from tests.report.test_html_browser import CHROMIUMS, FLAGS
+from tests.report.browser import chromium
 from tests.vqa_set import questions, write_questions
 from tests.workspace import SCENES, Raw, Workspace
 
@@ -33,15 +33,9 @@ ADA = ("play", "suite.yaml", "--name", "ada", "--number", "2", "--consent", "con
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    """A headless Chromium; skips where there is none."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    found = next(filter(None, map(shutil.which, CHROMIUMS)), None)
-    if found is None:
-        pytest.skip("no Chromium: apt-get install chromium")
-    with playwright.sync_playwright() as started:
-        running = started.chromium.launch(executable_path=found, args=FLAGS)
+    """A browser; its event loop runs while it does, so that it ends with its module."""
+    with chromium() as running:
         yield running
-        running.close()
 
 
 @pytest.fixture(scope="module")
