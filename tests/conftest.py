@@ -1,16 +1,21 @@
-"""Shared fixtures: where the official data is, if it is here."""
+"""Shared fixtures: where the official data is, if it is here; a browser for each module."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
 
+from tests.browser import chromium
 from tests.fork_server import end_fork_server
 from tests.workspace import Workspace
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 OFFICIAL_MISSING = (
     "official PhyBlock data not found: put it at ../shared or set PHYBLOCK_OFFICIAL to the folder "
@@ -57,6 +62,13 @@ def pictures_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where all workspaces of a test session, in all its processes, keep rendered pictures."""
     base = tmp_path_factory.getbasetemp()
     return (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "pictures"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A browser; its event loop runs while it does, so that it ends with its module."""
+    with chromium() as running:
+        yield running
 
 
 @pytest.fixture

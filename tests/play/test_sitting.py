@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from tests.browser import Visit
 from tests.fork_server import Forked, fork_server
-from tests.report.browser import chromium
 from tests.vqa_set import questions, write_questions
 from tests.workspace import SCENES, Raw, Workspace
 
@@ -29,13 +29,6 @@ PHONE = {"width": 390, "height": 780}
 HOSTILE = "<img src=x onerror=alert(1)></script><script>alert(2)</script>"
 CONSENT = f"May we keep your answers?\n\n{HOSTILE}"
 ADA = ("play", "suite.yaml", "--name", "ada", "--number", "2", "--consent", "consent.txt")
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """A browser; its event loop runs while it does, so that it ends with its module."""
-    with chromium() as running:
-        yield running
 
 
 @pytest.fixture(scope="module")
@@ -66,32 +59,30 @@ class Sat:
 
     page: Page
     process: Forked
-    complaints: list[str]
+    visit: Visit
 
 
 @contextmanager
 def sitting(browser: Browser, workspace: Workspace, **options: Any) -> Iterator[Sat]:
+    """A page that complains of nothing until its server is gone, and asks for nothing elsewhere."""
     command = [*ADA, "--out", "ada", "--beside", "out", "--no-browser"]
     with fork_server().start(command, workspace.root, workspace.env) as process:
         line = process.stdout.readline()
         address = re.search(r"http://127\.0\.0\.1:\d+/\S+/", line)
         assert address, line + process.stderr.read()
-        page, complaints = opened(browser, address[0], **options)
+        visit = opened(browser, address[0], **options)
         try:
-            yield Sat(page, process, complaints)
+            yield Sat(visit.page, process, visit)
+            assert visit.asked_elsewhere(address[0]) == []
         finally:
             process.kill()
-            page.close()
+            visit.page.close()
 
 
-def opened(browser: Browser, address: str, **options: Any) -> tuple[Page, list[str]]:
-    page = browser.new_page(**{"viewport": {"width": 1300, "height": 900}, **options})
-    complaints: list[str] = []
-    page.on("console", lambda message: complaints.append(message.text))
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("dialog", lambda dialog: complaints.append(dialog.message))
-    page.goto(address)
-    return page, complaints
+def opened(browser: Browser, address: str, **options: Any) -> Visit:
+    visit = Visit(browser.new_page(**{"viewport": {"width": 1300, "height": 900}, **options}))
+    visit.page.goto(address)
+    return visit
 
 
 def task(page: Page, number: int) -> None:
@@ -126,14 +117,14 @@ def test_a_sitting_by_mouse_keys_and_phone_over_a_kill(
         sat.page.reload()
         task(sat.page, 3)
         assert sat.page.locator(".chips li").count() == 1
-        assert not sat.complaints
+        assert not sat.visit.complaints
         sat.process.kill()
         sat.page.get_by_text("has stopped").wait_for()
     assert [*map(said, answered(run))] == [plan(3, 7), plan(12, 1, 7)]
     with sitting(browser, workspace, viewport=PHONE, has_touch=True, color_scheme="dark") as sat:
         end_on_a_phone(sat.page, run)
         assert sat.process.wait() == 0
-        assert not sat.complaints
+        assert not sat.visit.complaints
     check_as_of_any_model(workspace, run)
 
 
@@ -262,7 +253,8 @@ def test_a_folder_without_a_server_gives_its_answers_as_a_file(
     done = workspace.phyblock(*BOB, "--export", folder)
     assert done.code == 0, done.err
     check_nothing_is_given_away(folder)
-    page, complaints = opened(browser, (folder / "index.html").as_uri())
+    visit = opened(browser, (folder / "index.html").as_uri())
+    page = visit.page
     page.get_by_role("button", name="I agree").click()
     for number in range(1, 8):
         task(page, number)
@@ -279,7 +271,8 @@ def test_a_folder_without_a_server_gives_its_answers_as_a_file(
     file = workspace.root / "answers.json"
     download.value.save_as(file)
     page.close()
-    assert not complaints
+    assert not visit.complaints
+    assert visit.asked_elsewhere(folder.as_uri(), "blob:") == []
     content = json.loads(file.read_text(encoding="utf-8"))
     check_bad_files(workspace, content)
     done = workspace.phyblock(*BOB, "--import", file, "--out", "bob", "--no-report")

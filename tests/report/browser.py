@@ -1,57 +1,22 @@
-"""A headless Chromium, and a visit to a page that was opened from disk."""
+"""A visit to a report that was opened from disk."""
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import pytest
+from tests.browser import Visit
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Locator, LocatorAssertions, Page
-
-_FLAGS = [
-    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
-    *("--disable-background-networking", "--disable-component-update"),
-]
-_CHROMIUMS = ("chromium", "chromium-browser", "google-chrome")
+    from playwright.sync_api import Page
 
 
-def expect(locator: Locator) -> LocatorAssertions:
-    """What is waited for; the page forbids the `eval` that other ways of waiting need."""
-    from playwright.sync_api import expect as expected
-
-    return expected(locator)
-
-
-@contextmanager
-def chromium() -> Iterator[Browser]:
-    """A headless Chromium; skips where there is none."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    found = next(filter(None, map(shutil.which, _CHROMIUMS)), None)
-    if found is None:
-        pytest.skip("no Chromium: apt-get install chromium")
-    with playwright.sync_playwright() as started:
-        running = started.chromium.launch(executable_path=found, args=_FLAGS)
-        yield running
-        running.close()
-
-
-class Visit:
-    """A page that was opened from disk, and all that it complained of or asked for."""
+class ReportVisit(Visit):
+    """A report's page, by its file."""
 
     def __init__(self, page: Page, path: Path) -> None:
-        self.page = page
+        super().__init__(page)
         self.path = path
-        self.complaints: list[str] = []
-        self.requests: list[str] = []
-        page.on("console", lambda message: self.complaints.append(message.text))
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("dialog", lambda dialog: self.complaints.append(dialog.message))
-        page.on("request", lambda request: self.requests.append(request.url))
 
     def open(self, view: str = "results") -> Page:
         self.page.goto(f"{self.path.as_uri()}#{view}")

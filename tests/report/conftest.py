@@ -1,26 +1,13 @@
-"""One run for all tests of the page, and a browser for each module of them."""
+"""One run for all tests of the page."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.report.browser import chromium
 from tests.report.html_run import make_run
 from tests.workspace import Workspace
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """A browser; its event loop runs while it does, so that it ends with its module."""
-    with chromium() as running:
-        yield running
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,8 @@ import pytest
 import yaml
 
 from phyblock.report import write_report, write_tables
-from tests.report.browser import Visit, expect
+from tests.browser import expect
+from tests.report.browser import ReportVisit
 from tests.report.html_run import HOSTILE, HOSTILE_SAMPLE, many
 from tests.workspace import Workspace
 
@@ -21,13 +22,13 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture
-def visit(browser: Browser, made: Workspace) -> Iterator[Visit]:
+def visit(browser: Browser, made: Workspace) -> Iterator[ReportVisit]:
     page = browser.new_page(viewport={"width": 1400, "height": 1000}, color_scheme="light")
-    visit = Visit(page, made.out / "report.html")
+    visit = ReportVisit(page, made.out / "report.html")
     yield visit
     page.close()
     assert visit.complaints == []
-    assert all(url.startswith("file://") for url in visit.requests)
+    assert visit.asked_elsewhere("file://") == []
 
 
 def painted(page: Page, selector: str) -> int:
@@ -43,7 +44,7 @@ def painted(page: Page, selector: str) -> int:
     return count
 
 
-def test_results_stand_in_the_page_before_anything_is_loaded(visit: Visit) -> None:
+def test_results_stand_in_the_page_before_anything_is_loaded(visit: ReportVisit) -> None:
     page = visit.open()
     assert page.inner_text("h1") == "trial"
     heads = page.locator(".headline h2").all_inner_texts()
@@ -59,7 +60,7 @@ def test_results_stand_in_the_page_before_anything_is_loaded(visit: Visit) -> No
     assert page.get_by_text("Expected").first.is_visible()
 
 
-def test_a_column_sorts_the_models_of_its_table(visit: Visit) -> None:
+def test_a_column_sorts_the_models_of_its_table(visit: ReportVisit) -> None:
     page = visit.open()
     # Baselines alone: a body of models that is empty stays empty, and the order of others too.
     heading = page.get_by_role("button", name="Level 3").first
@@ -70,7 +71,7 @@ def test_a_column_sorts_the_models_of_its_table(visit: Visit) -> None:
     assert visit.hash == "results?sort=full_planning.4.up"
 
 
-def test_filters_narrow_the_list(visit: Visit) -> None:
+def test_filters_narrow_the_list(visit: ReportVisit) -> None:
     page = visit.open("samples")
     assert visit.count() == "20 samples"
     page.select_option("#filter-model", label="oracle")
@@ -96,7 +97,7 @@ def test_filters_narrow_the_list(visit: Visit) -> None:
     expect(page.locator("#detail .facts").first).to_contain_text("Setting B")
 
 
-def test_a_sample_shows_everything_about_it(visit: Visit) -> None:
+def test_a_sample_shows_everything_about_it(visit: ReportVisit) -> None:
     visit.show("full_planning/oracle/t5/s0")
     page = visit.page
     assert page.inner_text("#sample-title .title-key") == "t5"
@@ -115,7 +116,7 @@ def test_a_sample_shows_everything_about_it(visit: Visit) -> None:
     expect(page.locator("details[open] dl")).to_contain_text("Finish")
 
 
-def test_wrong_steps_say_why_and_what_was_possible(visit: Visit) -> None:
+def test_wrong_steps_say_why_and_what_was_possible(visit: ReportVisit) -> None:
     visit.show("full_planning/random/t5/s0")
     page = visit.page
     wrong = page.locator(".strip button.wrong").first
@@ -126,7 +127,7 @@ def test_wrong_steps_say_why_and_what_was_possible(visit: Visit) -> None:
     assert "Possible here (outlined): 3 (blue cube)." in said
 
 
-def test_play_scrub_and_keys_move_through_the_steps(visit: Visit) -> None:
+def test_play_scrub_and_keys_move_through_the_steps(visit: ReportVisit) -> None:
     visit.show("full_planning/oracle/t5/s0")
     page = visit.page
     where = page.locator(".controls output")
@@ -151,7 +152,7 @@ def test_play_scrub_and_keys_move_through_the_steps(visit: Visit) -> None:
     assert page.inner_text("#play") == "Play"
 
 
-def test_a_drag_turns_the_drawing(visit: Visit) -> None:
+def test_a_drag_turns_the_drawing(visit: ReportVisit) -> None:
     visit.show("full_planning/oracle/t5/s0")
     page = visit.page
     before = page.eval_on_selector("canvas.stage", "canvas => canvas.toDataURL()")
@@ -166,7 +167,7 @@ def test_a_drag_turns_the_drawing(visit: Visit) -> None:
     assert page.eval_on_selector("canvas.stage", "canvas => canvas.toDataURL()") == before
 
 
-def test_keys_and_buttons_go_through_the_list(visit: Visit) -> None:
+def test_keys_and_buttons_go_through_the_list(visit: ReportVisit) -> None:
     page = visit.open("samples")
     title = page.locator("#sample-title")
     first = title.inner_text()
@@ -184,7 +185,7 @@ def test_keys_and_buttons_go_through_the_list(visit: Visit) -> None:
     assert title.inner_text() == second
 
 
-def test_two_models_stand_side_by_side(visit: Visit) -> None:
+def test_two_models_stand_side_by_side(visit: ReportVisit) -> None:
     visit.show("full_planning/random/t5/s1")
     page = visit.page
     page.select_option("#compare", "oracle")
@@ -199,14 +200,14 @@ def test_two_models_stand_side_by_side(visit: Visit) -> None:
     assert page.input_value("#compare") == ""
 
 
-def test_an_address_leads_back_to_the_same_view(visit: Visit) -> None:
+def test_an_address_leads_back_to_the_same_view(visit: ReportVisit) -> None:
     page = visit.open("samples?s=full_planning%2Frandom%2Ft5%2Fs1&with=oracle")
     expect(page.locator("canvas.stage")).to_have_count(2)
     assert page.inner_text("#sample-title .title-key") == "t5"
     assert page.input_value("#compare") == "oracle"
 
 
-def test_dark_and_light(visit: Visit) -> None:
+def test_dark_and_light(visit: ReportVisit) -> None:
     page = visit.open("samples")
     paper = "getComputedStyle(document.documentElement).backgroundColor"
     light = page.evaluate(paper)
@@ -219,7 +220,7 @@ def test_dark_and_light(visit: Visit) -> None:
     assert page.evaluate(paper) == light
 
 
-def test_a_question_with_its_options_and_answer(visit: Visit) -> None:
+def test_a_question_with_its_options_and_answer(visit: ReportVisit) -> None:
     page = visit.open("samples")
     page.locator("#tracks button[data-track=vqa]").click()
     assert visit.count() == "24 samples"
@@ -243,7 +244,7 @@ def test_a_question_with_its_options_and_answer(visit: Visit) -> None:
     assert sorted(marks[1::2]) == [f"✓ given {n}" for n in (1, 2, 3, 4)]
 
 
-def test_an_episode_turn_by_turn(visit: Visit) -> None:
+def test_an_episode_turn_by_turn(visit: ReportVisit) -> None:
     visit.show("step_planning/oracle/t5/s0")
     page = visit.page
     assert page.locator(".turns > li").count() == 4
@@ -261,7 +262,7 @@ def test_a_plan_with_poses_as_it_was_given_and_carried_out(
     assert workspace.run().code == 0
     write_report(write_tables(workspace.out), figures=())
     page = browser.new_page(viewport={"width": 1400, "height": 1000})
-    visit = Visit(page, workspace.out / "report.html")
+    visit = ReportVisit(page, workspace.out / "report.html")
     # The second block is refused: it would stand in the first.
     for model, n_carried in (("oracle", "2 blocks"), ("oracle-2d", "1 block")):
         visit.show(f"pose_planning/{model}/t1/s0")
@@ -280,7 +281,7 @@ def test_a_plan_with_poses_as_it_was_given_and_carried_out(
     assert visit.complaints == []
 
 
-def test_a_hostile_reply_does_nothing(visit: Visit) -> None:
+def test_a_hostile_reply_does_nothing(visit: ReportVisit) -> None:
     visit.show(HOSTILE_SAMPLE)
     page = visit.page
     page.locator("summary", has_text="Raw text").last.click()
@@ -313,7 +314,7 @@ def test_even_markup_in_the_page_may_run_nothing(browser: Browser, made: Workspa
 
 def test_a_narrow_window_shows_list_or_sample(browser: Browser, made: Workspace) -> None:
     page = browser.new_page(viewport={"width": 400, "height": 800})
-    visit = Visit(page, made.out / "report.html")
+    visit = ReportVisit(page, made.out / "report.html")
     visit.open("samples")
     assert not page.locator("#detail").is_visible()
     page.locator("#list [role=option]").first.click()
@@ -350,7 +351,7 @@ def test_a_report_without_the_data_set_still_shows_replies(
     (folder / "run.yaml").write_text(yaml.safe_dump(manifest))
     write_report(write_tables(folder), figures=())
     page = browser.new_page()
-    visit = Visit(page, folder / "report.html")
+    visit = ReportVisit(page, folder / "report.html")
     visit.show("full_planning/oracle/t5/s0")
     assert "Nothing can be drawn without the data set" in page.inner_text("#detail")
     assert page.locator(".strip button.right").count() == 4
@@ -366,7 +367,7 @@ def test_twenty_thousand_records_keep_memory_bounded(
     folder = _large_run(made, tmp_path / "run")
     write_report(write_tables(folder), figures=())
     page = browser.new_page(viewport={"width": 1400, "height": 1000})
-    visit = Visit(page, folder / "report.html")
+    visit = ReportVisit(page, folder / "report.html")
     visit.open("samples")
     assert visit.count() == "20,000 samples"
     for step in range(40):

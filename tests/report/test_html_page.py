@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from phyblock.report import write_report, write_tables
-from tests.report.browser import Visit, expect
+from tests.browser import expect
+from tests.report.browser import ReportVisit
 from tests.report.html_run import MARKUP
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
@@ -50,25 +51,25 @@ def troubled(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Wo
 
 
 @pytest.fixture
-def visit(browser: Browser, made: Workspace) -> Iterator[Visit]:
+def visit(browser: Browser, made: Workspace) -> Iterator[ReportVisit]:
     yield from visited(browser, made)
 
 
 @pytest.fixture
-def trouble(browser: Browser, troubled: Workspace) -> Iterator[Visit]:
+def trouble(browser: Browser, troubled: Workspace) -> Iterator[ReportVisit]:
     yield from visited(browser, troubled)
 
 
-def visited(browser: Browser, run: Workspace) -> Iterator[Visit]:
+def visited(browser: Browser, run: Workspace) -> Iterator[ReportVisit]:
     page = browser.new_page(viewport={"width": 1400, "height": 1000}, color_scheme="light")
-    visit = Visit(page, run.out / "report.html")
+    visit = ReportVisit(page, run.out / "report.html")
     yield visit
     page.close()
     assert visit.complaints == []
-    assert all(url.startswith("file://") for url in visit.requests)
+    assert visit.asked_elsewhere("file://") == []
 
 
-def test_a_banner_says_first_what_a_run_is_not(trouble: Visit) -> None:
+def test_a_banner_says_first_what_a_run_is_not(trouble: ReportVisit) -> None:
     page = trouble.open()
     caution = page.inner_text(".caution")
     assert "This run is not finished:" in caution
@@ -81,7 +82,7 @@ def test_a_banner_says_first_what_a_run_is_not(trouble: Visit) -> None:
 
 
 def test_what_a_model_saw_is_the_first_tab_pixel_for_pixel(
-    trouble: Visit, troubled: Workspace
+    trouble: ReportVisit, troubled: Workspace
 ) -> None:
     sent = {record["track"]: record for record in troubled.records() if record["model"] == "alpha"}
     page = trouble.page
@@ -121,14 +122,14 @@ def test_pictures_that_are_not_kept_are_said(
     monkeypatch.setenv("PHYBLOCK_CACHE", str(tmp_path / "cache"))
     write_report(write_tables(folder), figures=())
     page = browser.new_page()
-    visit = Visit(page, folder / "report.html")
+    visit = ReportVisit(page, folder / "report.html")
     sample = next(r["sample"] for r in troubled.records() if r["track"] == "full_planning")
     visit.show(sample, tab="saw")
     expect(page.locator("#panel-saw .notice")).to_contain_text("is not kept beside this page")
     page.close()
 
 
-def test_everything_that_is_seen_is_in_the_address(visit: Visit) -> None:
+def test_everything_that_is_seen_is_in_the_address(visit: ReportVisit) -> None:
     page = visit.open("samples")
     page.select_option("#filter-model", label="random")
     page.select_option("#filter-sort", label="Worst first")
@@ -161,7 +162,7 @@ def test_everything_that_is_seen_is_in_the_address(visit: Visit) -> None:
     assert visit.hash == address
 
 
-def test_back_and_forward_go_through_what_was_seen(visit: Visit) -> None:
+def test_back_and_forward_go_through_what_was_seen(visit: ReportVisit) -> None:
     page = visit.open("results")
     page.get_by_role("link", name="Samples").click()
     title = page.locator("#sample-title")
@@ -181,7 +182,7 @@ def test_back_and_forward_go_through_what_was_seen(visit: Visit) -> None:
     expect(page.locator(".intro h1")).to_be_visible()
 
 
-def test_a_link_to_what_is_not_there_says_so(visit: Visit) -> None:
+def test_a_link_to_what_is_not_there_says_so(visit: ReportVisit) -> None:
     page = visit.page
     page.goto(f"{visit.path.as_uri()}#samples?s=full_planning%2Fnobody%2Ft5%2Fs0&model=nobody")
     expect(page.locator("#warning")).to_contain_text("model “nobody”")
@@ -191,7 +192,7 @@ def test_a_link_to_what_is_not_there_says_so(visit: Visit) -> None:
     expect(page.locator("#warning")).to_contain_text("view “elsewhere”")
 
 
-def test_filtering_out_what_is_shown_moves_on(visit: Visit) -> None:
+def test_filtering_out_what_is_shown_moves_on(visit: ReportVisit) -> None:
     visit.show(PLAN.format("oracle", 0))
     page = visit.page
     page.select_option("#filter-model", label="random")
@@ -202,7 +203,7 @@ def test_filtering_out_what_is_shown_moves_on(visit: Visit) -> None:
     expect(page.locator("#detail")).to_contain_text("No sample is chosen")
 
 
-def test_the_pane_scrolls_by_keyboard_and_the_list_moves(visit: Visit) -> None:
+def test_the_pane_scrolls_by_keyboard_and_the_list_moves(visit: ReportVisit) -> None:
     visit.show(PLAN.format("oracle", 0), tab="did")
     page = visit.page
     page.set_viewport_size({"width": 1400, "height": 500})
@@ -219,7 +220,7 @@ def test_the_pane_scrolls_by_keyboard_and_the_list_moves(visit: Visit) -> None:
     expect(page.locator("#sample-title")).not_to_have_text(title)
 
 
-def test_skip_to_content_stays_in_the_view(visit: Visit) -> None:
+def test_skip_to_content_stays_in_the_view(visit: ReportVisit) -> None:
     page = visit.open("samples")
     page.keyboard.press("Tab")
     page.keyboard.press("Enter")
@@ -227,7 +228,7 @@ def test_skip_to_content_stays_in_the_view(visit: Visit) -> None:
     assert page.locator("#workspace").is_visible()
 
 
-def test_search_finds_scenes_models_and_replies(visit: Visit) -> None:
+def test_search_finds_scenes_models_and_replies(visit: ReportVisit) -> None:
     page = visit.open("samples")
     page.fill("#search", "ORACLE t5")
     assert visit.count().startswith("2 samples")
@@ -238,7 +239,7 @@ def test_search_finds_scenes_models_and_replies(visit: Visit) -> None:
     expect(page.locator("#sample-title")).to_contain_text("oracle · seed 1")
 
 
-def test_models_are_ranked_and_their_numbers_lead_to_samples(trouble: Visit) -> None:
+def test_models_are_ranked_and_their_numbers_lead_to_samples(trouble: ReportVisit) -> None:
     page = trouble.open()
     heads = page.locator(".headline").first.locator("thead th").all_inner_texts()
     assert heads[:2] == ["Model", "Overall F1"]
@@ -248,7 +249,7 @@ def test_models_are_ranked_and_their_numbers_lead_to_samples(trouble: Visit) -> 
     assert page.input_value("#filter-level") == "2"
 
 
-def test_a_matrix_cell_opens_a_replay(visit: Visit) -> None:
+def test_a_matrix_cell_opens_a_replay(visit: ReportVisit) -> None:
     page = visit.open("matrix")
     first = page.locator(".matrix-cell a").first
     first.focus()
@@ -273,7 +274,7 @@ def test_a_matrix_cell_opens_a_replay(visit: Visit) -> None:
     assert "order=worst" in visit.hash
 
 
-def test_replies_are_markdown_that_can_do_nothing(visit: Visit) -> None:
+def test_replies_are_markdown_that_can_do_nothing(visit: ReportVisit) -> None:
     visit.show(PLAN.format("oracle", 1))
     page = visit.page
     reply = page.locator(".markdown").last
@@ -332,7 +333,7 @@ PARTS = [
 ]
 
 
-def test_markdown_of_any_text_loses_no_word_and_makes_no_element_of_its(visit: Visit) -> None:
+def test_markdown_of_any_text_loses_no_word_and_makes_no_element_of_its(visit: ReportVisit) -> None:
     draw = Random(7)
     texts = []
     for _ in range(400):
@@ -359,7 +360,7 @@ def test_markdown_of_any_text_loses_no_word_and_makes_no_element_of_its(visit: V
         assert set(re.findall(r"w\d+x", text)) <= set(re.findall(r"w\d+x", shown)), text
 
 
-def test_markdown_of_a_long_hostile_text_takes_no_time(visit: Visit) -> None:
+def test_markdown_of_a_long_hostile_text_takes_no_time(visit: ReportVisit) -> None:
     page = visit.open()
     took = page.evaluate(
         """() => ["*", "**", "`", "[", "_", "> ", "1. ", "- ", "|", "\\\\"].map((part) => {
@@ -382,7 +383,7 @@ def test_markdown_of_a_long_hostile_text_takes_no_time(visit: Visit) -> None:
         "{i}) Move({n})",
     ],
 )
-def test_each_step_finds_its_sentence(visit: Visit, form: str) -> None:
+def test_each_step_finds_its_sentence(visit: ReportVisit, form: str) -> None:
     draw = Random(form)
     page = visit.open()
     for _ in range(12):
@@ -393,7 +394,7 @@ def test_each_step_finds_its_sentence(visit: Visit, form: str) -> None:
         assert all(one and one in line for one, line in zip(found, said, strict=True)), text
 
 
-def test_a_wrong_step_shows_the_block_that_was_tried_and_the_sentence(visit: Visit) -> None:
+def test_a_wrong_step_shows_the_block_that_was_tried_and_the_sentence(visit: ReportVisit) -> None:
     visit.show(PLAN.format("oracle", 1), step="1", numbers="off")
     page = visit.page
     why = page.locator(".why")
@@ -419,7 +420,7 @@ def test_a_wrong_step_shows_the_block_that_was_tried_and_the_sentence(visit: Vis
     assert page.locator(".why .quote").inner_text() == "2. Move block with index 3"
 
 
-def test_blocks_have_numbers_and_candidates_names_beside_their_colors(visit: Visit) -> None:
+def test_blocks_have_numbers_and_candidates_names_beside_their_colors(visit: ReportVisit) -> None:
     visit.show(PLAN.format("oracle", 0))
     page = visit.page
     names = page.locator(".cell-name").all_inner_texts()
@@ -433,7 +434,7 @@ def test_blocks_have_numbers_and_candidates_names_beside_their_colors(visit: Vis
     assert "numbers=off" in visit.hash
 
 
-def test_on_paper_everything_is_open(visit: Visit) -> None:
+def test_on_paper_everything_is_open(visit: ReportVisit) -> None:
     page = visit.open()
     page.emulate_media(media="print", color_scheme="dark")
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
@@ -454,7 +455,7 @@ def test_on_paper_everything_is_open(visit: Visit) -> None:
     assert not page.locator("#list").is_visible()
 
 
-def test_a_phone_shows_every_column_of_the_headline(visit: Visit) -> None:
+def test_a_phone_shows_every_column_of_the_headline(visit: ReportVisit) -> None:
     page = visit.page
     page.set_viewport_size({"width": 390, "height": 844})
     visit.open()
@@ -524,14 +525,14 @@ LABELS = """() => {
         "samples?s=step_planning%2Frandom%2Ft5%2Fs0&track=step_planning",
     ],
 )
-def test_every_view_has_names_headings_and_focus(visit: Visit, address: str) -> None:
+def test_every_view_has_names_headings_and_focus(visit: ReportVisit, address: str) -> None:
     page = visit.open(address)
     if address.startswith("samples"):
         page.wait_for_selector("#detail .tabs")
     assert page.evaluate(LABELS) == []
 
 
-def test_evidence_is_a_list_that_can_be_read(visit: Visit) -> None:
+def test_evidence_is_a_list_that_can_be_read(visit: ReportVisit) -> None:
     visit.show("vqa/oracle/sh-000/s0", track="vqa")
     page = visit.page
     page.locator("summary", has_text="Evidence").click()

@@ -10,38 +10,14 @@ from urllib.parse import quote, urlencode
 
 import pytest
 
+from tests.browser import Visit, expect
 from tests.site.site_runs import HOSTILE, make_hostile
 from tests.workspace import Workspace
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Locator, LocatorAssertions, Page
+    from playwright.sync_api import Browser, Page
 
-FLAGS = [
-    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
-    *("--disable-background-networking", "--disable-component-update"),
-]
-CHROMIUMS = ("chromium", "chromium-browser", "google-chrome")
 PHONE = {"width": 390, "height": 844}
-
-
-def expect(locator: Locator) -> LocatorAssertions:
-    """What is waited for; the page forbids the `eval` that other ways of waiting need."""
-    from playwright.sync_api import expect as expected
-
-    return expected(locator)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """A headless Chromium; skips where there is none."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    found = next(filter(None, map(shutil.which, CHROMIUMS)), None)
-    if found is None:
-        pytest.skip("no Chromium: apt-get install chromium")
-    with playwright.sync_playwright() as started:
-        running = started.chromium.launch(executable_path=found, args=FLAGS)
-        yield running
-        running.close()
 
 
 @pytest.fixture(scope="module")
@@ -56,20 +32,12 @@ def site(made: Workspace) -> Path:
     return made.root / "site" / "index.html"
 
 
-class Visit:
-    """A page that was opened from disk, and all that it complained of or asked for."""
+class SiteVisit(Visit):
+    """A site's page, by its file."""
 
     def __init__(self, page: Page, path: Path) -> None:
-        self.page, self.path = page, path
-        self.complaints: list[str] = []
-        page.on("console", lambda message: self.complaints.append(message.text))
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("dialog", lambda dialog: self.complaints.append(dialog.message))
-        page.on("request", lambda request: self._asked(request.url))
-
-    def _asked(self, url: str) -> None:
-        if not url.startswith(self.path.parent.as_uri()):
-            self.complaints.append(url)
+        super().__init__(page)
+        self.path = path
 
     def open(self, view: str = "", **words: str) -> Page:
         """Open a view and wait until it is shown."""
@@ -81,13 +49,14 @@ class Visit:
 
 
 @pytest.fixture
-def visit(browser: Browser, site: Path) -> Iterator[Visit]:
+def visit(browser: Browser, site: Path) -> Iterator[SiteVisit]:
     page = browser.new_page(viewport={"width": 1400, "height": 1000}, color_scheme="light")
-    visit = Visit(page, site)
+    visit = SiteVisit(page, site)
     yield visit
     hacked = page.evaluate("window.hacked")
     page.close()
     assert visit.complaints == []
+    assert visit.asked_elsewhere(site.parent.as_uri()) == []
     assert hacked is None
 
 
@@ -153,7 +122,7 @@ STRUCTURE = """() => {
 
 
 @pytest.mark.parametrize("name", VIEWS)
-def test_every_view_can_be_read_and_hostile_names_do_nothing(visit: Visit, name: str) -> None:
+def test_every_view_can_be_read_and_hostile_names_do_nothing(visit: SiteVisit, name: str) -> None:
     view, words = VIEWS[name]
     page = visit.open(view, **words)
     found: dict[str, Any] = page.evaluate(STRUCTURE)
@@ -175,7 +144,7 @@ def names(page: Page) -> list[str]:
     return page.locator(".board tbody th a").all_inner_texts()
 
 
-def test_the_table_is_sorted_and_its_columns_are_chosen_by_keyboard(visit: Visit) -> None:
+def test_the_table_is_sorted_and_its_columns_are_chosen_by_keyboard(visit: SiteVisit) -> None:
     page = visit.open()
     assert names(page)[0] == "oracle"
     page.locator(".board th button").first.focus()
@@ -199,7 +168,7 @@ def test_the_table_is_sorted_and_its_columns_are_chosen_by_keyboard(visit: Visit
     assert page.locator(".board tbody tr").first.locator(".rank").inner_text() == "1\u20132"
 
 
-def test_from_the_table_to_a_replay_and_back(visit: Visit) -> None:
+def test_from_the_table_to_a_replay_and_back(visit: SiteVisit) -> None:
     page = visit.open()
     page.get_by_role("link", name="oracle").first.click()
     expect(page.locator("h1")).to_have_text("oracle")
@@ -225,14 +194,14 @@ def test_from_the_table_to_a_replay_and_back(visit: Visit) -> None:
     expect(page.locator(".board")).to_have_count(1)
 
 
-def test_a_question_says_what_is_right_and_what_was_given(visit: Visit) -> None:
+def test_a_question_says_what_is_right_and_what_was_given(visit: SiteVisit) -> None:
     page = visit.open("replay", m="oracle", t="vqa", i="sh-000", n="0")
     assert "✓ right, given" in page.inner_text(".options")
     assert "Answered" in page.inner_text("main")
 
 
 @pytest.mark.parametrize("view", ["model", "scene", "replay", "nothing"])
-def test_what_is_not_there_is_said(visit: Visit, view: str) -> None:
+def test_what_is_not_there_is_said(visit: SiteVisit, view: str) -> None:
     page = visit.open(view, m="<b>x", s="<b>y", i="z")
     expect(page.locator("h1")).to_contain_text("There is no such")
 
