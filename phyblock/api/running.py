@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import signal
+import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -16,7 +19,7 @@ from phyblock.run.consent import spending_refused, unlimited_spending
 from phyblock.run.events import RunEvent
 from phyblock.run.execute import RunResult
 from phyblock.run.finding import check_commands, find_models_file
-from phyblock.run.plan import RunPlan, make_plan
+from phyblock.run.plan import make_plan
 from phyblock.run.session import Session, check_ready
 from phyblock.specs import load_models
 
@@ -38,9 +41,12 @@ def run_suite(
 
     The arguments are the options of `phyblock run`: `models` replaces the suite's, `limit` keeps so
     many scenes, `out` is the run's folder (`results/SUITE-DIGEST`). A model that bills is asked
-    with `yes` alone, or under a limit of the suite (`limits.max_cost_usd`). Interrupted, the run
-    stops and keeps what it has. Warns of models that were stopped and of samples that are left.
-    Raises InputError for what is wrong with the input, before anything is asked.
+    with `yes` alone, or under a limit of the suite (`limits.max_cost_usd`). Warns of models that
+    were stopped, and of samples that are left, rejected or not judged.
+
+    Raises InputError for what is wrong with the input, before anything is asked. Interrupted, the
+    run sends nothing more, waits for calls under way (not after a second interrupt), and raises
+    KeyboardInterrupt once what was answered is on disk.
     """
     if limit is not None and (isinstance(limit, bool) or limit < 1):
         raise SpecError(Problem("run_suite", "is no number of scenes", "limit", str(limit), "1..."))
@@ -58,35 +64,87 @@ def run_suite(
     if costly:
         hint = "agree with yes=True, or set a limit: load_suite(NAME, 'limits.max_cost_usd=5')"
         raise spending_refused(plan, costly, "would cost money, and nobody agreed", hint)
-    _tell(_completed(plan, folder, use_cache=use_cache, retry_failed=retry_failed))
+    session = Session(plan, folder, _unseen, use_cache=use_cache, retry_failed=retry_failed)
+    _tell(folder, _RunApart(session).completed())
     return load_run(folder)
 
 
-def _completed(plan: RunPlan, folder: Path, *, use_cache: bool, retry_failed: bool) -> RunResult:
-    """Run in a thread of its own: a notebook's has a loop already."""
-    begun: list[tuple[asyncio.AbstractEventLoop, Session]] = []
+class _RunApart:
+    """A run in a thread of its own, since a notebook's has a loop already, and how it is stopped.
 
-    async def run() -> RunResult:
-        opened = Session(plan, folder, _unseen, use_cache=use_cache, retry_failed=retry_failed)
-        async with opened as session:
-            begun.append((asyncio.get_running_loop(), session))
+    As for `phyblock run`, the first interrupt lets it send nothing more, the second gives up calls
+    under way.
+    """
+
+    def __init__(self, opening: Session) -> None:
+        self._opening = opening
+        self._is_interrupted = False
+        self._stops = 0
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._whole: asyncio.Task[RunResult] | None = None
+        self._session: Session | None = None
+
+    def completed(self) -> RunResult:
+        """Run to the end; KeyboardInterrupt, once all is written, where it was interrupted."""
+        try:
+            with self._interruptible(), ThreadPoolExecutor(1) as pool:
+                try:
+                    return pool.submit(asyncio.run, self._run()).result()
+                except BaseException:
+                    # A program's handlers of other signals may raise what they like.
+                    self._stop()
+                    raise
+        finally:
+            if self._is_interrupted:
+                raise KeyboardInterrupt
+
+    async def _run(self) -> RunResult:
+        self._whole, self._loop = asyncio.current_task(), asyncio.get_running_loop()
+        async with self._opening as session:
+            self._session = session
+            self._heed()
             return await session.run()
 
-    with ThreadPoolExecutor(1) as pool:
-        done = pool.submit(asyncio.run, run())
+    @contextlib.contextmanager
+    def _interruptible(self) -> Iterator[None]:
+        """Note Ctrl-C in the place of being torn from waiting by it, unless it is ignored."""
+        is_main = threading.current_thread() is threading.main_thread()
+        before = signal.getsignal(signal.SIGINT)
+        if not is_main or not callable(before):
+            yield
+            return
+        signal.signal(signal.SIGINT, self._on_interrupt)
         try:
-            return done.result()
-        except KeyboardInterrupt:
-            for loop, session in begun:
-                loop.call_soon_threadsafe(session.executor.interrupt)
-            return done.result()
+            yield
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+    def _on_interrupt(self, *_: object) -> None:
+        self._is_interrupted = True
+        self._stop()
+
+    def _stop(self) -> None:
+        self._stops += 1
+        if self._loop is not None:
+            # A loop that is closed has nothing to stop.
+            with contextlib.suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self._heed)
+
+    def _heed(self) -> None:
+        """Do in the run's thread what was asked for; at the latest when the run is open."""
+        if self._stops and self._session is not None:
+            self._session.executor.interrupt()
+        if self._stops > 1 and self._whole is not None:
+            self._whole.cancel()
+            # Once, as what is answered must be written.
+            self._whole = None
 
 
 def _unseen(_: RunEvent) -> None:
     """Nobody watches."""
 
 
-def _tell(result: RunResult) -> None:
+def _tell(folder: Path, result: RunResult) -> None:
     for model, reason in result.stopped.items():
         warnings.warn(f"{model} was stopped: {reason}", stacklevel=3)
     if result.left:
@@ -96,3 +154,6 @@ def _tell(result: RunResult) -> None:
     if result.failed:
         said = f"{counted(result.failed, 'request')} rejected for good"
         warnings.warn(f"{said}: ask again with retry_failed=True", stacklevel=3)
+    if result.unjudged:
+        said = f"{counted(result.unjudged, 'answer')} could not be judged"
+        warnings.warn(f"{said}: phyblock score {folder} tries again, without a call", stacklevel=3)

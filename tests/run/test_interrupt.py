@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import select
 import signal
+import sqlite3
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 
@@ -124,3 +128,59 @@ def test_a_second_interrupt_ends_at_once(workspace: Workspace) -> None:
     assert f"0 of {SAMPLES} samples are done (interrupted)" in out
     assert "give the same command again" in out
     assert not workspace.records()
+
+
+PROGRAM = """
+import signal, sys, phyblock
+for folder in sys.argv[1:]:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        phyblock.run_suite("suite.yaml", out=folder)
+    except KeyboardInterrupt:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        print("interrupted", flush=True)
+    else:
+        print("went on", flush=True)
+"""
+
+
+def test_a_program_is_interrupted_in_a_run_as_well_at_any_time(workspace: Workspace) -> None:
+    opening, asking, waiting = folders = [workspace.root / name for name in ("a", "b", "c")]
+    with Running(OpenAIChat(Faults(latency_s=1.0))) as running:
+        server = running.server
+        prepare(workspace, running.url, "alpha")
+        locked = sqlite3.connect(workspace.cache / "replies.sqlite", isolation_level=None)
+        locked.execute("BEGIN EXCLUSIVE")
+        process = subprocess.Popen(
+            [sys.executable, "-c", PROGRAM, *map(str, folders)],
+            cwd=workspace.root,
+            env=workspace.env,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert process.stdout is not None
+        with process, process.stdout as said:
+            try:
+                # The reply cache is opened last; until it is unlocked, the run is not open.
+                wait_for((opening / "run.yaml").exists)
+                process.send_signal(signal.SIGINT)
+                locked.close()
+                assert said.readline() == "interrupted\n"
+                assert (server.requests, workspace.records(opening)) == (0, [])
+
+                wait_for(lambda: server.requests == AT_ONCE)
+                server.faults = Faults(mode="slow")
+                process.send_signal(signal.SIGINT)
+                assert said.readline() == "interrupted\n"
+                assert len(workspace.records(asking)) == AT_ONCE
+
+                wait_for(lambda: server.requests == 2 * AT_ONCE)
+                while not select.select([said], [], [], 0.5)[0]:
+                    process.send_signal(signal.SIGINT)
+                assert said.readline() == "interrupted\n"
+                # The first four are known from the run before.
+                assert len(workspace.records(waiting)) == AT_ONCE
+                assert process.wait(60) == 0
+            finally:
+                process.kill()
+        assert server.requests == 2 * AT_ONCE

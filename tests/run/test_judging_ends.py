@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from phyblock.api.running import run_suite
 from phyblock.cli.main import phyblock
 from phyblock.errors import SimulationError
 from phyblock.run.rescore import rescore
@@ -86,6 +87,8 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
     told = capsys.readouterr().out
     assert "1 answer could not be judged: phyblock score out tries again, without a call" in told
     assert "rejected" not in told
+    with pytest.warns(UserWarning, match="1 answer could not be judged: phyblock score out"):
+        run_suite("suite.yaml", out="out", limit=2)
     # A plan that takes too long is given up, in a worker or without one, and says so.
     monkeypatch.setattr(PosePlanning, "judge_apart", whole)
     monkeypatch.setattr(carry, "LONGEST_S", -1.0)
