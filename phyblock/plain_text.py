@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
-__all__ = ["counted", "csv_cell", "one_line", "plain_lines", "well_formed"]
+__all__ = ["counted", "csv_cell", "one_line", "plain_lines", "some_of", "well_formed"]
 
+_SOME = 5
 _HALF = re.compile("[\ud800-\udfff]")
 _FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -36,6 +38,11 @@ def plain_lines(text: str) -> str:
 def counted(number: int, noun: str, several: str = "") -> str:
     """A number with its noun: `1 call`, `2 calls`; `several` is a plural that takes no plain s."""
     return f"{number:,} {noun if number == 1 else several or noun + 's'}"
+
+
+def some_of(names: Sequence[str]) -> str:
+    """The first names of a list that may be long: what errors tell of what is allowed."""
+    return ", ".join([*names[:_SOME], *["..."] * (len(names) > _SOME)]) or "none"
 
 
 def csv_cell(value: object) -> object:

@@ -26,6 +26,7 @@ from phyblock.env.pose_play import PosePlay
 from phyblock.env.scenes import read_tasks
 from phyblock.env.state import LARGEST, MOST_BLOCKS, TRAITS, block_rows, candidate_rows, goal_rows
 from phyblock.errors import DataError, Problem
+from phyblock.plain_text import some_of
 from phyblock.sim import PictureStyle
 from phyblock.sim.pictures import LARGEST_PX, SMALLEST_PX
 from phyblock.words import GATINGS, SETTINGS, Background, Gating, Physics, PoseRotation, Setting
@@ -179,9 +180,8 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
     def _find(self, scene: object) -> AssemblyTask:
         if scene in self._tasks:
             return self._tasks[str(scene)]
-        some = ", ".join(list(self._tasks)[:5])
-        message = "the environment has no such scene"
-        raise DataError(Problem("PhyBlockEnv", message, "scene", str(scene), f"{some}, ..."))
+        message, allowed = "the environment has no such scene", some_of(list(self._tasks))
+        raise DataError(Problem("PhyBlockEnv", message, "scene", str(scene), allowed))
 
     def _observation(self) -> Observation:
         if self._observe == "state":

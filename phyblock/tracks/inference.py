@@ -11,7 +11,7 @@ from PIL import Image
 
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
-from phyblock.plain_text import one_line
+from phyblock.plain_text import one_line, some_of
 from phyblock.records import Record
 from phyblock.records.reading import read_records
 from phyblock.sim import PictureStyle, candidates_png
@@ -80,7 +80,7 @@ def _chosen(run: Run, track: str, scene: str) -> str | None:
     if scene:
         known = records["scene"].unique()
         if scene not in known:
-            message, allowed = "has no such scene", ", ".join(sorted(known)[:5]) + ", ..."
+            message, allowed = "has no such scene", some_of(sorted(known))
             raise SpecError(Problem(str(run.path), message, "--scene", scene, allowed))
         records = records[records["scene"] == scene]
     read = records[records["outcome"] == "ok"]

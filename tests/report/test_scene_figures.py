@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import functools
+import re
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,15 +13,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import phyblock
+from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.domain import Plan
 from phyblock.errors import SpecError
 from phyblock.report.figures import Wanted, write_paper_figures
+from phyblock.report.figures.perturbations import perturbation_strip
 from phyblock.scoring import AssemblyScorer
 from phyblock.tables.drawing import COLUMN_IN, Look
+from phyblock.tables.load import Run
 from phyblock.tracks.full_planning.film import PLAN_VIEW
 from phyblock.tracks.full_planning.record import PlanRecord
+from phyblock.tracks.kind import kind_of
 from phyblock.tracks.plans import score_fields
-from tests.report.factory import laws, record
+from tests.report.factory import laws, manifest, record, run_of
 
 N_SCENES = 12
 
@@ -83,3 +90,21 @@ def test_every_figure_of_scenes_is_drawn_alike_twice(
     if "vqa" not in suite:
         with pytest.raises(SpecError, match="no such scene"):
             write_paper_figures(run, Wanted(names, "nowhere"), Look())
+
+
+@pytest.mark.parametrize(
+    "draw", [perturbation_strip, kind_of("full_planning").report().figures["inference"].draw]
+)
+def test_of_a_scene_that_a_run_has_not_errors_name_those_it_has(
+    draw: Callable[[Run, Dataset, str], object],
+) -> None:
+    tasks = tuple(
+        AssemblyTask(replace(scenes()[0].scene, id=str(n)), scenes()[0].candidates)
+        for n in range(7)
+    )
+    dataset = Dataset("scenes", Path(), tasks)
+    for count, allowed in {0: "none", 2: "0, 1", 7: "0, 1, 2, 3, 4, ..."}.items():
+        run = run_of([record(scene=task.scene.id) for task in tasks[:count]], manifest())
+        with pytest.raises(SpecError, match=f"(?s)no such scene.*allowed: {re.escape(allowed)}$"):
+            draw(run, dataset, "nope")
+    assert draw(run_of([], manifest()), dataset, "") is None

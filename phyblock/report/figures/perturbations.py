@@ -12,6 +12,7 @@ from PIL import Image
 
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
+from phyblock.plain_text import some_of
 from phyblock.report.sensitivity_view import factor_name
 from phyblock.sim import candidates_key, candidates_png, goal_key, goal_png
 from phyblock.sim.pictures import PictureStyle
@@ -37,14 +38,17 @@ def perturbation_strip(run: Run, dataset: Dataset, scene: str) -> Figure | None:
     """Goal above candidates, a column a way of asking: the reference, then one factor at a time.
 
     Ways that change no picture have none. Of the scene that is named, else of the first; None
-    where pictures are all alike. Raises SpecError for a scene that the run has not.
+    where pictures are all alike, or nothing was asked. Raises SpecError for a scene that the run
+    has not.
     """
-    asked = run.records["scene"].unique()
-    if scene and scene not in asked:
-        message, allowed = "has no such scene", ", ".join(sorted(asked)[:5]) + ", ..."
-        raise SpecError(Problem(str(run.path), message, "--scene", scene, allowed))
     tasks = {task.scene.id: task for task in dataset.tasks}
-    task = tasks[scene or min(asked)]
+    asked = sorted(tasks.keys() & set(run.records["scene"]))
+    if scene and scene not in asked:
+        message, allowed = "has no such scene", some_of(asked)
+        raise SpecError(Problem(str(run.path), message, "--scene", scene, allowed))
+    if not asked:
+        return None
+    task = tasks[scene or asked[0]]
     shown: dict[tuple[str, str], _Shown] = {}
     for title, one, style in _ways(run, task):
         key = goal_key(one.scene, style), candidates_key(one.candidates, style)
