@@ -12,7 +12,7 @@ from itertools import islice
 from typing import Any, Protocol, TypeVar
 
 from phyblock.errors import InputError, PhyblockError, Problem
-from phyblock.worker_processes import end_workers, without_interrupts, worker_pool
+from phyblock.worker_processes import end_workers, starting_workers, worker_pool
 
 __all__ = ["Workers", "open_workers"]
 
@@ -75,7 +75,7 @@ class _Processes:
             raise PhyblockError("a worker process was killed; nothing was written") from error
 
     def _submit(self, function: Callable[[T], R], task: T) -> Future[R]:
-        with without_interrupts():
+        with starting_workers():
             return self._pool.submit(function, task)
 
 

@@ -92,7 +92,17 @@ def test_what_is_wrong_is_named() -> None:
         "score: setting": lambda: phyblock.score("", scene, setting="C"),  # type: ignore[arg-type]
         "score: reply": lambda: phyblock.score(None, scene),  # type: ignore[arg-type]
         "run_suite: limit": lambda: phyblock.run_suite(suite, limit=0),
-        "is no list of names": lambda: phyblock.run_suite(suite, models="random"),
+        "a list of names": lambda: phyblock.run_suite(suite, models="random"),
+        "run_suite: models[0]": lambda: phyblock.run_suite(suite, models=[1]),  # type: ignore[list-item]
+        "names no model": lambda: phyblock.run_suite(suite, models=[]),
+        "is a variable not set": lambda: phyblock.run_suite(suite, out=""),
+        "found: str 'x'": lambda: phyblock.run_suite(suite, limit="x"),  # type: ignore[arg-type]
+        "found: bool True": lambda: phyblock.run_suite(suite, limit=True),
+        "score: scene": lambda: phyblock.score("", "l1-001-animal"),  # type: ignore[arg-type]
+        "render: scene": lambda: phyblock.render(suite),  # type: ignore[arg-type]
+        "render: size_px": lambda: phyblock.render(scene, size_px=128.5),  # type: ignore[arg-type]
+        "render: view": lambda: phyblock.render(scene, view=["front"]),  # type: ignore[arg-type]
+        "overrides[0]": lambda: phyblock.load_suite("quick", 5),  # type: ignore[arg-type]
     }
     for said, call in wrong.items():
         with pytest.raises(SpecError, match=re.escape(said)):
@@ -121,3 +131,22 @@ def test_nothing_is_spent_unasked_and_a_loop_may_run(
 
     run = asyncio.run(in_a_notebook())
     assert set(run.records["outcome"]) == {"ok"}
+
+
+def test_a_program_without_a_guard_is_not_run_again_by_its_workers(
+    workspace: Workspace,
+) -> None:
+    workspace.write_scenes()
+    workspace.write_suite(tracks=["step_planning"], models=["oracle"], limit=1)
+    program = workspace.root / "program.py"
+    program.write_text(
+        "import phyblock\n"
+        "print('begins')\n"
+        "run = phyblock.run_suite('suite.yaml', out='out')\n"
+        "print(list(run.records['outcome']))\n"
+    )
+    words = [sys.executable, str(program)]
+    done = subprocess.run(
+        words, cwd=workspace.root, env=workspace.env, capture_output=True, text=True, timeout=300
+    )
+    assert done.stdout.splitlines() == ["begins", "['ok']"], done.stderr

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
+from phyblock.api.given import expect
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.files import write_named
@@ -46,8 +47,17 @@ def render(
     """Draw a scene as models see it: goal and numbered candidates, or one of the two.
 
     `size_px` is the side of each square [pixels]. Raises SpecError for a view, background or size
-    that there is not, DataError for a scene without blocks.
+    that there is not and for arguments of another kind, DataError for a scene without blocks.
     """
+    texts = {"show": show, "view": view, "background": background}
+    expect(
+        "render",
+        {
+            "scene": (scene, AssemblyTask, "a scene of a suite: suite.scenes[ID]"),
+            "size_px": (size_px, int, "a whole number of pixels"),
+            **{name: (text, str, "a word") for name, text in texts.items()},
+        },
+    )
     if show not in get_args(Shown):
         raise SpecError(Problem("render", "is not known", "show", str(show), _any(Shown)))
     try:

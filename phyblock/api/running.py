@@ -10,7 +10,9 @@ import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import NoneType
 
+from phyblock.api.given import expect
 from phyblock.api.suites import Suite, load_suite
 from phyblock.errors import Problem, SpecError
 from phyblock.plain_text import counted
@@ -29,7 +31,7 @@ __all__ = ["run_suite"]
 def run_suite(
     suite: Suite | str | Path,
     *,
-    models: Sequence[str] = (),
+    models: Sequence[str] | None = None,
     limit: int | None = None,
     out: str | Path | None = None,
     models_file: str | Path | None = None,
@@ -48,15 +50,11 @@ def run_suite(
     run sends nothing more, waits for calls under way (not after a second interrupt), and raises
     KeyboardInterrupt once what was answered is on disk.
     """
-    if limit is not None and (isinstance(limit, bool) or limit < 1):
-        raise SpecError(Problem("run_suite", "is no number of scenes", "limit", str(limit), "1..."))
-    if isinstance(models, str):
-        hint = f"give a list: models=[{models!r}]"
-        raise SpecError(Problem("run_suite", "is no list of names", "models", models, hint=hint))
+    _check(suite, models, limit, out, models_file)
     loaded = (suite if isinstance(suite, Suite) else load_suite(suite)).loaded
     named = None if models_file is None else str(models_file)
     known_in = find_models_file(named, loaded.path)
-    plan = make_plan(loaded, load_models(known_in), only=models, limit=limit)
+    plan = make_plan(loaded, load_models(known_in), only=models or (), limit=limit)
     check_commands(plan.models, known_in, named)
     folder = Path(out) if out is not None else Path("results") / plan.folder_name
     plan = check_ready(plan)
@@ -67,6 +65,30 @@ def run_suite(
     session = Session(plan, folder, _unseen, use_cache=use_cache, retry_failed=retry_failed)
     _tell(folder, _RunApart(session).completed())
     return load_run(folder)
+
+
+def _check(suite: object, models: object, limit: object, out: object, models_file: object) -> None:
+    paths, a_path = (str, Path, NoneType), "a path"
+    expect(
+        "run_suite",
+        {
+            "suite": (suite, (Suite, str, Path), "a suite, its name or its path"),
+            "models": (models, (list, tuple, NoneType), "a list of names: ['gpt-4o']"),
+            "limit": (limit, (int, NoneType), "1..."),
+            "out": (out, paths, a_path),
+            "models_file": (models_file, paths, a_path),
+        },
+    )
+    names = list(models) if isinstance(models, list | tuple) else None
+    if names is not None:
+        expect("run_suite", {f"models[{n}]": (m, str, "a name") for n, m in enumerate(names)})
+    if names == []:
+        hint = "leave it out for the suite's own models"
+        raise SpecError(Problem("run_suite", "names no model", "models", "[]", hint=hint))
+    if isinstance(limit, int) and limit < 1:
+        raise SpecError(Problem("run_suite", "is no number of scenes", "limit", str(limit), "1..."))
+    if out == "":
+        raise SpecError(Problem("run_suite", "is empty: is a variable not set?", "out"))
 
 
 class _RunApart:

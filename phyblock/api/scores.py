@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from html import escape
 
+from phyblock.api.given import expect
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.parsing import parse_plan
@@ -64,9 +65,16 @@ def score(
 ) -> PlanScore:
     """Read a reply to full planning and score its plan against a scene, by the AOV graph.
 
-    Raises SpecError for a setting, matcher or parser that there is not, and a reply that is no
-    text.
+    Raises SpecError for a setting, matcher or parser that there is not, and for arguments of
+    another kind.
     """
+    expect(
+        "score",
+        {
+            "reply": (reply, str, "text"),
+            "scene": (scene, AssemblyTask, "a scene of a suite: suite.scenes[ID]"),
+        },
+    )
     given = {
         "setting": (setting, SETTINGS),
         "matcher": (matcher, MATCHERS),
@@ -77,8 +85,6 @@ def score(
         for name, (word, words) in given.items()
         if word not in words
     ]
-    if not isinstance(reply, str):
-        problems.append(Problem("score", "is no text", "reply", type(reply).__name__, "str"))
     if problems:
         raise SpecError(problems)
     parsed = parse_plan(reply, len(scene.candidates), parser)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 
+from phyblock.api.given import expect
 from phyblock.api.pictures import render
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import Problem, SpecError
@@ -116,6 +117,8 @@ def load_suite(suite: str | Path, *overrides: str) -> Suite:
 
     Raises SpecError with all that is wrong, each with its file, line and field.
     """
+    texts = {f"overrides[{n}]": (text, str, "KEY=VALUE") for n, text in enumerate(overrides)}
+    expect("load_suite", {"suite": (suite, (str, Path), "a name or a path"), **texts})
     path = find_suite(str(suite))
     data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
     return Suite(read_suite(path, overrides, data_dir=data, prompt_dirs=prompts))

@@ -18,7 +18,7 @@ from phyblock.errors import DataError, SimulationError
 from phyblock.files import atomic_write, writing
 from phyblock.models.base import Image
 from phyblock.picture_files import LARGEST_PICTURE_BYTES, picture_size
-from phyblock.worker_processes import without_interrupts, worker_pool
+from phyblock.worker_processes import starting_workers, worker_pool
 
 __all__ = ["Drawing", "Studio", "Workshop", "render_workers", "to_image"]
 
@@ -197,6 +197,6 @@ def _whole_png(path: Path) -> bytes | None:
 
 
 async def _done_in(pool: ProcessPoolExecutor, work: Callable[[], _Result]) -> _Result:
-    with without_interrupts():
+    with starting_workers():
         done = asyncio.get_running_loop().run_in_executor(pool, work)
     return await done
