@@ -200,7 +200,7 @@ def _sit(
         console.print("Ctrl-C ends the sitting; the same command goes on.", style="dim")
         if opens:
             # A browser for terminals would not come back before it is closed.
-            Thread(target=webbrowser.open, args=(server.address,), daemon=True).start()
+            Thread(target=webbrowser.open, args=(server.one_time_address,), daemon=True).start()
 
     sitting = Sitting(plan, person, folder, begun)
     with Server(sitting.desk, port) as server:

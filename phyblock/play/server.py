@@ -2,7 +2,8 @@
 
 Names other than 127.0.0.1 and localhost are refused as hosts, so that no foreign name that is made
 to mean this machine gets in; what changes anything must come from a page of this address. It reads
-from memory and from files that were named to it, and writes nothing.
+from memory and from files that were named to it, and writes nothing. A browser is started with an
+address that leads on once: what stands on a command line can be read by others on the machine.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import json
 import mimetypes
 import re
 import secrets
+import sys
 import threading
 from collections.abc import Callable, Mapping
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -37,6 +39,10 @@ _POLICY = (
 )
 _FRAMED_POLICY = "frame-ancestors 'none'"
 """Of files that bring a policy of their own."""
+_USED = (
+    b"This address opens the page once, and was opened already. Open the one in the terminal. "
+    b"If it was not you who opened it, end the sitting with Ctrl-C and give the command again."
+)
 _STATE = re.compile(r"(?:after=(\d{1,9}))?")
 _PICTURE = re.compile(r"picture/(\d{1,9})/(\d{1,3})")
 
@@ -51,6 +57,8 @@ class Server:
     def __init__(self, desk: Desk, port: int = 0) -> None:
         self._desk = desk
         self._token = secrets.token_urlsafe(24)
+        self._code = secrets.token_urlsafe(24)
+        self._code_used = threading.Lock()
         self._assets = assets("served.js")
         self._files: Mapping[str, Path] = {}
         self.finished = threading.Event()
@@ -78,6 +86,11 @@ class Server:
         """The address of the page."""
         return f"http://{HOST}:{self.port}/{self._token}/"
 
+    @property
+    def one_time_address(self) -> str:
+        """An address that leads on to the page when it is opened first, and never again."""
+        return f"http://{HOST}:{self.port}/{self._code}/"
+
     def __enter__(self) -> Server:
         self._thread.start()
         return self
@@ -95,6 +108,14 @@ class Server:
         token, slash, rest = path.removeprefix("/").partition("/")
         is_ours = secrets.compare_digest(token.encode(), self._token.encode()) and slash
         return rest if is_ours else None
+
+    def is_code(self, path: str) -> bool:
+        """Whether this is the path of the one-time address."""
+        return secrets.compare_digest(path.encode(), f"/{self._code}/".encode())
+
+    def use_code(self) -> str | None:
+        """The path of the page; None for all but the first who asks."""
+        return f"/{self._token}/" if self._code_used.acquire(blocking=False) else None
 
     def get(self, name: str, query: str) -> tuple[str, bytes, str] | None:
         """Type, content and policy of what stands under a name; None where nothing does."""
@@ -144,6 +165,11 @@ class _Listener(ThreadingHTTPServer):
         TCPServer.server_bind(self)
         self.server_name, self.server_port = self.server_address[:2]  # type: ignore[assignment]
 
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing of a page that was closed or reloaded while it was answered."""
+        if not isinstance(sys.exc_info()[1], ConnectionError):
+            super().handle_error(request, client_address)
+
 
 class _Handler(BaseHTTPRequestHandler):
     sitting: Server
@@ -191,7 +217,11 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _admitted(self, *, changes: bool) -> tuple[str | None, str]:
         """The name that is asked for and its query; None where the request was refused."""
-        split = urlsplit(self.path)
+        try:
+            split = urlsplit(self.path)
+        except ValueError:
+            self._refuse(400)
+            return None, ""
         hosts, origin = self.headers.get_all("Host", []), self.headers.get("Origin")
         origins = [f"http://{host}" for host in self.sitting.hosts]
         name = self.sitting.below(split.path)
@@ -199,6 +229,8 @@ class _Handler(BaseHTTPRequestHandler):
             self._refuse(421)
         elif (origin is None and changes) or (origin is not None and origin not in origins):
             self._refuse(403)
+        elif not changes and self.sitting.is_code(split.path):
+            self._lead_on()
         elif name is None:
             self._refuse(404)
         elif changes and self.headers.get("Content-Type") != "application/json":
@@ -209,11 +241,18 @@ class _Handler(BaseHTTPRequestHandler):
             return name, split.query
         return None, ""
 
-    def _refuse(self, status: int) -> None:
-        self.close_connection = True
-        self._send(status, "text/plain", b"", _POLICY)
+    def _lead_on(self) -> None:
+        page = self.sitting.use_code()
+        if page is None:
+            self._refuse(410, _USED)
+        else:
+            self._send(303, "text/plain", b"", _POLICY, Location=page)
 
-    def _send(self, status: int, kind: str, content: bytes, policy: str) -> None:
+    def _refuse(self, status: int, why: bytes = b"") -> None:
+        self.close_connection = True
+        self._send(status, "text/plain", why, _POLICY)
+
+    def _send(self, status: int, kind: str, content: bytes, policy: str, **more: str) -> None:
         self.send_response(status)
         is_text = kind.startswith("text/") or kind.endswith(("json", "javascript"))
         self.send_header("Content-Type", f"{kind}; charset=utf-8" if is_text else kind)
@@ -224,10 +263,17 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Cross-Origin-Opener-Policy", "same-origin")
         self.send_header("Referrer-Policy", "no-referrer")
         self.send_header("Cache-Control", "no-store")
+        for name, value in more.items():
+            self.send_header(name, value)
         if self.close_connection:
             self.send_header("Connection", "close")
         self.end_headers()
         self.wfile.write(content)
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """Refuse what is no request at all as everything else, with nothing of it repeated."""
+        del message, explain
+        self._refuse(code)
 
     def log_message(self, format: str, *args: object) -> None:
         """Say nothing: the terminal is the run's."""

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import http.client
 import socket
+import struct
+import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from phyblock.errors import SpecError
 from phyblock.play.desk import Desk
@@ -168,3 +173,87 @@ def test_a_port_that_is_taken_is_a_clear_error(server: Server, desk: Desk) -> No
 def test_no_path_shows_up_in_an_answer(server: Server) -> None:
     answer = ask(server, path="/<script>alert(1)</script>")
     assert (answer.status, answer.body) == (404, b"")
+
+
+def send(server: Server, content: bytes) -> socket.socket:
+    connection = socket.create_connection(("127.0.0.1", server.port), timeout=10)
+    connection.sendall(content)
+    return connection
+
+
+def until_idle(threads: int) -> None:
+    """Wait until no more than so many threads run: every request is through."""
+    end = time.monotonic() + 10
+    while threading.active_count() > threads:
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+TARGETS = st.one_of(
+    st.sampled_from(
+        ["http://[", "//[::1", "http://[x]/{token}/state", "/{token}/state?after=[", "*"]
+    ),
+    st.text(st.characters(min_codepoint=33, max_codepoint=255), min_size=1, max_size=30),
+)
+
+
+@given(target=TARGETS, method=st.sampled_from(["GET", "POST"]))
+def test_whatever_is_asked_for_is_answered_with_a_refusal(
+    server: Server, target: str, method: str
+) -> None:
+    asked = target.replace("{token}", token(server))
+    lines = f"{method} {asked} HTTP/1.1\r\nHost: {server.hosts[0]}\r\nConnection: close\r\n\r\n"
+    with send(server, lines.encode("latin-1")) as connection, connection.makefile("rb") as answer:
+        status, _, rest = answer.read().partition(b"\r\n")
+    # Without a version there is no line of status, and nothing else.
+    assert status == b"" or status.split()[1] in (b"400", b"403", b"404")
+    assert rest.partition(b"\r\n\r\n")[2] == b""
+
+
+@pytest.mark.parametrize("resets", [True, False])
+def test_who_leaves_while_waiting_leaves_no_word_on_the_terminal(
+    server: Server, desk: Desk, resets: bool, capfd: pytest.CaptureFixture[str]
+) -> None:
+    before = threading.active_count()
+    path = f"/{token(server)}/state?after={desk.state(-1)['change']}"
+    lines = f"GET {path} HTTP/1.1\r\nHost: {server.hosts[0]}\r\n\r\n"
+    # The second is asked for on the same connection, which is gone when it is read.
+    connection = send(server, 2 * lines.encode())
+    while threading.active_count() == before:
+        time.sleep(0.005)
+    if resets:
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    connection.close()
+    desk.welcome(desk.state(-1)["about"])
+    until_idle(before)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_fault_of_ours_is_still_seen(
+    server: Server, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    server.show_files({"gone.html": tmp_path / "gone.html"})
+    before = threading.active_count()
+    with pytest.raises(http.client.RemoteDisconnected):
+        ask(server, path="/{token}/gone.html")
+    until_idle(before)
+    server.show_files({})
+    assert "FileNotFoundError" in capfd.readouterr().err
+
+
+def test_the_address_for_a_browser_leads_on_once_and_does_not_tell_the_token(
+    server: Server,
+) -> None:
+    origin, code = server.one_time_address.rstrip("/").rsplit("/", 1)
+    assert origin == f"http://{server.hosts[0]}"
+    assert code != token(server)
+    assert ask(server, path=f"/{code}/state").status == 404
+    assert ask(server, "POST", f"/{code}/", b"{}").status == 404
+    assert ask(server, path=f"/{code}/", Host="evil.example").status == 421
+    assert ask(server, path=f"/{code}/", Origin="http://evil.example").status == 403
+    first = ask(server, path=f"/{code}/")
+    assert (first.status, first.headers["Location"]) == (303, f"/{token(server)}/")
+    again = ask(server, path=f"/{code}/")
+    assert again.status == 410
+    assert b"Open the one in the terminal" in again.body
+    assert token(server) not in str(again)
