@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -48,6 +49,10 @@ def workspace(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> W
         seeds=[3, 4],
     )
     (made.root / "consent.txt").write_text(CONSENT, encoding="utf-8")
+    started = made.root / "browser"
+    started.write_text('#!/bin/sh\necho "$1" > opened.new && mv opened.new opened\n')
+    started.chmod(0o755)
+    made.env["BROWSER"] = f"{started} %s"
     done = made.run()
     assert done.code == 0, done.err
     return made
@@ -64,24 +69,40 @@ class Sat:
 
 @contextmanager
 def sitting(browser: Browser, workspace: Workspace, **options: Any) -> Iterator[Sat]:
-    """A page that complains of nothing until its server is gone, and asks for nothing elsewhere."""
-    command = [*ADA, "--out", "ada", "--beside", "out", "--no-browser"]
+    """A page at the address that a browser is started with; it asks for nothing elsewhere."""
+    command = [*ADA, "--out", "ada", "--beside", "out"]
     with fork_server().start(command, workspace.root, workspace.env) as process:
-        line = process.stdout.readline()
-        address = re.search(r"http://127\.0\.0\.1:\d+/\S+/", line)
-        assert address, line + process.stderr.read()
-        visit = opened(browser, address[0], **options)
         try:
+            line = process.stdout.readline()
+            printed = re.search(r"(http://127\.0\.0\.1:\d+/)(\S+)/", line)
+            assert printed, line
+            address = given_to_a_browser(workspace.root / "opened")
+            # Others on the machine can read what a browser is started with.
+            assert printed[2] not in address
+            visit = opened(browser, address, **options)
+            assert visit.page.url == printed[0]
             yield Sat(visit.page, process, visit)
-            assert visit.asked_elsewhere(address[0]) == []
+            assert visit.asked_elsewhere(address, printed[0]) == []
+            visit.page.close()
         finally:
             process.kill()
-            visit.page.close()
+
+
+def given_to_a_browser(note: Path) -> str:
+    end = time.monotonic() + 20
+    while not note.exists():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    address = note.read_text().strip()
+    note.unlink()
+    return address
 
 
 def opened(browser: Browser, address: str, **options: Any) -> Visit:
-    visit = Visit(browser.new_page(**{"viewport": {"width": 1300, "height": 900}, **options}))
+    context = browser.new_context(**{"viewport": {"width": 1300, "height": 900}, **options})
+    visit = Visit(context.new_page())
     visit.page.goto(address)
+    visit.page.locator("#main h1").wait_for()
     return visit
 
 
@@ -263,9 +284,18 @@ def test_a_folder_without_a_server_gives_its_answers_as_a_file(
             assert "5 tasks of 7 are left" in page.inner_text("#main")
             page.get_by_role("button", name="I agree").click()
             task(page, number)
+            behind = Visit(page.context.new_page())
+            behind.page.goto(page.url)
+            behind.page.get_by_role("button", name="I agree").click()
+            task(behind.page, number)
         is_order = page.get_by_role("button", name="Clear").count() and number > 3
         page.keyboard.type("cdab" if is_order else "4" if number < 4 else "d")
         page.keyboard.press("Control+Enter")
+        if number == 4:
+            answer_in_a_tab_that_is_behind(behind)
+            task(page, 5)
+            page.reload()
+            page.get_by_role("button", name="I agree").click()
     with page.expect_download() as download:
         page.get_by_role("button", name="Save the answers").click()
     file = workspace.root / "answers.json"
@@ -285,6 +315,17 @@ def test_a_folder_without_a_server_gives_its_answers_as_a_file(
         answer["took_s"] for answer in content["answers"]
     ]
     shutil.rmtree(folder)
+
+
+def answer_in_a_tab_that_is_behind(visit: Visit) -> None:
+    """At task 3 when 4 was answered: it takes no answer to 3, and goes on at 5."""
+    page = visit.page
+    page.keyboard.press("7")
+    page.keyboard.press("Control+Enter")
+    task(page, 5)
+    assert "answered in another tab" in page.get_by_role("alert").inner_text()
+    page.close()
+    assert not visit.complaints
 
 
 SHOWN = {

@@ -15,11 +15,19 @@ const Desk = (() => {
 
   const key = (sitting) => `phyblock ${sitting.head.run} ${sitting.head.model}`;
   const ready = loaded.then((sitting) => {
-    const kept = JSON.parse(localStorage.getItem(key(sitting)) || "null");
-    if (kept) Object.assign(state, { agreed: kept.agreed, answers: kept.answers });
+    takeUp(sitting);
     if (state.answers.length === sitting.questions.length) state.phase = "saved";
     return sitting;
   });
+
+  /** Take up what another tab has stored since; whether it had. */
+  function takeUp(sitting) {
+    const kept = JSON.parse(localStorage.getItem(key(sitting)) || "null");
+    if (!kept || kept.answers.length <= state.answers.length) return false;
+    Object.assign(state, { agreed: kept.agreed, answers: kept.answers, since: null, before: 0 });
+    return true;
+  }
+
   const elapsed = () => state.before + (state.since === null ? 0 : (performance.now() - state.since) / 1000);
 
   function goTo(phase) {
@@ -46,21 +54,27 @@ const Desk = (() => {
 
   async function post(name, body) {
     const sitting = await ready;
+    const question = () => goTo(state.answers.length === sitting.questions.length ? "saved" : "question");
+    const isBehind = takeUp(sitting);
     if (name === "agree") {
       state.agreed = state.agreed || new Date().toISOString();
-      goTo("question");
+      question();
     } else if (name === "pause") {
       state.before = elapsed();
       state.since = null;
       goTo("paused");
     } else if (name === "resume") {
-      goTo("question");
+      question();
     } else if (name === "answer") {
+      if (isBehind || body.change !== state.change) {
+        question();
+        throw new Error("409");
+      }
       const answer = { number: state.answers.length + 1, picks: body.picks, took_s: Math.round(1000 * elapsed()) / 1000 };
       const answers = [...state.answers, answer];
       localStorage.setItem(key(sitting), JSON.stringify({ agreed: state.agreed, answers }));
       Object.assign(state, { answers, since: null, before: 0 });
-      goTo(answers.length === sitting.questions.length ? "saved" : "question");
+      question();
     }
   }
 

@@ -7,7 +7,7 @@
   const clock = document.getElementById("clock");
   const pause = document.getElementById("pause");
   const RETRY_MS = 1500;
-  const shown = { change: -1, phase: "", keys: null, since: null, number: 0 };
+  const shown = { change: -1, phase: "", keys: null, since: null, number: 0, notice: "" };
 
   const time = (seconds) => {
     const whole = Math.max(0, Math.floor(seconds));
@@ -48,6 +48,7 @@
       progress.textContent = `Task ${question.number} of ${question.of}`;
       shown.since = performance.now() - 1000 * state.elapsed_s;
       shown.keys = Picker.show(main, question, (picks) => submit(state.change, picks));
+      if (shown.notice) main.prepend(el("p", { class: "notice", role: "alert" }, shown.notice));
       if (shown.number !== question.number) scrollTo(0, 0);
       shown.number = question.number;
     },
@@ -82,12 +83,21 @@
   };
 
   async function submit(change, picks) {
+    shown.notice = "";
     try {
       await Desk.post("answer", { change, picks });
-    } catch {
-      document.getElementById("said").textContent = "The answer did not arrive; asking again what is shown.";
-      shown.change = -1;
+    } catch (error) {
+      // 409: what the page showed is not what is asked now.
+      shown.notice = error.message === "409"
+        ? "That answer was not kept: the task was answered in another tab. This is the next one."
+        : "That answer could not be kept. Please submit it again.";
+      take(await Desk.next(-1).catch(() => ({ change: -1, phase: "lost" })));
     }
+  }
+
+  function take(state) {
+    shown.change = state.change;
+    show(state);
   }
 
   function show(state) {
@@ -105,12 +115,10 @@
       try {
         const state = await Desk.next(shown.change);
         if (state.change === shown.change) continue;
-        shown.change = state.change;
-        show(state);
+        take(state);
         if (["closed", "done", "saved"].includes(state.phase)) return;
       } catch {
-        if (shown.phase !== "lost") show({ phase: "lost" });
-        shown.change = -1;
+        if (shown.phase !== "lost") take({ change: -1, phase: "lost" });
         await new Promise((go) => setTimeout(go, RETRY_MS));
       }
     }
