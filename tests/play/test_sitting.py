@@ -150,7 +150,7 @@ def test_a_sitting_by_mouse_keys_and_phone_over_a_kill(
 
 
 def begin_with_mouse_and_keys(page: Page, run: Path) -> None:
-    assert "May we keep your answers?" in page.inner_text("#main")
+    page.get_by_text("May we keep your answers?").wait_for()
     page.get_by_role("button", name="I agree").click()
 
     task(page, 1)
@@ -175,7 +175,7 @@ def begin_with_mouse_and_keys(page: Page, run: Path) -> None:
 
 
 def end_on_a_phone(page: Page, run: Path) -> None:
-    assert "Welcome back. 5 tasks of 7 are left" in page.inner_text("#main")
+    page.get_by_text("Welcome back. 5 tasks of 7 are left").wait_for()
     page.get_by_role("button", name="I agree").tap()
     task(page, 3)
     fits_the_phone(page)
@@ -281,7 +281,7 @@ def test_a_folder_without_a_server_gives_its_answers_as_a_file(
         task(page, number)
         if number == 3:
             page.reload()
-            assert "5 tasks of 7 are left" in page.inner_text("#main")
+            page.get_by_text("5 tasks of 7 are left").wait_for()
             page.get_by_role("button", name="I agree").click()
             task(page, number)
             behind = Visit(page.context.new_page())
