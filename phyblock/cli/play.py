@@ -162,7 +162,8 @@ def _import(
     console: Console, plan: RunPlan, person: Person, folder: Path, file: Path, *, page: bool
 ) -> int:
     given = read_answers(file, plan, person)
-    model = PersonModel(person.model, plan.suite, FileAnswers(given, plan, person.model).ask)
+    answers = FileAnswers(given, plan, person.model)
+    model = PersonModel(person.model, plan.suite, answers.ask)
 
     async def run() -> RunResult:
         present = {model.name: model}
@@ -173,6 +174,9 @@ def _import(
 
     result = asyncio.run(run())
     show_made(folder, plan.suite.tables, page=page)
+    if known := len(given) - answers.taken:
+        text = f"{known:,} of {counted(len(given), 'answer')} of {shown_path(file)} were there"
+        console.print(f"{text} already: those in the run stay.", soft_wrap=True)
     done = f"{result.settled:,} of {counted(result.samples, 'answer')} are there"
     console.print(f"{done}. The run is in {shown_path(folder)}", soft_wrap=True)
     return 1 if result.left else 0

@@ -41,7 +41,7 @@ class AnswersFile(_Strict):
     run: str
     model: str
     consent: str
-    agreed: str
+    agreed: str = Field(pattern=r"^\d{4}-\d\d-\d\dT[\d:.]+Z$")
     answers: list[GivenAnswer]
 
 
@@ -109,13 +109,18 @@ def _problem(path: Path, fault: Mapping[str, object]) -> Problem:
     assert isinstance(steps, tuple)
     names = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps)
     field = "".join(names).removeprefix(".")
-    return Problem(str(path), "is no file of answers", field, str(fault["msg"]))
+    return Problem(str(path), "is no file of answers", field, _words(fault))
+
+
+def _words(fault: Mapping[str, object]) -> str:
+    return "no mapping" if fault["type"] == "model_type" else str(fault["msg"])
 
 
 class FileAnswers:
-    """Answers requests out of a file, of a run that asks each item once."""
+    """Answers requests out of a file, of a run that asks each item once; counts those `taken`."""
 
     def __init__(self, given: Mapping[int, Given], plan: RunPlan, model: str) -> None:
+        self.taken = 0
         self._given = given
         self._numbers = {
             (sample.track.name, sample.item.key): number
@@ -128,4 +133,5 @@ class FileAnswers:
         given = self._given.get(self._numbers[request.track, request.key])
         if given is None:
             raise HaltedError("has no answer in the file")
+        self.taken += 1
         return given

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import mimetypes
+import os
 import re
 import secrets
 import sys
@@ -158,7 +159,8 @@ def _answer(body: Mapping[str, Any]) -> tuple[int, list[int]]:
 
 class _Listener(ThreadingHTTPServer):
     daemon_threads = True
-    allow_reuse_address = False
+    # The same command goes on at the same port at once; on Windows two could then share one.
+    allow_reuse_address = os.name == "posix"
 
     def server_bind(self) -> None:
         """Bind without asking the network for the machine's name, which may take long."""

@@ -314,6 +314,9 @@ def test_a_folder_without_a_server_gives_its_answers_as_a_file(
     assert [record["reply"]["latency_s"] for record in records] == [
         answer["took_s"] for answer in content["answers"]
     ]
+    again = workspace.phyblock(*BOB, "--import", file, "--out", "bob", "--no-report")
+    assert "were there already: those in the run stay" in " ".join(again.out.split())
+    assert answered(workspace.root / "bob") == records
     shutil.rmtree(folder)
 
 
@@ -393,6 +396,7 @@ def check_bad_files(workspace: Workspace, content: dict[str, Any]) -> None:
         ({"answers": [{**first, "took_s": -1}]}, "answers[0].took_s: is no file of answers"),
         ({"answers": [{**first, "picks": [99]}]}, "question 1: holds picks outside"),
         ({"more": 1}, "more: is no file of answers"),
+        ({"agreed": "yesterday"}, "agreed: is no file of answers"),
     ):
         file = workspace.root / "bad.json"
         file.write_text(json.dumps({**content, **change}), encoding="utf-8")
