@@ -16,7 +16,7 @@ from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Cell, Measure
 from phyblock.tracks.estimates import counted_samples, track_measures
-from phyblock.tracks.headline import headline_columns
+from phyblock.tracks.headline import headline_columns, main_measure
 from phyblock.tracks.kind import kind_of, kinds
 
 __all__ = ["Comparable", "Part", "comparable", "comparable_tracks"]
@@ -122,7 +122,7 @@ def comparable_tracks() -> tuple[str, ...]:
 
 
 def comparable(run: Run, track: str, measure: str = "") -> Comparable:
-    """A measure of a track of a run, the track's first where none is named.
+    """A measure of a track of a run, the main one where none is named.
 
     Raises SpecError for a measure that the track has not.
     """
@@ -130,7 +130,7 @@ def comparable(run: Run, track: str, measure: str = "") -> Comparable:
     if measure and measure not in known:
         message, allowed = "has no such measure", ", ".join(known)
         raise SpecError(Problem(f"track {track}", message, "--measure", measure, allowed))
-    chosen = known[measure] if measure else next(iter(known.values()))
+    chosen = known[measure] if measure else main_measure(run, track)
     report = kind_of(track).report()
     cells = report.cells(run)
     shown = report.headline(run) if report.headline is not None else ()

@@ -112,9 +112,8 @@ def compare_runs(
     pairs = [
         (Side(f"{a} ({tags[0]})", a, first), Side(f"{b} ({tags[1]})", b, second)) for a, b in names
     ]
-    what, other = (
-        comparable(run, _shared_track([first, second], track), measure) for run in (first, second)
-    )
+    what = comparable(first, _shared_track([first, second], track), measure)
+    other = comparable(second, what.track, what.measure.name)
     parts = [part for part in what.parts if part in other.parts]
     return compare(pairs, parts if len(pairs) == 1 else parts[-1:], what)
 

@@ -56,7 +56,7 @@ class ItemsAsked:
 
 @dataclass(frozen=True, eq=False)
 class Varied:
-    """The samples of a track, measured by its first measure as a whole.
+    """The samples of a track, measured by its main measure as a whole.
 
     `asked` has the items of each model that has any; models need not have the same. `parents` are
     the base scenes of every scene.

@@ -14,7 +14,7 @@ from phyblock.site.values import TrackValues, values_of
 from phyblock.tables.headline import Value
 from phyblock.tables.showing import varied_words
 from phyblock.tracks.estimates import track_measures
-from phyblock.tracks.headline import headline_columns, main_column
+from phyblock.tracks.headline import headline_columns, main_column, main_measure
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["AllValues", "all_values", "board_of"]
@@ -65,7 +65,7 @@ def _first_runs(runs: Sequence[SiteRun]) -> dict[str, int]:
 def _track(track: str, one: SiteRun) -> dict[str, Any]:
     kind, run = kind_of(track), one.run
     main = main_column(run, track)
-    (measure,) = (m for m in track_measures(track) if m.name == main.measure)
+    measure = main_measure(run, track)
     return {
         "name": track,
         "title": kind.title,

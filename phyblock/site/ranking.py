@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 
+from phyblock.report.comparable import comparable
 from phyblock.report.compare import Side, compare
 from phyblock.report.verdicts import ranks
 from phyblock.site.entries import Entry
 from phyblock.site.runs import SiteRun
-from phyblock.site.values import main_comparable
 
 __all__ = ["rank_ranges_of"]
 
@@ -25,7 +25,7 @@ def rank_ranges_of(
     sides = [Side(entry.name, entry.model.name, runs[entry.runs[track]].run) for entry in entries]
     if len(sides) < 2:
         return {side.label: (1, 1) for side in sides}
-    what = main_comparable(sides[0].run, track)
+    what = comparable(sides[0].run, track)
     table = compare(list(combinations(sides, 2)), what.parts[-1:], what).table
     known = table.assign(p=table["p"].fillna(1.0), p_holm=table["p_holm"].fillna(1.0))
     found = ranks(known, what.measure)

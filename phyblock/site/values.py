@@ -15,9 +15,9 @@ from phyblock.tables.headline import Value, headline_values
 from phyblock.tables.load import Run
 from phyblock.tables.measures import Measure
 from phyblock.tracks.estimates import track_estimates, track_measures
-from phyblock.tracks.headline import headline_columns, main_column
+from phyblock.tracks.headline import headline_columns
 
-__all__ = ["Facts", "Key", "TrackValues", "main_comparable", "values_of"]
+__all__ = ["Facts", "Key", "TrackValues", "values_of"]
 
 Key = tuple[str, str, int, str]
 """A sample of one model: scene, item, seed, variant."""
@@ -55,14 +55,9 @@ class TrackValues:
     facts: Mapping[str, Facts] = field(default_factory=dict)
 
 
-def main_comparable(run: Run, track: str) -> Comparable:
-    """The measure that models of a track are ranked by."""
-    return comparable(run, track, main_column(run, track).measure)
-
-
 def values_of(run: Run, track: str) -> TrackValues:
     """All values of a track."""
-    what = main_comparable(run, track)
+    what = comparable(run, track)
     samples = {model: dict(pairs) for model, pairs in _samples(run, what)}
     return TrackValues(
         dict(_values(run, track)), samples, _facts(run, track, samples, what.measure)

@@ -186,12 +186,12 @@ class TrackReport:
     for models of the run. `short` is the name of the column that stands for the track in a summary.
 
     `tables`, `figures` and `paper_tables` (by their number in the paper) are its own. `main_figure`
-    is the name of the figure of its first measure. `check_alike` raises SpecError where the first
-    run cannot be compared with the second in these cells. `part_names` say what `Record.part`
-    stands for. `items` opens, for the page of a run, what was asked about where that is more than
-    scenes; it raises DataError where that is not what the run was made on. `episodes` shows records
-    that are episodes, `export` writes what is asked about. `showing` says, in words that end every
-    caption, what is unusual about how items were shown.
+    is the name of the figure of its main measure, else that of the track. `check_alike` raises
+    SpecError where the first run cannot be compared with the second in these cells. `part_names`
+    say what `Record.part` stands for. `items` opens, for the page of a run, what was asked about
+    where that is more than scenes; it raises DataError where that is not what the run was made on.
+    `episodes` shows records that are episodes, `export` writes what is asked about. `showing` says,
+    in words that end every caption, what is unusual about how items were shown.
     """
 
     measures: tuple[Measure, ...]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from phyblock.tables.load import Run
+from phyblock.tables.measures import Measure
 from phyblock.tables.track_report import HeadlineColumn
+from phyblock.tracks.estimates import track_measures
 from phyblock.tracks.kind import kind_of
 
-__all__ = ["headline_columns", "main_column"]
+__all__ = ["headline_columns", "main_column", "main_measure"]
 
 
 def headline_columns(run: Run, track: str) -> tuple[HeadlineColumn, ...]:
@@ -23,3 +25,9 @@ def main_column(run: Run, track: str) -> HeadlineColumn:
     columns = headline_columns(run, track)
     main = kind_of(track).report().main
     return next((column for column in columns if column.heading == main), columns[-1])
+
+
+def main_measure(run: Run, track: str) -> Measure:
+    """The measure of that column: the one that is drawn, compared and ranked by."""
+    name = main_column(run, track).measure
+    return next(measure for measure in track_measures(track) if measure.name == name)

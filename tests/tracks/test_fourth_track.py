@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,16 @@ from phyblock.cli.main import phyblock
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import SpecError
 from phyblock.models.base import Message, Request
+from phyblock.report.comparable import comparable
+from phyblock.report.compare import compare_models
+from phyblock.report.figures import figure_files, figure_titles
+from phyblock.report.figures.dots import measure_dots
+from phyblock.report.html.headline import headlines
 from phyblock.scoring.ratios import ratio_of
+from phyblock.site.values import values_of
+from phyblock.tables.load import load_run
 from phyblock.tables.measures import Measure, SampleCounts
-from phyblock.tables.track_report import TrackReport
+from phyblock.tables.track_report import WHOLE, HeadlineColumn, TrackReport
 from phyblock.tracks import Opening, TrackKind
 from phyblock.tracks.opening import assembly_pictures
 from phyblock.tracks.selection import select_tasks
@@ -111,6 +119,28 @@ class Counter(OpenAIChat):
         return body
 
 
+def check_who_leads(out: Path) -> None:
+    """What leads the headline is drawn, compared and ranked by, wherever else it stands."""
+    run = load_run(out)
+    columns = tuple(HeadlineColumn(m.name, WHOLE.name, m.heading) for m in (ERROR, EXACT))
+    report = replace(TRACK.report(), headline=lambda _: columns, main=EXACT.heading)
+    for kind, leading in ((TRACK, ERROR), (replace(TRACK, report=lambda: report), EXACT)):
+        registry.unregister_track("counting")
+        registry.register_track(kind)
+        figure = measure_dots(run, track="counting")
+        assert figure is not None
+        assert [panel.get_xlabel() for panel in figure.axes] == [
+            f"{leading.heading} ({leading.unit})"
+        ]
+        assert figure_titles(run)["counting"] == f"Counting: {leading.heading}"
+        assert "figures/counting.svg" in figure_files()
+        assert comparable(run, "counting").measure == leading
+        assert compare_models(run).name == leading.heading
+        assert [table.strip_name for table in headlines(run)] == [kind.report().main or "Overall"]
+        worth = values_of(run, "counting").samples["oracle"].values()
+        assert set(worth) == {leading.best}
+
+
 def test_a_track_runs_from_yaml_to_the_report(
     workspace: Workspace,
     monkeypatch: pytest.MonkeyPatch,
@@ -142,7 +172,7 @@ def test_a_track_runs_from_yaml_to_the_report(
     error = estimates[estimates["measure"] == "error"].set_index("model")
     assert error.loc[["counter", "oracle"], "value"].tolist() == [0.6, 0]
     assert error.loc["counter", "lo"] < 0.6 < error.loc["counter", "hi"]
-    for file in ("tables/counting.md", "tables/measures.md", "figures/counting-error.svg"):
+    for file in ("tables/counting.md", "tables/measures.md", "figures/counting.svg"):
         assert (workspace.out / file).exists(), file
     assert "Counting" in (workspace.out / "report.html").read_text("utf-8")
     for more in ("compare --out out", "compare --measure exact", "export --to csv"):
@@ -150,5 +180,6 @@ def test_a_track_runs_from_yaml_to_the_report(
         assert not phyblock.main([verb, "out", *options], standalone_mode=False)
     assert pd.read_csv(workspace.out / "comparison.csv")["verdict"].notna().all()
     assert len(pd.read_csv(workspace.out / "export" / "csv" / "records.csv")) == 15
+    check_who_leads(workspace.out)
     pytest.importorskip("inspect_ai")
     assert not phyblock.main(["export", "out", "--to", "inspect"], standalone_mode=False)

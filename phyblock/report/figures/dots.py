@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from phyblock.plain_text import counted
-from phyblock.report.measure_table import main_heading
 from phyblock.tables.drawing import (
     ACCENT,
     COLORS,
@@ -27,7 +26,7 @@ from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Measure
 from phyblock.tracks.estimates import track_estimates
-from phyblock.tracks.headline import headline_columns
+from phyblock.tracks.headline import headline_columns, main_column, main_measure
 from phyblock.tracks.kind import kind_of
 
 if TYPE_CHECKING:
@@ -38,7 +37,7 @@ if TYPE_CHECKING:
 
     from phyblock.tables.track_report import HeadlineColumn
 
-__all__ = ["main_measure", "measure_dots"]
+__all__ = ["measure_dots"]
 
 _ROW_IN = 0.19
 _MOST_PANELS = 6
@@ -50,11 +49,6 @@ _NUMBER_IN, _BETWEEN_IN = 0.36, 0.12
 _NONE = (np.nan, np.nan, np.nan)
 
 
-def main_measure(track: str) -> Measure:
-    """The first measure of a track: the one that is drawn and compared."""
-    return kind_of(track).report().measures[0]
-
-
 def measure_dots(run: Run, *, track: str) -> Figure | None:
     """A panel a cell, a dot a model with its 95 % interval; None where nothing was measured.
 
@@ -62,7 +56,7 @@ def measure_dots(run: Run, *, track: str) -> Figure | None:
     parts of a mean are left out. A figure too narrow for panels shows the first one, with the
     values of the other cells in it as small marks.
     """
-    measure = main_measure(track)
+    measure = main_measure(run, track)
     columns = _columns(run, track, measure)
     found = headline_rows(track_estimates(run, track), run.design)
     found = found[found["measure"] == measure.name]
@@ -99,11 +93,9 @@ def measure_dots(run: Run, *, track: str) -> Figure | None:
 
 def _columns(run: Run, track: str, measure: Measure) -> list[HeadlineColumn]:
     """The headline columns of a measure, the one that models are ranked by first."""
-    columns = [c for c in headline_columns(run, track) if c.measure == measure.name]
-    columns = columns[-_MOST_PANELS:]
-    heading = main_heading(run, track)
-    leading = next((c for c in columns if c.heading == heading), columns[-1])
-    return [leading, *(column for column in columns if column is not leading)]
+    columns, leading = headline_columns(run, track), main_column(run, track)
+    others = [c for c in columns if c.measure == measure.name and c != leading]
+    return [leading, *others[1 - _MOST_PANELS :]]
 
 
 def _ranked(run: Run, main: Mapping[str, tuple[float, ...]], measure: Measure) -> Sequence[str]:

@@ -10,7 +10,6 @@ import pandas as pd
 
 from phyblock.plain_text import counted
 from phyblock.report.compare import compare_models
-from phyblock.report.figures.dots import main_measure
 from phyblock.tables.drawing import (
     ACCENT,
     INK,
@@ -23,6 +22,7 @@ from phyblock.tables.drawing import (
 )
 from phyblock.tables.load import Run
 from phyblock.tables.text_table import between, level_name, number
+from phyblock.tracks.headline import main_measure
 from phyblock.tracks.kind import kind_of
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def difference_forest(run: Run, *, track: str) -> Figure | None:
     if table.empty:
         return None
     several = table["part"].nunique() > 1
-    rows = _of_parts(table) if several else _of_pairs(table, main_measure(track).better)
+    rows = _of_parts(table) if several else _of_pairs(table, main_measure(run, track).better)
     names_in = names_width_in(row.label for row in rows if not row.is_heading)
     figure = new_figure(1.1 + _ROW_IN * len(rows), names_in + _LEAST_PLOT_IN)
     ax = figure.subplots()

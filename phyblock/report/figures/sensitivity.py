@@ -18,7 +18,7 @@ from phyblock.tables.drawing import (
     new_figure,
 )
 from phyblock.tables.load import Run
-from phyblock.tracks.estimates import track_measures
+from phyblock.tracks.headline import main_measure
 from phyblock.tracks.kind import kind_of
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def moved_dots(run: Run, *, track: str) -> Figure | None:
     axes[0].set_xlim(left=0)
     bare_axes(axes)
     legend_below(figure, *axes[0].get_legend_handles_labels())
-    measure = track_measures(track)[0]
+    measure = main_measure(run, track)
     unit = f" ({measure.unit})" if measure.unit else ""
     headed(
         figure,

@@ -12,7 +12,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.folders import OutFolder
 from phyblock.report.figures.captions import caption_files
 from phyblock.report.figures.data import dataset_levels
-from phyblock.report.figures.dots import main_measure, measure_dots
+from phyblock.report.figures.dots import measure_dots
 from phyblock.report.figures.forest import difference_forest
 from phyblock.report.figures.kit import block_kit
 from phyblock.report.figures.perturbations import perturbation_strip
@@ -29,6 +29,7 @@ from phyblock.tables.drawing import (
 )
 from phyblock.tables.load import Run
 from phyblock.tables.track_report import FigureMaker, SceneFigure
+from phyblock.tracks.headline import main_measure
 from phyblock.tracks.kind import kind_of, kinds
 
 if TYPE_CHECKING:
@@ -49,7 +50,6 @@ PAPER = "paper"
 _FOLDER = "figures"
 _FORMS: Mapping[str, Callable[[Figure], bytes]] = {"svg": svg_bytes, "png": png_bytes}
 _PAPER_FORMS: Mapping[str, Callable[[Figure], bytes]] = {"pdf": pdf_bytes, "svg": svg_bytes}
-_SCENES = "scenes"
 
 _Maker = FigureMaker | SceneFigure
 
@@ -67,55 +67,39 @@ class Wanted:
     data: Path | None = None
 
 
-def _makers(run: Run) -> dict[str, _Maker]:
-    """Figures of a run by name: of its tracks, in their order, then of its scenes."""
+def _makers(run: Run | None = None) -> dict[str, _Maker]:
+    """Figures of a run by name: of its tracks, in their order, then of its scenes; where no run is
+    given, those that any run may have.
+    """
+    varies = run is None or bool(run.design.suite.vary.factors)
     makers: dict[str, _Maker] = {}
-    for track in run.design.suite.tracks:
-        makers |= _of_track(track)
-        if not run.design.suite.vary.factors:
-            del makers[_moved_name(track)]
-    makers |= _OF_ANY_RUN
-    if not run.design.suite.vary.factors:
-        del makers[_PERTURBATIONS]
+    for track in kinds() if run is None else run.design.suite.tracks:
+        makers |= _of_track(track, run, varies=varies)
+    makers["scenes"] = FigureMaker("The scenes of the run by level", dataset_levels)
+    makers["kit"] = FigureMaker("The blocks and their dimensions", block_kit, in_report=False)
+    if varies:
+        makers["perturbations"] = SceneFigure("A scene in all ways of asking", perturbation_strip)
     return makers
 
 
-def _of_track(track: str) -> dict[str, _Maker]:
-    """Figures that a track may have."""
-    kind = kind_of(track)
-    title, measure = kind.title, main_measure(track).heading
-    return {
-        _main_name(track): FigureMaker(f"{title}: {measure}", partial(measure_dots, track=track)),
-        **kind.report().figures,
-        f"forest-{_dashed(track)}": FigureMaker(
+def _of_track(track: str, run: Run | None, *, varies: bool) -> dict[str, _Maker]:
+    kind, dashed = kind_of(track), track.replace("_", "-")
+    title, report = kind.title, kind.report()
+    main = title if run is None else f"{title}: {main_measure(run, track).heading}"
+    makers: dict[str, _Maker] = {
+        report.main_figure or dashed: FigureMaker(main, partial(measure_dots, track=track)),
+        **report.figures,
+        f"forest-{dashed}": FigureMaker(
             f"{title}: differences between models",
             partial(difference_forest, track=track),
             in_report=False,
         ),
-        _moved_name(track): FigureMaker(
-            f"{title}: what the way of asking changes", partial(moved_dots, track=track)
-        ),
     }
-
-
-_PERTURBATIONS = "perturbations"
-_OF_ANY_RUN: Mapping[str, _Maker] = {
-    _SCENES: FigureMaker("The scenes of the run by level", dataset_levels),
-    "kit": FigureMaker("The blocks and their dimensions", block_kit, in_report=False),
-    _PERTURBATIONS: SceneFigure("A scene in all ways of asking", perturbation_strip),
-}
-
-
-def _main_name(track: str) -> str:
-    return kind_of(track).report().main_figure or f"{_dashed(track)}-{main_measure(track).name}"
-
-
-def _moved_name(track: str) -> str:
-    return f"sensitivity-{_dashed(track)}"
-
-
-def _dashed(track: str) -> str:
-    return track.replace("_", "-")
+    if varies:
+        makers[f"sensitivity-{dashed}"] = FigureMaker(
+            f"{title}: what the way of asking changes", partial(moved_dots, track=track)
+        )
+    return makers
 
 
 def _is_in_report(maker: _Maker) -> bool:
@@ -213,10 +197,7 @@ def figure_files(names: Sequence[str] | None = None) -> tuple[str, ...]:
     """Every file of these figures, by its name in a run folder; by default of all that a report
     may have.
     """
-    makers = dict(_OF_ANY_RUN)
-    for track in kinds():
-        makers |= _of_track(track)
-    known = [name for name, maker in makers.items() if _is_in_report(maker)]
+    known = [name for name, maker in _makers().items() if _is_in_report(maker)]
     return tuple(
         f"{_FOLDER}/{name}.{ending}"
         for name in (known if names is None else names)

@@ -11,14 +11,14 @@ from urllib.parse import urlencode
 
 from phyblock.report.floors import Floor, floors_run, headline_floors
 from phyblock.report.html.leads import samples_query
-from phyblock.report.html.ranked import kinds_of, main_measure, rank_texts
+from phyblock.report.html.ranked import kinds_of, rank_texts
 from phyblock.report.html.standing import shortfalls
 from phyblock.report.measure_table import headline_of, main_heading
 from phyblock.tables.headline import Value
 from phyblock.tables.load import Run
 from phyblock.tables.showing import captioned, varied_words
 from phyblock.tables.text_table import NO_VALUE, number, spread
-from phyblock.tracks.headline import headline_columns
+from phyblock.tracks.headline import headline_columns, main_measure
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["Cell", "Headline", "Row", "headlines"]

@@ -9,17 +9,8 @@ from phyblock.report.compare import compare_models
 from phyblock.report.measure_table import headline_of, main_heading
 from phyblock.tables.headline import Value
 from phyblock.tables.load import Run
-from phyblock.tables.measures import Measure
-from phyblock.tracks.estimates import track_measures
-from phyblock.tracks.headline import main_column
 
-__all__ = ["kinds_of", "main_measure", "rank_texts"]
-
-
-def main_measure(run: Run, track: str) -> Measure:
-    """The measure that models of a track are ranked by."""
-    name = main_column(run, track).measure
-    return next(measure for measure in track_measures(track) if measure.name == name)
+__all__ = ["kinds_of", "rank_texts"]
 
 
 def rank_texts(run: Run, track: str) -> dict[str, str]:
@@ -29,7 +20,7 @@ def rank_texts(run: Run, track: str) -> dict[str, str]:
     models = [name for name, sort in kinds_of(run).items() if sort == "model" and name in known]
     if len(models) < 2:
         return {}
-    found = compare_models(run, models, track, main_measure(run, track).name)
+    found = compare_models(run, models, track)
     texts = {}
     for row in found.ranks.to_dict("records"):
         best, worst = row["best"], row["worst"]

@@ -117,6 +117,7 @@ REPORT = TrackReport(
         ),
         "step_scenes": TableMaker(partial(scenes_frame, NAME), scenes_view, "table3"),
     },
+    main_figure="step-planning-f1",
     figures={
         "step-progress": FigureMaker("Blocks placed, turn by turn", progress_by_turn),
         "inference-steps": SceneFigure(

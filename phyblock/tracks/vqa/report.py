@@ -95,6 +95,7 @@ REPORT = TrackReport(
         "letters": TableMaker(letters_frame, letters_view, "table2"),
         "questions": TableMaker(questions_frame, None, "table2"),
     },
+    main_figure="vqa-accuracy",
     figures={
         "vqa-subtasks": FigureMaker("VQA accuracy by subtask", vqa_heat_map),
         "subtask-cards": SceneFigure("A question of each subtask", subtask_cards),
