@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 
-from phyblock.errors import Problem, SpecError
+from phyblock.errors import Problem, SpecError, StoreError
 from phyblock.models import (
     BatchFiles,
     Breakers,
@@ -175,9 +176,14 @@ class Session:
             )
         )
         try:
-            return await self.executor.run()
-        finally:
-            self._note_stopped(self.executor.result)
+            result = await self.executor.run()
+        except BaseException:
+            # Where the disk is full, what ended the run comes first.
+            with contextlib.suppress(StoreError):
+                self._note_stopped(self.executor.result)
+            raise
+        self._note_stopped(result)
+        return result
 
     def _note_stopped(self, result: RunResult) -> None:
         reason = result.stop.reason if result.stop and result.left else ""

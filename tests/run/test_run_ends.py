@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from aiohttp import web
 
-from phyblock.records import Line, Record
+from phyblock.records import STOPPED, Line, Record
 from phyblock.run.appending import AppendFile
 from phyblock.run.events import RunEvent, SampleDone, Stopping
 from phyblock.run.execute import Cause
@@ -63,6 +63,8 @@ def test_a_mistake_of_ours_loses_no_call_under_way(
     def judges_badly(self: FullPlanning, item: Any, text: str | None) -> Any:
         judged.append(item)
         if len(judged) == 1:
+            # Why the run stopped cannot be noted then, which hides nothing.
+            (workspace.out / STOPPED).mkdir()
             raise ZeroDivisionError("in judge")
         return judge(self, item, text)
 
