@@ -49,7 +49,7 @@ check: $(TESTS)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# The documentation site; a broken link is an error.
+# The documentation site, in build/docs-site; a broken link is an error.
 docs: $(TESTS)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
 
@@ -62,4 +62,4 @@ lock: $(TESTS)
 	$(LOCK) --constraint requirements-dev.lock --output-file requirements.lock
 
 clean:
-	rm -rf $(VENV) .venv-* build dist site *.egg-info
+	rm -rf $(VENV) .venv-* build dist *.egg-info
