@@ -24,7 +24,7 @@ from phyblock.env.block_play import BlockPlay
 from phyblock.env.play import Play
 from phyblock.env.pose_play import PosePlay
 from phyblock.env.scenes import read_tasks
-from phyblock.env.state import LARGEST, MOST_BLOCKS, TRAITS, block_rows, candidate_rows, goal_rows
+from phyblock.env.state import MOST_BLOCKS, candidate_rows, goal_rows, rows_space
 from phyblock.errors import DataError, Problem
 from phyblock.plain_text import some_of
 from phyblock.sim import PictureStyle
@@ -122,7 +122,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         self._pictures: OrderedDict[tuple[Block, ...] | str, NDArray[np.uint8]] = OrderedDict()
         self._begin(self._task)
         self.action_space = self._play.action_space
-        space = _space(observe, size_px, with_world=action == "pose")
+        space = _space(observe, size_px, self._play.more_spaces())
         self.observation_space = cast(spaces.Space[Observation], space)
 
     def reset(
@@ -195,15 +195,13 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
     def _state(self) -> Observation:
         placed = np.bincount(self._play.chosen, minlength=MAX_CANDIDATES + 1)[1:]
         left = 1 - self._steps / self._most_steps
-        state: Observation = {
+        return {
             "goal": goal_rows(self._task.scene.blocks),
             "candidates": candidate_rows(self._play.candidates(self._task).candidates),
             "placed": placed.astype(np.uint8),
             "left": np.array([max(0.0, left)], dtype=np.float32),
+            **self._play.more_state(),
         }
-        if isinstance(self._play, PosePlay):
-            state["world"] = block_rows(self._play.blocks[-MOST_BLOCKS:])
-        return state
 
     def _current(self) -> NDArray[np.uint8]:
         return self._picture(self._play.blocks)
@@ -268,16 +266,15 @@ def _check_limits(**limits: int | None) -> None:
             raise ValueError(f"{name} is {most}; allowed: 1 or more, or None")
 
 
-def _space(observe: str, size_px: int, *, with_world: bool) -> spaces.Dict[Any]:
+def _space(observe: str, size_px: int, more: Mapping[str, spaces.Space[Any]]) -> spaces.Dict[Any]:
     if observe == "state":
-        goal = spaces.Box(-LARGEST, LARGEST, (MOST_BLOCKS, TRAITS), np.float32)
         return spaces.Dict(
             {
-                "goal": goal,
-                "candidates": spaces.Box(-LARGEST, LARGEST, (MAX_CANDIDATES, TRAITS), np.float32),
+                "goal": rows_space(MOST_BLOCKS),
+                "candidates": rows_space(MAX_CANDIDATES),
                 "placed": spaces.Box(0, _MOST_OF_A_KIND, (MAX_CANDIDATES,), np.uint8),
                 "left": spaces.Box(0.0, 1.0, (1,), np.float32),
-                **({"world": goal} if with_world else {}),
+                **more,
             }
         )
     shape = (size_px, size_px, 3)

@@ -6,6 +6,7 @@ import io
 from typing import Any, NamedTuple, Protocol
 
 from gymnasium import spaces
+from numpy.typing import NDArray
 from PIL import Image
 
 from phyblock.datasets import AssemblyTask
@@ -63,6 +64,14 @@ class Play(Protocol):
 
     def info(self) -> dict[str, Any]:
         """The state in structure; tuples, since arrays of several lengths make no vector."""
+
+    def more_spaces(self) -> dict[str, spaces.Space[Any]]:
+        """What `observe="state"` shows of this way of building alone, by name."""
+        return {}
+
+    def more_state(self) -> dict[str, NDArray[Any]]:
+        """These observations as they are now."""
+        return {}
 
     def close(self) -> None:
         """Release the simulator."""

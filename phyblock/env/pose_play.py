@@ -14,6 +14,7 @@ from PIL import Image
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import MAX_CANDIDATES, Block, CandidateSet, PoseStep
 from phyblock.env.play import DONE, Acted, Play, picture_of
+from phyblock.env.state import MOST_BLOCKS, block_rows, rows_space
 from phyblock.scoring import blocks_reached
 from phyblock.sim import PictureStyle, goal_style
 from phyblock.sim.carry import CarriedStep, Carrying, CarryLimits
@@ -149,6 +150,14 @@ class PosePlay(Play):
             "reached": self._reached,
             "is_complete": self._is_complete,
         }
+
+    def more_spaces(self) -> dict[str, spaces.Space[Any]]:
+        """Where the blocks lie, rows as in a goal."""
+        return {"world": rows_space(MOST_BLOCKS)}
+
+    def more_state(self) -> dict[str, NDArray[Any]]:
+        """Of more blocks than there are rows, those that came last."""
+        return {"world": block_rows(self.blocks[-MOST_BLOCKS:])}
 
     def close(self) -> None:
         """Release the simulator."""

@@ -10,11 +10,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
 from phyblock.domain import BLOCK_TYPES, COLORS, MAX_CANDIDATES, Block, Candidate
 
-__all__ = ["LARGEST", "MOST_BLOCKS", "TRAITS", "block_rows", "candidate_rows", "goal_rows"]
+__all__ = [
+    "LARGEST",
+    "MOST_BLOCKS",
+    "TRAITS",
+    "block_rows",
+    "candidate_rows",
+    "goal_rows",
+    "rows_space",
+]
 
 MOST_BLOCKS = 64
 """Rows of a goal; built-in ones have 22 blocks at most."""
@@ -22,6 +31,11 @@ TRAITS = 9
 """There, type, color, three angles, three coordinates."""
 LARGEST = 360.0
 """No number of a row is larger, nor smaller than its negative."""
+
+
+def rows_space(count: int) -> spaces.Box:
+    """Rows of so many blocks, shape (count, TRAITS)."""
+    return spaces.Box(-LARGEST, LARGEST, (count, TRAITS), np.float32)
 
 
 def goal_rows(blocks: Sequence[Block]) -> NDArray[np.float32]:
