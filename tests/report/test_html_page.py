@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from phyblock.report import write_report, write_tables
+from phyblock.scoring import ERROR_TYPES
 from tests.browser import expect
 from tests.report.browser import ReportVisit
 from tests.report.html_run import MARKUP
@@ -421,11 +422,31 @@ def test_each_step_finds_its_sentence(visit: ReportVisit, form: str) -> None:
         assert all(one and one in line for one, line in zip(found, said, strict=True)), text
 
 
+def test_why_a_step_is_wrong_is_told_in_one_script(visit: ReportVisit) -> None:
+    rooms = Path(__file__).parents[2] / "phyblock"
+    scripts = [
+        path
+        for room in ("play", "report/html", "site")
+        for path in rooms.glob(f"{room}/assets/*.js")
+    ]
+    for error in ERROR_TYPES:
+        telling = [
+            path.name for path in scripts if re.search(rf"\b{error}\b", path.read_text("utf-8"))
+        ]
+        assert telling == ["dom.js"]
+    reasons = visit.open().evaluate(
+        "names => names.map((name) => Words.reason(name, 'red arch'))", ERROR_TYPES
+    )
+    assert len({*reasons}) == len(ERROR_TYPES)
+    assert not {*reasons} & {name.replace("_", " ") for name in ERROR_TYPES}
+
+
 def test_a_wrong_step_shows_the_block_that_was_tried_and_the_sentence(visit: ReportVisit) -> None:
     visit.show(PLAN.format("oracle", 1), step="1", numbers="off")
     page = visit.page
     why = page.locator(".why")
     expect(why).to_contain_text("Glowing: what was tried, in the place of block 1")
+    expect(page.locator(".said").first).to_contain_text("The goal has no green cylinder.")
     assert why.locator(".quote").inner_text() == "1. Move block with index 9."
     tried = [int(n) for n in page.evaluate("Stage.style('--tried-rgb')").split(",")]
     glowing = """(canvas, [red, green, blue]) => {

@@ -3,13 +3,6 @@
 
 const Results = (() => {
   const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
-  const reasons = {
-    shape_not_in_gt: "the goal has no such block",
-    overflow: "all such blocks were placed already",
-    incorrect_orientation: "it is turned otherwise in the goal",
-    dependency_not_met: "what it rests on was not there yet",
-  };
-  const reason = (why) => reasons[why] || Words.named(why);
   const number = (value) => (value === null || value === undefined ? "–" : value.toFixed(1));
 
   function page(results, finish) {
@@ -67,13 +60,13 @@ const Results = (() => {
     if (!row.steps) return null;
     const first = row.steps.findIndex((step) => step.why);
     const parts = [];
-    if (first >= 0) parts.push(`It first broke at step ${first + 1}: ${reason(row.steps[first].why)}.`);
+    if (first >= 0) parts.push(`It first broke at step ${first + 1}: ${Words.reason(row.steps[first].why)}.`);
     if (row.missing) parts.push(`${Words.count(row.missing, "block")} of the goal ${row.missing === 1 ? "is" : "are"} missing.`);
     if (!parts.length) parts.push("Every step is right, and nothing is missing.");
     return [
       el("ol", { class: "chips" }, row.steps.map((step, n) => el("li", { class: step.why ? "wrong" : "right" },
         el("span", { class: "muted number" }, `${n + 1}.`), el("b", { class: "number" }, step.name),
-        step.why ? ` ✗ ${reason(step.why)}` : " ✓"))),
+        step.why ? ` ✗ ${Words.reason(step.why)}` : " ✓"))),
       el("p", {}, parts.join(" ")),
     ];
   }

@@ -29,8 +29,20 @@ const Words = (() => {
   };
   /** What people call a name of the data. */
   const named = (name) => names[name] || String(name).replaceAll("_", " ");
+  const reasons = {
+    shape_not_in_gt: (block) => `the goal has no ${block}`,
+    overflow: (block) => `every ${block} of the goal is already placed`,
+    incorrect_orientation: (block, turned) => `the goal has no ${block} turned this way${turned && `, but candidate ${turned}`}`,
+    dependency_not_met: (block, turned, below) => `too early: ${below || "what it rests on"} must come first`,
+  };
+  /**
+   * Why a step was wrong, as a part of a sentence: `turned` are the candidates that are turned as
+   * the goal needs, `below` what must be placed before; all of them in words.
+   */
+  const reason = (why, block = "such block", turned = "", below = "") =>
+    (reasons[why] ? reasons[why](block, turned, below) : named(why));
   const percent = (share) => (share === null || share === undefined ? "–" : (100 * share).toFixed(1));
   const count = (n, noun) => `${n.toLocaleString("en")} ${noun}${n === 1 ? "" : "s"}`;
   const block = (one) => `${one.color} ${named(one.type)}`;
-  return { named, percent, count, block };
+  return { named, reason, percent, count, block };
 })();

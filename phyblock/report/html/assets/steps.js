@@ -33,25 +33,14 @@ const Steps = (() => {
   function reason(scene, setting, number, why, placed) {
     const candidate = scene.candidates[number - 1];
     if (!candidate) return `There is no candidate ${number}.`;
-    const name = Words.block(candidate);
-    const all = scene.blocks.map((_, v) => v);
-    const ofKind = all.filter((v) => sameKind(scene.blocks[v], candidate));
-    const open = ofKind.filter((v) => !placed.has(v));
-    if (why === "shape_not_in_gt") return `The goal has no ${name}.`;
-    if (why === "overflow") {
-      return ofKind.length === 1 ? `The only ${name} is already placed.`
-        : `All ${ofKind.length} ${name} blocks of the goal are already placed.`;
-    }
-    if (why === "incorrect_orientation") {
-      return `The goal needs a ${name} turned another way: candidate ${listed(scene, setting, open)}.`;
-    }
-    if (why === "dependency_not_met") {
-      const same = open.filter((v) => standIns(scene, setting, scene.blocks[v]).includes(number));
-      const waits = (same.length ? same : open).flatMap((v) => scene.blocks[v].depend)
-        .filter((d) => !placed.has(d));
-      return `Too early: it rests on ${listed(scene, setting, waits) || "blocks"}, not placed yet.`;
-    }
-    return `${Words.named(why)}.`;
+    const open = scene.blocks.map((_, v) => v)
+      .filter((v) => !placed.has(v) && sameKind(scene.blocks[v], candidate));
+    const same = open.filter((v) => standIns(scene, setting, scene.blocks[v]).includes(number));
+    const waits = (same.length ? same : open).flatMap((v) => scene.blocks[v].depend)
+      .filter((d) => !placed.has(d));
+    const words = [open, waits].map((vertices) => listed(scene, setting, vertices));
+    const said = Words.reason(why, Words.block(candidate), ...words);
+    return `${said[0].toUpperCase()}${said.slice(1)}.`;
   }
 
   /**
