@@ -179,6 +179,9 @@ def end_on_a_phone(page: Page, run: Path) -> None:
     page.get_by_role("button", name="I agree").tap()
     task(page, 3)
     fits_the_phone(page)
+    # Goal and candidates one below the other, without the line that is between them.
+    halves = [one.bounding_box() for one in page.locator(".window:visible").all()]
+    assert [half and round(half["height"] - half["width"]) for half in halves] == [0, 0]
     page.get_by_role("button", name="Candidate 16").tap()
     page.get_by_role("button", name="Pause").tap()
     page.get_by_role("heading", name="Paused").wait_for()

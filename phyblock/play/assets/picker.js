@@ -72,12 +72,14 @@ const Picker = (() => {
         choice.spots.filter((spot) => spot.picture === number).map((spot) => ({ ...spot, place })),
       );
       const left = Math.min(1, ...here.map((spot) => spot.box[0]));
-      // A goal beside its candidates comes apart on a narrow screen: the same picture, twice.
-      const cuts = here.length && left > 0.2 ? [[0, left], [left, 1]] : [[0, 1]];
-      const windows = cuts.map(([from, to]) => {
+      // A goal beside its candidates comes apart on a narrow screen: the same picture, cut in two of
+      // one size and the line between them, which is shown where they stand side by side.
+      const cuts = here.length && left > 0.5 ? [[0, 1 - left], [1 - left, left], [left, 1]] : [[0, 1]];
+      const windows = cuts.map(([from, to], n) => {
         const share = to - from;
-        const image = el("img", { src: part.picture, alt: alternative(part), draggable: "false" });
-        const frame = el("div", { class: "window" }, image);
+        const isLine = cuts.length > 1 && n === 1;
+        const image = el("img", { src: part.picture, alt: n ? "" : alternative(part), draggable: "false" });
+        const frame = el("div", { class: isLine ? "window line" : "window" }, image);
         frame.style.flexGrow = share;
         frame.style.aspectRatio = `${part.width * share} / ${part.height}`;
         image.style.width = `${100 / share}%`;
