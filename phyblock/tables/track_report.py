@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
+from phyblock.tables.listing import Listing, by_settings
 from phyblock.tables.measures import CELL, Cell, Measure
 from phyblock.tables.text_table import TextTable
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from phyblock.records import Record
     from phyblock.sim import PictureStyle
     from phyblock.sim.film import FilmStep
+    from phyblock.tables.design import Design
     from phyblock.tables.load import Run
 
 __all__ = [
@@ -190,8 +192,9 @@ class TrackReport:
     SpecError where the first run cannot be compared with the second in these cells. `part_names`
     say what `Record.part` stands for. `items` opens, for the page of a run, what was asked about
     where that is more than scenes; it raises DataError where that is not what the run was made on.
-    `episodes` shows records that are episodes, `export` writes what is asked about. `showing` says,
-    in words that end every caption, what is unusual about how items were shown.
+    `episodes` shows records that are episodes, `export` writes what is asked about. `listings` are
+    the scores that the page of a run lists samples by, the one that the headline leads with first.
+    `showing` says, in words that end every caption, what is unusual about how items were shown.
     """
 
     measures: tuple[Measure, ...]
@@ -213,4 +216,5 @@ class TrackReport:
     items: Callable[[Run, Dataset], PageItems] | None = None
     episodes: EpisodeView | None = None
     export: ItemExport | None = None
+    listings: Callable[[Design], tuple[Listing, ...]] = by_settings
     showing: Callable[[Run], tuple[str, ...]] = lambda _: ()

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
 import pytest
 import yaml
 
@@ -274,11 +275,38 @@ def test_a_plan_with_poses_as_it_was_given_and_carried_out(
     assert page.locator(".strip button.right").count() == 1
     page.locator(".strip button.wrong").click()
     said = page.inner_text(".said")
-    assert "Off in height, no room" in said
+    assert "Off in height, overlaps" in said
     assert "5.0 cm too low" in said
     assert "Refused: it would share space with others" in said
+    _lists_what_the_headline_leads_with(visit, workspace.out)
     page.close()
     assert visit.complaints == []
+
+
+def _lists_what_the_headline_leads_with(visit: ReportVisit, folder: Path) -> None:
+    """One scene was asked about once, so that a sample is worth what its model is."""
+    models = ("oracle", "oracle-2d")
+    found = pd.read_csv(folder / "tables" / "estimates.csv", keep_default_na=False)
+    value = {
+        (row["measure"], row["model"]): f"{100 * float(row['value']):.1f}"
+        for row in found[found["cell"] == "overall"].to_dict("records")
+    }
+    assert value["f1_c", "oracle-2d"] != value["f1_a", "oracle-2d"]
+    page = visit.open("matrix")
+    reached = page.locator("#matrix .matrix-cell").all_inner_texts()
+    assert sorted(reached) == sorted(str(round(float(value["f1_c", m]))) for m in models)
+    page = visit.open("samples")
+    for setting in ("C", "A", "B"):
+        page.select_option("#filter-setting", label=setting)
+        marks = page.locator(".row-mark .number").all_inner_texts()
+        assert marks == [value[f"f1_{setting.lower()}", model] for model in models]
+    assert "Overflow" in page.inner_text("#filter-error")
+    page.select_option("#filter-setting", label="C")
+    page.select_option("#filter-error", label="Off in height")
+    assert page.locator(".row-model").all_inner_texts() == ["oracle-2d"]
+    assert "setting" not in visit.hash
+    page.select_option("#filter-setting", label="A")
+    assert visit.count() == "2 samples"
 
 
 def test_a_hostile_reply_does_nothing(visit: ReportVisit) -> None:

@@ -136,7 +136,11 @@ def test_the_newest_record_of_every_sample_is_there_once(
             counts = {name: rows["scores"][setting][name][row] for name in ("tp", "fp", "fn")}
             assert counts == {name: found[name] for name in counts}
             bits = rows["scores"][setting]["wrong"][row]
-            wrong = {name for n, name in enumerate(columns["error_types"]) if bits >> n & 1}
+            wrong = {
+                name
+                for n, name in enumerate(columns["listings"][0]["AB".index(setting)]["errors"])
+                if bits >> n & 1
+            }
             assert wrong == {name for name, count in found["errors"].items() if count}
     assert not by_name
 

@@ -9,11 +9,13 @@ from typing import Any, NamedTuple
 
 from phyblock.records import Record
 from phyblock.records.reading import run_records
-from phyblock.scoring import ERROR_TYPES
 from phyblock.tables.design import Design
-from phyblock.tracks.kind import kinds
+from phyblock.tables.listing import Listing
+from phyblock.tracks.kind import kind_of, kinds
 
 __all__ = ["Item", "Place", "SampleIndex", "read_places"]
+
+_COUNTED = ("tp", "fp", "fn", "wrong")
 
 
 class Place(NamedTuple):
@@ -76,7 +78,9 @@ class SampleIndex:
     """Columns over all samples, and over the items that they are about."""
 
     def __init__(self, design: Design) -> None:
-        self._design = design
+        self._listings: dict[str, tuple[Listing, ...]] = {
+            track: kind_of(track).report().listings(design) for track in design.suite.tracks
+        }
         self._scenes, self._items = _Names(), _Names()
         self._tracks, self._models, self._outcomes = _Names(), _Names(), _Names()
         self._subtasks, self._variants = _Names(), _Names()
@@ -84,10 +88,12 @@ class SampleIndex:
         self._about: dict[str, list[Any]] = {"scene": [], "levels": [], "subtask": []}
         names = ("track", "model", "item", "seed", "variant", "outcome", "correct")
         self._rows: dict[str, list[Any]] = {name: [] for name in names}
-        self._scores: dict[str, dict[str, list[int | None]]] = {
-            setting: {name: [] for name in ("tp", "fp", "fn", "wrong")}
-            for setting in design.suite.settings
+        self._scores: dict[str, dict[str, list[float | None]]] = {
+            listing.name: {part: [] for part in _COUNTED}
+            for listings in self._listings.values()
+            for listing in listings
         }
+        self._matcher = design.matcher
 
     @property
     def scenes(self) -> list[str]:
@@ -116,9 +122,10 @@ class SampleIndex:
         }
         for name, value in row.items():
             self._rows[name].append(value)
+        listings = {listing.name: listing for listing in self._of(record.track)}
         for setting, columns in self._scores.items():
-            for name, value in self._score(record, setting).items():
-                columns[name].append(value)
+            for part, count in _score(record, listings.get(setting)).items():
+                columns[part].append(count)
 
     def _add_item(self, record: Record) -> None:
         part = record.part
@@ -126,15 +133,8 @@ class SampleIndex:
         self._about["levels"].append(record.levels)
         self._about["subtask"].append(None if part is None else self._subtasks.number(part))
 
-    def _score(self, record: Record, setting: str) -> dict[str, int | None]:
-        """Counts under a setting by the headline matcher, and a bit for each type of wrong step."""
-        scores = [score for score in record.scores if score.setting == setting]
-        headline = [score for score in scores if score.matcher == self._design.matcher]
-        for score in headline or scores:
-            errors = score.errors or {}
-            wrong = sum(1 << n for n, name in enumerate(ERROR_TYPES) if errors.get(name))
-            return {"tp": score.tp, "fp": score.fp, "fn": score.fn, "wrong": wrong}
-        return dict.fromkeys(("tp", "fp", "fn", "wrong"))
+    def _of(self, track: str) -> tuple[Listing, ...]:
+        return self._listings.get(track, ())
 
     def columns(self, questions: Mapping[Item, int]) -> dict[str, Any]:
         """The index as the page takes it; `questions` numbers the items that have a question."""
@@ -149,9 +149,14 @@ class SampleIndex:
             "scenes": self.scenes,
             "seeds": sorted(self._seeds),
             "variants": self._variants.values,
-            "settings": list(self._scores),
-            "matcher": self._design.matcher,
-            "error_types": list(ERROR_TYPES),
+            "listings": [
+                [
+                    {"name": one.name, "errors": one.errors, "is_counted": one.is_counted}
+                    for one in self._of(track)
+                ]
+                for track in self._tracks.values
+            ],
+            "matcher": self._matcher,
             "items": {
                 "key": [item.key for item in items],
                 **self._about,
@@ -159,3 +164,12 @@ class SampleIndex:
             },
             "rows": {**self._rows, "scores": self._scores},
         }
+
+
+def _score(record: Record, listing: Listing | None) -> dict[str, float | None]:
+    """What a listing says of a sample, with a bit for each type of wrong step."""
+    found = listing.score(record) if listing else None
+    if listing is None or found is None:
+        return dict.fromkeys(_COUNTED)
+    wrong = sum(1 << n for n, name in enumerate(listing.errors) if name in found.errors)
+    return dict(zip(_COUNTED, (found.tp, found.fp, found.fn, wrong), strict=True))

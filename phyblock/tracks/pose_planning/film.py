@@ -23,7 +23,7 @@ _ENDS: dict[StepEnd, str] = {
     "stands": "stands",
     "falls": "falls",
     "knocks_over": "knocks others over",
-    "overlaps": "no room",
+    "overlaps": "overlaps",
     "under_floor": "under the floor",
     "no_block": "no such block",
 }

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from phyblock.tables.design import OVERALL
+from phyblock.tables.design import OVERALL, Design
+from phyblock.tables.listing import Listing, by_settings
 from phyblock.tables.load import Run
 from phyblock.tables.showing import planning_words
 from phyblock.tables.track_report import (
@@ -19,6 +20,7 @@ from phyblock.tables.track_report import (
 from phyblock.tracks.inference import inference
 from phyblock.tracks.pose_planning.figures import f1_by_tolerance, pose_error_bars
 from phyblock.tracks.pose_planning.film import pose_film, pose_table
+from phyblock.tracks.pose_planning.listing import LISTED_IN_C
 from phyblock.tracks.pose_planning.measures import (
     NAME,
     POSE_PLANNING_MEASURES,
@@ -58,6 +60,10 @@ def _notes(run: Run) -> Sequence[str]:
     )
 
 
+def _listings(design: Design) -> tuple[Listing, ...]:
+    return (LISTED_IN_C, *by_settings(design))
+
+
 REPORT = TrackReport(
     measures=POSE_PLANNING_MEASURES,
     cells=level_cells,
@@ -81,5 +87,6 @@ REPORT = TrackReport(
         ),
     },
     episodes=_VIEW,
+    listings=_listings,
     showing=lambda run: planning_words(run, "pose"),
 )

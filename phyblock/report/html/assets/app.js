@@ -120,7 +120,7 @@
     title.replaceChildren(el("span", { class: "title-key" }, sample.key),
       el("span", { class: "muted" }, sample.asked));
     detail.scrollTop = 0;
-    Detail.show(detail, row, beside ? beside[0] : -1, Filters.state.setting, at);
+    Detail.show(detail, row, beside ? beside[0] : -1, Filters.listing(Data.index.rows.track[row]), at);
   }
 
   function warn(unknown) {

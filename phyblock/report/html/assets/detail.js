@@ -13,14 +13,14 @@ const Detail = (() => {
    *
    * `at` may say the step, the view [degrees] and the tab of an address.
    */
-  async function show(into, row, other, setting, at = {}) {
+  async function show(into, row, other, listed, at = {}) {
     place = into;
     const turn = ++shown;
     player?.stop();
     const samples = [row, other].filter((n) => n >= 0).map(Data.sample);
     try {
       const loaded = await Promise.all(samples.map(async (sample) => ({
-        ...sample, setting, record: await Data.entry("records", sample.row),
+        ...sample, listed, setting: listed?.name || "", record: await Data.entry("records", sample.row),
       })));
       const sample = loaded[0];
       const scene = Data.index.starts.scenes.length ? await Data.entry("scenes", sample.sceneNumber) : null;
@@ -161,7 +161,8 @@ const Detail = (() => {
     const { record } = sample;
     const facts = [];
     if (sample.outcome !== "ok") facts.push(el("span", { class: "chip" }, Words.named(sample.outcome)));
-    if (score) {
+    // Parts of a mean are no counts: the view of such a sample says what they come to.
+    if (score && sample.listed.is_counted) {
       for (const [name, value] of [["F1", Words.percent(score.f1)], ["TP", score.tp], ["FP", score.fp], ["FN", score.fn]]) {
         facts.push(el("span", { class: "fact" }, `${name} `, el("b", { class: "number" }, String(value))));
       }

@@ -3,15 +3,15 @@
 
 const Filters = (() => {
   const ORDERS = { name: "Name", model: "Model", worst: "Worst first", best: "Best first" };
-  const state = { track: 0, setting: "", order: "name", text: "", inReplies: false };
+  const state = { track: 0, order: "name", text: "", inReplies: false };
   const chosen = {};
+  const settings = {};
   let fields = {};
   let form, changed;
 
   function start(onChange) {
     changed = onChange;
     form = document.getElementById("filters");
-    state.setting = Data.index.settings[0] || "";
     const place = document.getElementById("tracks");
     place.hidden = Data.index.tracks.length < 2;
     place.replaceChildren(...Data.index.tracks.map((track, i) => el("button", {
@@ -28,14 +28,35 @@ const Filters = (() => {
     state.track = i;
     document.querySelectorAll("#tracks button").forEach((button, k) =>
       button.setAttribute("aria-pressed", String(k === i)));
-    fields = fieldsOfTrack();
-    for (const name of Object.keys(chosen)) if (!find(name, chosen[name].word)) delete chosen[name];
-    build();
+    refit();
   }
+
+  /** By what score a track's samples are listed: the one chosen for it, else its first. */
+  const listing = (track = state.track) => {
+    const known = Data.index.listings[track] || [];
+    return known.find(({ name }) => name === settings[track]) || known[0] || null;
+  };
 
   /** Whether a row of the chosen track has a value in a column. */
   const hasValue = (column) => column.some((value, row) =>
     value !== null && Data.index.rows.track[row] === state.track);
+
+  /** List the chosen track by another score, whose wrong steps may have other types. */
+  function setSetting(name) {
+    settings[state.track] = name;
+    refit();
+  }
+
+  /** Make the fields of what is listed now; what was chosen and is no more is let go. */
+  function refit() {
+    fields = fieldsOfTrack();
+    for (const name of Object.keys(chosen)) {
+      const option = find(name, chosen[name].word);
+      if (option) chosen[name] = option;
+      else delete chosen[name];
+    }
+    build();
+  }
 
   const numbered = (names, label = (name) => name) =>
     names.map((name, value) => ({ word: String(name), value, label: label(name) }));
@@ -44,8 +65,8 @@ const Filters = (() => {
   function fieldsOfTrack() {
     const { index } = Data;
     const levels = [...new Set(index.items.levels.flat())].sort();
-    const scores = index.rows.scores[state.setting];
-    const hasScores = scores !== undefined && hasValue(scores.tp);
+    const listed = listing(), known = index.listings[state.track] || [];
+    const hasScores = listed !== null && hasValue(index.rows.scores[listed.name].tp);
     const hasParts = hasValue(index.rows.item.map((item) => index.items.subtask[item]));
     const means = Object.entries(index.subtask_groups).map(([word, { title, of }]) =>
       ({ word, value: of.map((name) => index.subtasks.indexOf(name)), label: `${title}: ${of.join(", ")}` }));
@@ -57,11 +78,11 @@ const Filters = (() => {
       answer: hasValue(index.rows.correct) && ["Answer", [
         { word: "right", value: 1, label: "Right" }, { word: "wrong", value: 0, label: "Wrong" }]],
       outcome: ["Outcome", numbered(index.outcomes, Words.named)],
-      error: hasScores && ["Error type", numbered(index.error_types, Words.named)],
+      error: hasScores && ["Error type", numbered(listed.errors, Words.named)],
       seed: index.seeds.length > 1 && ["Seed", index.seeds.map((n) => ({ word: String(n), value: n, label: `Seed ${n}` }))],
       variant: index.variants.length > 1 && ["Asked", index.variants.map((name, value) =>
         ({ word: name || "reference", value, label: name || "As the reference" }))],
-      setting: hasScores && index.settings.length > 1 && ["Setting", numbered(index.settings)],
+      setting: hasScores && known.length > 1 && ["Setting", numbered(known.map(({ name }) => name))],
     };
     return Object.fromEntries(Object.entries(all).filter(([, field]) => field));
   }
@@ -75,11 +96,11 @@ const Filters = (() => {
 
   function field(name, label, options) {
     const isSetting = name === "setting";
-    const now = isSetting ? state.setting : chosen[name]?.word;
+    const now = isSetting ? listing().name : chosen[name]?.word;
     const select = el("select", {
       id: `filter-${name}`,
       onchange: () => {
-        if (isSetting) state.setting = select.value;
+        if (isSetting) setSetting(select.value);
         else if (select.value) chosen[name] = find(name, select.value);
         else delete chosen[name];
         changed({ isSetting });
@@ -137,7 +158,7 @@ const Filters = (() => {
       checks.push((row) => parts.has(items.subtask[columns.item[row]]));
     }
     if (error !== undefined) {
-      const wrong = columns.scores[state.setting]?.wrong || [];
+      const wrong = columns.scores[listing().name].wrong;
       checks.push((row) => (wrong[row] || 0) >> error & 1);
     }
     if (words(state.text).length) checks.push(named(words(state.text), replies));
@@ -157,11 +178,11 @@ const Filters = (() => {
 
   /** What the address says of filters: all that is not as it is at first. */
   function asked() {
-    const { tracks, settings } = Data.index;
+    const { tracks, listings } = Data.index;
     return {
       track: tracks.length > 1 ? tracks[state.track] : "",
       ...Object.fromEntries(Object.entries(chosen).map(([name, option]) => [name, option.word])),
-      setting: state.setting === (settings[0] || "") ? "" : state.setting,
+      setting: listing() === (listings[state.track]?.[0] || null) ? "" : listing().name,
       order: state.order === "name" ? "" : state.order,
       q: state.text.trim(),
       in: state.inReplies ? "replies" : "",
@@ -176,15 +197,16 @@ const Filters = (() => {
     const place = track === null ? (row >= 0 ? index.rows.track[row] : state.track) : index.tracks.indexOf(track);
     if (place < 0) unknown.push(`track “${track}”`);
     for (const name of Object.keys(chosen)) delete chosen[name];
-    state.setting = index.settings[0] || "";
-    if (place !== state.track) setTrack(Math.max(0, place));
+    for (const track of Object.keys(settings)) delete settings[track];
+    setTrack(Math.max(0, place));
+    const setting = given.get("setting");
+    if (find("setting", setting)) setSetting(setting);
     for (const name of Object.keys(fields)) {
       const word = given.get(name);
       if (word === null) continue;
       const option = find(name, word);
       if (!option) unknown.push(`${fields[name][0].toLowerCase()} “${word}”`);
-      else if (name === "setting") state.setting = word;
-      else chosen[name] = option;
+      else if (name !== "setting") chosen[name] = option;
     }
     const order = given.get("order") || "name";
     if (!Object.hasOwn(ORDERS, order)) unknown.push(`order “${order}”`);
@@ -195,5 +217,5 @@ const Filters = (() => {
     return unknown;
   }
 
-  return { start, setTrack, test, asked, restore, words, state };
+  return { start, setTrack, test, asked, restore, words, listing, state };
 })();

@@ -43,7 +43,7 @@ const List = (() => {
   function worth(row) {
     const { correct, scores } = Data.index.rows;
     if (correct[row] !== null) return correct[row];
-    const columns = scores[Filters.state.setting];
+    const columns = scores[Filters.listing(Data.index.rows.track[row])?.name];
     if (!columns || columns.tp[row] === null) return null;
     const tp = columns.tp[row], whole = 2 * tp + columns.fp[row] + columns.fn[row];
     return whole ? (2 * tp) / whole : 0;
@@ -146,11 +146,11 @@ const List = (() => {
     if (sample.correct !== null) {
       return el("span", { class: `row-mark ${sample.correct ? "right" : "wrong"}` }, sample.correct ? "✓ right" : "✗ wrong");
     }
-    const score = sample.scores[Filters.state.setting];
+    const listed = Filters.listing(), score = listed && sample.scores[listed.name];
     if (!score) return el("span", { class: "row-mark" }, "–");
     const bar = el("span", { class: "bar" }, el("span", {}));
     bar.firstChild.style.width = `${100 * (score.f1 || 0)}%`;
-    return el("span", { class: "row-mark", title: "F1 of this sample [%]" }, bar,
+    return el("span", { class: "row-mark", title: `F1 of this sample in setting ${listed.name} [%]` }, bar,
       el("span", { class: "number" }, Words.percent(score.f1)));
   }
 

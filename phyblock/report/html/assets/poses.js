@@ -6,13 +6,8 @@ const Poses = (() => {
   const FAR_M = 0.5;
   const SLIGHT_CM = 0.25;
   const SLIGHT_DEG = 5;
-  const ERRORS = {
-    wrong_kind: "Wrong kind", wrong_rotation: "Wrong rotation", too_early: "Too early",
-    off_sideways: "Off sideways", off_height: "Off in height", interpenetrating: "Interpenetrating",
-    floating: "Floating", toppling: "Toppling others",
-  };
   const ENDS = {
-    stands: "stands", falls: "falls", knocks_over: "knocks others over", overlaps: "no room",
+    stands: "stands", falls: "falls", knocks_over: "knocks others over", overlaps: "overlaps",
     under_floor: "under the floor", no_block: "no such block",
   };
   const PHYSICAL = ["interpenetrating", "floating", "toppling"];
@@ -121,7 +116,7 @@ const Poses = (() => {
   }
 
   function describe(scene, given, outcome, number) {
-    const verdict = outcome.error ? ERRORS[outcome.error] : "Correct";
+    const verdict = outcome.error ? Words.named(outcome.error) : "Correct";
     const end = ENDS[outcome.end];
     const isSaid = !outcome.error || PHYSICAL.includes(outcome.error);
     return {
