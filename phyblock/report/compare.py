@@ -51,8 +51,8 @@ class Comparison:
     `table` has one row a pair and part of the track (levels, categories of questions): a, b, part,
     value_a, value_b, difference (a minus b), se, lo, hi [all in `unit`], p, p_holm (corrected for
     all rows), verdict, detectable (the difference that a single test finds in four of five cases)
-    and detectable_holm (the same at the first step of Holm's correction) [in `unit`], better,
-    worse and same (samples on which a has the better, worse, same value), n_samples, n_scenes,
+    and detectable_holm (the same at the first step of Holm's correction) [in `unit`; NaN where that
+    is more than values can differ by], better, worse and same (samples on which a has the better, worse, same value), n_samples, n_scenes,
     n_clusters. `ranks` has one row a model where all pairs of several models were compared as a
     whole: model, value, best and worst rank that the model may have. `flipped` has one row a pair
     and sample that one side alone got wholly right: a, b, scene, item (scene or question), seed,
@@ -256,6 +256,8 @@ def _estimated(
     numbers = {"value_a": values[:, 0], "value_b": values[:, 1], "difference": found.value}
     numbers |= {"se": found.se, "lo": found.lo, "hi": found.hi}
     table = pd.DataFrame({name: what.measure.scale * value for name, value in numbers.items()})
+    most = what.measure.most_apart
+    table[["lo", "hi"]] = table[["lo", "hi"]].clip(-most, most)
     tallies = pd.DataFrame([_tally(one, what, part) for one in paired])
     more = {"n_scenes": seen.sum(axis=0), "n_clusters": sizes}
     return pd.concat([table.assign(p=found.p), tallies], axis=1).assign(**more)

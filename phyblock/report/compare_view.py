@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pandas as pd
@@ -74,9 +75,11 @@ def _notes(found: Comparison) -> tuple[str, ...]:
             f"{counted(most['n_clusters'], 'base scene')}; scenes that share one are not taken as "
             "independent."
         )
+        single = table["detectable"].median()
+        median = "" if math.isnan(single) else f"; a single test, in the median, {number(single)}"
         notes.append(
-            f"“finds”: the difference that this comparison would find in {POWER:.0%} of cases; "
-            f"a single one of these tests, in the median, {number(table['detectable'].median())}."
+            f"“finds”: the difference that this comparison would find in {POWER:.0%} of cases"
+            f"{median}; {NO_VALUE}: none that is possible, or no sample differs."
         )
     notes.append(
         f"p values are corrected for {table['p'].notna().sum()} comparisons (Holm); “cannot tell” "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -96,6 +97,11 @@ class Measure:
     def scale(self) -> float:
         """What a value is multiplied by where it is shown."""
         return 100.0 if self.unit == "%" else 1.0
+
+    @property
+    def most_apart(self) -> float:
+        """The most that two values can differ by, as they are shown; infinite without a bound."""
+        return self.scale * (2 if self.is_difference else 1) if self.unit == "%" else math.inf
 
 
 def value_key(row: Mapping[Any, Any]) -> str:

@@ -49,6 +49,9 @@ def test_turning_a_pair_round_turns_all_that_it_says_round(records: Records) -> 
     for name, sign in (("difference", -1), ("se", 1), ("p_holm", 1), ("n_samples", 1)):
         pd.testing.assert_series_equal(one[name], sign * other[name], check_names=False)
     pd.testing.assert_series_equal(one["lo"], -other["hi"], check_names=False)
+    # No two shares are further apart than 100 points, of however few scenes.
+    bounded = one[["lo", "hi", "detectable", "detectable_holm"]]
+    assert not (bounded.abs() > 100).any(axis=None)
 
 
 def test_only_samples_that_both_have_are_compared() -> None:
