@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri, stdtr, stdtrit  # type: ignore[import-untyped]
 
 from phyblock.scoring.ratios import Floats, Metric, f1_of
-from phyblock.scoring.uncertainty import Clusters, in_unit_range, jackknife
+from phyblock.scoring.uncertainty import Clusters, in_range, jackknife
 from tests.scoring.worlds import World
 
 WORLDS = {
@@ -94,7 +94,7 @@ def main() -> None:
             apart = weaker(counts, rng)
             gaps.append(float(difference_of(apart.sum(axis=0))))
             for name, groups in (("naive", alone), ("jackknife", clusters)):
-                one = in_unit_range(jackknife(counts[:, 0], groups, f1_of))
+                one = in_range(jackknife(counts[:, 0], groups, f1_of))
                 held[name].append(bool(one.lo <= truth <= one.hi))
                 widths[name].append(float(one.hi - one.lo))
                 for case, pair in (("alike", counts), ("apart", apart)):

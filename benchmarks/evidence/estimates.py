@@ -24,7 +24,7 @@ from phyblock.datasets import AssemblyTask, read_official, recorded_models
 from phyblock.domain import Plan
 from phyblock.scoring import ERROR_TYPES, Goal, level1_counts
 from phyblock.scoring.ratios import Floats, f1_of, ratio_of, recall_of
-from phyblock.scoring.uncertainty import Clusters, in_unit_range, jackknife
+from phyblock.scoring.uncertainty import Clusters, in_range, jackknife
 
 Tasks = tuple[AssemblyTask, ...]
 LEVEL1 = 2
@@ -64,7 +64,7 @@ def print_whole_plans(
         rows = np.array([[one.fp == one.fn == 0, 1] for one in found], dtype=np.float64)
         rng = np.random.default_rng(seed)
         lo, hi, _ = pigeonhole(rows, clusters, ratio_of, rng, resamples)
-        now = in_unit_range(jackknife(rows, clusters, ratio_of))
+        now = in_range(jackknife(rows, clusters, ratio_of))
         print(
             f"  {model:24} {100 * now.value:4.1f}: before {100 * lo:.1f} to {100 * hi:.1f}, "
             f"now {100 * now.lo:.1f} to {100 * now.hi:.1f}"
@@ -84,7 +84,7 @@ def print_errors(tasks: Tasks, plans: dict[str, list[Plan]], clusters: Clusters)
     print("error types, all models: share of wrong steps, interval (before: none) [%]")
     for n, name in enumerate(ERROR_TYPES):
         one = np.stack([counts[:, n], counts.sum(axis=1)], axis=-1)
-        now = in_unit_range(jackknife(one, clusters, ratio_of))
+        now = in_range(jackknife(one, clusters, ratio_of))
         print(f"  {name:24} {100 * now.value:.1f}: {100 * now.lo:.1f} to {100 * now.hi:.1f}")
     told = ", ".join(map(str, of_levels[LEVEL1]))
     print(f"  rows of level 2: {told}; of level 1, before: {told}, now: no row")

@@ -31,7 +31,7 @@ __all__ = [
     "Estimate",
     "detectable",
     "holm",
-    "in_unit_range",
+    "in_range",
     "jackknife",
     "least_p",
     "rank_ranges",
@@ -40,6 +40,8 @@ __all__ = [
 CONFIDENCE = 0.95
 POWER = 0.8
 """How often a difference is found that `detectable` names."""
+_NOTHING = 1e-9
+"""Share of a value that its standard error has by rounding alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,31 +135,38 @@ def jackknife(
     return Estimate(value, se, value - wide, value + wide, p, behind)
 
 
-def in_unit_range(found: Estimate, is_share: ArrayLike = True) -> Estimate:
-    """The same estimates, of which shares have Wilson's interval in the place of Student's.
+def in_range(found: Estimate, most: ArrayLike = 1.0) -> Estimate:
+    """The same estimates, with Wilson's interval in the place of Student's where a range is known.
 
-    Of a share p with standard error s, its effective number of samples is p (1 - p) / s^2 (Kish),
-    and where every unit agrees on 0 or on 1, so that s says nothing, the number of clusters; the
-    interval is that of Wilson (Journal of the American Statistical Association 22, 1927) with
-    Student's quantile (Dean and Pagano, *Evaluating confidence interval methods for binomial
-    proportions in clustered surveys*, Journal of Survey Statistics and Methodology 3, 2015). It
-    stays in [0, 1] and has a width at 0 and at 1 as well.
+    Values are from 0 to `most`: 1 for shares, infinity for what is never below zero; NaN for no
+    range, which keeps Student's. Of a share p with standard error s, the effective number of
+    samples is p (1 - p) / s^2 (Kish), and where every unit agrees, so that s says nothing, the
+    number of clusters; the interval is that of Wilson (Journal of the American Statistical
+    Association 22, 1927) with Student's quantile (Dean and Pagano, *Evaluating confidence interval
+    methods for binomial proportions in clustered surveys*, Journal of Survey Statistics and
+    Methodology 3, 2015). Any other mean is taken as a share of the end of its range, in the limit
+    where that is infinite. The interval stays in the range and has a width even where nothing
+    varies, unless the range has no end, which leaves no scale for one.
     """
-    chosen = np.broadcast_to(np.asarray(is_share, dtype=bool), found.value.shape)
-    share = np.where(chosen, found.value, np.nan)
+    end = np.broadcast_to(np.asarray(most, dtype=np.float64), found.value.shape)
+    chosen = ~np.isnan(end)
+    value = np.where(chosen, found.value, np.nan)
     behind = found.n_clusters.astype(np.float64)
     known = ~np.isnan(found.se) & chosen
     t = stdtrit(np.where(known & (behind > 1), behind - 1, np.nan), (1 + CONFIDENCE) / 2)
-    at_end = (share <= 0) | (share >= 1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        # s^2 / (p (1 - p)), the inverse of the effective number, is 0 where nothing varies.
-        per_sample = np.where(at_end, 1 / behind, found.se**2 / (share * (1 - share)))
-    scale = 1 + t**2 * per_sample
-    centre = (share + t**2 * per_sample / 2) / scale
-    half = t * np.sqrt(per_sample * (share * (1 - share) + t**2 * per_sample / 4)) / scale
-    # Rounding leaves no share outside of its interval.
-    lo, hi = np.minimum(centre - half, share), np.maximum(centre + half, share)
-    lo, hi = np.maximum(lo, 0.0), np.minimum(hi, 1.0)
+        inverse = 1 / end
+        spread = value * (1 - value * inverse)
+        is_still = (spread <= 0) | (found.se <= _NOTHING * value)
+        # What one cluster that fell at either end would vary by, over `spread`.
+        still = np.where(inverse > 0, 1 / (behind * inverse), 0.0)
+        per_spread = np.where(is_still, still, found.se**2 / spread)
+    scale = 1 + t**2 * per_spread * inverse
+    centre = (value + t**2 * per_spread / 2) / scale
+    half = t * np.sqrt(per_spread * (spread + t**2 * per_spread / 4)) / scale
+    # Rounding leaves no value outside of its interval.
+    lo, hi = np.minimum(centre - half, value), np.maximum(centre + half, value)
+    lo, hi = np.maximum(lo, 0.0), np.minimum(hi, end)
     return replace(found, lo=np.where(known, lo, found.lo), hi=np.where(known, hi, found.hi))
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from phyblock.scoring.ratios import Floats
-from phyblock.scoring.uncertainty import Clusters, in_unit_range, jackknife
+from phyblock.scoring.uncertainty import Clusters, in_range, jackknife
 from phyblock.tables.intervals import Grouping, base_scenes, grouped, parents_of, summed
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Cell, Measure, SampleCounts
@@ -189,8 +189,7 @@ def _rows_of(
         all_values,
         n_clusters=np.repeat(usable[:, :, None], len(measures), axis=-1),
     )
-    is_share = np.array([measure.is_share for measure in measures])
-    within = in_unit_range(found, is_share)
+    within = in_range(found, [measure.end_of_range for measure in measures])
     spread = _over_seeds(all_values(pool.of_seeds))
     members = np.array([[n in pooled_in(cell, cells) for n in pool.pooled] for cell in cells])
     scenes = np.any(present[:, :, None, :] & members, axis=-1).sum(axis=0)

@@ -67,7 +67,8 @@ class Measure:
     defined. `heading` and `meaning` are for people; `unit` "%" stands for values in [0, 1] that
     tables show times 100. `over` names what is counted. `chance` says what guessing gives in a
     cell, `floors` names baselines that never see the goal. One that is not `in_tables` is in the
-    frame of estimates alone. One that `is_difference` of two shares may be below zero.
+    frame of estimates alone. One that `is_difference` of two shares may be below zero. Values in
+    another unit are from 0 to `most` where that is given, infinity for no end.
     """
 
     name: str
@@ -82,11 +83,19 @@ class Measure:
     floors: tuple[str, ...] = ()
     in_tables: bool = True
     is_difference: bool = False
+    most: float | None = None
 
     @property
     def is_share(self) -> bool:
         """Whether values are parts of a whole, which bounds their intervals."""
         return self.unit == "%" and not self.is_difference
+
+    @property
+    def end_of_range(self) -> float:
+        """Where the range of values ends that begins at 0; NaN for no range."""
+        if self.is_share:
+            return 1.0
+        return math.nan if self.most is None else self.most
 
     @property
     def best(self) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 
 from phyblock.domain.question import SUBTASKS, Question, Subtask
 from phyblock.scoring.ratios import ratio_of
-from phyblock.scoring.uncertainty import Clusters, in_unit_range, jackknife
+from phyblock.scoring.uncertainty import Clusters, in_range, jackknife
 from phyblock_making.attacks.cues import CUES, Floats
 from phyblock_making.attacks.observed import RULES, Observed, credit, kind_of
 from phyblock_making.attacks.probes import (
@@ -222,7 +222,7 @@ def _attacked(
         [question.scene.parents or (question.scene.id,) for question in questions]
     )
     counts = np.stack([sides, np.ones_like(sides)], axis=-1)
-    found = in_unit_range(jackknife(counts, clusters, ratio_of))
+    found = in_range(jackknife(counts, clusters, ratio_of))
     most, least = (
         Rate(float(found.value[side]), float(found.lo[side]), float(found.hi[side]))
         for side in (0, 1)

@@ -18,7 +18,7 @@ from phyblock.scoring.uncertainty import (
     Clusters,
     detectable,
     holm,
-    in_unit_range,
+    in_range,
     jackknife,
     rank_ranges,
 )
@@ -68,7 +68,7 @@ def test_a_mean_of_lone_units_has_students_interval(x: np.ndarray) -> None:
     se = x.std(ddof=1) / np.sqrt(len(x))
     assert found.se == pytest.approx(se, abs=1e-9)
     lo, hi = x.mean() + stats.t.ppf([0.025, 0.975], len(x) - 1) * se
-    assert (found.lo, found.hi) == pytest.approx((lo, hi), abs=1e-6)
+    assert (float(found.lo), float(found.hi)) == pytest.approx((lo, hi), abs=1e-6)
 
 
 @given(hnp.arrays(np.int64, (6, 3), elements=st.integers(0, 9)), st.integers(2, 5))
@@ -84,7 +84,7 @@ def test_counts_a_whole_number_of_times_as_large_change_nothing(
 
 @given(hnp.arrays(np.int64, (8, 3), elements=st.integers(0, 9)))
 def test_the_interval_of_a_share_holds_it_and_stays_in_its_range(counts: np.ndarray) -> None:
-    found = in_unit_range(jackknife(counts, alone(8), f1_of))
+    found = in_range(jackknife(counts, alone(8), f1_of))
     if np.isnan(found.se):
         assert np.isnan([found.lo, found.hi, found.p]).all()
     else:
@@ -96,18 +96,57 @@ def test_a_difference_keeps_students_interval_beside_shares() -> None:
         [np.array([[2, 5], [1, 5], [0, 5]]), np.array([[-2, 5], [-1, 5], [-4, 5]])], 1
     )
     found = jackknife(counts, alone(3), mean_of)
-    bounded = in_unit_range(found, [True, False])
+    bounded = in_range(found, [1.0, np.nan])
     assert (bounded.lo[1], bounded.hi[1]) == (found.lo[1], found.hi[1])
     assert 0 < bounded.lo[0] < bounded.value[0] < bounded.hi[0] < 1
 
 
 @given(st.integers(2, 300), st.booleans())
 def test_none_of_n_and_all_of_n_have_wilsons_interval(n: int, is_right: bool) -> None:
-    found = in_unit_range(jackknife([[int(is_right), 1]] * n, alone(n), ratio_of))
+    found = in_range(jackknife([[int(is_right), 1]] * n, alone(n), ratio_of))
     assert found.hi > found.lo
     quantile = stats.t.ppf(0.975, n - 1) ** 2
     assert found.hi - found.lo == pytest.approx(quantile / (n + quantile))
     assert found.hi == 1 if is_right else found.lo == 0
+
+
+@given(st.integers(1, 9), st.integers(10, 19), st.integers(2, 40), st.integers(2, 6))
+def test_scenes_that_agree_leave_a_share_in_doubt(part: int, whole: int, n: int, k: int) -> None:
+    """As much as if each were one sample, also where scenes of several counts have the same."""
+    counts = np.array([[part, whole]] * n)
+    found = in_range(jackknife(counts * np.arange(1, n + 1)[:, None] ** k, alone(n), ratio_of))
+    same = in_range(jackknife(counts, alone(n), ratio_of))
+    assert 0 < found.lo < found.value < found.hi < 1
+    assert (float(found.lo), float(found.hi)) == pytest.approx((float(same.lo), float(same.hi)))
+    p, z = part / whole, stats.t.ppf(0.975, n - 1)
+    bounds = [float(found.lo), float(found.hi)]
+    ends = [(p - end) ** 2 for end in bounds]
+    assert ends == pytest.approx([z**2 * e * (1 - e) / n for e in bounds])
+
+
+@given(
+    hnp.arrays(float, st.integers(2, 12), elements=st.floats(0, 180, width=32)),
+    st.sampled_from([180.0, 400.0, np.inf]),
+)
+def test_an_interval_stays_in_the_range_of_its_measure(x: np.ndarray, most: float) -> None:
+    student = jackknife(np.stack([x, np.ones(len(x))], 1), alone(len(x)), mean_of)
+    found = in_range(student, most)
+    assert 0 <= found.lo <= found.value <= found.hi <= most
+    if found.se > 1e-6 * found.value:
+        assert found.lo < found.value < found.hi
+    if most < np.inf:
+        share = jackknife(np.stack([x / most, np.ones(len(x))], 1), alone(len(x)), mean_of)
+        as_share = in_range(share)
+        assert (float(found.lo), float(found.hi)) == pytest.approx(
+            tuple(most * float(end) for end in (as_share.lo, as_share.hi))
+        )
+        return
+    # A range without end is the limit of one whose end is far away.
+    far = in_range(student, 1e9)
+    if found.se > 1e-3 * found.value:
+        assert (float(found.lo), float(found.hi)) == pytest.approx(
+            (float(far.lo), float(far.hi)), rel=1e-3, abs=1e-6
+        )
 
 
 @given(hnp.arrays(np.int64, (8, 3), elements=st.integers(0, 9)))
@@ -270,7 +309,7 @@ def test_intervals_hold_the_truth_and_tests_err_as_often_as_they_say(world: Worl
     n, covered, erred = 1000, 0, 0
     for _ in range(n):
         counts, clusters, _ = world.draw(draw, models=2)
-        found = in_unit_range(jackknife(counts[:, 0], clusters, f1_of))
+        found = in_range(jackknife(counts[:, 0], clusters, f1_of))
         covered += bool(found.lo <= truth <= found.hi)
         # Both models are alike in truth.
         erred += bool(jackknife(counts, clusters, difference_of).p < 0.05)

@@ -4,6 +4,7 @@ plan without its poses; by level.
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
 import numpy as np
@@ -137,12 +138,12 @@ POSE_PLANNING_MEASURES = (
     Measure(
         "position_error", "Position error", FITS, partial(_mean, FITS, "position_cm", "n"),
         "distance of steps from the blocks that they stand for", unit="cm", better="lower",
-        over="steps",
+        over="steps", most=math.inf,
     ),
     Measure(
         "rotation_error", "Rotation error", FITS, partial(_mean, FITS, "turn_deg", "n"),
         "how far these steps are turned, up to symmetry", unit="degrees", better="lower",
-        over="steps",
+        over="steps", most=180.0,
     ),
     Measure(
         "volume_iou", "Volume IoU", FITS, partial(_mean, FITS, "iou", "n"),
