@@ -41,6 +41,7 @@ _KEPT_PICTURES = 64
 """Of one scene; 50 MB at 512 pixels."""
 _MOST_OF_A_KIND = 255
 _SMALLEST_PX = 16
+_RENDER_MODES = ("rgb_array",)
 
 
 class PhyBlockEnv(gymnasium.Env[Observation, Any]):
@@ -56,7 +57,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
     `max_failures` failed moves in a row (None: no bound).
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": [*_RENDER_MODES], "render_fps": 2}  # noqa: RUF012
 
     def __init__(
         self,
@@ -94,7 +95,10 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         )
         _check_together(action, setting, gating, physics, rotation)
         _check_limits(max_steps=max_steps, max_failures=max_failures)
-        if size_px < _SMALLEST_PX:
+        if render_mode not in (None, *_RENDER_MODES):
+            allowed = ", ".join(_RENDER_MODES)
+            raise ValueError(f"render_mode is {render_mode!r}; allowed: {allowed}, or None")
+        if not _SMALLEST_PX <= size_px <= LARGEST_PX:
             raise ValueError(f"size_px is {size_px}, allowed {_SMALLEST_PX}..{LARGEST_PX}")
         tasks = read_tasks(data) if isinstance(data, str | Path) else tuple(data)
         if levels is not None:
@@ -119,6 +123,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         self.render_mode = render_mode
         self._steps = self._failures = self._most_steps = 0
         self._outcome: str = ""
+        self._is_over = False
         self._pictures: OrderedDict[tuple[Block, ...] | str, NDArray[np.uint8]] = OrderedDict()
         self._begin(self._task)
         self.action_space = self._play.action_space
@@ -128,7 +133,12 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin a scene: `options["scene"]`, else the one given, else one drawn at random."""
+        """Begin a scene: `options["scene"]`, else the one given, else one drawn at random.
+
+        Raises ValueError for another option, DataError for a scene that is not there.
+        """
+        if unknown := sorted(map(str, set(options or {}) - {"scene"})):
+            raise ValueError(f"options has {', '.join(unknown)}; allowed: scene")
         super().reset(seed=seed)
         name = (options or {}).get("scene", self._scene)
         if name is None:
@@ -137,16 +147,23 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         return self._observation(), self._info()
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Try a candidate, or end the assembly; ValueError for an action outside the space."""
+        """Try a candidate, or end the assembly.
+
+        Raises ValueError for an action outside the space, ResetNeeded of gymnasium where the
+        episode has ended.
+        """
+        if self._is_over:
+            raise gymnasium.error.ResetNeeded("the episode has ended: call reset() before step()")
         acted = self._play.act(action)
         self._steps += 1
         if acted is None:
-            self._outcome = "done"
+            self._outcome, self._is_over = "done", True
             return self._observation(), 0.0, True, False, self._info()
         self._outcome = acted.outcome
         self._failures = 0 if acted.is_right else self._failures + 1
         ended = self._play.has_ended
         cut = self._steps >= self._most_steps or self._failures == self._max_failures
+        self._is_over = ended or cut
         return self._observation(), acted.reward, ended, cut and not ended, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -170,7 +187,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
     def _begin(self, task: AssemblyTask) -> None:
         self._play.begin(task)
         self._steps = self._failures = 0
-        self._outcome = "begun"
+        self._outcome, self._is_over = "begun", False
         most = self._max_steps
         self._most_steps = 2 * len(task.scene) if most is None else most
         if task is not self._task:

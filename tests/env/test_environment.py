@@ -229,7 +229,9 @@ def test_an_invalid_candidate_is_told() -> None:
         ({"physics": "strct"}, "allowed: off, settle, strict"),
         ({"observe": "picture"}, "allowed: pictures, state"),
         ({"size_px": 15}, "size_px is 15, allowed 16..2048"),
-        ({"size_px": 2049}, "size_px is 2049, allowed"),
+        ({"size_px": 2049}, "size_px is 2049, allowed 16..2048"),
+        ({"size_px": 1e9}, "allowed 16..2048"),
+        ({"render_mode": "human"}, "render_mode is 'human'; allowed: rgb_array, or None"),
         ({"max_steps": 0}, "max_steps is 0"),
         ({"max_failures": -1}, "max_failures is -1"),
         ({"data": ()}, "no tasks"),
@@ -243,6 +245,26 @@ def test_an_invalid_candidate_is_told() -> None:
 def test_an_option_that_is_not_allowed_is_said(options: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         PhyBlockEnv(**{"data": SOME, **options})
+
+
+def test_what_reset_knows_no_option_for_is_said() -> None:
+    env = PhyBlockEnv(SOME[:1], observe="state", physics="off")
+    with pytest.raises(ValueError, match="options has seeds, x; allowed: scene"):
+        env.reset(options={"x": 1, "seeds": 2})
+
+
+@pytest.mark.parametrize("limit", [{}, {"max_steps": 1}, {"max_failures": 1}])
+def test_nothing_is_carried_out_after_the_end(limit: dict[str, int]) -> None:
+    env = PhyBlockEnv(SOME[:1], observe="state", physics="off", **limit)
+    _, info = env.reset()
+    wrong = next(n for n in range(1, 17) if n not in info["right_moves"])
+    *_, ended, cut, info = env.step(wrong if limit else DONE)
+    assert (ended, cut) == (not limit, bool(limit))
+    with pytest.raises(gymnasium.error.ResetNeeded, match="call reset"):
+        env.step(wrong)
+    _, info = env.reset()
+    *_, info = env.step(info["right_moves"][0])
+    assert len(info["chosen"]) == 1
 
 
 def test_blocks_change_places_in_the_step_that_says_so_and_not_in_the_next() -> None:
