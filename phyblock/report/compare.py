@@ -52,13 +52,13 @@ class Comparison:
     value_a, value_b, difference (a minus b), se, lo, hi [all in `unit`], p, p_holm (corrected for
     all rows), verdict, detectable (the difference that a single test finds in four of five cases)
     and detectable_holm (the same at the first step of Holm's correction) [in `unit`; NaN where that
-    is more than values can differ by], better, worse and same (samples on which a has the better, worse, same value), n_samples, n_scenes,
-    n_clusters. `ranks` has one row a model where all pairs of several models were compared as a
-    whole: model, value, best and worst rank that the model may have. `flipped` has one row a pair
-    and sample that one side alone got wholly right: a, b, scene, item (scene or question), seed,
-    variant (what differs from the reference of the run), right (that side's label), value_a,
-    value_b. `name` is what the values are called, `unit`
-    theirs, `how` says what they are.
+    is more than values can differ by], better, worse and same (samples on which a has the better,
+    worse, same value), n_samples, n_scenes, n_clusters. `ranks` has one row a model where all pairs
+    of several models were compared as a whole: model, value, best and worst rank that the model may
+    have. `flipped` has one row a pair and sample that one side alone got wholly right: a, b, scene,
+    item (scene or question), seed, variant (what differs from the reference of the run), right
+    (that side's label), value_a, value_b. `name` is what the values are called, `unit` theirs,
+    `how` says what they are.
     """
 
     table: pd.DataFrame
