@@ -19,16 +19,22 @@ from phyblock.parsing import READER_VERSION
 from phyblock.records import MANIFEST, RECORDS, Manifest, read_manifest
 from phyblock.run.rescore import judged_anew
 from phyblock.run.rewritten import manifest_text, records_text
+from phyblock.tables.design import read_design
+from phyblock.tracks.kind import kinds_with_physics
 
-__all__ = ["Verified", "opened_bundle"]
+__all__ = ["FELL", "Verified", "opened_bundle"]
 
+FELL = "what fell is taken from the records"
+"""What is not scored again, in words."""
 _SHOWN = 5
 
 
 @dataclass(frozen=True)
 class Verified:
     """A bundle that was scored again: `folder` is its run, with the data of this machine, while it
-    is open; `records` and `tables` are how many came out as the same bytes.
+    is open; `records` and `tables` are how many came out as the same bytes, `expected` how many
+    samples a whole run has. Of the tracks in `physics`, by their titles, what fell is taken from
+    the records.
     """
 
     about: About
@@ -36,6 +42,13 @@ class Verified:
     folder: Path
     records: int
     tables: int
+    expected: int
+    physics: tuple[str, ...]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether no sample was left out."""
+        return self.records == self.expected
 
 
 @contextlib.contextmanager
@@ -58,10 +71,12 @@ def opened_bundle(path: Path, data: Sequence[Path] = (), name: str = "") -> Iter
             (folder / MANIFEST).write_text(manifest_text(here), encoding="utf-8")
             judged, records = judged_anew(folder)
         _check_lines(where, about, folder / RECORDS, records_text(records))
-        _check_floors(where, about, manifest, judged)
+        _check_worked_out(where, about, manifest, judged)
         tables = written_with_tables(Path(scratch) / "again", manifest, records)
         _check_tables(where, about, tables)
-        yield Verified(about, manifest, folder, len(records), len(tables))
+        expected = read_design(manifest.fields(), where).all_samples
+        physics = tuple(kind.title for kind in kinds_with_physics(manifest.suite))
+        yield Verified(about, manifest, folder, len(records), len(tables), expected, physics)
 
 
 def _check_lines(where: str, about: About, told: Path, again: str) -> None:
@@ -77,10 +92,12 @@ def _check_lines(where: str, about: About, told: Path, again: str) -> None:
         raise StoreError(Problem(where, message, found=found, hint=_hint(about)))
 
 
-def _check_floors(where: str, about: About, told: Manifest, again: Manifest) -> None:
-    if told.floors != again.floors:
-        message = "does not verify: worked out again, floors come out otherwise"
-        raise StoreError(Problem(where, message, "floors", hint=_hint(about)))
+def _check_worked_out(where: str, about: About, told: Manifest, again: Manifest) -> None:
+    """Raise StoreError naming what follows from suite and data and is said otherwise."""
+    for field in ("floors", "items", "scenes", "scenes_by_level"):
+        if getattr(told, field) != getattr(again, field):
+            message = f"does not verify: worked out again, {field} come out otherwise"
+            raise StoreError(Problem(where, message, field, hint=_hint(about)))
 
 
 def _check_tables(where: str, about: About, tables: dict[str, str]) -> None:

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import click
 
-from phyblock.bundle import BUNDLE_FILE, bundle_run
+from phyblock.bundle import BUNDLE_FILE, Verified, bundle_run
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
 from phyblock.plain_text import counted
 
-__all__ = ["command"]
+__all__ = ["command", "how_whole"]
 
 _MB = 1e6
 
@@ -41,3 +41,10 @@ def command(run: Path, out: Path | None, data: tuple[Path, ...]) -> None:
         f"Verified: {counted(made.verified.records, 'record')} scored again and "
         f"{counted(made.verified.tables, 'table file')} come out the same."
     )
+    console.print(how_whole(made.verified))
+
+
+def how_whole(found: Verified) -> str:
+    """How many samples a bundle has of those that its suite asks for."""
+    samples = f"{found.records:,} of {found.expected:,} expected samples"
+    return f"{samples}." if found.is_whole else f"{samples}: the run is not whole."

@@ -7,6 +7,8 @@ from pathlib import Path
 import click
 
 from phyblock.bundle import opened_bundle
+from phyblock.bundle.verify import FELL
+from phyblock.cli.bundle import how_whole
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
 from phyblock.plain_text import counted
@@ -24,7 +26,7 @@ __all__ = ["command"]
 )
 def command(file: Path, data: tuple[Path, ...]) -> None:
     """Score the replies in the bundle FILE again, and say whether its records and tables come out
-    as the same bytes. Exit code 2 where they do not.
+    as the same bytes, and whether samples were left out. Exit code 2 where they do not come out.
 
     Nothing is asked of anyone. Bundles hold no data: sets that come with phyblock are found, others
     are named with --data.
@@ -33,9 +35,14 @@ def command(file: Path, data: tuple[Path, ...]) -> None:
     with opened_bundle(file, data) as found:
         models = [model.name for model in found.manifest.models]
         console.print(f"{shown_path(file)} verifies.")
+        console.print(how_whole(found))
         console.print(
             f"{counted(found.records, 'record')} of {counted(len(models), 'model')}, scored again, "
             f"and {counted(found.tables, 'table file')} come out as the same bytes."
         )
         console.print(f"Run {found.manifest.run}, made with phyblock {found.about.phyblock}.")
+        if found.physics:
+            tracks = ", ".join(found.physics)
+            console.print(f"{tracks}: physics was not carried out, {FELL}.")
         console.print("That the models gave these replies, no bundle can show.")
+        console.print("Nor can it what they cost, how long they took, and which model answered.")

@@ -65,6 +65,11 @@ class ManifestModel(Line):
     """`litellm`: asked over the network; `replay`: a recording; `baseline`: a rule; `human`: a
     person."""
 
+    @property
+    def is_baseline(self) -> bool:
+        """Whether it is a rule; rules have no rank among models."""
+        return self.kind == "baseline"
+
 
 class ManifestDataset(Line):
     """The data set."""

@@ -17,8 +17,10 @@ from phyblock.parsing import READER_VERSION
 from phyblock.records import FORMAT, Manifest
 from phyblock.records.manifest import ManifestChoice
 from phyblock.run.models import PlannedModel
+from phyblock.sim.registry import told_engine
 from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tracks import AnyTrack, kind_of
+from phyblock.tracks.kind import kinds_with_physics
 from phyblock.variants import Variant
 
 __all__ = ["make_manifest"]
@@ -141,7 +143,8 @@ def _versions() -> dict[str, str]:
 def _of_tracks(loaded: LoadedSuite) -> dict[str, Any]:
     """What single tracks say beyond what all of them have."""
     kinds = [kind_of(name) for name in loaded.suite.tracks]
-    return {
+    told = {"engine": told_engine()} if kinds_with_physics(loaded.suite.model_dump()) else {}
+    return told | {
         key: value
         for kind in kinds
         if kind.manifest is not None

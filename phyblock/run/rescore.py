@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
+from phyblock.datasets import AssemblyTask
 from phyblock.errors import Problem, SpecError, StoreError
 from phyblock.parsing import reader_version
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
 from phyblock.records.reading import read_records
-from phyblock.run.data import recorded_dataset
+from phyblock.run.data import asked_about, recorded_dataset
 from phyblock.run.folder import check_place, run_folder
 from phyblock.run.judging import judged_apart
 from phyblock.run.records import about_item
@@ -58,23 +60,45 @@ def rescore(
         run_folder(folder).check([f"{name}/"])
     _check_target(target, identity)
     names = [name for name in suite.tracks if kind_of(name).rescored or counts_samples(name)]
-    records, floors = _scored(folder, manifest, suite, names, data)
-    told = {"identity": identity, "suite": suite.model_dump(mode="json"), "floors": floors}
-    write_run(target, manifest.model_copy(update=told), records)
+    scored = _scored(folder, manifest, suite, names, data)
+    told = {"identity": identity, "suite": suite.model_dump(mode="json"), "floors": scored.floors}
+    write_run(target, manifest.model_copy(update=told), scored.records)
     return target
 
 
 def judged_anew(folder: Path, data: Path | None = None) -> tuple[Manifest, list[Record]]:
     """The manifest and the newest records of a run, made again of its replies and its data.
 
-    All tracks are judged, and what records say of their items is taken from the data. Physics is
-    not: what became of blocks that were let go is taken from the records. Nothing is written.
+    All tracks are judged, and what records say of their items is taken from the data, as is how
+    much was to be asked. Physics is not carried out: what became of blocks that were let go is
+    taken from the records. Nothing is written.
     Raises as `rescore`.
     """
     manifest = read_manifest(folder)
     suite = _suite(folder, manifest, None, None)
-    records, floors = _scored(folder, manifest, suite, suite.tracks, data, anew=True)
-    return manifest.model_copy(update={"floors": floors}), records
+    scored = _scored(folder, manifest, suite, suite.tracks, data, anew=True)
+    scenes = [task.scene for task in scored.asked]
+    told = {
+        "floors": scored.floors,
+        "items": scored.items,
+        "scenes": len(scenes),
+        "scenes_by_level": {
+            level: sum(level in scene.levels for scene in scenes) for level in suite.levels
+        },
+    }
+    return manifest.model_copy(update=told), scored.records
+
+
+@dataclass(frozen=True)
+class _Scored:
+    """Records judged again; what floors reach, the scenes asked about, and items of each track that
+    was judged.
+    """
+
+    records: list[Record]
+    floors: FloorValues
+    asked: Sequence[AssemblyTask]
+    items: Mapping[str, int]
 
 
 def _scored(
@@ -85,8 +109,8 @@ def _scored(
     data: Path | None,
     *,
     anew: bool = False,
-) -> tuple[list[Record], FloorValues]:
-    """The records of a run, those of the tracks in `names` judged again, and what floors reach."""
+) -> _Scored:
+    """The records of a run, those of the tracks in `names` judged again."""
     dataset = recorded_dataset(folder, manifest, suite.levels, data)
 
     def reopened(name: str, one: SuiteSpec) -> AnyTrack:
@@ -101,7 +125,10 @@ def _scored(
     from phyblock.run.floors import floor_values
 
     told = {"suite": suite.model_dump(mode="json")}
-    return records, floor_values(manifest.model_copy(update=told), suite, reopened)
+    floors = floor_values(manifest.model_copy(update=told), suite, reopened)
+    asked = asked_about(manifest, suite.levels, dataset).tasks
+    items = {name: len(track.items) for name, track in tracks[""].items()}
+    return _Scored(records, floors, asked, items)
 
 
 async def _judged_again(

@@ -10,17 +10,15 @@ from typing import Any
 from phyblock.site.entries import Entry
 from phyblock.site.ranking import rank_ranges_of
 from phyblock.site.runs import SiteRun
-from phyblock.site.values import TrackValues, values_of
+from phyblock.site.values import AllValues, TrackValues, values_of
 from phyblock.tables.headline import Value
 from phyblock.tables.showing import varied_words
 from phyblock.tracks.estimates import track_measures
 from phyblock.tracks.headline import headline_columns, main_column, main_measure
 from phyblock.tracks.kind import kind_of
 
-__all__ = ["AllValues", "all_values", "board_of"]
+__all__ = ["all_values", "board_of"]
 
-AllValues = Mapping[tuple[int, str], TrackValues]
-"""By number of the run, and track."""
 _DIGITS = 4
 
 
@@ -75,6 +73,7 @@ def _track(track: str, one: SiteRun) -> dict[str, Any]:
         "better": measure.better,
         "best": measure.best,
         "notes": list(kind.report().notes(run)),
+        "physics": kind.physics(run.manifest.suite),
     }
 
 
@@ -108,7 +107,7 @@ def _rows(
     for track, number in first.items():
         main = _id(track, next(iter(values[number, track].values)), _main(track, runs[number]))
         ranked = [entry for entry in entries if main in _values(entry, values)]
-        ranges[track] = rank_ranges_of(track, ranked, runs)
+        ranges[track] = rank_ranges_of(track, ranked, runs, values)
     return [
         {
             "name": entry.name,

@@ -10,21 +10,27 @@ from phyblock.report.compare import Side, compare
 from phyblock.report.verdicts import ranks
 from phyblock.site.entries import Entry
 from phyblock.site.runs import SiteRun
+from phyblock.site.values import AllValues
 
 __all__ = ["rank_ranges_of"]
 
 
 def rank_ranges_of(
-    track: str, entries: Sequence[Entry], runs: Sequence[SiteRun]
+    track: str, entries: Sequence[Entry], runs: Sequence[SiteRun], values: AllValues
 ) -> Mapping[str, tuple[int, int]]:
     """Best and worst rank of entries in a track, by name, Holm-corrected over all pairs.
 
-    `entries` are those with a value in it. A pair without a sample in common is not told apart.
-    Raises SpecError for runs that cannot be compared.
+    `entries` are those with a value in it. Only models have ranks, of which no sample was left out;
+    {} where there are not two. A pair without a sample in common is not told apart. Raises
+    SpecError for runs that cannot be compared.
     """
-    sides = [Side(entry.name, entry.model.name, runs[entry.runs[track]].run) for entry in entries]
+    sides = [
+        Side(entry.name, entry.model.name, runs[entry.runs[track]].run)
+        for entry in entries
+        if not entry.model.is_baseline and values[entry.runs[track], track].is_whole(entry.model)
+    ]
     if len(sides) < 2:
-        return {side.label: (1, 1) for side in sides}
+        return {}
     what = comparable(sides[0].run, track)
     table = compare(list(combinations(sides, 2)), what.parts[-1:], what).table
     known = table.assign(p=table["p"].fillna(1.0), p_holm=table["p_holm"].fillna(1.0))

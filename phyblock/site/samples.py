@@ -9,10 +9,10 @@ from typing import Any
 from phyblock.records import Record
 from phyblock.records.reading import any_records
 from phyblock.report.html.index import read_places
-from phyblock.site.board import AllValues
 from phyblock.site.chunks import Chunks
 from phyblock.site.entries import Entry
 from phyblock.site.runs import SiteRun
+from phyblock.site.values import AllValues
 from phyblock.tables.load import Run
 from phyblock.tracks.drawable import scene_entry
 from phyblock.tracks.kind import kind_of

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from phyblock.records.manifest import ManifestModel
 from phyblock.report.comparable import Comparable, comparable
 from phyblock.tables.cost import cost_frame
 from phyblock.tables.coverage import coverage_frame
@@ -17,7 +18,7 @@ from phyblock.tables.measures import Measure
 from phyblock.tracks.estimates import track_estimates, track_measures
 from phyblock.tracks.headline import headline_columns
 
-__all__ = ["Facts", "Key", "TrackValues", "values_of"]
+__all__ = ["AllValues", "Facts", "Key", "TrackValues", "values_of"]
 
 Key = tuple[str, str, int, str]
 """A sample of one model: scene, item, seed, variant."""
@@ -53,6 +54,15 @@ class TrackValues:
     values: Mapping[str, Mapping[tuple[str, str], Value]]
     samples: Mapping[str, Mapping[Key, float]]
     facts: Mapping[str, Facts] = field(default_factory=dict)
+
+    def is_whole(self, model: ManifestModel) -> bool:
+        """Whether no sample of a model was left out."""
+        facts = self.facts[model.name]
+        return facts.done == facts.expected
+
+
+AllValues = Mapping[tuple[int, str], TrackValues]
+"""By number of the run, and track."""
 
 
 def values_of(run: Run, track: str) -> TrackValues:

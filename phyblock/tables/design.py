@@ -101,6 +101,11 @@ class Design(_Part):
         return self.items.get(track, 0) * self.repeats
 
     @property
+    def all_samples(self) -> int:
+        """Samples that a complete run holds."""
+        return len(self.models) * sum(self.samples(track) for track in self.suite.tracks)
+
+    @property
     def repeats(self) -> int:
         """How often a model is asked about each item: with every seed, in every way."""
         return len(self.suite.seeds) * self.suite.vary.n_variants

@@ -19,7 +19,7 @@ from phyblock.tracks.base import AnyTrack
 from phyblock.tracks.by_hand import Picking
 from phyblock.tracks.studio import Workshop, render_workers
 
-__all__ = ["Opening", "TrackKind", "kind_of", "kinds"]
+__all__ = ["Opening", "TrackKind", "kind_of", "kinds", "kinds_with_physics"]
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,8 @@ class TrackKind:
     adds something to them. `counted` is what its measures count of every sample as it is judged.
     `no_examples` says why it shows no worked examples, "" where it does.
     `by_hand` says of a subject how a person answers, None where nothing can be picked.
-    `varies` names the factors of a suite's `vary` that change what it asks.
+    `varies` names the factors of a suite's `vary` that change what it asks. `physics` says of a
+    suite, as a manifest holds it, whether blocks are let go in a physics engine.
     """
 
     name: str
@@ -83,6 +84,7 @@ class TrackKind:
     no_examples: str = "it declares none"
     by_hand: Callable[[Any], Picking] | None = None
     varies: tuple[str, ...] = ("repeats",)
+    physics: Callable[[Mapping[str, Any]], bool] = lambda _: False
 
     def data_folder(self, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:
         """The folder of its own data: text, path of keys, whether it may be a bundled set."""
@@ -92,6 +94,12 @@ class TrackKind:
 def kinds() -> Mapping[str, TrackKind]:
     """Every track by name, in the order in which they are listed."""
     return {name: kind for name, kind in known_tracks().items() if isinstance(kind, TrackKind)}
+
+
+def kinds_with_physics(suite: Mapping[str, Any]) -> tuple[TrackKind, ...]:
+    """The tracks of a suite, as a manifest holds it, that let blocks go in a physics engine."""
+    asked = [kind for name, kind in kinds().items() if name in (suite.get("tracks") or ())]
+    return tuple(kind for kind in asked if kind.physics(suite))
 
 
 def kind_of(name: str) -> TrackKind:

@@ -155,13 +155,23 @@ def _twice(records: list[Raw], _: Raw) -> None:
     records.append(records[0])
 
 
+def _asked_about_less(records: list[Raw], manifest: Raw) -> None:
+    del records[1:]
+    manifest["items"] = {"full_planning": 1, "vqa": 0, "step_planning": 0}
+    manifest["scenes"] = 1
+
+
 def _floor(_: list[Raw], manifest: Raw) -> None:
     floors = manifest["floors"]["full_planning"]["all-candidates"]
     floors.update(dict.fromkeys(floors, 0.0))
 
 
 @pytest.mark.parametrize(
-    "change", [_score, _answer, _subtask, _level, _parents, _turn, _plan, _twice, _floor]
+    "change",
+    [
+        *(_score, _answer, _subtask, _level, _parents, _turn, _plan, _twice),
+        *(_floor, _asked_about_less),
+    ],
 )
 def test_what_does_not_follow_from_the_replies_is_refused(
     made: Workspace, tmp_path: Path, change: Callable[[list[Raw], Raw], None]
@@ -171,6 +181,21 @@ def test_what_does_not_follow_from_the_replies_is_refused(
         pytest.fail("it was taken")
     assert str(path) in str(caught.value)
     assert "/run/" not in str(caught.value)
+
+
+def test_samples_that_were_left_out_are_counted(made: Workspace, tmp_path: Path) -> None:
+    """Anyone may leave out what went wrong and bundle the rest: then it is said."""
+    copy = tmp_path / "run"
+    shutil.copytree(made.out, copy)
+    lines = (copy / RECORDS).read_text(encoding="utf-8").splitlines(keepends=True)
+    (copy / RECORDS).write_text("".join(lines[1:]), encoding="utf-8")
+    bundle_run(copy, made.root / "less.zip")
+    known = ("--data", "data", "--data", "questions")
+    done = made.phyblock("verify-bundle", "less.zip", *known)
+    assert done.code == 0, done.err
+    assert "9 of 10 expected samples: the run is not whole" in done.out
+    done = made.phyblock("verify-bundle", "out/bundle.zip", *known)
+    assert "10 of 10 expected samples." in done.out
 
 
 def test_what_is_not_changed_is_made_here_to_the_byte(made: Workspace, tmp_path: Path) -> None:

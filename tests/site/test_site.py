@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Collection, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -12,16 +13,14 @@ import pytest
 
 from phyblock.bundle import bundle_run
 from phyblock.errors import SpecError, StoreError
-from phyblock.report.compare import compare_models
+from phyblock.report.html.ranked import rank_texts
 from phyblock.report.html.sources import Sources
 from phyblock.site import write as site_write
 from phyblock.site import write_site
 from phyblock.site.alike import check_runs_alike
 from phyblock.site.board import all_values, board_of
 from phyblock.site.entries import entries_of
-from phyblock.site.ranking import rank_ranges_of
 from phyblock.site.runs import SiteRun, open_runs
-from phyblock.tables.load import Run
 from tests.report.factory import manifest, record, run_of, score
 from tests.workspace import Workspace
 
@@ -52,30 +51,57 @@ def test_the_board_says_what_tables_and_comparisons_say(made: Workspace) -> None
         runs = open_runs([made.root / "first"], (), kept)
         entries = entries_of(runs)
         board = board_of(runs, entries, all_values(runs))
-        compared = compare_models(runs[0].run, track="full_planning")
     rows = {row["name"]: row for row in board["rows"]}
     assert rows["oracle"]["values"]["full_planning/A/Overall F1"][0] == 100.0
     facts = rows["oracle"]["facts"]["full_planning"]
     assert (facts["expected"], facts["done"], facts["solved"]) == (5, 5, 5)
-    ranked = compared.ranks.set_index("model")[["best", "worst"]]
-    for name, row in rows.items():
-        assert row["ranks"]["full_planning"] == list(ranked.loc[name])
+    assert not any(row["ranks"] for row in board["rows"])
     settings = {column["setting"] for column in board["columns"] if column["track"] == "vqa"}
     assert settings == {""}
 
 
-def planned(model: str, seed: int, right: int) -> Run:
-    """A run of one model, `right` of four steps of every scene right."""
-    scores = [score(right, 4 - right, 4 - right, setting=setting) for setting in "AB"]
-    records = [record(model, scene, seed, scores) for scene in map(str, range(12))]
-    return run_of(records, manifest(models=[model], seeds=[seed]))
+SCENES = [str(number) for number in range(12)]
+
+
+def planned(
+    seed: int = 0, rules: Sequence[str] = (), left_out: Collection[str] = (), **right: int
+) -> SiteRun:
+    """A run of models by how many of four steps of every scene they have right; `rules` are
+    baselines among them, and of scenes `left_out` the first has no record.
+    """
+    records = [
+        record(model, scene, seed, [score(n, 4 - n, 4 - n, setting=setting) for setting in "AB"])
+        for place, (model, n) in enumerate(right.items())
+        for scene in SCENES
+        if place or scene not in left_out
+    ]
+    facts = manifest(models=right, seeds=[seed], items={"full_planning": len(SCENES)})
+    for model in facts["models"]:
+        model["kind"] = "baseline" if model["name"] in rules else "litellm"
+    return SiteRun("run", run_of(records, facts), False, Sources())
+
+
+def ranks_of(*runs: SiteRun) -> dict[str, Any]:
+    board = board_of(runs, entries_of(runs), all_values(runs))
+    return {row["name"]: row["ranks"].get("full_planning") for row in board["rows"]}
 
 
 def test_models_without_a_common_sample_are_not_told_apart() -> None:
-    best, alike, elsewhere = planned("a", 0, 4), planned("b", 0, 1), planned("c", 9, 0)
-    runs = [SiteRun(run.path.name, run, False, Sources()) for run in (best, alike, elsewhere)]
-    ranges = rank_ranges_of("full_planning", entries_of(runs), runs)
-    assert ranges == {"a": (1, 2), "b": (2, 3), "c": (1, 3)}
+    ranks = ranks_of(planned(a=4), planned(b=1), planned(9, c=0))
+    assert ranks == {"a": [1, 2], "b": [2, 3], "c": [1, 3]}
+
+
+def test_models_alone_have_ranks_the_same_on_the_site_and_in_the_report() -> None:
+    run = planned(rules=["rule"], rule=4, a=3, b=1)
+    ranks = ranks_of(run)
+    assert ranks == {"rule": None, "a": [1, 1], "b": [2, 2]}
+    said = {name: str(found[0]) for name, found in ranks.items() if found}
+    assert rank_texts(run.run, "full_planning") == said
+
+
+def test_a_model_of_which_samples_were_left_out_has_no_rank() -> None:
+    run = planned(left_out=SCENES[1:], cherry=4, a=3, b=1)
+    assert ranks_of(run) == {"cherry": None, "a": [1, 1], "b": [2, 2]}
 
 
 def site_run(where: str, **facts: Any) -> SiteRun:

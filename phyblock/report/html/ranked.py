@@ -34,9 +34,9 @@ def _is_known(value: Value) -> bool:
 
 def kinds_of(run: Run) -> dict[str, Literal["model", "baseline"]]:
     """Which models are baselines; these come last."""
-    kinds = {model.name: model.kind for model in run.manifest.models}
-    baselines = [name for name in run.design.model_names if kinds.get(name) == "baseline"]
-    models = [name for name in run.design.model_names if name not in baselines]
+    rules = {model.name for model in run.manifest.models if model.is_baseline}
+    baselines = [name for name in run.design.model_names if name in rules]
+    models = [name for name in run.design.model_names if name not in rules]
     return {
         **dict.fromkeys(models, "model"),
         **dict.fromkeys(baselines, "baseline"),

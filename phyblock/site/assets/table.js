@@ -5,7 +5,7 @@ const Table = (() => {
   const DASH = "–";
   const FACTS = [
     ["solved", "Solved", (fact, track) => [fact.solved, `of ${fact.done.toLocaleString("en")}`, track]],
-    ["usd_per_solved", "USD a solved one", (fact) => [fact.usd_per_solved, "", null, "usd"]],
+    ["usd_per_solved", "USD a solved {item}", (fact) => [fact.usd_per_solved, "", null, "usd"]],
     ["usd_per_100", "USD for 100 replies", (fact) => [fact.usd_per_100, "", null, "usd"]],
     ["prompt_tokens", "Tokens in", (fact) => [fact.prompt_tokens]],
     ["completion_tokens", "Tokens out", (fact) => [fact.completion_tokens]],
@@ -39,7 +39,7 @@ const Table = (() => {
 
   function factColumn([name, heading, of], track, several) {
     return {
-      id: `${track.name}/${name}`, heading: heading.replace("one", track.item), group: several ? track.title : "",
+      id: `${track.name}/${name}`, heading: heading.replace("{item}", track.item), group: several ? track.title : "",
       setting: "", about: track.title, better: LOWER_FIRST.includes(name) ? "lower" : "higher",
       value: (row) => (row.facts[track.name] ? of(row.facts[track.name])[0] ?? null : null),
       cell: (row) => {
@@ -119,6 +119,13 @@ const Table = (() => {
     return range[0] === range[1] ? String(range[0]) : `${range[0]}–${range[1]}`;
   }
 
+  /** How many samples of how many a row has, where some were left out. */
+  function lacking(row, track) {
+    const fact = row.facts[track];
+    const said = (number) => number.toLocaleString("en");
+    return fact && fact.done < fact.expected ? `${said(fact.done)} of ${said(fact.expected)} samples: no rank` : "";
+  }
+
   function strip([value, lo, hi]) {
     const spread = lo === null ? [value, value] : [Math.max(0, lo), Math.min(100, hi)];
     return svg("svg", { viewBox: "0 0 104 12", class: "strip-plot", "aria-hidden": "true" },
@@ -127,7 +134,7 @@ const Table = (() => {
       svg("circle", { cx: 2 + value, cy: 6, r: 2.5 }));
   }
 
-  return { groups, usual, sorted, rank, strip, text, dollars, DASH };
+  return { groups, usual, sorted, rank, lacking, strip, text, dollars, DASH };
 })();
 
 /** An element of a drawing. */

@@ -103,7 +103,8 @@ const Views = (() => {
         el("tbody", {}, rows.map((row) => el("tr", { class: row.kind },
           el("td", { class: "rank number" }, Table.rank(row, state.track.name)),
           el("th", { scope: "row", class: "text name" }, link("model", { m: row.name }, row.name),
-            row.kind === "baseline" ? el("small", {}, "baseline") : null),
+            row.kind === "baseline" ? el("small", {}, "baseline") : null,
+            Table.lacking(row, state.track.name) ? el("small", {}, Table.lacking(row, state.track.name)) : null),
           columns.map((column) => cell(row, column)))))));
   }
 
@@ -116,10 +117,11 @@ const Views = (() => {
   function notes(state) {
     const { track } = state;
     return el("div", { class: "notes" },
-      el("p", {}, `Rank: the best and the worst place that a model may have by ${track.title}, ${track.main}, from tests of every pair of models on the samples that both have, corrected for their number (Holm, 95 %). Models whose ranks overlap may be equally good.`),
+      el("p", {}, `Rank: the best and the worst place that a model may have by ${track.title}, ${track.main}, from tests of every pair of models on the samples that both have, corrected for their number (Holm, 95 %). Models whose ranks overlap may be equally good. Baselines, and models of which samples were left out, have no rank.`),
       el("p", {}, "Under a value stands its 95 % interval, from leaving out each base scene in turn."),
       track.notes.map((note) => el("p", {}, note)),
-      el("p", {}, "“Scored again” are runs that came as a bundle, whose replies were scored again when this page was made and came out the same."));
+      el("p", {}, "“Scored again” are runs that came as a bundle, whose replies were scored again when this page was made and came out the same. What replies cost, how long they took, and which model gave them no scoring can tell: that is taken from the records."),
+      track.physics ? el("p", {}, `${track.title}: physics is not carried out again, what fell is taken from the records.`) : null);
   }
 
   function chart(state) {

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from phyblock.resources import bundled
-from phyblock.sim.registry import told_engine
-from phyblock.specs import LoadedSuite
+from phyblock.tables.design import read_section
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.kind import TrackKind
 from phyblock.tracks.poses import POSE_COUNTS
@@ -19,9 +18,8 @@ from phyblock.tracks.step_planning.track import StepPlanning
 __all__ = ["TRACK"]
 
 
-def _manifest(loaded: LoadedSuite) -> Mapping[str, Any]:
-    is_off = loaded.suite.section(StepsSpec).physics == "off"
-    return {} if is_off else {"engine": told_engine()}
+def _physics(suite: Mapping[str, Any]) -> bool:
+    return read_section(suite, "steps", StepsSpec).physics != "off"
 
 
 def _report() -> TrackReport:
@@ -40,7 +38,7 @@ TRACK = TrackKind(
     subject=StepSubject,
     baselines=STEP_RULES,
     by_hand=pick_step,
-    manifest=_manifest,
+    physics=_physics,
     plays=True,
     section=("steps", StepsSpec, "The rules of the step_planning track."),
     record=EpisodeRecord,
