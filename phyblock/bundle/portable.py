@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 from phyblock.bundle.about import BundledData, data_of
-from phyblock.errors import DataError, Problem
+from phyblock.errors import DataError, Problem, SpecError
 from phyblock.records import Manifest, Record
 from phyblock.resources import bundled
-from phyblock.run.data import asked_about, open_dataset
+from phyblock.run.data import asked_about, open_dataset, recorded_dataset
+from phyblock.run.reopen import reopen_tracks
+from phyblock.run.rescore import recorded_suite
 from phyblock.tables.design import read_design
+from phyblock.tracks.kind import kind_of
 
 __all__ = ["localized", "portable_manifest", "portable_records"]
 
@@ -82,29 +86,34 @@ def _last_part(text: str) -> str:
     return (PurePosixPath(text) if "/" in text else PureWindowsPath(text)).name
 
 
-def localized(manifest: Manifest, folders: Sequence[Path], where: str) -> Manifest:
-    """The manifest with the places of its data on this machine.
+def localized(folder: Path, manifest: Manifest, data: Sequence[Path], where: str) -> Manifest:
+    """The manifest of the run in `folder` with the places of its data on this machine.
 
-    They are looked for in `folders`, by name first, and among the sets that come with phyblock.
-    Raises DataError that names what is missing, StoreError for a manifest that names no plan.
+    They are looked for in the folders `data`, by name first, and among the sets that come with
+    phyblock; the first that holds what was asked is taken. Raises DataError that names what is
+    missing, StoreError for a manifest that names no plan.
     """
     levels = read_design(manifest.fields(), where).suite.levels
-    fields = manifest.fields()
+    holds = {"dataset": partial(_is_dataset, levels), "questions": partial(_is_asked, folder)}
     problems = []
-    taken: list[Path] = []
     for part, needed in data_of(manifest).items():
-        left = [path for path in folders if path not in taken]
-        places = [path for path in _places(needed.name, left) if path.is_dir()]
-        if part == "dataset":
-            places = [path for path in places if _is_dataset(path, manifest, levels)]
-        if places:
-            fields[part] = {**fields[part], _ROOT: str(places[0])}
-            taken.append(places[0])
-        else:
-            problems.append(_missing(where, part, needed, folders))
+        places = (path for path in _places(needed.name, data) if path.is_dir())
+        moved = (_moved(manifest, part, path) for path in places)
+        # What questions are about is known only where the scenes were found.
+        is_sure = not problems
+        here = next((one for one in moved if not is_sure or holds[part](one)), None)
+        if here is None:
+            problems.append(_missing(where, part, needed, data))
+        manifest = here or manifest
     if problems:
         raise DataError(problems)
-    return Manifest.model_validate(fields)
+    return manifest
+
+
+def _moved(manifest: Manifest, part: str, path: Path) -> Manifest:
+    """The manifest with a part of its data in another folder."""
+    held = getattr(manifest, part).model_copy(update={_ROOT: str(path)})
+    return manifest.model_copy(update={part: held})
 
 
 def _places(name: str, folders: Sequence[Path]) -> list[Path]:
@@ -114,14 +123,27 @@ def _places(name: str, folders: Sequence[Path]) -> list[Path]:
     return [*named, *own, *(path for path in folders if path not in named)]
 
 
-def _is_dataset(path: Path, manifest: Manifest, levels: Sequence[int]) -> bool:
-    """Whether the scenes that the run asked about stand in a folder as they were then."""
+def _is_dataset(levels: Sequence[int], manifest: Manifest) -> bool:
+    """Whether the scenes that the run asked about stand where it says as they were then."""
     assert manifest.dataset is not None
     try:
-        dataset = open_dataset(manifest.dataset.format, path)
+        dataset = open_dataset(manifest.dataset.format, Path(manifest.dataset.root))
     except DataError:
         return False
     return asked_about(manifest, levels, dataset).sha256 == manifest.dataset.sha256
+
+
+def _is_asked(folder: Path, manifest: Manifest) -> bool:
+    """Whether the questions that the run asked stand where it says as they were then."""
+    suite = recorded_suite(folder, manifest)
+    names = [name for name in suite.tracks if kind_of(name).own_root(manifest) is not None]
+    try:
+        dataset = recorded_dataset(folder, manifest, suite.levels, None)
+        for track in reopen_tracks(folder, manifest, suite, names, dataset).values():
+            track.close()
+    except (DataError, SpecError):
+        return False
+    return True
 
 
 def _missing(where: str, part: str, needed: BundledData, folders: Sequence[Path]) -> Problem:

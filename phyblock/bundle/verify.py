@@ -67,7 +67,7 @@ def opened_bundle(path: Path, data: Sequence[Path] = (), name: str = "") -> Iter
             unpack(path, folder)
             manifest = read_manifest(folder)
             about = read_about(path, folder, manifest)
-            here = localized(manifest, data, where)
+            here = localized(folder, manifest, data, where)
             (folder / MANIFEST).write_text(manifest_text(here), encoding="utf-8")
             judged, records = judged_anew(folder)
         _check_lines(where, about, folder / RECORDS, records_text(records))

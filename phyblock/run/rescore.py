@@ -31,7 +31,7 @@ from phyblock.words import Matcher, PlanParser
 if TYPE_CHECKING:
     from phyblock.run.floors import FloorValues
 
-__all__ = ["judged_anew", "rescore"]
+__all__ = ["judged_anew", "recorded_suite", "rescore"]
 
 
 def rescore(
@@ -51,7 +51,7 @@ def rescore(
     is no run or cannot be written, DataError when the data are not what the run was made on.
     """
     manifest = read_manifest(folder)
-    suite = _suite(folder, manifest, parser, matcher)
+    suite = recorded_suite(folder, manifest, parser, matcher)
     name = f"scores/{suite.parser}-{suite.scoring.matchers[0]}"
     target = out or folder / name
     by = f"{suite.parser} {reader_version(suite.parser)}, {suite.scoring.matchers[0]}"
@@ -75,7 +75,7 @@ def judged_anew(folder: Path, data: Path | None = None) -> tuple[Manifest, list[
     Raises as `rescore`.
     """
     manifest = read_manifest(folder)
-    suite = _suite(folder, manifest, None, None)
+    suite = recorded_suite(folder, manifest)
     scored = _scored(folder, manifest, suite, suite.tracks, data, anew=True)
     scenes = [task.scene for task in scored.asked]
     told = {
@@ -184,13 +184,17 @@ def _check_target(target: Path, identity: str) -> None:
         raise StoreError(Problem(str(target), "holds another run", hint=hint))
 
 
-def _suite(
+def recorded_suite(
     folder: Path,
     manifest: Manifest,
-    parser: PlanParser | None,
-    matcher: Matcher | None,
+    parser: PlanParser | None = None,
+    matcher: Matcher | None = None,
 ) -> SuiteSpec:
-    """The run's suite with parser and headline matcher replaced."""
+    """The suite of the run in `folder`, with parser and headline matcher replaced where named.
+
+    Raises StoreError for a suite that is none, SpecError for a parser that cannot read what was
+    asked for.
+    """
     try:
         suite = suite_model().model_validate(manifest.suite)
         matchers = suite.scoring.matchers

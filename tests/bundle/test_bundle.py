@@ -98,6 +98,27 @@ def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(
     assert "Traceback" not in done.err
 
 
+def test_data_are_told_by_what_they_hold_whatever_their_names(
+    made: Workspace, tmp_path: Path
+) -> None:
+    """Scenes and questions in one folder are found, and so are questions beside others of their
+    name.
+    """
+    both, other = tmp_path / "both", tmp_path / "questions"
+    shutil.copytree(made.root / "data", both)
+    shutil.copytree(made.root / "questions", both, dirs_exist_ok=True)
+    others = questions(per_subtask=3, subtasks=SUBTASKS)
+    write_questions(other, others)
+    bundle = made.out / "bundle.zip"
+    with opened_bundle(bundle, [both]) as found:
+        assert found.records == 10
+    with opened_bundle(bundle, [other, *folders(made)]) as found:
+        assert found.records == 10
+    needs = pytest.raises(DataError, match="needs the questions questions")
+    with needs, opened_bundle(bundle, [other, made.root / "data"]):
+        pytest.fail("it was taken")
+
+
 def test_a_run_without_its_data_is_bundled_to_the_same_bytes_and_said_to_be_unverified(
     made: Workspace, tmp_path: Path
 ) -> None:
