@@ -1,7 +1,7 @@
 """A run as one file that others can score again: its manifest, its records, and their digests.
 
 `archive` is the file, read within bounds; `about` what it says of itself; `portable` takes what is
-of one machine out of a run; `write` makes a bundle and `verify` judges one.
+of one machine out of a run, by `texts`; `write` makes a bundle and `verify` judges one.
 """
 
 from phyblock.bundle.verify import Verified, opened_bundle

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from phyblock.bundle.about import BundledData, data_of
+from phyblock.bundle.texts import Cleaner, model_name, without_paths
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.records import Manifest, Record
+from phyblock.records.reply import StoredReply
 from phyblock.resources import bundled
 from phyblock.run.data import asked_about, open_dataset, recorded_dataset
 from phyblock.run.reopen import reopen_tracks
@@ -24,8 +26,11 @@ _ROOT = "root"
 
 
 def portable_manifest(manifest: Manifest) -> Manifest:
-    """The manifest with the last part of every path, and without the addresses of servers."""
-    fields = _without_paths(manifest.fields())
+    """The manifest with the last part of every path, and without the addresses of servers.
+
+    What is sent to models stays as it is, and so does the identity, made of what the run was.
+    """
+    fields = without_paths(manifest.fields())
     for model in fields.get("models", ()):
         model.pop(_SERVED_AT, None)
     for part in ("dataset", "questions"):
@@ -38,52 +43,33 @@ def portable_manifest(manifest: Manifest) -> Manifest:
 def portable_records(
     records: Iterable[Record], manifest: Manifest, folder: Path
 ) -> Iterator[Record]:
-    """Records whose errors name no path of this machine; nothing else of them is changed."""
-    named = map(Path, _paths(manifest.fields()))
+    """Records whose errors and names of models tell no path and no server of this machine; nothing
+    else of them is changed.
+    """
+    held = (manifest.dataset, manifest.questions)
+    named = [Path(one.root) for one in held if one is not None]
     homes = {folder.resolve().parent, Path.home(), Path.cwd(), *named}
-    roots = sorted((str(path) for path in homes if len(path.parts) > 1), key=len, reverse=True)
+    roots = {str(path) for path in homes if len(path.parts) > 1}
+    cleaner = Cleaner(roots, [at for model in manifest.models for at in model.served_at])
     for record in records:
-        if record.error is None:
-            yield record
-            continue
-        message = record.error.message
-        for root in roots:
-            message = message.replace(root, PurePosixPath(root).name)
-        error = record.error.model_copy(update={"message": message})
-        yield record if error == record.error else record.model_copy(update={"error": error})
+        changed: dict[str, Any] = {}
+        if (error := record.error) is not None:
+            said = cleaner.clean(error.message)
+            changed["error"] = error.model_copy(update={"message": said})
+        if record.reply is not None:
+            changed["reply"] = _portable_reply(record.reply)
+        if record.asked_turns:
+            changed["turns"] = tuple(
+                turn.model_copy(update={"reply": _portable_reply(turn.reply)})
+                for turn in record.asked_turns
+            )
+        yield record.model_copy(update=changed)
 
 
-def _without_paths(value: Any) -> Any:
-    if isinstance(value, str):
-        return _last_part(value) if _is_path(value) else value
-    if isinstance(value, Mapping):
-        return {key: _without_paths(below) for key, below in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_without_paths(below) for below in value]
-    return value
-
-
-def _paths(value: Any) -> Iterator[str]:
-    if isinstance(value, str):
-        if _is_path(value):
-            yield value
-    elif isinstance(value, Mapping):
-        for below in value.values():
-            yield from _paths(below)
-    elif isinstance(value, (list, tuple)):
-        for below in value:
-            yield from _paths(below)
-
-
-def _is_path(text: str) -> bool:
-    """Whether a text is a path that begins at the root of a machine, or at somebody's home."""
-    if "\n" in text:
-        return False
-    return text.startswith(("/", "~/")) or PureWindowsPath(text).is_absolute()
-
-
-def _last_part(text: str) -> str:
-    return (PurePosixPath(text) if "/" in text else PureWindowsPath(text)).name
+def _portable_reply(reply: StoredReply) -> StoredReply:
+    if (name := model_name(reply.provider_model)) == reply.provider_model:
+        return reply
+    return reply.model_copy(update={"provider_model": name})
 
 
 def localized(folder: Path, manifest: Manifest, data: Sequence[Path], where: str) -> Manifest:

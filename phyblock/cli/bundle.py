@@ -28,8 +28,10 @@ _MB = 1e6
 def command(run: Path, out: Path | None, data: tuple[Path, ...]) -> None:
     """Write the folder RUN as one file: manifest, records, digests.
 
-    It holds no keys, no pictures, no prompts and no paths of this machine. Its replies are scored
-    again first, where the data are at hand: a run whose scores do not come out again is refused.
+    It holds no keys, no pictures and no prompts; of paths of this machine it holds the last part,
+    and of servers no address, but for what models wrote and were sent beside the prompt. Its
+    replies are scored again first, where the data are at hand: a run whose scores do not come out
+    again is refused.
     """
     console = make_console()
     made = bundle_run(run, out, data)

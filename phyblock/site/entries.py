@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from phyblock.bundle.portable import portable_manifest
 from phyblock.records.manifest import ManifestModel
 from phyblock.site.runs import SiteRun
 
@@ -41,7 +42,8 @@ def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
     entries: list[tuple[str, Entry]] = []
     for number, one in enumerate(runs):
         tracks = one.run.design.suite.tracks
-        for model in one.run.manifest.models:
+        # A run stands in the same row as a folder and as a bundle.
+        for model in portable_manifest(one.run.manifest).models:
             identity = _identity(model)
             same = (
                 entry
