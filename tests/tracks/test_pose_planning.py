@@ -34,7 +34,7 @@ from phyblock.tracks.pose_planning import judging
 from phyblock.tracks.pose_planning.baselines import POSE_RULES, PoseSubject, written
 from phyblock.tracks.pose_planning.film import pose_film, pose_table
 from phyblock.tracks.pose_planning.judging import PoseRules
-from phyblock.tracks.pose_planning.record import PoseRecord, kept_rests
+from phyblock.tracks.pose_planning.record import PoseOutcome, PoseRecord, kept_rests
 from phyblock.tracks.pose_planning.resting import worlds_of
 from phyblock.tracks.pose_planning.spec import PoseSpec
 from phyblock.tracks.pose_planning.track import PosePlanning
@@ -145,6 +145,26 @@ def test_a_reply_is_read_scored_and_carried_out(
     assert judged({**fields, **track.about(task)}, task, again) == record
 
 
+def forgeries(pose: PoseOutcome) -> list[dict[str, Any]]:
+    """Changes of what became of a plan that nobody would call rounding."""
+    steps = [step.fields() for step in pose.steps]
+    fell = [step["moved_cm"] > 2 and step["end"] not in REFUSED_ENDS for step in steps]
+    stand = {"end": "stands", "moved_cm": 0.0, "turned_deg": 0.0, "knocked": []}
+    upright = [{**one, **stand} if is_one else one for one, is_one in zip(steps, fell, strict=True)]
+    absent = [*steps[:-1], {**steps[-1], "rests": [*(steps[-1]["rests"] or []), ASTRAY]}]
+    return [
+        {"reached": pose.reached + 3},
+        {"completed": not pose.completed},
+        {"iou": 0.0 if pose.iou > 0.5 else 1.0},
+        {"steps": absent},
+        {"steps": [{**one, "end": "no_block"} for one in steps]},
+        *([{"steps": upright}] if any(fell) else []),
+    ]
+
+
+ASTRAY = {"step": 99, "center_cm": (0.0, 0.0, 0.0), "euler_deg": (0.0, 0.0, 0.0)}
+
+
 @pytest.mark.parametrize("baseline", ["oracle-noise-1cm", "stack", "oracle-2d"])
 def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
     built_in: list[AssemblyTask], baseline: str
@@ -152,7 +172,8 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
     item = built_in[0]
     track = PosePlanning(RULES)
     subject = PoseSubject(item.scene, item.candidates, is_free=False)
-    found = track.judge(item, POSE_RULES[baseline](subject, np.random.default_rng(1)))
+    text = POSE_RULES[baseline](subject, np.random.default_rng(1))
+    found = track.judge(item, text)
     blocks = [put(step, item.candidates) for step in found.parsed.plan.steps]
     worlds = carry_out(blocks, RULES.limits).worlds
     record = judged(begun("s", track.name, "m", item, 0, None), item, found)
@@ -168,6 +189,14 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
             assert start.angle_deg(end) < 1.1
     last = list(pose_film(record, item))[-1].blocks
     assert [block.order for block in last] == [block.order for block in worlds[-1]]
+    # What is said of a plan must be borne out by it.
+    about = begun("s", track.name, "m", item, 0, None)
+    assert judged(about, item, asyncio.run(track.judge_apart(item, text, record))) == record
+    for change in forgeries(record.pose):
+        pose = {**record.fields()["pose"], **change}
+        forged = known_records().validate_python({**record.fields(), "pose": pose})
+        again = judged(about, item, asyncio.run(track.judge_apart(item, text, forged)))
+        assert again.fields()["pose"] != pose, change
 
 
 @settings(max_examples=12, deadline=None)

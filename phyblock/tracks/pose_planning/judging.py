@@ -13,6 +13,7 @@ import numpy as np
 
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import (
+    Block,
     Candidate,
     CandidateSet,
     Plan,
@@ -40,11 +41,12 @@ from phyblock.sim.registry import told_engine
 from phyblock.sim.voxels import voxel_iou
 from phyblock.tracks.plans import score_fields
 from phyblock.tracks.pose_planning.bodies import laid, pieces_of
+from phyblock.tracks.pose_planning.ended import Ended, borne_out
 from phyblock.tracks.pose_planning.resting import Rest, rests_of
 from phyblock.tracks.showing import file_plan
 from phyblock.words import AnswerFormat, Matcher, PoseRotation, Setting
 
-__all__ = ["Earlier", "Ended", "PoseJudgement", "PoseRules", "judge_poses"]
+__all__ = ["Earlier", "PoseJudgement", "PoseRules", "judge_poses"]
 
 _ONE_AT_A_TIME = threading.Lock()
 _KEPT = 32
@@ -86,27 +88,17 @@ class PoseRules:
 
 
 @dataclass(frozen=True)
-class Ended:
-    """What became of a plan that was carried out: its steps, what each of them moved (None where
-    that was not kept), the blocks of the goal that were reached, all that stands beside the goal,
-    whether that is the whole goal and nothing else, and the engine with its version.
-    """
-
-    steps: tuple[CarriedStep, ...]
-    rests: tuple[tuple[Rest, ...] | None, ...]
-    reached: int
-    iou: float
-    completed: bool
-    engine: str
-
-
-@dataclass(frozen=True)
 class Earlier:
     """A plan that was carried out before, by which tolerances, and what became of it."""
 
     steps: tuple[PoseStep, ...]
     limits: Mapping[str, float]
     ended: Ended
+
+    def is_of(self, steps: Sequence[PoseStep], rules: PoseRules) -> bool:
+        """Whether this is what became of these steps under these rules."""
+        is_whole = len(self.ended.steps) == len(steps)
+        return is_whole and (self.steps, self.limits) == (tuple(steps), rules.told)
 
 
 @dataclass(frozen=True)
@@ -179,7 +171,8 @@ def judge_poses(
 ) -> PoseJudgement:
     """Read, score and carry out a reply; None, where there is no reply, is an empty plan.
 
-    A plan that is the `earlier` one ended as it did.
+    A plan that is the `earlier` one ended as it did, as far as that is borne out by where its
+    blocks came to lie.
     """
     parsed = ParsedPoses(PosePlan(), None)
     if text is not None:
@@ -189,8 +182,12 @@ def judge_poses(
     kept = tuple(step for step in given if 1 <= step.candidate <= n)
     scorer = _scorer(item.scene, item.candidates, "B" if rules.is_free else "A")
     poses = scorer.score([laid(step, item.candidates[step.candidate]) for step in kept])
-    is_known = earlier is not None and (earlier.steps, earlier.limits) == (given, rules.told)
-    ended = earlier.ended if earlier and is_known else _carried(item, given, rules)
+    blocks = [put(step, item.candidates) for step in given]
+    if earlier is not None and earlier.is_of(given, rules):
+        reached = (rules.reached_cm, rules.reached_deg)
+        ended = borne_out(blocks, item.scene.blocks, earlier.ended, rules.limits, reached)
+    else:
+        ended = _carried(item, blocks, rules)
     found = iter(poses[0].fits)
     fits = tuple(next(found) if 1 <= step.candidate <= n else None for step in given)
     numbers, ends = [step.candidate for step in given], [step.end for step in ended.steps]
@@ -207,8 +204,7 @@ def judge_poses(
     )
 
 
-def _carried(item: AssemblyTask, given: Sequence[PoseStep], rules: PoseRules) -> Ended:
-    blocks = [put(step, item.candidates) for step in given]
+def _carried(item: AssemblyTask, blocks: Sequence[Block | None], rules: PoseRules) -> Ended:
     # An engine has no more than one plan at a time, whichever thread asks.
     with _ONE_AT_A_TIME:
         done: Carried = carry_out(blocks, rules.limits)

@@ -22,9 +22,9 @@ from phyblock.sim.placing import upright
 from phyblock.sim.registry import REFERENCE_ENGINE, physics_engine
 from phyblock.tracks.base import ENGINE, READER
 from phyblock.tracks.pose_planning.baselines import PoseSubject
+from phyblock.tracks.pose_planning.ended import Ended
 from phyblock.tracks.pose_planning.judging import (
     Earlier,
-    Ended,
     PoseJudgement,
     PoseRules,
     judge_poses,
