@@ -81,7 +81,7 @@ def localized(folder: Path, manifest: Manifest, data: Sequence[Path], where: str
     """
     levels = read_design(manifest.fields(), where).suite.levels
     holds = {"dataset": partial(_is_dataset, levels), "questions": partial(_is_asked, folder)}
-    problems = []
+    problems: list[Problem] = []
     for part, needed in data_of(manifest).items():
         places = (path for path in _places(needed.name, data) if path.is_dir())
         moved = (_moved(manifest, part, path) for path in places)

@@ -84,15 +84,9 @@ def _values(
     run: Run, what: Comparable, part: Part, design: Design
 ) -> Iterator[tuple[str, dict[str, float]]]:
     """What every model of a run reaches in each item, the mean over its samples [percent]."""
-    each = what.each(part)
-    for model, samples in what.samples(run, part, design).items():
-        values = what.measure.scale * each(what.counts_of(samples, part))
-        items = samples.index.get_level_values("item")
-        found: dict[str, list[float]] = {}
-        for item, value in zip(items, values, strict=True):
-            if value == value:
-                found.setdefault(str(item), []).append(float(value))
-        yield model, {item: sum(many) / len(many) for item, many in found.items()}
+    for model, values in what.values(run, part, design):
+        means = values.groupby(level="item").mean()
+        yield model, {str(item): float(mean) for item, mean in means.items()}
 
 
 def _went(record: Record, design: Design) -> dict[str, Any]:

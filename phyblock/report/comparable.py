@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,6 +66,15 @@ class Comparable:
         indexed = rows.assign(pooled_cell=rows[CELL].map(place)).set_index(_KEYS)
         columns = ["pooled_cell", *self.measure.counted.columns]
         return {str(model): mine[columns] for model, mine in indexed.groupby("model", sort=False)}
+
+    def values(self, run: Run, part: Part, design: Design) -> Iterator[tuple[str, pd.Series]]:
+        """What each sample is worth in the measure's unit, by model; by scene, item, seed and
+        variant, without samples that have no value.
+        """
+        each = self.each(part)
+        for model, samples in self.samples(run, part, design).items():
+            worth = self.measure.scale * each(self.counts_of(samples, part))
+            yield model, pd.Series(worth, index=samples.index.set_names(_KEYS)).dropna()
 
     def counts(self, both: pd.DataFrame, part: Part) -> Floats:
         """Counts of paired samples, flat over pooled cells: (samples, 2, pooled x (columns + 1)).

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
+
+from pydantic import BaseModel
 
 from phyblock.errors import Problem, SpecError
 from phyblock.site.runs import SiteRun
+from phyblock.specs.sections import ImagesSpec
 from phyblock.tables.load import Run
 from phyblock.tracks.base import ENGINE, READER
+from phyblock.tracks.kind import kind_of
 
 __all__ = ["check_runs_alike"]
 
 _ASKED_ANEW = ("pictures", READER)
-"""What a track's identity says that may differ: how big pictures are, and who read the replies."""
+"""What a track's identity says that may differ: digests of pictures, which change with their size,
+and who read the replies.
+"""
+_CONTROLS = frozenset({"blind", "wrong_image", "prompt", "path"})
+"""What a track's section of the suite says that is shown with the run, or known by its digest."""
 _HINT = "make a site of each"
 
 
@@ -22,7 +30,7 @@ def check_runs_alike(runs: Sequence[SiteRun]) -> None:
     against, so that they cannot stand in one table.
 
     All must be of one version of one data set. Those that share a track must have asked about the
-    same items of it, in the same words, and count in the same way.
+    same items of it, in the same words, shown alike in any size, and count in the same way.
     """
     problems: list[Problem] = []
     for number, one in enumerate(runs):
@@ -73,8 +81,19 @@ def _facts(run: Run, shared: Sequence[str]) -> Iterator[tuple[str, Any]]:
         for key, value in manifest.tracks.get(track, {}).items():
             if key not in _ASKED_ANEW:
                 yield f"tracks.{track}.{key}", _shown(value)
+        if manifest.tracks.get(track, {}).get("pictures") is not None:
+            yield from _said("images", run.section("images", ImagesSpec), {"size_px"})
+        if (section := kind_of(track).section) is not None:
+            yield from _said(section[0], run.section(*section[:2]), _CONTROLS)
         if ENGINE not in manifest.tracks.get(track, {}):
             yield f"tracks.{track}.{ENGINE}", "the engine of reference"
+
+
+def _said(name: str, section: BaseModel, without: Collection[str]) -> Iterator[tuple[str, Any]]:
+    """What a section of the suite says, its defaults as well."""
+    for field in type(section).model_fields:
+        if field not in without:
+            yield f"{name}.{field}", str(getattr(section, field))
 
 
 def _shown(value: Any) -> Any:

@@ -9,6 +9,7 @@ from typing import Any
 from phyblock.records import Record
 from phyblock.records.reading import any_records
 from phyblock.report.html.index import read_places
+from phyblock.report.html.samples import IN_INDEX
 from phyblock.site.chunks import Chunks
 from phyblock.site.entries import Entry
 from phyblock.site.runs import SiteRun
@@ -22,9 +23,10 @@ __all__ = ["write_samples"]
 _LONGEST_TEXT = 6000
 """Characters of a reply that a site shows; the bundle has all of it."""
 _LONGEST_REASONING = 2000
-_SHOWN = ("parse", "error", "shown", "answer", "question", "pose", "ending")
+_LEFT_OUT = IN_INDEX | {"reply", "scores", "turns", "prompt", "asked", "time", "counts"}
+"""Fields of records that a replay needs otherwise or not at all; what tracks add, it has."""
 _REPLY = ("text", "reasoning", "finish", "cost_usd", "usage", "latency_s")
-_TURN = ("n", "step", "outcome", "placed", "world", "swapped", "fallen", "parse")
+_NOT_OF_TURN = ("reply", "prompt")
 _TENTHS = 10
 
 
@@ -136,7 +138,9 @@ def _question(one: SiteRun, record: Record, pack: Chunks) -> int:
 
 def _replay(record: Record, run: Run) -> dict[str, Any]:
     fields = record.fields()
-    entry = {name: fields[name] for name in _SHOWN if fields.get(name) is not None}
+    entry = {
+        name: value for name, value in fields.items() if name not in _LEFT_OUT and value is not None
+    }
     if record.reply is not None:
         entry["reply"] = _reply(fields["reply"])
     entry["scores"] = [
@@ -147,7 +151,7 @@ def _replay(record: Record, run: Run) -> dict[str, Any]:
     if record.asked_turns:
         entry["turns"] = [
             {
-                **{name: turn[name] for name in _TURN if name in turn},
+                **{name: value for name, value in turn.items() if name not in _NOT_OF_TURN},
                 "reply": _reply(turn["reply"]),
             }
             for turn in fields["turns"]

@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from phyblock.records.manifest import ManifestModel
 from phyblock.report.comparable import Comparable, comparable
 from phyblock.tables.cost import cost_frame
@@ -46,7 +44,8 @@ class Facts:
 @dataclass(frozen=True, eq=False)
 class TrackValues:
     """A track of a run: `values` by setting, model and heading; `samples` what each sample is worth
-    by the main measure, in its unit, by model and `Key`; `facts` by model.
+    by the main measure, in its unit, by model and `Key`, without those that have no value; `facts`
+    by model.
 
     Settings are those of the run, or "" alone where the track knows none.
     """
@@ -88,11 +87,8 @@ def _values(run: Run, track: str) -> Iterator[tuple[str, Mapping[tuple[str, str]
 
 
 def _samples(run: Run, what: Comparable) -> Iterator[tuple[str, Iterator[tuple[Key, float]]]]:
-    part = what.parts[-1]
-    each = what.each(part)
-    for model, rows in what.samples(run, part, run.design).items():
-        values = what.measure.scale * np.nan_to_num(each(what.counts_of(rows, part)))
-        yield model, zip(rows.index, values.tolist(), strict=True)
+    for model, values in what.values(run, what.parts[-1], run.design):
+        yield model, zip(values.index, values.tolist(), strict=True)
 
 
 def _facts(

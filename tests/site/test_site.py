@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
+import zlib
+from base64 import b64decode
 from collections.abc import Collection, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -13,6 +15,8 @@ import pytest
 
 from phyblock.bundle import bundle_run
 from phyblock.errors import SpecError, StoreError
+from phyblock.records import Record
+from phyblock.records.known import known_records
 from phyblock.report.html.ranked import rank_texts
 from phyblock.report.html.sources import Sources
 from phyblock.site import write as site_write
@@ -21,6 +25,7 @@ from phyblock.site.alike import check_runs_alike
 from phyblock.site.board import all_values, board_of
 from phyblock.site.entries import entries_of
 from phyblock.site.runs import SiteRun, open_runs
+from phyblock.site.values import values_of
 from tests.report.factory import manifest, record, run_of, score
 from tests.workspace import Workspace
 
@@ -104,6 +109,33 @@ def test_a_model_of_which_samples_were_left_out_has_no_rank() -> None:
     assert ranks_of(run) == {"cherry": None, "a": [1, 1], "b": [2, 2]}
 
 
+def test_a_sample_without_a_value_has_none() -> None:
+    nothing = [score(0, 0, 0, setting=setting) for setting in "AB"]
+    records = [record("a", "000", 0, nothing), record("a", "001", 0, [score(1, 1, 1)])]
+    run = run_of(records, manifest(models=["a"], seeds=[0]))
+    assert values_of(run, "full_planning").samples == {"a": {("001", "001", 0, ""): 50.0}}
+
+
+def chunks(folder: Path, kind: str) -> list[Any]:
+    """What stands in the chunks of a kind, as the page unpacks it."""
+    texts = [path.read_text() for path in sorted(folder.glob(f"data/*/{kind}-*.js"))]
+    packed = [text.split("'")[5] for text in texts]
+    return [entry for one in packed for entry in json.loads(zlib.decompress(b64decode(one)))]
+
+
+def test_replays_have_all_that_tracks_add_to_records(made: Workspace, tmp_path: Path) -> None:
+    write_site([made.root / "first"], tmp_path / "site", data_of(made))
+    found = set().union(*(entry.keys() for entry in chunks(tmp_path / "site", "replays")))
+    added: set[str] = set()
+    for line in (made.root / "first" / "records.jsonl").read_text(encoding="utf-8").splitlines():
+        fields = known_records().validate_json(line)
+        own = type(fields).model_fields.keys() - Record.model_fields.keys()
+        added |= {name for name in own if getattr(fields, name) is not None}
+    assert added <= found
+    assert {"pose", "progress"} <= added
+    assert not {"prompt", "time", "counts"} & found
+
+
 def site_run(where: str, **facts: Any) -> SiteRun:
     return SiteRun(where, run_of([], manifest(**facts)), False, Sources())
 
@@ -136,9 +168,17 @@ def test_a_model_asked_different_things_is_one_row_and_the_same_things_two() -> 
     assert len(set(names)) == len(names)
 
 
+def shown(images: dict[str, Any], digest: str) -> dict[str, Any]:
+    facts = in_track("full_planning")
+    tracks = {"full_planning": {**facts["tracks"]["full_planning"], "pictures": digest}}
+    return {"suite": {**facts["suite"], "images": images}, "tracks": tracks}
+
+
 @pytest.mark.parametrize(
     ("change", "field"),
     [
+        (shown({"background": "lawn"}, "b"), "images.background"),
+        (shown({"size_px": 512, "view": "top"}, "b"), "images.view"),
         ({"dataset": {"name": "d", "sha256": "0" * 64, "version": 3}}, "dataset.version"),
         ({"dataset": {"name": "e", "sha256": "0" * 64, "version": 2}}, "dataset.name"),
         ({"dataset": {"name": "d", "sha256": "1" * 64, "version": 2}}, "dataset.sha256"),
@@ -155,7 +195,7 @@ def test_a_model_asked_different_things_is_one_row_and_the_same_things_two() -> 
 def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(
     change: dict[str, Any], field: str
 ) -> None:
-    first = site_run("one", **in_track("full_planning"))
+    first = site_run("one", **in_track("full_planning", **shown({}, "a")))
     other = site_run("two", **in_track("full_planning", **change))
     with pytest.raises(SpecError) as caught:
         check_runs_alike([first, other])
@@ -166,6 +206,8 @@ def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(
 
 def test_a_recording_that_was_asked_elsewhere_stands_beside_any_prompt() -> None:
     first = site_run("one", **in_track("full_planning"))
+    larger = site_run("two", **in_track("full_planning", **shown({"size_px": 512}, "b")))
+    check_runs_alike([site_run("one", **in_track("full_planning", **shown({}, "a"))), larger])
     asked = {"full_planning": {"prompt": None, "pictures": None}}
     check_runs_alike([first, site_run("two", **in_track("full_planning", tracks=asked))])
 

@@ -15,15 +15,23 @@ from phyblock.sim import PictureStyle
 from phyblock.tables.track_report import PageItems
 from phyblock.tracks.kind import kinds
 
-__all__ = ["items_shown", "pack_prompts", "pack_samples", "pictures_sent", "states_sent"]
+__all__ = [
+    "IN_INDEX",
+    "items_shown",
+    "pack_prompts",
+    "pack_samples",
+    "pictures_sent",
+    "states_sent",
+]
 
-_IN_INDEX = frozenset(
+IN_INDEX = frozenset(
     {
         *("sample", "track", "model", "key", "scene", "levels", "parents", "n_blocks", "seed"),
         *("variant",),
         *("outcome", "run"),
     }
 )
+"""Fields of records that the index has, or that are of no use on a page."""
 
 
 def pack_prompts(folder: Path, pack: Pack) -> dict[str, int]:
@@ -97,7 +105,7 @@ def _records(folder: Path, places: Iterable[Place]) -> Iterable[Record]:
 def _entry(
     record: Record, prompts: Mapping[str, int], pictures: Mapping[str, str]
 ) -> dict[str, Any]:
-    entry = {name: value for name, value in record.fields().items() if name not in _IN_INDEX}
+    entry = {name: value for name, value in record.fields().items() if name not in IN_INDEX}
     entry["prompt"] = _prompt(record.prompt, prompts, pictures)
     entry["scores"] = [_score(score.fields()) for score in record.scores]
     if record.asked_turns:
