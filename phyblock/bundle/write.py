@@ -11,13 +11,14 @@ from pathlib import Path
 from phyblock.bundle.about import about_text, describe
 from phyblock.bundle.archive import ABOUT, pack
 from phyblock.bundle.portable import portable_manifest, portable_records
-from phyblock.bundle.tables import written_with_tables
+from phyblock.bundle.tables import digests_of_tables
 from phyblock.bundle.verify import Verified, opened_bundle
 from phyblock.errors import DataError
 from phyblock.files import atomic_write, write_named
 from phyblock.records import MANIFEST, RECORDS, read_manifest
 from phyblock.records.reading import read_records
 from phyblock.run.folder import run_folder
+from phyblock.run.rewritten import write_run
 
 __all__ = ["BUNDLE_FILE", "Bundled", "bundle_run"]
 
@@ -53,7 +54,8 @@ def bundle_run(folder: Path, out: Path | None = None, data: Sequence[Path] = ())
     with tempfile.TemporaryDirectory(prefix="phyblock-") as scratch:
         made = Path(scratch) / "run"
         records = portable_records(read_records(folder, manifest), manifest, folder)
-        tables = written_with_tables(made, portable, records)
+        write_run(made, portable, records)
+        tables = digests_of_tables(made)
         files = {name: (made / name).read_bytes() for name in (MANIFEST, RECORDS)}
         about = describe(portable, files, tables, version("phyblock"))
         packed = pack({**files, ABOUT: about_text(about).encode()})

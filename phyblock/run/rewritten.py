@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import yaml
@@ -12,12 +12,12 @@ from phyblock.files import atomic_write, writing
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record
 from phyblock.run.folder import run_folder
 
-__all__ = ["manifest_text", "records_text", "write_run"]
+__all__ = ["manifest_text", "record_lines", "write_run"]
 
 
 def write_run(folder: Path, manifest: Manifest, records: Iterable[Record]) -> None:
     """Write manifest and records of a run; raises StoreError where the disk refuses."""
-    texts = {MANIFEST: manifest_text(manifest), RECORDS: records_text(records)}
+    texts = {MANIFEST: manifest_text(manifest), RECORDS: "".join(record_lines(records))}
     run_folder(folder).begin()
     with writing(folder):
         for name, text in texts.items():
@@ -29,7 +29,7 @@ def manifest_text(manifest: Manifest) -> str:
     return yaml.safe_dump(manifest.fields(), sort_keys=False, allow_unicode=True, width=100)
 
 
-def records_text(records: Iterable[Record]) -> str:
-    """`records.jsonl`: the same text for the same records."""
-    lines = (json.dumps(r.fields(), ensure_ascii=False, separators=(",", ":")) for r in records)
-    return "".join(line + "\n" for line in lines)
+def record_lines(records: Iterable[Record]) -> Iterator[str]:
+    """`records.jsonl`, line by line: the same text for the same records."""
+    for record in records:
+        yield json.dumps(record.fields(), ensure_ascii=False, separators=(",", ":")) + "\n"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import random
 import stat
 import struct
 import warnings
@@ -52,6 +53,13 @@ def smaller_than_it_is() -> bytes:
     return patched(SOUND, size, struct.pack("<L", 7))
 
 
+def dense(size: int) -> bytes:
+    """Bytes that are packed some 140 times smaller."""
+    draws = random.Random(0)
+    block = bytes(20_000)
+    return b"".join(draws.randbytes(120) + block for _ in range(size // len(block)))
+
+
 def encrypted() -> bytes:
     data = bytearray(SOUND)
     at = data.index(b"PK\1\2")
@@ -73,6 +81,7 @@ HOSTILE: dict[str, Callable[[], bytes]] = {
     "twice": lambda: with_more(("records.jsonl", b"x")),
     "link": linked,
     "bomb": lambda: archive(*list(CONTENTS.items())[:2], ("records.jsonl", bytes(40 * 2**20))),
+    "dense": lambda: archive(*list(CONTENTS.items())[:2], ("records.jsonl", dense(20 * 2**20))),
     "manifest too large": lambda: archive(("run.yaml", b"x" * (3 * 2**20))),
     "larger than it says": smaller_than_it_is,
     "encrypted": encrypted,
