@@ -15,6 +15,7 @@ from phyblock.errors import Problem, StoreError
 from phyblock.parsing import READER_VERSION
 from phyblock.records import MANIFEST, RECORDS, Line, Manifest
 from phyblock.records.decode import decode, problem_of
+from phyblock.report.inputs import digest_of_file
 
 __all__ = [
     "FORMAT",
@@ -23,7 +24,6 @@ __all__ = [
     "about_text",
     "data_of",
     "describe",
-    "digest_of",
     "read_about",
 ]
 
@@ -126,7 +126,7 @@ def read_about(path: Path, folder: Path, manifest: Manifest) -> About:
     if not manifest.models:
         raise StoreError(Problem(f"{path}: {MANIFEST}", "names no model", "models", hint=_HINT))
     found = {
-        **{f"files.{name}": digest_of(folder / name) for name in (MANIFEST, RECORDS)},
+        **{f"files.{name}": digest_of_file(folder / name) for name in (MANIFEST, RECORDS)},
         "run": manifest.identity,
         "suite": _digest_of_suite(manifest),
     }
@@ -147,15 +147,6 @@ def read_about(path: Path, folder: Path, manifest: Manifest) -> About:
             for name in differ
         )
     return about
-
-
-def digest_of(path: Path) -> str:
-    """SHA-256 of a file, as hexadecimal digits."""
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while chunk := file.read(2**20):
-            digest.update(chunk)
-    return digest.hexdigest()
 
 
 def _sha256(data: bytes) -> str:

@@ -9,8 +9,9 @@ from typing import Any
 from phyblock.records import Record
 from phyblock.records.reading import any_records
 from phyblock.report.html.index import read_places
+from phyblock.report.html.pack import Pack
 from phyblock.report.html.samples import IN_INDEX
-from phyblock.site.chunks import Chunks
+from phyblock.site.chunks import chunks
 from phyblock.site.entries import Entry
 from phyblock.site.runs import SiteRun
 from phyblock.site.values import AllValues
@@ -58,7 +59,7 @@ def write_samples(
 
     Raises OSError where the disk refuses, StoreError for a record that cannot be read.
     """
-    packs = {kind: Chunks(folder, kind, build) for kind in ("replays", "scenes", "questions")}
+    packs = {kind: chunks(folder, kind, build) for kind in ("replays", "scenes", "questions")}
     tracks, scenes, items, outcomes, ways = (_Numbers() for _ in range(5))
     about: dict[str, list[Any]] = {name: [] for name in ("scene", "levels", "part", "question")}
     names = ("entry", "item", "seed", "way", "outcome", "score")
@@ -129,7 +130,7 @@ def _scene(scene: str, runs: Sequence[SiteRun]) -> dict[str, Any] | None:
     return None if task is None else scene_entry(task.scene, task.candidates)
 
 
-def _question(one: SiteRun, record: Record, pack: Chunks) -> int:
+def _question(one: SiteRun, record: Record, pack: Pack) -> int:
     """The number of what was asked, where it is more than a scene and at hand; else -1."""
     items = one.sources.items.get(record.track)
     shown = None if items is None else items.shown(record)

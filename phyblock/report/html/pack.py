@@ -7,22 +7,31 @@ the page parses it, so nothing that a model said is ever read as code.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
-__all__ = ["Pack", "write_script"]
+__all__ = ["Pack", "to_json", "write_script"]
 
 _CHUNK_CHARACTERS = 300_000
 
 
 class Pack:
-    """Entries of one kind in numbered scripts of about 300 kB, written as they fill.
+    """Entries of one kind in numbered scripts, written as they fill.
 
-    `starts` holds the number of the first entry of every script.
+    `starts` holds the number of the first entry of every script. `write` puts JSON text into the
+    script of a folder, name and build; a script has about `most` characters of it.
     """
 
-    def __init__(self, folder: Path, kind: str, build: str) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        kind: str,
+        build: str,
+        write: Callable[[Path, str, str, str], None] | None = None,
+        most: int = _CHUNK_CHARACTERS,
+    ) -> None:
         self.starts: list[int] = []
+        self._write, self._most = write or _write, most
         self._folder = folder
         self._kind = kind
         self._build = build
@@ -32,8 +41,8 @@ class Pack:
 
     def add(self, entry: object) -> int:
         """Append an entry and say its number; raises OSError where the disk refuses."""
-        text = _to_json(entry)
-        if self._entries and self._size + len(text) > _CHUNK_CHARACTERS:
+        text = to_json(entry)
+        if self._entries and self._size + len(text) > self._most:
             self._flush()
         self._entries.append(text)
         self._size += len(text)
@@ -47,17 +56,18 @@ class Pack:
 
     def _flush(self) -> None:
         name = f"{self._kind}-{len(self.starts)}"
-        _write(self._folder, name, self._build, f"[{','.join(self._entries)}]")
+        self._write(self._folder, name, self._build, f"[{','.join(self._entries)}]")
         self.starts.append(self._count - len(self._entries))
         self._entries, self._size = [], 0
 
 
 def write_script(folder: Path, name: str, build: str, data: Mapping[str, object]) -> None:
     """Write one object as the script `<name>.js`; raises OSError where the disk refuses."""
-    _write(folder, name, build, _to_json(data))
+    _write(folder, name, build, to_json(data))
 
 
-def _to_json(data: object) -> str:
+def to_json(data: object) -> str:
+    """Data as a script has them; ValueError for a number that JSON has not."""
     # ASCII: a page from disk has no header that tells an encoding, and lone surrogates survive.
     return json.dumps(data, ensure_ascii=True, separators=(",", ":"), allow_nan=False)
 

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import Any
 
-import jinja2
-
 from phyblock.report.html.headline import Headline
+from phyblock.report.html.shell import fill
 from phyblock.tables.text_table import Column, TextTable
 
 __all__ = ["Figure", "render_page"]
 
+_PACKAGE = "phyblock.report.html"
 _SCRIPTS = (
     *("dom.js", "data.js", "solid.js", "filters.js", "search.js", "list.js", "steps.js"),
     *(
@@ -57,16 +54,10 @@ def render_page(
     `about` says what the run was (title, facts: pairs of name and text), `cautions` what it is
     not; `folder` is where the page finds its data. Names of `models` lead to their samples.
     """
-    environment = jinja2.Environment(
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    script = "\n".join(_asset(name) for name in _SCRIPTS)
-    style = "\n".join(_asset(name) for name in _STYLES)
-    template = environment.from_string(_asset("page.html.j2"))
-    return template.render(
+    return fill(
+        (_PACKAGE, "page.html.j2"),
+        [(_PACKAGE, name) for name in _SCRIPTS],
+        [(_PACKAGE, name) for name in _STYLES],
         about=about,
         cautions=cautions,
         models=frozenset(models),
@@ -75,32 +66,7 @@ def render_page(
         tables=[(table, _groups(table.columns)) for table in tables],
         folder=folder,
         build=build,
-        script=script,
-        style=style,
-        policy=_policy(script, style),
     )
-
-
-def _policy(script: str, style: str) -> str:
-    """Content security: what is in the page by its digest, data and pictures from beside it."""
-    return "; ".join(
-        [
-            "default-src 'none'",
-            f"script-src '{_digest(script)}' 'self'",
-            f"style-src '{_digest(style)}'",
-            "img-src 'self'",
-            "base-uri 'none'",
-            "form-action 'none'",
-        ]
-    )
-
-
-def _digest(text: str) -> str:
-    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-
-
-def _asset(name: str) -> str:
-    return (files("phyblock.report.html") / "assets" / name).read_text(encoding="utf-8")
 
 
 def _groups(columns: Sequence[Column]) -> list[tuple[str, int]]:
