@@ -13,7 +13,9 @@ const Table = (() => {
     ["done", "Samples done", (fact) => [fact.done, fact.done < fact.expected ? `of ${fact.expected.toLocaleString("en")}` : ""]],
     ["failed", "Not read or failed", (fact) => [fact.failed]],
   ];
-  const LOWER_FIRST = ["usd_per_solved", "usd_per_100", "prompt_tokens", "completion_tokens", "latency_s", "failed", "rank"];
+  /** What no scoring can tell. */
+  const RECORDED = ["usd_per_solved", "usd_per_100", "prompt_tokens", "completion_tokens", "latency_s"];
+  const LOWER_FIRST = [...RECORDED, "failed", "rank"];
 
   const text = (value, digits = 1) => (value === null || value === undefined ? DASH
     : value.toLocaleString("en", { minimumFractionDigits: digits, maximumFractionDigits: digits }));
@@ -40,7 +42,7 @@ const Table = (() => {
   function factColumn([name, heading, of], track, several) {
     return {
       id: `${track.name}/${name}`, heading: heading.replace("{item}", track.item), group: several ? track.title : "",
-      setting: "", about: track.title, better: LOWER_FIRST.includes(name) ? "lower" : "higher",
+      setting: "", about: track.title + (RECORDED.includes(name) ? ", as the records say" : ""), better: LOWER_FIRST.includes(name) ? "lower" : "higher",
       value: (row) => (row.facts[track.name] ? of(row.facts[track.name])[0] ?? null : null),
       cell: (row) => {
         if (!row.facts[track.name]) return { text: DASH };
