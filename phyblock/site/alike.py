@@ -23,6 +23,8 @@ and who read the replies.
 _CONTROLS = frozenset({"blind", "wrong_image", "prompt", "path"})
 """What a track's section of the suite says that is shown with the run, or known by its digest."""
 _HINT = "make a site of each"
+_SCENES = "dataset.sha256"
+_SCENES_HINT = "give all runs the same levels and --limit, or make a site of each"
 
 
 def check_runs_alike(runs: Sequence[SiteRun]) -> None:
@@ -52,7 +54,19 @@ def _differences(one: SiteRun, first: SiteRun) -> Iterator[Problem]:
         if value is None or other is None or value == other:
             continue
         message = f"cannot stand in one table with {first.where}"
-        yield Problem(one.where, message, field, str(value), str(other), _HINT)
+        if field == _SCENES:
+            message += ": other scenes were asked about"
+            found, allowed = (_asked(side.run, shared) for side in (one, first))
+            yield Problem(one.where, message, field, found, allowed, _SCENES_HINT)
+        else:
+            yield Problem(one.where, message, field, str(value), str(other), _HINT)
+
+
+def _asked(run: Run, shared: Sequence[str]) -> str:
+    """How many items of each track, and the digest of the scenes that they are about."""
+    assert run.manifest.dataset is not None
+    items = (f"{run.manifest.items.get(track, 0):,} of {track}" for track in shared)
+    return f"{', '.join(items)}, scenes {run.manifest.dataset.sha256[:12]}"
 
 
 def _tracks(run: Run) -> tuple[str, ...]:
@@ -68,7 +82,7 @@ def _facts(run: Run, shared: Sequence[str]) -> Iterator[tuple[str, Any]]:
     if not shared:
         return
     if data is not None:
-        yield "dataset.sha256", data.sha256
+        yield _SCENES, data.sha256
     if (asked := manifest.questions) is not None:
         yield "questions.version", asked.version
     yield "scoring.matchers", suite.scoring.matchers[0]

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from phyblock.report.html.standing import shortfalls
 from phyblock.site.entries import Entry
 from phyblock.site.ranking import rank_ranges_of
 from phyblock.site.runs import SiteRun
@@ -108,6 +109,7 @@ def _rows(
         main = _id(track, next(iter(values[number, track].values)), _main(track, runs[number]))
         ranked = [entry for entry in entries if main in _values(entry, values)]
         ranges[track] = rank_ranges_of(track, ranked, runs, values)
+    lacking = {key: shortfalls(runs[key[0]].run, key[1]) for key in values}
     return [
         {
             "name": entry.name,
@@ -117,6 +119,11 @@ def _rows(
             "runs": dict(entry.runs),
             "values": _values(entry, values),
             "ranks": {t: list(r[entry.name]) for t, r in ranges.items() if entry.name in r},
+            "lacking": {
+                track: lacking[number, track][entry.model.name]
+                for track, number in entry.runs.items()
+                if entry.model.name in lacking[number, track]
+            },
             "facts": {
                 track: _rounded(asdict(values[number, track].facts[entry.model.name]))
                 for track, number in entry.runs.items()

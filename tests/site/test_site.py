@@ -107,6 +107,9 @@ def test_models_alone_have_ranks_the_same_on_the_site_and_in_the_report() -> Non
 def test_a_model_of_which_samples_were_left_out_has_no_rank() -> None:
     run = planned(left_out=SCENES[1:], cherry=4, a=3, b=1)
     assert ranks_of(run) == {"cherry": None, "a": [1, 1], "b": [2, 2]}
+    board = board_of([run], entries_of([run]), all_values([run]))
+    lacking = {row["name"]: row["lacking"].get("full_planning") for row in board["rows"]}
+    assert lacking == {"cherry": f"1 of {len(SCENES)} answered", "a": None, "b": None}
 
 
 def test_a_sample_without_a_value_has_none() -> None:
@@ -202,6 +205,7 @@ def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(
     (problem,) = caught.value.problems
     assert (problem.where, problem.field) == ("two", field)
     assert "cannot stand in one table with one" in problem.message
+    assert ("--limit" in problem.hint) == (field == "dataset.sha256")
 
 
 def test_a_recording_that_was_asked_elsewhere_stands_beside_any_prompt() -> None:

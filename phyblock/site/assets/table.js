@@ -121,11 +121,14 @@ const Table = (() => {
     return range[0] === range[1] ? String(range[0]) : `${range[0]}–${range[1]}`;
   }
 
-  /** How many samples of how many a row has, where some were left out. */
+  /** How many samples of how many were answered and why no more, where some were not; and whether
+      that leaves the row without a rank. */
   function lacking(row, track) {
-    const fact = row.facts[track];
+    const [fact, why] = [row.facts[track], row.lacking[track]];
     const said = (number) => number.toLocaleString("en");
-    return fact && fact.done < fact.expected ? `${said(fact.done)} of ${said(fact.expected)} samples: no rank` : "";
+    const isCut = fact && fact.done < fact.expected;
+    const counted = why || (isCut ? `${said(fact.done)} of ${said(fact.expected)} samples` : "");
+    return counted && isCut ? `${counted}; no rank` : counted;
   }
 
   function strip([value, lo, hi]) {
