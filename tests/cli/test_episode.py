@@ -7,6 +7,11 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from phyblock.datasets import read_builtin
+from phyblock.records.reading import read_records
+from phyblock.tracks.step_planning.episode_views import OUTCOME_NAMES
+from phyblock.tracks.step_planning.film import episode_film, episode_table
+from phyblock.tracks.step_planning.record import EpisodeRecord
 from tests.workspace import Workspace
 
 SEESAW = {
@@ -55,7 +60,7 @@ def test_an_episode_is_told_and_shown(played: Workspace) -> None:
     )
     assert (done.code, done.err) == (0, "")
     assert "Collapsed" in done.out
-    assert "2  Move(3)    placed" in done.out
+    assert "2  Move(3)    Placed" in done.out
     with Image.open(gif) as frames:
         assert frames.n_frames == 4
         frames.seek(2)
@@ -64,6 +69,24 @@ def test_an_episode_is_told_and_shown(played: Workspace) -> None:
         assert frames.convert("RGB").crop((262, 17, 390, 145)).tobytes() != before
     with Image.open(sheet) as picture:
         assert picture.format == "PNG"
+
+
+def test_frames_say_what_became_of_steps_as_tables_do(played: Workspace) -> None:
+    (task,) = read_builtin(played.root / "data").tasks
+    for record in read_records(played.root / "out"):
+        assert isinstance(record, EpisodeRecord)
+        _, *frames, last = episode_film(record, task)
+        outcomes = [row[2] for row in episode_table(record).rows]
+        assert all(
+            frame.caption.endswith(f": {said}")
+            for frame, said in zip(frames, outcomes, strict=True)
+            if said != "Done"
+        )
+        assert set(outcomes) <= set(OUTCOME_NAMES.values())
+        turns = tuple(turn.model_copy(update={"outcome": "empty"}) for turn in record.turns)
+        unread = record.model_copy(update={"turns": turns})
+        assert {row[2] for row in episode_table(unread).rows} == {"Empty"}
+        assert last.caption.startswith(f"{record.progress[-1]} of 3 blocks placed; ended: ")
 
 
 @pytest.mark.parametrize(

@@ -113,6 +113,7 @@ def test_true_poses_in_a_random_valid_order_are_right_and_stand(
          [None, "interpenetrating"], 1),
         (STANDS.replace("block 1", "block 99"), (0, 0, 0, 0), ["no_block", "falls"],
          ["wrong_kind", "too_early"], 0),
+        ("Step1: block 1 at (9, 0, 2.5)", (0, 0, 0, 0), ["stands"], ["off_sideways"], 0),
         ("Step1: block 3 at (0, 0, 7.5)", (0, 0, 0, 0), ["falls"], ["too_early"], 0),
         ("I cannot say.", (0, 0, 0, 0), [], [], 0),
         (None, (0, 0, 0, 0), [], [], 0),
@@ -138,6 +139,12 @@ def test_a_reply_is_read_scored_and_carried_out(
     record = judged({**fields, **track.about(task)}, task, found)
     assert known_records().validate_json(record.as_json()) == record
     assert isinstance(record, PoseRecord)
+    frames = list(pose_film(record, task))[1:-1]
+    assert [frame.tone == "good" for frame in frames] == [error is None for error in errors]
+    assert not any(frame.caption.endswith("stands") for frame in frames if frame.tone == "bad")
+    assert [row[4] == "overlaps" for row in pose_table(record).rows] == [
+        end == "overlaps" for end in ends
+    ]
     notes = " ".join(pose_table(record).notes)
     assert ("There is no plan" in notes) == (not ends)
     assert ("(no_plan)" in notes) == (text == "I cannot say.")

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block, PoseStep
 from phyblock.plain_text import counted
+from phyblock.scoring import PoseError
 from phyblock.sim.carry import CarryLimits, carry_out
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.placing import put, upright
@@ -81,8 +82,9 @@ def pose_film(record: PoseRecord, task: AssemblyTask) -> Iterator[FilmStep]:
         if pose.engine != (engine := told_engine()):
             by = f" (shown in {engine}, not {pose.engine})"
     for n, (one, step, world) in enumerate(zip(given, pose.steps, worlds, strict=True), 1):
-        tone: Tone = "good" if step.end == "stands" else "bad"
-        yield FilmStep(f"{n}. block {one.block}: {_ended(step)}", tone, one.block, world)
+        tone: Tone = "good" if step.error is None else "bad"
+        where = "" if step.error is None or step.end != "stands" else _where(step.error)
+        yield FilmStep(f"{n}. block {one.block}: {_ended(step)}{where}", tone, one.block, world)
     tone = "good" if pose.completed else "bad"
     yield FilmStep(f"{_came_to(record, pose)}{by}", tone, None, worlds[-1] if worlds else ())
 
@@ -113,6 +115,11 @@ def _ended(step: StepOutcome) -> str:
     if step.end == "knocks_over":
         return f"knocks over {', '.join(map(str, step.knocked))}"
     return _ENDS[step.end]
+
+
+def _where(error: PoseError) -> str:
+    """What is wrong with a step that stands."""
+    return f", but {ERROR_NAMES[error].lower()}"
 
 
 def _came_to(record: PoseRecord, pose: PoseOutcome | None) -> str:

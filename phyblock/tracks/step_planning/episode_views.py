@@ -15,6 +15,7 @@ from phyblock.tracks.step_planning.rules import ENDINGS
 
 __all__ = [
     "ENDING_NAMES",
+    "OUTCOME_NAMES",
     "endings_in_terminal",
     "endings_view",
     "moves_view",
@@ -34,7 +35,7 @@ ENDING_NAMES = {
     "unanswered": "Unanswered",
 }
 """What people read in the place of each ending."""
-_OUTCOMES = {
+OUTCOME_NAMES = {
     "placed": "Placed",
     "shape_not_in_gt": "Shape not in GT",
     "overflow": "Overflow",
@@ -44,6 +45,7 @@ _OUTCOMES = {
     "unread": "Unread",
     "done": "Done",
 }
+"""What people read in the place of each outcome of a step."""
 _OF_SHARE = ("%", "95 % CI")
 _CURVE = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 30, 44)
 
@@ -86,7 +88,7 @@ def moves_view(table: pd.DataFrame, run: Run) -> TextTable:
         )
         for row in table.to_dict("records")
     )
-    columns = [Column(kind, _OUTCOMES[name]) for name in STEP_OUTCOMES for kind in _OF_SHARE]
+    columns = [Column(kind, OUTCOME_NAMES[name]) for name in STEP_OUTCOMES for kind in _OF_SHARE]
     return TextTable(
         f"What became of steps (%){run.design.of_suite}",
         (_MODEL, Column("Steps"), *columns),

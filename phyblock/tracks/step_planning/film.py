@@ -11,7 +11,7 @@ from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.registry import REFERENCE_ENGINE, told_engine
 from phyblock.sim.site import settle
 from phyblock.tables.text_table import Column, TextTable
-from phyblock.tracks.step_planning.episode_views import ENDING_NAMES
+from phyblock.tracks.step_planning.episode_views import ENDING_NAMES, OUTCOME_NAMES
 from phyblock.tracks.step_planning.record import EpisodeRecord, EpisodeTurn
 
 __all__ = ["episode_film", "episode_table"]
@@ -31,8 +31,8 @@ def episode_table(record: EpisodeRecord) -> TextTable:
         (
             str(turn.step),
             _operation(turn),
-            _words(turn.outcome),
-            _words(turn.parse.rule),
+            _outcome(turn),
+            (turn.parse.rule or "none").replace("_", " "),
             f"{len(turn.world)} of {record.n_blocks}",
         )
         for turn in record.steps
@@ -44,8 +44,10 @@ def episode_table(record: EpisodeRecord) -> TextTable:
     )
 
 
-def _words(name: str | None) -> str:
-    return (name or "none").replace("_", " ")
+def _outcome(turn: EpisodeTurn) -> str:
+    name = turn.outcome or "unread"
+    # Beyond the outcomes of moves there are ways in which a reply says none.
+    return OUTCOME_NAMES.get(name, name.replace("_", " ").capitalize())
 
 
 def episode_film(record: EpisodeRecord, task: AssemblyTask) -> Iterator[FilmStep]:
@@ -55,9 +57,10 @@ def episode_film(record: EpisodeRecord, task: AssemblyTask) -> Iterator[FilmStep
     for turn in record.steps:
         blocks = tuple(task.scene.blocks[vertex] for vertex in turn.world)
         tone: Tone = {"placed": "good", "done": "plain"}.get(turn.outcome or "", "bad")  # type: ignore[assignment]
-        told = _words(turn.outcome)
         move = turn.parse.move
-        caption = f"{turn.step}. {_operation(turn)}" + ("" if told == "done" else f": {told}")
+        caption = f"{turn.step}. {_operation(turn)}" + (
+            "" if turn.outcome == "done" else f": {_outcome(turn)}"
+        )
         yield FilmStep(caption, tone, move if isinstance(move, int) else None, blocks)
     by = ""
     if record.ending == "collapsed":
@@ -68,7 +71,9 @@ def episode_film(record: EpisodeRecord, task: AssemblyTask) -> Iterator[FilmStep
             by = f" (falls in {now}, not {engine})"
     tone = "good" if record.ending == "completed" else "bad"
     placed = record.progress[-1] if record.progress else 0
-    caption = f"{_ending(record)}: {placed} of {counted(record.n_blocks, 'block')}{by}"
+    caption = (
+        f"{placed} of {counted(record.n_blocks, 'block')} placed; ended: {_ending(record)}{by}"
+    )
     yield FilmStep(caption, tone, None, blocks)
 
 
