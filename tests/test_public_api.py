@@ -84,6 +84,7 @@ def test_what_is_wrong_is_named() -> None:
     scene = next(iter(suite.scenes.values()))
     wrong: dict[str, typing.Callable[[], object]] = {
         "there is no such suite": lambda: phyblock.load_suite("quik"),
+        "suite: is empty": lambda: phyblock.load_suite(""),
         "--set limit=0": lambda: phyblock.load_suite("quick", "limit=0"),
         "has no such scene": lambda: suite.scenes["l9"],
         "render: show": lambda: phyblock.render(scene, show="all"),  # type: ignore[arg-type]

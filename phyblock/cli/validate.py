@@ -26,6 +26,11 @@ __all__ = ["command"]
 
 # A models file has model names at its top level, a suite has these.
 _SUITE_KEY = re.compile(rf"^(?:{'|'.join(suite_model().model_fields)})[ \t]*:", re.MULTILINE)
+# Keys that scenes have and neither suites nor models, in YAML and in JSON.
+_SCENE_KEYS = tuple(
+    re.compile(rf"""(?:^|[\s{{,"'-]){key}["']?[ \t]*:[ \t]*(?:[\[#]|$)""", re.MULTILINE)
+    for key in ("blocks", "position")
+)
 
 
 @click.command("validate")
@@ -67,7 +72,19 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[s
     if path.suffix == ".j2":
         hint = "name the suite that uses it: its prompts are rendered"
         raise SpecError(Problem(str(path), "is a prompt, not a suite", hint=hint))
-    if not _is_suite(path):
+    try:
+        return _check_written(path, sets, models_file)
+    except SpecError as error:
+        if not _holds_scenes(path):
+            raise
+        message, allowed = "holds scenes", "a suite, a models file, or the folder of a data set"
+        hint = f"`phyblock scenes complete {shown_path(path)}` makes a data set of them"
+        raise SpecError(Problem(str(path), message, allowed=allowed, hint=hint)) from error
+
+
+def _check_written(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[str]:
+    """What a sound suite or models file is."""
+    if not _has_keys(path, _SUITE_KEY):
         known = load_models(path)
         _check_models(path, known, known)
         if not known:
@@ -93,12 +110,17 @@ def _check_models(path: Path, known: Mapping[str, ModelSpec], names: Collection[
         raise SpecError(problems)
 
 
-def _is_suite(path: Path) -> bool:
-    """Whether a file has a key of suites; False for what cannot be read, whose reader says why."""
+def _holds_scenes(path: Path) -> bool:
+    return _has_keys(path, *_SCENE_KEYS)
+
+
+def _has_keys(path: Path, *keys: re.Pattern[str]) -> bool:
+    """Whether a file has such keys; False for what cannot be read, whose reader says why."""
     try:
-        return bool(_SUITE_KEY.search(read_bytes(path).decode(errors="replace")))
+        text = read_bytes(path).decode(errors="replace")
     except (OSError, ValueError):
         return False
+    return all(key.search(text) for key in keys)
 
 
 def _about(dataset: Dataset) -> str:

@@ -35,6 +35,9 @@ def find_suite(name: str) -> Path:
     path = Path(name)
     if os.path.isfile(path):
         return path
+    if not name.strip():
+        allowed = "a suite file, or a bundled suite: " + ", ".join(bundled_suites())
+        raise SpecError(Problem("suite", "is empty", found=repr(name), allowed=allowed))
     if path.suffix in ("", ".yaml") and path.parent == Path():
         inside = bundled("benchmarks", f"{path.stem}.yaml")
         if os.path.isfile(inside):
