@@ -14,6 +14,7 @@ from phyblock.report import write_report, write_tables
 from phyblock.scoring import ERROR_TYPES
 from tests.browser import expect
 from tests.report.browser import ReportVisit
+from tests.report.factory import manifest, write_run
 from tests.report.html_run import MARKUP
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
@@ -191,6 +192,30 @@ def test_a_link_to_what_is_not_there_says_so(visit: ReportVisit) -> None:
     assert "has no sample" in page.inner_text("#detail")
     page.goto(f"{visit.path.as_uri()}#elsewhere")
     expect(page.locator("#warning")).to_contain_text("view “elsewhere”")
+
+
+def test_a_model_without_any_sample_is_in_the_run_and_says_why(trouble: ReportVisit) -> None:
+    page = trouble.open()
+    page.locator(".headline a", has_text="locked").first.click()
+    expect(page.locator("#list-status")).to_contain_text("no sample of locked here: 0 of 2")
+    assert "Incorrect API key" in page.inner_text("#list-status")
+    assert page.locator("#warning").is_hidden()
+    assert page.locator("#list [role=option]").count() == 0
+    assert page.locator("#filter-model option:checked").inner_text() == "locked"
+
+
+def test_every_view_of_a_run_without_records_says_why(browser: Browser, tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", [], manifest())
+    write_report(write_tables(folder), figures=())
+    page = browser.new_page()
+    visit = ReportVisit(page, folder / "report.html")
+    visit.page.goto(f"{visit.path.as_uri()}#samples")
+    expect(page.locator("#list-status")).to_contain_text("There is no sample here. This run is not")
+    visit.open("matrix")
+    expect(page.locator("#matrix-none")).to_contain_text("This run is not finished: 0 of ")
+    assert page.locator("#matrix").is_hidden()
+    page.close()
+    assert visit.complaints == []
 
 
 def test_filtering_out_what_is_shown_moves_on(visit: ReportVisit) -> None:

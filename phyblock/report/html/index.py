@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -66,6 +66,10 @@ class _Names:
 
     numbers: dict[Any, int] = field(default_factory=dict)
 
+    @classmethod
+    def of(cls, values: Iterable[Any]) -> _Names:
+        return cls({value: n for n, value in enumerate(dict.fromkeys(values))})
+
     def number(self, value: Any) -> int:
         return self.numbers.setdefault(value, len(self.numbers))
 
@@ -82,7 +86,9 @@ class SampleIndex:
             track: kind_of(track).report().listings(design) for track in design.suite.tracks
         }
         self._scenes, self._items = _Names(), _Names()
-        self._tracks, self._models, self._outcomes = _Names(), _Names(), _Names()
+        # A model and a track without any record are in the run as well.
+        self._tracks, self._models = _Names.of(design.suite.tracks), _Names.of(design.model_names)
+        self._outcomes = _Names()
         self._subtasks, self._variants = _Names(), _Names()
         self._seeds: set[int] = set()
         self._about: dict[str, list[Any]] = {"scene": [], "levels": [], "subtask": []}

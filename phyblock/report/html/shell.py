@@ -35,7 +35,7 @@ def _policy(script: str, style: str) -> str:
             "default-src 'none'",
             f"script-src '{_digest(script)}' 'self'",
             f"style-src '{_digest(style)}'",
-            "img-src 'self'",
+            "img-src 'self' data:",
             "base-uri 'none'",
             "form-action 'none'",
         ]

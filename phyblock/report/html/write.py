@@ -31,7 +31,7 @@ from phyblock.report.html.samples import (
 from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.shown import images_of
 from phyblock.report.html.sources import Sources, open_sources
-from phyblock.report.html.standing import cautions, samples_done
+from phyblock.report.html.standing import cautions, samples_done, shortfalls
 from phyblock.report.made import PAGE
 from phyblock.report.write import TablesWritten
 from phyblock.run.folder import run_folder
@@ -46,7 +46,7 @@ REPORT_FILE = PAGE
 _FOLDER = "report"
 _PICTURES = "pictures"
 _CHUNK_BYTES = 2**20
-_LAYOUT = 3
+_LAYOUT = 4
 """Version of the scripts' folder; those of the first were not listed as ours."""
 _NOT_SHOWN = ("table1",)
 """Tables that a headline table replaces."""
@@ -153,6 +153,8 @@ def _write_data(
         "no_scenes": sources.lacking,
         "subtask_names": part_names(run),
         "subtask_groups": mean_parts(run),
+        "cautions": cautions(run),
+        "shortfalls": {track: shortfalls(run, track) for track in run.design.suite.tracks},
     }
     write_script(new, "index", build, content)
     return pictures, is_whole

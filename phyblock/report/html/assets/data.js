@@ -100,8 +100,17 @@ const Data = (() => {
     return -1;
   }
 
+  /** Why a track, or a model in it, has no sample at all; "" where there is one. */
+  function lacking(track, model) {
+    const { rows, models, cautions, shortfalls } = index;
+    if (rows.track.some((of, row) => of === track && (model === undefined || rows.model[row] === model))) return "";
+    if (model === undefined) return ["There is no sample here.", ...cautions].join(" ");
+    const why = shortfalls[index.tracks[track]]?.[models[model]];
+    return `There is no sample of ${models[model]} here${why ? `: ${why}` : ""}.`;
+  }
+
   return {
-    open, sample, find, entry, chunk,
+    open, sample, find, entry, chunk, lacking,
     get index() {
       return index;
     },

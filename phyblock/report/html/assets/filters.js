@@ -217,5 +217,8 @@ const Filters = (() => {
     return unknown;
   }
 
-  return { start, setTrack, test, asked, restore, words, listing, state };
+  /** Why nothing can pass, whatever else is chosen: the track, or the model in it, has no sample. */
+  const lacking = () => Data.lacking(state.track) || (chosen.model ? Data.lacking(state.track, chosen.model.value) : "");
+
+  return { start, setTrack, test, asked, restore, words, listing, lacking, state };
 })();

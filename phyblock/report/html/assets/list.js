@@ -102,7 +102,7 @@ const List = (() => {
   function say() {
     const isOutside = chosen >= 0 && !rows.includes(chosen) ? " The sample shown does not pass them." : "";
     status.textContent = rows.length ? `${Words.count(rows.length, "sample")}${isOutside && `.${isOutside}`}`
-      : `No sample passes these filters.${isOutside}`;
+      : Filters.lacking() || `No sample passes these filters.${isOutside}`;
   }
 
   function paint() {

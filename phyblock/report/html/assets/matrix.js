@@ -64,6 +64,13 @@ const Matrix = (() => {
     box.style.setProperty("--models", models.length);
     box.setAttribute("aria-rowcount", items.length + 1);
     box.setAttribute("aria-colcount", models.length + 1);
+    const why = Data.lacking(state.track), none = document.getElementById("matrix-none");
+    none.textContent = why;
+    none.hidden = !why;
+    box.hidden = Boolean(why);
+    const { key, levels } = Data.index.items;
+    const widest = items.reduce((most, item) => Math.max(most, `${key[item]} L${levels[item].join(", ")}`.length), 0);
+    box.style.setProperty("--names", `${0.58 * widest + 0.6}rem`);
     const noun = Data.index.track_items[state.track] || "item";
     head.replaceChildren(el("span", { role: "columnheader", class: "matrix-corner" }, `${noun[0].toUpperCase()}${noun.slice(1)}`),
       ...models.map((model) => el("span", { role: "columnheader", class: "matrix-model" },
