@@ -52,6 +52,7 @@ check: $(TESTS)
 # The documentation site, in build/docs-site; a broken link is an error.
 docs: $(TESTS)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
+	$(BIN)/python -m pytest -n 2 -q -m '' tests/docs
 
 LOCK := $(BIN)/uv pip compile pyproject.toml --universal --python-version 3.10 \
 	  --generate-hashes --no-emit-index-url --no-emit-find-links --no-annotate --no-header --quiet

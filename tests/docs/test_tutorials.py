@@ -1,4 +1,7 @@
-"""What the tutorials tell a reader to do works, in their order and from nothing."""
+"""What the tutorials tell a reader to do works, in their order and from nothing.
+
+`make docs` runs these; they are slow, since a reader waits for figures and pages, too.
+"""
 
 from __future__ import annotations
 
@@ -69,6 +72,7 @@ def follow(page: str, workspace: Workspace, url: str) -> str:
     return printed
 
 
+@pytest.mark.slow
 def test_a_reader_gets_an_own_model_into_the_table(workspace: Workspace) -> None:
     with Running(OpenAIChat()) as server:
         printed = follow("first-model.md", workspace, server.url)

@@ -10,21 +10,25 @@ import time
 
 import pytest
 
-# A task says its process and stays; the first line tells that both are at work.
-WORK = """
-import sys, time, os
-from phyblock_making.workers import open_workers
+# A task says its process and stays; the first line tells that both are at work. Workers know the
+# functions of modules, not those of the program itself.
+TASKS = """
+import time, os
 
 def stay(n):
     os.write(1, f"{os.getpid()}\\n".encode())
     time.sleep(60)
+"""
+WORK = """
+import sys
+from phyblock_making.workers import open_workers
+from tasks import stay
 
-if __name__ == "__main__":
-    try:
-        with open_workers(2) as workers:
-            list(workers.map(stay, range(2)))
-    except KeyboardInterrupt:
-        sys.exit(130)
+try:
+    with open_workers(2) as workers:
+        list(workers.map(stay, range(2)))
+except KeyboardInterrupt:
+    sys.exit(130)
 """
 
 
@@ -41,8 +45,9 @@ def test_workers_end_with_the_process_that_started_them(
     sent: signal.Signals, tmp_path: os.PathLike[str]
 ) -> None:
     script = os.path.join(tmp_path, "work.py")
-    with open(script, "w", encoding="utf-8") as file:
-        file.write(WORK)
+    for name, text in (("work.py", WORK), ("tasks.py", TASKS)):
+        with open(os.path.join(tmp_path, name), "w", encoding="utf-8") as file:
+            file.write(text)
     with subprocess.Popen(
         [sys.executable, script],
         stdout=subprocess.PIPE,

@@ -78,7 +78,10 @@ def prepare(workspace: Workspace, url: str, seeds: int) -> None:
 
 @pytest.mark.parametrize(
     ("kills", "seeds", "start"),
-    [(4, 20, 1), pytest.param(20, 80, 2, marks=pytest.mark.slow)],
+    [
+        (1, 5, 1),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in ((4, 20, 1), (20, 80, 2))),
+    ],
 )
 def test_what_was_answered_is_kept_whenever_the_run_is_killed(
     workspace: Workspace, kills: int, seeds: int, start: int

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 PHONE = {"width": 390, "height": 844}
 
 
-@pytest.fixture(scope="module")
+# Of the session as `made` is, in whose folder it lies: a worker may come to a module twice.
+@pytest.fixture(scope="session")
 def site(made: Workspace) -> Path:
     """A site of a bundle and a run with hostile names."""
     make_hostile(made.root / "first", made.root / "hostile")

@@ -190,6 +190,7 @@ def test_no_learner_wins_by_the_candidates_of_the_built_in_set(setting: Setting)
 
 
 @pytest.mark.parametrize("setting", SETTINGS)
+@pytest.mark.slow
 def test_no_learner_wins_by_the_candidates_of_some_fresh_goals(setting: Setting) -> None:
     """F1 of so few goals is known to a point or two, so that twice as much is chance."""
     assert gain(fresh(100, 7), setting, repeats=False) <= 2 * GAIN
