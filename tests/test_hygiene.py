@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
@@ -114,3 +115,17 @@ def test_what_one_room_alone_imports_is_forbidden_to_every_other(
     }
     covered = {room for room in rooms if {room, room.partition(".")[0]} & named}
     assert covered == rooms - allowed
+
+
+def test_nothing_that_is_built_is_tracked() -> None:
+    """Pages, scripts of others and runs are made here; what is tracked is what people wrote."""
+    words = ["git", "-C", str(ROOT), "ls-files", "-z"]
+    listed = subprocess.run(words, capture_output=True, text=True, check=False)
+    if listed.returncode:
+        pytest.skip("not a git checkout")
+    files = [Path(name) for name in listed.stdout.split("\0") if name]
+    folders = {file.parts[0] for file in files if len(file.parts) > 1}
+    known = {".ci", "benchmarks", "docs", "prompts", "results", "tests", *PACKAGES}
+    assert folders <= known
+    assert not [file for file in files if re.search(r"\.min\.|\.map$", file.name)]
+    assert [file for file in files if file.parts[0] == "results"] == [Path("results/README.md")]

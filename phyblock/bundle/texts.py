@@ -41,7 +41,7 @@ def without_paths(value: Any) -> Any:
 
 
 def model_name(text: str) -> str:
-    """A name, of a path its last part: `hosted_vllm//home/me/Qwen` is `hosted_vllm/Qwen`."""
+    """A name, of a path its last part: `hosted_vllm//srv/models/Qwen` is `hosted_vllm/Qwen`."""
     prefix = found[0] if (found := _PREFIX.match(text)) else ""
     rest = text[len(prefix) :]
     return prefix + _last_part(rest) if _is_path(rest) else text

@@ -14,7 +14,7 @@ from phyblock.records.known import known_records
 from tests.report.factory import manifest, record
 
 SERVERS = ["http://10.0.0.5:8000/v1", "http://gpu-7.lab:9000/v1"]
-AT_HOME = "/home/alice/models/Qwen2-VL"
+AT_HOME = "/srv/models/Qwen2-VL"
 
 
 def run_manifest(**more: Any) -> Manifest:
@@ -29,7 +29,7 @@ def run_manifest(**more: Any) -> Manifest:
         (AT_HOME, "Qwen2-VL"),
         (f"hosted_vllm/{AT_HOME}", "hosted_vllm/Qwen2-VL"),
         ("hosted_vllm/~/Qwen", "hosted_vllm/Qwen"),
-        ("C:\\Users\\alice\\Qwen", "Qwen"),
+        ("D:\\models\\Qwen", "Qwen"),
         ("openai/gpt-4o", "openai/gpt-4o"),
         ("hosted_vllm/Qwen/Qwen2-VL", "hosted_vllm/Qwen/Qwen2-VL"),
     ],
