@@ -172,6 +172,50 @@ def test_the_table_is_sorted_and_its_columns_are_chosen_by_keyboard(visit: SiteV
     assert page.locator(".board tbody tr").first.locator(".rank").inner_text() == "\u2013"
 
 
+CROWD = """(count) => {
+  const board = { tracks: [], rows: Array.from({ length: count }, (_, i) => ({
+    name: `model-number-${i}`, kind: "litellm", lacking: {},
+    values: { f1: [30 + (i * 7) % 23, 25 + (i * 7) % 23, 34 + (i * 7) % 23] },
+    facts: { plan: { completion_tokens: 300 + (i * 37) % 400, done: i ? 8 : 5, expected: 8 } },
+  })) };
+  const column = { id: "f1", heading: "F1", unit: "%" };
+  const { drawing } = Chart.draw(board, { name: "plan" }, column, "completion_tokens");
+  document.querySelector("main").replaceChildren(drawing);
+  const boxes = (selector) => [...drawing.querySelectorAll(selector)].map((one) => one.getBBox());
+  const meet = (a, b) => a.x < b.x + b.width && b.x < a.x + a.width
+    && a.y < b.y + b.height && b.y < a.y + a.height;
+  const names = boxes(".point text");
+  const all = [...names, ...boxes(".point circle")];
+  return {
+    met: names.flatMap((a, i) => all.slice(i + 1).filter((b) => meet(a, b))).length,
+    outside: names.filter((a) => a.x < 0 || a.x + a.width > drawing.viewBox.baseVal.width).length,
+    cut: drawing.querySelectorAll(".cut circle").length,
+  };
+}"""
+"""Draw made-up models close to each other: how many names meet another name or a point."""
+
+
+@pytest.mark.parametrize("count", [1, 6, 18])
+def test_names_in_the_chart_meet_nothing(visit: SiteVisit, count: int) -> None:
+    assert visit.open().evaluate(CROWD, count) == {"met": 0, "outside": 0, "cut": 1}
+
+
+def test_baselines_do_not_tell_how_hard_a_scene_is(visit: SiteVisit) -> None:
+    page = visit.open("scenes")
+    expect(page.locator(".lead")).to_contain_text("mean score of all baselines")
+    page.evaluate("Store.board.rows[1].kind = 'replay'; Site.go('scenes', { q: 't' })")
+    expect(page.locator(".lead")).to_contain_text("mean score of all models")
+    own = page.evaluate("""() => {
+      const { rows, items, scenes } = Store.index;
+      const place = scenes.indexOf("t5");
+      return rows.score.filter((score, i) => score !== null && items.scene[rows.item[i]] === place
+        && Store.index.tracks[items.track[rows.item[i]]] === Store.board.tracks[0].name
+        && Store.board.rows[rows.entry[i]].kind !== "baseline").map((score) => score / 10);
+    }""")
+    shown = page.get_by_role("link", name="t5").locator(".shade").inner_text()
+    assert float(shown) == pytest.approx(sum(own) / len(own), abs=0.051)
+
+
 def test_from_the_table_to_a_replay_and_back(visit: SiteVisit) -> None:
     page = visit.open()
     page.get_by_role("link", name="oracle").first.click()

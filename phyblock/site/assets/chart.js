@@ -4,6 +4,10 @@
 const Chart = (() => {
   const [WIDTH, HEIGHT] = [860, 420];
   const [LEFT, RIGHT, TOP, BOTTOM] = [52, 150, 16, 46];
+  /** Sizes of a name: the width of a letter at the most, the height of a line. */
+  const [LETTER, LINE] = [7.2, 14];
+  /** How far below its point a name may stand, the nearest first. */
+  const SHIFTS = [0, ...Array.from({ length: 30 }, (_, n) => [(n + 1) * 7, -(n + 1) * 7]).flat()];
   const AXES = [
     ["usd_per_100", "Cost of 100 replies [USD]"],
     ["usd_per_solved", "Cost of a solved sample [USD]"],
@@ -67,33 +71,42 @@ const Chart = (() => {
     drawing.append(
       svg("text", { x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 8, class: "title middle" }, title),
       svg("text", { x: LEFT, y: TOP - 4, class: "title" }, `${column.heading}${column.unit ? ` [${column.unit}]` : ""}`));
-    for (const { row, at } of placed(rows, (one) => y(one.values[column.id][0]), (one) => x(fact(one, track, name)))) {
+    const points = rows.map((row) => {
       const [value, lo, hi] = row.values[column.id];
       const [cx, cy] = [x(fact(row, track, name)), y(value)];
-      const point = svg("a", { href: Site.address("model", { m: row.name }), class: `point ${row.kind === "baseline" ? "baseline" : ""}` },
-        svg("title", {}, `${row.name}: ${Table.text(value)}, ${said(fact(row, track, name))}`),
-        lo === null ? "" : svg("line", { class: "interval", x1: cx, x2: cx, y1: y(Math.max(0, lo)), y2: y(Math.min(most, hi)) }),
+      const bar = lo === null ? [cy, cy] : [y(Math.min(most, hi)), y(Math.max(0, lo))];
+      return { row, value, cx, cy, bar, hasBar: lo !== null };
+    });
+    for (const { row, value, cx, cy, bar, hasBar, name: { x: nx, y: ny, end, away } } of named(points)) {
+      const kind = [row.kind === "baseline" && "baseline", Table.isCut(row, track.name) && "cut"].filter(Boolean).join(" ");
+      drawing.append(svg("a", { href: Site.address("model", { m: row.name }), class: `point ${kind}` },
+        svg("title", {}, [`${row.name}: ${Table.text(value)}, ${said(fact(row, track, name))}`, Table.lacking(row, track.name)].filter(Boolean).join("; ")),
+        hasBar ? svg("line", { class: "interval", x1: cx, x2: cx, y1: bar[0], y2: bar[1] }) : "",
         row.kind === "baseline" ? svg("rect", { x: cx - 4.5, y: cy - 4.5, width: 9, height: 9 }) : svg("circle", { cx, cy, r: 5 }),
-        Math.abs(at - cy) > 8 ? svg("line", { class: "leader", x1: cx + 6, y1: cy, x2: cx + 12, y2: at }) : "",
-        svg("text", { x: cx + 14, y: at + 4 }, short(row.name)));
-      drawing.append(point);
+        away ? svg("line", { class: "leader", x1: cx + (end ? -6 : 6), y1: cy, x2: nx + (end ? 2 : -2), y2: ny }) : "",
+        svg("text", { x: nx, y: ny + 4, class: end ? "end" : null }, short(row.name))));
     }
     return { drawing, without };
   }
 
   const short = (name) => (name.length > 22 ? `${name.slice(0, 21)}…` : name);
 
-  /** Rows with the heights of their names, so far apart that names near each other can be read. */
-  function placed(rows, yOf, xOf) {
-    const found = [];
-    for (const row of [...rows].sort((a, b) => yOf(a) - yOf(b))) {
-      let at = yOf(row);
-      for (const other of found) {
-        if (Math.abs(xOf(other.row) - xOf(row)) < 150 && Math.abs(at - other.at) < 14) at = other.at + 14;
-      }
-      found.push({ row, at: Math.min(at, HEIGHT - BOTTOM - 2) });
-    }
-    return found;
+  /** Points with the place of their name: beside the point, on the side and as near to its height as
+      meets no other name, point or bar, and leaves the drawing nowhere. */
+  function named(points) {
+    const taken = points.map(({ cx, cy, bar }) => ({ left: cx - 5, right: cx + 5, top: Math.min(bar[0], cy - 5), bottom: Math.max(bar[1], cy + 5) }));
+    return [...points].sort((a, b) => a.cy - b.cy).map((point) => {
+      const width = short(point.row.name).length * LETTER;
+      const places = SHIFTS.flatMap((shift) => [false, true].map((end) => {
+        const [from, ny] = [point.cx + (end ? -14 : 14), point.cy + shift];
+        return { x: from, y: ny, end, away: Math.abs(shift) > LINE / 2,
+          box: { left: end ? from - width : from, right: end ? from : from + width, top: ny - LINE / 2, bottom: ny + LINE / 2 } };
+      })).filter(({ box }) => box.left >= LEFT && box.right <= WIDTH && box.top >= 0 && box.bottom <= HEIGHT - BOTTOM);
+      const meets = ({ box }) => taken.filter((one) => box.left < one.right && one.left < box.right && box.top < one.bottom && one.top < box.bottom).length;
+      const name = places.find((place) => !meets(place)) || places.reduce((least, place) => (meets(place) < meets(least) ? place : least));
+      taken.push(name.box);
+      return { ...point, name };
+    });
   }
 
   return { axes, draw };

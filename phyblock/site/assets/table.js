@@ -126,9 +126,14 @@ const Table = (() => {
   function lacking(row, track) {
     const [fact, why] = [row.facts[track], row.lacking[track]];
     const said = (number) => number.toLocaleString("en");
-    const isCut = fact && fact.done < fact.expected;
-    const counted = why || (isCut ? `${said(fact.done)} of ${said(fact.expected)} samples` : "");
-    return counted && isCut ? `${counted}; no rank` : counted;
+    const counted = why || (isCut(row, track) ? `${said(fact.done)} of ${said(fact.expected)} samples` : "");
+    return counted && isCut(row, track) ? `${counted}; no rank` : counted;
+  }
+
+  /** Whether a row was not asked everything that its run holds. */
+  function isCut(row, track) {
+    const fact = row.facts[track];
+    return Boolean(fact) && fact.done < fact.expected;
   }
 
   function strip([value, lo, hi]) {
@@ -139,7 +144,7 @@ const Table = (() => {
       svg("circle", { cx: 2 + value, cy: 6, r: 2.5 }));
   }
 
-  return { groups, usual, sorted, rank, lacking, strip, text, dollars, DASH };
+  return { groups, usual, sorted, rank, lacking, isCut, strip, text, dollars, DASH };
 })();
 
 /** An element of a drawing. */

@@ -117,7 +117,7 @@ const Views = (() => {
   function notes(state) {
     const { track } = state;
     return el("div", { class: "notes" },
-      el("p", {}, `Rank: the best and the worst place that a model may have by ${track.title}, ${track.main}, from tests of every pair of models on the samples that both have, corrected for their number (Holm, 95 %). Models whose ranks overlap may be equally good. Baselines, and models of which samples were left out, have no rank.`),
+      el("p", {}, `Rank: the best and the worst place that a model may have by ${track.title}, ${track.main}, from tests of every pair of models on the samples that both have, corrected for their number (Holm, 95 %). Models whose ranks overlap may be equally good. Baselines have no rank, nor have models that were not asked everything.`),
       el("p", {}, "Under a value stands its 95 % interval, from leaving out each base scene in turn."),
       track.notes.map((note) => el("p", {}, note)),
       el("p", {}, "“Scored again” are runs that came as a bundle, whose replies were scored again when this page was made and came out the same. What replies cost, how long they took, and which model gave them no scoring can tell: that is taken from the records."),
@@ -140,6 +140,7 @@ const Views = (() => {
     return el("section", { class: "costs" }, el("h2", {}, "Cost against score"), el("div", { class: "tools" }, choice),
       el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Cost against score" }, drawing),
       el("p", { class: "notes" }, [`${track.title}. Bars are 95 % intervals. Squares are baselines.`,
+        data.rows.some((row) => Table.isCut(row, track.name)) ? " Hollow points were not asked everything." : "",
         without.length ? ` Not drawn, as nothing is known: ${without.map((row) => row.name).join(", ")}.` : ""].join("")));
   }
 
@@ -235,8 +236,11 @@ const Views = (() => {
     const index = await Store.openSamples();
     const track = data.tracks.find(({ name }) => name === words.get("t")) || data.tracks[0];
     const sums = new Map();
+    const isModel = data.rows.map((row) => row.kind !== "baseline");
+    // Baselines know the goal or do not look: they say nothing of how hard a scene is to models.
+    const counts = isModel.includes(true) ? (row) => isModel[index.rows.entry[row]] : () => true;
     index.rows.item.forEach((item, row) => {
-      if (index.tracks[index.items.track[item]] !== track.name || index.rows.score[row] === null) return;
+      if (!counts(row) || index.tracks[index.items.track[item]] !== track.name || index.rows.score[row] === null) return;
       const scene = index.items.scene[item];
       const sum = sums.get(scene) || { n: 0, sum: 0, levels: index.items.levels[item] };
       sum.n += 1;
@@ -254,7 +258,7 @@ const Views = (() => {
       onchange: (event) => Site.go("scenes", { t: words.get("t"), q: event.target.value }) }));
     return [
       el("h1", {}, "Scenes"),
-      el("p", { class: "lead" }, `The mean score of all models in ${track.title.toLowerCase()}, the hardest first.`),
+      el("p", { class: "lead" }, `The mean score of all ${isModel.includes(true) ? "models" : "baselines"} in ${track.title.toLowerCase()}, the hardest first.`),
       el("div", { class: "tools" }, choice, search),
       el("p", { class: "muted", role: "status" }, plural(list.length, "scene")),
       el("ul", { class: "tiles" }, list.map(({ name, score, levels }) => el("li", {},
