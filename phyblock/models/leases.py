@@ -1,8 +1,9 @@
 """Questions that are being asked right now, in a table beside the replies of the cache.
 
 A lease is held while a request is under way and renewed until it ends, so that no other process
-asks the same. It runs out soon after its holder died or hangs. Nothing but time tells that, and the
-clock of the machine may be set: a lease that would last longer than any can is none.
+asks the same. It ends with its process where that can be told, by those on the same machine, and
+else runs out soon after its holder died or hangs. The clock of the machine may be set: a lease that
+would last longer than any can is none.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ import time
 import uuid
 from collections.abc import Callable
 from typing import NamedTuple
+
+from phyblock.models.holder import holder_name, is_holder_gone
 
 __all__ = ["LEASE_S", "Lease", "Leases"]
 
@@ -29,7 +32,9 @@ _EXISTS = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'leases'"
 
 
 class Lease(NamedTuple):
-    """One lease that was taken; `owner` differs from that of every other."""
+    """One lease that was taken; `owner` differs from that of every other, and names the process
+    behind its first word, where the process has a name.
+    """
 
     key: str
     owner: str
@@ -43,18 +48,21 @@ class Leases:
         self._db = db
         self._now = now
         self._held: set[Lease] = set()
+        self._holder = holder_name()
         if db.execute(_EXISTS).fetchone() is None:
             db.execute(_CREATE)
 
     def is_taken(self, key: str) -> bool:
         """Whether the question is being asked."""
         now = self._now()
-        row = self._db.execute("SELECT until FROM leases WHERE key = ?", (key,)).fetchone()
-        return row is not None and now < row[0] <= now + LEASE_S
+        row = self._db.execute("SELECT until, owner FROM leases WHERE key = ?", (key,)).fetchone()
+        if row is None or not now < row[0] <= now + LEASE_S:
+            return False
+        return not is_holder_gone(row[1].partition(" ")[2])
 
     def take(self, key: str, *, by_force: bool = False) -> Lease | None:
         """Take the lease, or None where another holds it. `by_force` takes it from the other."""
-        lease = Lease(key, uuid.uuid4().hex)
+        lease = Lease(key, f"{uuid.uuid4().hex} {self._holder}".rstrip())
         self._db.execute("BEGIN IMMEDIATE")
         try:
             is_free = by_force or not self.is_taken(key)
