@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import make_console, shown_path
-from phyblock.cli.paths import NAME_OR_PATH, UserPath
+from phyblock.cli.paths import UserPath
 from phyblock.domain import SUBTASKS, Question
 from phyblock.files import make_folder, write_named
 from phyblock.folders import OutFolder
@@ -23,7 +23,10 @@ from phyblock_making.cli.question_sets import (
     data_option,
     questions_argument,
     read_question_set,
+    read_unseen,
     size_option,
+    unseen_data_option,
+    unseen_option,
 )
 from phyblock_making.cli.vqa_attacks_view import (
     attack_findings,
@@ -71,18 +74,8 @@ _ANSWERS = "answers.csv"
     "--no-text-probe", is_flag=True, help="Leave out what needs scikit-learn: classifiers."
 )
 @click.option("--no-pictures", is_flag=True, help="Leave out the attacks that look at pictures.")
-@click.option(
-    "--unseen",
-    type=NAME_OR_PATH,
-    metavar="PATH",
-    help="Another set of questions, of another seed: a text probe learns from it alone.",
-)
-@click.option(
-    "--unseen-data",
-    type=NAME_OR_PATH,
-    metavar="PATH",
-    help="The scenes that those are about, unless they are those of --data.",
-)
+@unseen_option
+@unseen_data_option
 @click.option(
     "--json", "table", type=UserPath(dir_okay=False), metavar="FILE", help="All figures as JSON."
 )
@@ -115,7 +108,7 @@ def command(
         if out is not None:
             make_folder(out.parent)
     read = read_question_set(questions, data)
-    other = _other_set(unseen, unseen_data or data, read.root)
+    other = read_unseen(unseen, unseen_data or data, read.root)
     some = select_questions(read.tasks, SUBTASKS, range(1, 5), per_subtask, None)
     chosen = [task.question for task in some]
     if blind is not None:
@@ -142,16 +135,6 @@ def command(
         if place is not None:
             told = f"{counted(len(chosen), 'question')} in {shown_path(place)}"
             console.print(told, markup=False)
-
-
-def _other_set(unseen: str | None, data: str, mine: Path) -> list[Question]:
-    """The questions of another set; BadParameter where it is the one that is audited."""
-    if unseen is None:
-        return []
-    other = read_question_set(unseen, data)
-    if other.root.resolve() == mine.resolve():
-        raise click.BadParameter(f"{unseen} is the set that is audited", param_hint="--unseen")
-    return [task.question for task in other.tasks]
 
 
 def _audits(asked: Sequence[Question], with_texts: bool) -> list[SubtaskAudit]:

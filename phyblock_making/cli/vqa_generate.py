@@ -17,7 +17,12 @@ from phyblock.plain_text import counted
 from phyblock_making.attacks.attack_card import attack_card
 from phyblock_making.attacks.attacks import Attacked, all_attacks, attack
 from phyblock_making.attacks.observed import Observed, observe
-from phyblock_making.cli.question_sets import data_option
+from phyblock_making.cli.question_sets import (
+    data_option,
+    read_unseen,
+    unseen_data_option,
+    unseen_option,
+)
 from phyblock_making.cli.subtasks_option import subtasks_option
 from phyblock_making.cli.working import jobs_option, ray_option, seed_option
 from phyblock_making.questions.question_files import check_place, write_questions
@@ -42,6 +47,8 @@ __all__ = ["command"]
 @ray_option
 @click.option("--out", type=UserPath(), required=True, metavar="DIR", help="Folder to write.")
 @click.option("--replace", is_flag=True, help="Replace questions that are in the folder.")
+@unseen_option
+@unseen_data_option
 def command(
     data: str,
     subtasks: tuple[Subtask, ...],
@@ -51,14 +58,18 @@ def command(
     ray_address: str | None,
     out: Path,
     replace: bool,
+    unseen: str | None,
+    unseen_data: str | None,
 ) -> None:
     """Make questions, each with an answer that is derived, and their data card.
 
-    The same scenes, subtasks, numbers and seed give the same files, whatever runs the work.
+    The same scenes, subtasks, numbers and seed give the same files, whatever runs the work. With
+    --unseen the card says as well what is learned from the texts of that set.
     """
     check_place(out, replace)
     wanted = {subtask: per_subtask or PER_SUBTASK[subtask] for subtask in subtasks}
     read = read_data_set(data)
+    other = read_unseen(unseen, unseen_data or data, out)
     scenes = [task.scene for task in read.tasks]
     console = make_console(stderr=True)
     with (
@@ -79,8 +90,10 @@ def command(
         made_by += f" --subtasks {','.join(subtasks)}"
     if per_subtask is not None:
         made_by += f" --per-subtask {per_subtask}"
+    if unseen is not None:
+        made_by += f" --unseen {Path(unseen).name}"
     originals = {scene.id: scene for scene in scenes}
-    audits, attacked = _audited(questions, observed)
+    audits, attacked = _audited(questions, observed, other)
     told = attack_card(attacked, observed)
     write_questions(out, questions, originals, read.name, made_by, audits, told)
     outcome = f"{counted(len(questions), 'question')} in {counted(len(subtasks), 'subtask')}"
@@ -88,18 +101,21 @@ def command(
 
 
 def _audited(
-    questions: Sequence[Question], observed: Sequence[Observed]
+    questions: Sequence[Question], observed: Sequence[Observed], other: Sequence[Question]
 ) -> tuple[list[SubtaskAudit], list[Attacked]]:
     """Audit and attacks for the data card; without what learns where scikit-learn is not."""
     try:
-        return _figures(questions, observed, with_texts=True)
+        return _figures(questions, observed, other, with_texts=True)
     except SpecError:
-        return _figures(questions, observed, with_texts=False)
+        return _figures(questions, observed, other, with_texts=False)
 
 
 def _figures(
-    questions: Sequence[Question], observed: Sequence[Observed], with_texts: bool
+    questions: Sequence[Question],
+    observed: Sequence[Observed],
+    other: Sequence[Question],
+    with_texts: bool,
 ) -> tuple[list[SubtaskAudit], list[Attacked]]:
     audits = list(audit_questions(questions, with_text_probe=with_texts))
-    attacks = all_attacks(with_texts=with_texts)
+    attacks = all_attacks(other, with_texts=with_texts)
     return audits, [row for one in attacks for row in attack(one, observed)]

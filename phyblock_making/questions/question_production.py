@@ -26,7 +26,7 @@ from phyblock_making.questions.question_draft import Draft, Option
 from phyblock_making.questions.selection import Pooled, select
 from phyblock_making.workers import Workers
 
-__all__ = ["PER_SUBTASK", "make_questions", "tidy_picture"]
+__all__ = ["PER_SUBTASK", "as_question", "make_questions", "scene_drafts", "tidy_picture"]
 
 PER_SUBTASK: Mapping[Subtask, int] = {
     subtask: 50 if subtask in ("OR", "AD") else 150 for subtask in SUBTASKS
@@ -58,7 +58,7 @@ def make_questions(
     for subtask, count in wanted.items():
         pool: list[Pooled] = []
         tasks = [(subtask, seed, scene) for scene in _tried(subtask, scenes, seed)]
-        for drafts in workers.map(_drafts, tasks):
+        for drafts in workers.map(scene_drafts, tasks):
             pool += [Pooled(draft, _texts(draft.options)) for draft in drafts]
             report(subtask, len(tasks))
         rng = _rng(seed, subtask, "choice")
@@ -68,6 +68,14 @@ def make_questions(
         if not short:
             yield from _dealt(subtask, taken, rng)
     _check_enough(short, wanted)
+
+
+def scene_drafts(task: tuple[Subtask, int, Scene]) -> list[Draft]:
+    """The drafts of a subtask, by a seed, about a scene; they depend on nothing else."""
+    subtask, seed, scene = task
+    maker = MAKERS[subtask]
+    drafts = maker.drafts(scene, _rng(seed, subtask, scene.id))
+    return list(islice(drafts, maker.drafts_a_scene))
 
 
 def _check_enough(short: Mapping[Subtask, int], wanted: Mapping[Subtask, int]) -> None:
@@ -112,13 +120,6 @@ def _tried(subtask: Subtask, scenes: Sequence[Scene], seed: int) -> list[Scene]:
     return [scene for _, _, scene in ranked[: MAKERS[subtask].scenes_tried]]
 
 
-def _drafts(task: tuple[Subtask, int, Scene]) -> list[Draft]:
-    subtask, seed, scene = task
-    maker = MAKERS[subtask]
-    drafts = maker.drafts(scene, _rng(seed, subtask, scene.id))
-    return list(islice(drafts, maker.drafts_a_scene))
-
-
 def _texts(options: Sequence[Option]) -> tuple[str, ...]:
     """The options as texts; of pictures and places, whose texts tell nothing, none."""
     return tuple(option for option in options if isinstance(option, str))
@@ -133,7 +134,7 @@ def _dealt(
     for number, (one, right) in enumerate(zip(shuffled(rng, taken), letters, strict=True), 1):
         order = _places(subtask, right, rng)
         name = f"{subtask.lower()}-{number:0{width}d}"
-        yield _question(name, subtask, one.draft, order, pick(rng, BACKGROUNDS))
+        yield as_question(name, subtask, one.draft, order, pick(rng, BACKGROUNDS))
 
 
 def _places(subtask: Subtask, right: int, rng: np.random.Generator) -> list[int]:
@@ -144,9 +145,10 @@ def _places(subtask: Subtask, right: int, rng: np.random.Generator) -> list[int]
     return [right, *(rest[int(i)] for i in rng.permutation(len(rest)))]
 
 
-def _question(
+def as_question(
     name: str, subtask: Subtask, draft: Draft, places: Sequence[int], background: Background
 ) -> Question:
+    """A draft with its options dealt: `places` says of each, in their order, where it goes."""
     options: list[str] = [""] * len(places)
     pictures = list(draft.pictures)
     marks: list[Mark] = []

@@ -64,6 +64,18 @@ def test_questions_are_written_with_card_and_checksums(folder: Path) -> None:
     assert re.search(r"\| text, within the set \| CO \| 4 \| 25 \| \d+ \| .* \| 49 \| 26 \|", card)
 
 
+def test_the_card_tells_what_was_learned_from_another_set(folder: Path, tmp_path: Path) -> None:
+    """The set is the same bytes as without it."""
+    made = tmp_path / "learned"
+    vqa("generate", "--data", folder, "--out", made, *SMALL, "--unseen", folder / "q")
+    assert (made / QUESTION_LINES).read_bytes() == (folder / "q" / QUESTION_LINES).read_bytes()
+    card = (made / "CARD.md").read_text(encoding="utf-8")
+    assert card.split("\n\n    ", 1)[1].splitlines()[0].endswith("--unseen q")
+    assert re.search(r"\| text, unseen set \| all \| 8 \| 25 \| \d+ \|", card)
+    with pytest.raises(click.BadParameter, match="is the set that is audited"):
+        vqa("generate", "--out", folder / "q", "--replace", *SMALL, "--unseen", folder / "q")
+
+
 def test_a_folder_is_not_written_over_unasked(folder: Path) -> None:
     with pytest.raises(StoreError, match="holds questions already"):
         vqa("generate", "--data", folder, "--out", folder / "q", *SMALL)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 from collections import Counter
 from dataclasses import replace
 
@@ -10,20 +11,32 @@ import numpy as np
 import pytest
 
 from phyblock.datasets import QuestionSet, read_builtin, read_questions
-from phyblock.domain import LETTERS, SUBTASKS
+from phyblock.domain import LETTERS, SUBTASKS, Subtask
+from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled
+from phyblock.sim.registry import other_simulators
 from phyblock.sim.seeing import mark_pixel
-from phyblock_making.questions.question_production import PER_SUBTASK
+from phyblock_making.questions.question_production import (
+    PER_SUBTASK,
+    as_question,
+    make_questions,
+    scene_drafts,
+)
 from phyblock_making.questions.rederiving import problem_of
 from phyblock_making.questions.shortcuts import duplicates_of
+from phyblock_making.workers import open_workers
 
 FOLDER = bundled("benchmarks", "data", "phyblock-vqa")
+DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
+SCENES = {task.scene.id: task.scene for task in DATA.tasks}
+SEED = 0
+"""That of the command in the set's card."""
 SAMPLE = slice(7, None, 50)
 
 
 @pytest.fixture(scope="module")
 def built_in() -> QuestionSet:
-    return read_questions(FOLDER, read_builtin(bundled("benchmarks", "data", "phyblock-400")))
+    return read_questions(FOLDER, DATA)
 
 
 def test_all_subtasks_are_whole(built_in: QuestionSet) -> None:
@@ -88,3 +101,40 @@ def test_fifty_corrupted_answers_of_all_subtasks_are_found(built_in: QuestionSet
             wrong = ((question.answer[0] + 1 + number % 3) % len(LETTERS),)
         found += problem_of(replace(question, answer=wrong)) is not None
     assert found == 50
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("subtask", ["CO", "SI", "OR"])
+def test_a_subtask_made_by_the_command_of_the_card_has_the_same_bytes(subtask: Subtask) -> None:
+    """Subtasks come out alike alone and with others; these three are the quickest."""
+    wanted = {subtask: PER_SUBTASK[subtask]}
+    with open_workers() as workers:
+        made = list(make_questions(list(SCENES.values()), wanted, SEED, workers))
+    lines = [StoredQuestion.of(one, SCENES[one.scene.id]).as_json() for one in made]
+    assert lines == shipped_lines(subtask)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(other_simulators()), reason="the set is made with the default simulators")
+@pytest.mark.parametrize("subtask", SUBTASKS)
+def test_shipped_lines_are_among_those_that_their_scenes_give(
+    built_in: QuestionSet, subtask: Subtask
+) -> None:
+    """A few of each subtask, of those too that take minutes to make whole."""
+    lines = shipped_lines(subtask)
+    asked = [task.question for task in built_in.tasks if task.question.subtask == subtask]
+    for question, line in list(zip(asked, lines, strict=True))[9::40]:
+        original = SCENES[question.scene.id]
+        background = question.pictures[0].background
+        assert background is not None
+        made = (
+            as_question(question.id, subtask, draft, places, background)
+            for draft in scene_drafts((subtask, SEED, original))
+            for places in itertools.permutations(range(len(LETTERS)))
+        )
+        assert line in (StoredQuestion.of(one, original).as_json() for one in made), question.id
+
+
+def shipped_lines(subtask: Subtask) -> list[str]:
+    text = (FOLDER / "questions.jsonl").read_text(encoding="utf-8")
+    return [line for line in text.splitlines() if f'"subtask": "{subtask}"' in line]
