@@ -9,7 +9,7 @@ import click
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.names import split_names
-from phyblock.cli.paths import UserPath
+from phyblock.cli.paths import UserPath, moved_data_option
 from phyblock.errors import Problem, SpecError
 from phyblock.report.figures import PAPER, Wanted, figure_names, of_models, write_paper_figures
 from phyblock.tables.drawing import COLUMN_IN, WIDTH_IN, Font, Look
@@ -62,7 +62,7 @@ class _Width(click.ParamType):  # type: ignore[type-arg]
 )
 @click.option("--no-title", is_flag=True, help="Leave the title to the caption.")
 @click.option("--out", type=UserPath(), help=f"Folder for the files. [default: RUN/{PAPER}]")
-@click.option("--data", type=UserPath(), help="The data set, where it has moved.")
+@moved_data_option
 def command(
     run: Path,
     names: tuple[str, ...],

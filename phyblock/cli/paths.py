@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-__all__ = ["NAME_OR_PATH", "UserPath", "models_file_option"]
+__all__ = ["NAME_OR_PATH", "UserPath", "models_file_option", "moved_data_option"]
 
 
 class UserPath(click.Path):
@@ -46,4 +46,10 @@ models_file_option = click.option(
     type=NAME_OR_PATH,
     metavar="FILE",
     help="Models file instead of models.yaml.",
+)
+
+moved_data_option = click.option(
+    "--data",
+    type=UserPath(exists=True, file_okay=False),
+    help="The data set, where it has moved.",
 )

@@ -9,7 +9,7 @@ import click
 
 from phyblock import report
 from phyblock.cli.console import make_console, shown_path
-from phyblock.cli.paths import UserPath
+from phyblock.cli.paths import UserPath, moved_data_option
 from phyblock.cli.summary import print_summary
 from phyblock.report.inputs import inputs_digest
 from phyblock.report.made import PAGE, TABLES, note_made, still_made
@@ -20,7 +20,7 @@ __all__ = ["command", "show_made", "show_tables"]
 
 @click.command("report")
 @click.argument("run", type=UserPath())
-@click.option("--data", type=UserPath(), help="The data set, where it has moved.")
+@moved_data_option
 def command(run: Path, data: Path | None) -> None:
     """Write tables and report.html of the folder RUN again, and print the tables.
 

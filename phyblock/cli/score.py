@@ -7,7 +7,7 @@ from typing import cast
 
 import click
 
-from phyblock.cli.paths import UserPath
+from phyblock.cli.paths import UserPath, moved_data_option
 from phyblock.cli.report import show_tables
 from phyblock.run.rescore import rescore
 from phyblock.words import MATCHERS, PLAN_PARSERS, Matcher, PlanParser
@@ -20,7 +20,7 @@ __all__ = ["command"]
 @click.option("--parser", type=click.Choice(PLAN_PARSERS), help="Parser to read replies with.")
 @click.option("--matcher", type=click.Choice(MATCHERS), help="Matcher of the headline numbers.")
 @click.option("--out", type=UserPath(), help="Folder for the new scores.")
-@click.option("--data", type=UserPath(), help="The data set, where it has moved.")
+@moved_data_option
 def command(
     run: Path, parser: str | None, matcher: str | None, out: Path | None, data: Path | None
 ) -> None:

@@ -74,7 +74,8 @@ def components_frame(run: Run) -> pd.DataFrame:
                 for name, part in zip(("shift", "single"), parts, strict=True):
                     scale = found.what.measure.scale
                     row |= {name: scale * part.sd}
-                    row |= {f"{name}_lo": scale * part.lo, f"{name}_hi": scale * part.hi}
+                    high = np.minimum(scale * part.hi, found.what.measure.most_apart)
+                    row |= {f"{name}_lo": scale * part.lo, f"{name}_hi": high}
                 rows.append(row | size)
     return pd.DataFrame(rows, columns=list(_COMPONENTS))
 
@@ -173,7 +174,8 @@ def _level_rows(found: Varied, blocks: Blocks) -> list[dict[str, Any]]:
                 row["difference" if name == "value" else name] = number
             row["p"] = np.nan if is_reference else told.p[n, 1]
             row["detectable"] = float(detectable(row["se"], items.clusters.size, _LEVEL))
-            rows.append(row | {"n_items": len(items.names)})
+            row["n_items"] = len(items.names)
+            rows.append(_within(row, found.what.measure.most_apart))
     return rows
 
 
@@ -220,8 +222,17 @@ def _pair_rows(found: Varied, blocks: Blocks) -> list[dict[str, Any]]:
                 row["change" if name == "value" else name] = scale * getattr(told, name)[n]
             row["p"] = told.p[n]
             row["detectable"] = float(detectable(row["se"], clusters.size, _LEVEL))
-            rows.append(row)
+            rows.append(_within(row, 2 * found.what.measure.most_apart))
     return rows
+
+
+def _within(row: dict[str, Any], most: float) -> dict[str, Any]:
+    """A row whose interval ends where what it bounds does, at `most` to either side; a difference
+    that is detectable beyond it is none (NaN).
+    """
+    ends = {name: float(np.clip(row[name], -most, most)) for name in ("lo", "hi")}
+    found = row["detectable"]
+    return row | ends | {"detectable": found if found <= most else np.nan}
 
 
 def _changes(values: Floats) -> Floats:

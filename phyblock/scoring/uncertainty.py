@@ -131,7 +131,7 @@ def jackknife(
     wide = stdtrit(df, (1 + CONFIDENCE) / 2) * se
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.where(value == 0, 0 * se, np.abs(value) / se)
-    p = np.minimum(np.maximum(2 * stdtr(df, -t), least_p(behind)), 1) + 0 * se
+        p = np.minimum(np.maximum(2 * stdtr(df, -t), least_p(behind)), 1) + 0 * se
     return Estimate(value, se, value - wide, value + wide, p, behind)
 
 

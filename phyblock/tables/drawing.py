@@ -27,6 +27,8 @@ __all__ = [
     "MUTED",
     "PAGE_LOOK",
     "PALE",
+    "PANEL_PT",
+    "ROW_PT",
     "WIDTH_IN",
     "Font",
     "Heading",
@@ -36,6 +38,7 @@ __all__ = [
     "headed",
     "heading_of",
     "legend_below",
+    "name_across",
     "names_width_in",
     "new_figure",
     "pdf_bytes",
@@ -89,7 +92,9 @@ class Heading:
 
 PAGE_LOOK = Look()
 _LOOK: ContextVar[Look] = ContextVar("_LOOK", default=PAGE_LOOK)
-_TITLE_PT, _SUBTITLE_PT, _LEGEND_PT, _ROW_PT = 10.5, 7.5, 7.5, 7.5
+_TITLE_PT, _SUBTITLE_PT, _LEGEND_PT, _AXIS_PT = 10.5, 7.5, 7.5, 8.0
+ROW_PT, PANEL_PT = 7.5, 8.5
+"""Sizes of the names of rows and of panels."""
 _HEAD_IN = 0.5
 """Height that figures leave for a title and one line below it."""
 _LINES_IN = {_TITLE_PT: 0.19, _SUBTITLE_PT: 0.14}
@@ -101,10 +106,10 @@ _RC: dict[str, Any] = {
     "font.size": 8,
     # A name is a name, whatever signs are in it.
     "text.parse_math": False,
-    "axes.titlesize": 8.5,
+    "axes.titlesize": PANEL_PT,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
-    "axes.labelsize": 8,
+    "axes.labelsize": _AXIS_PT,
     "axes.labelcolor": INK,
     "axes.edgecolor": MUTED,
     "axes.linewidth": 0.6,
@@ -115,11 +120,12 @@ _RC: dict[str, Any] = {
     "xtick.labelcolor": INK,
     "ytick.labelcolor": INK,
     "xtick.labelsize": 7.5,
-    "ytick.labelsize": _ROW_PT,
+    "ytick.labelsize": ROW_PT,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
     "grid.color": GRID,
     "grid.linewidth": 0.6,
+    "hatch.linewidth": 0.5,
     "legend.frameon": False,
     "legend.fontsize": _LEGEND_PT,
     "svg.hashsalt": _SALT,
@@ -169,7 +175,15 @@ def new_figure(height_in: float, least_in: float = 0.0) -> Figure:
 
 def names_width_in(names: Iterable[str]) -> float:
     """The room at the left of a figure that names of its rows take [inches]."""
-    return max(text_width_in(name, _ROW_PT) for name in names) + 0.25
+    return max(text_width_in(name, ROW_PT) for name in names) + 0.25
+
+
+def name_across(ax: Axes, name: str, room_in: float) -> None:
+    """Name the axis across of a plot that is `room_in` wide [inches].
+
+    A name wider than the plot ends where the plot ends, so that it is never cut.
+    """
+    ax.set_xlabel(name, loc="right" if text_width_in(name, _AXIS_PT) > room_in else "center")
 
 
 def headed(figure: Figure, title: str, subtitle: str) -> None:

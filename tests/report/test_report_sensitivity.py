@@ -103,6 +103,15 @@ def test_the_figure_and_the_table_show_the_same_components() -> None:
             assert (row[2], row[4]) == (number(wanted["shift"]), number(wanted["single"]))
 
 
+def test_two_scenes_bound_no_difference_beyond_what_the_measure_allows() -> None:
+    few = run_of(asked(dict.fromkeys(MODELS, 2), seed=8), facts(*MODELS))
+    for table, most in ((levels_frame(few), 100.0), (pairs_frame(few), 200.0)):
+        ends = table[["lo", "hi"]].to_numpy(float)
+        assert np.nanmax(np.abs(ends)) == most
+        assert not (table["detectable"] > most).any()
+    assert not (components_frame(few)[["shift_hi", "single_hi"]] > 100).any(axis=None)
+
+
 def of_model(frame: Callable[[Run], pd.DataFrame], run: Run, model: str) -> pd.DataFrame:
     """Rows of a model, without what its neighbours decide."""
     table = frame(run)

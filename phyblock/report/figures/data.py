@@ -43,7 +43,14 @@ def dataset_levels(run: Run) -> Figure | None:
     left.barh(places, total - several, height=0.6, color=ACCENT, label="a base scene")
     if several.any():
         left.barh(
-            places, several, 0.6, left=total - several, color=COLORS[4], label="made of several"
+            places,
+            several,
+            0.6,
+            left=total - several,
+            color=COLORS[4],
+            edgecolor="white",
+            hatch="//",
+            label="made of several",
         )
         legend_below(figure, *left.get_legend_handles_labels())
     for place, count in enumerate(total):

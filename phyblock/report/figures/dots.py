@@ -42,6 +42,8 @@ __all__ = ["measure_dots"]
 _ROW_IN = 0.19
 _MOST_PANELS = 6
 _LEAST_PANEL_IN, _LEAST_PLOT_IN = 0.82, 1.0
+_THREE_IN = 1.2
+"""From here on a panel has room for three numbers on its axis."""
 _STEP = 20
 """Scales of shares end at a multiple of this [%]."""
 _NUMBER_IN, _BETWEEN_IN = 0.36, 0.12
@@ -69,7 +71,7 @@ def measure_dots(run: Run, *, track: str) -> Figure | None:
     if measure.unit == "%":
         longest = max(_STEP, _STEP * math.ceil(longest / _STEP))
     names_in = names_width_in(models)
-    room_in = drawn_width_in() - names_in
+    room_in = drawn_width_in(names_in + _LEAST_PLOT_IN) - names_in
     n_panels = len(columns) if room_in / len(columns) >= _LEAST_PANEL_IN else 1
     figure = new_figure(1.0 + _ROW_IN * len(models), names_in + _LEAST_PLOT_IN)
     axes = figure.subplots(1, n_panels, sharey=True, squeeze=False)[0]
@@ -79,7 +81,7 @@ def measure_dots(run: Run, *, track: str) -> Figure | None:
         unit = f" ({measure.unit})" if measure.unit else ""
         ax.set(title=column.heading, xlabel=f"{measure.heading}{unit}")
         if measure.unit == "%":
-            ax.set_xticks(np.linspace(0, longest, 3 if n_panels > 1 or room_in < 2 else 5))
+            ax.set_xticks(np.linspace(0, longest, _ticks(room_in / n_panels)))
     axes[0].set_yticks(np.arange(len(models)), models)
     axes[0].set_ylim(len(models) - 0.4, -0.6)
     bare_axes(axes)
@@ -89,6 +91,11 @@ def measure_dots(run: Run, *, track: str) -> Figure | None:
     title = f"{kind_of(track).title}: {measure.heading}"
     headed(figure, title, _subtitle(run, track, int(found["n_clusters"].max())))
     return figure
+
+
+def _ticks(panel_in: float) -> int:
+    """How many numbers an axis has room for that is so long [inches]."""
+    return 2 if panel_in < _THREE_IN else 3 if panel_in < 2 else 5
 
 
 def _columns(run: Run, track: str, measure: Measure) -> list[HeadlineColumn]:

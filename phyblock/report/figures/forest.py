@@ -12,13 +12,15 @@ from phyblock.plain_text import counted
 from phyblock.report.compare import compare_models
 from phyblock.tables.drawing import (
     ACCENT,
-    INK,
     MUTED,
+    ROW_PT,
     bare_axes,
     headed,
     legend_below,
+    name_across,
     names_width_in,
     new_figure,
+    text_width_in,
 )
 from phyblock.tables.load import Run
 from phyblock.tables.text_table import between, level_name, number
@@ -33,6 +35,7 @@ __all__ = ["difference_forest"]
 
 _ROW_IN = 0.19
 _LEAST_PLOT_IN, _NUMBERS_IN, _TICK_IN = 1.0, 1.05, 0.42
+_MARGIN_IN = 0.08
 _MOST_MODELS = 6
 """Of more models than these, all are held against the best one alone."""
 _LEVEL = 0.05
@@ -72,16 +75,20 @@ def difference_forest(run: Run, *, track: str) -> Figure | None:
     several = table["part"].nunique() > 1
     rows = _of_parts(table) if several else _of_pairs(table, main_measure(run, track).better)
     names_in = names_width_in(row.label for row in rows if not row.is_heading)
-    figure = new_figure(1.1 + _ROW_IN * len(rows), names_in + _LEAST_PLOT_IN)
+    headings_in = max(text_width_in(row.label, ROW_PT, "bold") for row in rows if row.is_heading)
+    figure = new_figure(
+        1.1 + _ROW_IN * len(rows), max(names_in + _LEAST_PLOT_IN, headings_in + 2 * _MARGIN_IN)
+    )
     ax = figure.subplots()
-    _draw(ax, rows)
+    _draw(figure, ax, rows)
     room_in = figure.get_figwidth() - names_in
     if room_in >= _NUMBERS_IN + _LEAST_PLOT_IN:
         _tell(ax, rows)
         room_in -= _NUMBERS_IN
     ax.xaxis.set_major_locator(MaxNLocator(max(1, int(room_in / _TICK_IN))))
     unit = "points" if found.unit == "%" else found.unit
-    ax.set_xlabel(f"Difference of {found.name}" + (f" ({unit})" if unit else ""))
+    measured = f"Difference of {found.name}" + (f" ({unit})" if unit else "")
+    name_across(ax, measured, room_in)
     handles = ax.get_lines()[1:3]
     legend_below(figure, handles, [str(handle.get_label()) for handle in handles])
     most = table.loc[table["n_scenes"].idxmax()]
@@ -131,7 +138,7 @@ def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
     return [{str(name): value for name, value in row.items()} for row in table.to_dict("records")]
 
 
-def _draw(ax: Axes, rows: Sequence[_Row]) -> None:
+def _draw(figure: Figure, ax: Axes, rows: Sequence[_Row]) -> None:
     ax.axvline(0, color=MUTED, linewidth=0.8)
     for is_sure, face, label in ((True, ACCENT, _FOUND), (False, "white", _NOT_FOUND)):
         chosen = [(n, row) for n, row in enumerate(rows) if not row.is_heading]
@@ -147,12 +154,28 @@ def _draw(ax: Axes, rows: Sequence[_Row]) -> None:
             markersize=4,
             label=label,
         )
-    ax.set_yticks(range(len(rows)), [row.label for row in rows])
-    for tick, row in zip(ax.get_yticklabels(), rows, strict=True):
-        tick.set_fontweight("bold" if row.is_heading else "normal")
-        tick.set_color(INK)
+    ax.set_yticks(range(len(rows)), ["" if row.is_heading else row.label for row in rows])
+    for n, row in enumerate(rows):
+        if row.is_heading:
+            _head(figure, ax, n, row.label)
     ax.set_ylim(len(rows) - 0.4, -0.6)
     bare_axes([ax])
+
+
+def _head(figure: Figure, ax: Axes, place: int, label: str) -> None:
+    """A heading from the figure's left edge on, over the plot where it is long."""
+    heading = ax.annotate(
+        label,
+        (_MARGIN_IN / figure.get_figwidth(), place),
+        xycoords=("figure fraction", "data"),
+        va="center",
+        fontsize=ROW_PT,
+        fontweight="bold",
+        annotation_clip=False,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},
+        zorder=4,
+    )
+    heading.set_in_layout(False)
 
 
 def _tell(ax: Axes, rows: Sequence[_Row]) -> None:

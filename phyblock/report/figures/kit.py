@@ -32,6 +32,8 @@ _CM = 100.0
 _TOP, _FOOT = 0.06, 0.84
 """What of a square picture is shown."""
 _AWAY_M = 0.011
+_BESIDE_PT = 6.0
+"""From the middle of an arrow to the middle of its number."""
 _FARTHER = 1.12
 """Than what just frames the blocks: their dimensions stand beside them."""
 _GRAMS = 1000
@@ -82,7 +84,9 @@ def _show(ax: Axes, block: DrawnBlock, camera: Camera) -> None:
     ax.set_yticks([])
     for spine in ax.spines.values():
         spine.set_visible(False)
-    low, high = _box(block)[0], _box(block)[-1]
+    corners = _box(block)
+    low, high = corners[0], corners[-1]
+    middle = camera.to_pixels(corners, side).mean(axis=0)
     # The lower edges towards the camera, and the upright one at the left of the picture.
     away = _AWAY_M
     edges = (
@@ -92,23 +96,28 @@ def _show(ax: Axes, block: DrawnBlock, camera: Camera) -> None:
     )
     for edge in edges:
         ends = camera.to_pixels(np.array(edge), side)
-        _measured(ax, ends, math.dist(*edge) * _CM)
+        _measured(ax, ends, middle, math.dist(*edge) * _CM)
     ax.set(xlim=(0, side), ylim=(_FOOT * side, _TOP * side))
 
 
-def _measured(ax: Axes, ends: NDArray[np.float64], length_cm: float) -> None:
-    """A line with arrows at both ends and how long it is."""
+def _measured(
+    ax: Axes, ends: NDArray[np.float64], inner: NDArray[np.float64], length_cm: float
+) -> None:
+    """A line with arrows at both ends and how long it is, on the side away from `inner` [px]."""
     arrow = {"arrowstyle": "<->", "color": INK, "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0}
     ax.annotate("", tuple(ends[0]), tuple(ends[1]), arrowprops=arrow | {"mutation_scale": 5})
     middle = ends.mean(axis=0)
+    across, down = ends[1] - ends[0]
+    normal = np.array([-down, across]) / math.hypot(across, down)
+    if normal @ (middle - inner) < 0:
+        normal = -normal
     ax.annotate(
         f"{round(length_cm, 1):g}",
         tuple(middle),
-        (0, 0),
+        (_BESIDE_PT * normal[0], -_BESIDE_PT * normal[1]),
         textcoords="offset points",
         ha="center",
         va="center",
         fontsize=6.5,
         color=INK,
-        bbox={"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none"},
     )

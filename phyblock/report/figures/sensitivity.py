@@ -12,10 +12,13 @@ from phyblock.tables.drawing import (
     ACCENT,
     COLORS,
     MARKERS,
+    PANEL_PT,
     bare_axes,
     headed,
     legend_below,
+    names_width_in,
     new_figure,
+    text_width_in,
 )
 from phyblock.tables.load import Run
 from phyblock.tracks.headline import main_measure
@@ -27,7 +30,8 @@ if TYPE_CHECKING:
 __all__ = ["moved_dots"]
 
 _ROW_IN = 0.3
-_PANEL_IN = 0.6
+_APART_IN = 0.12
+"""Between the names of panels."""
 _APART = 0.16
 _PARTS = {"shift": ("shift of all items", ACCENT), "single": ("single items", COLORS[1])}
 
@@ -42,9 +46,13 @@ def moved_dots(run: Run, *, track: str) -> Figure | None:
         return None
     table = table[(table["track"] == track) & (table["factor"] != ITEMS)]
     factors, models = list(table["factor"].unique()), list(table["model"].unique())
-    figure = new_figure(1.2 + _ROW_IN * len(models), 1.7 + _PANEL_IN * len(factors))
+    titles = [factor_name(factor).replace(" ", "\n") for factor in factors]
+    words = [word for title in titles for word in title.split()]
+    panel_in = _APART_IN + max(text_width_in(word, PANEL_PT, "bold") for word in words)
+    least_in = names_width_in(models) + panel_in * len(factors)
+    figure = new_figure(1.2 + _ROW_IN * len(models), least_in)
     axes = figure.subplots(1, len(factors), sharey=True, sharex=True, squeeze=False)[0]
-    for ax, factor in zip(axes, factors, strict=True):
+    for ax, factor, title in zip(axes, factors, titles, strict=True):
         rows = table[table["factor"] == factor].set_index("model").loc[models]
         for n, (name, (label, color)) in enumerate(_PARTS.items()):
             places = np.arange(len(models)) + (n - 0.5) * _APART * 2
@@ -59,7 +67,7 @@ def moved_dots(run: Run, *, track: str) -> Figure | None:
                 label=label,
                 clip_on=False,
             )
-        ax.set(title=factor_name(factor).replace(" ", "\n"), xlabel="SD")
+        ax.set(title=title, xlabel="SD")
     axes[0].set_yticks(np.arange(len(models)), models)
     axes[0].set_ylim(len(models) - 0.4, -0.6)
     axes[0].set_xlim(left=0)

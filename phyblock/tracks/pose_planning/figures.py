@@ -17,6 +17,7 @@ from phyblock.tables.drawing import (
     bare_axes,
     headed,
     legend_below,
+    name_across,
     names_width_in,
     new_figure,
 )
@@ -117,7 +118,8 @@ def pose_error_bars(run: Run) -> Figure | None:
     shares = table.pivot(index="model", columns="error", values="value")
     ranks = table_c_frame(run).set_index("model")["f1_c"]
     models = list(ranks.sort_values(ascending=False, kind="stable").index)
-    figure = new_figure(1.05 + 0.2 * len(models), names_width_in(models) + 1.0)
+    names_in = names_width_in(models)
+    figure = new_figure(1.05 + 0.2 * len(models), names_in + 1.0)
     ax = figure.subplots()
     parts = (
         Part(
@@ -129,7 +131,8 @@ def pose_error_bars(run: Run) -> Figure | None:
     for place, model in enumerate(models):
         if shares.loc[model].isna().all():
             ax.text(1, place, "no steps", va="center", fontsize=7, color=INK)
-    ax.set(xlim=(0, 100), xlabel="Share of steps (%)", ylim=(len(models) - 0.4, -0.6))
+    ax.set(xlim=(0, 100), ylim=(len(models) - 0.4, -0.6))
+    name_across(ax, "Share of steps (%)", figure.get_figwidth() - names_in)
     bare_axes([ax])
     legend_below(figure, *ax.get_legend_handles_labels())
     headed(figure, "What was wrong with steps", "by the first error that each meets; all levels")

@@ -12,6 +12,7 @@ from phyblock.tables.drawing import (
     bare_axes,
     headed,
     legend_below,
+    name_across,
     names_width_in,
     new_figure,
 )
@@ -30,6 +31,8 @@ __all__ = ["error_bars"]
 _COLORS = (COLORS[0], COLORS[5], COLORS[4], COLORS[1])
 _INKS = ("white", "black", "black", "white")
 _LEAST_LABEL = 6.0
+_COUNTS_IN = 0.55
+"""What the numbers of wrong steps take beside the bars."""
 
 
 def error_bars(run: Run) -> Figure | None:
@@ -40,7 +43,8 @@ def error_bars(run: Run) -> Figure | None:
         return None
     order = {model: place for place, model in enumerate(ranked(intervals_table(run), "f1"))}
     table = table.sort_values("model", key=lambda names: names.map(order), kind="stable")
-    figure = new_figure(1.1 + 0.2 * len(table), names_width_in(table["model"]) + 1.2)
+    names_in = names_width_in(table["model"])
+    figure = new_figure(1.1 + 0.2 * len(table), names_in + 1.2)
     ax = figure.subplots()
     parts = (
         Part(ERROR_NAMES[name], 100 * table[f"{name}_share"].to_numpy(float), color, ink)
@@ -50,7 +54,8 @@ def error_bars(run: Run) -> Figure | None:
     for place, wrong in enumerate(table["wrong_steps"]):
         ax.text(101.5, place, f"{wrong:,}", va="center", color=MUTED, fontsize=7)
     ax.text(101.5, -0.72, "wrong steps", va="bottom", color=MUTED, fontsize=7)
-    ax.set(xlim=(0, 100), xlabel="Share of wrong steps (%)", ylim=(len(table) - 0.4, -0.7))
+    ax.set(xlim=(0, 100), ylim=(len(table) - 0.4, -0.7))
+    name_across(ax, "Share of wrong steps (%)", figure.get_figwidth() - names_in - _COUNTS_IN)
     bare_axes([ax])
     legend_below(figure, *ax.get_legend_handles_labels())
     headed(figure, "Why steps were wrong", f"{how_measured(run.design)}; all levels")

@@ -38,6 +38,9 @@ _ROW_IN = 0.19
 _LEAST_PANEL_IN, _LEAST_PLOT_IN = 0.7, 1.0
 _RADAR_MODELS = 8
 _RADAR_IN, _LEAST_RADAR_IN = 2.75, 2.2
+_RINGS = (25, 50, 75, 100)
+_CORNER_PT = 7
+"""Between a corner and its name, for a marker that stands at the corner."""
 _SETTINGS = {
     "a": (COLORS[0], "o", "A: with orientation"),
     "b": (COLORS[1], "D", "B: without orientation"),
@@ -85,7 +88,7 @@ def f1_radar(run: Run) -> Figure | None:
     axes = figure.subplots(rows, abreast, subplot_kw={"projection": "polar"}, squeeze=False)
     for ax, (title, drawn) in zip(axes.ravel(), shown.items(), strict=True):
         handles = _radar(ax, drawn, levels)
-        ax.set_title(title, loc="center", pad=14)
+        ax.set_title(title, loc="center", pad=12 + _CORNER_PT)
     names = list(next(iter(shown.values())))[:_RADAR_MODELS]
     if len(names) > 1:
         legend_below(figure, handles[: len(names)], names)
@@ -130,10 +133,20 @@ def _radar(ax: Axes, lines: dict[str, pd.Series[float]], levels: Sequence[str]) 
             clip_on=False,
         )
     ax.set_xticks(angles, [level_name(level) for level in levels])
-    ax.tick_params(axis="x", pad=4)
-    ax.set(ylim=(0, 100), yticks=[25, 50, 75, 100])
-    ax.set_yticklabels(["25", "50", "75", "100 %"], fontsize=6, color=MUTED)
-    polar.set_rlabel_position(180 / len(levels))
+    ax.tick_params(axis="x", pad=_CORNER_PT)
+    ax.set(ylim=(0, 100), yticks=_RINGS, yticklabels=[])
+    for share in _RINGS:
+        ax.text(
+            np.pi / len(levels),
+            share,
+            f"{share} %" if share == _RINGS[-1] else str(share),
+            ha="center",
+            va="center",
+            fontsize=6,
+            color=MUTED,
+            bbox={"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 0.3},
+            zorder=4,
+        )
     polar.spines["polar"].set_color(GRID)
     return handles[::-1]
 
@@ -154,7 +167,7 @@ def settings_dots(run: Run) -> Figure | None:
         mine = table[table["model"] == models[0]].set_index("level")
         return _of_one(run, models[0], mine.loc[list(levels)])
     names_in = names_width_in(models)
-    room_in = drawn_width_in() - names_in
+    room_in = drawn_width_in(names_in + _LEAST_PLOT_IN) - names_in
     levels = levels if room_in / len(levels) >= _LEAST_PANEL_IN else levels[:1]
     figure = new_figure(1.0 + _ROW_IN * len(models), names_in + _LEAST_PLOT_IN)
     axes = figure.subplots(1, len(levels), sharey=True, squeeze=False)[0]

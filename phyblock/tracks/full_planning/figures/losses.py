@@ -12,6 +12,7 @@ from phyblock.tables.drawing import (
     bare_axes,
     headed,
     legend_below,
+    name_across,
     names_width_in,
     new_figure,
 )
@@ -49,14 +50,16 @@ def loss_bars(run: Run) -> Figure | None:
         return None
     shares = table.pivot(index="model", columns="outcome", values="value")
     models = [model for model in ranked(intervals_table(run), "f1") if model in shares.index]
-    figure = new_figure(1.05 + 0.2 * len(models), names_width_in(models) + 1.0)
+    names_in = names_width_in(models)
+    figure = new_figure(1.05 + 0.2 * len(models), names_in + 1.0)
     ax = figure.subplots()
     parts = (
         Part(BLOCK_NAMES[outcome], shares.loc[models, outcome].to_numpy(float), *_LOOKS[outcome])
         for outcome in BLOCK_OUTCOMES
     )
     stack(ax, models, parts, 0.7, _LEAST_LABEL)
-    ax.set(xlim=(0, 100), xlabel="Share of the goals' blocks (%)", ylim=(len(models) - 0.4, -0.6))
+    ax.set(xlim=(0, 100), ylim=(len(models) - 0.4, -0.6))
+    name_across(ax, "Share of the goals' blocks (%)", figure.get_figwidth() - names_in)
     bare_axes([ax])
     legend_below(figure, *ax.get_legend_handles_labels())
     headed(figure, "What became of the goals' blocks", f"{how_measured(run.design)}; all levels")
