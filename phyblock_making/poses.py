@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from phyblock.domain.blocks import BlockType, Color, Euler
+from phyblock.domain.blocks import BlockType, Euler
 
-__all__ = ["KIT_COLOR", "POSES"]
+__all__ = ["POSES"]
 
 
 def _turns(*names: str, roll: float = 0.0, pitch: float = 0.0) -> dict[str, Euler]:
@@ -49,15 +49,3 @@ A `ramp+y` slopes down towards +y, a `round+x` shows its round side to +x, an ar
 `open+y` stands on one end with its hole to +y. `x` and `y` name the direction of the long side,
 and for `upright` slabs the one that the slab is thin in.
 """
-
-KIT_COLOR: dict[BlockType, Color] = {
-    "arch": "red",
-    "cube": "red",
-    "cuboid1": "blue",
-    "cuboid2": "green",
-    "cuboid3": "yellow",
-    "cylinder": "orange",
-    "semi_cylinder": "yellow",
-    "triangle": "orange",
-}
-"""Color in which the official kit has each type; a cube comes in all five."""

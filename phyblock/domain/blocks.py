@@ -50,30 +50,15 @@ DENSITY_KG_M3 = 1040.0
 FRICTION = 0.35
 """Coulomb coefficient of a pair of blocks, paper appendix A.1."""
 
-KIT_PALETTE: tuple[tuple[BlockType, Color], ...] = (
-    ("arch", "red"),
-    ("cube", "blue"),
-    ("cube", "green"),
-    ("cube", "orange"),
-    ("cube", "red"),
-    ("cube", "yellow"),
-    ("cuboid1", "blue"),
-    ("cuboid2", "green"),
-    ("cuboid3", "yellow"),
-    ("cylinder", "orange"),
-    ("semi_cylinder", "yellow"),
-    ("triangle", "orange"),
-)
-"""The twelve type-color pairs of the official kit."""
-
 
 @dataclass(frozen=True)
 class Shape:
-    """Size of a block type in its body frame.
+    """A type of block: its colors in the official kit, and its solid in the body frame.
 
     `low_m` and `high_m` are the corners of the bounding box [m]; `volume_m3` the solid's volume;
     `center_of_mass_m` its centroid [m]; `fold` the order of the rotational symmetry about the
-    body z axis, and `flips` whether half turns about axes in the x-y plane map it to itself.
+    body z axis, and `flips` whether half turns about axes in the x-y plane map it to itself. What
+    else rules ask of a shape follows from these.
     """
 
     low_m: tuple[float, float, float]
@@ -82,13 +67,44 @@ class Shape:
     center_of_mass_m: tuple[float, float, float]
     fold: int
     flips: bool
+    kit_colors: tuple[Color, ...]
+    """The first is the one that designs use."""
 
     @property
     def mass_kg(self) -> float:
         """Mass in ABS plastic [kg]."""
         return self.volume_m3 * DENSITY_KG_M3
 
+    @property
+    def sides_m(self) -> tuple[float, float, float]:
+        """Size of the bounding box along the body axes [m]."""
+        x, y, z = (high - low for low, high in zip(self.low_m, self.high_m, strict=True))
+        return (x, y, z)
 
+    @property
+    def is_box(self) -> bool:
+        """Whether the solid fills its bounding box."""
+        return math.isclose(self.volume_m3, math.prod(self.sides_m))
+
+    @property
+    def is_cube(self) -> bool:
+        """Whether it is a box with equal sides, which has more symmetries than `fold` says."""
+        return self.is_box and len(set(self.sides_m)) == 1
+
+    @property
+    def is_round(self) -> bool:
+        """Whether turns about the body z axis can hardly be seen."""
+        return self.fold > 4
+
+    @property
+    def is_long(self) -> bool:
+        """Whether one side is by far the longest, and turns about it can be seen."""
+        _, second, longest = sorted(self.sides_m)
+        return longest > _LONG * second and not self.is_round
+
+
+_LONG = 1.5
+"""The longest side of a long block is more than so many times the second."""
 _FACETS = 18
 _CYLINDER_RADIUS_M = 0.025
 _CYLINDER_AREA_M2 = 0.5 * _FACETS * _CYLINDER_RADIUS_M**2 * math.sin(2 * math.pi / _FACETS)
@@ -104,60 +120,62 @@ def _half_disc(radius_m: float, segments: int) -> tuple[float, float]:
     return area, moment / area
 
 
-def _box(x_m: float, y_m: float, z_m: float, fold: int) -> Shape:
+def _box(x_m: float, y_m: float, z_m: float, *kit_colors: Color) -> Shape:
     half = (x_m / 2, y_m / 2, z_m / 2)
     low = (-half[0], -half[1], -half[2])
-    return Shape(low, half, x_m * y_m * z_m, (0.0, 0.0, 0.0), fold, True)
+    fold = 4 if x_m == y_m else 2
+    return Shape(low, half, x_m * y_m * z_m, (0.0, 0.0, 0.0), fold, True, kit_colors)
 
 
-def _arch() -> Shape:
+def _arch(*kit_colors: Color) -> Shape:
     hole_m2, hole_z_m = _half_disc(0.0375, 10)
     solid_m2 = 0.1 * 0.05
     area_m2 = solid_m2 - hole_m2
-    center_z_m = -hole_m2 * (hole_z_m - 0.025) / area_m2
-    return Shape(
-        (-0.025, -0.05, -0.025), (0.025, 0.05, 0.025), area_m2 * 0.05, (0, 0, center_z_m), 2, False
-    )
+    center = (0.0, 0.0, -hole_m2 * (hole_z_m - 0.025) / area_m2)
+    half = (0.025, 0.05, 0.025)
+    return Shape((-0.025, -0.05, -0.025), half, area_m2 * 0.05, center, 2, False, kit_colors)
 
 
-def _semi_cylinder() -> Shape:
+def _semi_cylinder(*kit_colors: Color) -> Shape:
     area_m2, center_z_m = _half_disc(0.025, 10)
-    return Shape(
-        (-0.025, -0.025, 0.0), (0.025, 0.025, 0.025), area_m2 * 0.05, (0, 0, center_z_m), 2, False
-    )
+    center = (0.0, 0.0, center_z_m)
+    high = (0.025, 0.025, 0.025)
+    return Shape((-0.025, -0.025, 0.0), high, area_m2 * 0.05, center, 2, False, kit_colors)
 
 
-def _triangle() -> Shape:
+def _triangle(*kit_colors: Color) -> Shape:
     leg_m = 0.05
     half_m = leg_m / math.sqrt(2)
     volume_m3 = 0.5 * leg_m**2 * 0.05
     center = (0.0, 0.0, half_m / 3)
-    return Shape((-0.025, -half_m, 0.0), (0.025, half_m, half_m), volume_m3, center, 2, False)
+    low, high = (-0.025, -half_m, 0.0), (0.025, half_m, half_m)
+    return Shape(low, high, volume_m3, center, 2, False, kit_colors)
 
 
-def _cylinder() -> Shape:
+def _cylinder(*kit_colors: Color) -> Shape:
     y_m = _CYLINDER_RADIUS_M * math.sin(math.radians(80))
-    return Shape(
-        (-_CYLINDER_RADIUS_M, -y_m, -0.05),
-        (_CYLINDER_RADIUS_M, y_m, 0.05),
-        _CYLINDER_AREA_M2 * 0.1,
-        (0.0, 0.0, 0.0),
-        _FACETS,
-        True,
-    )
+    low, high = (-_CYLINDER_RADIUS_M, -y_m, -0.05), (_CYLINDER_RADIUS_M, y_m, 0.05)
+    center = (0.0, 0.0, 0.0)
+    return Shape(low, high, _CYLINDER_AREA_M2 * 0.1, center, _FACETS, True, kit_colors)
 
 
 SHAPES: dict[BlockType, Shape] = {
-    "arch": _arch(),
-    "cube": _box(0.05, 0.05, 0.05, 4),
-    "cuboid1": _box(0.05, 0.05, 0.025, 4),
-    "cuboid2": _box(0.1, 0.05, 0.025, 2),
-    "cuboid3": _box(0.15, 0.05, 0.025, 2),
-    "cylinder": _cylinder(),
-    "semi_cylinder": _semi_cylinder(),
-    "triangle": _triangle(),
+    "arch": _arch("red"),
+    "cube": _box(0.05, 0.05, 0.05, "red", "blue", "green", "orange", "yellow"),
+    "cuboid1": _box(0.05, 0.05, 0.025, "blue"),
+    "cuboid2": _box(0.1, 0.05, 0.025, "green"),
+    "cuboid3": _box(0.15, 0.05, 0.025, "yellow"),
+    "cylinder": _cylinder("orange"),
+    "semi_cylinder": _semi_cylinder("yellow"),
+    "triangle": _triangle("orange"),
 }
-"""Shape of every block type; for the cube, `fold` and `flips` are completed to all 24 rotations."""
+
+KIT_PALETTE: tuple[tuple[BlockType, Color], ...] = tuple(
+    sorted(
+        (block_type, color) for block_type, shape in SHAPES.items() for color in shape.kit_colors
+    )
+)
+"""The twelve type-color pairs of the official kit."""
 
 
 def euler_deg_to_quat_xyzw(euler_deg: Euler) -> NDArray[np.float64]:
@@ -199,9 +217,9 @@ def euler_deg_to_matrix(euler_deg: Euler) -> NDArray[np.float64]:
 @functools.cache
 def symmetries(block_type: BlockType) -> NDArray[np.float64]:
     """Rotations that map the block onto itself, body frame, shape (k, 3, 3)."""
-    if block_type == "cube":
-        return _cube_rotations()
     shape = SHAPES[block_type]
+    if shape.is_cube:
+        return _cube_rotations()
     turns = [_turn_z(360.0 * i / shape.fold) for i in range(shape.fold)]
     if shape.flips:
         half_turn_x = np.diag([1.0, -1.0, -1.0])

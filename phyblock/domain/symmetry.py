@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.blocks import (
+    SHAPES,
     BlockType,
     Euler,
     euler_deg_to_matrix,
@@ -96,9 +97,9 @@ def image_deg(euler_deg: Euler, symmetry: Symmetry) -> Euler:
 
 @functools.cache
 def pose_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, ...]:
-    """The orientation class; of an upright cylinder, whose 18 facets no one counts, its axis."""
+    """The orientation class; of an upright round block, whose facets no one counts, its axis."""
     rotation = euler_deg_to_matrix(euler_deg)
-    if block_type == "cylinder" and abs(rotation[2, 2]) > 1 - 1e-6:
+    if SHAPES[block_type].is_round and abs(rotation[2, 2]) > 1 - 1e-6:
         return (0.0, 0.0, 1.0)
     return orientation_class(block_type, euler_deg)
 

@@ -41,13 +41,13 @@ MARGIN_M = 0.005
 """How far off its place every weight may be [m]."""
 FRICTIONS = (0.28, 0.45)
 """The least and the most friction that a verdict has to hold under."""
-_LONG: tuple[BlockType, ...] = ("cuboid2", "cuboid3", "arch")
 Masses = tuple[tuple[BlockType, float], ...]
 """Types of which every block has so many times its mass."""
 MASS_FACTORS = (0.87, 1.15)
 """Long blocks may have so many times their mass at the least, and at the most."""
 MASSES: tuple[Masses, ...] = tuple(
-    tuple((one, factor) for one in _LONG) for factor in reversed(MASS_FACTORS)
+    tuple((block_type, factor) for block_type, shape in SHAPES.items() if shape.is_long)
+    for factor in reversed(MASS_FACTORS)
 )
 """Factors of mass at the ends of that range: long blocks heavier, and lighter."""
 _SIDES = np.array([(math.cos(a), math.sin(a)) for a in np.arange(8) * math.pi / 4])
@@ -96,7 +96,7 @@ def surely_falls(blocks: Sequence[Block]) -> bool:
     forces = _forces(blocks, FRICTIONS[1])
     if not forces.size:
         return bool(blocks)
-    is_long = np.array([block.type in _LONG for block in blocks])
+    is_long = np.array([SHAPES[block.type].is_long for block in blocks])
     loads = [_loads(blocks, ~is_long), _loads(blocks, is_long)]
     count = forces.shape[1]
     # A mass, and the mass times each part of its shift: the shift alone would not be linear.

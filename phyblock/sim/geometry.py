@@ -28,7 +28,6 @@ Outline = NDArray[np.float64]
 _ARC_SEGMENTS, _FACETS = 10, 18
 _ROUND_ARC_SEGMENTS, _ROUND_FACETS = 36, 72
 _ARCH_HOLE_RADIUS_M = 0.0375
-_BOXES: tuple[BlockType, ...] = ("cube", "cuboid1", "cuboid2", "cuboid3")
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +128,8 @@ def _prism(
 
     Raises ValueError for a type that has no outline here.
     """
-    high = SHAPES[block_type].high_m
+    shape = SHAPES[block_type]
+    high = shape.high_m
     if block_type == "arch":
         return _arch_prism(arc_segments)
     if block_type == "semi_cylinder":
@@ -141,7 +141,7 @@ def _prism(
         angles = np.radians(np.arange(facets) * (360 / facets))
         circle = high[0] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         return _convex(circle, high[2], (0, 1), 2)
-    if block_type not in _BOXES:
+    if not shape.is_box:
         raise ValueError(f"{block_type} has no geometry")
     x, y, z = high
     return _convex(np.array([[x, y], [-x, y], [-x, -y], [x, -y]]), z, (0, 1), 2)

@@ -8,9 +8,8 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
-from phyblock.domain.blocks import BLOCK_TYPES, COLORS, KIT_PALETTE, BlockType, Color
+from phyblock.domain.blocks import BLOCK_TYPES, COLORS, KIT_PALETTE, SHAPES, BlockType, Color
 from phyblock.domain.scene import Block
-from phyblock_making.poses import KIT_COLOR
 from phyblock_making.scenes.sketch import Sketch
 
 __all__ = ["PALETTES", "Draft", "Palette", "Theme"]
@@ -37,7 +36,7 @@ class Draft:
         self.sketch = Sketch()
         order = rng.permutation(len(COLORS))
         self._tones: tuple[Color, ...] = tuple(COLORS[i] for i in order[:2])
-        self._colors: dict[BlockType, Color] = dict(KIT_COLOR)
+        self._colors = {block_type: shape.kit_colors[0] for block_type, shape in SHAPES.items()}
         if palette == "full":
             drawn = rng.integers(len(COLORS), size=len(BLOCK_TYPES))
             self._colors = {t: COLORS[int(i)] for t, i in zip(BLOCK_TYPES, drawn, strict=True)}

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from phyblock.domain.aov import AOVGraph
-from phyblock.domain.blocks import BlockType, Color
+from phyblock.domain.blocks import SHAPES, BlockType, Color
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.geometry import corners_m
 from phyblock.sim.support import GROUND, drop_height_m, support_graph, whole_bounds_m
-from phyblock_making.poses import KIT_COLOR, POSES
+from phyblock_making.poses import POSES
 
 __all__ = ["UNIT_M", "Sketch", "make_scene", "scene_of"]
 
@@ -50,7 +50,8 @@ class Sketch:
         place = np.array([x, y]) * UNIT_M - middle[:2]
         above = (float(place[0]), float(place[1]), _ABOVE_M)
         order = len(self.blocks) + 1
-        block = Block(order, block_type, color or KIT_COLOR[block_type], above, euler, (), 1)
+        color = color or SHAPES[block_type].kit_colors[0]
+        block = Block(order, block_type, color, above, euler, (), 1)
         fall_m = drop_height_m(block, self.blocks)
         landed = tuple(round(c, 6) + 0.0 for c in (above[0], above[1], _ABOVE_M - fall_m))
         self.blocks.append(replace(block, position_m=(landed[0], landed[1], landed[2])))

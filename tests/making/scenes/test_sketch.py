@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, orientation_class
+from phyblock.domain import BLOCK_TYPES, orientation_class
 from phyblock.sim import find_gaps, find_overlaps, support_graph
-from phyblock_making.poses import KIT_COLOR, POSES
+from phyblock_making.poses import POSES
 from phyblock_making.scenes.sketch import make_scene
 from tests.designs.pad import Pad
 from tests.designs.scenes import designed_scenes
@@ -37,7 +37,6 @@ def test_whatever_is_put_down_neither_overlaps_nor_floats(drawn) -> None:
 def test_poses_of_a_type_look_different(block_type) -> None:
     poses = POSES[block_type].values()
     assert len({orientation_class(block_type, euler) for euler in poses}) == len(poses)
-    assert (block_type, KIT_COLOR[block_type]) in KIT_PALETTE
 
 
 def test_a_pair_stands_on_both_sides() -> None:
