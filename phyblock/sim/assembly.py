@@ -14,7 +14,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from phyblock.domain.scene import Scene
 from phyblock.errors import DataError, Problem
-from phyblock.sim.compose import ink_on, to_png
+from phyblock.sim.backgrounds import TONES
+from phyblock.sim.compose import to_png
 from phyblock.sim.pictures import PictureStyle, drawn, goal_camera
 from phyblock.sim.render import picture
 
@@ -106,4 +107,4 @@ def _one_palette(images: Sequence[Image.Image], colorful: Image.Image) -> list[I
 
 def _write(image: Image.Image, text: str, middle: tuple[float, float], size: float) -> None:
     font = ImageFont.load_default(size=size)
-    ImageDraw.Draw(image).text(middle, text, ink_on("white"), font, anchor="mm")
+    ImageDraw.Draw(image).text(middle, text, TONES["white"].ink, font, anchor="mm")

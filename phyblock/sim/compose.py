@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 from PIL import Image, ImageDraw, ImageFont
 
+from phyblock.sim.backgrounds import DARK_INK, LIGHT_INK, TONES
 from phyblock.sim.surfaces import SURFACES
 from phyblock.words import Background
 
 __all__ = [
     "GRID_COLUMNS",
     "LABEL_STRIP",
-    "ink_on",
     "joined_size_px",
     "numbered_grid",
     "side_by_side",
@@ -27,28 +27,6 @@ _LABEL_SIZE = 0.17
 _LABEL_MARGIN = 0.05
 _RIM = 0.012
 _GAP = 0.016
-_DARK_INK, _LIGHT_INK = (20, 24, 32), (255, 255, 255)
-_INK: dict[Background, tuple[int, int, int]] = {
-    "white": _DARK_INK,
-    "checkerboard": _LIGHT_INK,
-    "light-wood": _DARK_INK,
-    "dark-wood": _LIGHT_INK,
-    "concrete": _DARK_INK,
-    "lawn": _LIGHT_INK,
-}
-_LINE: dict[Background, tuple[int, int, int]] = {
-    "white": (205, 208, 214),
-    "checkerboard": (62, 80, 100),
-    "light-wood": (138, 104, 70),
-    "dark-wood": (150, 116, 88),
-    "concrete": (98, 98, 96),
-    "lawn": (158, 180, 120),
-}
-
-
-def ink_on(background: Background) -> tuple[int, int, int]:
-    """The color of writing that reads well on a background."""
-    return _INK[background]
 
 
 def to_png(image: Image.Image) -> bytes:
@@ -71,10 +49,10 @@ def numbered_grid(
         if place < len(cells):
             _write_number(cell, place + 1, background)
         grid.paste(cell.resize((box[2] - box[0], box[3] - box[1])), box[:2])
-    draw = ImageDraw.Draw(grid)
+    draw, line = ImageDraw.Draw(grid), TONES[background].line
     for edge in edges[1:-1]:
-        draw.line([(edge, 0), (edge, size_px)], fill=_LINE[background])
-        draw.line([(0, edge), (size_px, edge)], fill=_LINE[background])
+        draw.line([(edge, 0), (edge, size_px)], fill=line)
+        draw.line([(0, edge), (size_px, edge)], fill=line)
     return grid
 
 
@@ -101,8 +79,8 @@ def _write_number(cell: Image.Image, number: int, background: Background) -> Non
     side = cell.height
     font = ImageFont.load_default(size=_LABEL_SIZE * side)
     place = (side * (1 - _LABEL_MARGIN), side * (1 - _LABEL_MARGIN))
-    ink = _INK[background]
-    rim = _DARK_INK if ink == _LIGHT_INK else _LIGHT_INK
+    ink = TONES[background].ink
+    rim = DARK_INK if ink == LIGHT_INK else LIGHT_INK
     width = round(side * _RIM) if background in SURFACES else 0
     ImageDraw.Draw(cell).text(
         place, str(number), ink, font, anchor="rs", stroke_width=width, stroke_fill=rim

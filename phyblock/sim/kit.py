@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from phyblock.domain.candidates import CandidateSet
+from phyblock.sim.backgrounds import TONES
 from phyblock.sim.camera import Camera
-from phyblock.sim.compose import GRID_COLUMNS, ink_on, numbered_grid, to_png
+from phyblock.sim.compose import GRID_COLUMNS, numbered_grid, to_png
 from phyblock.sim.pictures import (
     LARGEST_PX,
     PictureStyle,
@@ -77,7 +78,7 @@ def _write(
     style: PictureStyle,
 ) -> None:
     low, high = box_cm(block)
-    draw, ink = ImageDraw.Draw(sheet), ink_on(style.background)
+    draw, ink = ImageDraw.Draw(sheet), TONES[style.background].ink
     font = ImageFont.load_default(size=_TEXT * side)
     sizes = (f"{name} {_number(size)}" for name, size in zip("xyz", high - low, strict=True))
     left, foot = corner[0] + _MARGIN * side, corner[1] + side * (1 - _MARGIN)

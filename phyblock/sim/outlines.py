@@ -7,24 +7,13 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.sim.renderer import Raster, Rgb
+from phyblock.sim.backgrounds import INK_RGB, TONES
+from phyblock.sim.renderer import Raster
 from phyblock.words import Background
 
-__all__ = ["INK_RGB", "RIM_RGB", "draw_outlines"]
+__all__ = ["draw_outlines"]
 
 Pixel = TypeVar("Pixel", np.uint8, np.float32)
-
-INK_RGB: Rgb = (14, 14, 16)
-"""Lines between faces, and round blocks on light floors."""
-RIM_RGB: dict[Background, Rgb] = {
-    "white": INK_RGB,
-    "checkerboard": (206, 212, 222),
-    "light-wood": INK_RGB,
-    "dark-wood": (240, 234, 226),
-    "concrete": INK_RGB,
-    "lawn": (250, 253, 244),
-}
-"""Lines where blocks end at the floor: all contrast with it by 3:1 or more."""
 
 
 def draw_outlines(
@@ -39,7 +28,7 @@ def draw_outlines(
     lined[_ends(raster.face, raster.prop) & (raster.prop >= 0)] = INK_RGB
     if background is not None:
         rim = _ends(raster.prop >= 0)
-        lined[rim | _ends(rim) & (raster.prop < 0)] = RIM_RGB[background]
+        lined[rim | _ends(rim) & (raster.prop < 0)] = TONES[background].rim
     return lined
 
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from phyblock.domain.scene import Block, Scene
+from phyblock.sim.backgrounds import TONES
 from phyblock.sim.camera import Camera, Window, frame, view_axes
-from phyblock.sim.compose import ink_on, to_png
+from phyblock.sim.compose import to_png
 from phyblock.sim.exact import rounded
 from phyblock.sim.pictures import PictureStyle, drawn, picture_key
 from phyblock.sim.render import SUPERSAMPLE, DrawnBlock, empty_ground, picture
@@ -135,7 +136,7 @@ def _ruled(
     for start, end, is_major in _lines(field):
         pen.line(start, end, _MAJOR if is_major else _MINOR, 2 if is_major else 1)
     share = np.asarray(pen.image, dtype=np.float32)[..., None] / np.float32(255)
-    ink = np.array(ink_on(style.background), dtype=np.float32)
+    ink = np.array(TONES[style.background].ink, dtype=np.float32)
     ruled = ground * (1 - share) + ink * share
     image = Image.fromarray(np.rint(ruled).astype(np.uint8))
     _write(_Pen(camera, size_px, image), field, style)
@@ -193,7 +194,7 @@ class _Pen:
 
 def _write(pen: _Pen, field: _Field, style: PictureStyle) -> None:
     """Axes through the origin, names and numbers, and the pole."""
-    ink = ink_on(style.background)
+    ink = TONES[style.background].ink
     is_dark = sum(ink) < 380
     x_ink, y_ink, z_ink = (_X_DARK, _Y_DARK, _Z_DARK) if is_dark else (_X_INK, _Y_INK, _Z_INK)
     (x0, x1), (y0, y1) = field.x, field.y

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageFilter
 
+from phyblock.sim.backgrounds import TONES
 from phyblock.sim.camera import Camera
 from phyblock.sim.surfaces import PERIOD_M, SURFACES, Surface, sample
 from phyblock.words import Background
 
-__all__ = ["SHADOW_STRENGTH", "floor", "shadow"]
+__all__ = ["floor", "shadow"]
 
 _TILE_M = 0.4
 _LIGHT_TILE = np.array([39.0, 56.0, 75.0], dtype=np.float32)
@@ -23,14 +24,6 @@ _FADE_FROM_M = np.float32(4.0)
 """Farther tiles blend into their mean color; at the horizon they are finer than a pixel."""
 _SOFTNESS = 340
 """Pictures are this many times as wide as the blur at the edge of a shadow."""
-SHADOW_STRENGTH: dict[Background, float] = {
-    "white": 0.16,
-    "checkerboard": 0.5,
-    "light-wood": 0.3,
-    "dark-wood": 0.5,
-    "concrete": 0.3,
-    "lawn": 0.48,
-}
 
 
 def floor(background: Background, camera: Camera, size_px: int) -> NDArray[np.float32]:
@@ -91,6 +84,6 @@ def shadow(background: Background, shaded: NDArray[np.bool_]) -> NDArray[np.floa
     mask = Image.fromarray(shaded.astype(np.uint8) * np.uint8(255))
     soft = mask.filter(ImageFilter.GaussianBlur(len(shaded) / _SOFTNESS))
     left: NDArray[np.float32] = np.asarray(soft, dtype=np.float32)[..., None]
-    left = left * np.float32(-SHADOW_STRENGTH[background] / 255.0)
+    left = left * np.float32(-TONES[background].shadow / 255.0)
     left += np.float32(1.0)
     return left

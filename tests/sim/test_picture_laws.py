@@ -16,9 +16,9 @@ from phyblock.datasets import read_builtin
 from phyblock.datasets.questions import read_questions
 from phyblock.domain import BLOCK_TYPES, Color
 from phyblock.domain.question import QuestionPicture
+from phyblock.sim.backgrounds import TONES
 from phyblock.sim.camera import Camera, view_axes
 from phyblock.sim.exploded import exploded_blocks
-from phyblock.sim.outlines import RIM_RGB
 from phyblock.sim.pictures import (
     PictureStyle,
     camera_for,
@@ -32,7 +32,7 @@ from phyblock.sim.pictures import (
 from phyblock.sim.question_pictures import drawn_blocks, question_camera
 from phyblock.sim.render import COLOR_RGB, DrawnBlock, picture, segments, shoot
 from phyblock.sim.surfaces import SURFACES
-from phyblock.sim.textures import SHADOW_STRENGTH, floor
+from phyblock.sim.textures import floor
 from phyblock.words import BACKGROUNDS, Background
 from phyblock_making.poses import POSES
 from tests.sim.structures import block, clouds, scene_of
@@ -194,8 +194,8 @@ def test_lines_round_blocks_stand_out_from_floor_and_shadow(background: Backgrou
     one = on_the_floor("cube", "red", (0.0, 0.0, 0.0))
     camera = camera_for([one], STYLE, "cube")
     ground = floor(background, camera, 256).reshape(-1, 3).astype(np.float64)
-    line = luminance(np.array(RIM_RGB[background], dtype=np.float64))
-    for left in (1.0, 1 - SHADOW_STRENGTH[background]):
+    line = luminance(np.array(TONES[background].rim, dtype=np.float64))
+    for left in (1.0, 1 - TONES[background].shadow):
         assert np.mean(contrast(line, luminance(ground * left)) >= LEAST_CONTRAST) >= 0.99
 
 
