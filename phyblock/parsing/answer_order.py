@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from phyblock.parsing.answer_value import CONTRADICTION, EDGES, LETTERS, unmarked
-from phyblock.parsing.text_forms import BACKWARD
+from phyblock.parsing.speech import BACKWARD, PLACES
 
 __all__ = ["OrderReader"]
 
@@ -13,12 +13,7 @@ _BETWEEN = (
     r"(?:[\s,;>|/.:()\[\]{}<=\-\u2010-\u2015→⇒➔➜、\uff0c]"
     r"|\b(?:and|then|to|first|next|finally|lastly|followed|by|comes|goes)\b){1,16}"
 )
-_PLACES = {
-    name: place
-    for place, names in enumerate(("first 1st", "second 2nd", "third 3rd", "fourth 4th"), start=1)
-    for name in names.split()
-}
-_RANKS = f"({'|'.join(_PLACES)}|last)"
+_RANKS = f"({'|'.join(PLACES)}|last)"
 _ORDINAL = re.compile(r"\b(?:first|second|third|fourth)\b", re.IGNORECASE)
 _CLAUSE = re.compile(r"[.;!?\n](?=\s)")
 _DENIED = re.compile(r"\b(?:not|nicht)\W{0,3}\Z|不是\s?\Z", re.IGNORECASE)
@@ -78,7 +73,7 @@ class OrderReader:
 
     def ranked(self, text: str) -> str | None:
         """The order that the places of all pictures say: "B is first, A second", "A: 2, B: 1"."""
-        places = {**_PLACES, "last": len(self.letters)}
+        places = {**PLACES, "last": len(self.letters)}
         named = [
             (int(m[3]) if m[3] else places[m[2]], m[1])
             for m in self._ranked.finditer(unmarked(text))
@@ -89,7 +84,7 @@ class OrderReader:
 
     def listed(self, text: str) -> str | None:
         """The order in the last numbered list of letters."""
-        counted = _ORDINAL.sub(lambda word: str(_PLACES[word[0].lower()]), unmarked(text))
+        counted = _ORDINAL.sub(lambda word: str(PLACES[word[0].lower()]), unmarked(text))
         items = [(int(m[1]), m[2].upper()) for m in self._item.finditer(counted)]
         last = items[-len(self.letters) :]
         numbers = "".join(letter for _, letter in last)

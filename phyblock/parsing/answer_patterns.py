@@ -11,7 +11,6 @@ __all__ = [
     "BRANDED",
     "CHOSEN",
     "CONCLUDED",
-    "CONDITIONAL",
     "CONFIRMED",
     "CORRECTED",
     "COUNTED",
@@ -27,12 +26,10 @@ __all__ = [
     "ORDER",
     "QUOTED",
     "REJECTS",
-    "REVISED",
     "SENTENCE",
     "SO",
     "TAG",
     "TURNED",
-    "UNSURE",
     "VERDICT",
 ]
 
@@ -133,13 +130,6 @@ NOT_BUT = re.compile(
     r"(?:(?:but|sondern|es|it's|it is)\s|而是)(?:option )?(?P<value>\(?[A-Z]\)?(?![A-Za-z]))"
 )
 """Not this but that: what is meant is that."""
-CONDITIONAL = re.compile(
-    r"\b(?:if|unless|provided|assuming|(?<=, )falls|wenn|otherwise|sonst|or else|depend(?:s"
-    r"|ing))\b(?! (?:I|we) (?:had|have|must)\b)"
-    r"|如果|否则|取决于",
-    re.IGNORECASE,
-)
-"""That an answer holds only under a condition."""
 QUOTED = re.compile(
     rf"(?<=[\w:] )[\"'\u201c\u00ab](?:[^\"'\u201d\u00bb\n]{{0,40}}?(?:{_WORDS})\s?[:：]"
     r"[^\"'\u201d\u00bb\n]{0,40})[\"'\u201d\u00bb]",
@@ -168,21 +158,6 @@ BOX = re.compile(r"\\boxed\s{0,2}\{(?P<value>[^\n]{1,80}?)\}{1,3}(?=[^}]|\Z)")
 JSON = re.compile(
     r"[\"'](?:final[_ ]?)?(?:answer|choice|option|selected_option|order|ordering|letter)[\"']"
     r"\s{0,4}:\s{0,4}(?P<value>\[[^\[\]]{1,120}\]|\"[^\"\n]{0,200}\"|'[^'\n]{0,200}'|\d{1,4}\b)",
-    re.IGNORECASE,
-)
-REVISED = re.compile(
-    r"\b(?:wait|actually|instead|rather|however|but|correct(?:ion|ed|ing)|revis\w+|mistake\w*|wrong"
-    r"|incorrect|re-?(?:check|think|consider|examin|evaluat|look|assess)\w*|second thought|hmm+|no,"
-    r"|final(?:ly)?|therefore|thus|hence|so|overall|conclusion|conclude|doch|aber|sondern|因此|所以"
-    r"|但)\b"
-    r"|因此|所以|但是?|不过",
-    re.IGNORECASE,
-)
-UNSURE = re.compile(
-    r"\b(?:cannot|can['\u2019]?t|could not|couldn['\u2019]t|unable to|not able to|impossible to"
-    r"|not possible to|insufficient|not enough|don['\u2019]t know|do not know"
-    r"|i['\u2019]m sorry|i am sorry|i apologi[sz]e|no (?:image|picture)|not sure|unclear"
-    r"|none of the|neither(?![^.;\n]{1,60}\bnor\b))\b|无法|抱歉|не могу",
     re.IGNORECASE,
 )
 BRANDED = re.compile(

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from phyblock.parsing.answer_order import OrderReader
-from phyblock.parsing.answer_patterns import CONDITIONAL, REVISED, TURNED
+from phyblock.parsing.answer_patterns import TURNED
 from phyblock.parsing.answer_value import CONTRADICTION, ChoiceReader
-from phyblock.parsing.text_forms import BACKWARD
+from phyblock.parsing.speech import BACKWARD, CONDITIONAL, REVISED, TAKES_BACK
 
 __all__ = ["Reader", "Stated", "forward", "is_conditional", "settle", "statements", "turned"]
 
@@ -28,9 +28,7 @@ class Stated:
 
 
 _SENTENCE_CHARS = 240
-_AFTERTHOUGHT = re.compile(
-    r"\b(?i:on second thought|wait|correction|oops|scratch that)\b[^\n]{0,40}?\b(?P<letter>[B-Z])\b"
-)
+_AFTERTHOUGHT = re.compile(rf"(?i:{TAKES_BACK})[^\n]{{0,40}}?\b(?P<letter>[B-Z])\b")
 _PART_OF_LINE = re.compile(r"\u2192|=>|;|\.\s")
 _ASKS = re.compile(r"[^.!?。！\n]{1,120}[?？]")  # noqa: RUF001
 _REVISION_CHARS = 4000

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from phyblock.parsing.speech import PLACES
 from phyblock.parsing.text_forms import plain_forms
 
 __all__ = ["CONTRADICTION", "EDGES", "LETTERS", "ChoiceReader", "plain", "unmarked"]
@@ -62,7 +63,6 @@ _ORDINAL = re.compile(
     r"(?:option|choice|answer|alternative|one\Z)\b",
     re.IGNORECASE,
 )
-_ORDINALS = {"first": 1, "second": 2, "third": 3, "fourth": 4}
 _DIGITS = re.compile(r"(?<![\w.,/])\d{1,6}(?:\.\d{1,6})?(?![\d/]|[.,]\d)")
 _UNIT = re.compile(r"(?P<space>\s?)(?P<unit>[a-z\"]*)")
 _LENGTHS = re.compile(r"(?:[mdk]?m|(?:milli|deci|kilo)?met\w+|in|inch\w*|ft|feet|foot|\")\Z")
@@ -160,8 +160,7 @@ class ChoiceReader:
         value = unmarked(text).strip()
         ordinal = _ORDINAL.search(value)
         if ordinal:
-            word = ordinal["word"].lower()
-            return self._nth(_ORDINALS.get(word) or int(word[0]))
+            return self._nth(PLACES[ordinal["word"].lower()])
         if self._has_digits:
             return None
         numbered = _NUMBERED.match(value) or _BARE_NUMBER.match(value)

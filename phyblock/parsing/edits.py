@@ -6,14 +6,16 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 
+from phyblock.parsing.speech import SUPPOSES
+
 __all__ = ["edited"]
 
 _Numbers = list[int]
 _Edit = Callable[[_Numbers, re.Match[str]], _Numbers | None]
 
 _IF = re.compile(
-    r"\b(?:if|unless|could|would|might|may|alternativ\w*|should you|in case|optional\w*|also|either"
-    r"|falls|wenn|same|earlier|previous(?:ly)?|first attempt)\b|\?"
+    r"\b(?:would|may|alternativ\w*|should you|in case|optional\w*|also|either"
+    r"|same|earlier|previous(?:ly)?|first attempt)\b|\?"
     r"|['\u2018\u2019\"](?=\w)[^'\n]{0,20}\d",
     re.IGNORECASE,
 )
@@ -135,7 +137,7 @@ def edited(numbers: Sequence[int], lines: Sequence[str]) -> tuple[list[int] | No
     read: set[int] = set()
     for at, line in enumerate(lines):
         for sentence in () if _STEP_LINE.match(line) else _SENTENCE.split(line):
-            if not re.search(r"\d", sentence) or _IF.search(sentence):
+            if not re.search(r"\d", sentence) or _IF.search(sentence) or SUPPOSES.search(sentence):
                 continue
             found = next(((m, edit) for p, edit in _EDITS if (m := p.search(sentence))), None)
             if found is None:

@@ -28,8 +28,8 @@ from phyblock.parsing.plan_patterns import (
     PART,
     PLAN_WORD,
     REVISION,
-    SUPPOSED_SENTENCE,
 )
+from phyblock.parsing.speech import SUPPOSES
 from phyblock.parsing.statement import read_statement
 from phyblock.parsing.structured import Found
 from phyblock.parsing.text_forms import plain_line
@@ -141,7 +141,7 @@ class LineReader:
         if marked is None and not statement.has_verb:
             return False
         form = "marked" if marked or STARTS_MOVING.match(line) else "sentences"
-        if form == "sentences" and SUPPOSED_SENTENCE.search(line):
+        if form == "sentences" and SUPPOSES.search(line):
             return False
         return self._extend(form, at, body, is_item=marked is not None)
 

@@ -9,16 +9,29 @@ guessed at. Nothing here raises on any text, and all of it takes linear time.
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from phyblock.parsing.answer_form import FormProblem
-from phyblock.parsing.answer_patterns import CONDITIONAL
-from phyblock.parsing.json_values import Fields, objects
+from phyblock.parsing.json_values import objects
+from phyblock.parsing.operation import (
+    ANSWER_LINE,
+    CALL,
+    DONE,
+    INTEGER,
+    LABEL,
+    OPERATION,
+    PHRASE,
+    Operation,
+    named,
+    number_of,
+    operation_of,
+    operations_of,
+)
 from phyblock.parsing.slips import without_slips
+from phyblock.parsing.speech import CONDITIONAL, TAKES_BACK, words
 from phyblock.parsing.statement import read_statement
 from phyblock.parsing.text_forms import answer_of
 
@@ -42,45 +55,14 @@ class ParsedMove:
     problem: MoveProblem | None = None
 
 
-_Operation = int | Literal["done"]
-_Find = Callable[[str, list[str]], Sequence[_Operation]]
+_Find = Callable[[str, list[str]], Sequence[Operation]]
 
-_LARGEST_DIGITS = 6
-_TOO_LARGE = 1_000_000
-"""What a longer number is read as: no candidate has either."""
-
-_INTEGER = r"(?P<number>[-+\u2212]?[0-9]+)(?![0-9])(?![.,][0-9])"
-_CALL = (
-    rf"move\s{{0,3}}[(\[]\s{{0,9}}(?:(?:id|index|block)\s{{0,3}}[=:]\s{{0,3}})?[\"'#<]?"
-    rf"{_INTEGER}[\"'>]?\s{{0,9}}[)\]]"
-)
-_PHRASE = (
-    rf"move\s{{1,3}}(?:the\s)?(?:block|candidate)\s{{1,3}}(?:with\s)?"
-    rf"(?:the\s)?(?:index|number|id)\s{{0,3}}[=:#]?\s{{0,3}}[(\"'\[]?{_INTEGER}[)\"'\]]?"
-)
-_DONE = r"(?:done|fertig|terminé|hecho|listo|готово|完成|完了|완료)(?:\s{0,3}\(\s{0,3}\))?"
-
-
-def _named(pattern: str, name: str) -> str:
-    return pattern.replace("?P<number>", f"?P<{name}>")
-
-
-_LABEL = (
-    r"(?:(?:my|the|your|final|next|chosen|selected|single|best|nächste[rs]?|siguiente"
-    r"|prochaine?)\s{1,3}){0,3}"
-    r"(?:plan|best|zug|schritt|paso|acción|step(?:\s{0,2}#?[0-9]{1,3})?|answer|action|operation"
-    r"|move|output|decision|choice"
-    r"|attempt|next|correction)"
-    r"\s{0,3}(?:is|:|=|->|\u2192)\s{0,3}"
-)
-_OPERATION = rf"(?:{_named(_CALL, 'call')}|{_named(_PHRASE, 'phrase')}|(?P<done>{_DONE}))"
-_ANSWER_LINE = re.compile(rf"(?:{_LABEL}:?\s{{0,3}})?{_OPERATION}\s{{0,3}}[.!;]?", re.IGNORECASE)
-_LABELED = re.compile(rf"(?<![\w]){_LABEL}[`*\"'_ ]{{0,6}}{_OPERATION}(?![\w?])", re.IGNORECASE)
+_LABELED = re.compile(rf"(?<![\w]){LABEL}[`*\"'_ ]{{0,6}}{OPERATION}(?![\w?])", re.IGNORECASE)
 _MENTION = re.compile(
-    rf"(?<![\w]){_named(_CALL, 'call')}|(?<![\w]){_named(_PHRASE, 'phrase')}", re.IGNORECASE
+    rf"(?<![\w]){named(CALL, 'call')}|(?<![\w]){named(PHRASE, 'phrase')}", re.IGNORECASE
 )
 _MORE = re.compile(
-    rf"[\s,;&+`*]{{1,4}}(?:(?:and|then|or)\s{{1,3}}){{0,2}}{_named(_CALL, 'call')}", re.IGNORECASE
+    rf"[\s,;&+`*]{{1,4}}(?:(?:and|then|or)\s{{1,3}}){{0,2}}{named(CALL, 'call')}", re.IGNORECASE
 )
 """A further operation behind one, with nothing said between them."""
 _NOT_MEANT = re.compile(
@@ -89,13 +71,9 @@ _NOT_MEANT = re.compile(
     re.IGNORECASE,
 )
 """What stands before an operation in its clause that is not the one to do now."""
-_TAKES_BACK = re.compile(
-    r"\b(?:wait|no[,:.]|actually|correction|sorry|oops|hmm+|mistake|revised|on second thought"
-    r"|instead)(?!\w)",
-    re.IGNORECASE,
-)
+_TAKES_BACK = words(TAKES_BACK, r"\b(?:actually|instead|no\.)")
 _CONCLUDES = re.compile(
-    rf"\b(?:so|therefore|thus|hence)\b[:,]?\s(?:[^\d\n.;]{{0,30}}\s)?{_named(_CALL, 'call')}"
+    rf"\b(?:so|therefore|thus|hence)\b[:,]?\s(?:[^\d\n.;]{{0,30}}\s)?{named(CALL, 'call')}"
     r"(?:\s(?:is\s)?(?:next|now))?\W{0,3}\Z",
     re.IGNORECASE,
 )
@@ -108,42 +86,22 @@ _MANY = re.compile(
     re.IGNORECASE,
 )
 _DONE_SENTENCE = re.compile(
-    rf"(?:\A|[.!?:\u2014]\s{{1,3}}|;\s{{0,3}}|(?:->|\u2192|\bthen)\s{{0,3}}){_DONE}\s{{0,2}}[.!]?\Z",
+    rf"(?:\A|[.!?:\u2014]\s{{1,3}}|;\s{{0,3}}|(?:->|\u2192|\bthen)\s{{0,3}}){DONE}\s{{0,2}}[.!]?\Z",
     re.IGNORECASE,
 )
 _UNSURE = re.compile(
     r"\b(?:or|either|perhaps|maybe|not sure|later|afterwards|then)\b", re.IGNORECASE
 )
 _OTHER_CALL = re.compile(
-    rf"(?:{_LABEL})(?!move|place|put|done)[a-z_]{{3,20}}\s?\([^()\n]{{0,20}}\)\W{{0,3}}",
+    rf"(?:{LABEL})(?!move|place|put|done)[a-z_]{{3,20}}\s?\([^()\n]{{0,20}}\)\W{{0,3}}",
     re.IGNORECASE,
 )
 """An answer that is another operation than those there are."""
 _CHOSEN = re.compile(r"\b(?:choose|select|pick|wähle|elijo|choisis)\b|选择?", re.IGNORECASE)
-_BARE = re.compile(
-    rf"(?:{_LABEL})?(?:(?:candidate|block)\s)?[#(\[]?{_INTEGER}[)\].]?", re.IGNORECASE
-)
-_OBJECT = re.compile(r"\{[^{}]{0,600}\}")
+_BARE = re.compile(rf"(?:{LABEL})?(?:(?:candidate|block)\s)?[#(\[]?{INTEGER}[)\].]?", re.IGNORECASE)
 _FENCE = re.compile(r"(?:`{3,}|~{3,})\s{0,3}[\w+-]{0,16}")
 _MARKUP = re.compile(r"</?(?:final_)?answer>|[*`_~]{1,3}|\\boxed\{|[{}]")
 _EDGES = " \t\r\f\v>#-*+\u2022|\"'"
-_INDEX_KEYS = ("index", "block_index", "id", "block_id", "block", "candidate", "number", "n")
-_INDEX_ALONE = _INDEX_KEYS[:4]
-"""Keys that are enough without an action."""
-_ACTION_KEYS = (
-    "action",
-    "operation",
-    "next_plan",
-    "next plan",
-    "plan",
-    "answer",
-    "move",
-    "step",
-    "op",
-    "name",
-    "function",
-    "tool",
-)
 
 
 def parse_move(text: str) -> ParsedMove:
@@ -166,7 +124,7 @@ def _plain(line: str) -> str:
     return "" if _FENCE.fullmatch(line) else _MARKUP.sub(" ", line).strip(_EDGES)
 
 
-def _verdict(found: Iterable[_Operation], rule: str) -> ParsedMove:
+def _verdict(found: Iterable[Operation], rule: str) -> ParsedMove:
     operations = set(found)
     if len(operations) > 1:
         return ParsedMove(
@@ -178,83 +136,25 @@ def _verdict(found: Iterable[_Operation], rule: str) -> ParsedMove:
     return ParsedMove(move=operation, rule=rule)
 
 
-def _number(digits: str) -> int:
-    sign = -1 if digits[0] in "-\u2212" else 1
-    bare = digits.lstrip("+-\u2212").lstrip("0") or "0"
-    return sign * (int(bare) if len(bare) <= _LARGEST_DIGITS else _TOO_LARGE)
-
-
-def _operation(match: re.Match[str]) -> _Operation:
-    groups = match.groupdict()
-    digits = groups.get("call") or groups.get("phrase")
-    return _number(digits) if digits else "done"
-
-
-def _last_lines(_: str, lines: list[str]) -> list[_Operation]:
+def _last_lines(_: str, lines: list[str]) -> list[Operation]:
     """The operations of the lines at the end that say nothing else."""
-    found: list[_Operation] = []
+    found: list[Operation] = []
     for line in reversed(lines):
-        match = _ANSWER_LINE.fullmatch(line)
+        match = ANSWER_LINE.fullmatch(line)
         if match is None:
             break
-        found.append(_operation(match))
+        found.append(operation_of(match))
     return found
 
 
-def _json(answer: str, _: list[str]) -> list[_Operation]:
-    found = [_from_object(match.group()) for match in _OBJECT.finditer(answer)]
-    if not any(operation is not None for operation in found):
-        found = [_of_fields(dict(_flat(value))) for _, _, value in objects(answer)]
-    return [operation for operation in found if operation is not None]
+def _json(answer: str, _: list[str]) -> list[Operation]:
+    return [operation for *_, value in objects(answer) for operation in operations_of(value)]
 
 
-def _flat(value: Any) -> Iterator[tuple[str, Any]]:
-    """The fields of an object and of those within it, as a call of a function has them."""
-    for key, held in value if isinstance(value, Fields) else ():
-        yield str(key).strip().lower(), held
-        is_text = isinstance(held, str) and held.lstrip().startswith("{")
-        for inner in [v for *_, v in objects(held)] if is_text else [held]:
-            yield from _flat(inner)
-
-
-def _from_object(text: str) -> _Operation | None:
-    """The operation of a JSON object, or None when it is none."""
-    try:
-        content = json.loads(text)
-    except (ValueError, RecursionError):
-        return None
-    return _of_fields({str(key).strip().lower(): value for key, value in content.items()})
-
-
-def _of_fields(fields: Mapping[str, Any]) -> _Operation | None:
-    """The operation that the fields of an object name, or None."""
-    index = next((_whole(fields[key]) for key in _INDEX_KEYS if key in fields), None)
-    for key in _ACTION_KEYS:
-        value = fields.get(key)
-        if key == "move" and _whole(value) is not None:
-            return _whole(value)
-        word = value.strip() if isinstance(value, str) else ""
-        if word.lower() == "move" and index is not None:
-            return index
-        if match := _ANSWER_LINE.fullmatch(word):
-            return _operation(match)
-    has_action = any(key in fields for key in _ACTION_KEYS)
-    is_alone = not has_action and any(key in fields for key in _INDEX_ALONE)
-    return index if is_alone else None
-
-
-def _whole(value: object) -> int | None:
-    if isinstance(value, str):
-        return _number(value.strip()) if re.fullmatch("[-+]?[0-9]+", value.strip()) else None
-    if isinstance(value, bool) or not isinstance(value, int):
-        return None
-    return max(-_TOO_LARGE, min(_TOO_LARGE, value))
-
-
-def _labeled(_: str, lines: list[str]) -> list[_Operation]:
+def _labeled(_: str, lines: list[str]) -> list[Operation]:
     """What labels name; behind words that take it back ("no", "wait") the last of them alone."""
     text = "\n".join(lines)
-    found: list[_Operation] = []
+    found: list[Operation] = []
     end = 0
     for match in _LABELED.finditer(text):
         if _is_not_meant(text, match.start()):
@@ -263,7 +163,7 @@ def _labeled(_: str, lines: list[str]) -> list[_Operation]:
             found = []
         more: re.Match[str] | None = match
         while more is not None:
-            found.append(_operation(more))
+            found.append(operation_of(more))
             end = more.end()
             more = _MORE.match(text, end)
     return found
@@ -274,9 +174,9 @@ def _is_not_meant(text: str, start: int) -> bool:
     return bool(_NOT_MEANT.search(before[before.rfind("\n") + 1 :]))
 
 
-def _mentions(line: str) -> list[_Operation]:
+def _mentions(line: str) -> list[Operation]:
     found = [
-        _operation(match)
+        operation_of(match)
         for match in _MENTION.finditer(line)
         if not _is_not_meant(line, match.start()) and not _ASKED.match(line, match.end())
     ]
@@ -285,19 +185,19 @@ def _mentions(line: str) -> list[_Operation]:
     return found
 
 
-def _concluded(_: str, lines: list[str]) -> list[_Operation]:
+def _concluded(_: str, lines: list[str]) -> list[Operation]:
     """The operation that the last sentence comes to: "Move(3) failed, so Move(5)"."""
     concludes = _CONCLUDES.search(lines[-1]) if len({*_mentions(lines[-1])}) > 1 else None
-    return [_operation(concludes)] if concludes and not _UNSURE.search(lines[-1]) else []
+    return [operation_of(concludes)] if concludes and not _UNSURE.search(lines[-1]) else []
 
 
-def _in_last_line(_: str, lines: list[str]) -> list[_Operation]:
+def _in_last_line(_: str, lines: list[str]) -> list[Operation]:
     is_item = _COUNTED.match(lines[-1])
-    done: list[_Operation] = ["done"] if _DONE_SENTENCE.search(lines[-1]) and not is_item else []
+    done: list[Operation] = ["done"] if _DONE_SENTENCE.search(lines[-1]) and not is_item else []
     return [*_mentions(lines[-1]), *done]
 
 
-def _anywhere(_: str, lines: list[str]) -> list[_Operation]:
+def _anywhere(_: str, lines: list[str]) -> list[Operation]:
     return [operation for line in lines for operation in _mentions(line)]
 
 
@@ -321,7 +221,7 @@ def _moved(line: str) -> list[int]:
 def _bare(_: str, lines: list[str]) -> list[int]:
     match = _BARE.fullmatch(lines[-1])
     is_answer = match is not None and (len(lines) == 1 or not match.start("number") <= 1)
-    return [_number(match["number"])] if match and is_answer else []
+    return [number_of(match["number"])] if match and is_answer else []
 
 
 _RULES: tuple[tuple[str, _Find], ...] = (

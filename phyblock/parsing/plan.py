@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 from phyblock.domain import Plan
@@ -21,27 +21,19 @@ from phyblock.parsing.answer_form import FormProblem
 from phyblock.parsing.edits import edited
 from phyblock.parsing.legend import with_numbers
 from phyblock.parsing.listing import Listing
+from phyblock.parsing.plan_choice import PlanLists, chosen, plans_of
 from phyblock.parsing.plan_doubt import is_doubtful
 from phyblock.parsing.plan_patterns import (
     AGAIN,
-    CHOICE,
     DOWNWARD,
-    EXPLANATION,
-    FINAL_LABEL,
-    HEADING_CHARS,
     NOT_REVERSED,
     OFFER,
-    OPTION,
-    OR_ELSE,
-    ORDINALS,
-    PART,
-    REFUSAL,
-    REVISION,
     SUPPOSED,
 )
 from phyblock.parsing.plan_rank import LAST, MOVES, rank_of
 from phyblock.parsing.reply_lists import reply_lists
-from phyblock.parsing.text_forms import BACKWARD, answer_of, plain_line
+from phyblock.parsing.speech import BACKWARD, REFUSAL
+from phyblock.parsing.text_forms import answer_of, plain_line
 from phyblock.words import PlanParser
 
 __all__ = ["PLAN_PROBLEMS", "ParsedPlan", "PlanProblem", "kept_plan", "parse_plan"]
@@ -120,12 +112,7 @@ def _steps(text: str) -> _Read:
     if not answer:
         return "empty"
     read = _choose(answer)
-    ways = {
-        "no_plan": (with_numbers, as_steps),
-        "catalogue": (with_numbers,),
-        "ambiguous": (as_unknown_steps,),
-    }
-    for other_way in ways.get(read, ()) if isinstance(read, str) else ():
+    for other_way in _OTHER_WAYS.get(read, ()) if isinstance(read, str) else ():
         rewritten = other_way(answer)
         other = _choose(rewritten) if rewritten else "no_plan"
         if not isinstance(other, str):
@@ -140,22 +127,6 @@ _OTHER_WAYS: dict[str, tuple[Callable[[str], str | None], ...]] = {
     "ambiguous": (as_unknown_steps,),
 }
 """How a reply is rewritten to be read again where nothing was read."""
-
-
-@dataclass
-class _Plan:
-    """Lists that are one plan."""
-
-    lists: list[Listing]
-    title: str
-    option: str = ""
-    explained: bool = False
-    is_unclear: bool = False
-    below: list[str] = field(default_factory=list)
-
-    @property
-    def numbers(self) -> list[int]:
-        return [number for listing in self.lists for number in listing.numbers]
 
 
 def _choose(answer: str) -> _Read:
@@ -175,14 +146,14 @@ def _choose(answer: str) -> _Read:
         return "refusal"
     if best == LAST and OFFER.search(answer):
         return "no_plan"
-    plans = _plans(named, ranks, best, found)
+    plans = plans_of(named, ranks, best, found)
     plans[-1].below = below
-    plan = _chosen(plans, answer)
+    plan = chosen(plans, answer)
     if plan is None:
         return "two_plans"
-    is_cut_off = _is_cut_off(answer, found, below)
+    is_cut_off = _is_cut_off(answer, found)
     if plan is plans[-1] and is_cut_off:
-        firm = plans if len(plans) > 1 else [*_plans(named, ranks, MOVES, found), plan]
+        firm = plans if len(plans) > 1 else [*plans_of(named, ranks, MOVES, found), plan]
         plan = firm[-2] if len(firm) > 1 else plan
     after = [] if plan.option else found[found.index(plan.lists[-1]) + 1 :]
     if is_cut_off:
@@ -213,83 +184,8 @@ def _behind(lines: Sequence[str], end: int) -> list[str]:
 _SENTENCE_END = re.compile(r"(?<=[\d)\]])[.;]\s{1,4}(?=[^\W\d])")
 
 
-def _plans(named: list[Listing], ranks: list[int], best: int, found: list[Listing]) -> list[_Plan]:
-    """The lists of the best rank as plans: parts joined, explanations left out."""
-    plans: list[_Plan] = []
-    passed: list[str] = []
-    kept = {id(listing) for listing, rank in zip(named, ranks, strict=True) if rank == best}
-    for listing in found:
-        passed += listing.above
-        if id(listing) not in kept:
-            passed.append("")
-            continue
-        relation = _relation(passed, plans, listing)
-        title = " ".join(passed[-2:])
-        option = OPTION.search(f"{title} {listing.label}")
-        if relation == "part":
-            plans[-1].lists.append(listing)
-        elif relation == "explanation":
-            plans[-1].explained = True
-        elif relation != "skip":
-            name = option["name"].lower() if option else ("or" if relation == "option" else "")
-            plans.append(_Plan([listing], title, name, is_unclear=relation == "unclear"))
-        passed = []
-    return plans
-
-
-def _relation(passed: list[str], plans: list[_Plan], listing: Listing) -> str:
-    """What a list is to the plan before it, by the lines between them."""
-    lines = [line for line in passed if line] or (
-        [listing.label] if listing.form == "labeled" else []
-    )
-    title = lines[0].strip() if len(lines) == 1 else ""
-    if not plans:
-        return "other"
-    if any(OPTION.search(line) or OR_ELSE.match(line) for line in lines[-2:]):
-        return "option"
-    before = plans[-1].lists[-1]
-    if listing.form == "labeled" and not any(passed):
-        return "other"
-    if len(lines) > 1 or len(title) > HEADING_CHARS or REVISION.search(title) or "" in passed:
-        is_explained = any(EXPLANATION.search(line) for line in lines[:1])
-        is_last_word = _is_announced(lines, listing)
-        return "explanation" if is_explained and not is_last_word else "other"
-    if EXPLANATION.search(title) and listing.form != "json":
-        return "explanation"
-    part = PART.search(title) if title else before.numbers != listing.numbers
-    if not (part and before.ends_named):
-        is_other = before.form == listing.form != "steps" and before.numbers != listing.numbers
-        return "unclear" if title and is_other else "other"
-    return "skip" if plans[-1].explained else "part"
-
-
-def _is_announced(lines: list[str], listing: Listing) -> bool:
-    """Whether a list behind an explanation is said to be the plan after all."""
-    if listing.form == "json" or (listing.form == "labeled" and FINAL_LABEL.search(listing.label)):
-        return True
-    return len(lines) > 1 and len(lines[-1]) < HEADING_CHARS and bool(REVISION.search(lines[-1]))
-
-
-def _chosen(plans: list[_Plan], answer: str) -> _Plan | None:
-    """The last plan, or of several options the one that is said to be meant."""
-    last = plans[-1]
-    options = [plan for plan in plans if plan.option]
-    if options and last.option:
-        if len({tuple(plan.numbers) for plan in plans}) == 1:
-            return last
-        chosen = [match[match.lastgroup or 0] for match in CHOICE.finditer(answer)]
-        ordinal = ORDINALS.get(chosen[-1].lower()) if chosen and len(plans) == 2 else None
-        if ordinal is not None:
-            return plans[ordinal]
-        named = [plan for plan in plans if chosen and plan.option == chosen[-1].lower()]
-        return named[-1] if named else (last if len(plans) == 1 else None)
-    return last
-
-
-def _is_cut_off(answer: str, found: list[Listing], below: list[str]) -> bool:
+def _is_cut_off(answer: str, found: list[Listing]) -> bool:
     """Whether the text ends within its last list."""
-    if below and found[-1].form != "steps":
-        return False
     unclosed = answer.count("{") > answer.count("}") or answer.count("```") % 2 == 1
     return unclosed or (not found[-1].ends_named)
 
@@ -299,7 +195,7 @@ def _is_declined(named: list[Listing]) -> bool:
     return any(SUPPOSED.search(line) for listing in named for line in listing.above[-2:])
 
 
-def _is_reversed(plan: _Plan, form: str) -> bool:
+def _is_reversed(plan: PlanLists, form: str) -> bool:
     """Whether the reply says that its list is to be built from its end."""
     said = [plan.title, *plan.lists[-1].above[-3:], plan.lists[-1].label, *plan.below[:4]]
     if any(BACKWARD.search(line) and not NOT_REVERSED.search(line) for line in said):

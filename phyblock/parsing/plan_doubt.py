@@ -23,17 +23,15 @@ from phyblock.parsing.plan_patterns import (
     REVISION,
 )
 from phyblock.parsing.plan_rank import LAST, NO, rank_of
+from phyblock.parsing.speech import TAKES_BACK, words
 
 __all__ = ["is_doubtful"]
 
-_CORRECTS = re.compile(
-    r"\b(?:wait|correction|corrected|oops|scratch that|(?:should|must|has to|needs to) be"
-    r"|should (?:have been|read)|i meant"
-    r"|sorry|i (?:forgot|missed|overlooked)"
-    r"|swap(?:ped)?|my mistake|moment|korrektur|sondern|muss|corrección|korrigier\w*)\b"
-    r"|(?:^|[.;:!,]\s)(?:replace|insert|change)\s|\b(?:actually|no|rather)\b[,:]|等等|应该是|更正|改为"
-    r"|訂正|正しくは",
-    re.IGNORECASE,
+_CORRECTS = words(
+    TAKES_BACK,
+    r"\b(?:(?:should|must|has to|needs to) be|should (?:have been|read)|swap(?:ped)?|sondern"
+    r"|muss)\b"
+    r"|(?:^|[.;:!,]\s)(?:replace|insert|change)\s|应该是|改为|正しくは",
 )
 _DROPS = re.compile(
     r"\b(?:forget|scrap|disregard|vergiss|(?:don['\u2019]t|do not) (?:use|trust|take))"
@@ -243,8 +241,6 @@ def _says_otherwise(listing: Listing, order: list[int], known: set[int]) -> bool
     is_as_long = len(listing.numbers) == len(order)
     if is_as_long and sorted(listing.numbers) == sorted(order) and not _is_no_plan(listing.label):
         return listing.numbers not in (order, sorted(order))
-    if listing.form == "steps" and rank_of(listing) > NO:
-        return listing.numbers != order
     is_plan = rank_of(listing) > (NO if listing.n_moves else LAST)
     return is_plan and bool({*listing.numbers} - known)
 

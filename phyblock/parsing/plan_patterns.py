@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import re
 
+from phyblock.parsing.speech import TAKES_BACK, words
+
 __all__ = [
     "AGAIN",
     "BLOCK_WORD",
@@ -26,10 +28,8 @@ __all__ = [
     "OR_ELSE",
     "PART",
     "PLAN_WORD",
-    "REFUSAL",
     "REVISION",
     "SUPPOSED",
-    "SUPPOSED_SENTENCE",
 ]
 
 PLAN_WORD = re.compile(
@@ -101,12 +101,10 @@ CHOICE = re.compile(
 )
 ORDINALS = {"first": 0, "former": 0, "second": 1, "latter": 1}
 """Which of two options a choice by place takes."""
-REVISION = re.compile(
-    r"final|correct|revis|updat|actual|summar|complete|overall|optimi|improv|korrigier|attempt"
-    r"|error|mistake|oops"
-    r"|\btry\b|new plan|second thought|reconsider|on reflection"
-    r"|\b(?:instead|answer|again|better|so|thus|therefore|wait|output)\b",
-    re.IGNORECASE,
+REVISION = words(
+    TAKES_BACK,
+    r"final|correct|revis|updat|actual|summar|complete|overall|optimi|improv|attempt|error"
+    r"|\btry\b|new plan|reconsider|\b(?:instead|answer|again|better|so|thus|therefore|output)\b",
 )
 PART = re.compile(
     r"structure|layer|level|\b(?:left|right|cent(?:er|re)|middle|upper|lower|bottom|top|base|part"
@@ -116,16 +114,6 @@ PART = re.compile(
     re.IGNORECASE,
 )
 HEADING_CHARS = 80
-REFUSAL = re.compile(
-    r"\bI(?:['\u2019]m| am) (?:sorry|unable|not able|afraid)|\bI (?:cannot|can['\u2019]?t|could not"
-    r"|won['\u2019]t|am not able)"
-    r"|\b(?:cannot|can['\u2019]t|not possible to|impossible to|unable to) (?:determine|give|provide"
-    r"|build|produce|see|view|make|create|identify|plan|be built)"
-    r"|as an ai|please (?:provide|send|upload|share)|(?:is|are) not visible|need to see"
-    r"|no (?:valid )?plan\b|ich kann (?:das |die |den |leider )?(?:\w+ )?(?:nicht|kein)|leider|无法"
-    r"|抱歉|不能确定|lo siento|désolé|не могу",
-    re.IGNORECASE,
-)
 OFFER = re.compile(
     r"\b(?:would you like|do you want|shall i|should i|may i|let me know (?:if|whether) (?:i"
     r"|you want me)"
@@ -136,10 +124,6 @@ OFFER = re.compile(
 """That the plan itself would come only if it is asked for."""
 SUPPOSED = re.compile(
     r"would|could|generic|hypothetical|in general|typical|illustrat|placeholder|candidates",
-    re.IGNORECASE,
-)
-SUPPOSED_SENTENCE = re.compile(
-    r"\b(?:if|unless|could|might|let me know|falls|wenn|könnte|si|peut|podría)\b|如果|可以",
     re.IGNORECASE,
 )
 AGAIN = re.compile(

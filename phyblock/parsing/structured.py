@@ -27,15 +27,14 @@ from phyblock.parsing.json_keys import (
 )
 from phyblock.parsing.json_values import Fields, cut_off, decoded, objects, whole_number
 from phyblock.parsing.mention import MOST_AT_ONCE
+from phyblock.parsing.speech import BACKWARD, TAKES_BACK, words
 from phyblock.parsing.statement import read_statement
-from phyblock.parsing.text_forms import BACKWARD, plain_line
+from phyblock.parsing.text_forms import plain_line
 from phyblock.parsing.tiers import lowest_first, tier_of
 
 __all__ = ["Found", "find_json", "line_numbers"]
 
-_REVISES = re.compile(
-    r"\b(?:wait|instead|correct\w*|revis\w+|example|or|again|no)\b", re.IGNORECASE
-)
+_REVISES = words(TAKES_BACK, r"\b(?:instead|example|or|again|no)\b")
 """Words between objects that are not steps of one plan."""
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 import unicodedata
 
-__all__ = ["BACKWARD", "answer_of", "number_of_word", "plain_forms", "plain_line"]
+__all__ = ["answer_of", "number_of_word", "plain_forms", "plain_line"]
 
 _NOT_ASCII = re.compile(r"[^\x00-\x7f]")
 _TAGS = r"(?:think(?:ing)?|thoughts?|reasoning|scratchpad|analysis|reflection)"
@@ -31,17 +31,6 @@ _LATEX = re.compile(
 )
 _LATEX_ARROW = re.compile(r"\\(?:long)?(?:right)?(?:arrow|to)\b")
 
-BACKWARD = re.compile(
-    r"\b(?:in |the )?revers(?:e|ed)(?: (?:order|of))?\b|\bbackwards?\b"
-    r"|from (?:the )?last to (?:the )?first"
-    r"|last (?:step|block|one|item|picture) first|read (?:it )?from (?:the )?(?:bottom|end|right)"
-    r"|umgekehrte?r? reihenfolge|rückwärts|von hinten|倒序|逆序|反过来"
-    r"|从后(?:往|到|向)前|相反的?顺序"
-    r"|ordre inverse"
-    r"|orden inverso",
-    re.IGNORECASE,
-)
-"""That a list stands in the opposite order."""
 _NUMBER_WORDS = {
     word: number
     for number, words in enumerate(

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from phyblock.parsing.speech import PLACES
+
 __all__ = ["lowest_first", "tier_of"]
 
 _TIERS = (
@@ -25,7 +27,6 @@ _NUMBER = re.compile(
     rf"|\b(?P<ordinal>first|second|third|fourth|fifth|sixth)\s{_PART}\b",
     re.IGNORECASE,
 )
-_ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth")
 _GROUND_FLOOR = re.compile(r"\bground floor\b", re.IGNORECASE)
 
 
@@ -39,7 +40,7 @@ def tier_of(label: str) -> tuple[int, int] | None:
     if numbered and not _GROUND_FLOOR.search(label):
         ordinal = (numbered["ordinal"] or "").lower()
         digits = numbered["after"] or numbered["cjk"] or numbered["alone"]
-        return (0, int(digits) if digits else 1 + _ORDINALS.index(ordinal))
+        return (0, int(digits) if digits else PLACES[ordinal])
     ranks = [_RANKS[word] for word in _WORD.findall(label.lower()) if word in _RANKS]
     ranks += [_RANKS[sign] for sign in "底中顶頂" if sign in label]
     return (1, ranks[0]) if ranks else None

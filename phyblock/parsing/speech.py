@@ -1,0 +1,89 @@
+"""What a reply says of its own words: that it takes them back, supposes, declines or concludes.
+
+Plans, answers and moves share these words; each adds what only it can mean by them.
+"""
+
+from __future__ import annotations
+
+import re
+
+__all__ = [
+    "BACKWARD",
+    "CONDITIONAL",
+    "PLACES",
+    "REFUSAL",
+    "REVISED",
+    "SUPPOSES",
+    "TAKES_BACK",
+    "UNSURE",
+    "words",
+]
+
+TAKES_BACK = (
+    r"\b(?:wait|hmm+|oops|sorry|scratch that|correct(?:ion|ed|ing)|(?:my )?mistakes?"
+    r"|on (?:second thought|reflection)|i mean(?:t)?|i (?:forgot|missed|overlooked)|revis\w+"
+    r"|re-?(?:check|think|consider|examin|evaluat|look|assess)\w*"
+    r"|moment|korrektur|korrigier\w*|corrección)\b"
+    r"|\b(?:actually|no|rather)\b[,:]|等等|更正|訂正"
+)
+"""That what was said before does not hold."""
+_TURNS = r"\b(?:actually|instead|rather|however|but|wrong|incorrect|doch|aber|sondern)\b|但是?|不过"
+_CONCLUDES = r"\b(?:final(?:ly)?|therefore|thus|hence|so|overall|conclusion|conclude)\b|因此|所以"
+_IF = (
+    r"\b(?:if|unless|provided|assuming|(?<=, )falls|wenn|si|otherwise|sonst|or else"
+    r"|depend(?:s|ing))\b"
+    r"(?! (?:I|we) (?:had|have|must)\b)|如果|否则|取决于"
+)
+_MAY = r"\b(?:could|might|let me know|könnte|peut|podría)\b|可以"
+_DECLINES = (
+    r"\bI(?:['\u2019]m| am) (?:sorry|unable|not able|afraid)"
+    r"|\bI (?:cannot|can['\u2019]?t|could not|won['\u2019]t|am not able|apologi[sz]e)"
+    r"|\b(?:cannot|can['\u2019]?t|not possible to|impossible to|unable to) (?:determine|give"
+    r"|provide|build|produce|see|view|make|create|identify|plan|be built)"
+    r"|as an ai|please (?:provide|send|upload|share)|(?:is|are) not visible|need to see"
+    r"|\bno (?:image|picture|(?:valid )?plan)\b"
+    r"|ich kann (?:das |die |den |leider )?(?:\w+ )?(?:nicht|kein)|leider|无法|抱歉|不能确定"
+    r"|lo siento|désolé|не могу"
+)
+_CANNOT = (
+    r"\b(?:cannot|can['\u2019]?t|could not|couldn['\u2019]t|unable to|not able to|impossible to"
+    r"|not possible to|insufficient|not enough|(?:don['\u2019]t|do not) know|not sure|unclear"
+    r"|none of the|neither(?![^.;\n]{1,60}\bnor\b))\b"
+)
+
+
+def words(*patterns: str) -> re.Pattern[str]:
+    """Any of several patterns, whatever the case of their letters."""
+    return re.compile("|".join(patterns), re.IGNORECASE)
+
+
+REVISED = words(TAKES_BACK, _TURNS, _CONCLUDES)
+"""That a further word replaces what was said: it is taken back, turned from, or come to."""
+CONDITIONAL = words(_IF)
+"""That what is said holds only under a condition."""
+SUPPOSES = words(_IF, _MAY)
+"""That what is said is only thought of."""
+REFUSAL = words(_DECLINES)
+UNSURE = words(_DECLINES, _CANNOT)
+"""That the reply cannot tell, in a text as short as an answer is."""
+
+BACKWARD = re.compile(
+    r"\b(?:in |the )?revers(?:e|ed)(?: (?:order|of))?\b|\bbackwards?\b"
+    r"|from (?:the )?last to (?:the )?first"
+    r"|last (?:step|block|one|item|picture) first|read (?:it )?from (?:the )?(?:bottom|end|right)"
+    r"|umgekehrte?r? reihenfolge|rückwärts|von hinten|倒序|逆序|反过来"
+    r"|从后(?:往|到|向)前|相反的?顺序"
+    r"|ordre inverse"
+    r"|orden inverso",
+    re.IGNORECASE,
+)
+"""That a list stands in the opposite order."""
+
+PLACES = {
+    name: place
+    for place, names in enumerate(
+        ("first 1st", "second 2nd", "third 3rd", "fourth 4th", "fifth 5th", "sixth 6th"), start=1
+    )
+    for name in names.split()
+}
+"""Words for a place in an order."""
