@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import os
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ import pytest
 from hypothesis import settings
 
 from tests.browser import chromium
-from tests.fork_server import end_fork_server
+from tests.fork_server import ONE_THREAD, end_fork_server
 from tests.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -25,6 +26,19 @@ OFFICIAL_MISSING = (
 # No test asserts on time: what a machine takes for an example says what else it was doing.
 settings.register_profile("phyblock", deadline=None)
 settings.load_profile("phyblock")
+
+os.environ.update(ONE_THREAD)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """What is collected stays to the end: the garbage collector need not go through it."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def official_root() -> Path | None:

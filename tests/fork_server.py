@@ -29,6 +29,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, NoReturn
 
+ONE_THREAD = {"OMP_NUM_THREADS": "1"}
+"""The environment in which numerical libraries use one thread. Those of two tests that run at once
+would wait for each other, busily, for most of their time.
+"""
+
 _ROOT = Path(__file__).parents[1]
 _ORDER_BYTES = 1 << 20
 _POLL_S = 0.01
@@ -84,6 +89,7 @@ class ForkServer:
                     "PATH": os.environ["PATH"],
                     "HOME": self._home.name,
                     "MPLCONFIGDIR": self._home.name,
+                    **ONE_THREAD,
                 },
                 stdin=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],

@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from tests.fork_server import Done, Forked, fork_server
+from tests.fork_server import ONE_THREAD, Done, Forked, fork_server
 
 Raw = dict[str, Any]
 
@@ -88,6 +88,7 @@ class Workspace:
             "PYTHONPATH": str(Path(__file__).parents[1]),
             "PHYBLOCK_CACHE": str(self.cache),
             "LITELLM_LOCAL_MODEL_COST_MAP": "True",
+            **ONE_THREAD,
         }
 
     def write_scenes(self, *scenes: Raw) -> Path:

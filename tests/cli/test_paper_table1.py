@@ -16,13 +16,17 @@ ROUNDING = 0.06
 METRICS = ("precision", "recall", "f1")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="module", params=["--no-report", pytest.param("", marks=pytest.mark.slow)])
 def reproduced(
-    official_checkout: Path, tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path
+    official_checkout: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    pictures_dir: Path,
+    request: pytest.FixtureRequest,
 ) -> tuple[Workspace, Done]:
+    """The run without a page, which takes as long as the rest, and with it."""
     workspace = Workspace(tmp_path_factory.mktemp("paper"), pictures_dir)
-    dataset = f"dataset.path={official_checkout}"
-    done = workspace.phyblock("run", "paper-table1", "--set", dataset, "--out", "out")
+    command = ["run", "paper-table1", "--set", f"dataset.path={official_checkout}", "--out", "out"]
+    done = workspace.phyblock(*command, *request.param.split())
     assert (done.code, done.err) == (0, "")
     return workspace, done
 

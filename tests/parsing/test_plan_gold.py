@@ -18,16 +18,14 @@ from pathlib import Path
 import pytest
 
 from phyblock.parsing import parse_plan
-from tests.official_replies import reply_texts
+from tests.official_replies import GOLD, gold_readings, reply_texts
 
 N = 16
-GOLD = Path(__file__).with_name("gold.csv")
 
 
 @pytest.fixture(scope="module")
 def readings() -> dict[str, tuple[int, ...]]:
-    with GOLD.open(encoding="utf-8", newline="") as file:
-        return {row["sha256"]: tuple(map(int, row["plan"].split())) for row in csv.DictReader(file)}
+    return gold_readings()
 
 
 def gold_replies(

@@ -34,6 +34,16 @@ def ended(process: Forked) -> tuple[int, str, str]:
     return process.returncode, out, err
 
 
+def interrupted(process: Forked, server: OpenAIChat, name: signal.Signals) -> tuple[int, str, str]:
+    """Interrupt a run while its calls are held, and let them be answered once it waits for them."""
+    wait_for(lambda: server.at_once == AT_ONCE)
+    process.send_signal(name)
+    assert process.stdout is not None
+    assert f"waiting for {AT_ONCE} calls under way" in process.stdout.readline()
+    server.holds = False
+    return ended(process)
+
+
 def prepare(workspace: Workspace, url: str, *names: str) -> None:
     workspace.write_models(url, *names)
     workspace.write_suite(
@@ -45,16 +55,12 @@ def prepare(workspace: Workspace, url: str, *names: str) -> None:
 def test_calls_under_way_are_waited_for_and_nothing_more_is_asked(
     workspace: Workspace, name: signal.Signals
 ) -> None:
-    with Running(OpenAIChat(Faults(latency_s=1.5))) as running:
+    with Running(OpenAIChat(holds=True)) as running:
         server = running.server
         prepare(workspace, running.url, "alpha")
-        process = workspace.start()
-        wait_for(lambda: server.at_once == AT_ONCE)
-        process.send_signal(name)
-        code, out, err = ended(process)
+        code, out, err = interrupted(workspace.start(), server, name)
 
         assert (code, err) == (130, "")
-        assert f"waiting for {AT_ONCE} calls under way" in out
         assert f"{AT_ONCE} of {SAMPLES} samples are done (interrupted)" in out
         assert f"phyblock run suite.yaml --out {workspace.out}" in out
         assert server.requests == AT_ONCE
@@ -73,15 +79,11 @@ def test_calls_under_way_are_waited_for_and_nothing_more_is_asked(
 
 
 def test_calls_that_wait_for_their_turn_are_not_sent_any_more(workspace: Workspace) -> None:
-    with Running(OpenAIChat(Faults(latency_s=1.5))) as running:
+    with Running(OpenAIChat(holds=True)) as running:
         server = running.server
         prepare(workspace, running.url, "alpha", "beta")
-        process = workspace.start()
-        wait_for(lambda: server.at_once == AT_ONCE)
-        process.send_signal(signal.SIGINT)
-        code, out, _ = ended(process)
+        code, _, _ = interrupted(workspace.start(), server, signal.SIGINT)
     assert code == 130
-    assert f"waiting for {AT_ONCE} calls under way" in out
     assert server.requests == AT_ONCE
     assert len(workspace.records()) == AT_ONCE
 

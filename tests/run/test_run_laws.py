@@ -13,7 +13,7 @@ import yaml
 
 from phyblock import load_run
 from phyblock.report import write_tables
-from tests.servers.chassis import Faults, Running
+from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Raw, Workspace
 
@@ -142,13 +142,14 @@ def test_a_cut_last_line_is_dropped_and_its_sample_run_again(copy: Workspace) ->
 
 
 def test_a_second_process_is_refused_and_the_first_goes_on(workspace: Workspace) -> None:
-    with Running(OpenAIChat(Faults(latency_s=3.0))) as running:
+    with Running(OpenAIChat(holds=True)) as running:
         workspace.write_models(running.url, "alpha")
         workspace.write_suite(models=["alpha"])
         with workspace.start() as first:
             while not running.server.at_once:
                 time.sleep(0.01)
             second = workspace.run()
+            running.server.holds = False
             out, err = first.communicate()
         assert second.code == 2
         assert "out: is being written by another phyblock run" in second.err

@@ -108,7 +108,7 @@ class LocalServer(ABC):
     """One provider's protocol; `ended` counts requests by how they ended.
 
     `elsewhere` is where redirects to another host lead. At most `width` requests are looked at
-    together; None is no bound.
+    together; None is no bound. While it `holds`, which a test may end, no request is answered.
     """
 
     def __init__(
@@ -118,6 +118,7 @@ class LocalServer(ABC):
         keep: bool = True,
         elsewhere: str = ELSEWHERE,
         width: int | None = None,
+        holds: bool = False,
     ) -> None:
         self._gate: AbstractAsyncContextManager[None] = (
             nullcontext() if width is None else asyncio.Semaphore(width)
@@ -125,6 +126,7 @@ class LocalServer(ABC):
         self.faults = faults or Faults()
         self.keep = keep
         self.elsewhere = elsewhere
+        self.holds = holds
         self.seen: list[Seen] = []
         self.ended: Counter[str] = Counter()
         self.by_sample: Counter[str] = Counter()
@@ -189,6 +191,8 @@ class LocalServer(ABC):
             self.ended[ending] += 1
             if self.faults.latency_s:
                 await asyncio.sleep(self.faults.latency_s)
+            while self.holds:
+                await asyncio.sleep(0.005)
             response = await self._end(seen, ending, request)
             if ending == "ok" or (ending in WIRE_FAULTS and WIRE_FAULTS[ending].ending == "reply"):
                 self.answered_by_sample[sample] += 1

@@ -39,7 +39,6 @@ from tests.sim.structures import block, clouds, scene_of
 
 DATA = Path(__file__).parents[2] / "benchmarks" / "data"
 SCENES = read_builtin(DATA / "phyblock-400")
-QUESTIONS = read_questions(DATA / "phyblock-vqa", SCENES).tasks
 STYLE = PictureStyle()
 SIZE_PX = 128
 LEAST_CONTRAST = 3.0
@@ -66,7 +65,8 @@ def is_the_same_wide_open(blocks: Sequence[DrawnBlock], camera: Camera) -> bool:
 
 
 def recipes(every: int) -> list[QuestionPicture]:
-    return [picture for task in QUESTIONS[::every] for picture in task.question.pictures]
+    questions = read_questions(DATA / "phyblock-vqa", SCENES).tasks[::every]
+    return [picture for task in questions for picture in task.question.pictures]
 
 
 def luminance(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
