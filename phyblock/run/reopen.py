@@ -12,7 +12,7 @@ from phyblock.run.data import CHANGED
 from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.specs.yaml_source import YamlSource
 from phyblock.tracks import AnyTrack, kind_of
-from phyblock.tracks.base import ENGINE, READER
+from phyblock.tracks.base import CARRYING, ENGINE, READER
 from phyblock.tracks.kind import Opening
 from phyblock.tracks.opening import open_tracks
 
@@ -50,6 +50,6 @@ def _check_alike(name: str, track: AnyTrack, manifest: Manifest, root: Path) -> 
     told = manifest.tracks.get(name, {})
     for key, value in track.identity().items():
         # Prompts and pictures are left out by a track that asks nobody.
-        if key not in (ENGINE, READER) and value is not None and value != told.get(key):
+        if key not in (CARRYING, ENGINE, READER) and value is not None and value != told.get(key):
             field, was = f"tracks.{name}.{key}", str(told.get(key))
             raise DataError(Problem(str(root), CHANGED, field, str(value), was))

@@ -4,12 +4,16 @@ The hand that puts a block gives way a little: one that would share space with o
 floor, by no more than a tolerance is moved out the shortest way, and one that hangs no higher above
 them is lowered; where it would share more, it is refused and stays out. Nothing is set right later:
 what fell or was knocked over stays so for the steps that follow.
+
+A block is let go with the blocks near it alone, as scenes are checked (`steps`): others join as
+soon as something that fell comes near them. What stands elsewhere would change the order in which
+an engine goes through contacts, and with it whether a block that lies on a narrow edge stays there.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from types import TracebackType
 
@@ -22,7 +26,7 @@ from phyblock.sim.convex import separating_axes
 from phyblock.sim.engine import PhysicsEngine
 from phyblock.sim.pose import Pose
 from phyblock.sim.stability import DEFAULT_TRIAL, movement
-from phyblock.sim.steps import wait
+from phyblock.sim.steps import REACH_M, groups, moments
 from phyblock.sim.support import (
     FIT_TOLERANCE_M,
     bounds_m,
@@ -35,7 +39,7 @@ from phyblock.words import StepEnd
 
 __all__ = ["LONGEST_S", "Carried", "CarriedStep", "CarryLimits", "Carrying", "carry_out"]
 
-_SETTLE_S, _COLLAPSE_S = 2.0, 3.0
+_LONGEST_FALL_S = 5.0
 LONGEST_S = 600.0
 """A plan that takes longer, by the clock, is given up: no result, whatever it did so far [s]."""
 _TRIES = 16
@@ -154,8 +158,7 @@ class Carrying:
         depth_cm = -float(bounds_m(block)[0, 2]) * _CM
         if depth_cm > self._limits.overlap_cm:
             return CarriedStep("under_floor", overlap_cm=round(depth_cm, _DIGITS))
-        before = self._world.poses()
-        others = tuple(pose.put(self._resting[order]) for order, pose in before.items())
+        others = self.blocks
         most_m = self._limits.overlap_cm / _CM
         free, given_m = _out_of_others(block, others, most_m)
         if free is None:
@@ -167,9 +170,10 @@ class Carrying:
         after = self._let_go(free)
         moved_cm, turned_deg = _moved(Pose.goal(block), after[block.order])
         knocked = tuple(
-            order
-            for order, pose in before.items()
-            if not self._is_still(*_moved(pose, after[order]))
+            other.order
+            for other in others
+            if other.order in after
+            and not self._is_still(*_moved(Pose.goal(other), after[other.order]))
         )
         is_still = self._is_still(moved_cm, turned_deg)
         end: StepEnd = "knocks_over" if knocked else "stands" if is_still else "falls"
@@ -178,23 +182,63 @@ class Carrying:
         return CarriedStep(end, moved, turned, gap, given, knocked)
 
     def _let_go(self, block: Block) -> dict[int, Pose]:
-        """Where all blocks are once they rest with this one among them."""
-        self._world.place(block)
-        if not wait(self._world, _SETTLE_S):
-            wait(self._world, _COLLAPSE_S)
-        after = self._world.poses()
+        """Where the block and all that it could move are once they rest."""
         self._resting[block.order] = block
-        if movement(tuple(self._resting.values()), after, DEFAULT_TRIAL).fallen:
+        apart = groups(self.blocks)
+        near: tuple[Block, ...] = ()
+        reached = {block.order}
+        while reached:
+            reached.update(one.order for one in near)
+            near = tuple(b for group in apart if _are_among(group, reached) for b in group)
+            after, reached = self._tried(near)
+        if movement(near, after, DEFAULT_TRIAL).fallen:
             for order, pose in after.items():
                 self._resting[order] = pose.put(self._resting[order])
-        else:
-            for order in after:
-                self._world.remove(order)
-            self._world.place_all(self._resting.values())
         return after
+
+    def _tried(self, near: Sequence[Block]) -> tuple[dict[int, Pose], set[int]]:
+        """Where blocks come to rest without the others, or which of the others they reach."""
+        others = tuple(block for block in self.blocks if block not in near)
+        self._world.place_all(near)
+        try:
+            before = self._world.poses()
+            for is_quiet in moments(self._world, _LONGEST_FALL_S):
+                after = self._world.poses()
+                if reached := _reached(near, before, after, others):
+                    return after, reached
+                if is_quiet:
+                    break
+                before = after
+            return after, set()
+        finally:
+            for block in near:
+                self._world.remove(block.order)
 
     def _is_still(self, moved_cm: float, turned_deg: float) -> bool:
         return moved_cm <= self._limits.stand_cm and turned_deg <= self._limits.stand_deg
+
+
+def _are_among(group: Sequence[Block], orders: Set[int]) -> bool:
+    return any(block.order in orders for block in group)
+
+
+def _reached(
+    near: Sequence[Block],
+    before: Mapping[int, Pose],
+    after: Mapping[int, Pose],
+    others: Sequence[Block],
+) -> set[int]:
+    """Orders of the others that blocks on the move have come near since a moment ago."""
+    if not others:
+        return set()
+    fallen = movement(near, after, DEFAULT_TRIAL).fallen
+    found = set()
+    for block in near:
+        if block.order in fallen:
+            was, now = (bounds_m(poses[block.order].put(block)) for poses in (before, after))
+            way = np.stack([np.minimum(was, now)[0], np.maximum(was, now)[1]])
+            found |= {o.order for o in others if boxes_near(bounds_m(o), way, REACH_M)}
+    return found
 
 
 def _moved(start: Pose, end: Pose) -> tuple[float, float]:

@@ -22,7 +22,16 @@ from phyblock.sim.stability import (
 from phyblock.sim.support import bounds_m, boxes_near
 from phyblock.sim.world import World
 
-__all__ = ["DEFAULT_REST", "Rest", "check_at_rest", "check_steps", "groups", "moments", "wait"]
+__all__ = [
+    "DEFAULT_REST",
+    "REACH_M",
+    "Rest",
+    "check_at_rest",
+    "check_steps",
+    "groups",
+    "moments",
+    "wait",
+]
 
 
 @dataclass(frozen=True)
@@ -39,7 +48,7 @@ class Rest:
 
 
 DEFAULT_REST = Rest()
-_REACH_M = 0.012
+REACH_M = 0.012
 """Groups this far apart stay apart while no block passes the limits of a trial."""
 
 
@@ -75,7 +84,7 @@ def check_at_rest(
     return verdict(found, trial)
 
 
-def groups(blocks: Sequence[Block], reach_m: float = _REACH_M) -> tuple[tuple[Block, ...], ...]:
+def groups(blocks: Sequence[Block], reach_m: float = REACH_M) -> tuple[tuple[Block, ...], ...]:
     """The blocks in groups that keep more than `reach_m` [m] of free space between them."""
     boxes = [bounds_m(block) for block in blocks]
     left = set(range(len(blocks)))

@@ -11,14 +11,14 @@ from phyblock.errors import Problem, SpecError
 from phyblock.site.runs import SiteRun
 from phyblock.specs.sections import ImagesSpec
 from phyblock.tables.load import Run
-from phyblock.tracks.base import ENGINE, READER
+from phyblock.tracks.base import CARRYING, ENGINE, READER
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["check_runs_alike"]
 
-_ASKED_ANEW = ("pictures", READER)
+_ASKED_ANEW = ("pictures", CARRYING, READER)
 """What a track's identity says that may differ: digests of pictures, which change with their size,
-and who read the replies.
+who read the replies and how plans were carried out.
 """
 _CONTROLS = frozenset({"blind", "wrong_image", "prompt", "path"})
 """What a track's section of the suite says that is shown with the run, or known by its digest."""

@@ -13,6 +13,7 @@ from phyblock.models.base import Reply, Request
 from phyblock.records import Record
 
 __all__ = [
+    "CARRYING",
     "ENGINE",
     "READER",
     "AnyTrack",
@@ -35,6 +36,10 @@ it is not the engine of reference. What it decided stands in the records.
 """
 READER = "reader"
 """The same of the version of a reader of the track's own; what is scored again is read anew."""
+CARRYING = "carrying"
+"""The same of the version of how plans are carried out and what stands is measured, as the records
+keep it.
+"""
 
 
 class Item(Protocol):

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from phyblock.domain import Block
+from phyblock.domain import Block, BlockType, euler_deg_to_matrix
+from phyblock.domain.blocks import SHAPES
 from phyblock.scoring.pose_end import blocks_reached
+from phyblock.scoring.solids import overlap_volume, placed
 from phyblock.sim.carry import CarryLimits, carry_out
 from phyblock.sim.engine import PhysicsEngine
 from phyblock.sim.registry import installed_engines, physics_engine
-from phyblock.sim.voxels import VOXEL_M, voxel_iou, voxels
+from phyblock.sim.support import find_overlaps
+from phyblock.sim.voxels import VOXEL_M, filled_voxels, voxel_iou
+from phyblock.tracks.pose_planning.bodies import pieces_of
 from tests.sim.structures import block, counterweighted_beam, tower
 
 
@@ -88,9 +95,69 @@ def test_the_same_plan_ends_the_same_to_the_last_digit_whatever_came_before(
     assert carry_out(beam, engine=engine) == first
 
 
-def test_voxels_are_those_whose_middle_is_in_a_block() -> None:
+def test_what_stands_elsewhere_changes_no_verdict(engine: PhysicsEngine) -> None:
+    far = [
+        block(1, "arch", (-0.005, 0.0375, 0.025), (0.0, 0.0, 90.0)),
+        block(2, "arch", (-0.005, 0.0875, 0.025), (0.0, 0.0, 90.0)),
+        block(3, "cuboid2", (0.02, 0.0625, 0.0625), (0.0, 0.0, 90.0)),
+        block(4, "cuboid2", (-0.03, 0.0625, 0.0625), (0.0, 0.0, 90.0)),
+        block(5, "cylinder", (0.02, 0.0625, 0.125)),
+        block(6, "triangle", (0.02, 0.0625, 0.175), (0.0, 0.0, 90.0)),
+    ]
+    # A cylinder on a plank lies on one of its narrow faces, from which little makes it roll.
+    lying = [
+        block(1, "cylinder", (0.0375, -0.0625, 0.02462), (90.0, 0.0, 0.0)),
+        block(2, "cylinder", (-0.0375, -0.0625, 0.02462), (90.0, 0.0, 0.0)),
+        block(3, "cuboid3", (0.0, -0.0625, 0.06174)),
+        block(4, "cube", (-0.05, -0.0625, 0.09924)),
+        block(5, "cylinder", (0.025, -0.0625, 0.09886), (90.0, 0.0, 90.0)),
+    ]
+    for near in (lying, [at(tower(1)[0], 0.0, -0.1, 0.065)]):
+        alone, beside = carry_out(near, engine=engine), carry_out([*far, *near], engine=engine)
+        assert beside.steps[len(far) :] == alone.steps
+        assert [one.position_m for one in beside.blocks[len(far) :]] == [
+            one.position_m for one in alone.blocks
+        ]
+
+
+def test_what_falls_upon_others_that_stand_apart_moves_them(engine: PhysicsEngine) -> None:
+    low, post = at(tower(1)[0], 0.11, 0.0, 0.025), block(1, "cube", (0.0, 0.0, 0.025))
+    plank = block(2, "cuboid3", (0.0, 0.0, 0.125), (0.0, 90.0, 0.0))
+    leaning = replace(plank, position_m=(0.03, 0.0, 0.125))
+    done = carry_out([low, post, leaning], engine=engine)
+    assert [step.end for step in done.steps[:2]] == ["stands", "stands"]
+    assert done.steps[2].end in ("falls", "knocks_over")
+    assert not find_overlaps(done.blocks, 0.002)
+
+
+@settings(max_examples=40)
+@given(
+    st.sampled_from(("cube", "cuboid2", "triangle", "arch", "cylinder")),
+    st.tuples(*[st.floats(-0.03, 0.03, allow_nan=False)] * 3),
+    st.floats(0.0, 90.0, allow_nan=False),
+)
+def test_voxels_know_what_two_blocks_share_nearly(
+    kind: BlockType, way_m: tuple[float, float, float], turn_deg: float
+) -> None:
+    one = block(1, kind, (0.01, 0.02, 0.06))
+    x, y, z = one.position_m
+    dx, dy, dz = way_m
+    other = replace(one, position_m=(x + dx, y + dy, z + dz), euler_deg=(0.0, 0.0, turn_deg))
+    pieces = [
+        placed(pieces_of(kind), euler_deg_to_matrix(b.euler_deg), np.array(b.position_m))
+        for b in (one, other)
+    ]
+    shared = overlap_volume(*pieces)
+    iou = shared / (2 * SHAPES[kind].volume_m3 - shared)
+    assert voxel_iou([one], [other]) == pytest.approx(iou, abs=0.08)
+    assert voxel_iou([one], [one]) == 1
+
+
+def test_a_voxel_counts_by_how_much_of_it_a_block_fills() -> None:
     cube = block(1, "cube", (0.0, 0.0, 0.025))
-    assert len(voxels([cube])) == round((0.05 / VOXEL_M) ** 3)
+    assert len(filled_voxels([cube])[0]) == round((0.05 / VOXEL_M) ** 3)
     assert voxel_iou([cube], [at(cube, 0.025, 0, 0.025)]) == pytest.approx(1 / 3)
+    assert voxel_iou([cube], [at(cube, 0, 0, 0.02625)]) == pytest.approx(39 / 41)
+    assert voxel_iou([cube, cube], [cube]) == 1
     assert voxel_iou([], []) == 1
     assert voxel_iou([cube], []) == 0

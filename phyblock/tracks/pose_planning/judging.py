@@ -46,8 +46,13 @@ from phyblock.tracks.pose_planning.resting import Rest, rests_of
 from phyblock.tracks.showing import file_plan
 from phyblock.words import AnswerFormat, Matcher, PoseRotation, Setting
 
-__all__ = ["Earlier", "PoseJudgement", "PoseRules", "judge_poses"]
+__all__ = ["CARRY_VERSION", "Earlier", "PoseJudgement", "PoseRules", "judge_poses"]
 
+CARRY_VERSION = 2
+"""Of how plans are carried out and what stands in the end is measured, up by one where some plan
+may end otherwise: before 2 everything in the world was let go together, and voxels were whole or
+empty.
+"""
 _ONE_AT_A_TIME = threading.Lock()
 _KEPT = 32
 _DIGITS = 4

@@ -20,10 +20,11 @@ from phyblock.records import Record
 from phyblock.sim.carry import CarriedStep
 from phyblock.sim.placing import upright
 from phyblock.sim.registry import REFERENCE_ENGINE, physics_engine
-from phyblock.tracks.base import ENGINE, READER
+from phyblock.tracks.base import CARRYING, ENGINE, READER
 from phyblock.tracks.pose_planning.baselines import PoseSubject
 from phyblock.tracks.pose_planning.ended import Ended
 from phyblock.tracks.pose_planning.judging import (
+    CARRY_VERSION,
     Earlier,
     PoseJudgement,
     PoseRules,
@@ -67,9 +68,15 @@ class PosePlanning(WholePlanTrack[PoseRules, PosePictures]):
 
     def identity(self) -> dict[str, Any]:
         """Name and version of the prompt, a digest of all that decides the pictures, the
-        version of the reader, and the physics engine where it is another one than PyBullet.
+        versions of the reader and of how plans are carried out, and the physics engine where it is
+        another one than PyBullet.
         """
-        return {**super().identity(), READER: POSE_READER_VERSION, **_other_engine()}
+        return {
+            **super().identity(),
+            READER: POSE_READER_VERSION,
+            CARRYING: CARRY_VERSION,
+            **_other_engine(),
+        }
 
     def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
         """The one request, made without rendering, and whether its pictures are the real ones."""
