@@ -38,7 +38,7 @@ from phyblock.run.prompts import PromptFile
 from phyblock.run.rewritten import manifest_text
 from phyblock.run.standing import Standing
 from phyblock.sim.registry import PHYSICS_VARIABLE, REFERENCE_ENGINE
-from phyblock.tracks.base import ENGINE
+from phyblock.tracks.base import CARRYING, ENGINE
 
 __all__ = ["RunStore", "holds_run"]
 
@@ -195,6 +195,12 @@ def _reasons(found: Manifest, wanted: Manifest) -> Iterator[str]:
     if engines[0] != engines[1] and engines[0].keys() == engines[1].keys():
         was, is_now = (one.engine or REFERENCE_ENGINE for one in (found, wanted))
         yield f"its blocks are let go in {was}, here in {is_now} ({PHYSICS_VARIABLE} chooses)"
+    for track, about in wanted.tracks.items():
+        if track in found.tracks and found.tracks[track].get(CARRYING) != about.get(CARRYING):
+            yield (
+                "this version carries plans out and measures what stands otherwise than the one "
+                "that made it, which phyblock score leaves as it was"
+            )
 
 
 def _changed(found: Manifest, wanted: Manifest) -> list[str]:

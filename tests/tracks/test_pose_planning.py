@@ -17,7 +17,7 @@ from PIL import Image
 from phyblock.cli.main import phyblock
 from phyblock.datasets import AssemblyTask, read_builtin
 from phyblock.domain import Block, Candidate, CandidateSet, PoseStep
-from phyblock.errors import InputError
+from phyblock.errors import InputError, StoreError
 from phyblock.models.base import Image as SentPicture
 from phyblock.parsing import POSE_READER_VERSION, pose_form
 from phyblock.records.known import known_records
@@ -31,6 +31,7 @@ from phyblock.sim.placing import center_cm, put
 from phyblock.sim.pose import Pose
 from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
 from phyblock.tracks.pose_planning import judging
+from phyblock.tracks.pose_planning import track as pose_track
 from phyblock.tracks.pose_planning.baselines import POSE_RULES, PoseSubject, written
 from phyblock.tracks.pose_planning.film import pose_film, pose_table
 from phyblock.tracks.pose_planning.judging import PoseRules
@@ -315,10 +316,13 @@ def test_a_run_with_faults_is_killed_resumed_and_scored_again(
     monkeypatch.setattr(judging, "carry_out", None)
     described = workspace.out / "run.yaml"
     told = described.read_text()
+    # A run of another version is read anew, and not gone on with.
     assert f"reader: {POSE_READER_VERSION}\n" in told
-    # A run of another version of the reader is read anew.
     described.write_text(told.replace(f"reader: {POSE_READER_VERSION}\n", "reader: 0\n"))
+    monkeypatch.setattr(pose_track, "CARRY_VERSION", judging.CARRY_VERSION + 1)
     again = rescore(workspace.out, None, None, workspace.root / "again")
+    with pytest.raises(StoreError, match="carries plans out and measures what stands otherwise"):
+        phyblock.main(run, standalone_mode=False)
     described.write_text(told)
     assert by_sample(workspace.records(again)) == by_sample(whole)
     table = pd.read_csv(workspace.out / "tables" / "table_c.csv").set_index("model")

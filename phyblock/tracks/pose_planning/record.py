@@ -127,7 +127,7 @@ class PoseOutcome(Line):
     reached: Whole
     """Blocks of the goal that stand where they should in the end."""
     iou: Amount
-    """Intersection over union of all that stands and the goal, in voxels of 5 mm, 64 points each."""
+    """Intersection over union of all that stands and the goal, in voxels of 5 mm by 64 points."""
     completed: bool
     """Whether all of the goal was reached, and nothing else lies about."""
     limits: CarryTolerances
