@@ -55,8 +55,10 @@ def leading(text: str, reader: ChoiceReader) -> str | None:
 
 def concluded(text: str, reader: ChoiceReader) -> str | None:
     """The letter that the last clause of a conclusion is."""
-    found = [reader.exact(match["value"]) for match in CONCLUDED.finditer(text)]
-    return found[-1] if found and not _is_open(text) else None
+    found = list(CONCLUDED.finditer(text))
+    if not found or UNSURE.search(text) or CONDITIONAL.search(_sentence_of(text, found[-1])):
+        return None
+    return reader.exact(found[-1]["value"])
 
 
 def _is_open(text: str) -> bool:

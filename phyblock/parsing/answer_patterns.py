@@ -63,7 +63,7 @@ CHOSEN = re.compile(
     r" (?:choose|pick|select|prefer|go with|answer|say|lean (?:more )?(?:to|towards?))"
     r"|\bmy (?:choice|pick|guess|selection) (?:is|would be)"
     r"|\b(?:correct|right|best) (?:option|choice|one|picture|image|letter|place|match)"
-    r" (?:is|would be|must be|should be)"
+    r"(?: is| would be| must be| should be|:)"
     r"|\b(?:nehme|wähle)(?: aber| daher| also)?|^(?:it )?looks like|\bje choisis|\b(?:elijo"
     r"|escolho|scelgo)"
     r"|我认为(?:答案)?是?|应?(?:该)?选(?:择|项)?(?:是"
@@ -115,10 +115,11 @@ CONCLUDED = re.compile(
     r"|image|place)"
     r"(?: must be| has to be| should be| is|['\u2019]s| leaves| matches| corresponds to)"
     r"(?: (?:the |with )?(?:option|picture|image|choice|place))?"
-    r"|(?:so|therefore|thus|hence|also|daher|donc|alors|entonces)[:,]?|leaves(?: only)?"
+    r"|(?:so|therefore|thus|hence|also|daher|donc|alors|entonces)[:,]?|leaves(?: only)?|only"
     r"|(?:verdict|remaining|conclusion)\s?(?:is|:|=|->|\u2192)|(?:choose|pick|select)|[;,] then"
     r")[ *_`]{0,4}"
-    r"(?P<value>\(?[A-Z]\)?)[*_`]{0,3}(?: it is)?(?=[\s.!,;]{0,3}(?:\Z|\n|[.!;]))",
+    r"(?P<value>\(?[A-Z]\)?)[*_`]{0,3}(?: it is| is left| remains)?"
+    r"(?=[\s.!,;]{0,3}(?:\Z|\n|[.!;]))",
 )
 CORRECTED = re.compile(
     rf"\b(?P<lead>correction|edit|korrektur|final(?: decision| choice)?|更正)\s?[:：]{_VALUE}",
@@ -145,7 +146,9 @@ TURNED = re.compile(
 """A turn away from the stated answer: "I would answer A, but the picture shows that it is D"."""
 VERDICT = re.compile(
     r"(?:^|[.;,:]\s|(?<=[✓✔✅✗✘❌×])\s"
-    r"|\n)[\s*\-_(\[]{0,6}(?:option )?(?P<letter>[A-Z])[*_)\]]{0,3}\s?[:.\-\u2013\u2014]?\s{0,3}"
+    r"|\n)[\s*\-_(\[]{0,6}(?:option )?(?P<letter>[A-Z])[*_)\]]{0,3}"
+    r"(?:\s?[:.]\s[^\n\u2013\u2014:]{1,40}?\s(?=[\-\u2013\u2014]))?"
+    r"\s?[:.\-\u2013\u2014]?\s{0,3}"
     r"(?:(?P<yes>✓|✔|✅|☑|(?:yes|correct|matches|fits|right|true)\b)|(?:✗|✘|❌|×|☒|(?:no|wrong"
     r"|incorrect|false|does not|doesn't|not)\b))",
     re.IGNORECASE,

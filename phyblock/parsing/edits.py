@@ -110,6 +110,11 @@ _WAYS: tuple[tuple[str, _Edit], ...] = (
         r"\s(?:step\s)?(?P<b>\d{1,2})",
         _swap,
     ),
+    (
+        r"\bsteps?\s(?P<a>\d{1,2})\s(?:and|&)\s(?:step\s)?(?P<b>\d{1,2})\s(?:must|should"
+        r"|ha(?:ve|s) to|needs? to|are to)\s(?:be\s)?(?:swap|switch|exchang)\w*",
+        _swap,
+    ),
     (rf"\b(?:remove|delete|skip|drop|ignore|omit|leave out|cut)\s(?:the )?{_STEP}", _remove),
     (
         rf"\b(?:insert|add|put)\s(?:(?:another|a|one|more|second|further)\s){{0,3}}{_NEW}"
@@ -156,6 +161,8 @@ def _named(text: str) -> set[int]:
 
 
 def _changed(before: _Numbers, after: _Numbers) -> set[int]:
-    """The blocks that an edit takes out or puts in."""
+    """The blocks that an edit takes out, puts in or exchanges."""
+    if len(before) == len(after):
+        return {n for old, new in zip(before, after, strict=True) if old != new for n in (old, new)}
     old, new = Counter(before), Counter(after)
     return {*(old - new), *(new - old)}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from phyblock.parsing.chain import chain
 from phyblock.parsing.line_patterns import ARRAY, LABELED, NOUN_LABEL, SENTENCE_END
-from phyblock.parsing.plan_patterns import PLAN_WORD
+from phyblock.parsing.plan_patterns import FINAL_LABEL, PLAN_WORD
 from phyblock.parsing.statement import read_statement
 
 __all__ = ["LabeledNumbers", "labeled_numbers"]
@@ -23,6 +23,7 @@ _PIECE = re.compile(
     re.IGNORECASE,
 )
 """A block by its looks and its number, as "red arch (3)" or "slab 2"."""
+_SENTENCES = re.compile(r"(?<=[^\d\s][.!?])\s(?=[^\W\d])")
 _LABEL_CHARS = 30
 """A label is shorter, where words stand beside the numbers behind it."""
 
@@ -38,8 +39,15 @@ class LabeledNumbers:
 
 
 def labeled_numbers(line: str) -> LabeledNumbers | None:
-    """The numbers that a line names behind a label, or in an array; None where it names none."""
+    """The numbers that a line names behind a label, or in an array; None where it names none.
+
+    The label is what the line begins with, or what its last sentence does where it says that it is
+    the plan.
+    """
     labeled = LABELED.match(line)
+    last = None if labeled else LABELED.match(_SENTENCES.split(line)[-1].strip())
+    if last and FINAL_LABEL.search(last["label"]) and len(chain(last["value"].rstrip(" ."))[0]) > 1:
+        labeled = last
     if labeled and (
         labeled["label"].count("(") > labeled["label"].count(")")
         or NOUN_LABEL.fullmatch(labeled["label"])

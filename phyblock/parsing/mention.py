@@ -67,7 +67,12 @@ _EACH = (
     r"(?:(?:on|at|for|in)\s)?(?:each|either|both|every|auf jeder|an jeder)\s(?:of\s)?(?:the\s)?"
     r"(?:sides?|ends?|seite|corners?|ecke)\b"
 )
-_UNIT = r"(?!\s?(?:[x×]\s|times?\b|mal\b|fois|veces|cm|mm|m\b|°|degrees?\b|%|次|个|块|more\b))"
+_MULTIPLIED = r"[x×]\s(?!\d{1,2}\b(?!\s?(?:[x×]|[cm]?m\b)))"
+"""A sign behind a number that says how many; "block 6 × 2" says so behind it."""
+_UNIT = (
+    rf"(?!\s?(?:{_MULTIPLIED}|times?\b|mal\b|fois|veces|cm|mm|m\b|°|degrees?\b"
+    r"|%|次|个|块|more\b))"
+)
 _SHARED_OUT = rf"\s?(?:per\b|{_EACH})"
 """What stands behind a number that says how many; a number that is called a block's is none."""
 _SO_MANY_EACH = re.compile(_SHARED_OUT, re.IGNORECASE)
@@ -129,6 +134,12 @@ _SO_MANY = re.compile(
     r"\s(?:\w{2,12}\s){0,3}?)\(?\Z",
     re.IGNORECASE,
 )
+_OF_KIND = re.compile(r"\b(?:of|with|mit|index)\b", re.IGNORECASE)
+_SO_MANY_OF = re.compile(
+    r"(?<!step )(?<!layer )(?<!level )(?<!row )\b(?P<n>\d{1,2})\s(?:[^\W\d]{2,12}\s){0,2}\Z",
+    re.IGNORECASE,
+)
+"""How many, before several blocks of one number: "2 blocks of index 6"."""
 _CORNER = re.compile(r"corner|ecke", re.IGNORECASE)
 SAYS_NUMBER = re.compile(rf"\d|{_WORD_NUMBER}", re.IGNORECASE)
 
@@ -158,6 +169,9 @@ def counted(mention: re.Match[str], text: str) -> list[int]:
         return []
     numbers = _group(given, is_plural=is_plural or bool(groups.get("cjk")))
     times = _times(text, mention)
+    if times == 1 and is_plural and _OF_KIND.search(noun):
+        many = _SO_MANY_OF.search(text[: mention.start()])
+        times = min(int(many["n"]), MOST_AT_ONCE) if many else 1
     return numbers * times if len(numbers) == 1 else numbers
 
 

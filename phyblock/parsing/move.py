@@ -77,6 +77,13 @@ _CONCLUDES = re.compile(
     r"(?:\s(?:is\s)?(?:next|now))?\W{0,3}\Z",
     re.IGNORECASE,
 )
+_OR = re.compile(r"\b(?:or|oder|ou)\s{1,3}\Z", re.IGNORECASE)
+"""An operation behind this is one of several, of which the others may be no number at all."""
+_FOLLOWS = re.compile(
+    rf"\b(?:so|therefore|thus|hence),?\s(?:(?:block|candidate|index)\s){{0,2}}{INTEGER}"
+    r"\s(?:has to|must|should|needs to|is to|will)?\s?(?:be|is|comes?|goes?)\s(?:next|now)\b",
+    re.IGNORECASE,
+)
 _CLAUSE_CHARS = 100
 _ASKED = re.compile(r"[^.!?;\n]{0,80}\?")
 _COUNTED = re.compile(r"\d{1,2}[.)]\s")
@@ -159,6 +166,8 @@ def _labeled(_: str, lines: list[str]) -> list[Operation]:
     for match in _LABELED.finditer(text):
         if _is_not_meant(text, match.start()):
             continue
+        if not found and _OR.search(text, 0, match.start()):
+            return []
         if found and _TAKES_BACK.search(text[end : match.start()]):
             found = []
         more: re.Match[str] | None = match
@@ -187,6 +196,9 @@ def _mentions(line: str) -> list[Operation]:
 
 def _concluded(_: str, lines: list[str]) -> list[Operation]:
     """The operation that the last sentence comes to: "Move(3) failed, so Move(5)"."""
+    follows = [number_of(match["number"]) for match in _FOLLOWS.finditer(lines[-1])]
+    if follows:
+        return [*follows]
     concludes = _CONCLUDES.search(lines[-1]) if len({*_mentions(lines[-1])}) > 1 else None
     return [operation_of(concludes)] if concludes and not _UNSURE.search(lines[-1]) else []
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 import re
 
 from phyblock.parsing.alike_lines import counted_lines
+from phyblock.parsing.plan_patterns import OPTION
+from phyblock.parsing.speech import REVISED
 from phyblock.parsing.text_tables import markdown_tables
 from phyblock.parsing.yaml_text import yaml_as_json
 
@@ -39,6 +41,7 @@ _CALL = re.compile(
     r"(?:(?:#|//)[^\n]{0,200})?$",
     re.MULTILINE | re.IGNORECASE,
 )
+_COMMENT = re.compile(r"^[ \t]*(?:#|//)[^\n\d]{0,200}\n", re.MULTILINE)
 _TAKES = re.compile(r"pick|grab|grasp|lift|take|get|select", re.IGNORECASE)
 _PUTS = re.compile(r"place|put|move|stack|drop|release|add|insert|set", re.IGNORECASE)
 _FIRST = re.compile(
@@ -84,7 +87,13 @@ def _plain_calls(text: str) -> str:
             return ""
         return f"{call['indent']}Move block {first['number']}" if first else call[0]
 
-    return _CALL.sub(moved, text)
+    first, last = calls[0].start(), calls[-1].end()
+    program = _COMMENT.sub(_unless_it_chooses, text[first:last])
+    return text[:first] + _CALL.sub(moved, program) + text[last:]
+
+
+def _unless_it_chooses(comment: re.Match[str]) -> str:
+    return comment[0] if OPTION.search(comment[0]) or REVISED.search(comment[0]) else ""
 
 
 def _verb(call: re.Match[str]) -> str:

@@ -56,7 +56,7 @@ _WHOLE = re.compile(r"(?<![\d.])\d{1,6}(?![\d]|\.\d)")
 _ROLE = re.compile(
     r"\b(?:steps?|layers?|levels?|rows?|col(?:umn)?s?|schritte?|ebene|schicht|plan|option|attempt"
     r"|structure|part|phase|stage)[ #_]?\d+"
-    r"|\d+(?:\.\d+)?\s?(?:%|°|cm|mm|m\b|percent|degrees?|[x×](?![a-z])|times|mal\b)|[x×]\s?\d+"
+    r"|\d+(?:\.\d+)?\s?(?:%|°|cm|mm|m\b|percent|degrees?|(?<=\d)[x×](?![a-z])|(?<=\s)[x×]\s(?!\d)|times|mal\b)|[x×]\s?\d+"
     r"|\(\s?-?\d+(?:\.\d+)?(?:\s?,\s?-?\d+(?:\.\d+)?){1,2}\s?\)|\d+(?:st|nd|rd|th)\b"
     r"|第\d+[层步]|\d+\s?[个块层步]|^\W*[a-z]{0,4}\d{1,3}(?:/\d{1,3})?\s?[.):-]\s|#\s\d{1,3}$"
     r"|(?<!block )(?<!index )\b\d+\s(?:\w+\s)?(?:blocks?|layers?|levels?|steps?|moves?|pieces?"

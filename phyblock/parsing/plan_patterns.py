@@ -71,12 +71,12 @@ EXPLANATION = re.compile(
     r"|remark|stability|überprüf|验证|检查|erklärung|begründung|解释|说明",
     re.IGNORECASE,
 )
-OPTION = re.compile(
-    r"\b(?P<kind>plan|option|alternative|variant|variante|solution|approach|version|possibility"
-    r"|candidate plan|lösung|方案)"
-    r"\s{0,2}#?(?P<name>[A-D]|[1-4]|one|two|three|I{1,3})\b",
-    re.IGNORECASE,
+_KIND = (
+    r"(?:plan|option|alternative|variante?|solution|approach|version|possibility|reading"
+    r"|interpretation|scenario|hypothesis|lösung|lesart|方案)"
 )
+_NAME = r"(?:[A-D]|[1-4]|one|two|three|I{1,3})\b"
+OPTION = re.compile(rf"\b(?P<kind>{_KIND})\s{{0,2}}#?(?P<name>{_NAME})", re.IGNORECASE)
 OR_ELSE = re.compile(
     r"^\W*(?:or|oder|ou|或者?|alternativ\w*|another (?:valid |possible )?\w+|or (?:else"
     r"|alternatively).{0,40})\b\W*",
@@ -84,15 +84,12 @@ OR_ELSE = re.compile(
 )
 CHOICE = re.compile(
     r"\b(?:choose|chose|pick|select|prefer|recommend|go(?:ing)? with|went with|use|best|better"
-    r"|final|submit|take|answer is"
-    r"|wähle|nehme|entscheide|选择?|采用)[^.\n]{0,40}?(?:plan|option|alternative|variant|solution"
-    r"|approach|version|lösung|方案)\s{0,2}#?(?P<a>[A-D]|[1-4]|one|two|three|I{1,3})\b"
-    r"|\b(?:plan|option|alternative|variant|solution|approach|version|lösung)\s{0,2}#?(?P<b>[A-D]"
-    r"|[1-4]|one|two|three|I{1,3})\b"
+    r"|final|submit|take|answer is|wähle|nehme|entscheide|选择?|采用)"
+    rf"[^.\n]{{0,40}}?{_KIND}\s{{0,2}}#?(?P<a>{_NAME})"
+    rf"|\b{_KIND}\s{{0,2}}#?(?P<b>{_NAME})"
     r"\s(?:is|seems|looks|ist|wins)\s?(?:the |my |more |clearly |a )?(?:better|best|final|correct"
     r"|right|stable|preferred|chosen|answer|one|besser|richtig)"
-    r"|\b(?:plan|option|alternative|variant|solution|version)\s?#?(?P<c>[A-D]"
-    r"|[1-4])\s?[(,:\-\u2013]{1,2}\s?"
+    rf"|\b{_KIND}\s?#?(?P<c>[A-D]|[1-4])\s?[(,:\-\u2013]{{1,2}}\s?"
     r"(?:better|best|chosen|final|recommended|preferred)\b"
     r"|\b(?:decision|choice|winner|entscheidung|wahl)\W{1,4}(?:is\s)?(?P<d>[A-D])\b(?!\w)"
     r"|\b(?:choose|pick|select|prefer|recommend|go(?:ing)? with|submit|take)\s(?:the\s)"

@@ -23,11 +23,17 @@ _NEXT_TURN = re.compile(
 _STRUCK_OUT = re.compile(
     r"~~[^~\n]{1,400}~~|<(?:del|s)>[^<>\n]{1,400}</(?:del|s)>|<!--(?:(?!<!--).){0,4000}?-->"
 )
+_FRAMED = re.compile(r"<\|begin_of_box\|>([^<>{}]{1,4000})(?:<\|end_of_box\|>|\Z)")
+_DEFINED = re.compile(
+    r"(?P<before>(?:\(|: ?))(?P<name>[NX])(?P<between>\)?)"
+    r",? (?:where|with) (?P=name) ?= ?(?P<value>\d{1,3}|[A-Z])\b"
+)
+"""An answer in the words of the prompt, "Move(N) with N = 3", and what its letter stands for."""
 _QUOTES = re.compile(
     r"[*`$\"\u201c\u201d\u00ab\u00bb\u201e]|(?<!\w)['\u2018\u2019]|['\u2018\u2019](?!\w)"
 )
 _LATEX = re.compile(
-    r"\\(?:text|textbf|mathrm|mathbf)\s{0,2}\{([^{}\n]{0,80})\}|\\(?:,|;|quad|[()\[\]])"
+    r"\\(?:text|textbf|mathrm|mathbf)\s{0,2}\{([^{}\n]{0,80})\}|\\(?:,|;|quad|[()\[\] ])"
 )
 _LATEX_ARROW = re.compile(r"\\(?:long)?(?:right)?(?:arrow|to)\b")
 
@@ -75,7 +81,8 @@ def answer_of(text: str) -> str | None:
         answer = answer[: ends.start()]
     if not answer.strip():
         return None if start or is_thinking else ""
-    return plain_forms(_STRUCK_OUT.sub(" ", answer))
+    answer = _DEFINED.sub(r"\g<before>\g<value>\g<between>", answer)
+    return plain_forms(_FRAMED.sub(r"\\boxed{\1}", _STRUCK_OUT.sub(" ", answer)))
 
 
 def number_of_word(word: str) -> int | None:
