@@ -5,17 +5,17 @@
 Run from the root of a checkout. A reading is wrong where it is not what was meant, and a failure
 where nothing is read of a reply that holds a plan. Two tables and the rounds (of plans, answers and
 moves) were written before any reader read them; what was read at first sight stands beside, and
-for the rounds its parts by kind.
+for the rounds its parts by kind and by whether their authors meant them to be hard.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from phyblock.parsing import parse_plan
 from phyblock.words import PlanParser
-from tests.parsing.fresh_replies import KINDS, fresh_replies, tally
+from tests.parsing.fresh_replies import KINDS, Fresh, fresh_replies, tally
 from tests.parsing.test_plan_hostile import ALIKE, LAST, LATER, NONE, PLANS
 from tests.parsing.test_plan_manners import FAILURES, READ
 
@@ -23,6 +23,8 @@ Rows = list[tuple[str, tuple[int, ...] | None]]
 N_CANDIDATES = 16
 LATE = 10
 """Rounds from this one on were read at first sight by version 4, or by what became it."""
+MARKED = 13
+"""Rounds from this one on say which replies their authors meant to be hard."""
 EARLIER = {
     "written first": {"right": 31, "failed": 4, "wrong": 5},
     "written then": {"right": 14, "failed": 3, "wrong": 3},
@@ -60,11 +62,21 @@ def main() -> None:
         print(f"round {number}: {sum(rounds['now'].values())} replies")
         print(f"  then      {_shown(rounds['first'])}")
         print(f"  now       {_shown(rounds['now'])}")
+    replies = list(fresh_replies())
     for kind in KINDS:
-        late = [reply for reply in fresh_replies() if reply.kind == kind and reply.round >= LATE]
-        counts = Counter(reply.verdict(reply.first) for reply in late)
-        holding = sum(reply.meant is not None for reply in late)
-        print(f"rounds {LATE} and later, {kind}, then: {_shown(counts)}; {holding} hold an answer")
+        late = [reply for reply in replies if reply.kind == kind and reply.round >= LATE]
+        print(f"rounds {LATE} and later, {kind}, then: {_then(late)}")
+    for is_plain in (True, False):
+        late = [reply for reply in replies if reply.plain == is_plain and reply.round >= MARKED]
+        name = "plain" if is_plain else "meant to be hard"
+        print(f"rounds {MARKED} and later, {name}, then: {_then(late)}")
+
+
+def _then(replies: Sequence[Fresh]) -> str:
+    """What came of replies at first sight, and how many of them hold an answer."""
+    counts = Counter(reply.verdict(reply.first) for reply in replies)
+    holding = sum(reply.meant is not None for reply in replies)
+    return f"{_shown(counts)}; {holding} of {len(replies)} hold an answer"
 
 
 def _shown(counts: Mapping[str, int]) -> str:

@@ -146,7 +146,7 @@ def _outer_line(text: str, reader: Reader) -> str | None:
     return named.pop() if len(named) == 1 else CONTRADICTION
 
 
-_LAST_SENTENCE = re.compile(r"[.!?]\s(?P<letter>[A-Z])[.!]?\Z")
+_LAST_SENTENCE = re.compile(r"[.!?:]\s(?P<letter>[A-Z])[.!]?\Z")
 _WAIT = words(TAKES_BACK)
 
 

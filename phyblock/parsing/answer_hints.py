@@ -18,7 +18,7 @@ from phyblock.parsing.answer_patterns import (
     SO,
 )
 from phyblock.parsing.answer_value import CONTRADICTION, ChoiceReader
-from phyblock.parsing.speech import CONDITIONAL, UNSURE
+from phyblock.parsing.speech import CONDITIONAL, TURNED_ROUND, UNSURE
 
 __all__ = [
     "concluded",
@@ -130,7 +130,7 @@ def counted(text: str, reader: ChoiceReader) -> str | None:
 
 def only_order(text: str, reader: OrderReader) -> str | None:
     """The one order in the text; listing the pictures as they were shown is none."""
-    if _is_open(text):
+    if _is_open(text) or TURNED_ROUND.search(text):
         return None
     for piece in (last_line(text), text):
         named = set(reader.orders(piece)) - {reader.letters}

@@ -55,7 +55,7 @@ SENTENCE = re.compile(
     rf"(?<![a-z])(?P<lead>(?:final\s)?(?:{_WORDS}))"
     rf"(?:\s(?:choice|option|key|correcta|correcte|correta|corretta))?"
     rf"(?:\sto\s(?:the|this|your)\squestion)?[ \t*_`]{{0,4}}"
-    rf"(?:{_IS}|\bwould be\b|\bshould be\b|\bmust be\b)[ \t*_`:]{{0,6}}{_VALUE}",
+    rf"(?:{_IS}|\b(?:would|should|must|has to) be\b)[ \t*_`:]{{0,6}}{_VALUE}",
     re.IGNORECASE,
 )
 CHOSEN = re.compile(

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from phyblock.parsing.answer_order import OrderReader
 from phyblock.parsing.answer_patterns import TURNED
 from phyblock.parsing.answer_value import CONTRADICTION, ChoiceReader
-from phyblock.parsing.speech import BACKWARD, CONDITIONAL, REVISED, TAKES_BACK
+from phyblock.parsing.speech import BACKWARD, CONDITIONAL, REVISED, TAKES_BACK, TURNED_ROUND
 
 __all__ = ["Reader", "Stated", "forward", "is_conditional", "settle", "statements", "turned"]
 
@@ -82,6 +82,8 @@ def forward(text: str, stated: Stated) -> Stated:
 def turned(text: str, stated: Sequence[Stated], reader: Reader) -> str | None:
     """What statements come to, unless the text turns to another option behind the last of them."""
     settled = settle(text, stated)
+    if settled and len(settled) > 1 and TURNED_ROUND.search(text, stated[-1].end):
+        return CONTRADICTION
     after = _AFTERTHOUGHT.search(text, stated[-1].end) if stated else None
     if settled and after and after["letter"] != settled and len(settled) == 1:
         return CONTRADICTION

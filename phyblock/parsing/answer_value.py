@@ -60,7 +60,7 @@ _NUMBERED = re.compile(
 _BARE_NUMBER = re.compile(r"[(\[]?(?P<number>\d{1,2})[)\].]{0,2}\s{0,3}\Z")
 _ORDINAL = re.compile(
     r"\b(?:the\s{1,2})?(?P<word>first|second|third|fourth|1st|2nd|3rd|4th)\s{1,2}"
-    r"(?:option|choice|answer|alternative|one\Z)\b",
+    r"(?:(?:of\s(?:the\s)?(?:\w+\s)?)?(?:option|choice|answer|alternative)s?|one\Z)\b",
     re.IGNORECASE,
 )
 _DIGITS = re.compile(r"(?<![\w.,/])\d{1,6}(?:\.\d{1,6})?(?![\d/]|[.,]\d)")

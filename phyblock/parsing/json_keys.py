@@ -42,8 +42,8 @@ OPPOSITE_KEY = re.compile(
     r"|example|attempt"
     r"|alternativ|initial|previous|old|count|total|number_of|num_|confidence|layers?_count|reason"
     r"|thought|analysis|^(?:to|onto?|target|under|location|destination|next[ _]to)$"
-    r"|explanation|descri|comment|note|supports?$|depend|on[ _]?top|below|position|coord|rotation"
-    r"|orient|size"
+    r"|explanation|descri|comment|note|supports?$|depend|on[ _]?top|below|position|coord"
+    r"|bbox|bounding|pixel|rotation|orient|size"
     r"|color|colour|shape|type|blocks?[ _](?:needed|required|used)|required|needed|selected"
     r"|inventory|dictionary"
     r"|unbenutzt|übrig|未使用|多余|干扰|剩余",

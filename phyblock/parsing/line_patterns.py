@@ -61,7 +61,7 @@ LABELED = re.compile(
     r"|(?<=[^\W\d]\s)(?:→|->)(?=\s)|\b(?:is|are|would be|ist|lautet|est|es)\b"
     r"(?:\s(?:then|therefore|thus|hence|now|also|daher|donc))?:?|是|为)\s{0,3}"
     r"(?P<value>[\s(\[{<#]{0,4}(?:(?:first|zuerst|erst|d'abord|primero)\s)?(?:(?:blocks?|index"
-    r"|indices|积木)\s)?\d[^\n]{0,400})",
+    r"|indices|(?<=[:：]\s)candidates?|积木)\s)?\d[^\n]{0,400})",
     re.IGNORECASE,
 )
 ARRAY = re.compile(

@@ -34,7 +34,7 @@ VERB = (
     r"|position(?:s|ed|ing)?(?=\s(?:the|a|block|index|#))|set(?:s|ting)?|us(?:e[sd]?|ing)|lay(?:s"
     r"|ing)?|insert(?:s|ed|ing)?"
     r"|attach(?:es|ed|ing)?|install(?:s|ed|ing)?|drop(?:s|ped)?|pick(?:s|ed)?(?: up)?|take|grab"
-    r"|(?:start|begin)(?:s|ing)? with|stand"
+    r"|(?:start|begin|continue|finish|end)(?:e?s|ing)? with|stand"
     r"|beweg(?:e|en|t)|verschieb(?:e|en|t)|platzier(?:e|en|t)|leg(?:e|en|t)|setz(?:e|en|t)"
     r"|stell(?:e|en|t)|nimm|nehme|stapel[en]|stapl\w{1,3}|füge"
     r"|déplace[rz]?|place[rz]|pose[rz]?|met(?:s|tre|tez)|ajoute[rz]?|empile[rz]?"
@@ -60,7 +60,7 @@ _WORD_NUMBER = (
     r"|sixteen|eins|zwei|drei|vier|fünf|sechs|sieben|acht|neun|zehn|elf|zwölf|un|deux|trois|quatre"
     r"|cinq|sept|huit|neuf|dix|uno|dos|tres|cuatro|cinco|seis|siete|ocho|nueve|diez|десять|один|два"
     r"|три|четыре|пять|шесть|семь|восемь|девять)(?!\w"
-    r"|\s(?!(?:on|onto|to|at|and|then|next|in|beside|above|over|as|is|goes|or|first|auf|und|et"
+    r"|\s(?!(?:on|onto|to|at|and|then|next|in|beside|above|over|across|between|as|is|goes|comes|or|first|auf|und|et"
     r"|y)\b)[^\W\d])|[一二三四五六七八九十]{1,2}(?![号號番\w])"
 )
 _EACH = (
@@ -115,12 +115,16 @@ MENTION = re.compile(
     r"|(?P<cjk>[0-9]{1,6}(?:(?:、|,|和|-|至|到)[0-9]{1,6}){0,20})(?=\s?(?:号|號|番))",
     re.IGNORECASE,
 )
+_GOES = (
+    r"(?:(?:goes|comes|is|are|must|be|placed|put|used|needed|on|in|at|onto|it|them|there)\s){0,6}"
+)
 TIMES = re.compile(
     r"[\s)\]}]{0,3}(?:\s?\([^()\d\n]{0,60}\))?[\s,]{0,2}[(\[]?\s?(?:"
     r"[x×]\s?(?P<a>\d{1,2})(?!\d)|(?P<b>\d{1,2})\s?(?:[x×](?!\w)"
     r"|of (?:them|these)\b|copies\b|pieces\b"
     r"|times\b|mal\b|fois\b|veces\b|次)"
-    r"|(?P<twice>twice|zweimal|deux fois|dos veces|两次|二次)|(?P<thrice>thrice|dreimal|三次)"
+    rf"|{_GOES}(?P<twice>twice|zweimal|deux fois|dos veces|两次|二次)"
+    r"|(?P<thrice>thrice|dreimal|三次)"
     r"|[号號番]?(?P<cjk>[两二三四五六])[个块個塊]"
     r"|(?P<word>[^\W\d_]{2,8})\s(?:times|mal|fois|veces)\b"
     rf"|(?:(?P<each>\d{{1,2}})|(?P<each_word>one|two|eine[rn]?|zwei))\s(?:\w{{2,8}}\s)?{_EACH})",

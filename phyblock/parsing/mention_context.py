@@ -52,7 +52,7 @@ SUPPORT = re.compile(
     r"|encima del?|sur|dessus d\w|à côté d\w|entre|debajo de|sopra|accanto|su(?! lado| izq| der)"
     r"|на|над|рядом с|не)\b"
     r"|在|到|于|不要?|上的|の上)"
-    rf"(?:[\s(,]{{0,3}}(?!{VERB}|(?:it|them)\b)[^\W\d]{{1,16}}){{0,7}}[\s(#]{{0,3}}\Z",
+    rf"(?:[\s(,]{{0,3}}(?!{VERB}|(?:it|them|both(?=[,;]))\b)[^\W\d]{{1,16}}){{0,7}}[\s(#]{{0,3}}\Z",
     re.IGNORECASE,
 )
 INSTEAD = re.compile(

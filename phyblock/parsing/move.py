@@ -93,7 +93,7 @@ _MANY = re.compile(
     re.IGNORECASE,
 )
 _DONE_SENTENCE = re.compile(
-    rf"(?:\A|[.!?:\u2014]\s{{1,3}}|;\s{{0,3}}|(?:->|\u2192|\bthen)\s{{0,3}}){DONE}\s{{0,2}}[.!]?\Z",
+    rf"(?:\A|[.!?:\u2014]\s{{1,3}}|;\s{{0,3}}|(?:->|\u2192|(?P<then>\bthen))\s{{0,3}}){DONE}\s{{0,2}}[.!]?\Z",
     re.IGNORECASE,
 )
 _UNSURE = re.compile(
@@ -205,8 +205,13 @@ def _concluded(_: str, lines: list[str]) -> list[Operation]:
 
 def _in_last_line(_: str, lines: list[str]) -> list[Operation]:
     is_item = _COUNTED.match(lines[-1])
-    done: list[Operation] = ["done"] if _DONE_SENTENCE.search(lines[-1]) and not is_item else []
-    return [*_mentions(lines[-1]), *done]
+    mentioned = _mentions(lines[-1])
+    says_done = _DONE_SENTENCE.search(lines[-1])
+    is_later = says_done and says_done["then"] and re.search(r"\d", lines[-1])
+    done: list[Operation] = (
+        ["done"] if says_done and not is_item and (mentioned or not is_later) else []
+    )
+    return [*mentioned, *done]
 
 
 def _anywhere(_: str, lines: list[str]) -> list[Operation]:

@@ -16,6 +16,7 @@ from phyblock.parsing.plan_patterns import (
     PART,
     REVISION,
 )
+from phyblock.parsing.speech import REVISED
 
 __all__ = ["PlanLists", "chosen", "plans_of"]
 
@@ -78,7 +79,7 @@ def _relation(passed: list[str], plans: list[PlanLists], listing: Listing) -> st
         return "other"
     if len(lines) > 1 or len(title) > HEADING_CHARS or REVISION.search(title) or "" in passed:
         is_explained = any(EXPLANATION.search(line) for line in lines[:1])
-        is_last_word = _is_announced(lines, listing)
+        is_last_word = _is_announced(lines, listing) or _replaces(lines, listing, before)
         return "explanation" if is_explained and not is_last_word else "other"
     if EXPLANATION.search(title) and listing.form != "json":
         return "explanation"
@@ -87,6 +88,13 @@ def _relation(passed: list[str], plans: list[PlanLists], listing: Listing) -> st
         is_other = before.form == listing.form != "steps" and before.numbers != listing.numbers
         return "unclear" if title and is_other else "other"
     return "skip" if plans[-1].explained else "part"
+
+
+def _replaces(lines: list[str], listing: Listing, before: Listing) -> bool:
+    """Whether whole steps come anew behind an explanation that turns from those before it."""
+    is_whole = listing.form == "steps" and listing.own[:1] == [1] and len(listing.own) > 1
+    is_other = is_whole and listing.numbers != before.numbers
+    return is_other and any(map(REVISED.search, lines))
 
 
 def _is_announced(lines: list[str], listing: Listing) -> bool:

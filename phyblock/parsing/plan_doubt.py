@@ -22,7 +22,7 @@ from phyblock.parsing.plan_patterns import (
     NOT_MEANT,
     REVISION,
 )
-from phyblock.parsing.plan_rank import LAST, NO, rank_of
+from phyblock.parsing.plan_rank import LAST, NO, is_announced, rank_of
 from phyblock.parsing.speech import TAKES_BACK, words
 
 __all__ = ["is_doubtful"]
@@ -96,6 +96,7 @@ _ONCE_MORE = re.compile(
     re.IGNORECASE,
 )
 """A step that names no block but moves one."""
+_TWICE = re.compile(r"\b(?:twice|thrice|zweimal|dreimal|dos veces|deux fois)\b", re.IGNORECASE)
 _FRAGMENT = 3
 """Steps of a list that may go on from what stands there already."""
 _MOST_LEFT_OUT = 4
@@ -130,10 +131,17 @@ def _names_more(lists: Sequence[Listing]) -> bool:
     is_whole = len(numbers) > _FRAGMENT or lists[0].form == "sentences"
     return any(
         listing.loose
+        or (listing.form == "sentences" and _loses_times(listing))
         or (is_whole and listing.supports - {*numbers})
         or (listing.form in _LOOSE_FORMS and _leaves_numbers(listing))
         for listing in lists
     )
+
+
+def _loses_times(listing: Listing) -> bool:
+    """Whether sentences say "twice" of a block that is in none of them more than once."""
+    is_repeated = len({*listing.numbers}) < len(listing.numbers)
+    return not is_repeated and any(map(_TWICE.search, listing.lines))
 
 
 def _is_torn(lists: Sequence[Listing]) -> bool:
@@ -229,11 +237,14 @@ def _holds(said: re.Match[str], order: Sequence[int]) -> bool:
 
 
 def _unexplained(later: Sequence[Listing]) -> Iterator[Listing]:
-    """The lists up to the one that an explanation begins with."""
+    """The lists that no explanation holds; one that is called the last form of the plan ends it."""
+    is_explained = False
     for listing in later:
-        if any(EXPLANATION.search(line) for line in listing.above):
-            return
-        yield listing
+        is_explained = is_explained or any(EXPLANATION.search(line) for line in listing.above)
+        if is_announced(listing):
+            is_explained = False
+        if not is_explained:
+            yield listing
 
 
 def _says_otherwise(listing: Listing, order: list[int], known: set[int]) -> bool:

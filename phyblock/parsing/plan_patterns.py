@@ -131,7 +131,7 @@ AGAIN = re.compile(
 )
 NOT_REVERSED = re.compile(
     r"\b(?:not|never|don't|do not|isn't|no need|take (?:it|them) apart|dis\w+|undo"
-    r"|remov\w+)\b[^.\n]{0,40}revers",
+    r"|remov\w+)\b[^.\n]{0,40}revers|\breverse of (?:it|this|that|the above)\b",
     re.IGNORECASE,
 )
 DOWNWARD = re.compile(

@@ -12,6 +12,7 @@ from phyblock.parsing.plan_patterns import (
     DOWNWARD,
     EXAMPLE,
     FINAL_LABEL,
+    HEADING_CHARS,
     LABEL_CHARS,
     LAYERS,
     NOT_MEANT,
@@ -20,7 +21,7 @@ from phyblock.parsing.plan_patterns import (
     REVISION,
 )
 
-__all__ = ["ASKED", "LAST", "MARKED", "MOVES", "NO", "rank_of"]
+__all__ = ["ASKED", "LAST", "MARKED", "MOVES", "NO", "is_announced", "rank_of"]
 
 NO, LAST, MARKED, MOVES, ASKED = range(5)
 """No plan; one where nothing else is; a marked list of moves; a numbered one; the asked form."""
@@ -50,6 +51,8 @@ def rank_of(listing: Listing) -> int:
     if listing.is_firm:
         is_final = bool(REVISION.search(heading))
         return ASKED if is_final else MOVES if listing.form == "numbered" else MARKED
+    if is_announced(listing) and listing.numbers != listing.own:
+        return ASKED
     if listing.own == listing.numbers and len(listing.own) > 2:
         return NO
     return (
@@ -57,6 +60,12 @@ def rank_of(listing: Listing) -> int:
         if PLAN_WORD.search(heading) or listing.form in ("numbered", "chain") or not heading
         else NO
     )
+
+
+def is_announced(listing: Listing) -> bool:
+    """Whether the heading of a list calls it the plan in its last form."""
+    title = listing.above[-1] if listing.above else ""
+    return bool(len(title) < HEADING_CHARS and REVISION.search(title) and PLAN_WORD.search(title))
 
 
 def _rank_of_label(listing: Listing, heading: str, *, is_catalogue: bool) -> int:

@@ -15,6 +15,7 @@ __all__ = [
     "REVISED",
     "SUPPOSES",
     "TAKES_BACK",
+    "TURNED_ROUND",
     "UNSURE",
     "words",
 ]
@@ -78,6 +79,13 @@ BACKWARD = re.compile(
     re.IGNORECASE,
 )
 """That a list stands in the opposite order."""
+
+TURNED_ROUND = re.compile(
+    r"\b(?:ha(?:s|ve) to|must|should|needs? to|is to) be (?:\w+ )?(?:turned|reversed|flipped"
+    r"|inverted|read (?:backwards?|from))|\b(?:turn|reverse|flip) (?:it|this|that|the order)\b",
+    re.IGNORECASE,
+)
+"""That an order is to be taken the other way round."""
 
 PLACES = {
     name: place

@@ -2,8 +2,10 @@
 
 `fresh_replies.jsonl` holds a reply a line: its round, what kind of answer it holds, its text, what
 is meant (null: nothing may be read), what was read at first sight, before anything was mended, and
-whether it is `hard`: a person reads it, a reader may admit that it does not. After a round the
-causes of what was misread were mended, and the next round was written.
+whether it is `hard`: a person reads it, a reader may admit that it does not. From round 13 on
+`plain` are those that their author did not mean to be hard. After a round the causes of what was
+misread were mended, and the next round was written; rounds 13 and 14, of two authors who knew
+nothing of each other, were written at the same time.
 """
 
 from __future__ import annotations
@@ -36,6 +38,7 @@ class Fresh:
     first: Any
     options: tuple[str, ...] = ()
     hard: bool = False
+    plain: bool = False
 
     def now(self) -> Any:
         """What is read of it today."""
