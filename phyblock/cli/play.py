@@ -20,8 +20,8 @@ from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.cli.report import show_made
 from phyblock.errors import Problem, SpecError, said
 from phyblock.plain_text import counted
-from phyblock.play.answers import FileAnswers, read_answers
-from phyblock.play.export import check_offline, export_sitting
+from phyblock.play.answers import FileAnswers, default_text, read_answers
+from phyblock.play.export import check_folder, check_offline, export_sitting
 from phyblock.play.page import default_consent
 from phyblock.play.person import Person, PersonModel, plan_sitting
 from phyblock.play.server import Server
@@ -39,6 +39,7 @@ from phyblock.specs import load_suite
 __all__ = ["command"]
 
 _INTERRUPTED = 130
+_RUNS = Path("results")
 _LARGEST_CONSENT_BYTES = 64 * 1024
 
 
@@ -101,7 +102,7 @@ def command(
     """
     if export is not None and answers is not None:
         raise SpecError(Problem("--export", "cannot be given with --import"))
-    person = Person(name, number, default_consent() if consent is None else _text(consent))
+    person = Person(name, number, _consent(consent, answers, offline=export is not None))
     path = find_suite(suite)
     data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
     loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
@@ -110,13 +111,21 @@ def command(
     if export is not None or answers is not None:
         check_offline(plan)
     if export is not None:
+        check_folder(export, _RUNS)
         return _export(console, plan, person, export)
-    folder = out or Path("results") / plan.folder_name
+    folder = out or _RUNS / plan.folder_name
     if holds_run(folder, plan.manifest):
         run_folder(folder).check(names_to_write(folder, page=True))
     if answers is not None:
         return _import(console, plan, person, folder, answers, page=not no_report)
     return _sit(console, plan, person, folder, beside, port, opens=not no_browser)
+
+
+def _consent(own: Path | None, answers: Path | None, *, offline: bool) -> str:
+    """The text that is agreed to, or was where there is a file of answers."""
+    if own is not None:
+        return _text(own)
+    return default_consent(offline=offline) if answers is None else default_text(answers)
 
 
 def _text(path: Path) -> str:

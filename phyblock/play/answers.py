@@ -11,12 +11,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from phyblock.bounded import load_json, read_bytes
 from phyblock.errors import DataError, Problem, said
 from phyblock.models import HaltedError, Request
-from phyblock.play.person import Given, Person, picking_of
+from phyblock.play.page import default_consent
+from phyblock.play.person import Given, Person, digest_of, picking_of
+from phyblock.records.line import Amount
 from phyblock.run.plan import RunPlan
 from phyblock.tracks.base import shown_item
-from phyblock.tracks.by_hand import Picking
+from phyblock.tracks.by_hand import Picking, picks_of
 
-__all__ = ["ANSWERS_FORMAT", "AnswersFile", "FileAnswers", "read_answers"]
+__all__ = ["ANSWERS_FORMAT", "AnswersFile", "FileAnswers", "default_text", "read_answers"]
 
 ANSWERS_FORMAT = 1
 _LARGEST_BYTES = 4 * 1024 * 1024
@@ -27,10 +29,14 @@ class _Strict(BaseModel):
 
 
 class GivenAnswer(_Strict):
-    """An answer: the question's number from 1, places among its choices, seconds it took."""
+    """An answer: the question's number from 1, places among its choices, seconds it took.
+
+    `numbers` are those of each pick, where numbers go with them.
+    """
 
     number: int = Field(ge=1)
     picks: list[int] = Field(max_length=1000)
+    numbers: list[list[Amount]] = Field(default=[], max_length=1000)
     took_s: float = Field(ge=0, le=1e9, allow_inf_nan=False)
 
 
@@ -43,6 +49,19 @@ class AnswersFile(_Strict):
     consent: str
     agreed: str = Field(pattern=r"^\d{4}-\d\d-\d\dT[\d:.]+Z$")
     answers: list[GivenAnswer]
+
+
+def default_text(path: Path) -> str:
+    """Which of the texts that come with phyblock was agreed to in a file: folders of earlier
+    versions had that of the server. What is wrong with the file `read_answers` says.
+    """
+    texts = [default_consent(offline=offline) for offline in (True, False)]
+    try:
+        found = load_json(read_bytes(path, _LARGEST_BYTES))
+    except (OSError, ValueError):
+        return texts[0]
+    agreed = found.get("consent") if isinstance(found, dict) else None
+    return next((text for text in texts if digest_of(text) == agreed), texts[0])
 
 
 def read_answers(path: Path, plan: RunPlan, person: Person) -> dict[int, Given]:
@@ -79,7 +98,12 @@ def read_answers(path: Path, plan: RunPlan, person: Person) -> dict[int, Given]:
             )
         if answer.number in given:
             problems.append(Problem(str(path), "is there twice", field, str(answer.number)))
-        given[answer.number] = Given(tuple(answer.picks), answer.took_s)
+        try:
+            picks = picks_of(answer.picks, answer.numbers)
+        except ValueError as error:
+            problems.append(Problem(str(path), str(error), f"answers[{place}].numbers"))
+            continue
+        given[answer.number] = Given(picks, answer.took_s)
     if problems:
         raise DataError(problems)
     _check_picks(path, given, plan, person)
@@ -98,7 +122,8 @@ def _check_picks(path: Path, given: Mapping[int, Given], plan: RunPlan, person: 
         try:
             picking_of(request, plan.suite).reply(picks)
         except ValueError as error:
-            field, found = f"the answer to question {number}", ", ".join(map(str, picks))
+            field = f"the answer to question {number}"
+            found = ", ".join(str(pick.place) for pick in picks)
             problems.append(Problem(str(path), str(error), field, found))
     if problems:
         raise DataError(problems)

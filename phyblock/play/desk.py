@@ -16,7 +16,7 @@ from typing import Any, Literal
 from phyblock.models import HaltedError, Image, Request
 from phyblock.play.person import Given
 from phyblock.play.shown import Place, pictures_of, shown
-from phyblock.tracks.by_hand import Picking
+from phyblock.tracks.by_hand import Pick, Picking
 
 __all__ = ["Desk", "NotNowError", "Stopwatch"]
 
@@ -136,7 +136,7 @@ class Desk:
             self._expect("consent")
             self._go_to("waiting" if self._laid is None else "question")
 
-    def answer(self, change: int, picks: Sequence[int]) -> None:
+    def answer(self, change: int, picks: Sequence[Pick]) -> None:
         """Take the answer to the question that was shown under a number.
 
         Raises NotNowError for another question than the one that lies there, ValueError for picks

@@ -16,11 +16,12 @@ from phyblock.play.answers import ANSWERS_FORMAT
 from phyblock.play.page import assets
 from phyblock.play.person import Person, picking_of
 from phyblock.play.shown import Place, pictures_of, shown
+from phyblock.records import MANIFEST
 from phyblock.run.plan import RunPlan
 from phyblock.tracks import SingleTrack
 from phyblock.tracks.base import shown_item
 
-__all__ = ["check_offline", "export_sitting"]
+__all__ = ["check_folder", "check_offline", "export_sitting"]
 
 _PAGE = "index.html"
 _PICTURES = "pictures"
@@ -33,6 +34,17 @@ def check_offline(plan: RunPlan) -> None:
         message = "goes turn by turn, which needs the server"
         hint = "leave it out: --set tracks=[...]"
         raise SpecError(Problem("--export", message, "tracks", ", ".join(turned), hint=hint))
+
+
+def check_folder(folder: Path, runs: Path) -> None:
+    """Raise SpecError where the folder holds runs, or is where they are put: who is given the
+    folder would be given what is in them.
+    """
+    places = [folder, *folder.iterdir()] if folder.is_dir() else []
+    if folder.resolve() == runs.resolve() or any((one / MANIFEST).exists() for one in places):
+        message = "is a folder of runs, which would be handed out with it"
+        hint = "name one of its own"
+        raise SpecError(Problem("--export", message, found=str(folder), hint=hint))
 
 
 async def export_sitting(plan: RunPlan, person: Person, folder: Path) -> Path:
@@ -72,4 +84,7 @@ async def export_sitting(plan: RunPlan, person: Person, folder: Path) -> Path:
         }
         script = f"const SITTING = {json.dumps(sitting)};\n"
         (new / "questions.js").write_text(script, encoding="utf-8")
+        drawn = {path.relative_to(new).as_posix() for path in (new / _PICTURES).iterdir()}
+        # What an earlier sitting left behind may be of scenes that this one does not show.
+        out.remove(set(out.names(f"{_PICTURES}/")) - drawn)
     return folder / _PAGE

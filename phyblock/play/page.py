@@ -11,6 +11,8 @@ _SHARED = (
     ("dom.js", "phyblock.report.html"),
     ("play.css", "phyblock.play"),
     ("icon.svg", "phyblock.play"),
+    ("picks.js", "phyblock.play"),
+    ("fields.js", "phyblock.play"),
     ("picker.js", "phyblock.play"),
     ("results.js", "phyblock.play"),
     ("play.js", "phyblock.play"),
@@ -30,9 +32,13 @@ def assets(desk: str, name: str = "") -> dict[str, tuple[str, bytes]]:
     }
 
 
-def default_consent() -> str:
-    """The text that a person agrees to where a study brings none of its own."""
-    return _content("phyblock.play", "consent.txt").decode()
+def default_consent(*, offline: bool) -> str:
+    """The text that a person agrees to where a study brings none of its own.
+
+    It says where answers are kept: by the server, or `offline` in the browser.
+    """
+    name = "consent-offline.txt" if offline else "consent.txt"
+    return _content("phyblock.play", name).decode()
 
 
 def _content(package: str, name: str) -> bytes:

@@ -14,10 +14,10 @@ from phyblock.play.order import arranged, row_of_name
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.specs import HUMAN, LoadedSuite, SuiteSpec
-from phyblock.tracks.by_hand import Picking
+from phyblock.tracks.by_hand import Pick, Picking
 from phyblock.tracks.kind import kinds
 
-__all__ = ["Given", "Person", "PersonModel", "picking_of", "plan_sitting"]
+__all__ = ["Given", "Person", "PersonModel", "digest_of", "picking_of", "plan_sitting"]
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")
 
@@ -50,7 +50,7 @@ class Person:
     @property
     def consent_sha256(self) -> str:
         """Digest of the text that is agreed to."""
-        return hashlib.sha256(self.consent.encode()).hexdigest()
+        return digest_of(self.consent)
 
     def planned(self) -> PlannedModel:
         """The person in a plan; number and text make runs that are not the same."""
@@ -58,6 +58,11 @@ class Person:
         params = {**number, "consent": self.consent_sha256}
         config = ModelConfig(self.model, "human", self.model, params=params, max_concurrency=1)
         return PlannedModel(self.model, config)
+
+
+def digest_of(consent: str) -> str:
+    """SHA-256 [hex] of a text that is agreed to."""
+    return hashlib.sha256(consent.encode()).hexdigest()
 
 
 def plan_sitting(loaded: LoadedSuite, person: Person, limit: int | None) -> RunPlan:
@@ -78,9 +83,9 @@ def plan_sitting(loaded: LoadedSuite, person: Person, limit: int | None) -> RunP
 
 @dataclass(frozen=True)
 class Given:
-    """What a person picked, by places among the choices, and how long it took [s]."""
+    """What a person picked, and how long it took [s]."""
 
-    picks: tuple[int, ...]
+    picks: tuple[Pick, ...]
     took_s: float
 
 

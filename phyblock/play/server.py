@@ -26,6 +26,7 @@ from phyblock.bounded import load_json
 from phyblock.errors import Problem, SpecError, said
 from phyblock.play.desk import Desk, NotNowError
 from phyblock.play.page import assets
+from phyblock.tracks.by_hand import Pick, picks_of
 
 __all__ = ["LARGEST_BODY_BYTES", "Server"]
 
@@ -148,13 +149,15 @@ class Server:
         return name in deeds
 
 
-def _answer(body: Mapping[str, Any]) -> tuple[int, list[int]]:
-    change, picks = body.get("change"), body.get("picks")
-    if type(change) is not int or not isinstance(picks, list):
-        raise ValueError("needs change and picks")
+def _answer(body: Mapping[str, Any]) -> tuple[int, tuple[Pick, ...]]:
+    change, picks, numbers = body.get("change"), body.get("picks"), body.get("numbers", [])
+    if type(change) is not int or not isinstance(picks, list) or not isinstance(numbers, list):
+        raise ValueError("needs change and picks, with numbers where there are any")
     if not all(type(pick) is int for pick in picks):
         raise ValueError("holds picks that are no whole numbers")
-    return change, picks
+    if not all(isinstance(own, list) and {*map(type, own)} <= {int, float} for own in numbers):
+        raise ValueError("holds numbers that are none")
+    return change, picks_of(picks, numbers)
 
 
 class _Listener(ThreadingHTTPServer):

@@ -6,7 +6,7 @@ Nothing else of an item is in it: no name, no scene, no answer.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from phyblock.models import Image, Request
@@ -54,6 +54,7 @@ def shown(
         "most": picking.most,
         "repeats": picking.repeats,
         "noun": picking.noun,
+        "fields": [asdict(field) for field in picking.fields],
     }
 
 

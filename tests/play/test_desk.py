@@ -11,7 +11,7 @@ from phyblock.models import HaltedError, Image, Message, Request
 from phyblock.play.desk import Desk, NotNowError
 from phyblock.play.person import Given
 from phyblock.play.shown import Place
-from phyblock.tracks.by_hand import Choice, Picking, Spot
+from phyblock.tracks.by_hand import Choice, Picking, Spot, picks_of
 
 PICTURE = Image(b"pixels", "candidates", 64, 64)
 PICKING = Picking(
@@ -20,7 +20,7 @@ PICKING = Picking(
     most=3,
     repeats=True,
     noun="step",
-    write=lambda picks: " ".join(map(str, picks)),
+    write=lambda picks: " ".join(str(pick.place) for pick in picks),
 )
 
 
@@ -88,10 +88,10 @@ def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses() -> None
         clock.now = 401.0
         assert desk.state(-1)["elapsed_s"] == 3.0
         clock.now = 403.5
-        desk.answer(desk.state(-1)["change"], [1, 0, 1])
+        desk.answer(desk.state(-1)["change"], picks_of([1, 0, 1]))
         return await task
 
-    assert asyncio.run(play()) == Given((1, 0, 1), 5.5)
+    assert asyncio.run(play()) == Given(picks_of([1, 0, 1]), 5.5)
 
 
 def test_an_answer_counts_once_and_only_for_what_lies_there() -> None:
@@ -101,14 +101,14 @@ def test_an_answer_counts_once_and_only_for_what_lies_there() -> None:
         desk.agree()
         change = desk.state(-1)["change"]
         with pytest.raises(NotNowError):
-            desk.answer(change - 1, [0])
+            desk.answer(change - 1, picks_of([0]))
         with pytest.raises(ValueError, match="holds 0 picks"):
             desk.answer(change, [])
-        desk.answer(change, [0])
+        desk.answer(change, picks_of([0]))
         for late in (change, change + 1):
             with pytest.raises(NotNowError):
-                desk.answer(late, [1])
-        assert (await task).picks == (0,)
+                desk.answer(late, picks_of([1]))
+        assert (await task).picks == picks_of([0])
         assert desk.state(-1)["phase"] == "waiting"
         with pytest.raises(NotNowError):
             desk.pause()

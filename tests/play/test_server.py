@@ -139,6 +139,10 @@ def test_other_paths_hold_nothing(server: Server, path: str) -> None:
         (400, b"{}", {}),
         (400, b'{"change": true, "picks": []}', {}),
         (400, b'{"change": 1, "picks": ["0"]}', {}),
+        (400, b'{"change": 1, "picks": [0], "numbers": [["2.5"]]}', {}),
+        (400, b'{"change": 1, "picks": [0], "numbers": [[true]]}', {}),
+        (400, b'{"change": 1, "picks": [0], "numbers": [1]}', {}),
+        (400, b'{"change": 1, "picks": [0], "numbers": [[1], [2]]}', {}),
         (409, b'{"change": 1, "picks": [0]}', {}),
     ],
 )

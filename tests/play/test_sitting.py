@@ -17,6 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from phyblock.play.answers import default_text
+from phyblock.play.page import default_consent
+from phyblock.play.person import digest_of
 from tests.browser import Visit
 from tests.fork_server import Forked, fork_server
 from tests.vqa_set import questions, write_questions
@@ -34,7 +37,9 @@ ADA = ("play", "suite.yaml", "--name", "ada", "--number", "2", "--consent", "con
 
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
-    """Three scenes and four questions, hostile texts in these; a run of two baselines."""
+    """Three scenes and four questions, hostile texts in these; scenes are asked about without poses
+    and with. A run of two baselines.
+    """
     made = Workspace(tmp_path_factory.mktemp("play"), pictures_dir)
     scenes = SCENES[:3]
     made.write_scenes(*scenes)
@@ -44,7 +49,8 @@ def workspace(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> W
         one["options"] = [o if o.startswith("<img") else f"{o} {HOSTILE}" for o in one["options"]]
     write_questions(made.root / "questions", asked)
     made.write_suite(
-        tracks=["full_planning", "vqa"],
+        tracks=["full_planning", "vqa", "pose_planning"],
+        pose={"rotation": "free"},
         vqa={"path": "./questions", "subtasks": list(SUBTASKS)},
         seeds=[3, 4],
     )
@@ -107,7 +113,7 @@ def opened(browser: Browser, address: str, **options: Any) -> Visit:
 
 
 def task(page: Page, number: int) -> None:
-    page.get_by_text(f"Task {number} of 7").wait_for()
+    page.get_by_text(f"Task {number} of 10").wait_for()
     page.locator(".answer").wait_for()
 
 
@@ -125,6 +131,10 @@ def said(record: Raw) -> str:
 
 def plan(*numbers: int) -> str:
     return "\n".join(f"Step{n}: Move block with index {one}" for n, one in enumerate(numbers, 1))
+
+
+def poses(*steps: str) -> str:
+    return "\n".join(f"Step{n}: block {one}" for n, one in enumerate(steps, 1))
 
 
 def test_a_sitting_by_mouse_keys_and_phone_over_a_kill(
@@ -175,7 +185,7 @@ def begin_with_mouse_and_keys(page: Page, run: Path) -> None:
 
 
 def end_on_a_phone(page: Page, run: Path) -> None:
-    page.get_by_text("Welcome back. 5 tasks of 7 are left").wait_for()
+    page.get_by_text("Welcome back. 8 tasks of 10 are left").wait_for()
     page.get_by_role("button", name="I agree").tap()
     task(page, 3)
     fits_the_phone(page)
@@ -198,9 +208,21 @@ def end_on_a_phone(page: Page, run: Path) -> None:
         else:
             page.locator(".choice").nth(1).tap()
         page.get_by_role("button", name=re.compile("^Submit")).tap()
+    give_places_by_touch(page)
+    give_places_by_keys(page)
+    task(page, 10)
+    page.get_by_role("button", name="Candidate 1").first.tap()
+    for name in "xyz":
+        page.get_by_label(f"{name}, cm").fill("0")
+    page.get_by_role("button", name="Submit 1 step").tap()
     page.get_by_role("heading", name="How it went").wait_for()
-    assert len(answered(run)) == 7
-    assert {record["question"]["subtask"]: said(record) for record in answered(run)[3:]} == {
+    assert len(answered(run)) == 10
+    assert [*map(said, answered(run)[7:])] == [
+        poses("3 at (0, 0, 2.5) turned (0, 0, 90)"),
+        poses("5 at (-0.5, 1.25, 5) turned (0, 0, 0)", "12 at (0, 0, 0) turned (0, 15, 0)"),
+        poses("1 at (0, 0, 0) turned (0, 0, 0)"),
+    ]
+    assert {record["question"]["subtask"]: said(record) for record in answered(run)[3:7]} == {
         "SH": "Answer: B",
         "AD": "Answer: B",
         "VP": "Answer: C",
@@ -215,6 +237,54 @@ def end_on_a_phone(page: Page, run: Path) -> None:
     popup.value.wait_for_selector("#detail .card")
     popup.value.close()
     page.get_by_role("button", name="Finish").tap()
+
+
+def give_places_by_touch(page: Page) -> None:
+    """What is no number is said at its field; rows are moved and removed, and all is undone."""
+    task(page, 8)
+    fits_the_phone(page)
+    page.get_by_role("button", name="Candidate 3").first.tap()
+    page.get_by_role("button", name="Candidate 7").first.tap()
+    rows = page.locator(".entries > li > div")
+    faults = page.locator(".fault:not(:empty)")
+    page.get_by_role("button", name="Move up step 2").tap()
+    assert [row.get_attribute("aria-label") for row in rows.all()] == ["step 1: 7", "step 2: 3"]
+    page.get_by_role("button", name="Remove step 1").tap()
+    page.get_by_role("button", name="Undo").tap()
+    assert rows.count() == 2
+    page.get_by_role("button", name="Remove step 1").tap()
+    x, y = (page.get_by_label(f"{name}, cm") for name in "xy")
+    x.fill("5 mm")
+    y.fill("0,0")
+    page.get_by_role("button", name="Submit 1 step").tap()
+    assert faults.all_inner_texts() == ["Give a number alone, in cm.", "Give a number."]
+    assert x.get_attribute("aria-invalid") == "true"
+    x.fill("1000.5")
+    assert faults.first.inner_text() == "Give one from \N{MINUS SIGN}1000 to 1000."
+    x.fill("0.001")
+    assert faults.first.inner_text() == "Give 2 decimals at most."
+    x.fill("0")
+    for _ in range(5):
+        page.get_by_role("button", name="More z of step 1").tap()
+    page.get_by_label("rz, °").fill("90")
+    assert faults.count() == 0
+    page.get_by_role("button", name="Submit 1 step").tap()
+
+
+def give_places_by_keys(page: Page) -> None:
+    """Numbers of blocks and of places in one flow, over a reload in the middle of it."""
+    task(page, 9)
+    picked = ("1", "2", *("Enter",) * 4, "ArrowUp", "Enter", "Enter", "5")
+    placed = ("ArrowDown", "Enter", *"1.25", "Enter", "PageUp", "Alt+ArrowUp")
+    for key in (*picked, *placed):
+        page.keyboard.press(key)
+    page.reload()
+    task(page, 9)
+    page.keyboard.press("Control+Enter")
+    faults = page.locator(".fault:not(:empty)")
+    assert faults.all_inner_texts() == ["Give a number."] * 3
+    for key in ("0", "Enter", "0", "Enter", "0", "Control+Enter"):
+        page.keyboard.press(key)
 
 
 def fits_the_phone(page: Page) -> None:
@@ -255,9 +325,9 @@ def check_as_of_any_model(workspace: Workspace, run: Path) -> None:
     words = ("--models", "human:ada", "--set", "seeds=[3]", "--out", again, "--no-report")
     done = workspace.phyblock("run", "suite.yaml", *words)
     assert done.code == 0, done.err
-    replayed = {record["key"]: record for record in answered(again)}
+    replayed = {(record["track"], record["key"]): record for record in answered(again)}
     for record in answered(run):
-        other = replayed[record["key"]]
+        other = replayed[record["track"], record["key"]]
         assert (record["scores"], record["parse"]) == (other["scores"], other["parse"])
     done = workspace.phyblock("compare", run, "out", "--models", "human:ada,oracle")
     assert done.code == 0, done.err
@@ -277,22 +347,25 @@ def test_a_folder_without_a_server_gives_its_answers_as_a_file(
     done = workspace.phyblock(*BOB, "--export", folder)
     assert done.code == 0, done.err
     check_nothing_is_given_away(folder)
+    check_no_picture_is_left_behind(workspace, folder)
     visit = opened(browser, (folder / "index.html").as_uri())
     page = visit.page
     page.get_by_role("button", name="I agree").click()
-    for number in range(1, 8):
+    for number in range(1, 11):
         task(page, number)
         if number == 3:
             page.reload()
-            page.get_by_text("5 tasks of 7 are left").wait_for()
+            page.get_by_text("8 tasks of 10 are left").wait_for()
             page.get_by_role("button", name="I agree").click()
             task(page, number)
             behind = Visit(page.context.new_page())
             behind.page.goto(page.url)
             behind.page.get_by_role("button", name="I agree").click()
             task(behind.page, number)
-        is_order = page.get_by_role("button", name="Clear").count() and number > 3
-        page.keyboard.type("cdab" if is_order else "4" if number < 4 else "d")
+        is_order = page.get_by_role("button", name="Clear").count() and 3 < number < 8
+        page.keyboard.type("cdab" if is_order else "d" if 3 < number < 8 else "4")
+        if number > 7:
+            page.keyboard.type("-1\n.5\n2.5")
         page.keyboard.press("Control+Enter")
         if number == 4:
             answer_in_a_tab_that_is_behind(behind)
@@ -313,7 +386,8 @@ def test_a_folder_without_a_server_gives_its_answers_as_a_file(
     records = answered(workspace.root / "bob")
     assert {record["model"] for record in records} == {"human:bob"}
     assert [*map(said, records[:3])] == [plan(4)] * 3
-    assert {*map(said, records[3:])} == {"Answer: D", "Answer: C, D, A, B"}
+    assert {*map(said, records[3:7])} == {"Answer: D", "Answer: C, D, A, B"}
+    assert {*map(said, records[7:])} == {poses("4 at (-1, 0.5, 2.5) turned (0, 0, 0)")}
     assert [record["reply"]["latency_s"] for record in records] == [
         answer["took_s"] for answer in content["answers"]
     ]
@@ -338,6 +412,7 @@ SHOWN = {
     *("head", "format", "run", "model", "consent", "name", "text", "questions"),
     *("number", "of", "turn", "messages", "role", "parts", "picture", "label", "width", "height"),
     *("choices", "spots", "box", "least", "most", "repeats", "noun"),
+    *("fields", "unit", "decimals", "step", "leap", "start"),
 }
 
 
@@ -356,15 +431,43 @@ def check_nothing_is_given_away(folder: Path) -> None:
     assert not any(re.search(r"\bt[123]\b|-001", text) for text in (script, *files))
 
 
+def check_no_picture_is_left_behind(workspace: Workspace, folder: Path) -> None:
+    """A larger sitting of earlier leaves no picture; what is not ours stays."""
+    left, own = folder / "pictures" / "0099-1.png", folder / "pictures" / "mine.png"
+    for path in (left, own):
+        path.write_bytes(b"png")
+    with (folder / ".generated").open("a") as listed:
+        listed.write("pictures/0099-1.png\n")
+    before = sorted(folder.rglob("*"))
+    done = workspace.phyblock(*BOB, "--export", folder)
+    assert done.code == 0, done.err
+    assert sorted(folder.rglob("*")) == [path for path in before if path != left]
+    own.unlink()
+
+
+def test_the_text_to_agree_to_says_where_answers_are(tmp_path: Path) -> None:
+    """And a file of answers tells which of the two it was, also that of an earlier version."""
+    texts = [default_consent(offline=offline) for offline in (True, False)]
+    assert ["in this browser" in text for text in texts] == [True, False]
+    file = tmp_path / "answers.json"
+    for text in texts:
+        file.write_text(json.dumps({"consent": digest_of(text)}), encoding="utf-8")
+        assert default_text(file) == text
+    file.write_text("[]", encoding="utf-8")
+    assert default_text(file) == texts[0]
+
+
 @pytest.mark.parametrize(
     ("words", "error"),
     [
         (["--name", "Ada Lovelace"], "--name: is no name"),
         (["--name", "../x"], "--name: is no name"),
         (["--name", HOSTILE], "--name: is no name"),
-        (["--name", "x", "--set", "tracks=[pose_planning]"], "cannot answer in pose_planning"),
         (["--name", "x", "--set", "tracks=[step_planning]", "--export", "e"], "turn by turn"),
         (["--name", "x", "--export", "e", "--import", "f"], "cannot be given with --import"),
+        (["--name", "x", "--export", "results"], "--export: is a folder of runs"),
+        (["--name", "x", "--export", "out"], "--export: is a folder of runs"),
+        (["--name", "x", "--export", "."], "--export: is a folder of runs"),
         (["--name", "x", "--import", "nowhere.json"], "nowhere.json: cannot be read"),
         (["--name", "x", "--consent", "nowhere.txt"], "nowhere.txt: --consent: cannot be read"),
         (["--name", "x", "--beside", "nowhere"], "nowhere"),
@@ -390,14 +493,18 @@ def test_a_person_is_not_asked_by_run(workspace: Workspace) -> None:
 
 def check_bad_files(workspace: Workspace, content: dict[str, Any]) -> None:
     """Files of another sitting, or that are broken, are refused as a whole."""
-    first = content["answers"][0]
+    first, *_, last = content["answers"]
     for change, error in (
         ({"model": "human:eve"}, "model: is of another sitting"),
         ({"run": "0" * 64}, "run: is of another sitting"),
-        ({"answers": [{**first, "number": 8}]}, "answers[0].number: is no question"),
+        ({"answers": [{**first, "number": 11}]}, "answers[0].number: is no question"),
         ({"answers": [first, first]}, "answers[1].number: is there twice"),
         ({"answers": [{**first, "took_s": -1}]}, "answers[0].took_s: is no file of answers"),
         ({"answers": [{**first, "picks": [99]}]}, "question 1: holds picks outside"),
+        ({"answers": [{**first, "numbers": [[1]]}]}, "question 1: holds 1 numbers with a pick"),
+        ({"answers": [{**last, "numbers": [["1"] * 6]}]}, "answers[0].numbers[0][0]: is no file"),
+        ({"answers": [{**last, "numbers": [[1] * 6] * 2}]}, "holds numbers of 2 picks"),
+        ({"answers": [{**last, "numbers": [[0.001] * 6]}]}, "x 0.001 with more than 2 decimals"),
         ({"more": 1}, "more: is no file of answers"),
         ({"agreed": "yesterday"}, "agreed: is no file of answers"),
     ):

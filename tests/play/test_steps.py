@@ -15,6 +15,7 @@ from phyblock.play.person import Person, plan_sitting
 from phyblock.play.sitting import Sitting
 from phyblock.run.execute import RunResult
 from phyblock.specs import load_suite
+from phyblock.tracks.by_hand import picks_of
 from tests.workspace import SCENES, Workspace
 
 RED, BLUE = 0, 2
@@ -52,7 +53,7 @@ def played(suite: Path, picks: Sequence[int]) -> tuple[RunResult, list[dict[str,
                 desk.agree()
             elif told["phase"] == "question" and left:
                 shown.append(told["question"])
-                desk.answer(told["change"], [left.pop(0)])
+                desk.answer(told["change"], picks_of([left.pop(0)]))
             elif told["phase"] == "question":
                 desk.close()
         return await run

@@ -70,7 +70,8 @@ const Desk = (() => {
         question();
         throw new Error("409");
       }
-      const answer = { number: state.answers.length + 1, picks: body.picks, took_s: Math.round(1000 * elapsed()) / 1000 };
+      const { picks, numbers } = body;
+      const answer = { number: state.answers.length + 1, picks, numbers, took_s: Math.round(1000 * elapsed()) / 1000 };
       const answers = [...state.answers, answer];
       localStorage.setItem(key(sitting), JSON.stringify({ agreed: state.agreed, answers }));
       Object.assign(state, { answers, since: null, before: 0 });

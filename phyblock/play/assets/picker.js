@@ -4,29 +4,18 @@
 const Picker = (() => {
   const MOST_BUTTONS = 6;
 
-  /** The picks so far, kept while the page lives, so that reloading it loses none. */
-  const draft = {
-    read(key) {
-      try {
-        const kept = JSON.parse(sessionStorage.getItem("draft"));
-        return kept && kept.key === key ? kept.picks : [];
-      } catch {
-        return [];
-      }
-    },
-    keep: (key, picks) => sessionStorage.setItem("draft", JSON.stringify({ key, picks })),
-  };
-
-  /** Show `question` in `main`; `submit` takes the picks. The answer is what takes keys. */
+  /** Show `question` in `main`; `submit` takes the answer. What is given back takes keys. */
   function show(main, question, submit) {
     const key = `${location.pathname} ${question.number} ${question.turn}`;
     const isOne = question.most === 1;
-    const picks = draft.read(key).filter((pick) => pick < question.choices.length);
+    const hasFields = question.fields.length > 0;
+    const picks = new Picks(key, (pick) => question.choices[pick.place] && pick.texts.length === question.fields.length);
     const typed = { text: "" };
     const spots = question.choices.map(() => []);
     const pictures = question.messages.flatMap((one) => one.parts).filter((part) => part.picture);
 
-    const chips = el("ol", { class: "chips", "aria-label": isOne ? "Your answer" : "Your answer so far" });
+    const rows = hasFields ? Fields.rows(picks, question, { head: rowHead, painted: paint, leave }) : null;
+    const chips = rows?.list || el("ol", { class: "chips", "aria-label": isOne ? "Your answer" : "Your answer so far" });
     const typing = el("span", { class: "typing muted number" });
     const undo = el("button", { type: "button", class: "quiet", onclick: takeBack }, "Undo");
     const clear = el("button", { type: "button", class: "quiet", onclick: takeAll }, "Clear");
@@ -36,18 +25,24 @@ const Picker = (() => {
       return isShown ? choiceButton(choice, place) : null;
     });
 
+    const hint = rows && el("p", { class: "hint muted" },
+      `Pick a block; each ${question.noun} then asks for ${new Intl.ListFormat("en").format(question.fields.map((field) => field.name))}.`,
+      el("span", { class: "keys" }, " Enter goes on, behind the last number to the next pick; ↑ ↓ change a number, PageUp and PageDown by more."));
+    const answer = el(
+      "section",
+      { class: rows ? "answer entered" : "answer", "aria-label": "Your answer", tabindex: "-1" },
+      hint,
+      el("div", { class: "choices" }, buttons),
+      el("div", { class: "given" }, chips, typing),
+      el("div", { class: "acts" }, isOne ? null : [undo, clear], done),
+    );
+    main.classList.toggle("with-fields", hasFields);
     main.replaceChildren(
       el("h1", { class: "visually-hidden" }, `Question ${question.number} of ${question.of}`),
       el("div", { class: "asked" }, question.messages.map(message)),
-      el(
-        "section",
-        { class: "answer", "aria-label": "Your answer" },
-        el("div", { class: "choices" }, buttons),
-        el("div", { class: "given" }, chips, typing),
-        el("div", { class: "acts" }, isOne ? null : [undo, clear], done),
-      ),
+      answer,
     );
-    paint("");
+    repaint("");
     return onKey;
 
     function message(one) {
@@ -87,7 +82,7 @@ const Picker = (() => {
         for (const spot of here.filter((one) => one.box[0] >= from && one.box[0] < to)) {
           const button = el("button", {
             type: "button", class: "spot", "data-place": spot.place,
-            "aria-label": spotName(spot.place), onclick: () => pick(spot.place),
+            "aria-label": spotName(spot.place), onclick: (event) => pick(spot.place, event.pointerType),
           });
           const [x, y, width, height] = spot.box;
           Object.assign(button.style, {
@@ -116,50 +111,71 @@ const Picker = (() => {
     }
 
     function choiceButton(choice, place) {
-      return el("button", { type: "button", class: "choice", "data-place": place, onclick: () => pick(place) },
+      return el("button", { type: "button", class: "choice", "data-place": place, onclick: (event) => pick(place, event.pointerType) },
         el("b", {}, choice.name), choice.text ? ` ${choice.text}` : null);
     }
 
-    function pick(place) {
+    function pick(place, pointer = "") {
       typed.text = "";
-      if (isOne) picks.splice(0, 1, place);
-      else if (!question.repeats && picks.includes(place)) return paint(`${question.choices[place].name} is picked already`);
-      else if (picks.length >= question.most) return paint("No more can be picked");
-      else picks.push(place);
-      paint(`${isOne ? "Picked" : `${question.noun} ${picks.length}:`} ${question.choices[place].name}`);
+      const { list } = picks, { name } = question.choices[place];
+      if (!isOne && !question.repeats && list.some((one) => one.place === place)) return paint(`${name} is picked already`);
+      if (!isOne && list.length >= question.most) return paint("No more can be picked");
+      picks.change((all) => {
+        if (isOne) all.length = 0;
+        all.push({ place, texts: Fields.blank(question.fields) });
+      });
+      repaint(`${isOne ? "Picked" : `${question.noun} ${picks.list.length}:`} ${name}`);
+      // A touch on a field opens a keyboard, which hides half the page: that is left to the person.
+      rows?.enter(pointer !== "touch");
     }
 
     function takeBack() {
-      const last = picks.pop();
-      paint(last === undefined ? "Nothing to undo" : `Took back ${question.choices[last].name}`);
+      repaint(picks.undo() ? "Undone" : "Nothing to undo");
     }
 
     function takeAll() {
-      picks.length = 0;
-      paint("All taken back");
+      picks.change((all) => { all.length = 0; });
+      repaint("All taken back");
+    }
+
+    /** Leave the fields: what is typed next names a choice. */
+    function leave() {
+      answer.focus({ preventScroll: true });
     }
 
     function send() {
-      if (picks.length < question.least) {
-        paint(`Pick ${question.least - picks.length} more first`);
+      if (picks.list.length < question.least) {
+        paint(`Pick ${question.least - picks.list.length} more first`);
+        return;
+      }
+      const numbers = rows?.numbers();
+      if (numbers === null) {
+        paint("A number is missing or wrong");
         return;
       }
       done.disabled = true;
       done.textContent = "Saving …";
-      submit([...picks]);
+      submit({ picks: picks.list.map((one) => one.place), ...(rows ? { numbers } : {}) });
+    }
+
+    /** Paint after picks were added, taken or undone. */
+    function repaint(words) {
+      rows?.paint();
+      paint(words);
     }
 
     function paint(words) {
-      draft.keep(key, picks);
+      const places = picks.list.map((one) => one.place);
       // A single pick that a button shows already need not be said twice.
-      const isSaid = isOne && picks.every((place) => buttons[place]);
-      chips.replaceChildren(...(isSaid ? [] : picks.map((place, n) => chip(place, n))));
-      undo.disabled = clear.disabled = !picks.length;
-      done.disabled = picks.length < question.least;
-      done.textContent = isOne || !picks.length ? "Submit" : `Submit ${Words.count(picks.length, question.noun)}`;
+      const isSaid = isOne && places.every((place) => buttons[place]);
+      if (!rows) chips.replaceChildren(...(isSaid ? [] : picks.list.map((one, n) => el("li", {}, chip(one, n)))));
+      undo.disabled = !picks.past.length;
+      clear.disabled = !places.length;
+      done.disabled = places.length < question.least;
+      done.textContent = isOne || !places.length ? "Submit" : `Submit ${Words.count(places.length, question.noun)}`;
       typing.textContent = typed.text ? `${typed.text}_ Enter picks it` : "";
       question.choices.forEach((_, place) => {
-        const at = picks.flatMap((one, n) => (one === place ? [n + 1] : []));
+        const at = places.flatMap((one, n) => (one === place ? [n + 1] : []));
         for (const spot of spots[place]) {
           spot.classList.toggle("picked", at.length > 0);
           spot.replaceChildren(...(at.length ? [el("span", { class: "badge number" }, isOne ? "✓" : at.join(", "))] : []));
@@ -170,7 +186,11 @@ const Picker = (() => {
       if (words) document.getElementById("said").textContent = words;
     }
 
-    function chip(place, n) {
+    function rowHead(one, n) {
+      return el("div", { class: "chip" }, chip(one, n));
+    }
+
+    function chip({ place }, n) {
       const choice = question.choices[place];
       const spot = choice.spots[0];
       const thumb = spot ? el("span", { class: "thumb", "aria-hidden": "true" }) : null;
@@ -182,15 +202,15 @@ const Picker = (() => {
         thumb.style.backgroundSize = `${100 / width}% ${100 / height}%`;
         thumb.style.backgroundPosition = `${at(x, width)} ${at(y, height)}`;
       }
-      return el("li", {}, isOne ? null : el("span", { class: "muted number" }, `${n + 1}.`), thumb,
-        el("b", { class: "number" }, choice.name), isOne && choice.text ? ` ${choice.text}` : null);
+      return [isOne ? null : el("span", { class: "muted number" }, `${n + 1}.`), thumb,
+        el("b", { class: "number" }, choice.name), isOne && choice.text ? ` ${choice.text}` : null];
     }
 
     /** Digits and letters name a choice; Enter ends a name that others begin with. */
     function onKey(event) {
       if (event.altKey || event.metaKey) return;
       if (event.key === "Enter" && event.ctrlKey) return taken(event, send);
-      if (event.ctrlKey) return;
+      if (event.ctrlKey || event.target.matches?.("input")) return;
       const spot = event.target.closest?.(".spot");
       const move = { ArrowLeft: -1, ArrowRight: 1, ArrowUp: -4, ArrowDown: 4 }[event.key];
       if (spot && move) {

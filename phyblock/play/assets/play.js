@@ -34,7 +34,7 @@
         el("h2", {}, "How it works"),
         el("ul", {},
           el("li", {}, "You see what models are sent: the same pictures and the same text. The text asks for a written form; here you click instead, and the form is written for you."),
-          el("li", {}, "Click a numbered block or an option to pick it. Picks can be undone until you submit; then they are kept, and the next task comes."),
+          el("li", {}, "Click a numbered block or an option to pick it. Where places are asked for as well, type the numbers. All can be undone until you submit; then it is kept, and the next task comes."),
           el("li", {}, "Without a mouse: type the number or letter (Enter where a longer number might follow), Backspace takes back, Ctrl+Enter submits."),
           el("li", {}, "The time you take is written down. Pause stops it and hides the task.")),
         primary("I agree, begin", () => post("agree")),
@@ -47,7 +47,7 @@
       const { question } = state;
       progress.textContent = `Task ${question.number} of ${question.of}`;
       shown.since = performance.now() - 1000 * state.elapsed_s;
-      shown.keys = Picker.show(main, question, (picks) => submit(state.change, picks));
+      shown.keys = Picker.show(main, question, (answer) => submit(state.change, answer));
       if (shown.notice) main.prepend(el("p", { class: "notice", role: "alert" }, shown.notice));
       if (shown.number !== question.number) scrollTo(0, 0);
       shown.number = question.number;
@@ -82,10 +82,10 @@
     },
   };
 
-  async function submit(change, picks) {
+  async function submit(change, answer) {
     shown.notice = "";
     try {
-      await Desk.post("answer", { change, picks });
+      await Desk.post("answer", { change, ...answer });
     } catch (error) {
       // 409: what the page showed is not what is asked now.
       shown.notice = error.message === "409"
@@ -105,6 +105,7 @@
     shown.since = null;
     shown.phase = state.phase;
     pause.hidden = state.phase !== "question";
+    main.className = "";
     views[state.phase](state);
     tick();
     main.focus({ preventScroll: true });

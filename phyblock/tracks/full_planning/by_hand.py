@@ -19,5 +19,5 @@ def pick_plan(subject: PlanSubject) -> Picking:
         most=_MOST_STEPS,
         repeats=True,
         noun="step",
-        write=lambda picks: plan_text(place + 1 for place in picks),
+        write=lambda picks: plan_text(pick.place + 1 for pick in picks),
     )

@@ -4,6 +4,7 @@ from phyblock.resources import bundled
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.kind import TrackKind
 from phyblock.tracks.pose_planning.baselines import POSE_RULES, PoseSubject
+from phyblock.tracks.pose_planning.by_hand import pick_poses
 from phyblock.tracks.pose_planning.counts import COUNTED
 from phyblock.tracks.pose_planning.opening import open_pose_planning
 from phyblock.tracks.pose_planning.record import PoseRecord
@@ -42,5 +43,6 @@ TRACK = TrackKind(
     tables=("table_c", "pose_errors"),
     rescored=True,
     no_examples="one would need the floor and the sheet of blocks of a scene of its own",
+    by_hand=pick_poses,
     varies=("prompt", "background", "candidate_order", "repeats"),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
-from phyblock.records import Line, Record
+from phyblock.records import Course, Line, Record
 from phyblock.records.line import Amount, Whole
 from phyblock.scoring import PoseError
 from phyblock.tracks.plans import PLAN_COLUMNS, PlanParse, plan_row
@@ -151,3 +151,12 @@ class PoseRecord(Record):
     def row(self) -> Mapping[str, Any]:
         """The plan in both numberings."""
         return plan_row(self.parse, self.shown)
+
+    def course(self, matcher: str) -> Course | None:
+        """What was wrong with each step, and how many blocks of the goal were not reached."""
+        if self.pose is None or self.parse is None:
+            return super().course(matcher)
+        names = (str(step.block) for step in self.parse.steps)
+        errors = (step.error for step in self.pose.steps)
+        blocks = next((score.tp + score.fn for score in self.scores), self.pose.reached)
+        return Course(tuple(zip(names, errors, strict=True)), blocks - self.pose.reached)

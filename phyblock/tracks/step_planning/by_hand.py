@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from phyblock.tracks.by_hand import Choice, Picking, candidate_choices
+from phyblock.tracks.by_hand import Choice, Pick, Picking, candidate_choices
 from phyblock.tracks.step_planning.baselines import StepSubject, step_text
 
 __all__ = ["pick_step"]
@@ -14,9 +14,9 @@ def pick_step(subject: StepSubject) -> Picking:
     """The candidates, and after them the end."""
     n_candidates = len(subject.candidates)
 
-    def write(picks: Sequence[int]) -> str:
-        (place,) = picks
-        return step_text(place + 1 if place < n_candidates else None)
+    def write(picks: Sequence[Pick]) -> str:
+        (pick,) = picks
+        return step_text(pick.place + 1 if pick.place < n_candidates else None)
 
     choices = (*candidate_choices(n_candidates), Choice("Done", "the goal is complete"))
     return Picking(choices, least=1, most=1, repeats=False, noun="step", write=write)

@@ -25,5 +25,5 @@ def pick_answer(subject: ChoiceSubject) -> Picking:
         most=picked,
         repeats=False,
         noun="place" if is_ordering else "option",
-        write=choice_text,
+        write=lambda picks: choice_text([pick.place for pick in picks]),
     )
