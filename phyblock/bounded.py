@@ -85,13 +85,11 @@ class RepeatedFieldError(ValueError):
         super().__init__(f"holds the field {field[:80]!r} twice in one object")
 
 
-def load_json(
-    data: bytes | str, *, deepest: int = _DEEPEST, finite: bool = True, unique: bool = False
-) -> Any:
+def load_json(data: bytes | str, *, finite: bool = True, unique: bool = False) -> Any:
     """Decode JSON whose nesting, integers and floats are bounded.
 
     Raises ValueError (a JSONDecodeError for broken syntax) for NaN, Infinity, a float outside the
-    range of doubles, an integer of more than 300 digits, or nesting below `deepest`. With
+    range of doubles, an integer of more than 300 digits, or nesting of more than 64 levels. With
     `finite=False` numbers outside that range pass, up to 4,300 digits, for a reader that says which
     field they stand in. With `unique` a field that stands twice in one object is refused too
     (RepeatedFieldError).
@@ -105,14 +103,14 @@ def load_json(
             object_pairs_hook=_unique if unique else None,
         )
     except RecursionError:
-        raise ValueError(f"is nested more than {deepest} levels deep") from None
-    _check_depth(found, deepest)
+        raise ValueError(f"is nested more than {_DEEPEST} levels deep") from None
+    _check_depth(found)
     return found
 
 
-def _check_depth(found: object, deepest: int) -> None:
+def _check_depth(found: object) -> None:
     level: list[object] = [found]
-    for _ in range(deepest + 1):
+    for _ in range(_DEEPEST + 1):
         below: list[object] = []
         for value in level:
             if isinstance(value, dict):
@@ -122,7 +120,7 @@ def _check_depth(found: object, deepest: int) -> None:
         level = [value for value in below if isinstance(value, (dict, list))]
         if not level:
             return
-    raise ValueError(f"is nested more than {deepest} levels deep")
+    raise ValueError(f"is nested more than {_DEEPEST} levels deep")
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,6 +10,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from phyblock.bounded import read_bytes
 from phyblock.bundle.archive import ABOUT, MEMBERS
+from phyblock.digests import hex_digest
 from phyblock.errors import Problem, StoreError
 from phyblock.parsing import READER_VERSION
 from phyblock.records import MANIFEST, RECORDS, Line, Manifest
@@ -83,7 +83,7 @@ def describe(
         run=manifest.identity,
         phyblock=phyblock,
         readers=READER_VERSION,
-        files={name: _sha256(files[name]) for name in (MANIFEST, RECORDS)},
+        files={name: hex_digest(files[name]) for name in (MANIFEST, RECORDS)},
         tables=tables,
         suite=_digest_of_suite(manifest),
         tracks=manifest.tracks,
@@ -149,10 +149,6 @@ def read_about(path: Path, folder: Path, manifest: Manifest) -> About:
     return about
 
 
-def _sha256(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
-
-
 def _digest_of_suite(manifest: Manifest) -> str:
     text = json.dumps(manifest.suite, sort_keys=True, separators=(",", ":"), default=str)
-    return _sha256(text.encode("utf-8", "replace"))
+    return hex_digest(text.encode("utf-8", "replace"))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from phyblock.bounded import read_bytes
+from phyblock.digests import hex_digest
 from phyblock.domain import CandidateSet, Question, Scene
 from phyblock.errors import DataError, Problem, said
 from phyblock.picture_files import LARGEST_PICTURE_BYTES
@@ -81,10 +81,7 @@ class QuestionSet:
 
 
 def _digests(files: Mapping[str, Path]) -> dict[str, str]:
-    return {
-        label: hashlib.sha256(_picture_bytes(path)).hexdigest()
-        for label, path in sorted(files.items())
-    }
+    return {label: hex_digest(_picture_bytes(path)) for label, path in sorted(files.items())}
 
 
 def _picture_bytes(path: Path) -> bytes:
@@ -95,8 +92,7 @@ def _picture_bytes(path: Path) -> bytes:
 
 
 def _digest(content: object) -> str:
-    text = json.dumps(content, sort_keys=True, default=_fields)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hex_digest(json.dumps(content, sort_keys=True, default=_fields))
 
 
 def _fields(one: Any) -> dict[str, object]:

@@ -27,6 +27,7 @@ __all__ = [
 
 LEAST_MODELS = 4
 """Fewer models leave a correlation over them without meaning."""
+_LEVEL = 0.05
 
 
 def discrimination(scores: Floats) -> Floats:
@@ -58,15 +59,15 @@ def _correlation(one: Floats, other: Floats, known: NDArray[np.bool_]) -> Floats
     return np.clip(out, -1.0, 1.0)
 
 
-def told_from_none(models: int, level: float = 0.05) -> float:
+def told_from_none(models: int) -> float:
     """How far from 0 a correlation over so many models must be, to be told from none.
 
-    Two-sided at `level`, one item alone, by the t distribution; NaN for fewer than three models.
+    Two-sided at 5 %, one item alone, by the t distribution; NaN for fewer than three models.
     """
     freedom = models - 2
     if freedom < 1:
         return float("nan")
-    t = float(stdtrit(freedom, 1 - level / 2))
+    t = float(stdtrit(freedom, 1 - _LEVEL / 2))
     return float(t / np.sqrt(freedom + t**2))
 
 

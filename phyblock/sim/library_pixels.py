@@ -7,10 +7,11 @@ of them alike give the same pictures, so that what was made with one is good und
 from __future__ import annotations
 
 import functools
-import hashlib
 import io
 
 from PIL import Image, ImageDraw, ImageFont
+
+from phyblock.digests import hex_digest
 
 __all__ = ["library_pixels"]
 
@@ -38,4 +39,4 @@ def library_pixels() -> str:
     sheet.paste(sheet.resize((31, 33), Image.Resampling.BOX), (0, 60))
     buffer = io.BytesIO()
     sheet.save(buffer, format="PNG", optimize=False, compress_level=6)
-    return hashlib.sha256(buffer.getvalue()).hexdigest()[:_DIGITS]
+    return hex_digest(buffer.getvalue())[:_DIGITS]

@@ -135,19 +135,12 @@ def after(
     return Outcome(found or (), tuple(settled), True)
 
 
-def after_removal(
-    blocks: Sequence[Block], order: int, settings: Sequence[Physics] = OUTCOME_SETTINGS
-) -> Outcome:
+def after_removal(blocks: Sequence[Block], order: int) -> Outcome:
     """What follows when the block with this order is taken away at once."""
-    return after([block for block in blocks if block.order != order], settings=settings)
+    return after([block for block in blocks if block.order != order])
 
 
-def holds(
-    blocks: Sequence[Block],
-    about: int,
-    settings: Sequence[Physics] = OUTCOME_SETTINGS,
-    limits: Limits = DEFAULT_LIMITS,
-) -> bool | None:
+def holds(blocks: Sequence[Block], about: int) -> bool | None:
     """Whether all blocks stay where they are; None where the settings, or the limits, differ.
 
     Quicker than `after`: a trial ends as soon as a block has clearly left its place, and only the
@@ -155,8 +148,8 @@ def holds(
     """
     near = next(group for group in groups(blocks) if any(b.order == about for b in group))
     verdicts = set()
-    for setting in settings:
-        verdicts.add(_holds(near, setting, limits))
+    for setting in OUTCOME_SETTINGS:
+        verdicts.add(_holds(near, setting, DEFAULT_LIMITS))
         if len(verdicts) > 1 or None in verdicts:
             return None
     return verdicts.pop()

@@ -7,7 +7,6 @@ process of one machine. Keys name everything that the bytes depend on, and nothi
 from __future__ import annotations
 
 import functools
-import hashlib
 import io
 import json
 import math
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from phyblock.digests import hex_digest
 from phyblock.domain.blocks import SHAPES, BlockType, Color, Euler
 from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
@@ -264,5 +264,4 @@ def picture_key(kind: str, style: PictureStyle, content: Iterable[object]) -> st
         "style": [style.size_px, style.background, style.azimuth_deg, style.elevation_deg],
         "content": list(content),
     }
-    text = json.dumps(parts, sort_keys=True, allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hex_digest(json.dumps(parts, sort_keys=True, allow_nan=False))

@@ -6,12 +6,12 @@ machine, and the key names everything that the bytes depend on.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Sequence
 from dataclasses import fields, replace
 
+from phyblock.digests import hex_digest
 from phyblock.domain.blocks import SHAPES
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block
@@ -101,8 +101,7 @@ def question_key(picture_recipe: QuestionPicture, style: PictureStyle) -> str:
         "framed": _field_values(_drawn(picture_recipe.framed)),
         "marks": [[mark.letter, *mark.position_m] for mark in picture_recipe.marks],
     }
-    text = json.dumps(parts, sort_keys=True, allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hex_digest(json.dumps(parts, sort_keys=True, allow_nan=False))
 
 
 def _is_alone(picture_recipe: QuestionPicture) -> bool:

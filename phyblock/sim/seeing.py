@@ -43,6 +43,7 @@ SEEN_PX = 256
 """Side of the pictures that are compared."""
 MARKS_APART_PX = 18.0
 """Targets are this far apart at the least, in pixels of `SEEN_PX`."""
+_LEAST_DEPTH_PX = 4
 _VISIBLE_STEP = 24
 _EDGE = 0.97
 _STYLE = PictureStyle(SEEN_PX)
@@ -108,17 +109,15 @@ def is_inside(recipe: QuestionPicture) -> bool:
     return bool(np.abs(camera.project(np.vstack(points))).max() < _EDGE)
 
 
-def block_mark(
-    recipe: QuestionPicture, shot: Shot, order: int, letter: str, least_depth_px: int = 4
-) -> Mark | None:
+def block_mark(recipe: QuestionPicture, shot: Shot, order: int, letter: str) -> Mark | None:
     """A mark in the middle of what shows of a block; None where less shows than its target needs.
 
     The place is the point of the block's surface behind the pixel farthest from the edge of what
-    shows; that is `least_depth_px` pixels of `SEEN_PX` at the least.
+    shows; that is four pixels of `SEEN_PX` at the least.
     """
     vertex = next(i for i, block in enumerate(recipe.blocks) if block.order == order)
     pixel, depth = _deepest(shot.block == vertex)
-    if depth < least_depth_px:
+    if depth < _LEAST_DEPTH_PX:
         return None
     block = drawn_blocks(recipe)[vertex]
     hit = _hit(block, _camera(recipe), pixel)

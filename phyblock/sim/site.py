@@ -159,12 +159,10 @@ def settle(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Settled:
         return _shared_site(trial, physics_engine()).settle(blocks)
 
 
-def state_picture(
-    scene: Scene, blocks: Sequence[Block], style: PictureStyle, label: str = "current"
-) -> QuestionPicture:
+def state_picture(scene: Scene, blocks: Sequence[Block], style: PictureStyle) -> QuestionPicture:
     """The recipe of a picture of blocks on the ground, seen exactly as the goal picture is."""
     view_deg = (style.azimuth_deg, style.elevation_deg)
-    return QuestionPicture(label, tuple(blocks), view_deg, framed=scene.blocks)
+    return QuestionPicture("current", tuple(blocks), view_deg, framed=scene.blocks)
 
 
 def _arrangement(group: Sequence[Block]) -> tuple[Block, ...]:

@@ -97,24 +97,22 @@ def find_gaps(blocks: Sequence[Block], tolerance_m: float = FIT_TOLERANCE_M) -> 
     return tuple(Gap(order, height) for order, height in heights if height > tolerance_m)
 
 
-def support_graph(
-    blocks: Sequence[Block], tolerance_m: float = CONTACT_TOLERANCE_M
-) -> dict[int, frozenset[int]]:
+def support_graph(blocks: Sequence[Block]) -> dict[int, frozenset[int]]:
     """For each block's order, the orders of the blocks it rests on; 0 is the ground.
 
-    B rests on A when they are within `tolerance_m` [m], the contact normal is within 45 degrees
+    B rests on A when they are within `CONTACT_TOLERANCE_M`, the contact normal is within 45 degrees
     of vertical and points up from A to B, and the contact is an area, or an edge lying on a face.
     An edge that lies along the border of a face carries only what nothing else carries.
     """
     solids = [_solid(block) for block in blocks]
     rests_on: dict[int, set[int]] = {solid.order: set() for solid in solids}
     for solid in solids:
-        if abs(solid.bottom_m) <= tolerance_m:
+        if abs(solid.bottom_m) <= CONTACT_TOLERANCE_M:
             rests_on[solid.order].add(GROUND)
     on_rims: dict[int, set[int]] = {solid.order: set() for solid in solids}
-    for first, second in _near_pairs(solids, tolerance_m):
+    for first, second in _near_pairs(solids, CONTACT_TOLERANCE_M):
         for one, other, axes in _piece_pairs(first, second):
-            rise, is_rim = _contact_rise(one, other, axes, tolerance_m)
+            rise, is_rim = _contact_rise(one, other, axes)
             carried = on_rims if is_rim else rests_on
             if rise > 0:
                 carried[second.order].add(first.order)
@@ -179,17 +177,15 @@ def _piece_pairs(first: _Solid, second: _Solid) -> Iterator[tuple[ConvexPiece, C
             yield one, other, separating_axes(one, other)
 
 
-def _contact_rise(
-    first: ConvexPiece, second: ConvexPiece, axes: Axes, tolerance_m: float
-) -> tuple[float, bool]:
+def _contact_rise(first: ConvexPiece, second: ConvexPiece, axes: Axes) -> tuple[float, bool]:
     """Vertical part of the contact normal from first to second, and whether it is a rim's.
 
     0.0 when neither rests on the other.
     """
-    if not -_MAX_CONTACT_OVERLAP_M <= axes.gap_m <= tolerance_m:
+    if not -_MAX_CONTACT_OVERLAP_M <= axes.gap_m <= CONTACT_TOLERANCE_M:
         return 0.0, False
     rim = 0.0
-    touching = axes.gaps_m > axes.gap_m - tolerance_m
+    touching = axes.gaps_m > axes.gap_m - CONTACT_TOLERANCE_M
     for direction in axes.directions[touching & (np.abs(axes.directions[:, 2]) >= _MIN_VERTICAL)]:
         extent = contact_extent(first, second, direction)
         if extent.area_m2 > _MIN_AREA_M2 or extent.length_m > _MIN_LENGTH_M:

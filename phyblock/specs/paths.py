@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 from phyblock.errors import Problem
@@ -18,19 +18,18 @@ _LONGEST_PATH, _LONGEST_NAME = 4095, 255
 _PLACE = re.compile(r":(\d+):(\d+)$")
 
 
-def expand(text: str, base: Path, environ: Mapping[str, str] | None = None) -> Path:
+def expand(text: str, base: Path) -> Path:
     """The absolute path that `text` means, seen from the folder `base`.
 
     Raises ValueError, with a message for the user, for a variable that is not set, a home
     folder that is not known, or what cannot be the name of a file or be written down in a run.
     """
-    values = os.environ if environ is None else environ
 
     def value_of(match: re.Match[str]) -> str:
         name = match[1] or match[2]
-        if name not in values:
+        if name not in os.environ:
             raise ValueError(f"the environment variable {name} is not set")
-        return values[name]
+        return os.environ[name]
 
     try:
         path = Path(_VARIABLE.sub(value_of, text)).expanduser()

@@ -118,13 +118,11 @@ def interval_frame(
     return table.reset_index(drop=True)
 
 
-def interval_view(
-    table: pd.DataFrame, run: Run, cells: Sequence[str], caption: str, by: str = CELL
-) -> TextTable:
+def interval_view(table: pd.DataFrame, run: Run, cells: Sequence[str], caption: str) -> TextTable:
     """Values with intervals out of `interval_frame`: a row a model, a pair of columns a cell."""
     rows = []
     for model, part in table.groupby("model", sort=False):
-        of_cell = part.set_index(by).to_dict("index")
+        of_cell = part.set_index(CELL).to_dict("index")
         pairs = [
             (number(of_cell[cell]["value"]), between(of_cell[cell]["lo"], of_cell[cell]["hi"]))
             for cell in cells

@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
-from phyblock.domain import Scene
+from phyblock.digests import drawn_bytes
 from phyblock.errors import Problem, SpecError
+from phyblock.tracks.base import Item
 
 __all__ = ["Elsewhere"]
 
 
-class _Asked(Protocol):
-    @property
-    def key(self) -> str: ...
-
-    @property
-    def scene(self) -> Scene: ...
-
-
-AskedT = TypeVar("AskedT", bound=_Asked)
+AskedT = TypeVar("AskedT", bound=Item)
 
 
 class Elsewhere(Generic[AskedT]):
@@ -39,7 +31,7 @@ class Elsewhere(Generic[AskedT]):
     def of(self, item: AskedT, seed: int) -> AskedT:
         """The one whose picture is shown: it depends on item and seed alone, not on the model."""
         others = self._others(item)
-        digest = hashlib.sha256(f"wrong image|{seed}|{item.key}".encode()).digest()
+        digest = drawn_bytes("wrong image", seed, item.key)
         return others[int.from_bytes(digest, "big") % len(others)]
 
     def each(self, item: AskedT, seeds: Iterable[int]) -> tuple[AskedT, ...]:
@@ -61,5 +53,5 @@ class Elsewhere(Generic[AskedT]):
         return self._found[item.key]
 
 
-def _parents(item: _Asked) -> tuple[str, ...]:
+def _parents(item: Item) -> tuple[str, ...]:
     return item.scene.parents or (item.scene.id,)

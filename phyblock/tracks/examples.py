@@ -3,30 +3,23 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 from collections.abc import Awaitable, Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
+from phyblock.digests import drawn_bytes
 from phyblock.domain import Scene
 from phyblock.domain.symmetry import fingerprint
 from phyblock.errors import Problem, SpecError
 from phyblock.models.base import Image, Message
 from phyblock.specs import LoadedSuite, did_you_mean
+from phyblock.tracks.base import Item
 
 __all__ = ["Examples", "Shots", "WorkedExample", "Working", "examples_of"]
 
 
-class _Asked(Protocol):
-    @property
-    def key(self) -> str: ...
-
-    @property
-    def scene(self) -> Scene: ...
-
-
-AskedT = TypeVar("AskedT", bound=_Asked)
+AskedT = TypeVar("AskedT", bound=Item)
 
 
 @dataclass(frozen=True)
@@ -159,9 +152,8 @@ class Examples(Generic[AskedT]):
         return self._goals[item.key]
 
     def _place(self, one: AskedT) -> tuple[int, bytes]:
-        text = f"example|{self.seed}|{one.key}"
         place = self.named.index(one.scene.id) if one.scene.id in self.named else len(self.named)
-        return place, hashlib.sha256(text.encode()).digest()
+        return place, drawn_bytes("example", self.seed, one.key)
 
 
 def examples_of(

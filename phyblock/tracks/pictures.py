@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from phyblock.datasets import AssemblyTask
+from phyblock.digests import hex_digest
 from phyblock.errors import DataError, Problem
 from phyblock.models.base import Image
 from phyblock.picture_files import decoded, read_picture
@@ -89,7 +89,7 @@ class Pictures(Studio):
         if self.policy.source == "dataset":
             of = dict.fromkeys(one.composite for one in (task, _goal_of(task)) if one is not None)
             parts = (b"" if path is None else read_picture(path) for path in of)
-            return tuple(hashlib.sha256(data).hexdigest() for data in parts)
+            return tuple(hex_digest(data) for data in parts)
         return tuple(drawing.key for drawing in self._drawings(task))
 
     def _shown_style(self, task: AssemblyTask) -> PictureStyle:
@@ -111,7 +111,7 @@ class Pictures(Studio):
         if self.policy.layout == "separate":
             apart = {"goal": goal, "candidates": grid}
             return tuple(apart[label] for label in self.policy.order)
-        key = hashlib.sha256(f"composite {goal.key} {grid.key}".encode()).hexdigest()
+        key = hex_digest(f"composite {goal.key} {grid.key}")
         return (Drawing("composite", key, partial(_composite, goal.make, grid.make)),)
 
     def _from_dataset(self, task: AssemblyTask) -> tuple[Image, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,6 +13,7 @@ import jinja2
 import jinja2.meta
 import jinja2.nodes
 
+from phyblock.digests import hex_digest
 from phyblock.errors import Problem, PromptError, said
 from phyblock.models.base import Image, Message
 from phyblock.parsing import AnswerForm
@@ -96,7 +96,7 @@ class OfficialPrompt:
     @property
     def version(self) -> str:
         """Hex digest of the text."""
-        return _digest(self.text)
+        return hex_digest(self.text)
 
     def messages(
         self, pictures: Sequence[Image], facts: Mapping[str, object]
@@ -213,7 +213,3 @@ class TemplatePrompt:
         is_head = of_templates[-1].name == "root"
         compiled = self._head if is_head else self._template
         return f"{self._path}:{compiled.get_corresponding_lineno(line)}"
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()

@@ -7,12 +7,12 @@ the numbers in the file.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from phyblock.datasets import AssemblyTask
+from phyblock.digests import drawn_bytes
 from phyblock.domain import CandidateSet
 from phyblock.errors import DataError, Problem
 from phyblock.records import Record
@@ -143,8 +143,7 @@ def shown_order(task: AssemblyTask, seed: int) -> tuple[int, ...]:
     """
 
     def place(number: int) -> bytes:
-        text = f"candidate order|{seed}|{task.scene.id}|{number}"
-        return hashlib.sha256(text.encode()).digest()
+        return drawn_bytes("candidate order", seed, task.scene.id, number)
 
     return tuple(sorted(range(1, len(task.candidates) + 1), key=place))
 

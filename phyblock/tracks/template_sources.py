@@ -17,6 +17,7 @@ import jinja2
 from jinja2 import nodes
 
 from phyblock.bounded import read_text
+from phyblock.digests import hex_digest
 from phyblock.errors import Problem, PromptError, said
 
 __all__ = ["Source", "Sources", "read_sources"]
@@ -50,7 +51,7 @@ class Sources:
         """Hex digest of the text, with those of what is included."""
         digest = hashlib.sha256(self.main.text.encode())
         for name, source in sorted(self.included.items()):
-            inner = hashlib.sha256(source.text.encode()).hexdigest()
+            inner = hex_digest(source.text)
             digest.update(f"\0{name}\0{inner}".encode())
         return digest.hexdigest()
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
 from phyblock.datasets import AssemblyTask
+from phyblock.digests import hex_digest
 from phyblock.models.base import Image, Request
 from phyblock.parsing import AnswerForm
 from phyblock.tracks.examples import Shots
@@ -86,7 +86,7 @@ class WholePlanTrack(ABC, Generic[RulesT, PicturesT]):
         keys = [self._pictures.keys(task) for task in self._pictured()]
         return {
             "prompt": {"name": self._prompt.name, "version": self._prompt.version},
-            "pictures": hashlib.sha256(json.dumps(keys).encode()).hexdigest(),
+            "pictures": hex_digest(json.dumps(keys)),
         }
 
     async def request(

@@ -9,7 +9,7 @@ from phyblock.domain.scene import Scene
 from phyblock.tracks.goal_blind.learning import FREQUENCIES
 from phyblock_making.auditing.tells import Blind, Part, Tells, blind_scores, find_tells
 
-__all__ = ["MOST_SCENES", "given_away_text"]
+__all__ = ["MOST_SCENES", "given_away_text", "percent"]
 
 MOST_SCENES = 1000
 """Larger sets are not learned from when their card is made, so that memory stays flat."""
@@ -61,16 +61,16 @@ def given_away_text(tasks: Sequence[tuple[Scene, CandidateSet]]) -> str:
 
 def _counted(tells: Tells) -> Iterator[str]:
     shares = [part.share or 0.0 for part in tells.places.values()]
-    yield f"{_percent(min(shares))}, {_percent(max(shares))}"
-    yield _percent(tells.first_pose.share)
-    yield _percent(tells.first_pose.chance if tells.first_pose.whole else None)
-    yield _percent(_together(part for poses, part in tells.kinds.items() if poses == 1))
-    yield _percent(_together(part for poses, part in tells.kinds.items() if poses > 1))
+    yield f"{percent(min(shares))}, {percent(max(shares))}"
+    yield percent(tells.first_pose.share)
+    yield percent(tells.first_pose.chance if tells.first_pose.whole else None)
+    yield percent(_together(part for poses, part in tells.kinds.items() if poses == 1))
+    yield percent(_together(part for poses, part in tells.kinds.items() if poses > 1))
 
 
 def _scored(scores: Iterable[Blind]) -> Iterator[str]:
     for one in scores:
-        yield from map(_percent, (one.every, one.once, one.evenly, one.learned))
+        yield from map(percent, (one.every, one.once, one.evenly, one.learned))
 
 
 def _together(parts: Iterable[Part]) -> float | None:
@@ -78,5 +78,6 @@ def _together(parts: Iterable[Part]) -> float | None:
     return Part(sum(part.part for part in found), sum(part.whole for part in found)).share
 
 
-def _percent(share: float | None) -> str:
+def percent(share: float | None) -> str:
+    """A share in percent with one decimal; `n/a` for none."""
     return "n/a" if share is None else f"{100 * share:.1f}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Iterator
 from itertools import combinations
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from phyblock.bounded import read_text
+from phyblock.digests import hex_digest
 from phyblock.domain.candidates import Candidate, CandidateSet
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, said
@@ -97,7 +97,7 @@ def check_sums(folder: Path) -> tuple[int, tuple[Problem, ...]]:
         file = folder / name
         if not file.is_file():
             wrong.append(Problem(str(file), "is missing"))
-        elif hashlib.sha256(file.read_bytes()).hexdigest() != digest:
+        elif hex_digest(file.read_bytes()) != digest:
             wrong.append(Problem(str(file), f"differs from its checksum in {SUMS_FILE}"))
     return len(lines), tuple(wrong)
 

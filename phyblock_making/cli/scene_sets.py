@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.errors import DataError, Problem
+from phyblock.specs import did_you_mean
 
 __all__ = ["find_scenes"]
 
@@ -17,8 +17,7 @@ def find_scenes(data: Dataset, names: Sequence[str]) -> tuple[AssemblyTask, ...]
     problems = []
     for name in names:
         if name not in tasks:
-            near = difflib.get_close_matches(name, tasks, 1)
-            hint = f"did you mean {near[0]}?" if near else f"it holds {_some(list(tasks))}"
+            hint = did_you_mean(name, tasks) or f"it holds {_some(list(tasks))}"
             problems.append(Problem(str(data.root), "holds no such scene", "", name, hint=hint))
     if problems:
         raise DataError(problems)

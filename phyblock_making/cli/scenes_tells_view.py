@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from rich.console import Console
 
 from phyblock.cli.console import plain_table
+from phyblock_making.auditing.given_away import percent
 from phyblock_making.auditing.tells import Blind, Part, Tells
 
 __all__ = ["print_blind", "print_tells"]
@@ -16,11 +17,11 @@ def print_tells(console: Console, tells: Tells) -> None:
     """Needed candidates by place and kinds by poses offered, and the pose that is listed first."""
     console.print("Candidates: are they needed")
     rows = [
-        (f"place {place}", *_shown(part), _percent(part.chance))
+        (f"place {place}", *_shown(part), percent(part.chance))
         for place, part in tells.places.items()
     ]
     first = tells.first_pose
-    rows.append(("first pose listed of a needed kind", *_shown(first), _percent(first.chance)))
+    rows.append(("first pose listed of a needed kind", *_shown(first), percent(first.chance)))
     rows += [
         (f"kind offered in {poses} pose{'s' * (poses > 1)}", *_shown(part), "")
         for poses, part in tells.kinds.items()
@@ -33,7 +34,7 @@ def print_blind(console: Console, scores: Sequence[Blind], with_boosting: bool) 
     if all(one.every is None for one in scores):
         return
     rows = [
-        (one.setting, *map(_percent, (one.every, one.once, one.evenly, one.learned)))
+        (one.setting, *map(percent, (one.every, one.once, one.evenly, one.learned)))
         for one in scores
     ]
     console.print("F1 without seeing the goal, %")
@@ -46,8 +47,4 @@ def print_blind(console: Console, scores: Sequence[Blind], with_boosting: bool) 
 
 
 def _shown(part: Part) -> tuple[str, str, str]:
-    return str(part.part), str(part.whole), _percent(part.share)
-
-
-def _percent(share: float | None) -> str:
-    return "n/a" if share is None else f"{100 * share:.1f}"
+    return str(part.part), str(part.whole), percent(part.share)

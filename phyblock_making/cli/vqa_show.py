@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import io
 import json
 from pathlib import Path
@@ -18,6 +17,7 @@ from phyblock.errors import DataError, Problem
 from phyblock.files import write_named
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
+from phyblock.specs import did_you_mean
 from phyblock_making.cli.question_sets import (
     data_option,
     questions_option,
@@ -67,9 +67,7 @@ def command(
 def _find(questions: QuestionSet, name: str) -> Question:
     by_id = {task.question.id: task.question for task in questions.tasks}
     if name not in by_id:
-        near = difflib.get_close_matches(name, by_id, 1)
-        hint = f"did you mean {near[0]}?" if near else ""
-        message = "holds no such question"
+        message, hint = "holds no such question", did_you_mean(name, by_id)
         raise DataError(Problem(str(questions.root), message, "", name, hint=hint))
     return by_id[name]
 

@@ -61,26 +61,24 @@ _MOST_DRAWN = 0.98
 
 
 def make_candidates(
-    scene: Scene,
-    seed: int = 0,
-    size: int = MAX_CANDIDATES,
-    palette: tuple[Kind, ...] = KIT_PALETTE,
+    scene: Scene, seed: int = 0, *, palette: tuple[Kind, ...] = KIT_PALETTE
 ) -> CandidateSet:
-    """Up to `size` candidates that look different, all that the scene needs among them.
+    """Up to `MAX_CANDIDATES` candidates that look different, all that the scene needs among them.
 
     Distractors come from `palette`. Types that goals have low stand first, candidates of one type
     in an order that is drawn. The same scene id and seed give the same set everywhere. Raises
-    DataError when the scene needs more than `size` looks.
+    DataError when the scene needs more looks than that.
     """
     needed = _by_look([Candidate(b.type, b.color, b.euler_deg) for b in scene.blocks])
-    if len(needed) > size:
+    if len(needed) > MAX_CANDIDATES:
+        allowed = f"at most {MAX_CANDIDATES}"
         message = "needs more different blocks than a candidate set holds"
-        raise DataError(Problem(scene.id, message, "blocks", str(len(needed)), f"at most {size}"))
+        raise DataError(Problem(scene.id, message, "blocks", str(len(needed)), allowed))
     salt = f"{seed}/{scene.id}"
     rates = _rates(palette)
     others = [one for one in rates if one.look not in needed]
     first = sorted(others, key=lambda one: _waiting(one, rates[one], salt))
-    chosen = [*needed.values(), *first[: size - len(needed)]]
+    chosen = [*needed.values(), *first[: MAX_CANDIDATES - len(needed)]]
     return CandidateSet(tuple(sorted(chosen, key=lambda one: _place(one, salt))))
 
 

@@ -18,26 +18,26 @@ EDGES = ("edge-x", "edge-x")
 _ROUND_OUT = ("round-y", "round+y")
 
 
-def topping(d: Draft, y: float = 0.0, x: float = 0.0) -> None:
+def topping(d: Draft, y: float = 0.0) -> None:
     """A roof or a dome on something two wide, its ridge either way."""
     if d.pick_type("triangle", "semi_cylinder") == "triangle":
-        d.put("triangle", y, x, d.pick(("roof", "roof-turned")))
+        d.put("triangle", y, pose=d.pick(("roof", "roof-turned")))
     else:
-        d.put("semi_cylinder", y, x, d.pick(("dome", "dome-turned")))
+        d.put("semi_cylinder", y, pose=d.pick(("dome", "dome-turned")))
 
 
-def column(d: Draft, parts: int, y: float = 0.0, x: float = 0.0) -> None:
+def column(d: Draft, parts: int) -> None:
     """Blocks two wide on one another, no two slabs running."""
     last = ""
     for number in range(parts):
         kinds = [kind for kind in ("cube", "cylinder", "cuboid1") if kind != last or kind == "cube"]
         last = d.pick(kinds)
         if last == "cube":
-            d.put("cube", y, x, tone=number)
+            d.put("cube", tone=number)
         elif last == "cylinder":
-            d.put("cylinder", y, x)
+            d.put("cylinder")
         else:
-            d.put("cuboid1", y, x)
+            d.put("cuboid1")
 
 
 def piers(d: Draft, width: int, tone: int = 0) -> None:

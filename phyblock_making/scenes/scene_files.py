@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -11,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from phyblock.datasets.version import VERSION_FILE
+from phyblock.digests import hex_digest
 from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
@@ -129,5 +129,5 @@ def open_writer(
 def sums_text(folder: Path) -> str:
     """Checksums of the scenes, the card and the version, as `sha256sum -c` reads them."""
     names = (CARD_FILE, SCENES_FILE, VERSION_FILE)
-    sums = [hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in names]
+    sums = [hex_digest((folder / name).read_bytes()) for name in names]
     return "".join(f"{one}  {name}\n" for one, name in zip(sums, names, strict=True))

@@ -57,14 +57,12 @@ class Sketch:
         self.blocks.append(replace(block, position_m=(landed[0], landed[1], landed[2])))
 
 
-def make_scene(
-    name: str, levels: tuple[int, ...], blocks: list[Block], parents: tuple[str, ...] = ()
-) -> Scene:
+def make_scene(name: str, levels: tuple[int, ...], blocks: list[Block]) -> Scene:
     """The scene that blocks make, moved so that the middle of its ground plan is the origin.
 
     Raises CycleError as `scene_of`.
     """
-    return scene_of(name, levels, _centered(blocks), parents)
+    return scene_of(name, levels, _centered(blocks))
 
 
 def scene_of(

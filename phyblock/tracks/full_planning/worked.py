@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
-
 from phyblock.datasets import AssemblyTask
+from phyblock.digests import drawn_bytes
 from phyblock.domain import Scene
 from phyblock.parsing import AnswerForm
 from phyblock.tracks.full_planning.baselines import plan_text
@@ -35,7 +34,7 @@ def _drawn_order(scene: Scene) -> list[int]:
     """Of the blocks that are ready, the one whose digest is the least comes next."""
 
     def place(vertex: int) -> bytes:
-        return hashlib.sha256(f"example plan|{scene.id}|{vertex}".encode()).digest()
+        return drawn_bytes("example plan", scene.id, vertex)
 
     order: list[int] = []
     while ready := scene.graph.ready(sum(1 << vertex for vertex in order)):

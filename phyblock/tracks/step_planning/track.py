@@ -7,7 +7,6 @@ order.
 from __future__ import annotations
 
 import asyncio
-import hashlib
 import json
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,6 +15,7 @@ from functools import partial
 from typing import Any
 
 from phyblock.datasets import AssemblyTask
+from phyblock.digests import hex_digest
 from phyblock.domain import Block
 from phyblock.models.base import Image, Message, Request
 from phyblock.records import Record
@@ -102,7 +102,7 @@ class StepPlanning:
         keys = [self._sight.pictures.keys(task) for task in self._showing.each(self.items)]
         return {
             "prompt": {"name": template.name, "version": template.version},
-            "pictures": hashlib.sha256(json.dumps(keys).encode()).hexdigest(),
+            "pictures": hex_digest(json.dumps(keys)),
             **engine,
         }
 

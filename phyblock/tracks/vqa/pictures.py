@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal
 
+from phyblock.digests import hex_digest
 from phyblock.domain import LETTERS, Question, QuestionPicture
 from phyblock.errors import DataError, Problem
 from phyblock.models.base import Image
@@ -103,7 +103,7 @@ class QuestionPictures(Studio):
         letters = "".join(drawing.label for drawing in options)
         parts = " ".join(drawing.key for drawing in options)
         text = f"sheet {LETTERED_VERSION} {self._cell_px} {letters} {parts}"
-        key = hashlib.sha256(text.encode()).hexdigest()
+        key = hex_digest(text)
         makes = tuple(drawing.make for drawing in options)
         sheet = Drawing(SHEET, key, partial(_sheet, makes, letters, self._cell_px))
         return (*(drawing for drawing in drawings if drawing.label not in LETTERS), sheet)
@@ -111,7 +111,7 @@ class QuestionPictures(Studio):
     def _drawing(self, shown: ShownQuestion, label: str) -> Drawing:
         if label in shown.files:
             path = shown.files[label]
-            key = hashlib.sha256(read_picture(path)).hexdigest()
+            key = hex_digest(read_picture(path))
             return Drawing(label, key, partial(read_picture, path))
         recipe = _recipe(shown.question, label)
         recipe = replace(recipe, background=self._background or recipe.background)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,6 +10,7 @@ from functools import partial
 from typing import Any
 
 from phyblock.datasets import QuestionSet, QuestionTask
+from phyblock.digests import hex_digest
 from phyblock.domain import LETTERS, Question, Scene, is_picture_option
 from phyblock.domain.rotation import rotated, rotated_label
 from phyblock.models.base import Image, Request
@@ -139,7 +139,7 @@ class Vqa:
         keys = [item.key for item in self.items]
         told: dict[str, Any] = {
             "questions": self._questions.sha256,
-            "asked": _digest(keys),
+            "asked": hex_digest(json.dumps(keys)),
             "by_subtask": dict(counts),
             "prompt": None,
             "pictures": None,
@@ -150,7 +150,9 @@ class Vqa:
             if examples:
                 told["examples"] = [example.key for example in examples]
             items = () if self.rules.blind else (*self.items, *examples)
-            told["pictures"] = _digest([self._pictures.keys(item.shown) for item in items])
+            told["pictures"] = hex_digest(
+                json.dumps([self._pictures.keys(item.shown) for item in items])
+            )
         return told
 
     async def request(
@@ -280,7 +282,3 @@ def _sort_of(task: QuestionTask) -> tuple[object, ...]:
         for picture in task.question.pictures
     )
     return (task.question.subtask, ShownQuestion(task.question, task.files).labels, *marks)
-
-
-def _digest(content: object) -> str:
-    return hashlib.sha256(json.dumps(content).encode()).hexdigest()
