@@ -12,10 +12,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
 
-from phyblock.parsing.answer_form import FormProblem
 from phyblock.parsing.json_values import objects
+from phyblock.parsing.move_problem import MoveProblem
 from phyblock.parsing.operation import (
     ANSWER_LINE,
     CALL,
@@ -35,10 +34,7 @@ from phyblock.parsing.speech import CONDITIONAL, TAKES_BACK, words
 from phyblock.parsing.statement import read_statement
 from phyblock.parsing.text_forms import answer_of
 
-__all__ = ["MOVE_PROBLEMS", "MOVE_RULES", "MoveProblem", "ParsedMove", "parse_move"]
-
-MoveProblem = Literal["empty", "no_move", "several_moves", "move_and_done", FormProblem]
-MOVE_PROBLEMS: tuple[MoveProblem, ...] = get_args(MoveProblem)
+__all__ = ["MOVE_RULES", "ParsedMove", "parse_move"]
 
 
 @dataclass(frozen=True)

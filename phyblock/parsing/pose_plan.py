@@ -28,15 +28,11 @@ from phyblock.parsing.text_forms import answer_of, plain_line
 __all__ = [
     "MOST_POSE_STEPS",
     "POSE_PROBLEMS",
-    "POSE_READER_VERSION",
     "ParsedPoses",
     "PoseProblem",
     "parse_poses",
     "pose_form",
 ]
-
-POSE_READER_VERSION = 2
-"""Of this reader alone; raised when any reply can be read otherwise."""
 
 MOST_POSE_STEPS = 100
 """Longer plans are not carried out: no goal has a quarter of it."""

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from phyblock.words import PlanParser
 
-__all__ = ["READER_VERSION", "reader_version"]
+__all__ = ["POSE_READER_VERSION", "READER_VERSION", "reader_version"]
 
 READER_VERSION = 5
 """Of the readers of plans, answers and moves, and of the JSON forms in which they are asked for; it
 goes up when any reply can be read otherwise, or is asked for in another form.
 """
+POSE_READER_VERSION = 2
+"""Of the reader of plans with poses alone; raised when any reply can be read otherwise."""
 
 
 def reader_version(parser: PlanParser) -> int:

@@ -13,10 +13,10 @@ import jinja2
 import jinja2.meta
 import jinja2.nodes
 
+from phyblock import parsing
 from phyblock.digests import hex_digest
 from phyblock.errors import Problem, PromptError, said
 from phyblock.models.base import Image, Message
-from phyblock.parsing import AnswerForm
 from phyblock.resources import bundled
 from phyblock.specs import did_you_mean
 from phyblock.tracks.template_bounds import BoundedEnvironment, render_block
@@ -39,7 +39,7 @@ _ALL_BLOCKS = (*_BLOCKS, "caption", "answer", "turn", "check")
 """Blocks that bundled templates have; another would say its text to nobody."""
 
 
-def form_facts(form: AnswerForm[Any] | None) -> dict[str, object]:
+def form_facts(form: parsing.AnswerForm[Any] | None) -> dict[str, object]:
     """What templates may use of the form of the answer; None is a form of their own, in text."""
     if form is None:
         return {"answer_format": "text", **dict.fromkeys(FORM_FACTS)}
@@ -47,7 +47,7 @@ def form_facts(form: AnswerForm[Any] | None) -> dict[str, object]:
     return {"answer_format": "json_schema", **dict(zip(FORM_FACTS, told, strict=True))}
 
 
-def response_format(form: AnswerForm[Any] | None) -> Mapping[str, object] | None:
+def response_format(form: parsing.AnswerForm[Any] | None) -> Mapping[str, object] | None:
     """What a request says of the form of the answer; nothing for text."""
     return None if form is None else form.response_format
 

@@ -7,10 +7,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
+from phyblock import parsing
 from phyblock.datasets import AssemblyTask
 from phyblock.digests import hex_digest
 from phyblock.models.base import Image, Request
-from phyblock.parsing import AnswerForm
 from phyblock.tracks.examples import Shots
 from phyblock.tracks.prompts import Prompt, form_facts, response_format
 from phyblock.tracks.showing import Showing, TaskShowing, told_of
@@ -32,7 +32,7 @@ class _TaskPictures(Protocol):
 
 
 class _Rules(Protocol):
-    def form(self, item: AssemblyTask) -> AnswerForm[Any] | None: ...
+    def form(self, item: AssemblyTask) -> parsing.AnswerForm[Any] | None: ...
 
 
 RulesT = TypeVar("RulesT", bound=_Rules)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.parsing.move import MOVE_PROBLEMS, MOVE_RULES, ParsedMove, parse_move
+from phyblock.parsing import MOVE_PROBLEMS, MOVE_RULES, ParsedMove, parse_move
 
 Outcome = int | str
 """A candidate's number, "done", or the name of a problem."""

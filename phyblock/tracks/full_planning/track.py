@@ -7,17 +7,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from phyblock import parsing
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
 from phyblock.models.base import Image
-from phyblock.parsing import (
-    AnswerForm,
-    ParsedPlan,
-    parse_asked_plan,
-    parse_plan,
-    plan_form,
-    reader_version,
-)
 from phyblock.scoring import AssemblyScorer, Score
 from phyblock.tracks.examples import Examples, Shots, WorkedExample, Working
 from phyblock.tracks.full_planning.baselines import PlanSubject
@@ -43,16 +36,16 @@ class PlanningRules:
     level1: Level1Criterion | None
     answer_format: AnswerFormat = "text"
 
-    def form(self, item: AssemblyTask) -> AnswerForm[tuple[int, ...]] | None:
+    def form(self, item: AssemblyTask) -> parsing.AnswerForm[tuple[int, ...]] | None:
         """The form in which a plan for a scene is asked for; None where that is text."""
-        return None if self.answer_format == "text" else plan_form(len(item.candidates))
+        return None if self.answer_format == "text" else parsing.plan_form(len(item.candidates))
 
-    def read(self, item: AssemblyTask, text: str) -> ParsedPlan:
+    def read(self, item: AssemblyTask, text: str) -> parsing.ParsedPlan:
         """What a reply to a question about a scene says."""
         n_candidates = len(item.candidates)
         if self.answer_format == "json_schema":
-            return parse_asked_plan(text, n_candidates)
-        return parse_plan(text, n_candidates, self.parser)
+            return parsing.parse_asked_plan(text, n_candidates)
+        return parsing.parse_plan(text, n_candidates, self.parser)
 
 
 @dataclass(frozen=True)
@@ -60,7 +53,7 @@ class PlanJudgement:
     """What a reply was read as, and what that is worth."""
 
     parser: PlanParser
-    parsed: ParsedPlan
+    parsed: parsing.ParsedPlan
     scores: tuple[Score, ...]
     in_file: tuple[int, ...] | None = None
     """The plan in the numbers of the file, where others were shown."""
@@ -84,7 +77,7 @@ class PlanJudgement:
                 "plan": list(self.parsed.plan.steps),
                 "file_plan": self.in_file,
                 "dropped": list(self.parsed.dropped),
-                "version": reader_version(self.parser),
+                "version": parsing.reader_version(self.parser),
                 "problem": self.parsed.problem,
             },
             "scores": [score_fields(score) for score in self.scores],
@@ -153,7 +146,7 @@ class FullPlanning(WholePlanTrack[PlanningRules, Pictures]):
 
     def judge(self, item: AssemblyTask, text: str | None) -> PlanJudgement:
         """Read and score a reply; None, where there is no reply, is scored as an empty plan."""
-        parsed = ParsedPlan(Plan(), None) if text is None else self.rules.read(item, text)
+        parsed = parsing.ParsedPlan(Plan(), None) if text is None else self.rules.read(item, text)
         key = (item.key, item.candidates)
         scorer = self._scorers.get(key)
         if scorer is None:

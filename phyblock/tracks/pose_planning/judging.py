@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from phyblock import parsing
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import (
     Block,
@@ -23,7 +24,6 @@ from phyblock.domain import (
     euler_deg_to_matrix,
     turn_deg,
 )
-from phyblock.parsing import POSE_READER_VERSION, AnswerForm, ParsedPoses, parse_poses, pose_form
 from phyblock.scoring import (
     TURN_TOLERANCE_DEG,
     AssemblyScorer,
@@ -85,11 +85,11 @@ class PoseRules:
             "reached_deg": self.reached_deg,
         }
 
-    def form(self, item: AssemblyTask) -> AnswerForm[Any] | None:
+    def form(self, item: AssemblyTask) -> parsing.AnswerForm[Any] | None:
         """The form in which a plan for a scene is asked for; None where that is text."""
         if self.answer_format == "text":
             return None
-        return pose_form(len(item.candidates), free=self.is_free)
+        return parsing.pose_form(len(item.candidates), free=self.is_free)
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class PoseJudgement:
     candidate.
     """
 
-    parsed: ParsedPoses
+    parsed: parsing.ParsedPoses
     kept: tuple[PoseStep, ...]
     in_file: tuple[int, ...] | None
     scores: tuple[Score, ...]
@@ -146,7 +146,7 @@ class PoseJudgement:
                 "plan": list(self.steps),
                 "file_plan": self.in_file,
                 "dropped": dropped,
-                "version": POSE_READER_VERSION,
+                "version": parsing.POSE_READER_VERSION,
                 "problem": self.parsed.problem,
                 "steps": [_given(step) for step in given],
             },
@@ -179,9 +179,9 @@ def judge_poses(
     A plan that is the `earlier` one ended as it did, as far as that is borne out by where its
     blocks came to lie.
     """
-    parsed = ParsedPoses(PosePlan(), None)
+    parsed = parsing.ParsedPoses(PosePlan(), None)
     if text is not None:
-        parsed = parse_poses(text, len(item.candidates), free=rules.is_free)
+        parsed = parsing.parse_poses(text, len(item.candidates), free=rules.is_free)
     given = parsed.plan.steps
     n = len(item.candidates)
     kept = tuple(step for step in given if 1 <= step.candidate <= n)

@@ -6,10 +6,10 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
+from phyblock import parsing
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block, Plan
 from phyblock.models.base import Image, Message, Reply, Request
-from phyblock.parsing.move import MoveProblem, ParsedMove
 from phyblock.scoring import (
     ERROR_TYPES,
     Assembly,
@@ -28,7 +28,7 @@ from phyblock.words import Setting
 
 __all__ = ["Desk", "StepEpisode"]
 
-_NOT_TRIED = ("done", *get_args(MoveProblem))
+_NOT_TRIED = ("done", *get_args(parsing.MoveProblem))
 """Outcomes of steps in which no move was attempted."""
 
 
@@ -78,7 +78,7 @@ class StepEpisode:
         self._tally = Tally()
         self._past: list[PastStep] = []
         self._turns: list[dict[str, Any]] = []
-        self._votes: list[tuple[ParsedMove, str]] = []
+        self._votes: list[tuple[parsing.ParsedMove, str]] = []
         self._seen: Image | None = None
         self._settled = True
 

@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from phyblock import parsing
 from phyblock.models.base import Image, Message
-from phyblock.parsing import AnswerForm, MoveProblem, ParsedMove
 from phyblock.scoring import MoveOutcome
 from phyblock.tracks.prompts import TemplatePrompt, form_facts
 from phyblock.words import CandidateScale, Gating, Setting
@@ -21,7 +21,7 @@ __all__ = ["FEEDBACKS", "Feedback", "History", "PastStep", "StepOutcome", "StepP
 Feedback = Literal["none", "success", "error_type"]
 FEEDBACKS: tuple[Feedback, ...] = get_args(Feedback)
 History = Literal["text", "turns"]
-StepOutcome = MoveOutcome | Literal["done"] | MoveProblem
+StepOutcome = MoveOutcome | Literal["done"] | parsing.MoveProblem
 """What became of a step; a problem is a reply in which no single operation could be read."""
 
 _FORMAT: Mapping[str, str] = {
@@ -83,7 +83,7 @@ class StepPrompt:
     gating: Gating = "aov"
     accepts: Setting = "A"
     is_blind: bool = False
-    form: Callable[[int], AnswerForm[ParsedMove] | None] = lambda _: None
+    form: Callable[[int], parsing.AnswerForm[parsing.ParsedMove] | None] = lambda _: None
 
     def __post_init__(self) -> None:
         """Raise PromptError where the template has no text for the turns of a conversation."""

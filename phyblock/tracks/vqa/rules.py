@@ -4,14 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from phyblock import parsing
 from phyblock.domain import Question
-from phyblock.parsing import (
-    AnswerForm,
-    ParsedAnswer,
-    choice_form,
-    parse_answer,
-    parse_asked_answer,
-)
 from phyblock.tracks.vqa.baselines import choice_text
 from phyblock.tracks.vqa.pictures import OptionsAs
 from phyblock.words import AnswerFormat
@@ -33,15 +27,15 @@ class VqaRules:
     wrong_image: bool = False
     answer_format: AnswerFormat = "text"
 
-    def form(self, question: Question) -> AnswerForm[str] | None:
+    def form(self, question: Question) -> parsing.AnswerForm[str] | None:
         """The form in which an answer is asked for; None where that is text."""
         if self.answer_format == "text":
             return None
-        return choice_form(question.options, question.subtask == "OR")
+        return parsing.choice_form(question.options, question.subtask == "OR")
 
-    def read(self, question: Question, text: str) -> ParsedAnswer:
+    def read(self, question: Question, text: str) -> parsing.ParsedAnswer:
         """What a reply to a question says."""
-        parse = parse_answer if self.answer_format == "text" else parse_asked_answer
+        parse = parsing.parse_answer if self.answer_format == "text" else parsing.parse_asked_answer
         return parse(text, question.options, question.subtask == "OR")
 
     def right_answer(self, question: Question) -> str:

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from phyblock import parsing
 from phyblock.datasets import QuestionSet, QuestionTask
 from phyblock.digests import hex_digest
 from phyblock.domain import LETTERS, Question, Scene, is_picture_option
 from phyblock.domain.rotation import rotated, rotated_label
 from phyblock.models.base import Image, Request
 from phyblock.models.guesses import Guesses
-from phyblock.parsing import ParsedAnswer
 from phyblock.tracks.elsewhere import Elsewhere
 from phyblock.tracks.examples import Examples, Shots, WorkedExample, Working
 from phyblock.tracks.prompts import Prompt, form_facts, response_format
@@ -62,7 +62,7 @@ def asked(task: QuestionTask, rotation: int = 0, *, is_one_of_many: bool = False
 class ChoiceJudgement:
     """What a reply was read as, and whether that is right."""
 
-    parsed: ParsedAnswer
+    parsed: parsing.ParsedAnswer
     right: str
 
     @property
@@ -219,7 +219,7 @@ class Vqa:
     def judge(self, item: AskedQuestion, text: str | None) -> ChoiceJudgement:
         """Read and score a reply; None, where there is no reply, is no answer."""
         question = item.question
-        parsed = ParsedAnswer(None, None)
+        parsed = parsing.ParsedAnswer(None, None)
         if text is not None:
             parsed = self.rules.read(question, text)
         return ChoiceJudgement(parsed, question.answer_letters)
