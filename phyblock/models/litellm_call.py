@@ -17,6 +17,7 @@ from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models.base import Reply
 from phyblock.models.completions import read_completion
 from phyblock.models.keys import api_key
+from phyblock.models.litellm_extras import leave_out, unlogged
 from phyblock.models.payload import wire_messages
 from phyblock.models.refusals import (
     refusal,
@@ -56,6 +57,7 @@ class LitellmTransport(GuardedTransport):
         litellm = _litellm()
         from phyblock.models.litellm_wire import CURRENT, Exchange
 
+        unlogged()
         arguments = self._arguments(call)
         exchange = Exchange(self._client, self._config)
         token = CURRENT.set(exchange)
@@ -137,6 +139,7 @@ def _litellm() -> types.ModuleType:
         from phyblock.models.litellm_wire import install
 
         install()
+        leave_out(litellm)
         # The import made clients of its own, which calls with its usual timeout would be given.
         litellm.in_memory_llm_clients_cache.flush_cache()
     module: types.ModuleType = litellm

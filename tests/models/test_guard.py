@@ -12,6 +12,7 @@ from phyblock.errors import DataError, ModelError, Problem, RetryableError, Unav
 from phyblock.models import ModelConfig, Reply, RetryPolicy
 from phyblock.models.http_client import Answer
 from phyblock.models.litellm_call import _litellm
+from phyblock.models.litellm_extras import leave_out
 from phyblock.models.refusals import read_body
 from phyblock.models.transport import Call, GuardedTransport, SeedRefusedError
 from tests.models.factory import ask, make_model, make_request, run
@@ -173,3 +174,24 @@ def test_a_limit_that_is_told_with_a_success_slows_down_as_any_other(code: objec
     with pytest.raises(RetryableError, match="slow down") as told:
         read_body(Answer(200, {"Retry-After": "7"}, body))
     assert (told.value.status, told.value.retry_after_s) == (429, 7)
+
+
+def test_what_is_left_out_of_calls_is_still_there_to_be_left_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Holds what `litellm_extras` relies on; a new litellm that differs fails here."""
+    monkeypatch.setenv(KEY_VARIABLE, KEY)
+    litellm = _litellm()
+    from openai.resources.chat.completions import completions
+
+    assert litellm.response_cost_calculator(response_object=None) is None
+    assert completions.async_maybe_transform.__module__ == leave_out.__module__
+    heard: list[object] = []
+    litellm._async_success_callback.append(lambda *_: heard.append("success"))
+    try:
+        with Running(OpenAIChat()) as running:
+            (reply,) = ask(make_model(ROUTES["openai"].config(running.url)), make_request())
+    finally:
+        litellm._async_success_callback.pop()
+    assert isinstance(reply, Reply), reply
+    assert not heard
