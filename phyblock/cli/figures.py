@@ -74,8 +74,8 @@ def command(
     out: Path | None,
     data: Path | None,
 ) -> None:
-    """Draw figures of the folder RUN for a paper: PDF and SVG whose text is text, and captions as
-    plain text and as LaTeX floats.
+    """Draw figures of the folder RUN for a paper: PDF and SVG whose text is text, PNG for slides,
+    and captions as plain text and as LaTeX floats.
 
     All figures of numbers, unless some are named; those of scenes (inference, subtask-cards,
     perturbations) are drawn where they are. Figures that the run has no numbers for are left out,

@@ -91,7 +91,7 @@ def test_compare_says_the_verdict_and_what_flipped(folder: Path, tmp_path: Path)
 def test_figures_and_exports_name_what_they_wrote(folder: Path) -> None:
     done = call("figures", folder, "--only", "f1-levels")
     assert done.output.split() == [
-        str(folder / "paper" / f"f1-levels.{e}") for e in ("pdf", "svg", "txt", "tex")
+        str(folder / "paper" / f"f1-levels.{e}") for e in ("pdf", "svg", "png", "txt", "tex")
     ]
     done = call(
         "figures", folder, "--only", "f1-levels", "--models", "alpha", "--out", folder / "x"

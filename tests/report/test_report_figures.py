@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import io
 import re
 import sys
 from pathlib import Path
@@ -10,8 +9,9 @@ import pytest
 from PIL import Image
 
 from phyblock.errors import StoreError
-from phyblock.report.figures import figure_names, write_figures
-from phyblock.tables.drawing import COLORS
+from phyblock.report.figures import Wanted, figure_names, write_figures, write_paper_figures
+from phyblock.run.folder import run_folder
+from phyblock.tables.drawing import COLORS, PAGE_LOOK
 from phyblock.tables.load import load_run
 from phyblock.tracks.step_planning.figure import step_progress
 from phyblock.tracks.vqa.figure import accuracy_by_subtask, vqa_heat_map
@@ -85,16 +85,28 @@ def test_every_figure_is_drawn_and_drawing_again_gives_the_same_bytes(tmp_path: 
     on_request = {"kit", *(f"forest-{name}" for name in ("full-planning", "vqa", "step-planning"))}
     on_request |= {"inference", "inference-steps", "subtask-cards"}
     drawn = [name for name in figure_names(run) if name not in on_request]
-    assert [file.stem for file in first][::2] == drawn
+    assert [file.name for file in first] == [f"{name}.svg" for name in drawn]
     assert {file: file.read_bytes() for file in write_figures(run)} == first
-    for file, data in first.items():
-        if file.suffix == ".svg":
-            assert re.search(rb"<svg[^>]*width=\"[\d.]+pt\"", data)
-            assert b"<dc:date>" not in data
-        else:
-            with Image.open(io.BytesIO(data)) as picture:
-                assert picture.width >= 1200
-                assert len(picture.convert("RGB").resize((200, 100)).getcolors(20000) or []) > 20
+    for data in first.values():
+        assert re.search(rb"<svg[^>]*width=\"[\d.]+pt\"", data)
+        assert b"<dc:date>" not in data
+
+
+def test_figures_for_slides_are_asked_for_and_what_a_run_drew_of_old_goes(tmp_path: Path) -> None:
+    run = load_run(folder_of(tmp_path / "run"), texts=False)
+    wanted = Wanted(("f1-levels", "losses"))
+    pictures = [f for f in write_paper_figures(run, wanted, PAGE_LOOK) if f.suffix == ".png"]
+    assert [file.stem for file in pictures] == [*wanted.names]
+    for file in pictures:
+        with Image.open(file) as picture:
+            assert picture.width >= 1200
+            assert len(picture.convert("RGB").resize((200, 100)).getcolors(20000) or []) > 20
+    (old,) = run_folder(run.path).write({"figures/f1-levels.png": b"by an earlier version"})
+    mine = old.with_name("losses.png")
+    mine.write_bytes(b"mine")
+    write_figures(run, ["f1-levels"])
+    assert not old.exists()
+    assert mine.read_bytes() == b"mine"
 
 
 def test_what_a_run_has_no_numbers_for_is_not_drawn(tmp_path: Path) -> None:
@@ -106,7 +118,7 @@ def test_what_a_run_has_no_numbers_for_is_not_drawn(tmp_path: Path) -> None:
 
 def test_a_figure_takes_no_style_of_the_user_and_leaves_none(tmp_path: Path) -> None:
     run = load_run(folder_of(tmp_path / "run"))
-    (file, _) = write_figures(run, ["f1-levels"])
+    (file,) = write_figures(run, ["f1-levels"])
     plain = file.read_bytes()
     with matplotlib.rc_context({"font.size": 30, "axes.facecolor": "red"}):
         write_figures(run, ["f1-levels"])

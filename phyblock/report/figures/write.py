@@ -48,8 +48,14 @@ __all__ = [
 PAPER = "paper"
 """The folder in a run's folder where figures for papers are, unless another is named."""
 _FOLDER = "figures"
-_FORMS: Mapping[str, Callable[[Figure], bytes]] = {"svg": svg_bytes, "png": png_bytes}
-_PAPER_FORMS: Mapping[str, Callable[[Figure], bytes]] = {"pdf": pdf_bytes, "svg": svg_bytes}
+_FORMS: Mapping[str, Callable[[Figure], bytes]] = {"svg": svg_bytes}
+_EARLIER_FORMS = ("png",)
+"""What earlier versions drew as well: it would stay as it is while the figure changes."""
+_PAPER_FORMS: Mapping[str, Callable[[Figure], bytes]] = {
+    "pdf": pdf_bytes,
+    "svg": svg_bytes,
+    "png": png_bytes,
+}
 
 _Maker = FigureMaker | SceneFigure
 
@@ -117,8 +123,7 @@ def figure_titles(run: Run) -> dict[str, str]:
 
 
 def write_figures(run: Run, names: Sequence[str] | None = None) -> tuple[Path, ...]:
-    """Draw figures of the report into `figures/` of the run's folder, NAME.svg and NAME.png; all
-    by default.
+    """Draw figures of the report into `figures/` of the run's folder, NAME.svg; all by default.
 
     Figures that the run has no numbers for are left out. The same records give the same bytes.
     Raises StoreError for a folder that cannot be written, and, before anything is drawn, naming
@@ -130,6 +135,7 @@ def write_figures(run: Run, names: Sequence[str] | None = None) -> tuple[Path, .
         return ()
     folder = run_folder(run.path)
     folder.check(figure_files(wanted))
+    folder.remove(f"{_FOLDER}/{name}.{ending}" for name in makers for ending in _EARLIER_FORMS)
     files: list[Path] = []
     with styled(PAGE_LOOK):
         for name in wanted:
@@ -145,7 +151,7 @@ def write_paper_figures(
     run: Run, wanted: Wanted, look: Look, out: Path | None = None
 ) -> tuple[Path, ...]:
     """Draw figures for a paper into `out`, else into `paper/` of the run's folder: NAME.pdf,
-    NAME.svg, and the caption as NAME.txt and as NAME.tex.
+    NAME.svg, NAME.png, and the caption as NAME.txt and as NAME.tex.
 
     As `write_figures` else; raises DataError too, where scenes are to be shown and cannot be read,
     and SpecError for a scene that the run has not or that no figure shows.
