@@ -11,7 +11,7 @@ import io
 import json
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import get_args
 
 import numpy as np
@@ -136,12 +136,13 @@ def composite_png(goal: bytes, candidates: bytes) -> bytes:
 
 def goal_key(scene: Scene, style: PictureStyle) -> str:
     """SHA-256 [hex] of all that the goal picture depends on; the scene's id is not part of it."""
-    return picture_key("goal", style, [astuple(block) for block in drawn(scene)])
+    content = [(b.type, b.color, b.position_m, b.euler_deg) for b in scene.blocks]
+    return picture_key("goal", style, content)
 
 
 def candidates_key(candidates: CandidateSet, style: PictureStyle) -> str:
     """SHA-256 [hex] of all that the candidate grid depends on."""
-    content = [astuple(candidate) for candidate in candidates.candidates]
+    content = [(c.type, c.color, c.euler_deg) for c in candidates.candidates]
     return picture_key("candidates", style, [style.candidate_scale, *content])
 
 

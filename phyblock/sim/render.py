@@ -7,6 +7,7 @@ block is no more than a color and a mesh here: physics lives in `phyblock.sim.wo
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -72,9 +73,7 @@ class DrawnBlock:
     @property
     def vertices_m(self) -> NDArray[np.float64]:
         """World corners of what is drawn, shape (n, 3) [m]."""
-        matrix = rounded(euler_deg_to_matrix(self.euler_deg))
-        vertices: NDArray[np.float64] = turned(drawn_mesh(self.type).vertices_m, matrix)
-        vertices += np.array(self.position_m)
+        vertices: NDArray[np.float64] = _turned_m(self.type, self.euler_deg) + self.position_m
         return vertices
 
     @property
@@ -82,6 +81,13 @@ class DrawnBlock:
         """World corners of the triangles that are drawn, shape (m, 3, 3) [m]."""
         triangles: NDArray[np.float64] = self.vertices_m[drawn_mesh(self.type).triangles]
         return triangles
+
+
+@functools.lru_cache(maxsize=1024)
+def _turned_m(block_type: BlockType, euler_deg: Euler) -> NDArray[np.float64]:
+    """World corners of what is drawn of a block at the origin, shape (n, 3) [m]; do not change."""
+    matrix = rounded(euler_deg_to_matrix(euler_deg))
+    return turned(drawn_mesh(block_type).vertices_m, matrix)
 
 
 @dataclass(frozen=True, eq=False)
