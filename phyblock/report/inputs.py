@@ -3,40 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
-import platform
-from collections.abc import Iterator, Sequence
-from importlib.metadata import PackageNotFoundError, version
+from collections.abc import Sequence
 from pathlib import Path
 
 from phyblock.bounded import NotRegularError, open_regular
 from phyblock.records import MANIFEST, PROMPTS, RECORDS, STOPPED, read_manifest
-from phyblock.registry import has_additions
 from phyblock.resources import cache_dir
+from phyblock.run.code import code_digest, digest_of, state_of
 from phyblock.tables.design import read_design
 from phyblock.tracks.kind import kinds
 
-__all__ = ["code_digest", "digest_of_file", "inputs_digest"]
+__all__ = ["digest_of_file", "inputs_digest"]
 
-_LIBRARIES = ("phyblock", "numpy", "pandas", "scipy", "matplotlib", "jinja2", "pydantic", "pillow")
 _VARIABLES = "PHYBLOCK_"
 _CHUNK_BYTES = 2**20
-_MOST_FILES = 100_000
-
-
-def code_digest() -> str | None:
-    """What stands for the code that makes tables, figures and the page.
-
-    None where tracks or measures were added from outside: their code cannot be told.
-    """
-    if has_additions():
-        return None
-    package = Path(__file__).parents[1]
-    state = _state(package)
-    if state is None:
-        return None
-    return _digest([platform.python_version(), *map(_version, _LIBRARIES), str(package), *state])
 
 
 def inputs_digest(folder: Path, tables: Sequence[str] | None) -> str | None:
@@ -50,7 +31,7 @@ def inputs_digest(folder: Path, tables: Sequence[str] | None) -> str | None:
     manifest = read_manifest(folder)
     roots = [manifest.dataset.root] if manifest.dataset else []
     roots += [root for kind in kinds().values() if (root := kind.own_root(manifest))]
-    data = [_state(Path(root)) for root in roots]
+    data = [state_of(Path(root)) for root in roots]
     if code is None or None in data:
         return None
     try:
@@ -61,7 +42,7 @@ def inputs_digest(folder: Path, tables: Sequence[str] | None) -> str | None:
     place = [folder.name, str(cache_dir()), *variables]
     if tables is None:
         tables = read_design(manifest.fields(), str(folder / MANIFEST)).suite.tables
-    return _digest([code, list(tables), held, roots, data, place])
+    return digest_of([code, list(tables), held, roots, data, place])
 
 
 def digest_of_file(path: Path) -> str:
@@ -74,31 +55,3 @@ def digest_of_file(path: Path) -> str:
     except FileNotFoundError:
         return ""
     return digest.hexdigest()
-
-
-def _digest(parts: Sequence[object]) -> str:
-    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
-
-
-def _state(folder: Path) -> list[tuple[str, int, int]] | None:
-    """Name, size and time of change of every file below; None where there are too many."""
-    found: list[tuple[str, int, int]] = []
-    for entry in _files(folder):
-        if len(found) == _MOST_FILES:
-            return None
-        stat = os.stat(entry)
-        found.append((entry, stat.st_size, stat.st_mtime_ns))
-    return sorted(found)
-
-
-def _files(folder: Path) -> Iterator[str]:
-    for above, folders, names in os.walk(folder):
-        folders[:] = [name for name in folders if name != "__pycache__"]
-        yield from (path for name in names if os.path.isfile(path := os.path.join(above, name)))
-
-
-def _version(library: str) -> str:
-    try:
-        return version(library)
-    except PackageNotFoundError:
-        return ""

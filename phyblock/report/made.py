@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 from pydantic import BaseModel, ConfigDict
 
 from phyblock.bounded import NotRegularError, read_bytes
-from phyblock.report.inputs import code_digest, digest_of_file
+from phyblock.report.inputs import digest_of_file
 from phyblock.report.terminal import Terminal
+from phyblock.run.code import code_digest
 from phyblock.run.folder import run_folder
 
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ run.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 from phyblock.models.base import Reply
 from phyblock.records import MANIFEST, Manifest, Record
 from phyblock.records.manifest import ManifestModel
+from phyblock.run.floor_orders import floor_orders, floor_seeds
 from phyblock.run.records import begun, judged
 from phyblock.specs import SuiteSpec
 from phyblock.tables.design import read_design
@@ -26,13 +26,11 @@ from phyblock.tables.load import Run, frames_of
 from phyblock.tables.measures import VALUE_KEY, value_key
 from phyblock.tracks import AnyTrack, SingleTrack, kind_of, shown_item
 from phyblock.tracks.estimates import counted_samples, track_measures
-from phyblock.variants import Variant
 
 __all__ = ["COMPUTED_FLOORS", "FloorValues", "floor_values"]
 
 COMPUTED_FLOORS = ("goal-blind", "all-candidates")
 """Those that leave nothing to chance; `random` stays below them."""
-_ORDER = "candidate_order"
 FloorValues = dict[str, dict[str, dict[str, float]]]
 """Values by track, floor and `value_key`."""
 
@@ -61,36 +59,12 @@ def floor_values(
             one = suite.model_copy(update={"settings": (setting, *others)})
             records = [
                 record
-                for order, copies in _orders(one)
+                for order, copies in floor_orders(one)
                 for record in _answered(reopened(name, order), floors, order, copies)
             ]
             for floor, key, value in _estimates(manifest, name, floors, records):
                 found[name][floor][key] = max(value, found[name][floor].get(key, value))
     return found
-
-
-def _orders(suite: SuiteSpec) -> list[tuple[SuiteSpec, int]]:
-    """The suite in each order of the candidates that it asks in, and how often an answer in that
-    order counts, so that orders weigh as they do among all ways of asking and seeds.
-    """
-    orders: dict[str, SuiteSpec] = {}
-    ways = Counter[str]()
-    for variant in suite.vary.variants:
-        level = dict(variant.levels).get(_ORDER, "")
-        if level not in orders:
-            only = Variant(((_ORDER, level),)) if level else Variant()
-            orders[level] = suite.at(only)
-        ways[level] += 1
-    often = {
-        level: ways[level] * len(suite.seeds) // len(_seeds(one)) for level, one in orders.items()
-    }
-    least = math.gcd(*often.values())
-    return [(one, often[level] // least) for level, one in orders.items()]
-
-
-def _seeds(suite: SuiteSpec) -> Sequence[int]:
-    """The seeds under which floors answer: one tells all unless each shows another order."""
-    return suite.seeds if suite.candidates.order == "shuffled" else suite.seeds[:1]
 
 
 def _answered(
@@ -101,7 +75,7 @@ def _answered(
     rules = kind_of(track.name).baselines
     order = suite.candidates.order
     for item in track.items:
-        for seed in _seeds(suite):
+        for seed in floor_seeds(suite):
             shown = shown_item(track, item, seed)
             ((request, _),) = track.outlines(shown)
             for floor in floors:

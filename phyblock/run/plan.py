@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from phyblock.datasets import Dataset
 from phyblock.errors import Problem, SpecError
@@ -13,6 +15,7 @@ from phyblock.models import ModelConfig
 from phyblock.records import Manifest
 from phyblock.records.manifest import ManifestChoice
 from phyblock.run.data import open_dataset
+from phyblock.run.kept_floors import kept_floors
 from phyblock.run.manifest import make_manifest
 from phyblock.run.models import PlannedModel, plan_models, recorded_format, recorded_order
 from phyblock.run.samples import Sample
@@ -21,6 +24,9 @@ from phyblock.tracks import AnyTrack, EpisodeTrack, Item, Opening, kind_of, open
 from phyblock.tracks.selection import select_tasks
 from phyblock.variants import Variant
 
+if TYPE_CHECKING:
+    from phyblock.run.floors import FloorValues
+
 __all__ = ["RunPlan", "make_plan"]
 
 
@@ -28,8 +34,8 @@ __all__ = ["RunPlan", "make_plan"]
 class RunPlan:
     """Everything a run needs; `manifest` is what `run.yaml` holds, but for what floors reach;
     `tracks` are those of the reference, `variants` all ways of asking with the tracks of each;
-    `reopened` opens a track under a suite, without prompts; `arranged` says in which order the
-    items of a track are asked about.
+    `floors` gives what floors reach; `arranged` says in which order the items of a track are asked
+    about.
     """
 
     suite: SuiteSpec
@@ -37,7 +43,7 @@ class RunPlan:
     dataset: Dataset
     variants: Mapping[Variant, tuple[AnyTrack, ...]]
     manifest: Manifest
-    reopened: Callable[[str, SuiteSpec], AnyTrack]
+    floors: Callable[[], FloorValues]
     arranged: Callable[[Sequence[Item]], Sequence[Item]] = tuple
 
     @property
@@ -46,12 +52,8 @@ class RunPlan:
         return next(iter(self.variants.values()))
 
     def begun(self) -> Manifest:
-        """The manifest of a run that begins, with what floors reach; it takes some seconds."""
-        # Tables are made of pandas, which `--help` and a run that goes on do without.
-        from phyblock.run.floors import floor_values
-
-        floors = floor_values(self.manifest, self.suite, self.reopened)
-        return self.manifest.model_copy(update={"floors": floors})
+        """The manifest of a run that begins, with what floors reach; it may take some seconds."""
+        return self.manifest.model_copy(update={"floors": self.floors()})
 
     @property
     def samples_per_model(self) -> int:
@@ -133,7 +135,8 @@ def make_plan(
         opening = Opening(replace(loaded, suite=one), dataset, limit, False, named)
         return kind_of(name).open(opening)
 
-    return RunPlan(suite, models, selected, variants, manifest, reopened)
+    floors = partial(kept_floors, manifest, suite, reopened, dataset)
+    return RunPlan(suite, models, selected, variants, manifest, floors)
 
 
 def _with_plain_names(suite: SuiteSpec, known: Mapping[str, ModelSpec]) -> SuiteSpec:

@@ -18,6 +18,7 @@ from phyblock.records.reading import read_records
 from phyblock.run.data import asked_about, recorded_dataset
 from phyblock.run.folder import check_place, run_folder
 from phyblock.run.judging import judged_apart
+from phyblock.run.kept_floors import kept_floors
 from phyblock.run.records import about_item
 from phyblock.run.reopen import reopen_tracks
 from phyblock.run.replayed import counted_again
@@ -121,11 +122,8 @@ def _scored(
         for variant in dict.fromkeys(variant.shown for variant in suite.vary.variants)
     }
     records = asyncio.run(_judged_again(folder, manifest, tracks, anew=anew))
-    # Tables are made of pandas, which `--help` and a run that goes on do without.
-    from phyblock.run.floors import floor_values
-
     told = {"suite": suite.model_dump(mode="json")}
-    floors = floor_values(manifest.model_copy(update=told), suite, reopened)
+    floors = kept_floors(manifest.model_copy(update=told), suite, reopened, dataset)
     asked = asked_about(manifest, suite.levels, dataset).tasks
     items = {name: len(track.items) for name, track in tracks[""].items()}
     return _Scored(records, floors, asked, items)

@@ -20,6 +20,7 @@ from phyblock.report import inputs
 from phyblock.report.html import PageWritten
 from phyblock.report.made import MADE, names_to_write, note_made, still_made
 from phyblock.report.terminal import Terminal
+from phyblock.run import code
 from phyblock.tracks.kind import kind_of
 from tests.workspace import Workspace
 
@@ -118,7 +119,7 @@ CHANGES: dict[str, Callable[[Path], object]] = {
     "table-removed": lambda run: (run / "tables/table1.md").unlink(),
     "table-changed": lambda run: swap(run / "tables/table1.csv", b"0", b"1"),
     "table-a-link": lambda run: as_link(run / "tables/table1.csv"),
-    "figure-removed": lambda run: (run / "figures/scenes.png").unlink(),
+    "figure-removed": lambda run: (run / "figures/scenes.svg").unlink(),
     "page-changed": lambda run: swap(run / "report.html", b"oracle", b"orakel"),
     "script-changed": lambda run: swap(next(run.glob("report/*/index.js")), b"oracle", b"orakel"),
     "record-added": repeat_a_line,
@@ -166,10 +167,10 @@ def test_other_tables_code_or_settings_are_other_inputs(
         patch.setenv("PHYBLOCK_RENDERER", "mine:make")
         assert not is_current(copied)
     with monkeypatch.context() as patch:
-        patch.setattr(inputs, "version", lambda _: "99")
+        patch.setattr(code, "version", lambda _: "99")
         assert not is_current(copied)
     with monkeypatch.context() as patch:
-        patch.setattr(inputs, "_MOST_FILES", 3)
+        patch.setattr(code, "_MOST_FILES", 3)
         assert not is_current(copied)
     assert is_current(copied)
     name = kind_of("full_planning").report().measures[0]

@@ -1,0 +1,95 @@
+"""What floors reach is worked out once, and again whenever anything that decides it changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from phyblock.resources import bundled
+from phyblock.run import code, floors
+from phyblock.run.floors import FloorValues
+from phyblock.run.plan import make_plan
+from phyblock.specs import load_suite
+from tests.workspace import SCENES, Workspace
+
+Begin = Callable[..., FloorValues]
+DATA, PROMPTS = bundled("benchmarks", "data"), bundled("prompts")
+SHUFFLED = {"candidates": {"order": "shuffled"}}
+
+
+@pytest.fixture
+def anew(monkeypatch: pytest.MonkeyPatch) -> list[FloorValues]:
+    """Values that were worked out, in order."""
+    values: list[FloorValues] = []
+    work_out = floors.floor_values
+
+    def counted(*given: Any) -> FloorValues:
+        values.append(work_out(*given))
+        return values[-1]
+
+    monkeypatch.setattr(floors, "floor_values", counted)
+    return values
+
+
+@pytest.fixture
+def begin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Begin:
+    """The floors in the manifest of a new run of a suite."""
+    workspace = Workspace(tmp_path, tmp_path / "pictures")
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+
+    def begun(*scenes: dict[str, Any], limit: int | None = None, **suite: Any) -> FloorValues:
+        workspace.write_scenes(*scenes)
+        loaded = load_suite(workspace.write_suite(**suite), data_dir=DATA, prompt_dirs=[PROMPTS])
+        plan = make_plan(loaded, {}, limit=limit)
+        return plan.begun().floors
+
+    return begun
+
+
+def test_the_same_is_worked_out_once(begin: Begin, anew: list[FloorValues]) -> None:
+    first = begin()
+    assert first["full_planning"]["goal-blind"]
+    same: list[dict[str, Any]] = [
+        {},
+        {"name": "other", "models": ["oracle"], "seeds": [3, 4, 5]},
+        {"tables": ["table1"], "limits": {"max_concurrency": 3}},
+    ]
+    assert [begin(**suite) for suite in same] == [first] * 3
+    assert anew == [first]
+
+
+def test_whatever_decides_the_values_is_in_the_key(
+    begin: Begin, anew: list[FloorValues], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changes: list[Callable[[], object]] = [
+        lambda: begin(limit=3),
+        # The fourth scene is not asked about, but learned from.
+        lambda: begin(*SCENES[:3], {**SCENES[3], "parents": ["t1"]}, *SCENES[4:], limit=3),
+        lambda: begin(settings=["B"]),
+        lambda: begin(scoring={"matchers": ["paper"]}),
+        lambda: begin(**SHUFFLED, seeds=[0]),
+        lambda: begin(**SHUFFLED, seeds=[0, 1]),
+        lambda: begin(levels=[3, 4]),
+        lambda: begin(vary={"candidate_order": ["file", "shuffled"]}),
+    ]
+    for count, change in enumerate(changes, 1):
+        change()
+        assert len(anew) == count
+    monkeypatch.setattr(code, "version", lambda _: "99")
+    changes[0]()
+    assert len(anew) == len(changes) + 1
+
+
+def test_a_file_that_holds_no_values_costs_only_the_time(
+    begin: Begin, anew: list[FloorValues], tmp_path: Path
+) -> None:
+    first = begin()
+    files = [*(tmp_path / "cache").rglob("*.json")]
+    for content in (b"{", b'{"full_planning": 1}', b"\xff"):
+        for file in files:
+            file.write_bytes(content)
+        assert begin() == first
+    assert anew == [first] * 4
