@@ -35,6 +35,7 @@ __all__ = [
 PHYSICS_VARIABLE = "PHYBLOCK_PHYSICS"
 REFERENCE_ENGINE = "pybullet"
 """The engine that the built-in data were made with, and what is meant where none is named."""
+_RENDERER_VARIABLE = "PHYBLOCK_RENDERER"
 _DEFAULT_RENDERER = "raster"
 
 
@@ -103,11 +104,16 @@ def renderer() -> Renderer:
     Raises InputError for a name that is not known, SimulationError for one that does not work
     here.
     """
-    variable = "PHYBLOCK_RENDERER"
-    word = os.environ.get(variable, _DEFAULT_RENDERER)
-    made = _make(variable, word, RENDERERS.get(word, word), ", ".join(RENDERERS))
+    return _renderer(os.environ.get(_RENDERER_VARIABLE, _DEFAULT_RENDERER))
+
+
+@functools.cache
+def _renderer(word: str) -> Renderer:
+    """Looked at once: every key of a picture asks for its renderer."""
+    path = RENDERERS.get(word, word)
+    made = _make(_RENDERER_VARIABLE, word, path, ", ".join(RENDERERS))
     if not isinstance(made, Renderer):
-        raise InputError(Problem(variable, "names no renderer", found=word))
+        raise InputError(Problem(_RENDERER_VARIABLE, "names no renderer", found=word))
     return made
 
 
