@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pandas as pd
 
-from phyblock.tables.load import Run
+from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.outcomes import HEADINGS, OUTCOMES
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
 
@@ -34,6 +34,7 @@ _COLUMNS = (
 )
 
 
+@made_once_copied
 def coverage_frame(run: Run) -> pd.DataFrame:
     """One row a model and track.
 

@@ -265,8 +265,11 @@ def bare_axes(axes: Sequence[Axes], grid: str = "x") -> None:
 
 def svg_bytes(figure: Figure) -> bytes:
     """The figure as SVG whose text is text, the same bytes for the same numbers."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
     file = io.BytesIO()
-    figure.savefig(file, format="svg", metadata={"Date": None, "Creator": "phyblock"})
+    # `savefig` would draw twice, the first time for the layout alone, which drawing makes as well.
+    FigureCanvasSVG(figure).print_svg(file, metadata={"Date": None, "Creator": "phyblock"})
     return file.getvalue()
 
 
