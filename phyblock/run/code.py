@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import platform
@@ -10,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from phyblock.digests import hex_digest
 from phyblock.registry import has_additions
 
 __all__ = ["code_digest", "digest_of", "state_of"]
@@ -34,7 +34,7 @@ def code_digest() -> str | None:
 
 def digest_of(parts: Sequence[object]) -> str:
     """The SHA-256 [hex] of values that JSON knows."""
-    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+    return hex_digest(json.dumps(parts))
 
 
 def state_of(folder: Path) -> list[tuple[str, int, int]] | None:

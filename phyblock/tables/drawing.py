@@ -269,7 +269,10 @@ def svg_bytes(figure: Figure) -> bytes:
 
     file = io.BytesIO()
     # `savefig` would draw twice, the first time for the layout alone, which drawing makes as well.
-    FigureCanvasSVG(figure).print_svg(file, metadata={"Date": None, "Creator": "phyblock"})
+    canvas = FigureCanvasSVG(figure)
+    canvas.print_svg(  # type: ignore[no-untyped-call]
+        file, metadata={"Date": None, "Creator": "phyblock"}
+    )
     return file.getvalue()
 
 
