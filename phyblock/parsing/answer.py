@@ -28,7 +28,6 @@ from phyblock.parsing.answer_hints import (
 )
 from phyblock.parsing.answer_order import OrderReader
 from phyblock.parsing.answer_patterns import (
-    BOX,
     CHOSEN,
     CONFIRMED,
     CORRECTED,
@@ -39,7 +38,6 @@ from phyblock.parsing.answer_patterns import (
     ORDER,
     QUOTED,
     SENTENCE,
-    TAG,
     VERDICT,
 )
 from phyblock.parsing.answer_statements import (
@@ -53,7 +51,7 @@ from phyblock.parsing.answer_statements import (
 from phyblock.parsing.answer_value import CONTRADICTION, ChoiceReader
 from phyblock.parsing.slips import without_letter_slips
 from phyblock.parsing.speech import TAKES_BACK, words
-from phyblock.parsing.text_forms import answer_of
+from phyblock.parsing.text_forms import BOX, TAG, answer_of
 
 __all__ = ["ParsedAnswer", "parse_answer"]
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 
-from phyblock.parsing.answer_value import CONTRADICTION, EDGES, LETTERS, unmarked
+from phyblock.parsing.answer_value import CONTRADICTION, EDGES, LETTERS
 from phyblock.parsing.speech import BACKWARD, PLACES
+from phyblock.parsing.text_forms import unmarked
 
 __all__ = ["OrderReader"]
 
@@ -17,7 +18,6 @@ _RANKS = f"({'|'.join(PLACES)}|last)"
 _ORDINAL = re.compile(r"\b(?:first|second|third|fourth)\b", re.IGNORECASE)
 _CLAUSE = re.compile(r"[.;!?\n](?=\s)")
 _DENIED = re.compile(r"\b(?:not|nicht)\W{0,3}\Z|不是\s?\Z", re.IGNORECASE)
-_ARROW = re.compile(r"\\(?:long)?(?:right)?(?:arrow|to)\b")
 _REMARK = re.compile(r"\s?\((?![A-Za-z1-9]\))[^()\n]{1,40}\)|(?<=[A-Z])\s?\(\d{1,2}\)")
 _THING = r"(?:(?:picture|image|option|figure|stage|step|photo|frame|img)\s{0,2}[(\[<]{0,1})?"
 
@@ -56,13 +56,13 @@ class OrderReader:
 
     def exact(self, text: str) -> str | None:
         """The order that a whole text is."""
-        value = unmarked(_ARROW.sub(" > ", text)).strip(EDGES)
+        value = unmarked(text).strip(EDGES)
         match = self._order.fullmatch(value)
         return self._letters(match) if match else None
 
     def orders(self, text: str) -> list[str]:
         """All orders in a text, each naming every option once."""
-        value = _REMARK.sub("", unmarked(_ARROW.sub(" > ", text)))
+        value = _REMARK.sub("", unmarked(text))
         found = []
         for match in self._order.finditer(value):
             before = _CLAUSE.split(value[max(0, match.start() - 60) : match.start()])[-1]

@@ -7,7 +7,6 @@ from __future__ import annotations
 import re
 
 __all__ = [
-    "BOX",
     "BRANDED",
     "CHOSEN",
     "CONCLUDED",
@@ -28,7 +27,6 @@ __all__ = [
     "REJECTS",
     "SENTENCE",
     "SO",
-    "TAG",
     "TURNED",
     "VERDICT",
 ]
@@ -153,11 +151,6 @@ VERDICT = re.compile(
     r"|incorrect|false|does not|doesn't|not)\b))",
     re.IGNORECASE,
 )
-TAG = re.compile(
-    r"<(?:final_)?answer>\s{0,20}(?P<value>[^<>]{1,400})",
-    re.IGNORECASE,
-)
-BOX = re.compile(r"\\boxed\s{0,2}\{(?P<value>[^\n]{1,80}?)\}{1,3}(?=[^}]|\Z)")
 JSON = re.compile(
     r"[\"'](?:final[_ ]?)?(?:answer|choice|option|selected_option|order|ordering|letter)[\"']"
     r"\s{0,4}:\s{0,4}(?P<value>\[[^\[\]]{1,120}\]|\"[^\"\n]{0,200}\"|'[^'\n]{0,200}'|\d{1,4}\b)",

@@ -10,17 +10,13 @@ import re
 from collections.abc import Sequence
 
 from phyblock.parsing.speech import PLACES
-from phyblock.parsing.text_forms import plain_forms
+from phyblock.parsing.text_forms import plain_forms, unmarked
 
-__all__ = ["CONTRADICTION", "EDGES", "LETTERS", "ChoiceReader", "plain", "unmarked"]
+__all__ = ["CONTRADICTION", "EDGES", "LETTERS", "ChoiceReader", "plain"]
 
 CONTRADICTION = ""
 
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
-_MARKUP = re.compile(
-    r"\\(?:text|textbf|mathrm|mathbf|boxed)\s{0,2}\{|\\[()\[\]]|[*_~`$\"\u201c\u201d\u00ab\u00bb]"
-    r"|(?<!\w)['\u2018\u2019]|['\u2018\u2019](?!\w)"
-)
 _SPACE = re.compile(r"\s+")
 _NOUN = r"(?:option|choice|answer|letter|alternative|picture|image|figure|place|position|spot)"
 _LEAD = re.compile(
@@ -220,13 +216,8 @@ def plain(text: str) -> str:
     value = _SPACE.sub(" ", plain_forms(text).casefold())
     for spelled, as_usual in _SPELLED:
         value = spelled.sub(as_usual, value)
-    value = _ARTICLES.sub("", _MARKUP.sub("", value).strip(EDGES))
+    value = _ARTICLES.sub("", unmarked(value).strip(EDGES))
     return " ".join(_WORD_NUMBERS.get(word, word) for word in value.split(" "))
-
-
-def unmarked(text: str) -> str:
-    """A text without markup."""
-    return _MARKUP.sub("", text).strip()
 
 
 def _closers(text: str) -> str:

@@ -33,7 +33,7 @@ from phyblock.parsing.plan_patterns import (
 from phyblock.parsing.plan_rank import LAST, MOVES, rank_of
 from phyblock.parsing.reply_lists import reply_lists
 from phyblock.parsing.speech import BACKWARD, REFUSAL
-from phyblock.parsing.text_forms import answer_of, plain_line
+from phyblock.parsing.text_forms import BOX, TAG, answer_of, plain_line
 from phyblock.words import PlanParser
 
 __all__ = ["PLAN_PROBLEMS", "ParsedPlan", "PlanProblem", "kept_plan", "parse_plan"]
@@ -91,22 +91,14 @@ def _official(text: str) -> _Read:
     return ("block_with_index", numbers) if numbers else "no_plan" if text.strip() else "empty"
 
 
-_FRAME = re.compile(
-    r"<(?:final_)?answer>(?P<tag>(?:(?!<(?:final_)?answer>).){1,20000}?)(?:</(?:final_)?answer>|\Z)"
-    r"|\\boxed\s{0,2}\{(?P<boxed>(?:[^{}]|\{[^{}]{0,200}\}){1,4000})\}",
-    re.IGNORECASE | re.DOTALL,
-)
-
-
 def _steps(text: str) -> _Read:
     answer = answer_of(text)
     if answer is None:
         return "thoughts_only"
-    for frame in reversed(list(_FRAME.finditer(answer))[-_MOST_FRAMES:]):
-        name = frame.lastgroup or "tag"
-        read = _choose(
-            f"Answer: {frame[name].strip()}" if "\n" not in frame[name].strip() else frame[name]
-        )
+    frames = [(frame.start(), "tag", frame["value"]) for frame in TAG.finditer(answer)]
+    frames += [(frame.start(), "boxed", frame["value"]) for frame in BOX.finditer(answer)]
+    for _, name, held in sorted(frames)[: -_MOST_FRAMES - 1 : -1]:
+        read = _choose(held if "\n" in held.strip() else f"Answer: {held.strip()}")
         if not isinstance(read, str):
             return name, read[1]
     if not answer:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 
+from phyblock.parsing.speech import SLIPS
+
 __all__ = ["without_letter_slips", "without_slips"]
 
-_SLIP = (
-    r"(?:no,? wait|wait,? no|wait|sorry|oops|correction|corrected|i mean(?:t)?|or rather|rather"
-    r"|make that|scratch that|no|nein|moment|pardon|better|besser)"
-)
+_SLIP = rf"(?:no,? wait|wait,? no|{SLIPS}|or rather|rather|make that|no|nein|better|besser)"
 _CALLED = r"(?:(?:it['\u2019]s|it is|make that|should be|that['\u2019]s|to|zu)\s)?"
 _BLOCK = r"(?:(?:the|block|index|candidate|number|no\.|with|#|move\(|kandidat|der|den)\s?){0,4}"
 _LEADS = r"[^\w\n,;]{0,2}(?:\.{2,3}|[,;(\u2013\u2014\-\u2192]|->|[.)]\s)[^\w\n]{0,3}"
@@ -32,7 +31,7 @@ _STEP_AGAIN = re.compile(
 
 _LETTER_AGAIN = re.compile(
     r"(?<![\w'])[A-Z][.,;]?\s?(?:[\u2013\u2014(\u2192-]\s?)?"
-    r"(?:(?:wait|no|actually|sorry|correct(?:ion|ed)|i mean|rather)[,.:]?\s){1,3}"
+    rf"(?:(?:{SLIPS}|no|actually|rather)[,.:]?\s){{1,3}}"
     r"(?:it is\s|it['\u2019]s\s)?(?P<new>(?-i:[A-Z]))(?=\)?[.!]?(?:\s|\Z))",
     re.IGNORECASE,
 )

@@ -13,6 +13,7 @@ __all__ = [
     "PLACES",
     "REFUSAL",
     "REVISED",
+    "SLIPS",
     "SUPPOSES",
     "TAKES_BACK",
     "TURNED_ROUND",
@@ -20,11 +21,13 @@ __all__ = [
     "words",
 ]
 
+SLIPS = r"wait|oops|sorry|scratch that|correct(?:ion|ed)|i mean(?:t)?|pardon|moment"
+"""Words that take back what was just said, in the same breath."""
 TAKES_BACK = (
-    r"\b(?:wait|hmm+|oops|sorry|scratch that|correct(?:ion|ed|ing)|(?:my )?mistakes?"
-    r"|on (?:second thought|reflection)|i mean(?:t)?|i (?:forgot|missed|overlooked)|revis\w+"
+    rf"\b(?:{SLIPS}|hmm+|correcting|(?:my )?mistakes?"
+    r"|on (?:second thought|reflection)|i (?:forgot|missed|overlooked)|revis\w+"
     r"|re-?(?:check|think|consider|examin|evaluat|look|assess)\w*"
-    r"|moment|korrektur|korrigier\w*|corrección)\b"
+    r"|korrektur|korrigier\w*|corrección)\b"
     r"|\b(?:actually|no|rather)\b[,:]|等等|更正|訂正"
 )
 """That what was said before does not hold."""

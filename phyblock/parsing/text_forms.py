@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 import unicodedata
 
-__all__ = ["answer_of", "number_of_word", "plain_forms", "plain_line"]
+__all__ = ["BOX", "TAG", "answer_of", "number_of_word", "plain_forms", "plain_line", "unmarked"]
 
 _NOT_ASCII = re.compile(r"[^\x00-\x7f]")
 _TAGS = r"(?:think(?:ing)?|thoughts?|reasoning|scratchpad|analysis|reflection)"
@@ -29,12 +29,19 @@ _DEFINED = re.compile(
     r",? (?:where|with) (?P=name) ?= ?(?P<value>\d{1,3}|[A-Z])\b"
 )
 """An answer in the words of the prompt, "Move(N) with N = 3", and what its letter stands for."""
+TAG = re.compile(
+    r"<(?:final_)?answer>(?P<value>(?:(?!</?(?:final_)?answer>).){1,20000})",
+    re.IGNORECASE | re.DOTALL,
+)
+BOX = re.compile(r"\\boxed\s{0,2}\{(?P<value>(?:[^{}]|\{[^{}]{0,200}\}){1,4000})\}", re.DOTALL)
+"""Frames in which an answer stands."""
 _QUOTES = re.compile(
     r"[*`$\"\u201c\u201d\u00ab\u00bb\u201e]|(?<!\w)['\u2018\u2019]|['\u2018\u2019](?!\w)"
 )
 _LATEX = re.compile(
     r"\\(?:text|textbf|mathrm|mathbf)\s{0,2}\{([^{}\n]{0,80})\}|\\(?:,|;|quad|[()\[\] ])"
 )
+_BOXED = re.compile(r"\\boxed\s{0,2}\{|\\[()\[\]]|~")
 _LATEX_ARROW = re.compile(r"\\(?:long)?(?:right)?(?:arrow|to)\b")
 
 _NUMBER_WORDS = {
@@ -94,6 +101,11 @@ def plain_line(line: str) -> str:
     """A line without emphasis, quotation marks and LaTeX; underscores are spaces."""
     value = _LATEX.sub(r" \1 ", _LATEX_ARROW.sub("→", line)) if "\\" in line else line
     return _QUOTES.sub("", value).replace("_", " ")
+
+
+def unmarked(text: str) -> str:
+    """A text as `plain_line`, without the marks of boxes and formulas either."""
+    return _BOXED.sub("", plain_line(text)).strip()
 
 
 def plain_forms(text: str) -> str:
