@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 
 from phyblock.parsing.speech import SUPPOSES
+from phyblock.parsing.text_forms import SENTENCES
 
 __all__ = ["edited"]
 
@@ -21,7 +22,6 @@ _IF = re.compile(
 )
 """What makes an edit one that is only thought of, or somebody else's."""
 _STEP_LINE = re.compile(r"\W{0,8}step\s?\d{1,2}\W{0,3}[:.=)\u2192-]", re.IGNORECASE)
-_SENTENCE = re.compile(r"(?<=[^\d\s][.;!])\s|(?<=\d[.;!])\s(?=\D)|\n")
 _DIGITS = re.compile(r"\d{1,3}")
 _EVERY = re.compile(r"\b(?:all|both|every|each|wherever|always|everywhere)\b|\ds\b", re.IGNORECASE)
 
@@ -141,7 +141,7 @@ def edited(numbers: Sequence[int], lines: Sequence[str]) -> tuple[list[int] | No
     plan: _Numbers | None = list(numbers)
     read: set[int] = set()
     for at, line in enumerate(lines):
-        for sentence in () if _STEP_LINE.match(line) else _SENTENCE.split(line):
+        for sentence in () if _STEP_LINE.match(line) else SENTENCES.split(line):
             if not re.search(r"\d", sentence) or _IF.search(sentence) or SUPPOSES.search(sentence):
                 continue
             found = next(((m, edit) for p, edit in _EDITS if (m := p.search(sentence))), None)

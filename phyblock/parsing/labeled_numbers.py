@@ -9,6 +9,7 @@ from phyblock.parsing.chain import chain
 from phyblock.parsing.line_patterns import ARRAY, LABELED, NOUN_LABEL, SENTENCE_END
 from phyblock.parsing.plan_patterns import FINAL_LABEL, PLAN_WORD
 from phyblock.parsing.statement import read_statement
+from phyblock.parsing.text_forms import SENTENCES
 
 __all__ = ["LabeledNumbers", "labeled_numbers"]
 
@@ -23,7 +24,6 @@ _PIECE = re.compile(
     re.IGNORECASE,
 )
 """A block by its looks and its number, as "red arch (3)" or "slab 2"."""
-_SENTENCES = re.compile(r"(?<=[^\d\s][.!?])\s(?=[^\W\d])")
 _LABEL_CHARS = 30
 """A label is shorter, where words stand beside the numbers behind it."""
 
@@ -45,7 +45,7 @@ def labeled_numbers(line: str) -> LabeledNumbers | None:
     the plan.
     """
     labeled = LABELED.match(line)
-    last = None if labeled else LABELED.match(_SENTENCES.split(line)[-1].strip())
+    last = None if labeled else LABELED.match(SENTENCES.split(line)[-1].strip())
     if last and FINAL_LABEL.search(last["label"]) and len(chain(last["value"].rstrip(" ."))[0]) > 1:
         labeled = last
     if labeled and (

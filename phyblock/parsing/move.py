@@ -21,9 +21,11 @@ from phyblock.parsing.operation import (
     DONE,
     INTEGER,
     LABEL,
+    MENTION,
     OPERATION,
-    PHRASE,
     Operation,
+    is_not_meant,
+    mentions,
     named,
     number_of,
     operation_of,
@@ -54,19 +56,10 @@ class ParsedMove:
 _Find = Callable[[str, list[str]], Sequence[Operation]]
 
 _LABELED = re.compile(rf"(?<![\w]){LABEL}[`*\"'_ ]{{0,6}}{OPERATION}(?![\w?])", re.IGNORECASE)
-_MENTION = re.compile(
-    rf"(?<![\w]){named(CALL, 'call')}|(?<![\w]){named(PHRASE, 'phrase')}", re.IGNORECASE
-)
 _MORE = re.compile(
     rf"[\s,;&+`*]{{1,4}}(?:(?:and|then|or)\s{{1,3}}){{0,2}}{named(CALL, 'call')}", re.IGNORECASE
 )
 """A further operation behind one, with nothing said between them."""
-_NOT_MEANT = re.compile(
-    r"\b(?:undo|remov\w+|revert\w*|take back|don['\u2019]t|do not|never|cannot|can['\u2019]t|after"
-    r"|since|because|last|previous\w*|prior|earlier|instead of|rather than)\b[^.;:,!?]{0,60}\Z",
-    re.IGNORECASE,
-)
-"""What stands before an operation in its clause that is not the one to do now."""
 _TAKES_BACK = words(TAKES_BACK, r"\b(?:actually|instead|no\.)")
 _CONCLUDES = re.compile(
     rf"\b(?:so|therefore|thus|hence)\b[:,]?\s(?:[^\d\n.;]{{0,30}}\s)?{named(CALL, 'call')}"
@@ -80,14 +73,7 @@ _FOLLOWS = re.compile(
     r"\s(?:has to|must|should|needs to|is to|will)?\s?(?:be|is|comes?|goes?)\s(?:next|now)\b",
     re.IGNORECASE,
 )
-_CLAUSE_CHARS = 100
-_ASKED = re.compile(r"[^.!?;\n]{0,80}\?")
 _COUNTED = re.compile(r"\d{1,2}[.)]\s")
-_MANY = re.compile(
-    r"(?<!\w)move\s{0,3}[(\[]\s{0,9}(?P<list>[0-9]{1,6}"
-    r"(?:\s{0,3}(?:[,;/&]|and|or)\s{0,3}[0-9]{1,6}){1,31})(?![0-9])",
-    re.IGNORECASE,
-)
 _DONE_SENTENCE = re.compile(
     rf"(?:\A|[.!?:\u2014]\s{{1,3}}|;\s{{0,3}}|(?:->|\u2192|(?P<then>\bthen))\s{{0,3}}){DONE}\s{{0,2}}[.!]?\Z",
     re.IGNORECASE,
@@ -160,7 +146,7 @@ def _labeled(_: str, lines: list[str]) -> list[Operation]:
     found: list[Operation] = []
     end = 0
     for match in _LABELED.finditer(text):
-        if _is_not_meant(text, match.start()):
+        if is_not_meant(text, match.start()):
             continue
         if not found and _OR.search(text, 0, match.start()):
             return []
@@ -174,34 +160,18 @@ def _labeled(_: str, lines: list[str]) -> list[Operation]:
     return found
 
 
-def _is_not_meant(text: str, start: int) -> bool:
-    before = text[max(0, start - _CLAUSE_CHARS) : start]
-    return bool(_NOT_MEANT.search(before[before.rfind("\n") + 1 :]))
-
-
-def _mentions(line: str) -> list[Operation]:
-    found = [
-        operation_of(match)
-        for match in _MENTION.finditer(line)
-        if not _is_not_meant(line, match.start()) and not _ASKED.match(line, match.end())
-    ]
-    for many in _MANY.finditer(line):
-        found += [int(digits) for digits in re.findall("[0-9]+", many["list"])]
-    return found
-
-
 def _concluded(_: str, lines: list[str]) -> list[Operation]:
     """The operation that the last sentence comes to: "Move(3) failed, so Move(5)"."""
     follows = [number_of(match["number"]) for match in _FOLLOWS.finditer(lines[-1])]
     if follows:
         return [*follows]
-    concludes = _CONCLUDES.search(lines[-1]) if len({*_mentions(lines[-1])}) > 1 else None
+    concludes = _CONCLUDES.search(lines[-1]) if len({*mentions(lines[-1])}) > 1 else None
     return [operation_of(concludes)] if concludes and not _UNSURE.search(lines[-1]) else []
 
 
 def _in_last_line(_: str, lines: list[str]) -> list[Operation]:
     is_item = _COUNTED.match(lines[-1])
-    mentioned = _mentions(lines[-1])
+    mentioned = mentions(lines[-1])
     says_done = _DONE_SENTENCE.search(lines[-1])
     is_later = says_done and says_done["then"] and re.search(r"\d", lines[-1])
     done: list[Operation] = (
@@ -211,7 +181,7 @@ def _in_last_line(_: str, lines: list[str]) -> list[Operation]:
 
 
 def _anywhere(_: str, lines: list[str]) -> list[Operation]:
-    return [operation for line in lines for operation in _mentions(line)]
+    return [operation for line in lines for operation in mentions(line)]
 
 
 def _loose(_: str, lines: list[str]) -> list[int]:
@@ -223,7 +193,7 @@ def _loose(_: str, lines: list[str]) -> list[int]:
 
 
 def _moved(line: str) -> list[int]:
-    if _MENTION.search(line) and not _mentions(line):
+    if MENTION.search(line) and not mentions(line):
         return []
     statement = read_statement(line.replace("_", " "), is_item=False)
     if statement.loose - {*statement.numbers}:

@@ -1,4 +1,7 @@
-"""How replies write one operation of step planning, `Move(3)` or `Done`: in words and as JSON."""
+"""How replies write one operation of step planning, `Move(3)` or `Done`: in words and as JSON.
+
+A mention counts where its clause means it: not "after Move(3)", not "Move(3)?".
+"""
 
 from __future__ import annotations
 
@@ -14,9 +17,12 @@ __all__ = [
     "DONE",
     "INTEGER",
     "LABEL",
+    "MENTION",
     "OPERATION",
     "PHRASE",
     "Operation",
+    "is_not_meant",
+    "mentions",
     "named",
     "number_of",
     "operation_of",
@@ -56,6 +62,22 @@ LABEL = (
 )
 OPERATION = rf"(?:{named(CALL, 'call')}|{named(PHRASE, 'phrase')}|(?P<done>{DONE}))"
 ANSWER_LINE = re.compile(rf"(?:{LABEL}:?\s{{0,3}})?{OPERATION}\s{{0,3}}[.!;]?", re.IGNORECASE)
+MENTION = re.compile(
+    rf"(?<![\w]){named(CALL, 'call')}|(?<![\w]){named(PHRASE, 'phrase')}", re.IGNORECASE
+)
+_NOT_MEANT = re.compile(
+    r"\b(?:undo|remov\w+|revert\w*|take back|don['\u2019]t|do not|never|cannot|can['\u2019]t|after"
+    r"|since|because|last|previous\w*|prior|earlier|instead of|rather than)\b[^.;:,!?]{0,60}\Z",
+    re.IGNORECASE,
+)
+"""What stands before an operation in its clause that is not the one to do now."""
+_CLAUSE_CHARS = 100
+_ASKED = re.compile(r"[^.!?;\n]{0,80}\?")
+_MANY = re.compile(
+    r"(?<!\w)move\s{0,3}[(\[]\s{0,9}(?P<list>[0-9]{1,6}"
+    r"(?:\s{0,3}(?:[,;/&]|and|or)\s{0,3}[0-9]{1,6}){1,31})(?![0-9])",
+    re.IGNORECASE,
+)
 _INDEX_KEYS = ("index", "block_index", "id", "block_id", "block", "candidate", "number", "n")
 _INDEX_ALONE = _INDEX_KEYS[:4]
 """Keys that are enough without an action."""
@@ -77,6 +99,24 @@ def operation_of(match: re.Match[str]) -> Operation:
     groups = match.groupdict()
     digits = groups.get("call") or groups.get("phrase")
     return number_of(digits) if digits else "done"
+
+
+def is_not_meant(text: str, start: int) -> bool:
+    """Whether the clause before an operation says that it is not the one to do now."""
+    before = text[max(0, start - _CLAUSE_CHARS) : start]
+    return bool(_NOT_MEANT.search(before[before.rfind("\n") + 1 :]))
+
+
+def mentions(line: str) -> list[Operation]:
+    """The operations that a line calls by name and means."""
+    found = [
+        operation_of(match)
+        for match in MENTION.finditer(line)
+        if not is_not_meant(line, match.start()) and not _ASKED.match(line, match.end())
+    ]
+    for many in _MANY.finditer(line):
+        found += [int(digits) for digits in re.findall("[0-9]+", many["list"])]
+    return found
 
 
 def operations_of(value: Any) -> list[Operation]:

@@ -16,6 +16,7 @@ from itertools import pairwise
 
 from phyblock.parsing.listing import Listing
 from phyblock.parsing.mention import named_blocks
+from phyblock.parsing.plan_claims import PLACE_OR_TIMES, counts_hold, places_hold
 from phyblock.parsing.plan_patterns import (
     CATALOGUE_WORD,
     EXPLANATION,
@@ -24,6 +25,7 @@ from phyblock.parsing.plan_patterns import (
 )
 from phyblock.parsing.plan_rank import LAST, NO, is_announced, rank_of
 from phyblock.parsing.speech import TAKES_BACK, words
+from phyblock.parsing.text_forms import SENTENCES
 
 __all__ = ["is_doubtful"]
 
@@ -41,7 +43,6 @@ _DROPS = re.compile(
     re.IGNORECASE,
 )
 _NUMBER = re.compile(r"\d")
-_SENTENCE = re.compile(r"[.;!?](?=\s|\Z)|[。；！？]")
 _ASIDE = re.compile(
     r"\b(?:not?|never|none|un\w+|distract\w*|decoy\w*|similar|alternativ\w*|could|would|might"
     r"|may|if"
@@ -75,21 +76,6 @@ _STEP_AGAIN = re.compile(
     re.IGNORECASE,
 )
 """A step named again, to take it back."""
-_PLACE_OR_TIMES = re.compile(
-    r"(?<![\d.])(?P<block>\d{1,2})\s(?:must|has to|needs to|should|is|comes?|goes)\s?(?:be|come"
-    r"|go)?\s?"
-    r"(?:(?:placed|used|needed)\s)?(?:(?P<place>first|last)|(?P<times>once|twice|three times"
-    r"|two times)"
-    r"|(?P<relation>before|after)\s(?:block\s|candidate\s)?(?P<other>\d{1,2}))\b",
-    re.IGNORECASE,
-)
-"""What is said of a block behind the plan that the plan itself shows to be so or not."""
-_TOTAL = re.compile(
-    r"\b(?:total(?: number)?(?: of)?|number of) ?(?:blocks?|steps?"
-    r"|moves?)?(?: used)?\W{1,4}(\d{1,2})\b(?! (?:layers|levels|kinds|types|colou?rs))",
-    re.IGNORECASE,
-)
-"""A count of the steps, said behind them."""
 _ONCE_MORE = re.compile(
     r"\bstep\W{0,3}\d{1,2}\W.{0,20}\b(?:repeat|again|same|another|likewise|also|mirror"
     r"|duplicate|copy)\b",
@@ -164,7 +150,7 @@ def _is_contradicted(
     """Whether lines and lists beside or behind the plan say otherwise."""
     order = _numbers(lists)
     known = {*order}
-    if any(int(total[1]) != len(order) for total in _TOTAL.finditer("\n".join(below))):
+    if not counts_hold("\n".join(below), order):
         return True
     beside = [line for listing in lists for line in listing.between]
     beside += [line for listing in later for line in listing.above]
@@ -173,7 +159,7 @@ def _is_contradicted(
         if listing.form == "labeled" and not _ASIDE.search(listing.label):
             beside += listing.lines
     said = "\n".join([*beside, *below, *(line for listing in after for line in listing.lines)])
-    if not all(_holds(match, order) for match in _PLACE_OR_TIMES.finditer(said)):
+    if not places_hold(said, order):
         return True
     return _is_corrected([*beside, *below], order) or any(
         _says_otherwise(listing, order, known) for listing in after
@@ -207,33 +193,17 @@ def _is_corrected(lines: Sequence[str], order: Sequence[int]) -> bool:
     is_explained = False
     numbers = {*order}
     for line in lines:
-        line = _PLACE_OR_TIMES.sub(" ", line)
+        line = PLACE_OR_TIMES.sub(" ", line)
         is_explained = is_explained or bool(EXPLANATION.search(line))
         if (_CORRECTS.search(line) and _NUMBER.search(line)) or _DROPS.search(line):
             return True
         again = _STEP_AGAIN.search(line)
         if again and (again["then"] or not again[0].lower().startswith("step")):
             return True
-        for sentence in () if is_explained else _SENTENCE.split(line):
+        for sentence in () if is_explained else SENTENCES.split(line):
             if not _ASIDE.search(sentence) and named_blocks(sentence) - numbers:
                 return True
     return False
-
-
-def _holds(said: re.Match[str], order: Sequence[int]) -> bool:
-    """Whether what a line says of a block's place or number of times is so in the plan."""
-    block = int(said["block"])
-    if said["times"]:
-        times = said["times"].lower()
-        return order.count(block) == {"once": 1, "twice": 2, "three times": 3}.get(times, 2)
-    if block not in order:
-        return False
-    if said["other"]:
-        earlier = said["relation"].lower() == "before"
-        other = int(said["other"])
-        first, then = (block, other) if earlier else (other, block)
-        return other in order and order.index(first) < order.index(then)
-    return order[0 if said["place"].lower() == "first" else -1] == block
 
 
 def _unexplained(later: Sequence[Listing]) -> Iterator[Listing]:

@@ -7,7 +7,16 @@ from __future__ import annotations
 import re
 import unicodedata
 
-__all__ = ["BOX", "TAG", "answer_of", "number_of_word", "plain_forms", "plain_line", "unmarked"]
+__all__ = [
+    "BOX",
+    "SENTENCES",
+    "TAG",
+    "answer_of",
+    "number_of_word",
+    "plain_forms",
+    "plain_line",
+    "unmarked",
+]
 
 _NOT_ASCII = re.compile(r"[^\x00-\x7f]")
 _TAGS = r"(?:think(?:ing)?|thoughts?|reasoning|scratchpad|analysis|reflection)"
@@ -35,6 +44,8 @@ TAG = re.compile(
 )
 BOX = re.compile(r"\\boxed\s{0,2}\{(?P<value>(?:[^{}]|\{[^{}]{0,200}\}){1,4000})\}", re.DOTALL)
 """Frames in which an answer stands."""
+SENTENCES = re.compile(r"(?<=[^\d\s][.;!?])\s|(?<=\d[.;!?])\s(?=\D)|(?<=[。；！？])|\n")
+"""Where one sentence ends and the next begins; a number with a full stop may count an item."""
 _QUOTES = re.compile(
     r"[*`$\"\u201c\u201d\u00ab\u00bb\u201e]|(?<!\w)['\u2018\u2019]|['\u2018\u2019](?!\w)"
 )
