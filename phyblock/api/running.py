@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import signal
+import sys
 import threading
 import warnings
 from collections.abc import Iterator, Sequence
@@ -18,7 +19,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.plain_text import counted
 from phyblock.report.notebook import LoadedRun, load_run
 from phyblock.run.consent import spending_refused, unlimited_spending
-from phyblock.run.events import RunEvent
+from phyblock.run.events import RunEvent, Stopping
 from phyblock.run.execute import RunResult
 from phyblock.run.finding import check_commands, find_models_file
 from phyblock.run.plan import make_plan
@@ -62,7 +63,7 @@ def run_suite(
     if costly:
         hint = "agree with yes=True, or set a limit: load_suite(NAME, 'limits.max_cost_usd=5')"
         raise spending_refused(plan, costly, "would cost money, and nobody agreed", hint)
-    session = Session(plan, folder, _unseen, use_cache=use_cache, retry_failed=retry_failed)
+    session = Session(plan, folder, _hear, use_cache=use_cache, retry_failed=retry_failed)
     _tell(folder, _RunApart(session).completed())
     return load_run(folder)
 
@@ -162,8 +163,10 @@ class _RunApart:
             self._whole = None
 
 
-def _unseen(_: RunEvent) -> None:
-    """Nobody watches."""
+def _hear(event: RunEvent) -> None:
+    """Say what an interrupted run waits for; of all else a program hears at the end."""
+    if isinstance(event, Stopping):
+        print(event.text, file=sys.stderr, flush=True)
 
 
 def _tell(folder: Path, result: RunResult) -> None:

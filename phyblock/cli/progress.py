@@ -92,7 +92,7 @@ class ProgressView:
             tally.is_stopped, tally.notice = True, f"stopped: {event.reason}"
             self._say(f"{one_line(event.model)} stopped: {event.reason}", style="red")
         elif isinstance(event, Stopping):
-            self._status = self._stopping_text(event)
+            self._status = event.text
             if self._live is None:
                 self._say(self._status)
 
@@ -131,12 +131,6 @@ class ProgressView:
             for name, tally in self._tallies.items()
             if tally.at_once
         )
-
-    def _stopping_text(self, event: Stopping) -> str:
-        if not event.in_flight:
-            return f"Stopping: {event.reason}."
-        calls = f"{counted(event.in_flight, 'call')} under way"
-        return f"Stopping: {event.reason}; waiting for {calls} (Ctrl-C again to give them up)."
 
     def _plain_line(self) -> None:
         now = self._now()

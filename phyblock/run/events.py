@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from phyblock.plain_text import counted
 from phyblock.records import Record
 from phyblock.run.standing import Summary
 
@@ -71,6 +72,14 @@ class Stopping:
 
     reason: str
     in_flight: int
+
+    @property
+    def text(self) -> str:
+        """What a person who stopped it is told: what it waits for, and how to give that up."""
+        if not self.in_flight:
+            return f"Stopping: {self.reason}."
+        calls = f"{counted(self.in_flight, 'call')} under way"
+        return f"Stopping: {self.reason}; waiting for {calls} (Ctrl-C again to give them up)."
 
 
 RunEvent = RunStarted | SampleDone | ModelNotice | RunNotice | ModelStopped | Stopping

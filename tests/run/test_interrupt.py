@@ -148,7 +148,9 @@ for folder in sys.argv[1:]:
 
 def test_a_program_is_interrupted_in_a_run_as_well_at_any_time(workspace: Workspace) -> None:
     opening, asking, waiting = folders = [workspace.root / name for name in ("a", "b", "c")]
-    with Running(OpenAIChat(Faults(latency_s=1.0))) as running:
+    told = workspace.root / "told"
+    slow = OpenAIChat(Faults(latency_s=1.0))
+    with Running(slow) as running, told.open("w", encoding="utf-8") as errors:
         server = running.server
         prepare(workspace, running.url, "alpha")
         locked = sqlite3.connect(workspace.cache / "replies.sqlite", isolation_level=None)
@@ -158,6 +160,7 @@ def test_a_program_is_interrupted_in_a_run_as_well_at_any_time(workspace: Worksp
             cwd=workspace.root,
             env=workspace.env,
             stdout=subprocess.PIPE,
+            stderr=errors,
             text=True,
         )
         assert process.stdout is not None
@@ -175,6 +178,8 @@ def test_a_program_is_interrupted_in_a_run_as_well_at_any_time(workspace: Worksp
                 process.send_signal(signal.SIGINT)
                 assert said.readline() == "interrupted\n"
                 assert len(workspace.records(asking)) == AT_ONCE
+                last = told.read_text(encoding="utf-8").splitlines()[-1]
+                assert f"interrupted; waiting for {AT_ONCE} calls" in last
 
                 wait_for(lambda: server.requests == 2 * AT_ONCE)
                 while not select.select([said], [], [], 0.5)[0]:
