@@ -33,7 +33,9 @@ def cache_dir() -> Path:
 
 
 def learned_dir() -> Path:
-    """Where plans are kept that floors learned, `DIGEST.json` each: they cost time alone."""
+    """Where plans that floors learned and what floors reach are kept, `DIGEST.json` each: they cost
+    time alone.
+    """
     return cache_dir() / "goal-blind"
 
 
