@@ -32,12 +32,15 @@ os.environ.update(ONE_THREAD)
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """What is collected stays to the end: the garbage collector need not go through it."""
+    """What is collected stays to the end, and what tests make is mostly gone without a collector:
+    it need not go through the one, nor often through the other.
+    """
     gc.disable()
     try:
         return (yield)
     finally:
         gc.freeze()
+        gc.set_threshold(50_000, 20, 20)
         gc.enable()
 
 

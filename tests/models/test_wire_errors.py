@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import traceback
+from dataclasses import replace
 
 import pytest
 from aiohttp import web
@@ -204,12 +205,13 @@ def test_a_seed_that_may_not_be_sent_is_not(route: str) -> None:
 
 def test_a_server_that_never_answers_is_a_timeout(route: str) -> None:
     running, server = serve(route, Faults(mode="slow"))
+    policy = replace(QUICK, attempts=3)
     with running:
-        model = make_model(config(route, running.url, timeout_s=0.2))
+        model = make_model(config(route, running.url, timeout_s=0.2), policy=policy)
         (answer,) = ask(model, make_request())
     assert isinstance(answer, RetryableError)
     assert answer.status is None
-    assert server.requests == QUICK.attempts
+    assert server.requests == policy.attempts
 
 
 @pytest.mark.parametrize("mode", ["echo-key", "ok"])

@@ -129,8 +129,9 @@ def test_wrong_steps_say_why_and_what_was_possible(visit: ReportVisit) -> None:
 
 
 def test_play_scrub_and_keys_move_through_the_steps(visit: ReportVisit) -> None:
-    visit.show("full_planning/oracle/t5/s0")
     page = visit.page
+    page.clock.install()
+    visit.show("full_planning/oracle/t5/s0")
     where = page.locator(".controls output")
     assert where.inner_text() == "End"
     page.locator("#scrub").fill("0")
@@ -145,9 +146,11 @@ def test_play_scrub_and_keys_move_through_the_steps(visit: ReportVisit) -> None:
     assert painted(page, "canvas.stage") > empty
     page.keyboard.press(" ")
     assert page.inner_text("#play") == "Pause"
+    page.clock.run_for(10_000)
     expect(where).to_have_text("End")
     expect(page.locator("#play")).to_have_text("Play")
     page.locator("#play").click()
+    page.clock.run_for(1_000)
     expect(where).to_have_text("Step 1 of 4")
     page.locator("#play").click()
     assert page.inner_text("#play") == "Play"

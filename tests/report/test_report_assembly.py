@@ -62,10 +62,9 @@ def test_each_cell_is_the_micro_average_of_its_records(records: Records, missing
 def test_the_order_of_records_changes_no_table(records: Records, random: Random) -> None:
     shuffled = records.copy()
     random.shuffle(shuffled)
+    run, other = run_of(records, manifest()), run_of(shuffled, manifest())
     for frame in (assembly_frame, table1_frame, errors_frame):
-        pd.testing.assert_frame_equal(
-            frame(run_of(records, manifest())), frame(run_of(shuffled, manifest()))
-        )
+        pd.testing.assert_frame_equal(frame(run), frame(other))
 
 
 @laws

@@ -109,11 +109,13 @@ def test_figures_for_slides_are_asked_for_and_what_a_run_drew_of_old_goes(tmp_pa
     assert mine.read_bytes() == b"mine"
 
 
-def test_what_a_run_has_no_numbers_for_is_not_drawn(tmp_path: Path) -> None:
+def test_what_a_run_has_no_numbers_for_is_not_drawn_and_no_window_is_opened(tmp_path: Path) -> None:
+    had_pyplot = "matplotlib.pyplot" in sys.modules
     run = load_run(write_run(tmp_path / "run", [], manifest()), texts=False)
     assert write_figures(run) == ()
     drawn = {file.stem for file in write_figures(load_run(folder_of(tmp_path / "other")))}
     assert drawn == PLANNING
+    assert ("matplotlib.pyplot" in sys.modules) == had_pyplot
 
 
 def test_a_figure_takes_no_style_of_the_user_and_leaves_none(tmp_path: Path) -> None:
@@ -124,12 +126,6 @@ def test_a_figure_takes_no_style_of_the_user_and_leaves_none(tmp_path: Path) -> 
         write_figures(run, ["f1-levels"])
         assert matplotlib.rcParams["font.size"] == 30
     assert file.read_bytes() == plain
-
-
-def test_drawing_opens_no_window_and_imports_no_pyplot(tmp_path: Path) -> None:
-    had = "matplotlib.pyplot" in sys.modules
-    write_figures(load_run(folder_of(tmp_path / "run")))
-    assert ("matplotlib.pyplot" in sys.modules) == had
 
 
 def test_accuracy_by_subtask_by_hand(tmp_path: Path) -> None:

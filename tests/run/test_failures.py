@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -48,7 +49,8 @@ def coverage(workspace: Workspace) -> dict[str, Raw]:
 def test_every_sample_is_scored_through_the_mix_of_faults(
     workspace: Workspace, samples: int
 ) -> None:
-    with Running(OpenAIChat(ISSUE_MIX, keep=False)) as running:
+    faults = replace(ISSUE_MIX, retry_after="0")
+    with Running(OpenAIChat(faults, keep=False)) as running:
         workspace.write_models(running.url, "alpha")
         workspace.write_suite(models=["alpha"], seeds=list(range(samples // 5)))
         done = workspace.run()
