@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from phyblock_making.attacks.attacks import Attacked
+from phyblock_making.attacks.attacks import UNSEEN_TEXT, Attacked
 from phyblock_making.attacks.observed import Observed
 
 __all__ = ["attack_card"]
@@ -63,6 +63,8 @@ VERSION_3: Mapping[str, Mapping[str, int]] = {
     },
 }
 """The same on the third version, whose next steps, outcomes and places could hang on an edge."""
+_UNSEEN = f""" What is called
+`{UNSEEN_TEXT}` has learned from the texts of the set after `--unseen` above, and no others."""
 _BEFORE = (VERSION_1, VERSION_2, VERSION_3)
 _CUTS_1 = "59 in 47 questions, 47 of them to be seen"
 
@@ -71,7 +73,7 @@ _TEXT = """
 
 From `phyblock vqa audit`; docs/vqa.md says what each goes by, and why aims of the built-in set are
 missed. Accuracy [%] of the better of both ways to read an attack, with a 95 % interval; the last
-columns are what it reached on earlier versions of `phyblock-vqa`.
+columns are what it reached on earlier versions of `phyblock-vqa`.{unseen}
 
 | attack | subtask | n | chance | reached | 95 % | aim | aim is | {versions} |
 |---|---|---|---|---|---|---|---|{rules}|
@@ -87,6 +89,7 @@ def attack_card(attacked: Sequence[Attacked], observed: Sequence[Observed]) -> s
     rows = [_row(one) for one in attacked if not one.kind]
     if not rows:
         return ""
+    unseen = _UNSEEN if any(one.attack.name == UNSEEN_TEXT for one in attacked) else ""
     versions = " | ".join(f"version {number}" for number in range(1, len(_BEFORE) + 1))
     rules = "|".join(["---"] * len(_BEFORE))
     cuts = [cut for one in observed for cut in one.cuts]
@@ -96,7 +99,12 @@ def attack_card(attacked: Sequence[Attacked], observed: Sequence[Observed]) -> s
         shown = sum(cut.pixels > 0 for cut in cuts)
         told = f"{len(cuts)} in {questions} questions, {shown} of them to be seen"
     return _TEXT.format(
-        rows="\n".join(rows), cuts=told, cuts_1=_CUTS_1, versions=versions, rules=rules
+        rows="\n".join(rows),
+        cuts=told,
+        cuts_1=_CUTS_1,
+        versions=versions,
+        rules=rules,
+        unseen=unseen,
     )
 
 

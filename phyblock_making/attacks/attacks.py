@@ -28,6 +28,7 @@ from phyblock_making.attacks.probes import (
 
 __all__ = [
     "ATTACKS",
+    "UNSEEN_TEXT",
     "Attack",
     "Attacked",
     "Rate",
@@ -38,6 +39,8 @@ __all__ = [
     "by_rule",
 ]
 
+UNSEEN_TEXT = "text, unseen set"
+"""The attack that learns from another set alone."""
 Verdict = Literal["met", "over, in noise", "missed"]
 """At most the aim; above it, but the interval reaches down to it; or all of it above."""
 
@@ -160,7 +163,7 @@ def all_attacks(unseen: Sequence[Question] = (), *, with_texts: bool = True) -> 
         *(_TEXTS, _INVERTED_TEXTS, True),
     )
     told = "the same, learned from the other set alone"
-    beyond = Attack("text, unseen set", told, unseen_text(unseen), _TEXTS, _INVERTED_TEXTS, True)
+    beyond = Attack(UNSEEN_TEXT, told, unseen_text(unseen), _TEXTS, _INVERTED_TEXTS, True)
     return (*ATTACKS, within, *([beyond] if unseen else []))
 
 
