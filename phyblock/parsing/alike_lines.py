@@ -20,7 +20,6 @@ _ALIKE = re.compile(
     re.MULTILINE | re.IGNORECASE,
 )
 _ALIKE_LINE = re.compile(r"^\D*(?P<n>\d{1,2})\D+(?P<block>\d{1,2})(?P<after>\D*)$")
-_UNIT = re.compile(r"\s?\w+s\b|\s?[cm]?m\b|%|\s?[x×]")
 _NO_STEPS = re.compile(
     r"\s*(?:block|candid|piece|cube|layer|level|tier|row|index|id|option|l|c"
     r"|b)",
@@ -32,9 +31,8 @@ _COUNTS = re.compile(
     re.IGNORECASE,
 )
 """What else lines may count: layers with the number of their blocks, or the candidates."""
-_MANY = re.compile(
-    r"\A\s?(?:blocks|cubes|pieces|cm|mm|%|°|x\b|×|blöcke|blocs|bloques|个|块|個|개)", re.I
-)
+_MANY = re.compile(r"\s?(?:\w+s\b|[cm]?m\b|%|°|[x×](?!\w)|blöcke|个|块|個|개)", re.IGNORECASE)
+"""What stands behind a number that says how many, or how long."""
 
 
 def counted_lines(text: str) -> str:
@@ -46,7 +44,7 @@ def _of_shape(lines: re.Match[str]) -> str:
     found = [_ALIKE_LINE.match(line) for line in lines[0].splitlines() if line.strip()]
     counted = [int(line["n"]) if line else 0 for line in found]
     says_else = _NO_STEPS.fullmatch(lines["before"].rstrip(" _s")) or any(
-        line and _UNIT.match(line["after"]) for line in found
+        line and _MANY.match(line["after"]) for line in found
     )
     if says_else or counted != [*range(1, len(counted) + 1)]:
         return lines[0]

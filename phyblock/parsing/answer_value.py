@@ -155,7 +155,7 @@ class ChoiceReader:
         """What a text names by the option's number, where numbers cannot mean anything else."""
         value = unmarked(text).strip()
         ordinal = _ORDINAL.search(value)
-        if ordinal:
+        if ordinal and not _NEGATION.search(value, 0, ordinal.start()):
             return self._nth(PLACES[ordinal["word"].lower()])
         if self._has_digits:
             return None

@@ -7,7 +7,6 @@ import re
 __all__ = [
     "ACTION_KEY",
     "ARGUMENTS_KEY",
-    "BACKWARD_KEY",
     "BLOCK_KEY",
     "CHOICE_KEY",
     "INDEX_KEY",
@@ -71,9 +70,6 @@ MANY_KEY = re.compile(
 STEP_TEXT = re.compile(r"\W{0,4}(?:step|schritt|paso|étape|步骤)\s?\d{1,2}\b", re.IGNORECASE)
 ARGUMENTS_KEY = re.compile(r"arguments|args|param(?:eter)?s|input|function|tool_input", re.I)
 LOOKS_KEY = re.compile(r"shape|color|colour|orientation|type|形状|颜色", re.IGNORECASE)
-BACKWARD_KEY = re.compile(
-    r"revers|backward|top[ _-](?:to[ _-]bottom|down)|last[ _-]to[ _-]first", re.I
-)
 CHOICE_KEY = re.compile(
     r"(?:plan|option|alternative|variant)[ _-]?(?P<which>[a-d1-4])", re.IGNORECASE
 )

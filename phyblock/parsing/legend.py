@@ -32,7 +32,6 @@ _SHAPE = re.compile(
     r"|brick)(?:e?s)?\b",
     re.IGNORECASE,
 )
-_ARTICLE = re.compile(r"^(?:the|a|an|one|and|der|die|das)\s", re.IGNORECASE)
 _NO_NAME = re.compile(
     r"\b(?:steps?|layers?|plan|answer|order|sequence|total|blocks?|candidates?|size|height"
     r"|width|rows?"
@@ -51,7 +50,7 @@ def with_numbers(text: str) -> str | None:
         named = {key: value for key, value in given.groupdict().items() if value}
         number = next(named.pop(key) for key in list(named) if key.endswith("number"))
         (name,) = named.values()
-        name = _ARTICLE.sub("", name.lower())
+        name = name.lower()
         if _NO_NAME.search(name):
             continue
         if numbers.setdefault(name, number) != number:

@@ -70,16 +70,14 @@ _OR = re.compile(r"\b(?:or|oder|ou)\s{1,3}\Z", re.IGNORECASE)
 """An operation behind this is one of several, of which the others may be no number at all."""
 _FOLLOWS = re.compile(
     rf"\b(?:so|therefore|thus|hence),?\s(?:(?:block|candidate|index)\s){{0,2}}{INTEGER}"
-    r"\s(?:has to|must|should|needs to|is to|will)?\s?(?:be|is|comes?|goes?)\s(?:next|now)\b",
+    r"\s(?:has to|must|should|needs to|is to|will)?\s?(?:be|is|comes?|goes?)\s(?:next|now)\b"
+    r"(?![^.;\n]{0,80}(?:\bor\b|\?))",
     re.IGNORECASE,
 )
 _COUNTED = re.compile(r"\d{1,2}[.)]\s")
 _DONE_SENTENCE = re.compile(
     rf"(?:\A|[.!?:\u2014]\s{{1,3}}|;\s{{0,3}}|(?:->|\u2192|(?P<then>\bthen))\s{{0,3}}){DONE}\s{{0,2}}[.!]?\Z",
     re.IGNORECASE,
-)
-_UNSURE = re.compile(
-    r"\b(?:or|either|perhaps|maybe|not sure|later|afterwards|then)\b", re.IGNORECASE
 )
 _OTHER_CALL = re.compile(
     rf"(?:{LABEL})(?!move|place|put|done)[a-z_]{{3,20}}\s?\([^()\n]{{0,20}}\)\W{{0,3}}",
@@ -166,7 +164,7 @@ def _concluded(_: str, lines: list[str]) -> list[Operation]:
     if follows:
         return [*follows]
     concludes = _CONCLUDES.search(lines[-1]) if len({*mentions(lines[-1])}) > 1 else None
-    return [operation_of(concludes)] if concludes and not _UNSURE.search(lines[-1]) else []
+    return [operation_of(concludes)] if concludes else []
 
 
 def _in_last_line(_: str, lines: list[str]) -> list[Operation]:

@@ -12,7 +12,6 @@ from phyblock.parsing.chain import chain
 from phyblock.parsing.json_keys import (
     ACTION_KEY,
     ARGUMENTS_KEY,
-    BACKWARD_KEY,
     BLOCK_KEY,
     CHOICE_KEY,
     INDEX_KEY,
@@ -27,6 +26,7 @@ from phyblock.parsing.json_keys import (
 )
 from phyblock.parsing.json_values import Fields, cut_off, decoded, objects, whole_number
 from phyblock.parsing.mention import MOST_AT_ONCE
+from phyblock.parsing.plan_patterns import DOWNWARD
 from phyblock.parsing.speech import BACKWARD, TAKES_BACK, words
 from phyblock.parsing.statement import read_statement
 from phyblock.parsing.text_forms import plain_line
@@ -138,10 +138,14 @@ def _object(fields: Fields, *, is_plan: bool) -> list[int]:
         return _step(fields)
     found = _ordered(fields, is_plan=is_plan)
     is_reversed = any(
-        BACKWARD.search(value) if isinstance(value, str) else BACKWARD_KEY.search(key)
+        BACKWARD.search(value) if isinstance(value, str) else _says_down(plain_line(key))
         for key, value in fields
     )
     return found[::-1] if is_reversed else found
+
+
+def _says_down(key: str) -> bool:
+    return bool(BACKWARD.search(key) or DOWNWARD.search(key))
 
 
 def _ordered(fields: Fields, *, is_plan: bool) -> list[int]:

@@ -27,7 +27,6 @@ _NUMBER = re.compile(
     rf"|\b(?P<ordinal>first|second|third|fourth|fifth|sixth)\s{_PART}\b",
     re.IGNORECASE,
 )
-_GROUND_FLOOR = re.compile(r"\bground floor\b", re.IGNORECASE)
 
 
 def tier_of(label: str) -> tuple[int, int] | None:
@@ -37,7 +36,7 @@ def tier_of(label: str) -> tuple[int, int] | None:
     value, so that a list that says some by numbers and others by words is not sorted by both.
     """
     numbered = _NUMBER.search(label)
-    if numbered and not _GROUND_FLOOR.search(label):
+    if numbered:
         ordinal = (numbered["ordinal"] or "").lower()
         digits = numbered["after"] or numbered["cjk"] or numbered["alone"]
         return (0, int(digits) if digits else PLACES[ordinal])
