@@ -66,10 +66,16 @@ def main() -> None:
     for kind in KINDS:
         late = [reply for reply in replies if reply.kind == kind and reply.round >= LATE]
         print(f"rounds {LATE} and later, {kind}, then: {_then(late)}")
-    for is_plain in (True, False):
-        late = [reply for reply in replies if reply.plain == is_plain and reply.round >= MARKED]
-        name = "plain" if is_plain else "meant to be hard"
-        print(f"rounds {MARKED} and later, {name}, then: {_then(late)}")
+    before = [reply for reply in replies if LATE <= reply.round < MARKED]
+    marked = [reply for reply in replies if reply.round >= MARKED]
+    print(f"rounds {LATE} to {MARKED - 1}, then: {_then(before)}")
+    print(f"rounds {MARKED} and later, then: {_then(marked)}")
+    parts = {f"rounds {MARKED} and later": marked}
+    for number in sorted({reply.round for reply in marked}):
+        parts[f"round {number}"] = [reply for reply in marked if reply.round == number]
+    for name, part in parts.items():
+        print(f"{name}, plain, then: {_then([r for r in part if r.plain])}")
+        print(f"{name}, meant to be hard, then: {_then([r for r in part if not r.plain])}")
 
 
 def _then(replies: Sequence[Fresh]) -> str:
