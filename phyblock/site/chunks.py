@@ -1,7 +1,7 @@
 """Data as packed scripts: a page that was opened from disk may load scripts, but not fetch files.
 
-A script calls `phyblockSite(build, name, packed)`; what is packed is JSON, deflated, in base 64. It
-is read as data alone, so that nothing a model said is ever read as code.
+A script hands its text to the page as those of a run's report do; here the text is JSON, deflated,
+in base 64.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-from phyblock.report.html.pack import Pack, to_json
+from phyblock.report.html.pack import Pack, to_json, write_taken
 
 __all__ = ["chunks", "write_chunk"]
 
@@ -31,5 +31,4 @@ def write_chunk(folder: Path, name: str, build: str, data: Any) -> None:
 
 def _write(folder: Path, name: str, build: str, text: str) -> None:
     packed = base64.b64encode(zlib.compress(text.encode("ascii"), _LEVEL)).decode("ascii")
-    script = f"phyblockSite('{build}','{name}','{packed}')\n"
-    (folder / f"{name}.js").write_text(script, encoding="ascii")
+    write_taken(folder, name, build, packed)

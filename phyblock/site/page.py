@@ -8,13 +8,14 @@ __all__ = ["render_page"]
 
 _REPORT, _OWN = "phyblock.report.html", "phyblock.site"
 _SCRIPTS = (
-    *((_REPORT, name) for name in ("dom.js", "solid.js", "steps.js", "poses.js", "stage.js")),
+    *((_REPORT, name) for name in ("dom.js", "chunks.js", "solid.js", "steps.js", "poses.js")),
+    *((_REPORT, name) for name in ("stage.js", "quotes.js", "overlay.js", "why.js")),
     *((_OWN, name) for name in ("store.js", "table.js", "chart.js", "views.js", "replay.js")),
     (_OWN, "site.js"),
 )
-"""Blocks, steps and the stage are those of a run's report."""
+"""Loading of data, blocks, steps and the stage are those of a run's report."""
 _STYLES = (
-    *((_REPORT, name) for name in ("base.css", "samples.css")),
+    *((_REPORT, name) for name in ("base.css", "samples.css", "reply.css")),
     (_OWN, "site.css"),
 )
 

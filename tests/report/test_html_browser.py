@@ -61,6 +61,32 @@ def test_results_stand_in_the_page_before_anything_is_loaded(visit: ReportVisit)
     assert page.get_by_text("Expected").first.is_visible()
 
 
+def test_numbers_of_all_tables_lead_to_the_samples_that_they_were_made_from(
+    visit: ReportVisit,
+) -> None:
+    page = visit.open()
+    assert page.locator(".tables td a").count() == page.locator(".tables td.text a").count()
+    page.get_by_text("Coverage, suite trial").click()
+    cells = page.locator("details[open] tbody td:not(.text) a")
+    expect(cells.first).to_be_visible()
+    heads = "a => [a.getAttribute('href').slice(1), a.textContent]"
+    for address, counted in cells.evaluate_all(f"all => all.map({heads})"):
+        visit.open(address)
+        if counted[0] != "$":
+            assert visit.count() == f"{counted} sample{'s' * (counted != '1')}", address
+    page = visit.open()
+    page.get_by_text("Right answers with 95 %").click()
+    of_oracle = page.locator("details[open] tbody tr", has_text="oracle").get_by_role("link")
+    address = "#samples?track=vqa&model=oracle&subtask=object_property"
+    assert of_oracle.nth(1).get_attribute("href") == address
+    of_oracle.nth(1).click()
+    assert visit.count() == "4 samples"
+    page = visit.open()
+    page.get_by_text("F1 in setting A (with").click()
+    address = "#samples?track=full_planning&model=oracle&level=3&setting=B"
+    assert of_oracle.nth(6).get_attribute("href") == address
+
+
 def test_a_column_sorts_the_models_of_its_table(visit: ReportVisit) -> None:
     page = visit.open()
     # Baselines alone: a body of models that is empty stays empty, and the order of others too.
@@ -307,7 +333,8 @@ def _lists_what_the_headline_leads_with(visit: ReportVisit, folder: Path) -> Non
     page.select_option("#filter-setting", label="C")
     page.select_option("#filter-error", label="Off in height")
     assert page.locator(".row-model").all_inner_texts() == ["oracle-2d"]
-    assert "setting" not in visit.hash
+    # What the address will say: it is written once nothing has changed for a while.
+    assert page.evaluate("Filters.asked().setting") == ""
     page.select_option("#filter-setting", label="A")
     assert visit.count() == "2 samples"
 

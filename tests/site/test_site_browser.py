@@ -224,8 +224,14 @@ def test_from_the_table_to_a_replay_and_back(visit: SiteVisit) -> None:
     page.get_by_role("link", name="t5").first.click()
     expect(page.locator(".stage")).to_have_count(1)
     expect(page.locator("output")).to_have_text("End")
+    drawn = page.eval_on_selector(".stage", "canvas => canvas.toDataURL()")
     page.keyboard.press("ArrowLeft")
     expect(page.locator("output")).to_have_text("Step 4 of 4")
+    # Blocks have numbers: red, green and orange look alike to some.
+    page.evaluate("Overlay.hasNumbers = false")
+    page.keyboard.press("ArrowRight")
+    assert page.eval_on_selector(".stage", "canvas => canvas.toDataURL()") != drawn
+    page.evaluate("Overlay.hasNumbers = true")
     page.keyboard.press("Space")
     expect(page.get_by_role("button", name="Pause")).to_be_visible()
     page.select_option("#beside", label=HOSTILE)

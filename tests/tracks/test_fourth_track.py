@@ -159,6 +159,8 @@ def test_a_track_runs_from_yaml_to_the_report(
         asked = [*run, "--set", "answer_format=json_schema"]
         with pytest.raises(SpecError, match="cannot be asked for as JSON"):
             phyblock.main(asked, standalone_mode=False)
+        with pytest.raises(SpecError, match="is a person, who cannot answer in counting"):
+            phyblock.main(["play", "suite.yaml", "--name", "ada"], standalone_mode=False)
         assert not phyblock.main(run, standalone_mode=False)
         whole = workspace.records()
         text = (workspace.out / "records.jsonl").read_text()

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from urllib.parse import urlencode
 
+from phyblock.plain_text import one_line
 from phyblock.tables.load import Run
+from phyblock.tables.outcomes import HEADINGS
+from phyblock.tables.text_table import TextTable, level_name
 from phyblock.tracks.kind import kind_of
 
-__all__ = ["mean_parts", "part_names", "samples_query"]
+__all__ = ["TableLeads", "mean_parts", "part_names", "samples_query", "table_leads"]
+
+_NOT_RUN = "Not run"
+"""Heads numbers of samples that there are not."""
 
 
 def samples_query(run: Run, track: str, cell: str) -> str:
@@ -45,3 +53,59 @@ def mean_parts(run: Run) -> dict[str, dict[str, object]]:
         for track in run.design.suite.tracks
         for name, (heading, of) in _part_groups(run, track).items()
     }
+
+
+@dataclass(frozen=True)
+class TableLeads:
+    """Which samples the numbers of a table were made from, in the words of the page's address.
+
+    Words of each column, and of each row with the whole table; None for a column without numbers,
+    and for a row of which no samples are known.
+    """
+
+    columns: tuple[str | None, ...]
+    rows: tuple[str | None, ...]
+
+
+def table_leads(run: Run, name: str, table: TextTable) -> TableLeads:
+    """What the headings and the texts of a table say of the samples behind its numbers."""
+    tracks = run.design.suite.tracks
+    of_table = [track for track in tracks if name in kind_of(track).report().tables] or tracks
+    words = _words(run, of_table)
+    models = {one_line(model): model for model in run.design.model_names}
+    settings = {
+        one.name for track in of_table for one in kind_of(track).report().listings(run.design)
+    }
+    columns = []
+    for column in table.columns:
+        named = {"setting": column.name} if column.name in settings else {}
+        known = words.get(column.group.lower(), {}) | words.get(column.name.lower(), {}) | named
+        is_bare = column.is_text or column.name == _NOT_RUN
+        columns.append(None if is_bare else urlencode(known))
+    rows, model = [], None
+    for row in table.rows:
+        # An empty name is the one above.
+        model = models.get(row[0]) if row[0] else model
+        chosen = {"track": of_table[0]} if len(of_table) == 1 else {}
+        for cell, column in zip(row[1:], table.columns[1:], strict=True):
+            chosen |= words.get(cell.lower(), {}) if column.is_text else {}
+        is_known = model is not None and "track" in chosen
+        rows.append(urlencode({**chosen, "model": model}) if is_known else None)
+    return TableLeads(tuple(columns), tuple(rows))
+
+
+def _words(run: Run, tracks: Sequence[str]) -> Mapping[str, dict[str, str]]:
+    """What names in tables of these tracks choose among samples; names in small letters."""
+    words: dict[str, dict[str, str]] = {}
+    for level in run.design.suite.levels:
+        words[level_name(str(level)).lower()] = {"level": str(level)}
+    for track in tracks:
+        words[kind_of(track).title.lower()] = {"track": track}
+        for short in kind_of(track).report().part_names:
+            words[short.lower()] = {"subtask": short}
+        for group, (heading, _) in _part_groups(run, track).items():
+            for name in (heading.lower(), group.replace("_", " ")):
+                words[name] = {"subtask": group}
+    for outcome, heading in HEADINGS.items():
+        words[heading.lower()] = {"outcome": outcome}
+    return words

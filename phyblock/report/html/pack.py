@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-__all__ = ["Pack", "to_json", "write_script"]
+__all__ = ["Pack", "to_json", "write_script", "write_taken"]
 
 _CHUNK_CHARACTERS = 300_000
 
@@ -31,7 +31,7 @@ class Pack:
         most: int = _CHUNK_CHARACTERS,
     ) -> None:
         self.starts: list[int] = []
-        self._write, self._most = write or _write, most
+        self._write, self._most = write or write_taken, most
         self._folder = folder
         self._kind = kind
         self._build = build
@@ -63,7 +63,7 @@ class Pack:
 
 def write_script(folder: Path, name: str, build: str, data: Mapping[str, object]) -> None:
     """Write one object as the script `<name>.js`; raises OSError where the disk refuses."""
-    _write(folder, name, build, to_json(data))
+    write_taken(folder, name, build, to_json(data))
 
 
 def to_json(data: object) -> str:
@@ -72,7 +72,8 @@ def to_json(data: object) -> str:
     return json.dumps(data, ensure_ascii=True, separators=(",", ":"), allow_nan=False)
 
 
-def _write(folder: Path, name: str, build: str, text: str) -> None:
+def write_taken(folder: Path, name: str, build: str, text: str) -> None:
+    """Write the script `<name>.js` that hands `text`, in ASCII, to the page; OSError as above."""
     quoted = text.replace("\\", "\\\\").replace("'", "\\'")
     script = f"phyblockTake('{build}','{name}','{quoted}')\n"
     (folder / f"{name}.js").write_text(script, encoding="ascii")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from phyblock.report.html.headline import Headline
+from phyblock.report.html.leads import TableLeads
 from phyblock.report.html.shell import fill
 from phyblock.tables.text_table import Column, TextTable
 
@@ -14,18 +15,10 @@ __all__ = ["Figure", "render_page"]
 
 _PACKAGE = "phyblock.report.html"
 _SCRIPTS = (
-    *("dom.js", "data.js", "solid.js", "filters.js", "search.js", "list.js", "steps.js"),
-    *(
-        "poses.js",
-        "stage.js",
-        "markdown.js",
-        "quotes.js",
-        "overlay.js",
-        "why.js",
-        "reply.js",
-        "sent.js",
-    ),
-    *("detail.js", "tracks.js", "matrix.js", "results.js", "address.js", "app.js"),
+    *("dom.js", "chunks.js", "data.js", "solid.js", "filters.js", "search.js", "list.js"),
+    *("steps.js", "poses.js", "stage.js", "markdown.js", "quotes.js", "overlay.js", "why.js"),
+    *("reply.js", "sent.js", "detail.js", "tracks.js", "matrix.js", "results.js", "address.js"),
+    "app.js",
 )
 _STYLES = ("base.css", "results.css", "samples.css", "reply.css", "matrix.css", "print.css")
 
@@ -44,7 +37,7 @@ def render_page(
     cautions: Sequence[str],
     headlines: Sequence[Headline],
     figures: Sequence[Figure],
-    tables: Sequence[TextTable],
+    tables: Sequence[tuple[TextTable, TableLeads]],
     models: Sequence[str],
     folder: str,
     build: str,
@@ -63,7 +56,7 @@ def render_page(
         models=frozenset(models),
         headlines=headlines,
         figures=figures,
-        tables=[(table, _groups(table.columns)) for table in tables],
+        tables=[(table, leads, _groups(table.columns)) for table, leads in tables],
         folder=folder,
         build=build,
     )

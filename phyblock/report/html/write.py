@@ -18,7 +18,7 @@ from phyblock.records import MANIFEST, PROMPTS, RECORDS, STOPPED
 from phyblock.report.figures import figure_titles, write_figures
 from phyblock.report.html.headline import headlines
 from phyblock.report.html.index import Item, Place, SampleIndex, read_places
-from phyblock.report.html.leads import mean_parts, part_names
+from phyblock.report.html.leads import mean_parts, part_names, table_leads
 from phyblock.report.html.pack import Pack, write_script
 from phyblock.report.html.page import Figure, render_page
 from phyblock.report.html.samples import (
@@ -204,7 +204,11 @@ def _page(written: TablesWritten, figures: Sequence[Path], build: str) -> str:
         headlines=headlines(run),
         figures=_figures(run, figures),
         models=run.design.model_names,
-        tables=[view for name, view in written.views.items() if name not in _NOT_SHOWN],
+        tables=[
+            (view, table_leads(run, name, view))
+            for name, view in written.views.items()
+            if name not in _NOT_SHOWN
+        ],
         folder=f"{_FOLDER}/{build}",
         build=build,
     )

@@ -37,7 +37,7 @@ const Replay = (() => {
     const settings = [...new Set(records.flatMap((record) => (record.scores || []).map((score) => score.setting)))];
     const setting = settings.includes(words.get("g")) ? words.get("g") : settings[0] || "A";
     const isQuestion = sample.part !== null;
-    const scene = inFile && asShown(inFile, records[0]);
+    const scene = inFile && Steps.asShown(inFile, records[0]);
     stop();
     return [
       Views.crumbs([["board", {}, "Ranking"], ["scenes", {}, "Scenes"], ["scene", { s: sample.scene }, sample.scene]]),
@@ -81,17 +81,6 @@ const Replay = (() => {
       settings.length > 1 ? choice("setting", "Setting", settings.map((name) => [name, name === "A" ? "A: with orientation" : name === "B" ? "B: without orientation" : name, () => choose({ g: name }), name === setting])) : null);
   }
 
-  /** The scene with its candidates in the order in which they were shown. */
-  function asShown(scene, { shown, pose }) {
-    if (!shown) return scene;
-    const isUpright = pose?.rotation === "free";
-    const candidates = shown.order.map((n) => scene.candidates[n - 1])
-      .map((one) => (isUpright ? { ...one, euler: [0, 0, 0] } : one));
-    const number = (block) => (isUpright ? candidates.findIndex((one) => Words.block(one) === Words.block(block))
-      : shown.order.indexOf(block.candidate)) + 1;
-    return { ...scene, candidates, blocks: scene.blocks.map((block) => ({ ...block, candidate: number(block) })) };
-  }
-
   const scoreOf = (record, setting) => (record.scores || []).find((score) => score.setting === setting && score.placed);
 
   /** What the stage shows of a record. */
@@ -111,12 +100,14 @@ const Replay = (() => {
     const panels = runs.map((run) => (run.steps.length ? Stage.panel(run, player, noun) : null));
     const isWide = runs.some(({ titles }) => titles.length > 1);
     const caption = (i, title) => (several ? `${samples[i].entry.name}${isWide ? `: ${title.toLowerCase()}` : ""}` : title);
+    if (scene) panels.forEach((panel, i) => panel && Overlay.over(panel.pictures, scene, runs[i], player));
     const told = panels.map((panel, i) => [several ? el("h2", { class: "model-name" }, samples[i].entry.name) : null,
-      facts(samples[i], records[i], setting), panel ? panel.said : nothing(records[i])]);
+      facts(samples[i], records[i], setting), panel ? panel.said : nothing(records[i]),
+      panel ? Why.note({ record: records[i] }, scene, runs[i].steps, player) : null]);
     return el("section", { class: "card", "aria-label": "Replay" },
       scene ? null : el("p", { class: "notice" }, Store.index.lacking || "The scene is not at hand, so that nothing can be drawn."),
       el("div", { class: ["sides", several && "two", isWide && "wide"].filter(Boolean).join(" ") },
-        scene ? el("figure", {}, el("figcaption", {}, "Goal"), picture("Goal", scene.blocks, { grid: true })) : null,
+        scene ? el("figure", {}, el("figcaption", {}, "Goal"), picture("Goal", scene.blocks, { grid: true, marks: Overlay.marks(scene) })) : null,
         panels.map((panel, i) => [
           (panel?.pictures || []).map(({ title, canvas }) => el("figure", { class: "built" }, el("figcaption", {}, caption(i, title)), canvas)),
           several ? null : el("div", { class: "about-step" }, told[i])])),

@@ -1,11 +1,8 @@
-/* The site's data: scripts that hold packed JSON, brought when they are needed. */
+/* The site's data: the ranking, all samples, and what is brought of each when it is looked at. */
 "use strict";
 
 const Store = (() => {
-  const { folder: FOLDER, build: BUILD } = document.documentElement.dataset;
-  const KEPT = 16;
-  const waiting = new Map();
-  const kept = new Map();
+  const chunks = chunksOf({ read: unpacked, noun: "site", most: 16 });
   let board = null;
   let index = null;
 
@@ -15,39 +12,9 @@ const Store = (() => {
     return JSON.parse(await new Response(stream).text());
   }
 
-  window.phyblockSite = (build, name, packed) => {
-    const waiter = waiting.get(name);
-    if (!waiter) return;
-    if (build === BUILD) waiter.settle(unpacked(packed));
-    else waiter.fail(new Error("The site was written again since this page was opened: reload it."));
-  };
-
-  function load(name) {
-    if (kept.has(name)) {
-      const found = kept.get(name);
-      kept.delete(name);
-      kept.set(name, found);
-      return found;
-    }
-    const found = new Promise((settle, fail) => waiting.set(name, { settle, fail }));
-    const script = document.createElement("script");
-    script.src = `${FOLDER}/${name}.js`;
-    script.onload = script.onerror = () => {
-      const waiter = waiting.get(name);
-      script.remove();
-      waiting.delete(name);
-      waiter.fail(new Error(`${FOLDER}/${name}.js is not there: the folder data/ belongs beside this page.`));
-    };
-    document.head.append(script);
-    kept.set(name, found);
-    found.catch(() => kept.delete(name));
-    if (kept.size > KEPT) kept.delete(kept.keys().next().value);
-    return found;
-  }
-
   /** The numbers of the first page. */
   async function openBoard() {
-    board = board || await load("board");
+    board = board || await chunks.load("board");
     return board;
   }
 
@@ -55,7 +22,7 @@ const Store = (() => {
   async function openSamples() {
     await openBoard();
     if (!index) {
-      index = await load("samples");
+      index = await chunks.load("samples");
       Solid.setKit(index.kit.shapes, index.kit.colors);
       index.rowsOfItem = grouped(index.rows.item, index.items.key.length);
       index.rowsOfEntry = grouped(index.rows.entry, board.rows.length);
@@ -69,17 +36,8 @@ const Store = (() => {
     return found;
   }
 
-  /** Number `n` of what stands in chunks of one kind: replays, scenes or questions. */
-  async function entry(kind, n) {
-    const starts = index.starts[kind];
-    let low = 0, high = starts.length - 1;
-    while (low < high) {
-      const middle = (low + high + 1) >> 1;
-      if (starts[middle] <= n) low = middle;
-      else high = middle - 1;
-    }
-    return (await load(`${kind}-${low}`))[n - starts[low]];
-  }
+  /** Number `n` of the replays, scenes or questions. */
+  const entry = (kind, n) => chunks.entry(index.starts[kind], kind, n);
 
   /** What the index knows of a sample. */
   function sample(row) {

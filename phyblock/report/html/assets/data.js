@@ -1,65 +1,17 @@
-/* The run's data: an index of all samples, and chunks that script tags bring when they are needed
-   (a page opened from disk may not fetch). Chunks that were not used for long are dropped. */
+/* The run's data: an index of all samples, and what is brought of each when it is looked at. */
 "use strict";
 
 const Data = (() => {
-  const KEPT = 24;
-  const FOLDER = document.documentElement.dataset.folder;
-  const BUILD = document.documentElement.dataset.build;
-  const waiting = new Map();
-  const kept = new Map();
+  const chunks = chunksOf({ read: JSON.parse, noun: "report", most: 24 });
   let index = null;
 
-  window.phyblockTake = (build, name, text) => {
-    const waiter = waiting.get(name);
-    if (!waiter) return;
-    if (build === BUILD) waiter.settle(JSON.parse(text));
-    else waiter.fail(new Error("The report was written again since this page was opened: reload it."));
-  };
+  /** Number `n` of the records, scenes, questions or prompts. */
+  const entry = (kind, n) => chunks.entry(index.starts[kind], kind, n);
 
-  function load(name) {
-    if (kept.has(name)) {
-      const found = kept.get(name);
-      kept.delete(name);
-      kept.set(name, found);
-      return Promise.resolve(found);
-    }
-    if (waiting.has(name)) return waiting.get(name).promise;
-    const waiter = {};
-    waiter.promise = new Promise((settle, fail) => Object.assign(waiter, { settle, fail }));
-    waiting.set(name, waiter);
-    const script = document.createElement("script");
-    script.src = `${FOLDER}/${name}.js`;
-    script.onload = script.onerror = () => {
-      script.remove();
-      waiting.delete(name);
-      waiter.fail(new Error(`${FOLDER}/${name}.js is not there: the folder ${FOLDER}/ belongs beside this page.`));
-    };
-    document.head.append(script);
-    return waiter.promise.then((found) => {
-      kept.set(name, found);
-      if (kept.size > KEPT) kept.delete(kept.keys().next().value);
-      return found;
-    });
-  }
-
-  /** Number `n` of what stands in chunks of one kind: records, scenes, questions or prompts. */
-  async function entry(kind, n) {
-    const starts = index.starts[kind];
-    let low = 0, high = starts.length - 1;
-    while (low < high) {
-      const middle = (low + high + 1) >> 1;
-      if (starts[middle] <= n) low = middle;
-      else high = middle - 1;
-    }
-    return (await chunk(kind, low))[n - starts[low]];
-  }
-
-  const chunk = (kind, n) => load(`${kind}-${n}`);
+  const chunk = (kind, n) => chunks.load(`${kind}-${n}`);
 
   async function open() {
-    index = await load("index");
-    kept.delete("index");
+    index = await chunks.load("index");
     Solid.setKit(index.kit.shapes, index.kit.colors);
     return index;
   }
@@ -114,6 +66,6 @@ const Data = (() => {
     get index() {
       return index;
     },
-    chunksKept: () => kept.size,
+    chunksKept: chunks.count,
   };
 })();

@@ -39,7 +39,7 @@ const Detail = (() => {
   }
 
   function build(loaded, inFile, question) {
-    const scene = inFile && asShown(inFile, loaded[0].record);
+    const scene = inFile && Steps.asShown(inFile, loaded[0].record);
     const several = loaded.length > 1;
     player = null;
     const did = question ? Question.about(question, loaded)
@@ -87,17 +87,6 @@ const Detail = (() => {
     }, buttons);
     mark(now);
     return el("div", { class: "tabs" }, list, panels);
-  }
-
-  /** The scene with its candidates in the order in which the samples' seed showed them. */
-  function asShown(scene, { shown, pose }) {
-    if (!shown) return scene;
-    const isUpright = pose?.rotation === "free";
-    const candidates = shown.order.map((n) => scene.candidates[n - 1])
-      .map((one) => (isUpright ? { ...one, euler: [0, 0, 0] } : one));
-    const number = (block) => (isUpright ? candidates.findIndex((one) => Words.block(one) === Words.block(block))
-      : shown.order.indexOf(block.candidate)) + 1;
-    return { ...scene, candidates, blocks: scene.blocks.map((block) => ({ ...block, candidate: number(block) })) };
   }
 
   /** Goal and what was built side by side, under one clock; the steps below. */

@@ -1,4 +1,5 @@
-/* The tables of results: a click on a heading sorts, and the address keeps it. */
+/* The tables of results: a click on a heading sorts, and the address keeps it; numbers lead to the
+   samples that they were made from. */
 "use strict";
 
 const Results = (() => {
@@ -17,6 +18,24 @@ const Results = (() => {
         });
       }
     });
+    document.querySelectorAll("details.table").forEach((details) => {
+      details.addEventListener("toggle", () => lead(details.querySelector("table")), { once: true });
+    });
+  }
+
+  /** Make links of the numbers of a table: a page of many models has ten thousand of them. */
+  function lead(table) {
+    const heads = [...table.tHead.rows[table.tHead.rows.length - 1].cells];
+    const wordsOf = ({ dataset }) => [...new URLSearchParams(dataset.lead)];
+    for (const row of table.tBodies[0].querySelectorAll("tr[data-lead]")) {
+      heads.forEach((head, i) => {
+        const text = row.cells[i].textContent;
+        // Intervals stand beside their number; of nothing there is nothing to see.
+        if (head.dataset.lead === undefined || !/^[^[]*\d/.test(text) || text === "0") return;
+        const words = Object.fromEntries([...wordsOf(row), ...wordsOf(head)]);
+        row.cells[i].replaceChildren(el("a", { href: Address.text("samples", words) }, text));
+      });
+    }
   }
 
   /** Rows without a value come last, either way. */

@@ -121,5 +121,16 @@ const Steps = (() => {
     return { ...said, text, note: expected && `Possible here (outlined): ${expected}.` };
   }
 
-  return { ofPlan, ofTurns, run, alone, nameOf };
+  /** The scene with its candidates in the order in which they were shown. */
+  function asShown(scene, { shown, pose }) {
+    if (!shown) return scene;
+    const isUpright = pose?.rotation === "free";
+    const candidates = shown.order.map((n) => scene.candidates[n - 1])
+      .map((one) => (isUpright ? { ...one, euler: [0, 0, 0] } : one));
+    const number = (block) => (isUpright ? candidates.findIndex((one) => Words.block(one) === Words.block(block))
+      : shown.order.indexOf(block.candidate)) + 1;
+    return { ...scene, candidates, blocks: scene.blocks.map((block) => ({ ...block, candidate: number(block) })) };
+  }
+
+  return { ofPlan, ofTurns, run, alone, nameOf, asShown };
 })();

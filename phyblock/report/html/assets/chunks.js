@@ -1,0 +1,57 @@
+/* Data beside the page, in scripts that are brought when they are needed: a page that was opened from
+   disk may not fetch. Those that were not used for long are dropped. */
+"use strict";
+
+/**
+ * Loads the page's data; `read` makes a value of what a script holds, `noun` is what was written
+ * anew where a script is of another build, `most` how many are kept.
+ */
+function chunksOf({ read, noun, most }) {
+  const { folder, build } = document.documentElement.dataset;
+  const waiting = new Map();
+  const kept = new Map();
+
+  window.phyblockTake = (builtAs, name, data) => {
+    const waiter = waiting.get(name);
+    if (!waiter) return;
+    if (builtAs === build) waiter.settle(read(data));
+    else waiter.fail(new Error(`The ${noun} was written again since this page was opened: reload it.`));
+  };
+
+  function load(name) {
+    const found = kept.get(name) || brought(name);
+    // The last one is the one that was used last.
+    kept.delete(name);
+    kept.set(name, found);
+    if (kept.size > most) kept.delete(kept.keys().next().value);
+    return found;
+  }
+
+  function brought(name) {
+    const found = new Promise((settle, fail) => waiting.set(name, { settle, fail }));
+    const script = document.createElement("script");
+    script.src = `${folder}/${name}.js`;
+    script.onload = script.onerror = () => {
+      const waiter = waiting.get(name);
+      script.remove();
+      waiting.delete(name);
+      waiter.fail(new Error(`${folder}/${name}.js is not there: the folder ${folder}/ belongs beside this page.`));
+    };
+    document.head.append(script);
+    found.catch(() => kept.delete(name));
+    return found;
+  }
+
+  /** Number `n` of what stands in chunks of one kind, which begin with the numbers `starts`. */
+  async function entry(starts, kind, n) {
+    let low = 0, high = starts.length - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (starts[middle] <= n) low = middle;
+      else high = middle - 1;
+    }
+    return (await load(`${kind}-${low}`))[n - starts[low]];
+  }
+
+  return { load, entry, count: () => kept.size };
+}
