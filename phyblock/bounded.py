@@ -95,7 +95,7 @@ def load_json(data: bytes | str, *, finite: bool = True, unique: bool = False) -
     (RepeatedFieldError).
     """
     try:
-        found = json.loads(
+        value = json.loads(
             data,
             parse_int=_integer if finite else _any_integer,
             parse_float=_float if finite else None,
@@ -104,12 +104,12 @@ def load_json(data: bytes | str, *, finite: bool = True, unique: bool = False) -
         )
     except RecursionError:
         raise ValueError(f"is nested more than {_DEEPEST} levels deep") from None
-    _check_depth(found)
-    return found
+    _check_depth(value)
+    return value
 
 
-def _check_depth(found: object) -> None:
-    level: list[object] = [found]
+def _check_depth(content: object) -> None:
+    level: list[object] = [content]
     for _ in range(_DEEPEST + 1):
         below: list[object] = []
         for value in level:
@@ -124,12 +124,12 @@ def _check_depth(found: object) -> None:
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    fields: dict[str, Any] = {}
     for field, value in pairs:
-        if field in found:
+        if field in fields:
             raise RepeatedFieldError(field)
-        found[field] = value
-    return found
+        fields[field] = value
+    return fields
 
 
 def _integer(digits: str, longest: int = LONGEST_INTEGER) -> int:

@@ -116,15 +116,15 @@ class _Builder:
         raise TooMuchError("has a tag that is not allowed", "", node.start_mark)
 
     def _mapping(self, node: yaml.MappingNode, above: tuple[yaml.Node, ...]) -> dict[Any, Any]:
-        found: dict[Any, Any] = {}
+        mapping: dict[Any, Any] = {}
         for key_node, value_node in node.value:
             key = self._scalar(key_node) if isinstance(key_node, yaml.ScalarNode) else None
             if not isinstance(key, (str, int)):
                 raise TooMuchError("has a key that is no text", "", key_node.start_mark)
-            if key in found:
+            if key in mapping:
                 raise TooMuchError("has a key that is written twice", "", key_node.start_mark)
-            found[key] = self.build(value_node, above)
-        return found
+            mapping[key] = self.build(value_node, above)
+        return mapping
 
     def _scalar(self, node: yaml.ScalarNode) -> Any:
         kind = node.tag.removeprefix(TAG)

@@ -62,21 +62,21 @@ class OutFolder:
         files = [name for name in names if not name.endswith("/")]
         there = [name for name in files if os.path.lexists(self.path / name)]
         known = self._known()
-        found = {self.path / name: _OUTSIDE for name in names if _is_outside(name)}
+        problems = {self.path / name: _OUTSIDE for name in names if _is_outside(name)}
         # Itself it may be a link: a person named it.
         if self.path.is_dir() and not os.access(self.path, os.W_OK | os.X_OK):
-            found[self.path] = _CLOSED
+            problems[self.path] = _CLOSED
         for folder in _folders(names):
             if wrong := _wrong_folder(self.path / folder):
-                found[self.path / folder] = wrong
+                problems[self.path / folder] = wrong
         for name in there:
             path = self.path / name
-            if not any(above in found for above in path.parents) and (
+            if not any(above in problems for above in path.parents) and (
                 wrong := _wrong_file(path, name in known)
             ):
-                found[path] = wrong
-        if found:
-            raise StoreError([Problem(str(p), wrong, hint=_HINT) for p, wrong in found.items()])
+                problems[path] = wrong
+        if problems:
+            raise StoreError([Problem(str(p), wrong, hint=_HINT) for p, wrong in problems.items()])
 
     def claim(self, names: Iterable[str]) -> None:
         """List `names` as ours and make their folders; raises as `check`."""
@@ -197,11 +197,11 @@ def _append(path: Path, data: bytes) -> None:
 
 def _folders(names: Iterable[str]) -> list[str]:
     """The folders that are named or hold what is named, those above before those below."""
-    found: set[str] = set()
+    folders: set[str] = set()
     for name in names:
         path = PurePosixPath(f"{name}_" if name.endswith("/") else name)
-        found |= {str(above) for above in path.parents}
-    return sorted(found - {"."})
+        folders |= {str(above) for above in path.parents}
+    return sorted(folders - {"."})
 
 
 def _is_outside(name: str) -> bool:

@@ -174,11 +174,13 @@ def _tell(folder: Path, result: RunResult) -> None:
         warnings.warn(f"{model} was stopped: {reason}", stacklevel=3)
     if result.left:
         reason = f" ({result.stop.reason})" if result.stop else ""
-        said = f"{result.left:,} of {counted(result.samples, 'sample')} left{reason}"
-        warnings.warn(f"{said}: the same call again goes on", stacklevel=3)
+        counts = f"{result.left:,} of {counted(result.samples, 'sample')} left{reason}"
+        warnings.warn(f"{counts}: the same call again goes on", stacklevel=3)
     if result.failed:
-        said = f"{counted(result.failed, 'request')} rejected for good"
-        warnings.warn(f"{said}: ask again with retry_failed=True", stacklevel=3)
+        counts = f"{counted(result.failed, 'request')} rejected for good"
+        warnings.warn(f"{counts}: ask again with retry_failed=True", stacklevel=3)
     if result.unjudged:
-        said = f"{counted(result.unjudged, 'answer')} could not be judged"
-        warnings.warn(f"{said}: phyblock score {folder} tries again, without a call", stacklevel=3)
+        counts = f"{counted(result.unjudged, 'answer')} could not be judged"
+        warnings.warn(
+            f"{counts}: phyblock score {folder} tries again, without a call", stacklevel=3
+        )

@@ -88,10 +88,10 @@ def score(
     if problems:
         raise SpecError(problems)
     parsed = parse_plan(reply, len(scene.candidates), parser)
-    (found,) = AssemblyScorer(scene.scene, scene.candidates, (setting,)).score(
+    (scored,) = AssemblyScorer(scene.scene, scene.candidates, (setting,)).score(
         parsed.plan, (matcher,), None
     )
-    counts = found.counts
+    counts = scored.counts
     return PlanScore(
         plan=parsed.plan.steps,
         rule=parsed.rule,
@@ -104,5 +104,5 @@ def score(
         precision=counts.precision,
         recall=counts.recall,
         f1=counts.f1,
-        errors=found.step_errors or (),
+        errors=scored.step_errors or (),
     )

@@ -125,17 +125,17 @@ def read_about(path: Path, folder: Path, manifest: Manifest) -> About:
     assert isinstance(about, About)
     if not manifest.models:
         raise StoreError(Problem(f"{path}: {MANIFEST}", "names no model", "models", hint=_HINT))
-    found = {
+    actual = {
         **{f"files.{name}": digest_of_file(folder / name) for name in (MANIFEST, RECORDS)},
         "run": manifest.identity,
         "suite": _digest_of_suite(manifest),
     }
-    said = {
+    stated = {
         **{f"files.{name}": about.files.get(name, "") for name in (MANIFEST, RECORDS)},
         "run": about.run,
         "suite": about.suite,
     }
-    differ = [name for name in found if found[name] != said[name]]
+    differ = [name for name in actual if actual[name] != stated[name]]
     if about.tracks != manifest.tracks:
         differ.append("tracks")
     if about.data != data_of(manifest):
@@ -143,7 +143,7 @@ def read_about(path: Path, folder: Path, manifest: Manifest) -> About:
     if differ:
         message = "is not what the bundle says it is: it was changed after it was made"
         raise StoreError(
-            Problem(str(path), message, name, found.get(name, ""), said.get(name, ""), _HINT)
+            Problem(str(path), message, name, actual.get(name, ""), stated.get(name, ""), _HINT)
             for name in differ
         )
     return about

@@ -54,8 +54,8 @@ def portable_records(
     for record in records:
         changed: dict[str, Any] = {}
         if (error := record.error) is not None:
-            said = cleaner.clean(error.message)
-            changed["error"] = error.model_copy(update={"message": said})
+            message = cleaner.clean(error.message)
+            changed["error"] = error.model_copy(update={"message": message})
         if record.reply is not None:
             changed["reply"] = _portable_reply(record.reply)
         if record.asked_turns:

@@ -42,7 +42,7 @@ def without_paths(value: Any) -> Any:
 
 def model_name(text: str) -> str:
     """A name, of a path its last part: `hosted_vllm//srv/models/Qwen` is `hosted_vllm/Qwen`."""
-    prefix = found[0] if (found := _PREFIX.match(text)) else ""
+    prefix = match[0] if (match := _PREFIX.match(text)) else ""
     rest = text[len(prefix) :]
     return prefix + _last_part(rest) if _is_path(rest) else text
 
@@ -66,7 +66,7 @@ class Cleaner:
         for host in self._hosts:
             text = re.sub(rf"(?<![\w.-]){re.escape(host)}(?::\d+)?(?![\w-])", _SERVER, text)
         text = _PLACE.sub(_SERVER, text)
-        return _PATH.sub(lambda found: _last_part(found[0]), text)
+        return _PATH.sub(lambda match: _last_part(match[0]), text)
 
 
 def _is_path(text: str) -> bool:

@@ -85,10 +85,10 @@ def opened_bundle(path: Path, data: Sequence[Path] = (), name: str = "") -> Iter
         yield Verified(about, manifest, folder, n_records, len(about.tables), expected, physics)
 
 
-def _check_lines(where: str, about: About, told: Path, again: Iterable[Record]) -> None:
+def _check_lines(where: str, about: About, stored: Path, again: Iterable[Record]) -> None:
     """Raise StoreError naming the first records that are scored otherwise than they say."""
     now = (line.encode() for line in record_lines(again))
-    with told.open("rb") as was:
+    with stored.open("rb") as was:
         pairs = enumerate(zip_longest(was, now), 1)
         wrong = [number for number, (before, after) in pairs if before != after]
     if wrong:
@@ -98,10 +98,10 @@ def _check_lines(where: str, about: About, told: Path, again: Iterable[Record]) 
         raise StoreError(Problem(where, message, found=found, hint=_hint(about)))
 
 
-def _check_worked_out(where: str, about: About, told: Manifest, again: Manifest) -> None:
+def _check_worked_out(where: str, about: About, stored: Manifest, again: Manifest) -> None:
     """Raise StoreError naming what follows from suite and data and is said otherwise."""
     for field in ("floors", "items", "scenes", "scenes_by_level"):
-        if getattr(told, field) != getattr(again, field):
+        if getattr(stored, field) != getattr(again, field):
             message = f"does not verify: worked out again, {field} come out otherwise"
             raise StoreError(Problem(where, message, field, hint=_hint(about)))
 

@@ -46,7 +46,7 @@ def command(run: Path, out: Path | None, data: tuple[Path, ...]) -> None:
     console.print(how_whole(made.verified))
 
 
-def how_whole(found: Verified) -> str:
+def how_whole(verified: Verified) -> str:
     """How many samples a bundle has of those that its suite asks for."""
-    samples = f"{found.records:,} of {found.expected:,} expected samples"
-    return f"{samples}." if found.is_whole else f"{samples}: the run is not whole."
+    samples = f"{verified.records:,} of {verified.expected:,} expected samples"
+    return f"{samples}." if verified.is_whole else f"{samples}: the run is not whole."

@@ -30,14 +30,14 @@ def stats() -> None:
     """Show how many replies are kept of each model, and how large the file is."""
     console = make_console()
     with ReplyCache(reply_cache_file()) as cache:
-        found = cache.stats()
-    rows = [(model, f"{replies:,}") for model, replies in found.by_model.items()]
+        held = cache.stats()
+    rows = [(model, f"{replies:,}") for model, replies in held.by_model.items()]
     console.print(plain_table(("model", "replies"), rows, numbers=1))
-    size = f"{found.size_bytes / 1e6:,.1f} MB"
-    text = f"{counted(found.replies, 'reply', 'replies')}, {size}, in {found.path}"
+    size = f"{held.size_bytes / 1e6:,.1f} MB"
+    text = f"{counted(held.replies, 'reply', 'replies')}, {size}, in {held.path}"
     console.print(text, soft_wrap=True, markup=False)
     if sizes := _learned():
-        text = f"{_told(list(sizes.values()))}, in {learned_dir()}"
+        text = f"{_sizes_text(list(sizes.values()))}, in {learned_dir()}"
         console.print(text, soft_wrap=True, markup=False)
 
 
@@ -71,18 +71,18 @@ def _clear_learned() -> None:
         except OSError as error:
             raise InputError(Problem(str(path), f"cannot be removed: {said(error)}")) from error
         removed.append(size)
-    make_console().print(f"Deleted {_told(removed)}.")
+    make_console().print(f"Deleted {_sizes_text(removed)}.")
 
 
 def _learned() -> dict[Path, int]:
     """The files of learned plans and their sizes [bytes]; others that lie there are not ours."""
-    found: dict[Path, int] = {}
+    sizes: dict[Path, int] = {}
     with contextlib.suppress(OSError), os.scandir(learned_dir()) as entries:
         for entry in entries:
             if _LEARNED.fullmatch(entry.name) and entry.is_file(follow_symlinks=False):
-                found[Path(entry.path)] = entry.stat(follow_symlinks=False).st_size
-    return found
+                sizes[Path(entry.path)] = entry.stat(follow_symlinks=False).st_size
+    return sizes
 
 
-def _told(sizes: list[int]) -> str:
+def _sizes_text(sizes: list[int]) -> str:
     return f"{counted(len(sizes), 'file')} of learned plans, {sum(sizes) / 1e6:,.1f} MB"

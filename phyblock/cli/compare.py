@@ -39,18 +39,18 @@ def command(
     """
     names = split_names(models)
     first = load_run(run, texts=False)
-    found = (
+    comparison = (
         compare_models(first, names, track or "", measure or "")
         if other is None
         else compare_runs(first, load_run(other, texts=False), names, track or "", measure or "")
     )
     console = make_console()
-    print_view(console, compare_view(found))
-    if len(found.ranks) > 2:
-        print_view(console, ranks_view(found))
-    if found.table[["a", "b"]].drop_duplicates().shape[0] == 1:
-        for line in flipped_lines(found):
+    print_view(console, compare_view(comparison))
+    if len(comparison.ranks) > 2:
+        print_view(console, ranks_view(comparison))
+    if comparison.table[["a", "b"]].drop_duplicates().shape[0] == 1:
+        for line in flipped_lines(comparison):
             console.print(line, markup=False, soft_wrap=True)
     if out is not None:
-        write_comparison(found, out)
+        write_comparison(comparison, out)
         console.print(f"Written to {shown_path(out)}", markup=False, soft_wrap=True)

@@ -87,11 +87,11 @@ def _find(run: Path, sample: str, tracks: Collection[str]) -> Record:
         titles = ", ".join(kind_of(name).title.lower() for name in tracks)
         message = f"holds no episodes of {titles}"
         raise StoreError(Problem(str(run / RECORDS), message, hint=hint))
-    found = [sample] if sample in episodes else [name for name in episodes if sample in name]
-    if len(found) == 1:
-        return next(iter(lines.at([starts[found[0]]])))
-    message = "holds no such episode" if not found else f"holds {len(found)} such episodes"
-    offered = found or episodes
+    matching = [sample] if sample in episodes else [name for name in episodes if sample in name]
+    if len(matching) == 1:
+        return next(iter(lines.at([starts[matching[0]]])))
+    message = "holds no such episode" if not matching else f"holds {len(matching)} such episodes"
+    offered = matching or episodes
     more = [f"and {len(offered) - _NAMED} more"] if len(offered) > _NAMED else []
     allowed = ", ".join([*offered[:_NAMED], *more])
     problem = Problem(str(run / RECORDS), message, "sample", sample, allowed)

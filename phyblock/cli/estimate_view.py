@@ -90,8 +90,8 @@ def _prices(rows: Sequence[Estimate]) -> Iterator[str]:
         if row.tariff is not None and row.tariff.source:
             by_source.setdefault(row.tariff.source, []).append(row.model)
     if by_source:
-        said = [f"{source} ({', '.join(models)})" for source, models in by_source.items()]
-        yield f"Prices of {rows[0].day}: {'; '.join(said)}."
+        sources = [f"{source} ({', '.join(models)})" for source, models in by_source.items()]
+        yield f"Prices of {rows[0].day}: {'; '.join(sources)}."
     for row in rows:
         coming = row.next_tariff
         if coming is not None and row.tariff is not None:

@@ -125,9 +125,9 @@ def show_problems(error: InputError) -> None:
         if shown[kind] == _SHOWN_ALIKE < alike[kind]:
             more = f"... and {alike[kind] - _SHOWN_ALIKE:,} more like it"
             click.echo(plain_lines(f"{more}: {': '.join(filter(None, kind))}"), err=True)
-    told = sum(alike[kind] if shown[kind] == _SHOWN_ALIKE else shown[kind] for kind in alike)
-    if len(error.problems) > told:
-        more = counted(len(error.problems) - told, "more problem")
+    n_shown = sum(alike[kind] if shown[kind] == _SHOWN_ALIKE else shown[kind] for kind in alike)
+    if len(error.problems) > n_shown:
+        more = counted(len(error.problems) - n_shown, "more problem")
         click.echo(f"... and {more}", err=True)
 
 

@@ -144,8 +144,8 @@ def _servers(name: str, config: ModelConfig) -> Iterator[tuple[str, ModelConfig]
 def _answered(server: str, reply: Reply) -> str:
     tokens = f"{reply.usage.prompt_tokens or '?'} + {reply.usage.completion_tokens or '?'} tokens"
     cost = "cost unknown" if reply.cost_usd is None else f"${reply.cost_usd:.6f}"
-    said = reply.text.strip()[:80]
-    return f"{server} answers: {said!r} in {reply.latency_s:.1f} s, {tokens}, {cost}"
+    answer = reply.text.strip()[:80]
+    return f"{server} answers: {answer!r} in {reply.latency_s:.1f} s, {tokens}, {cost}"
 
 
 def _show_retiring(console: Console, configs: Sequence[ModelConfig]) -> None:

@@ -190,10 +190,10 @@ class ProgressView:
         """A cut line for each model that has something to say: failures, the last notice."""
         lines = []
         for name, tally in self._tallies.items():
-            said = [tally.failure_text] if tally.failures else []
-            said += [tally.notice] if tally.notice and tally.done < tally.expected else []
-            if said:
-                text = one_line(f"{name}: {'; '.join(said)}")
+            remarks = [tally.failure_text] if tally.failures else []
+            remarks += [tally.notice] if tally.notice and tally.done < tally.expected else []
+            if remarks:
+                text = one_line(f"{name}: {'; '.join(remarks)}")
                 lines.append(Text(text, style="yellow", no_wrap=True, overflow="ellipsis"))
         return lines[:_REMARKS]
 

@@ -24,7 +24,7 @@ class _Trouble:
     retries: Counter[int | None] = field(default_factory=Counter)
     longest_wait_s: float = 0.0
     limit: int = 0
-    said: str = ""
+    last: str = ""
 
     def line(self, model: str) -> str:
         parts = []
@@ -36,7 +36,7 @@ class _Trouble:
             )
             times = "once" if total == 1 else f"{total} times"
             wait = f"waiting up to {self.longest_wait_s:.0f} s"
-            parts.append(f"asking again {times} ({kinds}), {wait}; last: {self.said}")
+            parts.append(f"asking again {times} ({kinds}), {wait}; last: {self.last}")
         if self.limit:
             parts.append(f"slowed down to {counted(self.limit, 'call')} at once")
         return f"{model}: {'; '.join(parts)}"
@@ -62,7 +62,7 @@ class Remarks:
         else:
             trouble.retries[notice.status] += 1
             trouble.longest_wait_s = max(trouble.longest_wait_s, notice.wait_s)
-            trouble.said = notice.text
+            trouble.last = notice.text
         return self.due(now_s)
 
     def due(self, now_s: float) -> list[str]:

@@ -193,9 +193,9 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
         )
         console.print(f"{rejected} ask again with --retry-failed", style="red", soft_wrap=True)
     if result.unjudged:
-        told = f"{counted(result.unjudged, 'answer')} could not be judged:"
+        unjudged = f"{counted(result.unjudged, 'answer')} could not be judged:"
         console.print(
-            f"{told} phyblock score {where} tries again, without a call",
+            f"{unjudged} phyblock score {where} tries again, without a call",
             style="red",
             soft_wrap=True,
         )

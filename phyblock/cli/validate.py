@@ -49,11 +49,11 @@ def command(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | N
     problems: list[Problem] = []
     for path in files:
         try:
-            told, *remarks = _check(path, sets, models_file)
+            summary, *remarks = _check(path, sets, models_file)
         except InputError as error:
             problems += error.problems
         else:
-            console.print(f"{shown_path(path)}: {told}", markup=False, soft_wrap=True)
+            console.print(f"{shown_path(path)}: {summary}", markup=False, soft_wrap=True)
             for remark in remarks:
                 console.print(f"  {remark}", markup=False, soft_wrap=True)
     if problems:
@@ -101,8 +101,8 @@ def _check_written(path: Path, sets: tuple[str, ...], models_file: str | None) -
     check_commands(plan.models, named, models_file)
     calls = plan.samples_per_model
     models = counted(len(plan.models), "model")
-    told = f"suite {plan.suite.name}, {models}, {counted(calls, 'sample')} a model"
-    return [told, *asking_remarks(loaded, plan)]
+    summary = f"suite {plan.suite.name}, {models}, {counted(calls, 'sample')} a model"
+    return [summary, *asking_remarks(loaded, plan)]
 
 
 def _check_models(path: Path, known: Mapping[str, ModelSpec], names: Collection[str]) -> None:

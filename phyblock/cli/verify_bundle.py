@@ -32,17 +32,18 @@ def command(file: Path, data: tuple[Path, ...]) -> None:
     are named with --data.
     """
     console = make_console()
-    with opened_bundle(file, data) as found:
-        models = [model.name for model in found.manifest.models]
+    with opened_bundle(file, data) as verified:
+        models = [model.name for model in verified.manifest.models]
         console.print(f"{shown_path(file)} verifies.")
-        console.print(how_whole(found))
+        console.print(how_whole(verified))
         console.print(
-            f"{counted(found.records, 'record')} of {counted(len(models), 'model')}, scored again, "
-            f"and {counted(found.tables, 'table file')} come out as the same bytes."
+            f"{counted(verified.records, 'record')} of {counted(len(models), 'model')}, "
+            f"scored again, and {counted(verified.tables, 'table file')} "
+            f"come out as the same bytes."
         )
-        console.print(f"Run {found.manifest.run}, made with phyblock {found.about.phyblock}.")
-        if found.physics:
-            tracks = ", ".join(found.physics)
+        console.print(f"Run {verified.manifest.run}, made with phyblock {verified.about.phyblock}.")
+        if verified.physics:
+            tracks = ", ".join(verified.physics)
             console.print(f"{tracks}: physics was not carried out, {FELL}.")
         console.print("That the models gave these replies, no bundle can show.")
         console.print("Nor can it what they cost, how long they took, and which model answered.")

@@ -25,8 +25,8 @@ def find_data_set(name: str) -> Path:
     path = Path(name)
     if (path / SCENES_FILE).is_file() or (path / _OFFICIAL).is_dir():
         return path
-    if (found := _file_or_bundled(path, SCENES_FILE)) is not None:
-        return found
+    if (folder := _file_or_bundled(path, SCENES_FILE)) is not None:
+        return folder
     names = ", ".join(bundled_sets(SCENES_FILE))
     allowed = f"a folder with {SCENES_FILE}, an official checkout, or a bundled set: {names}"
     message = "holds no data set" if path.is_dir() else "there is no such data set"
@@ -47,8 +47,8 @@ def find_questions(name: str) -> Path:
     path = Path(name)
     if path.is_dir():
         return path
-    if (found := _file_or_bundled(path, QUESTIONS_FILE)) is not None:
-        return found
+    if (folder := _file_or_bundled(path, QUESTIONS_FILE)) is not None:
+        return folder
     names = ", ".join(bundled_sets(QUESTIONS_FILE))
     allowed = f"a folder with {QUESTIONS_FILE}, or a bundled set: {names}"
     raise DataError(Problem(name, "there are no such questions", allowed=allowed))

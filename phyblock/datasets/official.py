@@ -126,8 +126,8 @@ def candidates_file(root: Path, goal: Path) -> Path:
 def recorded_models(root: Path) -> dict[str, Path]:
     """Folders of recorded replies in a checkout, by name, in name order."""
     outputs = root / _OUTPUTS
-    found = sorted(outputs.iterdir()) if outputs.is_dir() else []
-    folders = {path.name: path for path in found if path.is_dir() and any(path.glob("*.json"))}
+    paths = sorted(outputs.iterdir()) if outputs.is_dir() else []
+    folders = {path.name: path for path in paths if path.is_dir() and any(path.glob("*.json"))}
     if not folders:
         allowed = "a checkout with outputs/<model>/NNN.json"
         raise DataError(Problem(str(outputs), "holds no recorded replies", allowed=allowed))
@@ -141,20 +141,20 @@ def official_prompt(root: Path) -> str:
     marks that stood for the pictures are taken off. Where recordings differ, the prompt of most
     models is taken. Raises DataError when no recording carries one, or when there is no most.
     """
-    found: dict[str, list[str]] = {}
+    models_by_text: dict[str, list[str]] = {}
     for name, folder in recorded_models(root).items():
         raw = read_json(min(folder.glob("*.json")))
         instruction = raw.get("instruction") if isinstance(raw, dict) else None
         if isinstance(instruction, str):
-            found.setdefault(_PICTURE_MARKS.sub("", instruction), []).append(name)
+            models_by_text.setdefault(_PICTURE_MARKS.sub("", instruction), []).append(name)
     where = str(root / _OUTPUTS)
-    if not found:
+    if not models_by_text:
         message = "no recording carries the official prompt"
         allowed = "recordings with a field 'instruction', such as those of the InternVL models"
         raise DataError(Problem(where, message, "instruction", allowed=allowed))
-    ranked = sorted(found, key=lambda text: -len(found[text]))
-    if len(ranked) > 1 and len(found[ranked[0]]) == len(found[ranked[1]]):
-        names = "; ".join(", ".join(models) for models in found.values())
+    ranked = sorted(models_by_text, key=lambda text: -len(models_by_text[text]))
+    if len(ranked) > 1 and len(models_by_text[ranked[0]]) == len(models_by_text[ranked[1]]):
+        names = "; ".join(", ".join(models) for models in models_by_text.values())
         message = "the recordings carry different prompts, none more often than the others"
         raise DataError(Problem(where, message, "instruction", names))
     return ranked[0]
@@ -189,5 +189,5 @@ def read_goal(path: Path, kind: type[_GoalT]) -> _GoalT:
 
 def read_candidates(path: Path) -> CandidateSet:
     """The candidate set in a file; raises DataError with everything that is wrong in it."""
-    found = validated(_CandidateFile, {"candidates": read_json(path)}, str(path))
-    return candidate_set(found.candidates)
+    file = validated(_CandidateFile, {"candidates": read_json(path)}, str(path))
+    return candidate_set(file.candidates)

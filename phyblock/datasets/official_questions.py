@@ -134,8 +134,8 @@ def _starts(text: str) -> Iterator[int]:
     decoder, at = json.JSONDecoder(), text.index("[") + 1
     line, counted = 1, 0
     while True:
-        found = re.compile(r"[\s,]*").match(text, at)
-        at = found.end() if found else at
+        gap = re.compile(r"[\s,]*").match(text, at)
+        at = gap.end() if gap else at
         line += text.count("\n", counted, at)
         counted = at
         yield line
@@ -144,14 +144,14 @@ def _starts(text: str) -> Iterator[int]:
 
 def _index_base(entries: list[Any]) -> int | None:
     """Where the indices of a file begin, or None where its answers do not tell."""
-    found: set[int] = set()
+    indices: set[int] = set()
     for raw in entries:
         answer = raw.get("answer") if isinstance(raw, dict) else None
-        found.update(index for index in (answer if isinstance(answer, list) else [answer])
+        indices.update(index for index in (answer if isinstance(answer, list) else [answer])
                      if type(index) is int)  # fmt: skip
-    if 0 in found:
+    if 0 in indices:
         return 0
-    return 1 if len(LETTERS) in found else None
+    return 1 if len(LETTERS) in indices else None
 
 
 @dataclass(frozen=True)
@@ -163,11 +163,11 @@ class _Around(About):
 
 
 def _subtask_of(named: object) -> Subtask:
-    found = _NAMES.get(_NAME.sub("", named.lower())) if isinstance(named, str) else None
-    if found is None:
+    subtask = _NAMES.get(_NAME.sub("", named.lower())) if isinstance(named, str) else None
+    if subtask is None:
         allowed = f"in the entry or as the file's name: {', '.join(SUBTASKS)}"
         raise fault(Fault("is not known", allowed))
-    return found
+    return subtask
 
 
 def _around(info: ValidationInfo) -> _Around:
@@ -183,14 +183,14 @@ def _indices(answer: object, info: ValidationInfo) -> tuple[int, ...]:
     parts: Sequence[object] = answer if isinstance(answer, list) else [answer]
     if is_order and isinstance(answer, str):
         parts = [letter for letter in answer.upper() if letter.isalnum()]
-    found = [_index(part, options, base) for part in parts]
+    indices = [_index(part, options, base) for part in parts]
     wanted = len(options) if is_order else 1
-    if None in found or len(set(found)) < wanted or len(found) != wanted:
+    if None in indices or len(set(indices)) < wanted or len(indices) != wanted:
         allowed = "a permutation of the options" if is_order else "a letter, option or index"
         if base is None and any(type(part) is int for part in parts):
             allowed = "letters: the indices of this file do not tell whether they begin at 0"
         raise fault(Fault("is none of the options", allowed))
-    return tuple(cast(list[int], found))
+    return tuple(cast(list[int], indices))
 
 
 def _index(part: object, options: tuple[str, ...], base: int | None) -> int | None:
@@ -236,8 +236,8 @@ def _named(folder: Path, name: object) -> Path | None:
 
 
 def _usual(place: Path) -> Path | None:
-    found = (place.with_name(place.name + suffix) for suffix in _PICTURES)
-    return next((path for path in found if os.path.isfile(path)), None)
+    paths = (place.with_name(place.name + suffix) for suffix in _PICTURES)
+    return next((path for path in paths if os.path.isfile(path)), None)
 
 
 class _StoredEntry(Line, extra="ignore"):
@@ -270,5 +270,5 @@ def _completed(raw: Any, stem: str, number: int) -> Any:
 
 
 def _code(stem: str) -> str:
-    found = _NAMES.get(_NAME.sub("", stem.lower()))
-    return found.lower() if found else re.sub(r"[^A-Za-z0-9._-]", "-", stem)
+    subtask = _NAMES.get(_NAME.sub("", stem.lower()))
+    return subtask.lower() if subtask else re.sub(r"[^A-Za-z0-9._-]", "-", stem)

@@ -97,7 +97,7 @@ def read_lines(
     """
     lines = _lines(text)
     first_line: dict[str, int] = {}
-    found: list[_T] = []
+    values: list[_T] = []
     problems: list[Problem] = []
     for number, line in enumerate(lines, 1):
         where = f"{path}:{number}"
@@ -109,12 +109,12 @@ def read_lines(
         first = first_line.setdefault(name(one), number)
         if first != number:
             gather(problems, [used_already(where, f"by line {first}", name(one))], path)
-        found.append(one)
+        values.append(one)
     if not lines:
         problems.append(Problem(str(path), f"holds no {noun}s", allowed=f"one {noun} a line"))
     if problems:
         raise DataError(problems)
-    return found
+    return values
 
 
 def used_already(where: str, first: str, name: str) -> Problem:

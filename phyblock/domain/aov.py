@@ -52,10 +52,12 @@ class AOVGraph:
     @functools.cached_property
     def layers(self) -> tuple[int, ...]:
         """Layer of each vertex: 1 on the ground, else 1 + the highest layer it depends on."""
-        found: dict[int, int] = {}
+        layers: dict[int, int] = {}
         for vertex in self._first_order():
-            found[vertex] = 1 + max((found[other] for other in self.depends_on[vertex]), default=0)
-        return tuple(found[vertex] for vertex in range(len(self)))
+            layers[vertex] = 1 + max(
+                (layers[other] for other in self.depends_on[vertex]), default=0
+            )
+        return tuple(layers[vertex] for vertex in range(len(self)))
 
     def is_ready(self, vertex: int, placed: int) -> bool:
         """Whether `vertex` is unplaced and all it depends on is in the bit mask `placed`."""

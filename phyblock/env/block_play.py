@@ -109,6 +109,6 @@ class BlockPlay(Play):
         state = tuple(blocks[vertex] for vertex in self._assembly.vertices)
         self._settled = Settled((), state)
         if self._physics != "off":
-            found = self._site.settle(state)
+            settled = self._site.settle(state)
             is_held = self._physics == "settle"
-            self._settled = Settled(found.fallen, state if is_held else found.blocks)
+            self._settled = Settled(settled.fallen, state if is_held else settled.blocks)

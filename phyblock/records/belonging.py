@@ -54,12 +54,12 @@ class Belonging:
 
     def problem(self, where: str, line: Line) -> Problem | None:
         """What shows that a record or turn is of another run, or None."""
-        told: Iterator[tuple[str, object, str, bool]] = iter(())
+        comparisons: Iterator[tuple[str, object, str, bool]] = iter(())
         if isinstance(line, Record):
-            told = self._of_record(line)
+            comparisons = self._of_record(line)
         elif isinstance(line, Turn):
-            told = self._of_turn(line)
-        for name, found, allowed, is_alike in told:
+            comparisons = self._of_turn(line)
+        for name, found, allowed, is_alike in comparisons:
             if not is_alike:
                 return Problem(where, _MESSAGE, name, str(found), allowed, _HINT)
         return None
@@ -86,10 +86,10 @@ class Belonging:
         yield "sample", record.sample, named, is_named
         yield self._sample(record.sample)
         if record.prompt is not None:
-            told = self.variants.get(record.way.shown.key, {}).get(record.track)
-            wanted = self.prompts.get(record.track) if told is None else _version(told)
-            found = record.prompt.version
-            yield "prompt.version", found, str(wanted), wanted in (None, found)
+            of_variant = self.variants.get(record.way.shown.key, {}).get(record.track)
+            wanted = self.prompts.get(record.track) if of_variant is None else _version(of_variant)
+            version = record.prompt.version
+            yield "prompt.version", version, str(wanted), wanted in (None, version)
         if not record.run:
             yield self._shown(record)
 

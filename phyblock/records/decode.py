@@ -29,8 +29,8 @@ def decode(adapter: TypeAdapter[Any], line: bytes) -> Any:
     try:
         return adapter.validate_json(line, strict=True)
     except ValidationError:
-        found = load_json(line.decode("utf-8"))
-    return adapter.validate_json(json.dumps(_clean(found)), strict=True)
+        value = load_json(line.decode("utf-8"))
+    return adapter.validate_json(json.dumps(_clean(value)), strict=True)
 
 
 def is_cut(line: bytes) -> bool:

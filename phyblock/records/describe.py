@@ -45,13 +45,13 @@ def field_tables(title: str, kinds: Sequence[type[Line]], known: set[type[Line]]
         lines += ["", f"### {_heading(kind)}", "", inspect.cleandoc(kind.__doc__ or "")]
         base = next((parent for parent in kind.__mro__[1:] if parent in known), Line)
         names = [name for name in kind.model_fields if name in inspect.get_annotations(kind)]
-        told = _docs(kind)
+        docs = _docs(kind)
         if base is not Line:
             lines[-1] += f" It has the fields of {_name(base)}, and:"
         lines += ["", "| field | type | what |", "|---|---|---|"]
         hints = typing.get_type_hints(kind, include_extras=False)
         for name in names:
-            lines.append(f"| `{name}` | {_type(hints[name])} | {told.get(name, '')} |")
+            lines.append(f"| `{name}` | {_type(hints[name])} | {docs.get(name, '')} |")
             waiting += parts(hints[name])
     return "\n".join(lines) + "\n"
 
@@ -66,11 +66,11 @@ def put_between(document: str, text: str) -> str:
 def json_schema(title: str, adapter: TypeAdapter[Any], kinds: Sequence[type[Line]]) -> Any:
     """The JSON Schema (draft 2020-12) of a line, with what `kinds` say of their fields."""
     schema = adapter.json_schema()
-    told = {kind.__name__: kind for kind in _with_parts(kinds)}
+    by_name = {kind.__name__: kind for kind in _with_parts(kinds)}
     definitions = schema.get("$defs", {})
-    for name, found in {**definitions, schema.get("title", ""): schema}.items():
-        if name in told:
-            _describe(found, told[name])
+    for name, definition in {**definitions, schema.get("title", ""): schema}.items():
+        if name in by_name:
+            _describe(definition, by_name[name])
     return {"$schema": _DRAFT, **schema, "title": title}
 
 
@@ -79,28 +79,28 @@ def _describe(schema: dict[str, Any], kind: type[Line]) -> None:
         if issubclass(parent, Line):
             for name, text in _docs(parent).items():
                 schema["properties"][name]["description"] = text
-    for found in schema["properties"].values():
-        found.pop("title", None)
+    for described in schema["properties"].values():
+        described.pop("title", None)
 
 
 def _with_parts(kinds: Sequence[type[Line]]) -> list[type[Line]]:
-    found: list[type[Line]] = []
+    listed: list[type[Line]] = []
     waiting = list(kinds)
     while waiting:
         kind = waiting.pop(0)
-        if kind not in found:
-            found.append(kind)
+        if kind not in listed:
+            listed.append(kind)
             hints = typing.get_type_hints(kind)
             for name in kind.model_fields:
                 waiting += parts(hints[name])
-    return found
+    return listed
 
 
 def _docs(kind: type[Line]) -> dict[str, str]:
     """What stands below each field of a model, in one line."""
     (tree,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
     assert isinstance(tree, ast.ClassDef)
-    found: dict[str, str] = {}
+    docs: dict[str, str] = {}
     for field, below in zip(tree.body, tree.body[1:], strict=False):
         if (
             isinstance(field, ast.AnnAssign)
@@ -109,8 +109,8 @@ def _docs(kind: type[Line]) -> dict[str, str]:
             and isinstance(below, ast.Expr)
             and isinstance(below.value, ast.Constant)
         ):
-            found[field.target.id] = " ".join(str(below.value.value).split())
-    return found
+            docs[field.target.id] = " ".join(str(below.value.value).split())
+    return docs
 
 
 def _type(hint: Any) -> str:

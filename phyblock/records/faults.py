@@ -71,8 +71,8 @@ def free_of(*finders: Callable[[Any], Iterable[Fault]]) -> AfterValidator:
     """A check that these find nothing in a value, whose parts are sound."""
 
     def check(value: _T) -> _T:
-        if found := [each for find in finders for each in find(value)]:
-            raise fault(*found)
+        if faults := [each for find in finders for each in find(value)]:
+            raise fault(*faults)
         return value
 
     return AfterValidator(check)
@@ -82,8 +82,8 @@ def fits(find: Callable[[Any, ValidationInfo], Iterable[Fault]]) -> AfterValidat
     """A check that `find` finds nothing, given the fields before this one and the context."""
 
     def check(value: _T, info: ValidationInfo) -> _T:
-        if found := tuple(find(value, info)):
-            raise fault(*found)
+        if faults := tuple(find(value, info)):
+            raise fault(*faults)
         return value
 
     return AfterValidator(check)
@@ -102,8 +102,8 @@ def validated(kind: type[_LineT], raw: object, where: str, context: object = Non
 
 def refuse(faults: Iterable[Fault], where: str) -> None:
     """DataError with these faults of a line, if there are any."""
-    told = (Problem(where, f.message, dotted(f.at), f.found or "", f.allowed) for f in faults)
-    if problems := tuple(islice(told, _MOST_FAULTS)):
+    every = (Problem(where, f.message, dotted(f.at), f.found or "", f.allowed) for f in faults)
+    if problems := tuple(islice(every, _MOST_FAULTS)):
         raise DataError(problems)
 
 
@@ -118,8 +118,8 @@ def _problems(error: ValidationError, kind: type[Line], where: str) -> Iterator[
 def _faults(error: Any, kind: type[Line]) -> tuple[Fault, ...]:
     what, context = error["type"], error.get("ctx") or {}
     if what == _FAULTS:
-        told: tuple[Fault, ...] = context[_FAULTS]
-        return told
+        faults: tuple[Fault, ...] = context[_FAULTS]
+        return faults
     message, allowed = _WORDS.get(what, (error["msg"], ""))
     found = None
     if what == "missing":

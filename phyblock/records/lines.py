@@ -112,7 +112,7 @@ class Lines(Generic[LineT]):
             message = f"{is_not}: longer than {_LONGEST_LINE_BYTES // 1024**2} MB"
             raise self.error(Problem(where, message, hint=self.hint))
         try:
-            found: LineT = decode(self._adapter, data)
+            read: LineT = decode(self._adapter, data)
         except JSONDecodeError as error:
             problem = Problem(f"{where}:{error.colno}", f"{is_not}: {error.msg}", hint=self.hint)
             raise self.error(problem) from error
@@ -122,7 +122,7 @@ class Lines(Generic[LineT]):
             raise self.error(self.problem(error, where)) from error
         except ValueError as error:
             raise self.error(Problem(where, f"{is_not}: it {error}", hint=self.hint)) from error
-        return found
+        return read
 
 
 _TURN: TypeAdapter[Turn] = TypeAdapter(Turn)

@@ -187,8 +187,8 @@ def read_manifest(folder: Path) -> Manifest:
         where = _at(path, getattr(error, "problem_mark", None))
         raise StoreError(Problem(where, "is not YAML", hint=_HINT)) from error
     except LookupError as error:
-        message, said = "is not a run manifest", "no such key"
-        raise StoreError(Problem(str(path), message, "identity", said, hint=_HINT)) from error
+        message, missing = "is not a run manifest", "no such key"
+        raise StoreError(Problem(str(path), message, "identity", missing, hint=_HINT)) from error
     except ValidationError as error:
         raise StoreError(
             problem_of(one, str(path), "is not a run manifest", _HINT)
@@ -204,10 +204,10 @@ def _manifest(text: str) -> Manifest:
 
     Raises as `load_yaml` and pydantic do.
     """
-    found = load_yaml(text, _BOUNDS)
-    if not isinstance(found, dict) or "identity" not in found:
+    content = load_yaml(text, _BOUNDS)
+    if not isinstance(content, dict) or "identity" not in content:
         raise LookupError("identity")
-    return Manifest.model_validate(found)
+    return Manifest.model_validate(content)
 
 
 def _at(path: Path, mark: yaml.Mark | None) -> str:

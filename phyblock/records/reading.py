@@ -40,13 +40,13 @@ def newest_starts(lines: RecordLines, tracks: Collection[str] | None = None) -> 
 
     Only samples of `tracks` are taken, of all where it is None.
     """
-    found: dict[str, int] = {}
+    starts: dict[str, int] = {}
     start = 0
     for _, record in lines:
         if tracks is None or record.track in tracks:
-            found[record.sample] = start
+            starts[record.sample] = start
         start = lines.whole_bytes
-    return found
+    return starts
 
 
 def read_records(folder: Path, manifest: Manifest | None = None) -> Iterable[Record]:
@@ -65,13 +65,13 @@ def collect_turns(
 
     Samples `without` are left out. Raises StoreError where a turn is missing.
     """
-    found: dict[str, dict[int, StoredReply]] = {}
+    by_sample: dict[str, dict[int, StoredReply]] = {}
     for where, line in lines:
         if line.sample in without:
             continue
-        turns = found.setdefault(line.sample, {})
+        turns = by_sample.setdefault(line.sample, {})
         if not 0 <= line.turn <= len(turns):
             message = f"is turn {line.turn} of a sample of which {len(turns)} turns are there"
             raise StoreError(Problem(where, message, "turn", hint=TurnLines.hint))
         turns[line.turn] = line.reply
-    return {sample: [turns[n] for n in sorted(turns)] for sample, turns in found.items()}
+    return {sample: [turns[n] for n in sorted(turns)] for sample, turns in by_sample.items()}

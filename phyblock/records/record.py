@@ -197,8 +197,10 @@ class Record(Line):
 
     def course(self, matcher: str) -> Course | None:
         """How an assembly went, by a matcher where it was scored by that; None for what is none."""
-        told = [score for score in self.scores if score.why is not None]
-        score = next((one for one in told if one.matcher == matcher), next(iter(told), None))
+        assemblies = [score for score in self.scores if score.why is not None]
+        score = next(
+            (one for one in assemblies if one.matcher == matcher), next(iter(assemblies), None)
+        )
         if score is None:
             return None
         names = (self.said or "").split()

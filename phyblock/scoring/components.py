@@ -52,13 +52,13 @@ def shift(scores: Floats, clusters: Clusters) -> Component:
     if items < 2 or levels < 2 or clusters.size < 2:
         return NO_COMPONENT
     moved = (scores - scores.mean(axis=1, keepdims=True)).mean(axis=2)
-    found = jackknife(
+    estimate = jackknife(
         np.concatenate([moved, np.ones((items, 1))], axis=1),
         clusters,
         lambda sums: sums[..., :-1] / sums[..., -1:],
     )
     df = levels - 1
-    total, error = float((found.value**2).sum()), float((found.se**2).sum())
+    total, error = float((estimate.value**2).sum()), float((estimate.se**2).sum())
     if error <= np.finfo(float).tiny:
         exact = np.sqrt(total / df)
         return Component(exact, exact, exact)
@@ -107,10 +107,10 @@ def interaction(scores: Floats, clusters: Clusters) -> Component:
         of_blocks = (sums[..., 2] - n * apart) / (df * (blocks - 1))
         return np.stack([of_levels - of_blocks / blocks, of_blocks / blocks], axis=-1)
 
-    found = jackknife(counts, clusters, variance)
+    estimate = jackknife(counts, clusters, variance)
     most = (clusters.size - 1) * (levels - 1)
-    above, noise = (float(value) for value in found.value)
-    return _of_variance(above, float(found.se[0]), noise, most=most)
+    above, noise = (float(value) for value in estimate.value)
+    return _of_variance(above, float(estimate.se[0]), noise, most=most)
 
 
 def within(scores: Floats, clusters: Clusters) -> Component:
@@ -123,9 +123,9 @@ def within(scores: Floats, clusters: Clusters) -> Component:
         return NO_COMPONENT
     variances = scores.var(axis=2, ddof=1).mean(axis=1)
     counts = np.stack([np.ones(items), variances], axis=1)
-    found = jackknife(counts, clusters, lambda sums: sums[..., 1] / sums[..., 0])
+    estimate = jackknife(counts, clusters, lambda sums: sums[..., 1] / sums[..., 0])
     most = clusters.size * ways * (repeats - 1)
-    return _of_variance(float(found.value), float(found.se), most=most)
+    return _of_variance(float(estimate.value), float(estimate.se), most=most)
 
 
 def spread_of_items(scores: Floats, clusters: Clusters) -> Component:
@@ -137,12 +137,12 @@ def spread_of_items(scores: Floats, clusters: Clusters) -> Component:
     # Centered first: what is left of large squares would be noise.
     means = means - means.mean()
     counts = np.stack([np.ones(items), means, means**2], axis=1)
-    found = jackknife(
+    estimate = jackknife(
         counts,
         clusters,
         lambda sums: (sums[..., 2] - sums[..., 1] ** 2 / sums[..., 0]) / (sums[..., 0] - 1),
     )
-    return _of_variance(float(found.value), float(found.se), most=clusters.size - 1)
+    return _of_variance(float(estimate.value), float(estimate.se), most=clusters.size - 1)
 
 
 def _of_variance(variance: float, se: float, noise: float = 0.0, *, most: float) -> Component:

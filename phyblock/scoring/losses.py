@@ -125,10 +125,10 @@ def _too_many(
         if excess > 0:
             surplus[kind] = surplus.get(kind, -spare.get(kind, 0)) + excess
             blocks[kind] = blocks.get(kind, 0) | look & standing
-    found = (0, 0)
+    needed = (0, 0)
     for kind, some in blocks.items():
         if surplus[kind] == some.bit_count():
             return some, surplus[kind]
         if surplus[kind] > 0:
-            found = some, surplus[kind]
-    return found
+            needed = some, surplus[kind]
+    return needed

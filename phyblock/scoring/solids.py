@@ -57,14 +57,14 @@ def _shared(one: Piece, other: Piece) -> float:
 
 def _faces(piece: Piece) -> list[Floats]:
     """The faces of a polytope, each a polygon (n, 3) in order round it."""
-    found = []
+    faces = []
     for normal in (*piece.normals, *-piece.normals):
         heights = piece.corners @ normal
         face = piece.corners[heights > heights.max() - _FLAT]
         # A semi-cylinder has a face on one side of a pair alone.
         if len(face) > 2:
-            found.append(_round(face, normal))
-    return found
+            faces.append(_round(face, normal))
+    return faces
 
 
 def _round(points: Floats, normal: Floats) -> Floats:

@@ -135,7 +135,7 @@ def jackknife(
     return Estimate(value, se, value - wide, value + wide, p, behind)
 
 
-def in_range(found: Estimate, most: ArrayLike = 1.0) -> Estimate:
+def in_range(estimate: Estimate, most: ArrayLike = 1.0) -> Estimate:
     """The same estimates, with Wilson's interval in the place of Student's where a range is known.
 
     Values are from 0 to `most`: 1 for shares, infinity for what is never below zero; NaN for no
@@ -148,26 +148,28 @@ def in_range(found: Estimate, most: ArrayLike = 1.0) -> Estimate:
     where that is infinite. The interval stays in the range and has a width even where nothing
     varies, unless the range has no end, which leaves no scale for one.
     """
-    end = np.broadcast_to(np.asarray(most, dtype=np.float64), found.value.shape)
+    end = np.broadcast_to(np.asarray(most, dtype=np.float64), estimate.value.shape)
     chosen = ~np.isnan(end)
-    value = np.where(chosen, found.value, np.nan)
-    behind = found.n_clusters.astype(np.float64)
-    known = ~np.isnan(found.se) & chosen
+    value = np.where(chosen, estimate.value, np.nan)
+    behind = estimate.n_clusters.astype(np.float64)
+    known = ~np.isnan(estimate.se) & chosen
     t = stdtrit(np.where(known & (behind > 1), behind - 1, np.nan), (1 + CONFIDENCE) / 2)
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = 1 / end
         spread = value * (1 - value * inverse)
-        is_still = (spread <= 0) | (found.se <= _NOTHING * value)
+        is_still = (spread <= 0) | (estimate.se <= _NOTHING * value)
         # What one cluster that fell at either end would vary by, over `spread`.
         still = np.where(inverse > 0, 1 / (behind * inverse), 0.0)
-        per_spread = np.where(is_still, still, found.se**2 / spread)
+        per_spread = np.where(is_still, still, estimate.se**2 / spread)
     scale = 1 + t**2 * per_spread * inverse
     centre = (value + t**2 * per_spread / 2) / scale
     half = t * np.sqrt(per_spread * (spread + t**2 * per_spread / 4)) / scale
     # Rounding leaves no value outside of its interval.
     lo, hi = np.minimum(centre - half, value), np.maximum(centre + half, value)
     lo, hi = np.maximum(lo, 0.0), np.minimum(hi, end)
-    return replace(found, lo=np.where(known, lo, found.lo), hi=np.where(known, hi, found.hi))
+    return replace(
+        estimate, lo=np.where(known, lo, estimate.lo), hi=np.where(known, hi, estimate.hi)
+    )
 
 
 def least_p(n_clusters: ArrayLike) -> Floats:
@@ -188,8 +190,8 @@ def detectable(se: ArrayLike, n_clusters: ArrayLike, level: float) -> Floats:
     behind = np.asarray(n_clusters, dtype=np.float64)
     df = np.where(behind > 1, behind - 1.0, np.nan)
     error = np.asarray(se, dtype=np.float64)
-    found = (stdtrit(df, 1 - level / 2) + stdtrit(df, POWER)) * error
-    return np.where(error > 0, found, np.nan)
+    difference = (stdtrit(df, 1 - level / 2) + stdtrit(df, POWER)) * error
+    return np.where(error > 0, difference, np.nan)
 
 
 def _in_common(

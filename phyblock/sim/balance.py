@@ -151,7 +151,7 @@ def _least_residual(
     left_over = sparse.identity(rows)
     slack = [(0.0, None)] * (2 * rows)
     within = sparse.csr_matrix((0, count)) if at_most_zero is None else at_most_zero
-    found = linprog(
+    solution = linprog(
         np.concatenate([np.zeros(count), np.ones(2 * rows)]),
         A_eq=sparse.hstack([sparse.csr_matrix(unknown), left_over, -left_over]),
         b_eq=target,
@@ -160,9 +160,9 @@ def _least_residual(
         bounds=[*(bounds or [(0.0, None)] * count), *slack],
         method="highs",
     )
-    if found.status != 0:
-        raise PhyblockError(f"statics of {rows // 6} blocks are not decided: {found.message}")
-    return float(found.fun)
+    if solution.status != 0:
+        raise PhyblockError(f"statics of {rows // 6} blocks are not decided: {solution.message}")
+    return float(solution.fun)
 
 
 def _weights(
@@ -227,10 +227,12 @@ def _wrenches(at_m: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[
 
 
 def _contacts(blocks: Sequence[Block]) -> list[_Contact]:
-    found = [_Contact(None, i, place, _UP) for i, b in enumerate(blocks) for place in _on_floor(b)]
+    contacts = [
+        _Contact(None, i, place, _UP) for i, b in enumerate(blocks) for place in _on_floor(b)
+    ]
     for (below, one), (above, other) in combinations(enumerate(blocks), 2):
-        found += [_Contact(below, above, *place) for place in _between(one, other)]
-    return found
+        contacts += [_Contact(below, above, *place) for place in _between(one, other)]
+    return contacts
 
 
 @functools.lru_cache(maxsize=_KEPT)

@@ -108,8 +108,10 @@ def carry_out(
     with Carrying(limits, engine) as carrying:
         for number, block in enumerate(blocks, 1):
             if time.monotonic() > give_up_s:
-                told = f"carrying out a plan of {len(blocks)} steps took more than {LONGEST_S:g} s"
-                raise SimulationError(f"{told}; it was given up before step {number}")
+                message = (
+                    f"carrying out a plan of {len(blocks)} steps took more than {LONGEST_S:g} s"
+                )
+                raise SimulationError(f"{message}; it was given up before step {number}")
             steps.append(carrying.step(block))
             worlds.append(carrying.blocks)
     return Carried(tuple(steps), tuple(worlds))

@@ -118,21 +118,21 @@ def after(
     limits: Limits = DEFAULT_LIMITS,
 ) -> Outcome:
     """Let blocks go where they are, or push one of them, and see what follows."""
-    found: tuple[int, ...] | None = None
+    agreed: tuple[int, ...] | None = None
     first: dict[int, Pose] = {}
     for setting in settings:
         poses = _settle(blocks, setting, push)
         if poses is None:
             return _UNCLEAR
         moved = moved_orders(blocks, poses, limits)
-        if moved is None or moved != (moved if found is None else found):
+        if moved is None or moved != (moved if agreed is None else agreed):
             return _UNCLEAR
-        found, first = moved, first or poses
+        agreed, first = moved, first or poses
         if push is not None and not _went_alike(blocks, push, first, poses):
             return _UNCLEAR
-    still = set(first) - set(found or ())
+    still = set(first) - set(agreed or ())
     settled = [b if b.order in still else first[b.order].put(b) for b in blocks]
-    return Outcome(found or (), tuple(settled), True)
+    return Outcome(agreed or (), tuple(settled), True)
 
 
 def after_removal(blocks: Sequence[Block], order: int) -> Outcome:

@@ -95,7 +95,7 @@ def told_engine() -> str:
 
     Raises as `physics_engine` does.
     """
-    return _told(physics_engine())
+    return _described(physics_engine())
 
 
 def renderer() -> Renderer:
@@ -126,10 +126,10 @@ def other_simulators() -> tuple[str, ...]:
         ("the physics engine", physics_engine(), REFERENCE_ENGINE),
         ("the renderer", renderer(), _DEFAULT_RENDERER),
     )
-    return tuple(f"{what} {_told(one)}" for what, one, usual in used if one.name != usual)
+    return tuple(f"{what} {_described(one)}" for what, one, usual in used if one.name != usual)
 
 
-def _told(simulator: PhysicsEngine | Renderer) -> str:
+def _described(simulator: PhysicsEngine | Renderer) -> str:
     name, versions = simulator.name, simulator.versions
     if list(versions) == [name]:
         return f"{name} {versions[name]}"
@@ -154,5 +154,5 @@ def _make(variable: str, word: str, path: str, names: str) -> object:
         raise
     except Exception as error:
         # It may be anybody's code, or no factory at all.
-        said = f"cannot be {doing}: {type(error).__name__}: {error}"
-        raise InputError(Problem(variable, said, found=word)) from error
+        message = f"cannot be {doing}: {type(error).__name__}: {error}"
+        raise InputError(Problem(variable, message, found=word)) from error

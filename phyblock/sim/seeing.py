@@ -131,7 +131,7 @@ def visible_tops(recipe: QuestionPicture, shot: Shot, step_px: int, least_rise: 
     shows of a block are left out.
     """
     camera, blocks = _camera(recipe), drawn_blocks(recipe)
-    found = []
+    tops = []
     for row in range(step_px // 2, SEEN_PX - 2, step_px):
         for column in range(step_px // 2, SEEN_PX - 2, step_px):
             around = shot.block[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3]
@@ -140,8 +140,8 @@ def visible_tops(recipe: QuestionPicture, shot: Shot, step_px: int, least_rise: 
                 continue
             hit = _hit(blocks[vertex], camera, (row, column))
             if hit is not None and hit.rise >= least_rise:
-                found.append(hit)
-    return found
+                tops.append(hit)
+    return tops
 
 
 def mark_pixel(recipe: QuestionPicture, position_m: tuple[float, float, float]) -> tuple[int, int]:

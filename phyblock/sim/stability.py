@@ -67,13 +67,13 @@ class Movement(NamedTuple):
 
 def check(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Stability:
     """Let blocks go at their goal poses and see which of them stay."""
-    found = []
+    movements = []
     for physics in trial.physics:
         with World(physics) as world:
             world.place_all(blocks)
             world.step(trial.duration_s)
-            found.append(movement(blocks, world.poses(), trial))
-    return verdict(found, trial)
+            movements.append(movement(blocks, world.poses(), trial))
+    return verdict(movements, trial)
 
 
 def movement(blocks: Sequence[Block], poses: Mapping[int, Pose], trial: Trial) -> Movement:
@@ -86,12 +86,12 @@ def movement(blocks: Sequence[Block], poses: Mapping[int, Pose], trial: Trial) -
     )
 
 
-def verdict(found: Sequence[Movement], trial: Trial) -> Stability:
+def verdict(movements: Sequence[Movement], trial: Trial) -> Stability:
     """What the settings of a trial showed together."""
     return Stability(
-        fallen=tuple(sorted({order for one in found for order in one.fallen})),
-        moved_m=max((one.moved_m for one in found), default=0.0),
-        turned_deg=max((one.turned_deg for one in found), default=0.0),
-        agreed=len({one.fallen for one in found}) <= 1,
+        fallen=tuple(sorted({order for one in movements for order in one.fallen})),
+        moved_m=max((one.moved_m for one in movements), default=0.0),
+        turned_deg=max((one.turned_deg for one in movements), default=0.0),
+        agreed=len({one.fallen for one in movements}) <= 1,
         trial=trial,
     )

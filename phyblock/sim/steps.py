@@ -60,35 +60,35 @@ def check_steps(
     Only the group of the block just placed is tried, every block at its goal pose; the other
     groups were tried at earlier steps. With `rest` None every trial takes its full time.
     """
-    found: list[list[Movement]] = [[] for _ in blocks]
+    by_step: list[list[Movement]] = [[] for _ in blocks]
     for physics in trial.physics:
         with World(physics) as world:
             for count in range(len(blocks)):
                 group = _group_of_last(blocks[: count + 1])
-                found[count].append(_try(world, group, trial, rest))
-    return tuple(verdict(movements, trial) for movements in found)
+                by_step[count].append(_try(world, group, trial, rest))
+    return tuple(verdict(movements, trial) for movements in by_step)
 
 
 def check_at_rest(
     blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL, rest: Rest = DEFAULT_REST
 ) -> Stability:
     """Stability of a state as `check` finds it, each group watched until it is at rest."""
-    found = []
+    movements = []
     for physics in trial.physics:
         with World(physics) as world:
             tried = [_try(world, group, trial, rest) for group in groups(blocks)]
         fallen = tuple(sorted(order for one in tried for order in one.fallen))
         moved_m = max((one.moved_m for one in tried), default=0.0)
         turned_deg = max((one.turned_deg for one in tried), default=0.0)
-        found.append(Movement(moved_m, turned_deg, fallen))
-    return verdict(found, trial)
+        movements.append(Movement(moved_m, turned_deg, fallen))
+    return verdict(movements, trial)
 
 
 def groups(blocks: Sequence[Block], reach_m: float = REACH_M) -> tuple[tuple[Block, ...], ...]:
     """The blocks in groups that keep more than `reach_m` [m] of free space between them."""
     boxes = [bounds_m(block) for block in blocks]
     left = set(range(len(blocks)))
-    found: list[tuple[Block, ...]] = []
+    touching: list[tuple[Block, ...]] = []
     while left:
         frontier = [min(left)]
         left.remove(frontier[0])
@@ -99,8 +99,8 @@ def groups(blocks: Sequence[Block], reach_m: float = REACH_M) -> tuple[tuple[Blo
             near = {other for other in left if boxes_near(boxes[at], boxes[other], reach_m)}
             left -= near
             frontier += sorted(near)
-        found.append(tuple(blocks[member] for member in sorted(members)))
-    return tuple(found)
+        touching.append(tuple(blocks[member] for member in sorted(members)))
+    return tuple(touching)
 
 
 def _group_of_last(blocks: Sequence[Block]) -> tuple[Block, ...]:
@@ -114,10 +114,10 @@ def _try(world: World, group: Sequence[Block], trial: Trial, rest: Rest | None) 
         world.step(trial.duration_s)
     else:
         wait(world, trial.duration_s, rest)
-    found = movement(group, world.poses(), trial)
+    moved = movement(group, world.poses(), trial)
     for block in group:
         world.remove(block.order)
-    return found
+    return moved
 
 
 def wait(world: World, limit_s: float, rest: Rest = DEFAULT_REST) -> bool:

@@ -78,7 +78,7 @@ def find_overlaps(
 ) -> tuple[Overlap, ...]:
     """Pairs of blocks that share space deeper than `tolerance_m` [m]; blocks in the ground too."""
     solids = [_solid(block) for block in blocks]
-    found = [
+    overlaps = [
         Overlap(GROUND, solid.order, -solid.bottom_m)
         for solid in solids
         if solid.bottom_m < -tolerance_m
@@ -86,8 +86,8 @@ def find_overlaps(
     for first, second in _near_pairs(solids, 0.0):
         depth_m = -min(axes.gap_m for _, _, axes in _piece_pairs(first, second))
         if depth_m > tolerance_m:
-            found.append(Overlap(first.order, second.order, depth_m))
-    return tuple(found)
+            overlaps.append(Overlap(first.order, second.order, depth_m))
+    return tuple(overlaps)
 
 
 def find_gaps(blocks: Sequence[Block], tolerance_m: float = FIT_TOLERANCE_M) -> tuple[Gap, ...]:

@@ -92,11 +92,11 @@ def load_suite(
     secrets = list(find_secrets(source.data, source))
     if suite is None and isinstance(source.data, dict):
         problems += _broken_rules(source, problems)
-    found = merge_problems(source.problems, secrets, problems)
+    all_problems = merge_problems(source.problems, secrets, problems)
     if suite is not None:
-        found += vary_problems(suite, source)
-    if suite is None or found:
-        raise SpecError(sort_problems(found))
+        all_problems += vary_problems(suite, source)
+    if suite is None or all_problems:
+        raise SpecError(sort_problems(all_problems))
     # What varies has the values of the reference, wherever one value alone is asked for.
     return _locate(suite.at(Variant()), path, source, data_dir, prompt_dirs)
 
@@ -214,8 +214,8 @@ def _locate(
     finder.check_twice(prompts, ("vary", "prompt"))
     if dataset is None or finder.problems:
         raise SpecError(sort_problems(finder.problems))
-    found = map(_there, (folders, templates, prompts, unused))
-    return LoadedSuite(suite, path, dataset, source, *found).at(Variant())
+    located = map(_there, (folders, templates, prompts, unused))
+    return LoadedSuite(suite, path, dataset, source, *located).at(Variant())
 
 
 def _prompt(suite: SuiteSpec, track: str) -> str:
@@ -256,17 +256,17 @@ class _Finder:
                 hint = did_you_mean(text, names) or f"for a folder beside the suite write ./{text}"
                 self._complain(at, "is not a bundled data set", show(text), allowed, hint)
             return folder
-        found = self._expand(text, at)
-        if found is not None and not os.path.isdir(found):
-            self._complain(at, "no such folder", str(found))
-        return found
+        path = self._expand(text, at)
+        if path is not None and not os.path.isdir(path):
+            self._complain(at, "no such folder", str(path))
+        return path
 
     def file(self, text: str, at: FieldPath) -> Path | None:
         """A file that must be there."""
-        found = self._expand(text, at)
-        if found is not None and not os.path.isfile(found):
-            self._complain(at, "no such file", str(found))
-        return found
+        path = self._expand(text, at)
+        if path is not None and not os.path.isfile(path):
+            self._complain(at, "no such file", str(path))
+        return path
 
     def check_twice(self, files: Mapping[str, Path | None], at: FieldPath) -> None:
         """Complain of names that mean a file that another means already."""

@@ -39,8 +39,8 @@ def load_models(path: Path) -> dict[str, ModelSpec]:
     problems: list[Problem] = []
     for name, entry in data.items():
         hints = max(0, MOST_HINTS - len(problems))
-        spec, found = _read_entry(name, entry, source, hints)
-        problems += found
+        spec, of_entry = _read_entry(name, entry, source, hints)
+        problems += of_entry
         if spec is not None:
             models[name] = spec
     secrets = list(find_secrets(data, source))
@@ -58,9 +58,9 @@ def _read_entry(
         wrong = Problem(source.where((name,)), "has the wrong type", name, show(entry),
                         "a litellm id (provider/model), or a mapping")  # fmt: skip
         return None, [*problems, wrong]
-    spec, found = check(ModelSpec, {"id": entry} if isinstance(entry, str) else entry, source,
+    spec, of_entry = check(ModelSpec, {"id": entry} if isinstance(entry, str) else entry, source,
                         (name,), hints)  # fmt: skip
-    problems += found
+    problems += of_entry
     if spec is None:
         return None, problems
     for index, price in enumerate(spec.prices):

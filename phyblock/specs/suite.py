@@ -201,10 +201,10 @@ class SuiteSpec(Section):
     def section(self, model: type[SectionT]) -> SectionT:
         """The section of a track; LookupError where the suite was made without it."""
         values = (getattr(self, name) for name in type(self).model_fields)
-        found = next((value for value in values if isinstance(value, model)), None)
-        if found is None:
+        section = next((value for value in values if isinstance(value, model)), None)
+        if section is None:
             raise LookupError(f"the suite has no section of {model.__name__}")
-        return found
+        return section
 
     def at(self, variant: Variant) -> SuiteSpec:
         """The suite as a variant asks, its other factors at their reference."""

@@ -84,10 +84,10 @@ def check(
     except ValidationError as error:
         details = error.errors(include_url=False)
     faults = [_locate(detail, data, model, base) for detail in details]
-    told = [fault for fault in faults if not _is_echo(fault)]
+    own = [fault for fault in faults if not _is_echo(fault)]
     return None, [
-        *(_word(fault, source) for fault in told[:hints]),
-        *(_word_briefly(fault, source) for fault in told[hints:]),
+        *(_word(fault, source) for fault in own[:hints]),
+        *(_word_briefly(fault, source) for fault in own[hints:]),
     ]
 
 
@@ -207,18 +207,18 @@ def _not_a_choice(fault: _Fault) -> tuple[str, str, str]:
 
 
 def _type_hint(kind: str, fault: _Fault) -> str:
-    found = fault.found
-    if kind in ("int_type", "float_type") and isinstance(found, str):
-        return "take the quotes off" if re.fullmatch(r"[-+\d.eE]+", found) else ""
-    if kind == "tuple_type" and isinstance(found, str | int | float):
-        return f"write a list: [{_brief(found)}]"
-    if kind == "string_type" and isinstance(found, str | int | float):
-        return f'put it in quotes: "{_brief(found)}"'
+    value = fault.found
+    if kind in ("int_type", "float_type") and isinstance(value, str):
+        return "take the quotes off" if re.fullmatch(r"[-+\d.eE]+", value) else ""
+    if kind == "tuple_type" and isinstance(value, str | int | float):
+        return f"write a list: [{_brief(value)}]"
+    if kind == "string_type" and isinstance(value, str | int | float):
+        return f'put it in quotes: "{_brief(value)}"'
     return ""
 
 
-def _brief(found: object) -> str:
-    text = str(found)
+def _brief(value: object) -> str:
+    text = str(value)
     return text if len(text) <= 80 else text[:77] + "..."
 
 

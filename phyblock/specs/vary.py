@@ -108,8 +108,8 @@ class VarySpec(Section):
 
     def values(self, factor: str) -> tuple[Any, ...]:
         """The levels of a factor as fields of the suite take them."""
-        found = getattr(self, factor)
-        return tuple(range(1, found + 1)) if factor == REPEAT else tuple(found)
+        levels = getattr(self, factor)
+        return tuple(range(1, levels + 1)) if factor == REPEAT else tuple(levels)
 
     def names(self, factor: str) -> tuple[str, ...]:
         """The levels of a factor as records and tables name them: of a template, its file's."""

@@ -43,11 +43,11 @@ def vary_problems(suite: SuiteSpec, source: YamlSource) -> Iterator[Problem]:
 def _conflicts(suite: SuiteSpec, source: YamlSource, factor: str) -> Iterator[Problem]:
     """A field that says something else than the reference of the factor that varies it."""
     for path in suite.fields_of(factor):
-        found, first = read_dotted(suite, dotted(path)), suite.vary.values(factor)[0]
-        if path in source.values and found != first:
+        value, first = read_dotted(suite, dotted(path)), suite.vary.values(factor)[0]
+        if path in source.values and value != first:
             message = f"is varied by vary.{factor}, whose first level is the reference"
             hint = "leave it out, or change vary"
-            yield Problem(source.where(path), message, dotted(path), show(found), str(first), hint)
+            yield Problem(source.where(path), message, dotted(path), show(value), str(first), hint)
 
 
 def _levels(suite: SuiteSpec, source: YamlSource, factor: str) -> Iterator[Problem]:

@@ -57,8 +57,8 @@ def show(value: object) -> str:
 def close_match(word: str, known: Iterable[str]) -> str | None:
     """The known word that is most like `word`, case aside; None where none is close."""
     folded = {name.casefold(): name for name in known}
-    found = difflib.get_close_matches(word.casefold(), folded, n=1, cutoff=0.6)
-    return folded[found[0]] if found else None
+    matches = difflib.get_close_matches(word.casefold(), folded, n=1, cutoff=0.6)
+    return folded[matches[0]] if matches else None
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

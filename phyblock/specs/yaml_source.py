@@ -60,9 +60,9 @@ class YamlSource:
         """Place of the value at `path` (or of its key), else of the nearest thing around it."""
         first, second = (self.keys, self.values) if key else (self.values, self.keys)
         for end in range(len(path), 0, -1):
-            found = first.get(path[:end]) or second.get(path[:end])
-            if found:
-                return found
+            place = first.get(path[:end]) or second.get(path[:end])
+            if place:
+                return place
         return self.values.get((), f"{self.label}:1:1")
 
     def is_overridden(self, path: FieldPath) -> bool:
@@ -227,15 +227,15 @@ class _Reader:
             where = self._place
         elif mark is not None:
             where = f"{where}:{mark.line + 1}:{mark.column + 1}"
-        said = (error.problem or error.context or "unreadable").strip()
+        message = (error.problem or error.context or "unreadable").strip()
         hint = ""
-        if "\\t" in said:
+        if "\\t" in message:
             hint = "indent with spaces, not with tabs"
-        elif "mapping values are not allowed" in said:
+        elif "mapping values are not allowed" in message:
             hint = "put text that holds ': ' in quotes, or check the indentation"
-        elif "another document" in said:
+        elif "another document" in message:
             hint = "keep one document: remove the line ---"
-        return Problem(where, f"is not YAML: {said}", hint=hint)
+        return Problem(where, f"is not YAML: {message}", hint=hint)
 
     def _where(self, node: yaml.Node) -> str:
         mark = node.start_mark

@@ -30,11 +30,11 @@ def cost_frame(run: Run) -> pd.DataFrame:
     facts["price"] = records["cost_usd"].where(sent | records["cached"].fillna(False).astype(bool))
     facts["latency_s"] = records["latency_s"].where(sent)
     groups = facts.groupby(_ROW)
-    found = groups[list(_TOKENS)].mean().astype("float64")
-    found["cost_per_100_usd"] = 100 * groups["price"].mean()
-    found["latency_median_s"] = groups["latency_s"].median()
-    found["latency_p90_s"] = groups["latency_s"].quantile(0.9)
-    return coverage_frame(run)[[*_ROW, "replies", "cost_usd"]].join(found, on=_ROW)
+    costs = groups[list(_TOKENS)].mean().astype("float64")
+    costs["cost_per_100_usd"] = 100 * groups["price"].mean()
+    costs["latency_median_s"] = groups["latency_s"].median()
+    costs["latency_p90_s"] = groups["latency_s"].quantile(0.9)
+    return coverage_frame(run)[[*_ROW, "replies", "cost_usd"]].join(costs, on=_ROW)
 
 
 def cost_view(table: pd.DataFrame, run: Run) -> TextTable:

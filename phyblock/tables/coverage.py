@@ -151,11 +151,11 @@ def coverage_in_terminal(view: TextTable, table: pd.DataFrame) -> tuple[TextTabl
     if not (table["ok"] < table["expected"]).any():
         return ()
     always = ("Model", "Track", "Expected", "OK")
-    told = ("Not run", *HEADINGS.values())
+    missing = ("Not run", *HEADINGS.values())
     dropped = [
         column.name
         for i, column in enumerate(view.columns)
         if column.name not in always
-        and (column.name not in told or all(row[i] == "0" for row in view.rows))
+        and (column.name not in missing or all(row[i] == "0" for row in view.rows))
     ]
     return (replace(view.without(dropped), notes=()),)

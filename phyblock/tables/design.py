@@ -170,8 +170,8 @@ def read_section(
     Fields that only another version knows are left out. Raises StoreError naming `where` and every
     field that is wrong.
     """
-    told = suite.get(key)
-    known = told if isinstance(told, Mapping) else {}
+    section = suite.get(key)
+    known = section if isinstance(section, Mapping) else {}
     try:
         return model.model_validate({n: known[n] for n in model.model_fields if n in known})
     except ValidationError as error:
@@ -182,9 +182,9 @@ def _refused(error: ValidationError, where: str, *above: str) -> StoreError:
     return StoreError(
         Problem(
             where=where,
-            field=".".join(str(part) for part in (*above, *found["loc"])),
-            message=found["msg"],
+            field=".".join(str(part) for part in (*above, *fault["loc"])),
+            message=fault["msg"],
             hint="run.yaml is written by `phyblock run` and is never edited",
         )
-        for found in error.errors()
+        for fault in error.errors()
     )

@@ -183,13 +183,13 @@ def _rows_of(
         each = [value_of_cells(measure, cells, pool.pooled)(heard) for measure in measures]
         return np.stack(each, axis=-1)
 
-    found = jackknife(
+    estimate = jackknife(
         pool.counts,
         clusters,
         all_values,
         n_clusters=np.repeat(usable[:, :, None], len(measures), axis=-1),
     )
-    within = in_range(found, [measure.end_of_range for measure in measures])
+    within = in_range(estimate, [measure.end_of_range for measure in measures])
     spread = _over_seeds(all_values(pool.of_seeds))
     members = np.array([[n in pooled_in(cell, cells) for n in pool.pooled] for cell in cells])
     scenes = np.any(present[:, :, None, :] & members, axis=-1).sum(axis=0)
@@ -203,11 +203,11 @@ def _rows_of(
                     *group,
                     cell.name,
                     int(samples[g, c]),
-                    found.value[at],
+                    estimate.value[at],
                     *(values[at] for values in spread),
                     within.lo[at],
                     within.hi[at],
-                    found.se[at],
+                    estimate.se[at],
                     int(scenes[g, c]),
                     int(behind[g, c]),
                 )

@@ -166,13 +166,13 @@ class Flattened:
         ):
             self._labels[name].append(self._share(label))
         errors, blocks = score.errors or {}, score.blocks or {}
-        found = (
+        counts = (
             *(score.tp, score.fp, score.fn),
             *(errors.get(name, _UNKNOWN) for name in ERROR_TYPES),
             *(blocks.get(name, _UNKNOWN) for name in BLOCK_OUTCOMES),
             _UNKNOWN if score.kept is None else score.kept,
         )
-        for name, count in zip(_COUNTS, found, strict=True):
+        for name, count in zip(_COUNTS, counts, strict=True):
             self._counts[name].append(count)
 
     def _share(self, value: Any) -> Any:
@@ -214,9 +214,9 @@ def _row(record: Record) -> dict[str, Any]:
 
 def _objects(values: Iterable[Any]) -> np.ndarray[Any, Any]:
     """Values as they are, also where they are sequences themselves."""
-    found = list(values)
-    made = np.empty(len(found), dtype=object)
-    made[:] = found
+    objects = list(values)
+    made = np.empty(len(objects), dtype=object)
+    made[:] = objects
     return made
 
 
@@ -227,5 +227,5 @@ def _counts(column: array[int], rows: np.ndarray[Any, np.dtype[np.intp]], kind: 
 
 def _rule(parse: Any) -> str | None:
     """The rule that matched, of whatever a track says of its parsing."""
-    found = parse.get("rule") if isinstance(parse, dict) else getattr(parse, "rule", None)
-    return None if found is None else str(found)
+    rule = parse.get("rule") if isinstance(parse, dict) else getattr(parse, "rule", None)
+    return None if rule is None else str(rule)

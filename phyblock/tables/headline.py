@@ -47,22 +47,23 @@ class Value:
     hi: float
 
 
-def headline_rows(found: pd.DataFrame, design: Design) -> pd.DataFrame:
+def headline_rows(estimates: pd.DataFrame, design: Design) -> pd.DataFrame:
     """The rows of a frame of estimates in the headline setting and matcher."""
-    return found[
-        found["setting"].isin(["", design.setting]) & found["matcher"].isin(["", design.matcher])
+    return estimates[
+        estimates["setting"].isin(["", design.setting])
+        & estimates["matcher"].isin(["", design.matcher])
     ]
 
 
 def headline_values(
-    found: pd.DataFrame,
+    estimates: pd.DataFrame,
     design: Design,
     measures: Sequence[Measure],
     columns: Sequence[HeadlineColumn],
 ) -> Mapping[tuple[str, str], Value]:
     """Values by model and heading."""
     scale = {measure.name: measure.scale for measure in measures}
-    rows = headline_rows(found, design)
+    rows = headline_rows(estimates, design)
     values = {}
     for column in columns:
         mine = rows[(rows["measure"] == column.measure) & (rows[CELL] == column.cell)]
@@ -101,7 +102,7 @@ def narrower(view: TextTable) -> tuple[TextTable, ...]:
 
 
 def interval_frame(
-    found: pd.DataFrame, design: Design, scale: float, by: Sequence[str]
+    estimates: pd.DataFrame, design: Design, scale: float, by: Sequence[str]
 ) -> pd.DataFrame:
     """Pooled values with intervals, a row an estimate, models in the order of the suite.
 
@@ -109,7 +110,7 @@ def interval_frame(
     n_clusters.
     """
     place = {name: number for number, name in enumerate(design.model_names)}
-    rows = headline_rows(found, design)
+    rows = headline_rows(estimates, design)
     rows = rows[rows["model"].isin(place)]
     rows = rows.sort_values("model", key=lambda names: names.map(place), kind="stable")
     numbers = ["value", "lo", "hi", "se"]

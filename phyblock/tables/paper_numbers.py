@@ -83,8 +83,8 @@ def interleaved(table: pd.DataFrame, cells: Sequence[str]) -> pd.DataFrame:
         for cell in cells
     ]
     names = ["model", "published_name", "cell", "published", "ours"]
-    found = pd.DataFrame(rows, columns=names).astype({"published": "float64", "ours": "float64"})
-    return found.assign(difference=found["ours"] - found["published"])
+    frame = pd.DataFrame(rows, columns=names).astype({"published": "float64", "ours": "float64"})
+    return frame.assign(difference=frame["ours"] - frame["published"])
 
 
 def beside_view(

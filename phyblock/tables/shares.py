@@ -44,14 +44,14 @@ def shares_of(
     about = dict.fromkeys(SCORED_BY, "")
     about |= {} if CELL in rows else {CELL: WHOLE.name}
     counts = rows.assign(**about, **{_WHOLE: total})
-    found = estimate_frame(run, measures, cells, lambda _: counts)
+    estimates = estimate_frame(run, measures, cells, lambda _: counts)
     shares = {
         f"{part}_{name}": mine[end].astype("float64")
         for part in parts
-        for mine in (found[found["measure"] == part].set_index(["model", CELL]),)
+        for mine in (estimates[estimates["measure"] == part].set_index(["model", CELL]),)
         for end, name in _ENDS.items()
     }
-    at = pd.MultiIndex.from_frame(found[["model", CELL]].drop_duplicates())
+    at = pd.MultiIndex.from_frame(estimates[["model", CELL]].drop_duplicates())
     sums = counts.groupby(["model", CELL])[[_WHOLE, *parts]].sum().reindex(at)
     return sums.join(pd.DataFrame(shares, at))
 

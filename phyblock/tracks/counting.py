@@ -24,9 +24,9 @@ def count_sample(track: str, item: Any, judged: Any) -> Mapping[str, tuple[float
     not count a sample, its counts are empty: they are absent where a record was written before the
     measure was there, and `phyblock score` fills them in.
     """
-    found = {name: count(item, judged) for name, count in _sorts(track).items()}
+    counts = {name: count(item, judged) for name, count in _sorts(track).items()}
     return {
-        name: tuple(float(number) for number in numbers or ()) for name, numbers in found.items()
+        name: tuple(float(number) for number in numbers or ()) for name, numbers in counts.items()
     }
 
 

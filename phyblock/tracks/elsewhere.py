@@ -26,7 +26,7 @@ class Elsewhere(Generic[AskedT]):
         self._alike: dict[Hashable, list[AskedT]] = {}
         for one in pool:
             self._alike.setdefault(sort_of(one), []).append(one)
-        self._found: dict[str, list[AskedT]] = {}
+        self._others_of: dict[str, list[AskedT]] = {}
 
     def of(self, item: AskedT, seed: int) -> AskedT:
         """The one whose picture is shown: it depends on item and seed alone, not on the model."""
@@ -46,11 +46,11 @@ class Elsewhere(Generic[AskedT]):
             raise SpecError(Problem(f"{noun} {lacking.key}", message, field))
 
     def _others(self, item: AskedT) -> list[AskedT]:
-        if item.key not in self._found:
+        if item.key not in self._others_of:
             own = set(_parents(item))
             alike = self._alike.get(self._sort_of(item), ())
-            self._found[item.key] = [one for one in alike if not own & set(_parents(one))]
-        return self._found[item.key]
+            self._others_of[item.key] = [one for one in alike if not own & set(_parents(one))]
+        return self._others_of[item.key]
 
 
 def _parents(item: Item) -> tuple[str, ...]:

@@ -99,10 +99,10 @@ def counted_samples(run: Run, track: str, counted: SampleCounts) -> pd.DataFrame
     left_out = records["outcome"].isin(run.design.outcomes_left_out)
     rows = records[(records["track"] == track) & ~left_out]
     where = str(run.path / RECORDS)
-    found = [numbers_of(counted, counts, where) for counts in rows["counts"]]
-    rows = rows[np.array([bool(numbers) for numbers in found], dtype=bool)]
+    of_rows = [numbers_of(counted, counts, where) for counts in rows["counts"]]
+    rows = rows[np.array([bool(numbers) for numbers in of_rows], dtype=bool)]
     numbers = pd.DataFrame(
-        [list(numbers) for numbers in found if numbers],
+        [list(numbers) for numbers in of_rows if numbers],
         columns=list(counted.columns),
         index=rows.index,
         dtype="float64",

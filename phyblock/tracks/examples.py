@@ -122,17 +122,17 @@ class Examples(Generic[AskedT]):
 
     def used(self, items: Iterable[AskedT]) -> tuple[AskedT, ...]:
         """All that are examples of any of the items, by key."""
-        found = {one.key: one for item in items for one in self.of(item)}
-        return tuple(found[key] for key in sorted(found))
+        by_key = {one.key: one for item in items for one in self.of(item)}
+        return tuple(by_key[key] for key in sorted(by_key))
 
     def check(self, items: Sequence[AskedT], noun: str, where: str) -> None:
         """Raise SpecError for the first item that has fewer than wanted."""
         for item in items:
-            if (found := len(self.of(item))) < self.n:
+            if (offered := len(self.of(item))) < self.n:
                 message = f"{noun} {item.key} has fewer others to be shown as examples"
                 allowed = "others of its kind, of scenes that differ, which share neither base "
                 allowed += "scene nor goal with it or with what is shown in its place"
-                raise SpecError(Problem(where, message, "examples", str(found), allowed))
+                raise SpecError(Problem(where, message, "examples", str(offered), allowed))
 
     def _others(self, item: AskedT) -> Iterator[AskedT]:
         seen = (item, *self.stand_ins(item))

@@ -54,8 +54,8 @@ def inference(run: Run, dataset: Dataset, scene: str, *, view: EpisodeView) -> F
     task = as_recorded(tasks[record.scene], record)
     steps = list(view.frames(record, task))
     reply = _shortened(_reply(record), 0.46)
-    told = _told(steps[1:], 0.46)
-    n_lines = max(len(reply), len(told), 1)
+    outcomes = _outcome_lines(steps[1:], 0.46)
+    n_lines = max(len(reply), len(outcomes), 1)
     figure = new_figure(0.5, _LEAST_IN)
     width = figure.get_figwidth()
     figure.set_figheight(0.5 + width / 3 + 0.35 + _LINE_IN * n_lines)
@@ -65,7 +65,7 @@ def inference(run: Run, dataset: Dataset, scene: str, *, view: EpisodeView) -> F
     _pictures(pictures, task, steps[-1], picture_style(run.section("images", ImagesSpec)))
     left, right = (figure.add_subplot(grid[1, n : n + 3]) for n in (0, 3))
     _lines(left, "Reply", [(line, INK) for line in reply], n_lines)
-    _lines(right, "Steps", told, n_lines)
+    _lines(right, "Steps", outcomes, n_lines)
     headed(
         figure,
         f"{kind_of(view.track).title}: {one_line(record.model)}, scene {record.scene}",
@@ -126,7 +126,7 @@ def _cut(line: str, width_in: float) -> str:
     return line[: max(1, int(share * len(line)) - 4)] + "..."
 
 
-def _told(steps: Sequence[FilmStep], share: float) -> list[tuple[str, str]]:
+def _outcome_lines(steps: Sequence[FilmStep], share: float) -> list[tuple[str, str]]:
     width = new_figure(1, _LEAST_IN).get_figwidth() * share
     lines = [(_cut(_MARKS[s.tone] + one_line(s.caption), width), _TONES[s.tone]) for s in steps]
     half = _MOST_LINES // 2

@@ -45,9 +45,11 @@ def order_frame(track: str, criterion: str, run: Run) -> pd.DataFrame:
     """
     design = run.design
     records = run.records[run.records["track"] == track]
-    found = headline_rows(track_estimates(run, track), design)
-    found = found[(found[CELL] == WHOLE.name) & found["criterion"].isin(["", criterion])]
-    known = found.set_index(["measure", "model"]).to_dict("index")
+    estimates = headline_rows(track_estimates(run, track), design)
+    estimates = estimates[
+        (estimates[CELL] == WHOLE.name) & estimates["criterion"].isin(["", criterion])
+    ]
+    known = estimates.set_index(["measure", "model"]).to_dict("index")
     plans = _same_plans(records)
     same = shares_of(run, plans, ("same",), whole="pairs").droplevel(CELL).to_dict("index")
     named = counted_samples(run, track, POSE_COUNTS)

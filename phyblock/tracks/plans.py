@@ -35,16 +35,16 @@ PLAN_COLUMNS = dict.fromkeys(("parser", "plan", "file_plan", "dropped", "shown")
 
 def plan_row(parse: PlanParse | None, shown: ShownScene | None) -> Mapping[str, Any]:
     """The values of `PLAN_COLUMNS`; `shown` is None for what was shown as the file has it."""
-    told = None if shown is None else shown.fields()
+    order = None if shown is None else shown.fields()
     if parse is None:
-        return {**dict.fromkeys(PLAN_COLUMNS), "shown": told}
+        return {**dict.fromkeys(PLAN_COLUMNS), "shown": order}
     in_file = parse.plan if parse.file_plan is None else parse.file_plan
     return {
         "parser": parse.parser,
         "plan": list(parse.plan),
         "file_plan": list(in_file),
         "dropped": list(parse.dropped),
-        "shown": told,
+        "shown": order,
     }
 
 

@@ -43,8 +43,8 @@ def form_facts(form: parsing.AnswerForm[Any] | None) -> dict[str, object]:
     """What templates may use of the form of the answer; None is a form of their own, in text."""
     if form is None:
         return {"answer_format": "text", **dict.fromkeys(FORM_FACTS)}
-    told = (json.dumps(form.schema), form.example)
-    return {"answer_format": "json_schema", **dict(zip(FORM_FACTS, told, strict=True))}
+    facts = (json.dumps(form.schema), form.example)
+    return {"answer_format": "json_schema", **dict(zip(FORM_FACTS, facts, strict=True))}
 
 
 def response_format(form: parsing.AnswerForm[Any] | None) -> Mapping[str, object] | None:

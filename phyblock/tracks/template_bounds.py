@@ -231,8 +231,8 @@ def _check_width(width: object) -> None:
 
 
 def _check_percent(form: str) -> None:
-    for found in _PERCENT.finditer(form):
-        for width in found.groups():
+    for match in _PERCENT.finditer(form):
+        for width in match.groups():
             # The width of a star stands among the values.
             _check_width(
                 _MOST_WIDTH + 1 if width == "*" or len(width or "") > 4 else int(width or 0)
@@ -284,10 +284,10 @@ def _counted(name: str, func: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _range(*args: int) -> range:
-    found = range(*args)
-    if len(found) > _MOST_RANGE:
+    numbers = range(*args)
+    if len(numbers) > _MOST_RANGE:
         raise BoundError(f"it has a range of more than {_MOST_RANGE:,} numbers")
-    return found
+    return numbers
 
 
 @jinja2.pass_context
@@ -302,11 +302,11 @@ def _charged(value: Any) -> Any:
 
 def _each(values: Iterable[Any]) -> list[Any]:
     meter = _meter()
-    found = []
+    taken = []
     for value in values:
         meter.spend(1)
-        found.append(value)
-    return found
+        taken.append(value)
+    return taken
 
 
 def _spend(steps: int) -> None:

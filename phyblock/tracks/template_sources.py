@@ -58,12 +58,12 @@ class Sources:
     @property
     def circle(self) -> str:
         """Files that include one another in a circle, as `a.j2 -> b.j2 -> a.j2`; "" for none."""
-        found = {
+        includes = {
             name: [inner for node in source.naming for inner in _names(node.template, name)]
             for name, source in self.included.items()
         }
         try:
-            graphlib.TopologicalSorter(found).prepare()
+            graphlib.TopologicalSorter(includes).prepare()
         except graphlib.CycleError as error:
             return " -> ".join(reversed(error.args[1]))
         return ""
@@ -85,12 +85,12 @@ def read_sources(path: Path, folders: Sequence[Path]) -> Sources:
     todo = [main]
     while todo:
         source = todo.pop()
-        for name, found in _named_in(source, folders):
+        for name, file in _named_in(source, folders):
             if name not in included:
                 if len(included) == _MOST_FILES:
                     message = f"includes more than {_MOST_FILES} files"
                     raise PromptError(Problem(str(path), message, "", name))
-                included[name] = _read(found)
+                included[name] = _read(file)
                 todo.append(included[name])
     return Sources(main, included)
 
@@ -121,11 +121,11 @@ def _named_in(source: Source, folders: Sequence[Path]) -> Iterator[tuple[str, Pa
             hint = "take up its parts with {% include %} or {% import %}"
             raise PromptError(Problem(where, "a prompt cannot extend another", hint=hint))
         names = _names(node.template, where)
-        found = [(name, path) for name in names if (path := _find(name, folders, where))]
-        if not found and not getattr(node, "ignore_missing", False):
+        named = [(name, path) for name in names if (path := _find(name, folders, where))]
+        if not named and not getattr(node, "ignore_missing", False):
             allowed = f"a file in {' or '.join(map(str, folders))}"
             raise PromptError(Problem(where, "no such file", "", ", ".join(names), allowed))
-        yield from found
+        yield from named
 
 
 def _names(node: nodes.Expr, where: str) -> list[str]:

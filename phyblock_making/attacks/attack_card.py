@@ -93,14 +93,14 @@ def attack_card(attacked: Sequence[Attacked], observed: Sequence[Observed]) -> s
     versions = " | ".join(f"version {number}" for number in range(1, len(_BEFORE) + 1))
     rules = "|".join(["---"] * len(_BEFORE))
     cuts = [cut for one in observed for cut in one.cuts]
-    told = "none"
+    cut_text = "none"
     if cuts:
         questions = sum(bool(one.cuts) for one in observed)
         shown = sum(cut.pixels > 0 for cut in cuts)
-        told = f"{len(cuts)} in {questions} questions, {shown} of them to be seen"
+        cut_text = f"{len(cuts)} in {questions} questions, {shown} of them to be seen"
     return _TEXT.format(
         rows="\n".join(rows),
-        cuts=told,
+        cuts=cut_text,
         cuts_1=_CUTS_1,
         versions=versions,
         rules=rules,

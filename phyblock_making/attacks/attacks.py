@@ -162,8 +162,8 @@ def all_attacks(unseen: Sequence[Question] = (), *, with_texts: bool = True) -> 
         *("text, within the set", "a classifier of texts, by folds", text_within),
         *(_TEXTS, _INVERTED_TEXTS, True),
     )
-    told = "the same, learned from the other set alone"
-    beyond = Attack(UNSEEN_TEXT, told, unseen_text(unseen), _TEXTS, _INVERTED_TEXTS, True)
+    what = "the same, learned from the other set alone"
+    beyond = Attack(UNSEEN_TEXT, what, unseen_text(unseen), _TEXTS, _INVERTED_TEXTS, True)
     return (*ATTACKS, within, *([beyond] if unseen else []))
 
 
@@ -225,9 +225,9 @@ def _attacked(
         [question.scene.parents or (question.scene.id,) for question in questions]
     )
     counts = np.stack([sides, np.ones_like(sides)], axis=-1)
-    found = in_range(jackknife(counts, clusters, ratio_of))
+    estimate = in_range(jackknife(counts, clusters, ratio_of))
     most, least = (
-        Rate(float(found.value[side]), float(found.lo[side]), float(found.hi[side]))
+        Rate(float(estimate.value[side]), float(estimate.lo[side]), float(estimate.hi[side]))
         for side in (0, 1)
     )
     is_order = subtask == "OR"

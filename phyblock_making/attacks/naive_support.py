@@ -37,8 +37,8 @@ def naive_likings(question: Question, falls: Falls) -> Floats | None:
     moved = falls(shown.blocks, removed)
     if any(picture.label in LETTERS for picture in question.pictures):
         slots = question.evidence["slots"]
-        told = [colored_orders(one, shown, removed, slots) for one in option_pictures(question)]
-        return np.array([-len(one ^ moved) for one in told], dtype=float)
+        named = [colored_orders(one, shown, removed, slots) for one in option_pictures(question)]
+        return np.array([-len(one ^ moved) for one in named], dtype=float)
     if set(question.options) == set(OUTCOME_TEXTS):
         right = OUTCOME_TEXTS[min(len(moved), len(OUTCOME_TEXTS) - 1)]
         return np.array([float(option == right) for option in question.options])

@@ -38,15 +38,15 @@ def boosted(known: Sequence[Lesson], kin: Sequence[Sequence[int]]) -> list[Float
     Where too little is left to learn from, all chances are even.
     """
     groups = _groups(known)
-    found: dict[int, Floats] = {}
+    by_place: dict[int, Floats] = {}
     for held in sorted(set(groups), key=sorted):
         asked = [place for place, group in enumerate(groups) if group == held]
         near = {other for place in asked for other in kin[place]}
         seen = [
             place for place, group in enumerate(groups) if not group & held and place not in near
         ]
-        found.update(_fitted([known[p] for p in seen], {p: known[p] for p in asked}))
-    return [found[place] for place in range(len(known))]
+        by_place.update(_fitted([known[p] for p in seen], {p: known[p] for p in asked}))
+    return [by_place[place] for place in range(len(known))]
 
 
 def _groups(known: Sequence[Lesson]) -> list[frozenset[int]]:
@@ -69,12 +69,12 @@ def _fitted(seen: Sequence[Lesson], asked: dict[int, Lesson]) -> dict[int, Float
         max_iter=_TREES, learning_rate=0.08, max_leaf_nodes=12, early_stopping=False, random_state=0
     )
     model.fit(_features(seen), counts)
-    found = {}
+    fitted = {}
     for place, lesson in asked.items():
         exactly = np.zeros((len(lesson.units), MOST_COPIES + 1))
         exactly[:, model.classes_.astype(int)] = model.predict_proba(_features([lesson]))
-        found[place] = exactly[:, ::-1].cumsum(axis=1)[:, ::-1][:, 1:]
-    return found
+        fitted[place] = exactly[:, ::-1].cumsum(axis=1)[:, ::-1][:, 1:]
+    return fitted
 
 
 def _features(lessons: Sequence[Lesson]) -> Floats:

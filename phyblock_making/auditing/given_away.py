@@ -74,8 +74,8 @@ def _scored(scores: Iterable[Blind]) -> Iterator[str]:
 
 
 def _together(parts: Iterable[Part]) -> float | None:
-    found = list(parts)
-    return Part(sum(part.part for part in found), sum(part.whole for part in found)).share
+    listed = list(parts)
+    return Part(sum(part.part for part in listed), sum(part.whole for part in listed)).share
 
 
 def percent(share: float | None) -> str:

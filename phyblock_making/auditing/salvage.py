@@ -127,8 +127,8 @@ def _builtin(folder: Path, tasks: list[SalvagedTask], findings: list[Finding]) -
             findings.append(unreadable(line.id, used_already(where, f"by line {first}", line.id)))
             continue
         _tolerate(partial(validated, _Graph, raw, where), line.id, findings)
-        found = _tolerate(partial(validated, _Candidates, raw, where), line.id, findings)
-        candidates = None if found is None else candidate_set(found.candidates)
+        read = _tolerate(partial(validated, _Candidates, raw, where), line.id, findings)
+        candidates = None if read is None else candidate_set(read.candidates)
         tasks.append(SalvagedTask(line.scene(), candidates))
 
 

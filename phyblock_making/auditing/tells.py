@@ -89,12 +89,12 @@ def find_tells(tasks: Iterable[tuple[Scene, CandidateSet]]) -> Tells:
             by_poses[len(poses)].append(any(poses))
             if any(poses) and len(poses) > 1:
                 firsts.append((poses[0], sum(poses) / len(poses)))
-    every = [one for found in by_place.values() for one in found]
+    every = [one for flags in by_place.values() for one in flags]
     chance = sum(every) / max(len(every), 1)
     chance_first = sum(one for _, one in firsts) / max(len(firsts), 1)
     return Tells(
-        {place: Part(sum(found), len(found), chance) for place, found in sorted(by_place.items())},
-        {poses: Part(sum(found), len(found)) for poses, found in sorted(by_poses.items())},
+        {place: Part(sum(flags), len(flags), chance) for place, flags in sorted(by_place.items())},
+        {poses: Part(sum(flags), len(flags)) for poses, flags in sorted(by_poses.items())},
         Part(sum(first for first, _ in firsts), len(firsts), chance_first),
     )
 
@@ -106,7 +106,7 @@ def blind_scores(
     scenes = [scene for scene, _ in tasks]
     sets = {scene.id: offered for scene, offered in tasks}
     every = {name: Plan(tuple(range(1, len(one) + 1))) for name, one in sets.items()}
-    found = []
+    scores = []
     for setting in SETTINGS:
 
         def f1(plans: Mapping[str, Plan], setting: Setting = setting) -> float | None:
@@ -115,8 +115,8 @@ def blind_scores(
         once = goal_blind_plans(scenes, sets, setting, believed, repeats=False)
         evenly = goal_blind_plans(scenes, sets, setting, [CONSTANT])
         learned = goal_blind_plans(scenes, sets, setting, believed)
-        found.append(Blind(setting, f1(every), f1(once), f1(evenly), f1(learned)))
-    return found
+        scores.append(Blind(setting, f1(every), f1(once), f1(evenly), f1(learned)))
+    return scores
 
 
 def _f1(

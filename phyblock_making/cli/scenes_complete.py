@@ -63,8 +63,8 @@ def command(data: Path, jobs: int, out: Path | None) -> None:
         for note in one.notes:
             click.echo(f"note: scene {one.scene.id}: {note}")
     for finding in (*find_duplicates(scenes), *find_orphans(scenes)):
-        said = f"{finding.field} {finding.message}".strip()
-        click.echo(f"note: scene {finding.scene}: {said}")
+        sentence = f"{finding.field} {finding.message}".strip()
+        click.echo(f"note: scene {finding.scene}: {sentence}")
     click.echo(f"{counted(len(done), 'scene')} completed: {shown_path(folder)}")
     here = str(folder) if folder.is_absolute() else f"./{folder}"
     click.echo(f"Next: phyblock run quick --set dataset.path={shlex.quote(here)}")

@@ -37,8 +37,8 @@ def print_attacks(console: Console, attacked: Sequence[Attacked]) -> None:
     side = ("95 %", "aim")
     headings = ("attack", "", "kind", "aim is", "n", "chance", "most", *side, "least", *side)
     console.print(plain_table(headings, rows, numbers=8, tight=True))
-    told = {one.attack.name: one.attack.told for one in attacked}
-    legend = "; ".join(f"{name}: {what}" for name, what in told.items())
+    names = {one.attack.name: one.attack.told for one in attacked}
+    legend = "; ".join(f"{name}: {what}" for name, what in names.items())
     console.print(
         "Accuracy [%] of picking the option that an attack likes most, and the one that it likes "
         "least, ties at random, with the interval over base scenes; of orderings whole "
@@ -61,16 +61,16 @@ def attack_findings(attacked: Sequence[Attacked]) -> list[str]:
 def cut_findings(observed: Sequence[Observed]) -> list[str]:
     """Pictures that are cut open, and those that could not be looked at."""
     cuts = [(one.question.id, cut) for one in observed for cut in one.cuts]
-    found = [f"{one.question.id}: {one.fault}" for one in observed if one.fault]
+    findings = [f"{one.question.id}: {one.fault}" for one in observed if one.fault]
     if cuts:
         wrong = sum(cut.is_wrong for _, cut in cuts)
         shown = sum(cut.pixels > 0 for _, cut in cuts)
-        found.append(
+        findings.append(
             f"{counted(len(cuts), 'picture')} in {counted(len({q for q, _ in cuts}), 'question')} "
             f"cut open ({sum(c.at_near for _, c in cuts)} near, {sum(c.at_far for _, c in cuts)} "
             f"far), {shown} of them to be seen, {wrong} of wrong options"
         )
-    return found
+    return findings
 
 
 def audit_json(

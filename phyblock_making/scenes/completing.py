@@ -53,7 +53,7 @@ def complete(read: ReadScene) -> Completed:
     how = "number" if read.given.is_ordered else "list"
     # What overlaps or floats falls as well; that shall be told once.
     for names in (_GEOMETRY, _STANDING):
-        if found := tuple(findings_of(facts, names)):
+        if findings := tuple(findings_of(facts, names)):
             raise DataError(
                 replace(
                     one.problem,
@@ -61,7 +61,7 @@ def complete(read: ReadScene) -> Completed:
                     message=f"scene {read.name}: {one.message}",
                     hint=_HINTS.get(one.check, "").format(how),
                 )
-                for one in found
+                for one in findings
             )
     noted = [one.problem for one in findings_of(facts, _NOTED)]
     notes = [
@@ -126,15 +126,15 @@ def _other(given: GivenScene, scene: Scene) -> list[str]:
     listed = [one.block(number) for number, one in enumerate(given.blocks, 1)]
     by_place = {_place(block): block for block in scene.blocks}
     order_of = {block.order: by_place[_place(block)].order for block in listed}
-    told = []
+    notes = []
     for one, block in zip(given.blocks, (by_place[_place(block)] for block in listed), strict=True):
         depend = sorted(block.depend) or [0]
-        said = None if one.depend is None else sorted(order_of.get(n, n) for n in one.depend)
-        if said is not None and said != depend:
-            told.append(f"block {block.order} depends on {depend} by contact, not {said}")
+        declared = None if one.depend is None else sorted(order_of.get(n, n) for n in one.depend)
+        if declared is not None and declared != depend:
+            notes.append(f"block {block.order} depends on {depend} by contact, not {declared}")
         if one.layer is not None and one.layer != block.layer:
-            told.append(f"block {block.order} is on layer {block.layer}, not {one.layer}")
-    return told
+            notes.append(f"block {block.order} is on layer {block.layer}, not {one.layer}")
+    return notes
 
 
 def _place(block: Block) -> tuple[object, ...]:

@@ -89,23 +89,23 @@ def read_given(path: Path) -> tuple[ReadScene, ...]:
 
     A scene without an `id` is called as its file, with its number where that holds several.
     """
-    found: list[ReadScene] = []
+    scenes: list[ReadScene] = []
     problems: list[Problem] = []
     for file in _files(path):
         try:
-            found += _read(file)
+            scenes += _read(file)
         except (DataError, SpecError) as error:
             problems += error.problems
     first: dict[str, str] = {}
-    for one in found:
+    for one in scenes:
         if (earlier := first.setdefault(one.name, one.where)) != one.where:
             message, hint = f"is used by {earlier} already", "give it an id of its own"
             problems.append(Problem(one.where, message, "id", one.name, hint=hint))
     if problems:
         raise DataError(problems)
-    if not found:
+    if not scenes:
         raise DataError(Problem(str(path), "holds no scenes", allowed=_ALLOWED))
-    return tuple(sorted(found, key=lambda one: one.name))
+    return tuple(sorted(scenes, key=lambda one: one.name))
 
 
 def _files(path: Path) -> list[Path]:

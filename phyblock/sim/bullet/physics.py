@@ -134,14 +134,14 @@ class BulletSimulation:
         """Where bodies touched in the last time step."""
         numbers = {body.id: number for number, body in self._bodies.items()}
         numbers[self._floor] = FLOOR
-        found = []
+        contacts = []
         for point in self._bullet.getContactPoints(physicsClientId=self._client):
             # Bullet's normal points from its second body to its first one.
             second, first, (x, y, z) = numbers[point[1]], numbers[point[2]], point[7]
             if second < first:
                 first, second, x, y, z = second, first, -x, -y, -z
-            found.append(Contact(first, second, (x, y, z), point[8]))
-        return tuple(sorted(found))
+            contacts.append(Contact(first, second, (x, y, z), point[8]))
+        return tuple(sorted(contacts))
 
     def _set_friction(self, body: int) -> None:
         self._bullet.changeDynamics(

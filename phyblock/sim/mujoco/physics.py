@@ -140,7 +140,7 @@ class MujocoSimulation:
     def contacts(self) -> tuple[Contact, ...]:
         """Where bodies touched in the last time step."""
         if self._contacts is None:
-            self._contacts = tuple(sorted(self._found()))
+            self._contacts = tuple(sorted(self._measured()))
         return self._contacts
 
     def _interrupt(self) -> None:
@@ -162,7 +162,7 @@ class MujocoSimulation:
             place[:], motion[:] = body.place, body.motion
             body.place, body.motion = place, motion
 
-    def _found(self) -> Iterator[Contact]:
+    def _measured(self) -> Iterator[Contact]:
         """The contacts of the last substep."""
         numbers = (FLOOR, *self._bodies)
         bodies = self._model.geom_bodyid

@@ -56,9 +56,9 @@ class NumpyRenderer:
         solid = solids(props)
         front = solid[dot(solid.normals, solid.anchor_m - camera.eye_m) < 0]
         corners_px, owner = screen.corners_px(front.corners_m)
-        found = spans(corners_px, size_px)
-        found = found._replace(triangle=owner[found.triangle])
-        seen = nearest(found, screen.planes(front), size_px, screen.least, screen.most)
+        covering = spans(corners_px, size_px)
+        covering = covering._replace(triangle=owner[covering.triangle])
+        seen = nearest(covering, screen.planes(front), size_px, screen.least, screen.most)
         look = _Look(props, solid, front, screen, light)
         prop, face = (np.full((size_px, size_px), NOTHING) for _ in range(2))
         pixels = np.flatnonzero(seen.triangle != NOTHING)

@@ -66,7 +66,7 @@ class Nearest(NamedTuple):
     nearness: Floats
 
 
-def nearest(found: Spans, planes: Floats, size_px: int, least: float, most: float) -> Nearest:
+def nearest(covering: Spans, planes: Floats, size_px: int, least: float, most: float) -> Nearest:
     """The nearest triangle of each pixel.
 
     `planes` (n, 3) give the nearness of each triangle as a * column + b * row + c; what lies
@@ -74,7 +74,7 @@ def nearest(found: Spans, planes: Floats, size_px: int, least: float, most: floa
     """
     best = np.full(size_px * size_px, least)
     shown = np.full(size_px * size_px, NOTHING, dtype=np.int32)
-    for part in _parts(found):
+    for part in _parts(covering):
         lengths = part.right - part.left
         a, b, c = planes.T[:, part.triangle]
         start = np.cumsum(lengths) - lengths
@@ -90,14 +90,14 @@ def nearest(found: Spans, planes: Floats, size_px: int, least: float, most: floa
     return Nearest(shown.reshape(size_px, size_px), best.reshape(size_px, size_px))
 
 
-def covered(found: Spans, size_px: int) -> NDArray[np.bool_]:
+def covered(covering: Spans, size_px: int) -> NDArray[np.bool_]:
     """Which pixels any span covers, shape (size, size)."""
     inside = np.zeros((size_px, size_px), dtype=np.bool_)
-    if len(found.row):
-        first, end = int(found.row.min()), int(found.row.max()) + 1
-        n, start = (end - first) * (size_px + 1), (found.row - first) * (size_px + 1)
-        depth = np.bincount(start + found.left, minlength=n)
-        depth -= np.bincount(start + found.right, minlength=n)
+    if len(covering.row):
+        first, end = int(covering.row.min()), int(covering.row.max()) + 1
+        n, start = (end - first) * (size_px + 1), (covering.row - first) * (size_px + 1)
+        depth = np.bincount(start + covering.left, minlength=n)
+        depth -= np.bincount(start + covering.right, minlength=n)
         # A row's spans end within it, so that one sum runs through all rows.
         np.cumsum(depth, out=depth)
         inside[first:end] = depth.reshape(-1, size_px + 1)[:, :-1] > 0
@@ -117,9 +117,9 @@ def _from_center(place: Floats, size_px: int) -> Ints:
     return np.ceil(np.clip(place, 0.0, size_px) - 0.5).astype(np.int64)
 
 
-def _parts(found: Spans) -> Iterator[Spans]:
+def _parts(covering: Spans) -> Iterator[Spans]:
     """The spans in groups of about so many pixels as are worked on together."""
-    ends = np.cumsum(found.right - found.left)
+    ends = np.cumsum(covering.right - covering.left)
     cuts = np.flatnonzero(np.diff(ends // AT_ONCE)) + 1
     for group in np.split(np.arange(len(ends)), cuts):
-        yield Spans(*(column[group] for column in found))
+        yield Spans(*(column[group] for column in covering))

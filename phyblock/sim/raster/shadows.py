@@ -33,8 +33,8 @@ class LightMap:
         self.screen = light_screen(direction, solid.corners_m, size_px)
         backs = solid[dot(solid.normals, direction) < _AWAY]
         planes = self.screen.planes(backs)
-        found = spans(self.screen.places(backs.corners_m)[..., :2], size_px)
-        shown = nearest(found, planes, size_px, -np.inf, np.inf).triangle
+        covering = spans(self.screen.places(backs.corners_m)[..., :2], size_px)
+        shown = nearest(covering, planes, size_px, -np.inf, np.inf).triangle
         alike = np.ones(shown.shape, dtype=np.bool_)
         alike[:-1, :-1] = shown[:-1, :-1] == shown[1:, 1:]
         alike[:-1, :-1] &= (shown[:-1, :-1] == shown[:-1, 1:]) & (shown[:-1, :-1] == shown[1:, :-1])

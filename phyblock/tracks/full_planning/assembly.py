@@ -89,10 +89,10 @@ def _sums(run: Run) -> pd.DataFrame:
 def _estimates(run: Run) -> pd.DataFrame:
     """Metrics with spread and interval by cell."""
     names = {"value": "", "mean": "_mean", "sd": "_sd", "lo": "_lo", "hi": "_hi", "se": "_se"}
-    found = track_estimates(run, NAME).rename(columns={CELL: "level"}).assign(track=NAME)
+    estimates = track_estimates(run, NAME).rename(columns={CELL: "level"}).assign(track=NAME)
     parts = []
     for metric in METRICS:
-        mine = found[found["measure"] == metric].set_index(list(_CELL))
+        mine = estimates[estimates["measure"] == metric].set_index(list(_CELL))
         named = mine[list(names)].rename(columns={k: f"{metric}{end}" for k, end in names.items()})
         parts.append(named.astype("float64"))
     return pd.concat([*parts, mine[["seeds", "n_scenes", "n_clusters"]]], axis=1)

@@ -22,7 +22,7 @@ _ERRORS: dict[str, ErrorType] = {str(name): name for name in ERROR_TYPES}
 
 def _table(record: PlanRecord) -> TextTable:
     """Every step: the candidate that it names, and what became of it."""
-    rows = tuple((str(n), str(one), told) for n, one, _, told in _steps(record))
+    rows = tuple((str(n), str(one), outcome) for n, one, _, outcome in _steps(record))
     columns = (Column("Step"), Column("Block"), Column("Outcome", is_text=True))
     return TextTable(f"{record.sample}: {_came_to(record)}", columns, rows)
 
@@ -34,10 +34,10 @@ def _film(record: PlanRecord, task: AssemblyTask) -> Iterator[FilmStep]:
     """
     yield FilmStep(f"{record.model}, {task.scene.id}", "plain", None, ())
     blocks: tuple[Block, ...] = ()
-    for n, candidate, vertex, told in _steps(record):
+    for n, candidate, vertex, outcome in _steps(record):
         tone: Tone = "good" if vertex is not None else "bad"
         blocks += () if vertex is None else (task.scene.blocks[vertex],)
-        yield FilmStep(f"{n}. block {candidate}: {told}", tone, candidate, blocks)
+        yield FilmStep(f"{n}. block {candidate}: {outcome}", tone, candidate, blocks)
     tone = "good" if len(blocks) == len(task.scene.blocks) else "bad"
     yield FilmStep(_came_to(record), tone, None, blocks)
 
@@ -49,8 +49,8 @@ def _steps(record: PlanRecord) -> Iterator[tuple[int, int, int | None, str]]:
     if placed is None or why is None:
         return
     for n, (candidate, vertex, error) in enumerate(zip(plan, placed, why, strict=True), 1):
-        told = "placed" if vertex is not None else ERROR_NAMES[_ERRORS[str(error)]]
-        yield n, candidate, vertex, told
+        outcome = "placed" if vertex is not None else ERROR_NAMES[_ERRORS[str(error)]]
+        yield n, candidate, vertex, outcome
 
 
 def _score(record: PlanRecord) -> Score | None:

@@ -34,9 +34,9 @@ def losses_frame(run: Run) -> pd.DataFrame:
     100; `support`, beside them, is the sum of the three of missing supports. Plans that an earlier
     version scored are left out.
     """
-    found = headline_rows(track_estimates(run, NAME), run.design)
+    estimates = headline_rows(track_estimates(run, NAME), run.design)
     names = [*_ROWS, SUPPORT_MISSING.name]
-    rows = found[found["measure"].isin(names)].rename(columns={CELL: "level"})
+    rows = estimates[estimates["measure"].isin(names)].rename(columns={CELL: "level"})
     models = list(run.design.model_names)
     places = [
         rows["model"].map(models.index),

@@ -42,7 +42,7 @@ def settings_frame(run: Run) -> pd.DataFrame:
     if not {"A", "B"} <= set(design.suite.settings):
         return pd.DataFrame(columns=list(_COLUMNS))
     cube, estimates = _counts(run), _estimates(run)
-    found: dict[tuple[str, str], dict[str, Any]] = {}
+    by_cell: dict[tuple[str, str], dict[str, Any]] = {}
     for level in design.levels:
         matcher = design.matchers(design.criterion(level))[0]
         part = cube.only([n for n, cell in enumerate(cube.cells) if cell[0] == level])
@@ -61,15 +61,15 @@ def settings_frame(run: Run) -> pd.DataFrame:
         )
         for n, model in enumerate(models):
             f1 = [estimates[model, setting, level, matcher] for setting in "AB"]
-            found[model, level] = {
+            by_cell[model, level] = {
                 **{name: f1["AB".index(of)][end] for name, (of, end) in _F1.items()},
                 **{name: values[n, 2] for name, values in _paired(paired).items()},
                 "n_scenes": int(present[:, n].sum()),
                 "n_clusters": int(n_clusters[n]),
             }
-    answered = {model for model, _ in found}
+    answered = {model for model, _ in by_cell}
     rows = [
-        {"model": model, "level": level, **(found.get((model, level)) or _UNKNOWN)}
+        {"model": model, "level": level, **(by_cell.get((model, level)) or _UNKNOWN)}
         for model in design.model_names
         if model in answered
         for level in design.levels
@@ -77,15 +77,17 @@ def settings_frame(run: Run) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(_COLUMNS))
 
 
-def _paired(found: Estimate) -> dict[str, Floats]:
-    return {"difference": found.value, "lo": found.lo, "hi": found.hi}
+def _paired(estimate: Estimate) -> dict[str, Floats]:
+    return {"difference": estimate.value, "lo": estimate.lo, "hi": estimate.hi}
 
 
 def _estimates(run: Run) -> dict[Hashable, Any]:
     """F1 by model, setting, level and matcher."""
-    found = track_estimates(run, NAME)
-    found = found[found["measure"] == "f1"].set_index(["model", "setting", CELL, "matcher"])
-    return dict(found[list(_ENDS)].astype("float64").to_dict("index"))
+    estimates = track_estimates(run, NAME)
+    estimates = estimates[estimates["measure"] == "f1"].set_index(
+        ["model", "setting", CELL, "matcher"]
+    )
+    return dict(estimates[list(_ENDS)].astype("float64").to_dict("index"))
 
 
 def _counts(run: Run) -> CountCube:

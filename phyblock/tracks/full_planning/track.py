@@ -112,8 +112,8 @@ class FullPlanning(WholePlanTrack[PlanningRules, Pictures]):
         examples where there are any.
         """
         examples = () if self._pictures is None else self._examples.used(self.items)
-        told = {"examples": [task.key for task in examples]} if examples else {}
-        return {**super().identity(), **told}
+        shots = {"examples": [task.key for task in examples]} if examples else {}
+        return {**super().identity(), **shots}
 
     def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
         """What templates may use; nothing in it gives an answer away."""

@@ -71,8 +71,8 @@ def _key(
 def _read(path: Path, candidates: Mapping[str, CandidateSet]) -> dict[str, Plan] | None:
     """The plans in a file; None where there is none, or it holds no plan for each set."""
     try:
-        found = load_json(read_bytes(path))
-        plans = {name: Plan(tuple(steps)) for name, steps in found.items()}
+        kept = load_json(read_bytes(path))
+        plans = {name: Plan(tuple(steps)) for name, steps in kept.items()}
         is_whole = plans.keys() == candidates.keys() and all(
             type(step) is int and 1 <= step <= len(candidates[name])
             for name, plan in plans.items()

@@ -44,15 +44,15 @@ def lessons(
     scenes: Sequence[Scene], candidates: Mapping[str, CandidateSet], setting: Setting
 ) -> list[Lesson]:
     """Each scene with its candidate set, which `candidates` has by the scene's id."""
-    found = []
+    made = []
     for scene in scenes:
         offered = units(candidates[scene.id], setting)
         goal = Goal(scene, candidates[scene.id], setting)
         equal = [goal.equal_to[unit.place] for unit in offered]
         heights = tuple(_height(scene, vertices) for vertices in equal)
         counts = tuple(len(vertices) for vertices in equal)
-        found.append(Lesson(scene, candidates[scene.id], goal, offered, counts, heights))
-    return found
+        made.append(Lesson(scene, candidates[scene.id], goal, offered, counts, heights))
+    return made
 
 
 def related(scenes: Sequence[Scene]) -> list[list[int]]:
@@ -82,15 +82,15 @@ def left_out(
         for name, row in zip(names, one, strict=True):
             table[name] += row
     whole = sum((one.sum(axis=0) for one in rows), zero)
-    found = []
+    sums = []
     for names, others in zip(keys, kin, strict=True):
         own: dict[Hashable, Floats] = defaultdict(lambda: zero.copy())
         for other in others:
             for name, row in zip(keys[other], rows[other], strict=True):
                 own[name] += row
         part = np.array([table[name] - own[name] for name in names]).reshape(len(names), -1)
-        found.append((part, whole - sum((rows[other].sum(axis=0) for other in others), zero)))
-    return found
+        sums.append((part, whole - sum((rows[other].sum(axis=0) for other in others), zero)))
+    return sums
 
 
 def _height(scene: Scene, vertices: Sequence[int]) -> float:

@@ -48,12 +48,12 @@ def units(candidates: CandidateSet, setting: Setting) -> tuple[Unit, ...]:
     for number, one in enumerate(candidates.candidates, 1):
         numbers.setdefault(one.kind, []).append(number)
     alike = Counter(block_type for block_type, _ in numbers)
-    found = []
+    made = []
     for number, one in enumerate(candidates.candidates, 1):
         same = numbers[one.kind]
         rank = same.index(number)
         if setting == "A" or rank == 0:
             named = (number,) if setting == "A" else tuple(same)
             shown = (len(same), rank, len(numbers), len(candidates), alike[one.type])
-            found.append(Unit(named, one, *shown))
-    return tuple(found)
+            made.append(Unit(named, one, *shown))
+    return tuple(made)

@@ -32,8 +32,8 @@ def open_step_planning(opening: Opening) -> StepPlanning:
     steps = suite.section(StepsSpec)
     shown = (steps.feedback, steps.history, steps.memory, steps.cot)
     template = template_prompt(loaded, StepPlanning.name)
-    told = (rules.gating, rules.accepts, steps.blind, rules.form)
-    prompt = StepPrompt(template, *shown, *told)
+    rules_shown = (rules.gating, rules.accepts, steps.blind, rules.form)
+    prompt = StepPrompt(template, *shown, *rules_shown)
     return StepPlanning(rules, prompt, assembly_pictures(suite, opening.shop), tasks, showing, pool)
 
 

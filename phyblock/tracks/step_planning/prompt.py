@@ -122,8 +122,10 @@ class StepPrompt:
         seen = [step.seen or current for step in shown] + [current]
         messages = list(self._first(fixed, seen[0], facts, (), hidden, hidden + 1))
         for number, (step, picture) in enumerate(zip(shown, seen[1:], strict=True), hidden + 2):
-            told = {"told": step.told(self.feedback), "step": number, "history": []}
-            text = self.template.text("turn", {**facts, **told, "pictures": [picture.label]})
+            facts_of_turn = {"told": step.told(self.feedback), "step": number, "history": []}
+            text = self.template.text(
+                "turn", {**facts, **facts_of_turn, "pictures": [picture.label]}
+            )
             messages.append(Message("assistant", (step.reply.strip() or _NO_TEXT,)))
             messages.append(Message("user", (picture, text)))
         return tuple(messages)
@@ -143,7 +145,7 @@ class StepPrompt:
             {"step": number, "operation": one.operation, "told": one.told(self.feedback)}
             for number, one in enumerate(past[hidden:], hidden + 1)
         ]
-        told = past[-1].told(self.feedback) if past else ""
+        last = past[-1].told(self.feedback) if past else ""
         labels = [picture.label for picture in pictures]
-        more = {"pictures": labels, "step": step, "history": history, "told": told}
+        more = {"pictures": labels, "step": step, "history": history, "told": last}
         return self.template.messages(pictures, {**facts, **more})

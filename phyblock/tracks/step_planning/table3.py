@@ -96,10 +96,14 @@ def step_scores_frame(run: Run) -> pd.DataFrame:
     frame = pd.DataFrame(cells, columns=keys)
     frame = frame.join(groups.size().rename("n"), on=keys).join(groups[counts[1:]].sum(), on=keys)
     frame[counts] = frame[counts].fillna(0).astype("int64")
-    found = track_estimates(run, NAME)
+    estimates = track_estimates(run, NAME)
     for ends in (("value",), ("lo", "hi"), ("mean", "sd")):
         for metric in METRICS:
-            mine = found[found["measure"] == metric].set_index(keys)[list(ends)].astype("float64")
+            mine = (
+                estimates[estimates["measure"] == metric]
+                .set_index(keys)[list(ends)]
+                .astype("float64")
+            )
             names = {end: metric if end == "value" else f"{metric}_{end}" for end in ends}
             frame = frame.join(mine.rename(columns=names), on=keys)
     return frame
@@ -111,10 +115,12 @@ def step_intervals(run: Run) -> pd.DataFrame:
     Columns are model, cell (`placed` or `attempted`), value, lo, hi, se [%], n, n_scenes,
     n_clusters.
     """
-    found = track_estimates(run, NAME)
-    found = found[(found["measure"] == "f1") & found["value"].notna()].drop(columns=CELL)
-    found = found.rename(columns={"criterion": CELL}).sort_values(CELL, kind="stable")
-    table = interval_frame(found, run.design, 100.0, [CELL])
+    estimates = track_estimates(run, NAME)
+    estimates = estimates[(estimates["measure"] == "f1") & estimates["value"].notna()].drop(
+        columns=CELL
+    )
+    estimates = estimates.rename(columns={"criterion": CELL}).sort_values(CELL, kind="stable")
+    table = interval_frame(estimates, run.design, 100.0, [CELL])
     return table.drop(columns="seeds")
 
 
@@ -133,8 +139,8 @@ def table3_frame(run: Run) -> pd.DataFrame:
     Published rows have the recall alone.
     """
     design = run.design
-    found = headline_rows(track_estimates(run, NAME), design)
-    known = found.set_index(["measure", "criterion", "model"]).to_dict("index")
+    estimates = headline_rows(track_estimates(run, NAME), design)
+    known = estimates.set_index(["measure", "criterion", "model"]).to_dict("index")
     ends = ("mean", "sd") if len(design.suite.seeds) > 1 else ()
     wanted = [(name, end) for name in _LEADING for end in ("value", "lo", "hi")]
     wanted += [(name, "value") for name in _SHOWN if name not in _LEADING]

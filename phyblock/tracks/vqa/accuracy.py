@@ -54,8 +54,8 @@ def questions_frame(run: Run) -> pd.DataFrame:
     over seeds, `chance` is what uniform guessing would give. Where a model
     said nothing at all in a subtask, nothing was measured: NaN.
     """
-    found = track_estimates(run, NAME).set_index(["measure", "model", CELL])
-    known = found.to_dict("index")
+    estimates = track_estimates(run, NAME).set_index(["measure", "model", CELL])
+    known = estimates.to_dict("index")
     asked = {cell.name for cell in subtask_cells(run)}
     expected = expected_answers(run)
     rows: list[dict[str, Any]] = []

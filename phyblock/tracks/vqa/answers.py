@@ -122,5 +122,5 @@ def scored_answers(run: Run, model: str) -> pd.DataFrame:
 
 def expected_answers(run: Run) -> dict[str, int]:
     """Samples of each subtask that a complete run holds of one model."""
-    told = run.manifest.tracks.get(_TRACK, {}).get("by_subtask", {})
-    return {name: count * run.design.repeats for name, count in told.items()}
+    asked = run.manifest.tracks.get(_TRACK, {}).get("by_subtask", {})
+    return {name: count * run.design.repeats for name, count in asked.items()}

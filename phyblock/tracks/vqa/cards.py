@@ -90,14 +90,14 @@ def subtask_cards(run: Run, dataset: Dataset, scene: str) -> Figure | None:
 
 def _cards(questions: Iterable[Question], scene: str) -> dict[str, Question]:
     """The shortest question of each subtask, by its name."""
-    found: dict[str, Question] = {}
+    by_subtask: dict[str, Question] = {}
     for question in questions:
         if scene and question.scene.id != scene:
             continue
-        known = found.get(question.subtask)
+        known = by_subtask.get(question.subtask)
         if known is None or _length(question) < _length(known):
-            found[question.subtask] = question
-    return {name: found[name] for name in SUBTASKS if name in found}
+            by_subtask[question.subtask] = question
+    return {name: by_subtask[name] for name in SUBTASKS if name in by_subtask}
 
 
 def _length(question: Question) -> tuple[int, str]:
@@ -112,8 +112,8 @@ def _text(question: Question, width_in: float) -> list[tuple[str, str]]:
         if is_picture_option(option):
             continue
         color = _RIGHT if not is_order and place in question.answer else MUTED
-        told = f"{LETTERS[place]}. {option}"
-        lines += [(line, color) for line in wrapped(told, width_in, _TEXT_PT)]
+        text = f"{LETTERS[place]}. {option}"
+        lines += [(line, color) for line in wrapped(text, width_in, _TEXT_PT)]
     if is_order or any(map(is_picture_option, question.options)):
         lines.append((f"Answer: {question.answer_letters}", _RIGHT))
     return lines

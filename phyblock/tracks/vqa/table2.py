@@ -221,9 +221,9 @@ def paper_table2_view(table: pd.DataFrame, run: Run) -> TextTable:
 
 def vqa_intervals(run: Run) -> pd.DataFrame:
     """One row a model and cell of Table 2: value, lo, hi, se [%], n, n_scenes, n_clusters."""
-    found = track_estimates(run, NAME)
-    found = found[found["measure"] == ACCURACY.name]
-    table = interval_frame(found, run.design, ACCURACY.scale, [CELL])
+    estimates = track_estimates(run, NAME)
+    estimates = estimates[estimates["measure"] == ACCURACY.name]
+    table = interval_frame(estimates, run.design, ACCURACY.scale, [CELL])
     place = {name: number for number, name in enumerate(CELLS)}
     order = table.assign(m=pd.factorize(table["model"])[0], c=table[CELL].map(place))
     table = table.loc[order.sort_values(["m", "c"], kind="stable").index]

@@ -137,7 +137,7 @@ class Vqa:
         """Digests of all questions, of those asked, the prompt and the pictures."""
         counts = Counter(item.question.subtask for item in self.items)
         keys = [item.key for item in self.items]
-        told: dict[str, Any] = {
+        facts: dict[str, Any] = {
             "questions": self._questions.sha256,
             "asked": hex_digest(json.dumps(keys)),
             "by_subtask": dict(counts),
@@ -145,15 +145,15 @@ class Vqa:
             "pictures": None,
         }
         if self._prompt is not None and self._pictures is not None:
-            told["prompt"] = {"name": self._prompt.name, "version": self._prompt.version}
+            facts["prompt"] = {"name": self._prompt.name, "version": self._prompt.version}
             examples = [asked(task) for task in self._examples.used(self._tasks.values())]
             if examples:
-                told["examples"] = [example.key for example in examples]
+                facts["examples"] = [example.key for example in examples]
             items = () if self.rules.blind else (*self.items, *examples)
-            told["pictures"] = hex_digest(
+            facts["pictures"] = hex_digest(
                 json.dumps([self._pictures.keys(item.shown) for item in items])
             )
-        return told
+        return facts
 
     async def request(
         self, item: AskedQuestion, seed: int, params: Mapping[str, object], *, with_messages: bool

@@ -58,8 +58,8 @@ def stated_size_b(name: str) -> float | None:
 
     Of several numbers the first counts, which is of all experts where some alone are active.
     """
-    found = _STATED_SIZE.search(name)
-    return float(found[1]) if found else None
+    match = _STATED_SIZE.search(name)
+    return float(match[1]) if match else None
 
 
 def f1_by_cost(run: Run) -> Figure | None:
