@@ -26,7 +26,7 @@ from phyblock.resources import bundled
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
 from phyblock_making.auditing.scene_audit import audit_scene
 from phyblock_making.auditing.set_verification import verify_scene
-from phyblock_making.scenes import make_candidates
+from phyblock_making.scenes.candidate_sets import make_candidates
 from phyblock_making.scenes.compositions import beside
 from phyblock_making.scenes.scene_production import Order, produce, shares
 from phyblock_making.scenes.sketch import make_scene

@@ -5,6 +5,6 @@ of one machine out of a run, by `texts`; `write` makes a bundle and `verify` jud
 """
 
 from phyblock.bundle.verify import Verified, opened_bundle
-from phyblock.bundle.write import BUNDLE_FILE, Bundled, bundle_run
+from phyblock.bundle.write import BUNDLE_FILE, bundle_run
 
-__all__ = ["BUNDLE_FILE", "Bundled", "Verified", "bundle_run", "opened_bundle"]
+__all__ = ["BUNDLE_FILE", "Verified", "bundle_run", "opened_bundle"]

@@ -24,12 +24,10 @@ from phyblock.domain.question import (
     LETTERS,
     SUBTASK_NAMES,
     SUBTASKS,
-    Category,
     Mark,
     Question,
     QuestionPicture,
     Subtask,
-    category_of,
     is_picture_option,
 )
 from phyblock.domain.scene import Block, Kind, Look, Scene
@@ -49,7 +47,6 @@ __all__ = [
     "BlockType",
     "Candidate",
     "CandidateSet",
-    "Category",
     "Color",
     "CycleError",
     "Euler",
@@ -63,7 +60,6 @@ __all__ = [
     "QuestionPicture",
     "Scene",
     "Subtask",
-    "category_of",
     "euler_deg_to_matrix",
     "euler_deg_to_quat_xyzw",
     "is_picture_option",

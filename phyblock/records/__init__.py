@@ -28,8 +28,8 @@ from phyblock.records.record import (
     SentPrompt,
     ShownScene,
 )
-from phyblock.records.record_lines import RecordedLines, RecordLines, record_adapter
-from phyblock.records.reply import StoredError, StoredReply, StoredUsage
+from phyblock.records.record_lines import RecordedLines
+from phyblock.records.reply import StoredError, StoredReply
 from phyblock.records.scene import StoredScene
 from phyblock.records.stopped import STOPPED, Stopped, read_stopped
 
@@ -54,7 +54,6 @@ __all__ = [
     "PromptLines",
     "PromptMessage",
     "Record",
-    "RecordLines",
     "Recorded",
     "RecordedLines",
     "Score",
@@ -66,10 +65,8 @@ __all__ = [
     "StoredQuestion",
     "StoredReply",
     "StoredScene",
-    "StoredUsage",
     "Turn",
     "TurnLines",
     "read_manifest",
     "read_stopped",
-    "record_adapter",
 ]

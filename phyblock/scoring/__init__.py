@@ -1,7 +1,7 @@
 """Pure scoring: plans against AOV graphs, errors, losses, counts and micro averages."""
 
 from phyblock.scoring.assembly import AssemblyScorer, Score
-from phyblock.scoring.choices import LetterRates, chance, letter_rates
+from phyblock.scoring.choices import chance, letter_rates
 from phyblock.scoring.error_types import ERROR_TYPES, ErrorType, count_errors
 from phyblock.scoring.goal import Goal
 from phyblock.scoring.level1 import level1_counts
@@ -11,7 +11,7 @@ from phyblock.scoring.metrics import Counts, micro
 from phyblock.scoring.nearest import steps_kept
 from phyblock.scoring.pose import POSE_FRAMES, Laid, PoseFit, PoseFrame, PoseScore, PoseScorer
 from phyblock.scoring.pose_end import blocks_reached
-from phyblock.scoring.pose_errors import ERROR_TOLERANCE_CM, POSE_ERRORS, PoseError, pose_errors
+from phyblock.scoring.pose_errors import POSE_ERRORS, PoseError, pose_errors
 from phyblock.scoring.pose_match import TOLERANCES_CM, TURN_TOLERANCE_DEG
 from phyblock.scoring.steps import (
     MOVE_OUTCOMES,
@@ -19,13 +19,11 @@ from phyblock.scoring.steps import (
     Move,
     MoveOutcome,
     attempted_counts,
-    gated,
     placed_counts,
 )
 
 __all__ = [
     "BLOCK_OUTCOMES",
-    "ERROR_TOLERANCE_CM",
     "ERROR_TYPES",
     "MOVE_OUTCOMES",
     "POSE_ERRORS",
@@ -39,7 +37,6 @@ __all__ = [
     "ErrorType",
     "Goal",
     "Laid",
-    "LetterRates",
     "Match",
     "Move",
     "MoveOutcome",
@@ -54,7 +51,6 @@ __all__ = [
     "blocks_reached",
     "chance",
     "count_errors",
-    "gated",
     "letter_rates",
     "level1_counts",
     "match_plan",

@@ -15,18 +15,15 @@ from phyblock.sim.pictures import (
     goal_png,
     goal_style,
 )
-from phyblock.sim.stability import Stability, Trial, check
-from phyblock.sim.support import Gap, Overlap, find_gaps, find_overlaps, support_graph
+from phyblock.sim.stability import Trial, check
+from phyblock.sim.support import find_gaps, find_overlaps, support_graph
 from phyblock.sim.world import Physics, Pose, World
 
 __all__ = [
     "RENDER_VERSION",
-    "Gap",
-    "Overlap",
     "Physics",
     "PictureStyle",
     "Pose",
-    "Stability",
     "Trial",
     "World",
     "candidates_key",

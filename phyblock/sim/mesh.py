@@ -95,12 +95,6 @@ class Mesh:
         inertia: NDArray[np.float64] = np.trace(second) * np.eye(3) - second
         return inertia
 
-    def is_closed(self) -> bool:
-        """Whether every edge is used exactly once in each direction."""
-        edges = np.concatenate([self.triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-        forward = {(int(a), int(b)) for a, b in edges}
-        return len(forward) == len(edges) and all((b, a) in forward for a, b in forward)
-
     def _neighbors(self) -> list[tuple[int, int]]:
         """Pairs of triangles that share an edge."""
         beside: dict[tuple[int, int], int] = {}

@@ -4,33 +4,23 @@ from phyblock.specs.groups import GROUP, HUMAN, group_names, unknown_model, with
 from phyblock.specs.loading import LoadedSuite, load_suite, resolve_models, suite_tracks
 from phyblock.specs.model import ModelSpec
 from phyblock.specs.models_file import load_models
-from phyblock.specs.prices import BatchRateSpec, PriceSpec, RateSpec
+from phyblock.specs.prices import BatchRateSpec, RateSpec
 from phyblock.specs.schema import models_schema, suite_schema
 from phyblock.specs.sections import (
-    DatasetSpec,
-    ImagesSpec,
-    LimitsSpec,
     SamplingSpec,
-    ScoringSpec,
 )
-from phyblock.specs.suite import BUILTIN_DATASET, RECORDED, SuiteSpec, suite_model
+from phyblock.specs.suite import RECORDED, SuiteSpec, suite_model
 from phyblock.specs.words import did_you_mean
 
 __all__ = [
-    "BUILTIN_DATASET",
     "GROUP",
     "HUMAN",
     "RECORDED",
     "BatchRateSpec",
-    "DatasetSpec",
-    "ImagesSpec",
-    "LimitsSpec",
     "LoadedSuite",
     "ModelSpec",
-    "PriceSpec",
     "RateSpec",
     "SamplingSpec",
-    "ScoringSpec",
     "SuiteSpec",
     "did_you_mean",
     "group_names",

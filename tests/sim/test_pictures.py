@@ -27,7 +27,7 @@ from phyblock.sim.pictures import candidate_camera, on_the_floor
 from phyblock.sim.render import picture, shoot
 from phyblock.words import BACKGROUNDS
 from phyblock_making.poses import POSES
-from phyblock_making.scenes import make_candidates
+from phyblock_making.scenes.candidate_sets import make_candidates
 from tests.designs.scenes import designed_scene
 from tests.sim.structures import block, scene_of
 

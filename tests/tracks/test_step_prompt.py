@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from hypothesis import given, settings
@@ -16,7 +17,7 @@ from phyblock.resources import bundled
 from phyblock.scoring import MOVE_OUTCOMES
 from phyblock.sim import PictureStyle
 from phyblock.tracks import PicturePolicy, Pictures, TemplatePrompt
-from phyblock.tracks.step_planning.prompt import FEEDBACKS, Feedback, PastStep, StepPrompt
+from phyblock.tracks.step_planning.prompt import Feedback, PastStep, StepPrompt
 from phyblock.tracks.step_planning.rules import StepRules
 from phyblock.tracks.step_planning.track import StepPlanning
 from phyblock.words import Setting
@@ -104,7 +105,7 @@ def test_memory_bounds_what_is_shown_and_always_ends_with_the_state_as_it_is(
         assert told == (place > n - kept)
 
 
-@pytest.mark.parametrize("feedback", FEEDBACKS)
+@pytest.mark.parametrize("feedback", get_args(Feedback))
 def test_feedback_tells_no_more_than_it_may(feedback: Feedback) -> None:
     outcomes = [*MOVE_OUTCOMES, "no_move", "several_moves", "move_and_done", "empty"]
     told = {outcome: past(outcome)[0].told(feedback) for outcome in outcomes}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 from phyblock import parsing
 from phyblock.models.base import Image, Message
@@ -16,10 +16,9 @@ from phyblock.scoring import MoveOutcome
 from phyblock.tracks.prompts import TemplatePrompt, form_facts
 from phyblock.words import CandidateScale, Gating, Setting
 
-__all__ = ["FEEDBACKS", "Feedback", "History", "PastStep", "StepOutcome", "StepPrompt"]
+__all__ = ["Feedback", "History", "PastStep", "StepOutcome", "StepPrompt"]
 
 Feedback = Literal["none", "success", "error_type"]
-FEEDBACKS: tuple[Feedback, ...] = get_args(Feedback)
 History = Literal["text", "turns"]
 StepOutcome = MoveOutcome | Literal["done"] | parsing.MoveProblem
 """What became of a step; a problem is a reply in which no single operation could be read."""

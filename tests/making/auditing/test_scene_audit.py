@@ -19,7 +19,7 @@ from phyblock_making.auditing.scene_audit import AUDITED, SceneAudit, audit_scen
 from phyblock_making.auditing.set_audit import Audit, audit_scenes, findings_csv
 from phyblock_making.checks.set_checks import find_duplicates
 from phyblock_making.checks.tolerances import FOREIGN
-from phyblock_making.scenes import make_candidates
+from phyblock_making.scenes.candidate_sets import make_candidates
 from tests.designs.scenes import designed_scenes
 from tests.sim.structures import counterweighted_beam, scene_of, tower
 from tests.sim.test_support import FLOATING, OVERLAPPING

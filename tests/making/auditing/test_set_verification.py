@@ -17,7 +17,7 @@ from phyblock_making.auditing.set_verification import (
     verify_scenes,
 )
 from phyblock_making.checks.set_checks import find_duplicates, find_orphans
-from phyblock_making.scenes import make_candidates
+from phyblock_making.scenes.candidate_sets import make_candidates
 from phyblock_making.scenes.scene_files import SUMS_FILE, sums_text
 from phyblock_making.scenes.sketch import make_scene
 from phyblock_making.symmetry import transformed

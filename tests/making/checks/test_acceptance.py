@@ -6,8 +6,8 @@ import pytest
 
 from phyblock.domain import Block, Scene
 from phyblock.errors import DataError
-from phyblock_making.scenes import accept, form_problems, physics_problems
 from phyblock_making.scenes.sketch import make_scene
+from tests.designs.acceptance import accept, form_problems, physics_problems
 from tests.designs.pad import Pad
 from tests.designs.scenes import designed_scene
 

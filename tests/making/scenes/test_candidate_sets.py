@@ -20,8 +20,7 @@ from phyblock.words import SETTINGS, Setting
 from phyblock_making.auditing.boosting import boosted
 from phyblock_making.auditing.tells import Part, find_tells
 from phyblock_making.poses import POSES
-from phyblock_making.scenes import make_candidates
-from phyblock_making.scenes.candidate_sets import NEEDED
+from phyblock_making.scenes.candidate_sets import NEEDED, make_candidates
 from phyblock_making.scenes.grammar import Group, Request, draw
 from phyblock_making.scenes.scene_production import shares
 from tests.designs.scenes import designed_scene

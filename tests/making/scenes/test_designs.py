@@ -6,7 +6,7 @@ import pytest
 
 from phyblock.sim import find_gaps, find_overlaps
 from phyblock.sim.visibility import hidden_blocks
-from phyblock_making.scenes import accept, form_problems
+from tests.designs.acceptance import accept, form_problems
 from tests.designs.scenes import designed_scene, designed_scenes
 
 RECHECKED = ("l1-boat", "l1-dolmen", "l2-bridge", "l2-rocket", "l3-balance", "l3-robot")

@@ -13,12 +13,12 @@ from phyblock.domain import KIT_PALETTE, Scene
 from phyblock.domain.symmetry import canonical_form
 from phyblock.sim import find_gaps, find_overlaps
 from phyblock.sim.support import bounds_m
-from phyblock_making.scenes import form_problems
 from phyblock_making.scenes.buildings import BUILDINGS
 from phyblock_making.scenes.compositions import COMPOSITIONS, beside
 from phyblock_making.scenes.creatures import CREATURES
 from phyblock_making.scenes.grammar import GROUP_LEVELS, Request, draw
 from phyblock_making.scenes.scene_draft import PALETTES, Draft
+from tests.designs.acceptance import form_problems
 
 GROUPS = tuple(GROUP_LEVELS)
 seeds = st.integers(0, 2**31)

@@ -13,11 +13,11 @@ from phyblock.domain import Scene
 from phyblock.domain.symmetry import canonical_form
 from phyblock.errors import DataError, StoreError
 from phyblock.sim.visibility import hidden_blocks
-from phyblock_making.scenes import accept
 from phyblock_making.scenes.scene_card import card
 from phyblock_making.scenes.scene_files import SetWriter, open_writer, sums_text
 from phyblock_making.scenes.scene_production import Order, Share, produce, shares
 from phyblock_making.workers import open_workers
+from tests.designs.acceptance import accept
 from tests.sim.box_renderer import BOX_RENDERER
 from tests.sim.still_engine import STILL_ENGINE
 

@@ -1,0 +1,25 @@
+"""What the acceptance test of scenes finds, with the long trial and our own tolerances."""
+
+from __future__ import annotations
+
+from phyblock.domain import KIT_PALETTE, Scene
+from phyblock.domain.scene import Kind
+from phyblock.errors import DataError, Problem
+from phyblock_making.checks.acceptance import FORM, PHYSICS
+from phyblock_making.checks.scene_checks import findings_of
+from phyblock_making.checks.scene_facts import SceneFacts
+
+
+def accept(scene: Scene, palette: tuple[Kind, ...] = KIT_PALETTE) -> None:
+    problems = form_problems(scene, palette) or physics_problems(scene)
+    if problems:
+        raise DataError(problems)
+
+
+def form_problems(scene: Scene, palette: tuple[Kind, ...] = KIT_PALETTE) -> tuple[Problem, ...]:
+    facts = SceneFacts(scene, palette=palette)
+    return tuple(finding.problem for finding in findings_of(facts, FORM))
+
+
+def physics_problems(scene: Scene) -> tuple[Problem, ...]:
+    return tuple(finding.problem for finding in findings_of(SceneFacts(scene), PHYSICS))
