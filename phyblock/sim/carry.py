@@ -15,7 +15,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,13 +135,8 @@ class Carrying:
         self._world.__enter__()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._world.__exit__(kind, error, trace)
+    def __exit__(self, *error: object) -> None:
+        self._world.__exit__(*error)
 
     @property
     def blocks(self) -> tuple[Block, ...]:

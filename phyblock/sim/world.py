@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterable
-from types import TracebackType
 
 from phyblock.domain.blocks import SHAPES
 from phyblock.domain.scene import Block
@@ -36,12 +35,7 @@ class World:
         self._opened = self._stack.enter_context(self._engine.open(self.physics))
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._opened = None
         self._blocks.clear()
         self._stack.close()

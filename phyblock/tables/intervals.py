@@ -1,4 +1,4 @@
-"""Counts by scene and cell, with the base scenes of each scene."""
+"""Sums of counts by scene, model and whatever else rows differ in; base scenes of scenes."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from phyblock.scoring.ratios import Floats
-from phyblock.scoring.uncertainty import Clusters
 from phyblock.tables.load import Run
 
-__all__ = ["CountCube", "Grouping", "base_scenes", "grouped", "parents_of", "summed"]
+__all__ = ["Grouping", "base_scenes", "grouped", "parents_of", "summed"]
 
 # pandas groups rows by several columns far more slowly than numpy numbers of them, and tables are
 # made of hundreds of such sums.
@@ -70,45 +69,6 @@ def _sums(places: NDArray[np.intp], values: Floats, size: int) -> Floats:
     parts = values[order].tolist()
     sums = [math.fsum(parts[first:last]) for first, last in pairwise(ends.tolist())]
     return np.array(sums, dtype=np.float64)
-
-
-@dataclass(frozen=True, eq=False)
-class CountCube:
-    """Counts of scenes x cells, summed over seeds.
-
-    `counts` has shape (scenes, cells, counts); `present`, (scenes, cells), says where a cell has a
-    sample of the scene; `parents` are the base scenes of each scene. Scenes and cells are sorted.
-    """
-
-    cells: list[tuple[Any, ...]]
-    counts: Floats
-    present: NDArray[np.bool_]
-    parents: list[tuple[str, ...]]
-
-    @classmethod
-    def of(
-        cls,
-        table: pd.DataFrame,
-        parents: pd.Series[Any],
-        by: Sequence[str],
-        sums: Sequence[str],
-    ) -> CountCube:
-        """Rows of samples, in cells of equal values in the columns `by`."""
-        scenes, cells = grouped(table, "scene"), grouped(table, by)
-        counts, rows = summed(table, sums, (scenes, cells))
-        return cls(cells.values, counts, rows > 0, base_scenes(parents, scenes.values))
-
-    def only(self, cells: Sequence[int]) -> CountCube:
-        """Of the cells at these places, and of the scenes that they have."""
-        scenes = np.flatnonzero(self.present[:, cells].any(axis=1))
-        at = np.ix_(scenes, np.asarray(cells, dtype=np.intp))
-        parents = [self.parents[scene] for scene in scenes]
-        return CountCube([self.cells[n] for n in cells], self.counts[at], self.present[at], parents)
-
-    @property
-    def clusters(self) -> Clusters:
-        """The scenes' base scenes."""
-        return Clusters.of(self.parents)
 
 
 def base_scenes(parents: pd.Series[Any], scenes: Sequence[str]) -> list[tuple[str, ...]]:

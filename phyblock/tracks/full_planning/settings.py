@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 
 from phyblock.scoring.ratios import Floats, f1_of
-from phyblock.scoring.uncertainty import Estimate, jackknife
+from phyblock.scoring.uncertainty import Clusters, Estimate, jackknife
 from phyblock.tables.cells import cell_scores, measured
-from phyblock.tables.intervals import CountCube, parents_of
+from phyblock.tables.intervals import base_scenes, grouped, parents_of, summed
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL
 from phyblock.tables.text_table import Column, TextTable, between, level_name, number
@@ -41,20 +41,23 @@ def settings_frame(run: Run) -> pd.DataFrame:
     design = run.design
     if not {"A", "B"} <= set(design.suite.settings):
         return pd.DataFrame(columns=list(_COLUMNS))
-    cube, estimates = _counts(run), _estimates(run)
+    estimates = _estimates(run)
+    scores, parents = _scores(run), parents_of(run)
     by_cell: dict[tuple[str, str], dict[str, Any]] = {}
     for level in design.levels:
         matcher = design.matchers(design.criterion(level))[0]
-        part = cube.only([n for n, cell in enumerate(cube.cells) if cell[0] == level])
-        kept = {cell[2:]: n for n, cell in enumerate(part.cells) if cell[1] == matcher}
-        models = [m for m in design.model_names if (m, "A") in kept and (m, "B") in kept]
-        if not models:
+        part = scores[(scores["level"] == level) & (scores["matcher"] == matcher)]
+        scenes, known, settings = (grouped(part, by) for by in ("scene", "model", "setting"))
+        if settings.values != ["A", "B"]:
             continue
-        both = np.array([[kept[model, setting] for setting in "AB"] for model in models])
-        present, clusters = part.present[:, both[:, 0]], part.clusters
+        models = [model for model in design.model_names if model in known.values]
+        order = [known.values.index(model) for model in models]
+        counts, samples = summed(part, ["tp", "fp", "fn"], (scenes, known, settings))
+        present = samples[:, order, 0] > 0
+        clusters = Clusters.of(base_scenes(parents, scenes.values))
         n_clusters = clusters.behind(present)
         paired = jackknife(
-            part.counts[:, both],
+            counts[:, order],
             clusters,
             _both_and_difference,
             n_clusters=np.repeat(n_clusters[:, None], 3, axis=1),
@@ -90,12 +93,10 @@ def _estimates(run: Run) -> dict[Hashable, Any]:
     return dict(estimates[list(_ENDS)].astype("float64").to_dict("index"))
 
 
-def _counts(run: Run) -> CountCube:
-    """Counts tp, fp, fn of every scene by level, matcher, model and setting."""
+def _scores(run: Run) -> pd.DataFrame:
+    """Scores of the plans that were asked for, by the levels of their scenes."""
     scores = cell_scores(run)
-    scores = measured(scores[scores["track"] == NAME], ["level", "model"])
-    by = ["level", "matcher", "model", "setting"]
-    return CountCube.of(scores, parents_of(run), by, ["tp", "fp", "fn"])
+    return measured(scores[scores["track"] == NAME], ["level", "model"])
 
 
 def _both_and_difference(sums: Floats) -> Floats:
