@@ -9,7 +9,7 @@ from phyblock.errors import Problem, SpecError
 __all__ = ["Kinds", "expect"]
 
 Kinds = Mapping[str, tuple[object, type | tuple[type, ...], str]]
-"""By the name of an argument: what was given, the types that it may have, and these in words."""
+"""What was given, the types that it may have, and these in words, by the name of an argument."""
 
 
 def expect(function: str, kinds: Kinds) -> None:

@@ -66,7 +66,7 @@ class About(Line):
     suite: Digest
     """Digest of the suite in `run.yaml`, as JSON with sorted keys."""
     tracks: dict[str, dict[str, Any]]
-    """By track, what decides its results: version of the prompt, digests of pictures, questions."""
+    """Version of the prompt, and digests of pictures and questions, by track."""
     data: dict[str, BundledData]
     """What is needed to score again: `dataset`, and `questions` where there are any."""
 

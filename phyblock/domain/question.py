@@ -31,7 +31,7 @@ Category = Literal[
 ]
 
 SUBTASKS: tuple[Subtask, ...] = get_args(Subtask)
-"""In the order of the paper's Table 2."""
+"""Subtasks in the order of the paper's Table 2."""
 CATEGORIES: Mapping[Category, tuple[Subtask, ...]] = {
     "object_property": ("SH", "CO", "SI", "NU"),
     "object_relationship": ("RP", "AP", "RD", "RR"),

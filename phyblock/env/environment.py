@@ -38,7 +38,7 @@ Observe = Literal["pictures", "state"]
 Action = Literal["block", "pose"]
 _PICTURES = ("current", "goal", "candidates")
 _KEPT_PICTURES = 64
-"""Of one scene; 50 MB at 512 pixels."""
+"""Pictures of one scene that are kept; 50 MB at 512 pixels."""
 _MOST_OF_A_KIND = 255
 _SMALLEST_PX = 16
 _RENDER_MODES = ("rgb_array",)

@@ -109,7 +109,7 @@ class ManifestChoice(Line):
     models: tuple[Text, ...]
     """Its models."""
     of: int
-    """Of how many scenes these were chosen."""
+    """Number of scenes that these were chosen of."""
     tau: float
     """Kendall's tau-a of the models' ranks on such scenes and on all, cross-validated: each pair of
     models stands on scenes that the others choose."""
@@ -135,9 +135,9 @@ class Manifest(Line):
     dataset: ManifestDataset | None = None
     """The data set."""
     tracks: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    """By track, digests of what decides its results: prompt, pictures, questions."""
+    """Digests of what decides the results of each track: prompt, pictures, questions."""
     variants: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)
-    """By way of asking, as records name it, and track, the same digests; empty: there is one."""
+    """The same digests by way of asking, as records name it, and track; empty: there is one."""
     limit: int | None = None
     """Items at most of each track."""
     chosen: ManifestChoice | None = None
@@ -151,13 +151,13 @@ class Manifest(Line):
     scenes_by_level: dict[int, int] = Field(default_factory=dict)
     """Scenes of each level; one scene may be of several."""
     floors: dict[str, dict[str, dict[str, float]]] = Field(default_factory=dict)
-    """By track and baseline that never sees the goal, what it reaches on these scenes, in [0, 1]:
+    """What baselines reach on these scenes that never see the goal, by track and name, in [0, 1]:
     by measure, cell, setting, matcher and criterion."""
     engine: str | None = None
     """The physics engine that blocks are let go in, with its version; null where nothing of the run
     depends on one, and in runs from before there was a choice (PyBullet)."""
     versions: dict[str, str] = Field(default_factory=dict)
-    """Of Python and of libraries."""
+    """Versions of Python and of libraries."""
 
     @property
     def scenes_chosen(self) -> frozenset[str] | None:

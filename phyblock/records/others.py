@@ -66,12 +66,12 @@ class BatchLine(Line):
     id: str = ""
     """The provider's name for it."""
     keys: tuple[str, ...] = ()
-    """Of an intended one: the requests in their order, by their keys in the reply cache."""
+    """Requests of an intended batch in their order, by their keys in the reply cache."""
     most_usd: tuple[Usd, ...] = ()
-    """Of an intended one: what each of them can cost, empty where no price is known."""
+    """What each request of an intended batch can cost; empty where no price is known."""
     seeded: bool = True
-    """Of an intended one: whether seeds are sent."""
+    """Whether the requests of an intended batch carry seeds."""
     words: str = ""
     """Why it was lost, or how it ended."""
     is_complete: bool = True
-    """Of an ended one: False where the provider took back what it had not asked yet."""
+    """False where the provider took back what it had not asked when the batch ended."""

@@ -119,9 +119,9 @@ class StoredPicture(Line, extra="forbid"):
     ] = ()
     """Orders of blocks that are not drawn."""
     poses: Annotated[dict[str, StoredPose], OF_BLOCKS] = Field(default_factory=dict)
-    """By order, where blocks stand that are not at their place."""
+    """Where blocks stand that are not at their place, by order."""
     swap: Annotated[dict[str, StoredKind], OF_BLOCKS] = Field(default_factory=dict)
-    """By order, what blocks are that differ."""
+    """What blocks are that differ from the scene, by order."""
     add: Annotated[_Blocks, _in_scene(_known_orders)] = ()
     """Whole blocks that the scene does not have."""
     marks: Annotated[tuple[StoredMark, ...], Filled(MAX_BLOCKS)] = ()

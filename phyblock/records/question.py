@@ -117,7 +117,7 @@ class StoredQuestion(Line, extra="forbid"):
     answer: Annotated[str, fits(_answer_faults)]
     """`A` to `D`; for ordering all four letters in the right order, like `BADC`."""
     colors: Annotated[dict[str, Color], OF_BLOCKS] = Field(default_factory=dict)
-    """By order, the colors of blocks that are recolored; left out where none is."""
+    """Colors of blocks that are recolored, by order; left out where none is."""
     background: Background | None = None
     """Ground of all its pictures; left out where a run's own is drawn, as in older sets."""
     pictures: Annotated[tuple[Picture, ...], Filled(_MOST_PICTURES), fits(_picture_faults)]

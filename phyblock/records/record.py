@@ -158,7 +158,7 @@ class Record(Line):
     variant: dict[str, str] = Field(default_factory=dict)
     """Factors in which the way of asking differs from the run's reference, with their levels."""
     counts: dict[str, tuple[Amount, ...]] = Field(default_factory=dict)
-    """By name, what was counted for measures beside `scores`."""
+    """What was counted for measures beside `scores`, by name."""
 
     columns: ClassVar[Mapping[str, str]] = {}
     """Columns that the track adds to the frame of records, with their types in pandas."""
@@ -280,7 +280,7 @@ class Recorded(Line):
     error: StoredError | None = None
     """The error."""
     variant: dict[str, str] = Field(default_factory=dict)
-    """In what a varied run asked otherwise than its reference."""
+    """What a varied run asked otherwise than its reference."""
     shown: ShownScene | None = None
     """How the item was shown."""
     asked: AskedAs | None = None

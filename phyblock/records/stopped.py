@@ -18,7 +18,7 @@ class Stopped(Line):
     """Why the last session on a run did not ask all; there while there is anything to say."""
 
     models: dict[str, str] = Field(default_factory=dict)
-    """By name of a model that could not be asked on, why."""
+    """Why a model could not be asked on, by its name."""
     run: str = ""
     """Why the whole run was stopped; empty: it was not."""
 

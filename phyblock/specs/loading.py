@@ -1,4 +1,4 @@
-"""From a suite file and --set overrides to a validated suite with its paths resolved."""
+"""Reads a suite file and --set overrides as a validated suite with its paths resolved."""
 
 from __future__ import annotations
 

@@ -6,13 +6,13 @@ import pandas as pd
 
 from phyblock.registry import known_track
 from phyblock.tables.coverage import coverage_frame
+from phyblock.tables.flat import TOKENS
 from phyblock.tables.load import Run
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
 
 __all__ = ["cost_frame", "cost_view"]
 
 _ROW = ["model", "track"]
-_TOKENS = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
 
 
 def cost_frame(run: Run) -> pd.DataFrame:
@@ -26,11 +26,11 @@ def cost_frame(run: Run) -> pd.DataFrame:
     """
     records = run.records
     sent = records["attempts"].fillna(0).astype("int64") > 0
-    facts = records[[*_ROW, *_TOKENS]].astype(dict.fromkeys(_TOKENS, "Float64"))
+    facts = records[[*_ROW, *TOKENS]].astype(dict.fromkeys(TOKENS, "Float64"))
     facts["price"] = records["cost_usd"].where(sent | records["cached"].fillna(False).astype(bool))
     facts["latency_s"] = records["latency_s"].where(sent)
     groups = facts.groupby(_ROW)
-    costs = groups[list(_TOKENS)].mean().astype("float64")
+    costs = groups[list(TOKENS)].mean().astype("float64")
     costs["cost_per_100_usd"] = 100 * groups["price"].mean()
     costs["latency_median_s"] = groups["latency_s"].median()
     costs["latency_p90_s"] = groups["latency_s"].quantile(0.9)
@@ -56,7 +56,7 @@ def cost_view(table: pd.DataFrame, run: Run) -> TextTable:
             row["model"],
             row["track"].replace("_", " "),
             f"{row['replies']:,}",
-            *(number(row[name], 0) for name in _TOKENS),
+            *(number(row[name], 0) for name in TOKENS),
             _dollars(row["cost_usd"]),
             _dollars(row["cost_per_100_usd"]),
             number(row["latency_median_s"], 2),

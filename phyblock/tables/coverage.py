@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import pandas as pd
 
+from phyblock.tables.flat import TOKENS
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.outcomes import HEADINGS, OUTCOMES
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
 
 __all__ = ["coverage_frame", "coverage_in_terminal", "coverage_view"]
 
-_TOKENS = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
 _COUNTS = ("recorded", *OUTCOMES, "replies", "tokens_unknown", "cost_unknown", "cached", "attempts")
 
 _ROW = ["model", "track"]
@@ -24,7 +24,7 @@ _COLUMNS = (
     "not_run",
     *OUTCOMES,
     "replies",
-    *_TOKENS,
+    *TOKENS,
     "tokens_unknown",
     "cost_usd",
     "cost_unknown",
@@ -50,7 +50,7 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     cached = records["cached"].fillna(False).astype("bool")
     paid = replied & ~cached
     attempts = records["attempts"].fillna(0).astype("int64")
-    facts = records[[*_ROW, *_TOKENS]].assign(
+    facts = records[[*_ROW, *TOKENS]].assign(
         recorded=1,
         **{name: (records["outcome"] == name).astype("int64") for name in OUTCOMES},
         replies=replied.astype("int64"),
@@ -63,7 +63,7 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     )
     groups = facts.groupby(_ROW)
     sums = groups[list(_COUNTS)].sum()
-    known = groups[[*_TOKENS, "cost_usd"]].sum(min_count=1)
+    known = groups[[*TOKENS, "cost_usd"]].sum(min_count=1)
     design = run.design
     rows = [
         (model, track, design.samples(track))

@@ -61,9 +61,9 @@ COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h")
 
 WIDTH_IN = 7.0
-"""Of the text of a two-column paper."""
+"""Width of the text of a two-column paper."""
 COLUMN_IN = 3.35
-"""Of one of its columns."""
+"""Width of one of its columns."""
 
 Font = Literal["sans", "serif"]
 _FAMILIES: dict[Font, tuple[str, str]] = {

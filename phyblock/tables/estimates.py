@@ -125,7 +125,7 @@ class _Pool:
         return cls(groups.values, pooled, counts, rows, of_seeds, silent, origins)
 
     def only(self, cells: Sequence[Cell]) -> _Pool:
-        """Of these cells, and of the groups, scenes and seeds that have rows in them."""
+        """The part of these cells, with the groups, scenes and seeds that have rows in them."""
         names = [cell.name for cell in cells if not cell.of]
         kept = np.array([self.pooled.index(name) for name in names], dtype=np.intp)
         there = self.rows[:, :, kept] > 0
@@ -144,7 +144,7 @@ class _Pool:
 def value_of_cells(
     measure: Measure, cells: Sequence[Cell], pooled: Sequence[str]
 ) -> Callable[..., Floats]:
-    """From sums of counts (..., pooled, columns) to values of the cells (..., cells).
+    """A function from sums of counts (..., pooled, columns) to values of the cells (..., cells).
 
     With `asked`, of shape (..., pooled), means are over the pooled cells that were asked alone.
     """

@@ -17,7 +17,7 @@ from phyblock.records import Record, Score
 from phyblock.records.known import record_types
 from phyblock.scoring import BLOCK_OUTCOMES, ERROR_TYPES
 
-__all__ = ["BLOCK_COLUMNS", "Flattened"]
+__all__ = ["BLOCK_COLUMNS", "TOKENS", "Flattened"]
 
 BLOCK_COLUMNS = {name: f"blocks_{name}" for name in BLOCK_OUTCOMES}
 """Columns of scores that say what became of the goal's blocks."""
@@ -84,7 +84,8 @@ _SCORE_TYPES: dict[str, str] = {
 _OF_SAMPLE = ("sample", "track", "model", "scene", "seed", "variant", "outcome")
 """Columns of scores that are those of the record."""
 _REPLY = ("finish", "cost_usd", "latency_s", "provider_model", "attempts", "cached", "seed_sent")
-_USAGE = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
+TOKENS = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
+"""Columns that count tokens."""
 _COUNTS = ("tp", "fp", "fn", *ERROR_TYPES, *BLOCK_COLUMNS.values(), "kept")
 _LABELS = ("criterion", "matcher", "setting")
 _UNKNOWN = -(2**62)
@@ -197,7 +198,7 @@ def _row(record: Record) -> dict[str, Any]:
         "variant": record.way.key,
         **{name: getattr(record, name) for name in ("item", "levels", "parents", "n_blocks")},
         **{name: getattr(reply, name, None) for name in (*_TEXTS, *_REPLY)},
-        **{name: getattr(reply and reply.usage, name, None) for name in _USAGE},
+        **{name: getattr(reply and reply.usage, name, None) for name in TOKENS},
         "paid_usd": reply and record.paid_usd,
         "error_kind": error and error.kind,
         "error_status": error and error.status,

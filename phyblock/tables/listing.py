@@ -1,4 +1,4 @@
-"""By which scores the page of a run lists the samples of a track."""
+"""Scores by which the page of a run lists the samples of a track."""
 
 from __future__ import annotations
 

@@ -32,5 +32,5 @@ HEADINGS: dict[Outcome, str] = {
 
 
 def has_reply(rows: pd.DataFrame) -> pd.Series[bool]:
-    """Of each row of samples, by its `outcome`, whether the model said anything."""
+    """Whether the model said anything, for each row of samples, by its `outcome`."""
     return ~rows["outcome"].isin(WITHOUT_REPLY)

@@ -29,7 +29,7 @@ def control_words(run: Run, section: str) -> tuple[str, ...]:
 
 
 def varied_words(run: Run) -> tuple[str, ...]:
-    """In how many ways each item was asked, where there are several."""
+    """Number of ways in which each item was asked, where there are several."""
     n = run.design.suite.vary.n_variants
     return (f"asked in {n:,} ways",) if n > 1 else ()
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["HATCHES", "Part", "stack"]
 
 HATCHES = ("", "", "//", "..", "\\\\", "xx", "--", "++")
-"""Of parts by their place: they tell colors apart that look alike to some, or in print."""
+"""Hatches of parts by their place: they tell colors apart that look alike to some, or in print."""
 
 
 class Part(NamedTuple):

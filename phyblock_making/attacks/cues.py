@@ -116,14 +116,14 @@ PICTURE_CUES: Mapping[str, Cue] = {
     "unlike the others": _oddness,
     "colors unlike the others": _odd_colors,
 }
-"""Of options that are pictures."""
+"""Cues of options that are pictures."""
 SCENE_CUES: Mapping[str, Cue] = {
     "unlike the scene": _changed,
     "row of the change": _changed_middle(0),
     "column of the change": _changed_middle(1),
     "colors unlike the scene": _other_colors,
 }
-"""Of options that are pictures and stand beside one of the scene."""
+"""Cues of options that are pictures and stand beside one of the scene."""
 
 
 def _of_marks(measure: Callable[[Spot, Look], float]) -> Cue:
@@ -196,7 +196,7 @@ MARK_CUES: Mapping[str, Cue] = {
     "apart from the others": _of_marks(_alone),
     "from other marks": _of_marks(_from_others),
 }
-"""Of options that are marks in the scene's picture."""
+"""Cues of options that are marks in the scene's picture."""
 CUES = (*PICTURE_CUES, *SCENE_CUES, *MARK_CUES)
 """The names of all cues."""
 

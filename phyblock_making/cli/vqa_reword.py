@@ -75,7 +75,7 @@ def command(
 
 
 def _faults(taken: Set[str], reworded: Sequence[Question], jobs: int) -> dict[str, str]:
-    """By id, why reworded questions cannot be used."""
+    """Why reworded questions cannot be used, by id."""
     faults = {}
     with open_workers(jobs) as workers:
         verified = verify_questions(reworded, workers)

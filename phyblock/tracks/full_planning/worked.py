@@ -31,7 +31,7 @@ def worked_plan(task: AssemblyTask, form: parsing.AnswerForm[tuple[int, ...]] | 
 
 
 def _drawn_order(scene: Scene) -> list[int]:
-    """Of the blocks that are ready, the one whose digest is the least comes next."""
+    """Vertices in a valid order: the next is the ready one whose digest is the least."""
 
     def place(vertex: int) -> bytes:
         return drawn_bytes("example plan", scene.id, vertex)

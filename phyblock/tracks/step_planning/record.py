@@ -111,7 +111,7 @@ class EpisodeRecord(Record):
 
     @property
     def limit_usd(self) -> float:
-        """Of a request that failed: replies were counted where each was written, as a turn."""
+        """What a failed request counts; replies were counted where each was written, as a turn."""
         return super().limit_usd if self.reply is None else 0.0
 
     @property

@@ -125,7 +125,7 @@ def step_intervals(run: Run) -> pd.DataFrame:
 
 
 def step_intervals_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """Out of `step_intervals`."""
+    """Shows the table of `step_intervals`."""
     return interval_view(table, run, list(dict.fromkeys(table[CELL])), "F1 of step planning")
 
 
@@ -167,7 +167,7 @@ def published_recall(model: str) -> float | None:
 
 
 def table3_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """Out of `table3_frame`: completed goals and F1 of attempts first."""
+    """Shows the table of `table3_frame`, completed goals and F1 of attempts first."""
     design = run.design
     columns = [
         column
@@ -232,7 +232,7 @@ def paper_table3_frame(run: Run) -> pd.DataFrame:
 
 
 def paper_table3_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """Out of `paper_table3_frame`."""
+    """Shows the table of `paper_table3_frame`."""
     note = f"Setting {run.design.setting}. {_PUBLISHED_NOTE}"
     names = {_RECALL: METRIC_NAMES["recall"]}
     return beside_view(table, run, number_in_paper=3, names=names, note=note)

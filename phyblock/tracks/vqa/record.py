@@ -36,7 +36,7 @@ class QuestionShown(Line):
     category: str = ""
     """The category of the subtask."""
     rotation: Whole = 0
-    """By how many places its options were turned."""
+    """Number of places by which its options were turned."""
     options_as: str = ""
     """Whether options that are pictures were sent as pictures or as letters in one."""
     blind: bool = False

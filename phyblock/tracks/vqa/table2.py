@@ -211,7 +211,7 @@ def paper_table2_frame(run: Run) -> pd.DataFrame:
 
 
 def paper_table2_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """Out of `paper_table2_frame`."""
+    """Shows the table of `paper_table2_frame`."""
     note = (
         "Averages are unweighted means. The questions are our own: the paper's are not published."
     )

@@ -38,7 +38,7 @@ _LABEL_PT = 6.5
 _BESIDE_IN = 0.6
 """What the axis of F1 takes beside the plot."""
 _DECADE_IN = 1.4
-"""From here on there is room for three numbers in a decade."""
+"""There is room for three numbers in a decade from here on."""
 _STATED_SIZE = re.compile(r"(?<![A-Za-z0-9.])(\d+(?:\.\d+)?)[bB](?![A-Za-z0-9])")
 _SHIFTS = sorted((sign * 9.0 * n for n in range(60) for sign in (1, -1)), key=abs)
 """How far a label may be moved, the nearest first [points]."""
