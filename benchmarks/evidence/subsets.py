@@ -24,9 +24,9 @@ from phyblock.run.informative import most_informative
 from phyblock.scoring.item_analysis import (
     discrimination,
     explained,
+    least_correlation,
     pairs_kept,
     pairs_kept_by_choice,
-    told_from_none,
 )
 from phyblock.scoring.ratios import Floats, f1_of
 from phyblock.tracks.selection import evenly, stratified
@@ -88,7 +88,7 @@ def main() -> None:
     rng = np.random.default_rng(given.seed)
     models, levels, n_blocks, counts = recorded_counts(given.checkout)
     by_scene = f1_of(counts)
-    worth, least = discrimination(by_scene), told_from_none(len(models))
+    worth, least = discrimination(by_scene), least_correlation(len(models))
     print(f"{len(models)} models, {len(levels)} scenes; discrimination {np.nanmean(worth):.2f}")
     print(
         f"  below 0: {(worth < 0).sum()}; below {-least:.2f}: {(worth < -least).sum()}; "

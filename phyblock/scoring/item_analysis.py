@@ -20,9 +20,9 @@ __all__ = [
     "LEAST_MODELS",
     "discrimination",
     "explained",
+    "least_correlation",
     "pairs_kept",
     "pairs_kept_by_choice",
-    "told_from_none",
 ]
 
 LEAST_MODELS = 4
@@ -59,8 +59,8 @@ def _correlation(one: Floats, other: Floats, known: NDArray[np.bool_]) -> Floats
     return np.clip(out, -1.0, 1.0)
 
 
-def told_from_none(models: int) -> float:
-    """How far from 0 a correlation over so many models must be, to be told from none.
+def least_correlation(models: int) -> float:
+    """The least distance from 0 by which a correlation over so many models differs from none.
 
     Two-sided at 5 %, one item alone, by the t distribution; NaN for fewer than three models.
     """

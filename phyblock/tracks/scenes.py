@@ -13,7 +13,7 @@ from phyblock.scoring.item_analysis import (
     LEAST_MODELS,
     discrimination,
     explained,
-    told_from_none,
+    least_correlation,
 )
 from phyblock.scoring.ratios import Floats
 from phyblock.tables.headline import headline_rows
@@ -148,7 +148,7 @@ def _notes(table: pd.DataFrame) -> list[str]:
     if not len(table):
         return [f"A correlation over models needs {LEAST_MODELS} that replied."]
     worth, models = table["discrimination"], int(table["n_models"].max())
-    least = told_from_none(models)
+    least = least_correlation(models)
     parts = {name: 100 * explained(table["mean"], list(table[name])) for name in _GROUPS}
     return [
         "Discrimination: correlation of the models' values in a scene with their mean on all other "

@@ -26,8 +26,8 @@ __all__ = [
     "as_recorded",
     "file_plan",
     "in_order",
+    "showing_fields",
     "shown_order",
-    "told_of",
 ]
 
 
@@ -159,7 +159,7 @@ def file_plan(task: AssemblyTask, steps: Sequence[int]) -> tuple[int, ...] | Non
     return tuple(task.order[step - 1] if 1 <= step <= n else step for step in steps)
 
 
-def told_of(task: AssemblyTask) -> dict[str, Any]:
+def showing_fields(task: AssemblyTask) -> dict[str, Any]:
     """What records say of how a task was shown; nothing where it was as the file has it."""
     if not isinstance(task, ShownTask):
         return {}

@@ -13,7 +13,7 @@ from phyblock.digests import hex_digest
 from phyblock.models.base import Image, Request
 from phyblock.tracks.examples import Shots
 from phyblock.tracks.prompts import Prompt, form_facts, response_format
-from phyblock.tracks.showing import Showing, TaskShowing, told_of
+from phyblock.tracks.showing import Showing, TaskShowing, showing_fields
 
 __all__ = ["AS_IN_FILE", "WholePlanTrack"]
 
@@ -68,7 +68,7 @@ class WholePlanTrack(ABC, Generic[RulesT, PicturesT]):
 
     def about(self, item: AssemblyTask) -> dict[str, Any]:
         """How the scene is shown, where not as the file has it."""
-        return told_of(item)
+        return showing_fields(item)
 
     def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
         """What templates may use; nothing in it gives an answer away."""

@@ -57,11 +57,11 @@ class Attack:
 
     `likes` gives each question a liking for each option, or None where it has no say; `aim` is
     what picking the most liked option may reach, `aim_inverted` what picking the least liked may:
-    None where nobody would. `told` says what it goes by.
+    None where nobody would. `rule` says what it goes by.
     """
 
     name: str
-    told: str
+    rule: str
     likes: Likes
     aim: float = _PICTURES
     aim_inverted: float | None = _PICTURES

@@ -37,7 +37,7 @@ def print_attacks(console: Console, attacked: Sequence[Attacked]) -> None:
     side = ("95 %", "aim")
     headings = ("attack", "", "kind", "aim is", "n", "chance", "most", *side, "least", *side)
     console.print(plain_table(headings, rows, numbers=8, tight=True))
-    names = {one.attack.name: one.attack.told for one in attacked}
+    names = {one.attack.name: one.attack.rule for one in attacked}
     legend = "; ".join(f"{name}: {what}" for name, what in names.items())
     console.print(
         "Accuracy [%] of picking the option that an attack likes most, and the one that it likes "

@@ -14,9 +14,9 @@ from scipy import stats
 from phyblock.scoring.item_analysis import (
     discrimination,
     explained,
+    least_correlation,
     pairs_kept,
     pairs_kept_by_choice,
-    told_from_none,
 )
 from phyblock.scoring.ratios import Floats, ratio_of
 
@@ -61,7 +61,7 @@ def test_groups_explain_what_an_analysis_of_variance_says(rows: list[tuple[int, 
 
 @pytest.mark.parametrize("models", [4, 8, 26])
 def test_a_correlation_at_the_bound_has_a_p_of_5_percent(models: int) -> None:
-    r = told_from_none(models)
+    r = least_correlation(models)
     t = r * math.sqrt((models - 2) / (1 - r * r))
     assert 2 * stats.t.sf(t, models - 2) == pytest.approx(0.05)
 

@@ -25,8 +25,8 @@ from phyblock.tracks.showing import (
     TaskShowing,
     file_plan,
     in_order,
+    showing_fields,
     shown_order,
-    told_of,
 )
 from phyblock.tracks.step_planning.rules import StepRules
 from phyblock.tracks.step_planning.track import StepPlanning
@@ -58,7 +58,7 @@ def test_an_order_has_every_candidate_once_and_is_that_of_scene_and_seed(
         assert sorted(order) == list(range(1, len(task.candidates) + 1))
         shown = SHUFFLED.of(task, seed)
         assert [shown.candidates[n] for n in range(1, 17)] == [task.candidates[n] for n in order]
-        assert told_of(shown) == {"shown": {"order": list(order), "goal": task.key}}
+        assert showing_fields(shown) == {"shown": {"order": list(order), "goal": task.key}}
     assert len(set(orders)) == len(orders)
 
 
@@ -109,7 +109,7 @@ def test_an_episode_goes_the_same_in_either_numbering(
 def test_plain_showing_changes_nothing(tasks: tuple[AssemblyTask, ...]) -> None:
     plain = TaskShowing(Showing(seeds=(0, 1)))
     assert all(plain.of(task, 5) is task for task in tasks)
-    assert told_of(tasks[0]) == {}
+    assert showing_fields(tasks[0]) == {}
     assert file_plan(tasks[0], [1, 2]) is None
     assert plain.each(tasks) == list(tasks)
     assert len(TaskShowing(Showing("shuffled", seeds=(0, 1))).each(tasks)) == 10

@@ -108,7 +108,7 @@ def test_memory_bounds_what_is_shown_and_always_ends_with_the_state_as_it_is(
 @pytest.mark.parametrize("feedback", get_args(Feedback))
 def test_feedback_tells_no_more_than_it_may(feedback: Feedback) -> None:
     outcomes = [*MOVE_OUTCOMES, "no_move", "several_moves", "move_and_done", "empty"]
-    told = {outcome: past(outcome)[0].told(feedback) for outcome in outcomes}
+    told = {outcome: past(outcome)[0].report(feedback) for outcome in outcomes}
     if feedback == "none":
         assert set(told.values()) == {""}
         return

@@ -53,8 +53,8 @@ class PastStep:
     reply: str
     seen: Image | None
 
-    def told(self, feedback: Feedback) -> str:
-        """What the model hears of it."""
+    def report(self, feedback: Feedback) -> str:
+        """What the model is told about it."""
         if feedback == "none":
             return ""
         if self.outcome == "placed":
@@ -121,7 +121,7 @@ class StepPrompt:
         seen = [step.seen or current for step in shown] + [current]
         messages = list(self._first(fixed, seen[0], facts, (), hidden, hidden + 1))
         for number, (step, picture) in enumerate(zip(shown, seen[1:], strict=True), hidden + 2):
-            facts_of_turn = {"told": step.told(self.feedback), "step": number, "history": []}
+            facts_of_turn = {"told": step.report(self.feedback), "step": number, "history": []}
             text = self.template.text(
                 "turn", {**facts, **facts_of_turn, "pictures": [picture.label]}
             )
@@ -141,10 +141,10 @@ class StepPrompt:
         """The message with the goal and the candidates, and a system message if there is one."""
         pictures = (*fixed, current)
         history = [
-            {"step": number, "operation": one.operation, "told": one.told(self.feedback)}
+            {"step": number, "operation": one.operation, "told": one.report(self.feedback)}
             for number, one in enumerate(past[hidden:], hidden + 1)
         ]
-        last = past[-1].told(self.feedback) if past else ""
+        last = past[-1].report(self.feedback) if past else ""
         labels = [picture.label for picture in pictures]
         more = {"pictures": labels, "step": step, "history": history, "told": last}
         return self.template.messages(pictures, {**facts, **more})

@@ -28,7 +28,7 @@ from phyblock.tracks.base import ENGINE
 from phyblock.tracks.goal_blind.guessing import BlindGuesses
 from phyblock.tracks.pictures import Pictures
 from phyblock.tracks.prompts import response_format
-from phyblock.tracks.showing import Showing, TaskShowing, told_of
+from phyblock.tracks.showing import Showing, TaskShowing, showing_fields
 from phyblock.tracks.step_planning.baselines import StepSubject
 from phyblock.tracks.step_planning.episode import Desk, StepEpisode
 from phyblock.tracks.step_planning.prompt import PastStep, StepPrompt
@@ -89,7 +89,7 @@ class StepPlanning:
         """
         engine = {} if self.rules.physics == "off" else {"engine": told_engine()}
         most = self.rules.limits.max_steps(len(item.scene))
-        return {"max_steps": most, **engine, **told_of(item)}
+        return {"max_steps": most, **engine, **showing_fields(item)}
 
     def identity(self) -> dict[str, Any]:
         """Name and version of the prompt, a digest of all that decides the pictures, and the
