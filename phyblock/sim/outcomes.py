@@ -32,7 +32,6 @@ __all__ = [
     "after",
     "after_removal",
     "holds",
-    "moved_orders",
 ]
 
 LEAN_DEG = 2.0
@@ -124,7 +123,7 @@ def after(
         poses = _settle(blocks, setting, push)
         if poses is None:
             return _UNCLEAR
-        moved = moved_orders(blocks, poses, limits)
+        moved = _moved_orders(blocks, poses, limits)
         if moved is None or moved != (moved if agreed is None else agreed):
             return _UNCLEAR
         agreed, first = moved, first or poses
@@ -155,7 +154,7 @@ def holds(blocks: Sequence[Block], about: int) -> bool | None:
     return verdicts.pop()
 
 
-def moved_orders(
+def _moved_orders(
     blocks: Sequence[Block], poses: dict[int, Pose], limits: Limits = DEFAULT_LIMITS
 ) -> tuple[int, ...] | None:
     """Orders of the blocks that `poses` has elsewhere; None where one lies between the limits."""
@@ -184,10 +183,10 @@ def _holds(blocks: Sequence[Block], setting: Physics, limits: Limits) -> bool | 
     with World(setting) as world:
         world.place_all(blocks)
         for is_at_rest in moments(world, _LONGEST_S):
-            if moved_orders(blocks, world.poses(), loose):
+            if _moved_orders(blocks, world.poses(), loose):
                 return False
             if is_at_rest:
-                return True if moved_orders(blocks, world.poses(), limits) == () else None
+                return True if _moved_orders(blocks, world.poses(), limits) == () else None
     return None
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from phyblock.domain import Block, BlockType, Candidate, CandidateSet, Euler, PoseStep
 from phyblock.sim.geometry import corners_m
 
-__all__ = ["box_height_cm", "box_middle_m", "center_cm", "origin_m", "put", "upright"]
+__all__ = ["box_height_cm", "center_cm", "origin_m", "put", "upright"]
 
 _CM = 100.0
 UPRIGHT: Euler = (0.0, 0.0, 0.0)
@@ -18,7 +18,7 @@ UPRIGHT: Euler = (0.0, 0.0, 0.0)
 
 def center_cm(block: Block) -> tuple[float, float, float]:
     """The middle of the box round a block where it is [cm]."""
-    x, y, z = (np.array(block.position_m) + box_middle_m(block.type, block.euler_deg)) * _CM
+    x, y, z = (np.array(block.position_m) + _box_middle_m(block.type, block.euler_deg)) * _CM
     return float(x), float(y), float(z)
 
 
@@ -32,7 +32,7 @@ def origin_m(
     block_type: BlockType, euler_deg: Euler, center_cm: tuple[float, float, float]
 ) -> tuple[float, float, float]:
     """Where the body frame of a block is [m] whose box has its middle at a place [cm]."""
-    x, y, z = np.array(center_cm) / _CM - box_middle_m(block_type, euler_deg)
+    x, y, z = np.array(center_cm) / _CM - _box_middle_m(block_type, euler_deg)
     return float(x), float(y), float(z)
 
 
@@ -60,7 +60,7 @@ def upright(candidates: CandidateSet) -> tuple[CandidateSet, tuple[int, ...]]:
 
 
 @functools.lru_cache(maxsize=4096)
-def box_middle_m(block_type: BlockType, euler_deg: Euler) -> NDArray[np.float64]:
+def _box_middle_m(block_type: BlockType, euler_deg: Euler) -> NDArray[np.float64]:
     """The middle of the box round a block whose body frame is at the origin, shape (3,) [m]."""
     corners = corners_m(block_type, (0.0, 0.0, 0.0), euler_deg)
     middle: NDArray[np.float64] = (corners.min(axis=0) + corners.max(axis=0)) / 2

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from phyblock.errors import Problem
 
-__all__ = ["check_path", "expand", "is_utf8", "sort_problems"]
+__all__ = ["expand", "is_utf8", "sort_problems"]
 
 _VARIABLE = re.compile(r"\$(?:(\w+)|\{(\w+)\})")
 _LONGEST_PATH, _LONGEST_NAME = 4095, 255
@@ -36,13 +36,13 @@ def expand(text: str, base: Path) -> Path:
     except RuntimeError as error:
         raise ValueError("the home folder that ~ stands for is not known") from error
     # What was written must be UTF-8; the folder that it is seen from is named as it is.
-    check_path(str(path))
+    _check_path(str(path))
     whole = os.path.normpath(base.absolute() / path)
     _check_length(os.fsencode(whole))
     return Path(whole)
 
 
-def check_path(text: str) -> None:
+def _check_path(text: str) -> None:
     """Raise ValueError, with a message for the user, for what cannot be a path of UTF-8 names."""
     if not is_utf8(text):
         raise ValueError("holds a name that is not UTF-8")

@@ -52,7 +52,6 @@ __all__ = [
     "PROMPT_WORDS",
     "RECORDED",
     "SuiteSpec",
-    "default_tables",
     "suite_model",
 ]
 
@@ -82,7 +81,7 @@ def _one_of(name: str, names: Sequence[str]) -> str:
     raise refuse("is not one of the choices", allowed=", ".join(names), words=tuple(names))
 
 
-def default_tables() -> tuple[str, ...]:
+def _default_tables() -> tuple[str, ...]:
     """Tables of a suite that names none."""
     return tuple(name for name in table_names() if name != PUBLISHED_TABLE)
 
@@ -184,7 +183,7 @@ class SuiteSpec(Section):
         description="Ways of asking that are crossed, to tell how much each of them moves a model.",
     )
     tables: Unique[TableName] = Field(
-        default_factory=default_tables,
+        default_factory=_default_tables,
         description="Tables to write, as far as they belong to a track of the suite; published "
         "compares with the paper's numbers.",
     )

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Mapping
 from itertools import islice
 
-__all__ = ["SECRET_KEYS", "close_match", "did_you_mean", "looks_secret", "show"]
+__all__ = ["SECRET_KEYS", "did_you_mean", "looks_secret", "show"]
 
 _LONGEST = 80
 """Characters of a value that are shown, and so the most of its items that can matter."""
@@ -54,17 +54,11 @@ def show(value: object) -> str:
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
-def close_match(word: str, known: Iterable[str]) -> str | None:
-    """The known word that is most like `word`, case aside; None where none is close."""
-    folded = {name.casefold(): name for name in known}
-    matches = difflib.get_close_matches(word.casefold(), folded, n=1, cutoff=0.6)
-    return folded[matches[0]] if matches else None
-
-
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """A hint, or the empty text."""
-    match = close_match(word, known)
-    return f"did you mean {match}?" if match else ""
+    """A hint at the known word that is most like `word`, case aside; "" where none is close."""
+    folded = {name.casefold(): name for name in known}
+    matches = difflib.get_close_matches(word.casefold(), folded, n=1)
+    return f"did you mean {folded[matches[0]]}?" if matches else ""
 
 
 def _quote(text: str) -> str:

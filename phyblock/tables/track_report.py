@@ -36,7 +36,6 @@ __all__ = [
     "SceneFigure",
     "TableMaker",
     "TrackReport",
-    "in_whole",
 ]
 
 
@@ -166,7 +165,7 @@ WHOLE = Cell("overall", "Overall")
 """The one cell of a track that has no parts."""
 
 
-def in_whole(rows: pd.DataFrame, _: Run) -> pd.DataFrame:
+def _in_whole(rows: pd.DataFrame, _: Run) -> pd.DataFrame:
     """All samples in one cell."""
     return rows.assign(**{CELL: WHOLE.name})
 
@@ -199,7 +198,7 @@ class TrackReport:
 
     measures: tuple[Measure, ...]
     cells: Callable[[Run], tuple[Cell, ...]] = lambda _: (WHOLE,)
-    in_cells: Callable[[pd.DataFrame, Run], pd.DataFrame] = in_whole
+    in_cells: Callable[[pd.DataFrame, Run], pd.DataFrame] = _in_whole
     headline: Callable[[Run], tuple[HeadlineColumn, ...]] | None = None
     main: str = ""
     short: str = ""
