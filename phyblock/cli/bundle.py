@@ -28,10 +28,10 @@ _MB = 1e6
 def command(run: Path, out: Path | None, data: tuple[Path, ...]) -> None:
     """Write the folder RUN as one file: manifest, records, digests.
 
-    It holds no keys, no pictures and no prompts; of paths of this machine it holds the last part,
-    and of servers no address, but for what models wrote and were sent beside the prompt. Its
-    replies are scored again first, where the data are at hand: a run whose scores do not come out
-    again is refused.
+    Leaves out keys, pictures, prompts, addresses of servers, and all but the last part of paths of
+    this machine. Keeps what models wrote, and what they were sent beside the prompt. Scores the
+    replies again first, where the data are at hand, and refuses a run whose scores do not come out
+    the same.
     """
     console = make_console()
     made = bundle_run(run, out, data)

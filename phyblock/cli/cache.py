@@ -27,7 +27,7 @@ def command() -> None:
 
 @command.command("stats")
 def stats() -> None:
-    """Show how many replies are kept of each model, and how large the file is."""
+    """Show how many replies the cache holds of each model, and how large its file is."""
     console = make_console()
     with ReplyCache(reply_cache_file()) as cache:
         held = cache.stats()
@@ -42,7 +42,7 @@ def stats() -> None:
 
 
 @command.command("clear")
-@click.option("--model", metavar="ID", help="Delete the replies of this model id alone.")
+@click.option("--model", metavar="ID", help="Delete only the replies of this model id.")
 @click.option(
     "--learned",
     is_flag=True,

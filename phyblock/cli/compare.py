@@ -33,9 +33,9 @@ def command(
 ) -> None:
     """Compare the models of the folder RUN with one another, or those of RUN with OTHER's.
 
-    Pairs of samples of the same scene or question and seed, tested by a t test that knows which
-    scenes share base scenes; p values with Holm's correction, and the difference that each test
-    could have found.
+    Pairs samples of the same scene or question and seed, and tests them by a t test that knows
+    which scenes share base scenes. Shows p values with Holm's correction, and the difference that
+    each test could have found.
     """
     names = split_names(models)
     first = load_run(run, texts=False)

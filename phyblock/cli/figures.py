@@ -77,9 +77,9 @@ def command(
     """Draw figures of the folder RUN for a paper: PDF and SVG whose text is text, PNG for slides,
     and captions as plain text and as LaTeX floats.
 
-    All figures of numbers, unless some are named; those of scenes (inference, subtask-cards,
-    perturbations) are drawn where they are. Figures that the run has no numbers for are left out,
-    and one that cannot be read so narrow is drawn as wide as it needs.
+    Draws all figures of numbers, unless you name some with --only. Name figures of scenes
+    (inference, subtask-cards, perturbations) to draw them. Leaves out figures that the run has no
+    numbers for. Draws a figure that cannot be read at the chosen width as wide as it needs.
     """
     loaded = of_models(load_run(run, texts=False), split_names(models))
     known = figure_names(loaded)

@@ -36,7 +36,7 @@ _FILES = (
 def command(folder: Path, suite: str) -> None:
     """Lay out FOLDER with a suite, a models file and prompts to change.
 
-    Files that are already there are never written over.
+    Never writes over files that are already there.
     """
     file_name = f"{suite}.yaml"
     templates = [kind_of(name).template for name in suite_tracks(find_suite(suite))]

@@ -17,7 +17,7 @@ from phyblock.plain_text import counted, plain_lines
 __all__ = ["main", "show_problems"]
 
 _VERBS = {
-    "run": "Run a suite, or go on where it stopped.",
+    "run": "Run a suite, or continue where it stopped.",
     "play": "Answer a suite yourself, in a browser, as models do.",
     "score": "Read and score stored replies again; calls no model.",
     "report": "Write a run's tables again from its records.",

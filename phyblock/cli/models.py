@@ -53,7 +53,7 @@ _WIDE = 130
 @click.option(
     "--retiring",
     is_flag=True,
-    help=f"List those alone that their providers end within {_SOON_DAYS} days, or have ended.",
+    help=f"List only those that their providers end within {_SOON_DAYS} days, or have ended.",
 )
 @click.pass_context
 def command(ctx: click.Context, models_file: str | None, retiring: bool) -> None:

@@ -24,8 +24,8 @@ __all__ = ["command", "show_made", "show_tables"]
 def command(run: Path, data: Path | None) -> None:
     """Write tables and report.html of the folder RUN again, and print the tables.
 
-    Numbers come from run.yaml and records.jsonl alone: no model, no network. What the page draws
-    comes from the data set, as far as it is at hand.
+    Takes numbers from run.yaml and records.jsonl alone: no model, no network. Draws scenes from the
+    data set, where it is at hand.
     """
     show_tables(run, data)
 

@@ -61,7 +61,7 @@ _INTERRUPTED = 130
     "--informative",
     type=UserPath(),
     metavar="RUN",
-    help="With --limit: the scenes that tell the models of the folder RUN apart best.",
+    help="With --limit: choose the scenes that best tell apart the models of the folder RUN.",
 )
 @click.option(
     "--out",
@@ -71,8 +71,10 @@ _INTERRUPTED = 130
 @models_file_option
 @click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
 @click.option("--dry-run", is_flag=True, help="Print calls, tokens and dollars; call nothing.")
-@click.option("--retry-failed", is_flag=True, help="Ask again where a request was rejected.")
-@click.option("--no-report", is_flag=True, help="Write tables alone, no figures and no page.")
+@click.option(
+    "--retry-failed", is_flag=True, help="Ask again for samples whose request was rejected."
+)
+@click.option("--no-report", is_flag=True, help="Write only tables: no figures, no page.")
 @click.option("--yes", is_flag=True, help="Spend money without asking.")
 def command(
     suite: str,
@@ -90,8 +92,8 @@ def command(
 ) -> int:
     """Run SUITE: a YAML file, or the name of a bundled suite.
 
-    Records are kept as they come; the same command again goes on where it stopped and asks
-    nothing twice.
+    Keeps every record as it comes. Give the same command again to continue where it stopped;
+    nothing is asked twice.
     """
     console = make_console()
     path = find_suite(suite)

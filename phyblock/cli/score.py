@@ -24,10 +24,10 @@ __all__ = ["command"]
 def command(
     run: Path, parser: str | None, matcher: str | None, out: Path | None, data: Path | None
 ) -> None:
-    """Read and score the stored plans of the folder RUN again, and count again what measures
-    count; no model is called.
+    """Read and score the stored replies of the folder RUN again, and count every measure again.
+    Calls no model.
 
-    The new scores go to RUN/scores/PARSER-MATCHER (or --out); RUN itself stays as it is.
+    Writes the new scores to RUN/scores/PARSER-MATCHER (or --out), and leaves RUN as it is.
     """
     chosen = cast("PlanParser | None", parser), cast("Matcher | None", matcher)
     show_tables(rescore(run, *chosen, out, data), data)

@@ -31,9 +31,9 @@ __all__ = ["command"]
     help="How to print them.",
 )
 def command(run: Path, paper: bool, names: tuple[str, ...], form: str) -> None:
-    """Print all tables of the folder RUN that have rows; nothing is written.
+    """Print all tables of the folder RUN that have rows. Writes nothing.
 
-    With --paper, those of the paper's tables in which a model of the run has a row.
+    With --paper, print those of the paper's tables in which a model of the run has a row.
     """
     loaded = load_run(run, texts=False)
     if paper:

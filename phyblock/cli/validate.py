@@ -43,7 +43,7 @@ def command(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | N
     """Check FILES: suites (or names of bundled ones) and models files, data set folders, official
     checkouts.
 
-    All problems of all files are shown; exit code 2 when there are any.
+    Shows all problems of all files, and exits with 2 when there are any.
     """
     console = make_console()
     problems: list[Problem] = []

@@ -25,11 +25,11 @@ __all__ = ["command"]
     help="A folder of data that the run needs; may be given again.",
 )
 def command(file: Path, data: tuple[Path, ...]) -> None:
-    """Score the replies in the bundle FILE again, and say whether its records and tables come out
-    as the same bytes, and whether samples were left out. Exit code 2 where they do not come out.
+    """Score the replies in the bundle FILE again; say whether its records and tables come out as
+    the same bytes, and whether samples were left out. Exits with 2 where they do not come out.
 
-    Nothing is asked of anyone. Bundles hold no data: sets that come with phyblock are found, others
-    are named with --data.
+    Calls no model. A bundle holds no data: sets that come with phyblock are found; name others
+    with --data.
     """
     console = make_console()
     with opened_bundle(file, data) as verified:

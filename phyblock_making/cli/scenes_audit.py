@@ -66,10 +66,10 @@ def command(
 ) -> None:
     """Audit the data set PATH: a folder with scenes.jsonl, an official checkout, or a bundled set.
 
-    Nothing in PATH is changed. What cannot be read is a finding like all others. The findings go
-    to the CSV file, each of them; the tables show totals, disagreements and the worst scenes, then
-    what the candidate sets give away: by place, by the pose listed first, by how many poses are
-    offered, and to learners that never see the goal. The exit code is 0 whatever is found.
+    Changes nothing in PATH, and reports what it cannot read as a finding like all others. The
+    tables show totals, disagreements and the worst scenes, then what the candidate sets give away:
+    by place, by the pose listed first, by how many poses are offered, and to learners that never
+    see the goal. --csv writes every finding. Exits with 0, whatever it finds.
     """
     console = make_console()
     _check_places(table, fix, pictures)

@@ -32,12 +32,12 @@ __all__ = ["command"]
     help="Folder to write.  [default: NAME-set here]",
 )
 def command(data: Path, jobs: int, out: Path | None) -> None:
-    """Make a data set out of scenes that say type, color, position and euler of their blocks.
+    """Make a data set from scenes that give type, color, position and euler of their blocks.
 
     FILE_OR_FOLDER is YAML, JSON, or JSON with a scene a line, or a folder of such files.
-    Dependencies come from contacts, layers and levels from them; candidates are drawn unless they
-    are given. Scenes whose blocks overlap, float or fall are refused, and what was given is not
-    written over.
+    Derives dependencies from contacts, and layers and levels from those; draws candidates unless
+    they are given. Refuses scenes whose blocks overlap, float or fall. Never writes over what was
+    given.
     """
     given = read_given(data)
     folder = out or Path(f"{data.resolve().stem}-set")

@@ -80,7 +80,8 @@ def command(
 ) -> None:
     """Make N scenes with candidate sets, each checked by physics, and their data card.
 
-    The same N, seed, levels and palette give the same files, whatever runs the work.
+    The same N, seed, levels and palette give the same files, on any number of
+    processes or a cluster.
     """
     kind = cast(Palette, palette)
     order = Order(seed, kind, shares(count, levels))

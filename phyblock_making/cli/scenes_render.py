@@ -96,7 +96,7 @@ def command(
 ) -> None:
     """Draw the scenes SCENE... of the data set PATH, or all of them.
 
-    Files are named SCENE-VIEW-BACKGROUND-WHAT; those that this command wrote are written over.
+    Files are named SCENE-VIEW-BACKGROUND-WHAT; it writes over those that it wrote before.
     """
     read = read_data_set(data)
     tasks = find_scenes(read, scenes) if scenes else read.tasks

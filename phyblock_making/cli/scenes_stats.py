@@ -20,7 +20,7 @@ __all__ = ["command"]
 @click.command("stats")
 @click.argument("data", metavar="PATH", type=NAME_OR_PATH)
 def command(data: str) -> None:
-    """Statistics of the data set PATH, by level.
+    """Show statistics of the data set PATH, by level.
 
     Sizes, types, colors and layers as mean and most of a scene; blocks of every type and color;
     candidate sets.

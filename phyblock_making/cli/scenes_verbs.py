@@ -12,7 +12,7 @@ _VERBS = {
     "generate": "Make a data set from a seed.",
     "complete": "Make a data set from positions written by hand.",
     "verify": "Derive everything in a data set again and compare.",
-    "audit": "Hold any data set against geometry and physics.",
+    "audit": "Check any data set against geometry and physics.",
     "show": "Show the facts of one scene.",
     "render": "Draw scenes: views, backgrounds, exploded, filmstrips, animations.",
     "stats": "Count sizes, types, colors, layers and candidates by level.",

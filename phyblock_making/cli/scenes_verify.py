@@ -42,10 +42,10 @@ def command(data: str, jobs: int, ray_address: str | None, limit: int | None) ->
     """Check every scene of PATH against geometry and physics, down to the last number.
 
     PATH is a folder with scenes.jsonl or a bundled set, by default the built-in phyblock-400.
-    For data sets made elsewhere there is: phyblock scenes audit.
+    To check data sets made elsewhere, use: phyblock scenes audit.
 
-    Contacts, layers, overlaps, gaps, stability of the whole at two time steps and of every step,
-    candidates, duplicates, parents and checksums. Exit code 1 when anything fails.
+    Checks contacts, layers, overlaps, gaps, stability of the whole at two time steps and of every
+    step, candidates, duplicates, parents and checksums. Exits with 1 when anything fails.
     """
     where = find_data_set(data)
     if not (where / SCENES_FILE).is_file():

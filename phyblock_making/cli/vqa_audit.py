@@ -71,7 +71,7 @@ _ANSWERS = "answers.csv"
 )
 @size_option
 @click.option(
-    "--no-text-probe", is_flag=True, help="Leave out what needs scikit-learn: classifiers."
+    "--no-text-probe", is_flag=True, help="Leave out the classifiers, which need scikit-learn."
 )
 @click.option("--no-pictures", is_flag=True, help="Leave out the attacks that look at pictures.")
 @unseen_option
@@ -97,12 +97,12 @@ def command(
     """Audit the questions of PATH: what could be answered without looking, and what cannot be seen.
 
     PATH is a folder with questions.jsonl or a bundled set, by default the built-in phyblock-vqa.
-    By subtask: how often each letter is right; what the most frequent answer and a classifier of
-    the texts alone reach on questions they were not trained on; options that read alike and
-    repeated questions; the least visible block that is named; how questions cluster by scene.
-    Then what attacks reach that look at pictures and know nothing of blocks, or only that what
+    Shows by subtask: how often each letter is right; what the most frequent answer and a classifier
+    of the texts alone reach on questions they were not trained on; options that read alike and
+    repeated questions; the least visible block that is named; how questions cluster by scene. Then
+    shows what attacks reach that look at pictures and know nothing of blocks, or only that what
     rests on a block goes with it, beside the aims of the built-in sets; and which pictures are cut
-    open. The exit code is 0 whatever is found.
+    open. Exits with 0, whatever it finds.
     """
     for out in (sheet, table):
         if out is not None:

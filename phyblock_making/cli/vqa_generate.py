@@ -63,8 +63,8 @@ def command(
 ) -> None:
     """Make questions, each with an answer that is derived, and their data card.
 
-    The same scenes, subtasks, numbers and seed give the same files, whatever runs the work. With
-    --unseen the card says as well what is learned from the texts of that set.
+    The same scenes, subtasks, numbers and seed give the same files, on any number of processes or
+    a cluster. With --unseen, the card also says what is learned from the texts of that set.
     """
     check_place(out, replace)
     wanted = {subtask: per_subtask or PER_SUBTASK[subtask] for subtask in subtasks}

@@ -45,9 +45,9 @@ def command(
 ) -> None:
     """Ask questions of a set in the accepted wordings of FILE, as a set that a suite can name.
 
-    FILE is what phyblock vqa write wrote, after a person has read it. Each question that FILE has
-    a wording for is asked in one of them, under an id of its own; its answer is derived again, and
-    where that fails the question is left out and named.
+    FILE is what phyblock vqa write wrote, after a person has read it. Asks each question that FILE
+    has a wording for in one of them, under an id of its own. Derives its answer again; where that
+    fails, leaves the question out and names it.
     """
     check_place(out, replace)
     further = read_wordings(wordings)

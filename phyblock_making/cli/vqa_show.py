@@ -36,13 +36,13 @@ _GAP_PX = 8
 @data_option
 @click.option("--out", type=UserPath(), metavar="FILE", help="Draw the pictures to this PNG.")
 @size_option
-@click.option("--blind", is_flag=True, help="Keep answer and evidence to yourself.")
+@click.option("--blind", is_flag=True, help="Leave out answer and evidence.")
 def command(
     question: str, questions: str, data: str, out: Path | None, size: int, blind: bool
 ) -> None:
     """Show QUESTION, an id like sh-001: text, options, answer and evidence.
 
-    With --out its pictures are drawn side by side, in the order of the recipe.
+    With --out, draw its pictures side by side, in the order of the recipe.
     """
     shown = _find(read_question_set(questions, data), question)
     console = make_console()

@@ -27,7 +27,7 @@ def command(questions: str, data: str, jobs: int, ray_address: str | None) -> No
     """Derive every answer of PATH again, from scene, pictures and simulator.
 
     PATH is a folder with questions.jsonl or a bundled set, by default the built-in phyblock-vqa.
-    Exit code 1 when an answer differs, or a question is not fair.
+    Exits with 1 when an answer differs, or a question is not fair.
     """
     read = read_question_set(questions, data)
     asked = [task.question for task in read.tasks]

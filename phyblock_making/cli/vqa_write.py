@@ -76,10 +76,9 @@ def command(
 ) -> None:
     """Ask a model for further wordings of questions, and check what they mean.
 
-    A paraphrase is accepted when its slots are intact, when questions of the set asked in it have
-    their answers derived again, and when the model finds these answers for it. Everything that
-    was written goes to the file with the reason where it is not accepted; nothing is used before
-    a person has read it.
+    Accepts a paraphrase when its slots are intact, when the answers of questions asked in it can be
+    derived again, and when the model finds these answers. Writes every paraphrase to the file, with
+    the reason where it is not accepted. Nothing is used before a person has read it.
     """
     config = _config(name, models_file)
     check_free([out], "name another file")
