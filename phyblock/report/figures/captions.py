@@ -21,7 +21,8 @@ _ROUNDING_IN = 0.1
 def caption_files(run: Run, name: str, figure: Figure) -> dict[str, str]:
     """The caption of a figure by ending: `txt` alone, `tex` as a float that includes NAME.pdf.
 
-    What is wider than a column spans both, and is made narrower only where the text is.
+    What is wider than a column spans both. It is made smaller where the text is narrower, and where
+    it would leave the page no room for its caption.
     """
     heading = heading_of(figure)
     words = [*(word for track in run.design.suite.tracks for word in _showing(run, track))]
@@ -33,8 +34,9 @@ def caption_files(run: Run, name: str, figure: Figure) -> dict[str, str]:
         "% Needs \\usepackage{graphicx}.",
         rf"\begin{{figure{star}}}[t]",
         r"\centering",
+        r"\resizebox{!}{\ifdim\height>.85\textheight.85\textheight\else\height\fi}{%",
         r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
-        rf"\includegraphics{{{name}.pdf}}}}",
+        rf"\includegraphics{{{name}.pdf}}}}}}",
         rf"\caption{{{escape(text)}}}",
         rf"\label{{fig:phyblock-{name}}}",
         rf"\end{{figure{star}}}",

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 __all__ = ["block_kit"]
 
 _STYLE = PictureStyle(512, "white", 32.0, 24.0)
-_CELL_IN = 1.6
+_CELL_IN = 1.1
 _CM = 100.0
-_TOP, _FOOT = 0.06, 0.84
+_TOP, _FOOT = 0.06, 0.88
 """What of a square picture is shown."""
 _AWAY_M = 0.011
 _BESIDE_PT = 6.0

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["perturbation_strip"]
 
-_CELL_IN = 1.15
+_CELL_IN = 1.1
 _IMAGES, _ORDER = "images", "candidate_order"
 _Shown = tuple[str, AssemblyTask, PictureStyle]
 
