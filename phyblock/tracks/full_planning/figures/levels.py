@@ -39,8 +39,10 @@ _LEAST_PANEL_IN, _LEAST_PLOT_IN = 0.7, 1.0
 _RADAR_MODELS = 8
 _RADAR_IN, _LEAST_RADAR_IN = 2.75, 2.2
 _RINGS = (25, 50, 75, 100)
-_CORNER_PT = 7
+_CORNER_PT = 9
 """Between a corner and its name, for a marker that stands at the corner."""
+_NAMES_IN = 0.2
+"""Above and below a radar."""
 _SETTINGS = {
     "a": (COLORS[0], "o", "A: with orientation"),
     "b": (COLORS[1], "D", "B: without orientation"),
@@ -84,7 +86,7 @@ def f1_radar(run: Run) -> Figure | None:
         }
     abreast = len(shown) if drawn_width_in() / len(shown) >= _LEAST_RADAR_IN else 1
     rows, side = len(shown) // abreast, min(_RADAR_IN, drawn_width_in() / abreast)
-    figure = new_figure(0.5 + rows * side)
+    figure = new_figure(0.5 + rows * (side + _NAMES_IN))
     axes = figure.subplots(rows, abreast, subplot_kw={"projection": "polar"}, squeeze=False)
     for ax, (title, drawn) in zip(axes.ravel(), shown.items(), strict=True):
         handles = _radar(ax, drawn, levels)

@@ -16,7 +16,6 @@ from phyblock.tables.drawing import (
     MUTED,
     PALE,
     bare_axes,
-    drawn_width_in,
     headed,
     new_figure,
     text_width_in,
@@ -37,6 +36,10 @@ _LINE_POINTS = 8.5
 _LABEL_PT = 6.5
 _BESIDE_IN = 0.6
 """What the axis of F1 takes beside the plot."""
+_FREE_IN = 0.15
+"""Between a point and its name, and behind the name."""
+_MOST_OF_WIDTH = 0.7
+"""Of the plot, for a name: points need the rest."""
 _DECADE_IN = 1.4
 """There is room for three numbers in a decade from here on."""
 _STATED_SIZE = re.compile(r"(?<![A-Za-z0-9.])(\d+(?:\.\d+)?)[bB](?![A-Za-z0-9])")
@@ -82,17 +85,18 @@ def _scatter(
     if table.empty:
         return None
     table = table.assign(x=table["model"].map(known)).sort_values(["f1", "model"])
-    figure = new_figure(3.6)
+    names_in = max(text_width_in(name, _LABEL_PT) for name in table["model"])
+    figure = new_figure(3.6, _BESIDE_IN + (names_in + _FREE_IN) / _MOST_OF_WIDTH)
     ax = figure.subplots()
     ends = table[["lo", "hi"]].to_numpy(float)
     ax.vlines(table["x"], ends[:, 0], ends[:, 1], color=PALE, linewidth=2.2)
     ax.plot(table["x"], table["f1"], "o", color=ACCENT, markersize=5)
     ax.set_xscale("log")
     start = float(table["x"].min()) / 1.7
-    end = _end(table, start)
+    end = _end(table, start, figure.get_figwidth())
     ax.set(xlim=(start, end), xlabel=axis[1], ylabel="F1 overall (%)")
     ax.set_ylim(0, min(104.0, 8 + float(table["hi"].fillna(table["f1"]).max())))
-    is_wide = drawn_width_in() / math.log10(end / start) > _DECADE_IN
+    is_wide = figure.get_figwidth() / math.log10(end / start) > _DECADE_IN
     ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if is_wide else (1,)))
     ax.xaxis.set_minor_locator(NullLocator())
     ax.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
@@ -105,12 +109,12 @@ def _scatter(
     return figure
 
 
-def _end(table: pd.DataFrame, start: float) -> float:
+def _end(table: pd.DataFrame, start: float, width_in: float) -> float:
     """Where a scale from `start` ends, so that every name fits beside its point."""
-    width = drawn_width_in() - _BESIDE_IN
+    width = width_in - _BESIDE_IN
     ends = [math.log(float(table["x"].max()) * 1.3 / start)]
     for name, x in zip(table["model"], table["x"], strict=True):
-        free = 1 - min((text_width_in(name, _LABEL_PT) + 0.15) / width, 0.7)
+        free = 1 - min((text_width_in(name, _LABEL_PT) + _FREE_IN) / width, _MOST_OF_WIDTH)
         ends.append(math.log(x / start) / free)
     return start * math.exp(max(ends))
 
