@@ -3,7 +3,7 @@
 
 const Chart = (() => {
   const [WIDTH, HEIGHT] = [860, 420];
-  const [LEFT, RIGHT, TOP, BOTTOM] = [52, 150, 16, 46];
+  const [LEFT, RIGHT, TOP, BOTTOM] = [52, 150, 34, 46];
   /** Sizes of a name: the width of a letter at the most, the height of a line. */
   const [LETTER, LINE] = [7.2, 14];
   /** How far below its point a name may stand, the nearest first. */
@@ -70,7 +70,7 @@ const Chart = (() => {
     }
     drawing.append(
       svg("text", { x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 8, class: "title middle" }, title),
-      svg("text", { x: LEFT, y: TOP - 4, class: "title" }, `${column.heading}${column.unit ? ` [${column.unit}]` : ""}`));
+      svg("text", { x: LEFT, y: TOP - 18, class: "title" }, `${column.heading}${column.unit ? ` [${column.unit}]` : ""}`));
     const points = rows.map((row) => {
       const [value, lo, hi] = row.values[column.id];
       const [cx, cy] = [x(fact(row, track, name)), y(value)];
