@@ -7,8 +7,10 @@ has not is left as that version does it.
 from __future__ import annotations
 
 import contextlib
+import importlib
 from collections.abc import Mapping
 from types import ModuleType
+from typing import Any
 
 __all__ = ["leave_out", "unlogged"]
 
@@ -19,15 +21,16 @@ def leave_out(litellm: ModuleType) -> None:
     """
     if hasattr(litellm, "response_cost_calculator"):
         litellm.response_cost_calculator = _no_cost  # type: ignore[attr-defined]
-    with contextlib.suppress(ImportError):
-        from openai._utils import is_given
-        from openai.resources.chat.completions import completions
+    with contextlib.suppress(ImportError, AttributeError):
+        # The client is litellm's, and no package of ours.
+        is_given = importlib.import_module("openai._utils").is_given
+        chats: Any = importlib.import_module("openai.resources.chat.completions.completions")
 
         async def as_it_is(data: Mapping[str, object], _: object) -> dict[str, object]:
             return {name: value for name, value in data.items() if is_given(value)}
 
-        if hasattr(completions, "async_maybe_transform"):
-            completions.async_maybe_transform = as_it_is
+        if hasattr(chats, "async_maybe_transform"):
+            chats.async_maybe_transform = as_it_is
 
 
 def unlogged() -> None:

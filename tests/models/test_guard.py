@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import importlib
 import json
 from dataclasses import replace
 
@@ -182,10 +183,9 @@ def test_what_is_left_out_of_calls_is_still_there_to_be_left_out(
     """Holds what `litellm_extras` relies on; a new litellm that differs fails here."""
     monkeypatch.setenv(KEY_VARIABLE, KEY)
     litellm = _litellm()
-    from openai.resources.chat.completions import completions
-
+    chats = importlib.import_module("openai.resources.chat.completions.completions")
     assert litellm.response_cost_calculator(response_object=None) is None
-    assert completions.async_maybe_transform.__module__ == leave_out.__module__
+    assert chats.async_maybe_transform.__module__ == leave_out.__module__
     heard: list[object] = []
     litellm._async_success_callback.append(lambda *_: heard.append("success"))
     try:
