@@ -16,6 +16,8 @@ from tests.fork_server import ONE_THREAD, Done, Forked, fork_server
 
 Raw = dict[str, Any]
 
+SHARED = ("pictures", "goal-blind")
+"""Folders of the cache."""
 COMMAND = (sys.executable, "-m", "phyblock")
 _CUBE_M = 0.05
 _COLORS = ("red", "yellow", "blue", "green", "orange")
@@ -67,19 +69,27 @@ SCENES: tuple[Raw, ...] = (
 )
 
 
+def shared_folders(pictures: Path) -> list[Path]:
+    """Where workspaces that share rendered pictures have each of `SHARED`."""
+    return [pictures, *map(pictures.with_name, SHARED[1:])]
+
+
 class Workspace:
     """A folder with `data/`, `suite.yaml` and `models.yaml`, and a reply cache of its own.
 
-    Pictures are shared between workspaces, because each takes a while to draw.
+    Pictures are shared between workspaces, because each takes a while to draw, and so is what
+    floors reach.
     """
 
     def __init__(self, root: Path, pictures: Path) -> None:
         self.root = root
         self.cache = root / "cache"
-        pictures.mkdir(parents=True, exist_ok=True)
+        for folder in shared_folders(pictures):
+            folder.mkdir(parents=True, exist_ok=True)
         if not self.cache.exists():
             self.cache.mkdir()
-            (self.cache / "pictures").symlink_to(pictures, target_is_directory=True)
+            for name, folder in zip(SHARED, shared_folders(pictures), strict=True):
+                (self.cache / name).symlink_to(folder, target_is_directory=True)
         self.out = root / "out"
         self.env = {
             "PATH": os.environ["PATH"],

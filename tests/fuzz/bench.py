@@ -12,7 +12,7 @@ from pathlib import Path
 
 from tests.fuzz.laws import Broken, Tree, broken_laws, take_tree
 from tests.fuzz.worker import Ended, Worker
-from tests.workspace import Raw
+from tests.workspace import Raw, shared_folders
 
 __all__ = ["Bench", "Case", "Fifo", "Link"]
 
@@ -96,7 +96,7 @@ class Bench:
         return self._judge(case, folder, ended, before) + _lost(lines, _whole_lines(folder))
 
     def _judge(self, case: Case, folder: Path, ended: Ended, before: Tree) -> list[Broken]:
-        places = (*case.may_write, "cache", str(self._pictures))
+        places = (*case.may_write, "cache", *map(str, shared_folders(self._pictures)))
         after = take_tree(folder)
         return broken_laws(ended, folder, before, after, places, case.lasting)
 

@@ -17,7 +17,7 @@ from tests.fuzz.worker import Ended, Worker
 from tests.servers.chassis import Faults, Running
 from tests.servers.faults import WIRE_FAULTS
 from tests.vqa_set import questions, vqa_suite, write_questions
-from tests.workspace import SCENES, Workspace
+from tests.workspace import SCENES, SHARED, Workspace
 
 pytestmark = pytest.mark.fuzz
 
@@ -96,8 +96,8 @@ class Runner:
             ]
             ended = self._worker.phyblock(command, workspace.root, workspace.env, _LONGEST_S)
         after = take_tree(workspace.root)
-        pictures = str((workspace.cache / "pictures").resolve())
-        places = (workspace.out.name, "cache", pictures)
+        shared = [str((workspace.cache / name).resolve()) for name in SHARED]
+        places = (workspace.out.name, "cache", *shared)
         broken = broken_laws(ended, workspace.root, self._before, after, places, ())
         assert not broken, told(broken)
         self._before = after
