@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["HATCHES", "Part", "stack"]
 
-HATCHES = ("", "", "//", "..", "\\\\", "xx", "--", "++")
+HATCHES = ("", "", "//", "..", "\\\\", "xx", "----", "++")
 """Hatches of parts by their place: they tell colors apart that look alike to some, or in print."""
 
 
