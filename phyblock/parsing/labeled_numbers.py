@@ -45,7 +45,8 @@ def labeled_numbers(line: str) -> LabeledNumbers | None:
     the plan.
     """
     labeled = LABELED.match(line)
-    last = None if labeled else LABELED.match(SENTENCES.split(line)[-1].strip())
+    sentences = [] if labeled else SENTENCES.split(line)
+    last = LABELED.match(sentences[-1].strip()) if len(sentences) > 1 else None
     if last and FINAL_LABEL.search(last["label"]) and len(chain(last["value"].rstrip(" ."))[0]) > 1:
         labeled = last
     if labeled and (
