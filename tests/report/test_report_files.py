@@ -236,7 +236,10 @@ def test_a_cut_line_is_said_in_the_coverage(tmp_path: Path) -> None:
     assert "The last line of records.jsonl was cut off and is ignored." in view.notes
 
 
-@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
+LATEX = next(filter(shutil.which, ("pdflatex", "lualatex")), None)
+
+
+@pytest.mark.skipif(LATEX is None, reason="neither pdflatex nor lualatex is installed")
 def test_latex_compiles_inside_any_document(tmp_path: Path) -> None:
     models = [r"all & % $ # _ { } ~ ^ \ < > | \" ` ' -- [x] *", "[first]", "*star", "Ünïcode"]
     folder = write_run(
@@ -260,7 +263,7 @@ def test_latex_compiles_inside_any_document(tmp_path: Path) -> None:
             rf"{inputs}\end{{document}}"
         )
         (folder / "paper.tex").write_text(document)
-        command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
+        command = [str(LATEX), "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace")
         assert done.returncode == 0, done.stdout
         assert "Overfull" not in done.stdout
