@@ -48,6 +48,7 @@ from benchmarks.evidence.pose_plans import (
 )
 from phyblock.datasets import AssemblyTask
 from phyblock.datasets.named import read_data_set
+from phyblock.sim.carry import CarriedStep
 from phyblock.sim.registry import installed_engines
 
 NOISE = ("oracle", "oracle-noise-1mm", "oracle-noise-3mm", "oracle-noise-1cm")
@@ -144,8 +145,18 @@ def noise_lines(found: Mapping[str, Sequence[Verdict]]) -> Iterator[str]:
         yield f"  {what}: {', '.join(f'{value:.1f}' for value in values)}; {falls}"
 
 
-def agreement(plans: Sequence[Plan], processes: int, is_list: bool) -> None:
-    """Print how far the installed engines agree, and the plans in which they do not."""
+def alike_line(steps: Sequence[tuple[CarriedStep, CarriedStep]]) -> str:
+    """How many steps end alike in two engines."""
+    same = sum(one.end == other.end for one, other in steps)
+    neither = sum((one.end == "stands") == (other.end == "stands") for one, other in steps)
+    shares = [100 * count / len(steps) for count in (same, neither)]
+    return f"{shares[0]:.2f} % of steps end alike, {shares[1]:.2f} % stand in both or in neither"
+
+
+def agreement(
+    plans: Sequence[Plan], processes: int, is_list: bool
+) -> list[tuple[CarriedStep, CarriedStep]]:
+    """Print how far two engines agree, and the plans in which they do not; how each step ends."""
     engines = installed_engines()[:2]
     if len(engines) < 2:
         raise SystemExit(f"two engines must be installed, here is {engines[0]}")
@@ -154,9 +165,8 @@ def agreement(plans: Sequence[Plan], processes: int, is_list: bool) -> None:
         found = list(pool.map(ends_by_engine, plans, chunksize=4))
     pairs = [list(zip(*ends[:2], strict=True)) for ends in found]
     steps = [pair for plan in pairs for pair in plan]
-    same = sum(one.end == other.end for one, other in steps)
     print(f"{len(plans):,} plans, {len(steps):,} steps in {time.perf_counter() - begun:.0f} s")
-    print(f"  {' and '.join(engines)} end {100 * same / len(steps):.2f} % of steps alike")
+    print(f"  {' and '.join(engines)}: {alike_line(steps)}")
     for engine, ends in zip(engines, zip(*steps, strict=True), strict=True):
         print(
             f"  stand in {engine}: {100 * sum(s.end == 'stands' for s in ends) / len(ends):.2f} %"
@@ -168,6 +178,7 @@ def agreement(plans: Sequence[Plan], processes: int, is_list: bool) -> None:
             told = f"step {apart[0] + 1} of {len(plan)}: {' and '.join(first)}"
             more = f"; {len(apart) - 1} more steps of it differ" if len(apart) > 1 else ""
             print(f"    {task.scene.id}, order {seed + 1}, {told}{more}")
+    return steps
 
 
 def main() -> None:
@@ -192,11 +203,12 @@ def main() -> None:
         return
     tasks = [task for one in sets for task in one.tasks[:: options.every]]
     found: dict[str, list[Verdict]] = {}
+    steps: list[tuple[CarriedStep, CarriedStep]] = []
     for name in options.baselines.split(","):
         plans = [(task, name, seed, options.rotation) for task in tasks for seed in seeds]
         print(f"{name}, {options.rotation}: ", end="", flush=True)
         if options.engines:
-            agreement(plans, options.processes, options.list)
+            steps += agreement(plans, options.processes, options.list)
             continue
         begun = time.perf_counter()
         with ProcessPoolExecutor(options.processes) as pool:
@@ -205,7 +217,10 @@ def main() -> None:
         for one in found[name]:
             if options.list and name == "oracle" and one.faults:
                 print(f"    {one.scene}: {one.faults}")
-    print("\n".join(noise_lines(found)))
+    for line in noise_lines(found):
+        print(line)
+    if steps:
+        print(f"all {len(steps):,} steps: {alike_line(steps)}")
 
 
 if __name__ == "__main__":
