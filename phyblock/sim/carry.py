@@ -38,7 +38,7 @@ from phyblock.words import StepEnd
 
 __all__ = ["LONGEST_S", "Carried", "CarriedStep", "CarryLimits", "Carrying", "carry_out"]
 
-_LONGEST_FALL_S = 5.0
+_COLLAPSE_S = 3.0
 LONGEST_S = 600.0
 """A plan that takes longer, by the clock, is given up: no result, whatever it did so far [s]."""
 _TRIES = 16
@@ -197,18 +197,26 @@ class Carrying:
         others = tuple(block for block in self.blocks if block not in near)
         self._world.place_all(near)
         try:
-            before = self._world.poses()
-            for is_quiet in moments(self._world, _LONGEST_FALL_S):
-                after = self._world.poses()
-                if reached := _reached(near, before, after, others):
-                    return after, reached
-                if is_quiet:
-                    break
-                before = after
-            return after, set()
+            reached = self._watched(near, others, DEFAULT_TRIAL.duration_s)
+            # What has not fallen by then stands: an engine may let it creep on for ever.
+            if not reached and movement(near, self._world.poses(), DEFAULT_TRIAL).fallen:
+                reached = self._watched(near, others, _COLLAPSE_S)
+            return self._world.poses(), reached
         finally:
             for block in near:
                 self._world.remove(block.order)
+
+    def _watched(self, near: Sequence[Block], others: Sequence[Block], limit_s: float) -> set[int]:
+        """Let blocks go until they rest or reach others, which are named."""
+        before = self._world.poses()
+        for is_quiet in moments(self._world, limit_s):
+            after = self._world.poses()
+            if reached := _reached(near, before, after, others):
+                return reached
+            if is_quiet:
+                break
+            before = after
+        return set()
 
     def _is_still(self, moved_cm: float, turned_deg: float) -> bool:
         return moved_cm <= self._limits.stand_cm and turned_deg <= self._limits.stand_deg

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -14,12 +16,17 @@ from phyblock.domain.blocks import SHAPES
 from phyblock.scoring.pose_end import blocks_reached
 from phyblock.scoring.solids import overlap_volume, placed
 from phyblock.sim.carry import CarryLimits, carry_out
-from phyblock.sim.engine import PhysicsEngine
+from phyblock.sim.engine import Physics, PhysicsEngine, Velocity
+from phyblock.sim.pose import Pose
 from phyblock.sim.registry import installed_engines, physics_engine
+from phyblock.sim.stability import DEFAULT_TRIAL
 from phyblock.sim.support import find_overlaps
 from phyblock.sim.voxels import VOXEL_M, filled_voxels, voxel_iou
 from phyblock.tracks.pose_planning.bodies import pieces_of
+from tests.sim.still_engine import StillEngine, StillSimulation
 from tests.sim.structures import block, counterweighted_beam, tower
+
+CREEP_M_S = 0.0015
 
 
 @pytest.fixture(params=installed_engines(), scope="module")
@@ -128,6 +135,29 @@ def test_what_falls_upon_others_that_stand_apart_moves_them(engine: PhysicsEngin
     assert [step.end for step in done.steps[:2]] == ["stands", "stands"]
     assert done.steps[2].end in ("falls", "knocks_over")
     assert not find_overlaps(done.blocks, 0.002)
+
+
+class CreepingSimulation(StillSimulation):
+    """Everything goes to one side for ever, slowly, and never rests."""
+
+    def step(self, n: int) -> None:
+        for number, pose in self._poses.items():
+            way_m = np.array([CREEP_M_S * n * Physics().time_step_s, 0.0, 0.0])
+            self._poses[number] = Pose(pose.position_m + way_m, pose.quat_xyzw)
+            self._velocities[number] = Velocity((0.01, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+class CreepingEngine(StillEngine):
+    @contextlib.contextmanager
+    def open(self, physics: Physics) -> Iterator[StillSimulation]:  # noqa: ARG002
+        yield CreepingSimulation()
+
+
+def test_what_an_engine_lets_creep_stands_where_it_was_put() -> None:
+    done = carry_out(tower(3), engine=CreepingEngine())
+    assert [step.end for step in done.steps] == ["stands"] * 3
+    assert done.steps[0].moved_cm == pytest.approx(100 * CREEP_M_S * DEFAULT_TRIAL.duration_s)
+    assert voxel_iou(tower(3), done.blocks) == 1
 
 
 @settings(max_examples=40)

@@ -50,8 +50,8 @@ __all__ = ["CARRY_VERSION", "Earlier", "PoseJudgement", "PoseRules", "judge_pose
 
 CARRY_VERSION = 2
 """Of how plans are carried out and what stands in the end is measured, up by one where some plan
-may end otherwise: before 2 everything in the world was let go together, and voxels were whole or
-empty.
+may end otherwise: before 2 everything in the world was let go together, for 5 s where it crept,
+and voxels were whole or empty.
 """
 _ONE_AT_A_TIME = threading.Lock()
 _KEPT = 32
