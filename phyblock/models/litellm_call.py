@@ -57,15 +57,15 @@ class LitellmTransport(GuardedTransport):
         litellm = _litellm()
         from phyblock.models.litellm_wire import CURRENT, Exchange
 
-        unlogged()
         arguments = self._arguments(call)
         exchange = Exchange(self._client, self._config)
         token = CURRENT.set(exchange)
         started = time.perf_counter()
         try:
-            response = await asyncio.wait_for(
-                litellm.acompletion(**arguments), self._config.timeout_s + _GRACE_S
-            )
+            with unlogged():
+                response = await asyncio.wait_for(
+                    litellm.acompletion(**arguments), self._config.timeout_s + _GRACE_S
+                )
             latency_s = time.perf_counter() - started
             return read_completion(_plain(response), latency_s, exchange.answered().status)
         except ModelError:
@@ -136,10 +136,10 @@ def _litellm() -> types.ModuleType:
         litellm.drop_params = False
         for name in ("LiteLLM", "LiteLLM Router", "LiteLLM Proxy"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
-        from phyblock.models.litellm_wire import install
+        from phyblock.models.litellm_wire import CURRENT, install
 
         install()
-        leave_out(litellm)
+        leave_out(litellm, lambda: CURRENT.get() is not None)
         # The import made clients of its own, which calls with its usual timeout would be given.
         litellm.in_memory_llm_clients_cache.flush_cache()
     module: types.ModuleType = litellm

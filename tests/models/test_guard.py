@@ -177,21 +177,84 @@ def test_a_limit_that_is_told_with_a_success_slows_down_as_any_other(code: objec
     assert (told.value.status, told.value.retry_after_s) == (429, 7)
 
 
-def test_what_is_left_out_of_calls_is_still_there_to_be_left_out(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_is_left_out_is_left_out_of_our_calls_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Holds what `litellm_extras` relies on; a new litellm that differs fails here."""
     monkeypatch.setenv(KEY_VARIABLE, KEY)
     litellm = _litellm()
-    chats = importlib.import_module("openai.resources.chat.completions.completions")
-    assert litellm.response_cost_calculator(response_object=None) is None
-    assert chats.async_maybe_transform.__module__ == leave_out.__module__
     heard: list[object] = []
     litellm._async_success_callback.append(lambda *_: heard.append("success"))
+    costs: list[object] = []
+    calculate = litellm.response_cost_calculator
+    monkeypatch.setattr(
+        litellm, "response_cost_calculator", lambda **k: costs.append(calculate(**k)) or costs[-1]
+    )
+
+    async def another() -> object:
+        message = {"role": "user", "content": "?"}
+        answer = await litellm.acompletion("gpt-4o", [message], mock_response="Hello")
+        await asyncio.sleep(0.2)
+        return answer._hidden_params["response_cost"]
+
+    async def ours() -> Reply:
+        model = make_model(ROUTES["openai"].config(running.url))
+        try:
+            return await model.ask(make_request())
+        finally:
+            await model.aclose()
+
+    async def one_task() -> object:
+        await ours()
+        assert (set(costs), heard) == ({None}, [])
+        return await another()
+
     try:
         with Running(OpenAIChat()) as running:
-            (reply,) = ask(make_model(ROUTES["openai"].config(running.url)), make_request())
+            cost = run(one_task)
     finally:
         litellm._async_success_callback.pop()
-    assert isinstance(reply, Reply), reply
-    assert not heard
+    assert isinstance(cost, float)
+    assert cost > 0
+    assert heard
+
+
+def test_a_request_is_the_same_without_the_search_for_fields_to_rename() -> None:
+    _litellm()
+    from phyblock.models.http_client import HttpClient
+    from phyblock.models.litellm_wire import CURRENT, Exchange
+
+    chats = importlib.import_module("openai.resources.chat.completions.completions")
+    form = importlib.import_module("openai.types.chat.completion_create_params")
+    schema = {"type": "object", "properties": {"plan": {"type": "array"}}, "required": ["plan"]}
+    picture = {"url": "data:image/png;base64,iVBORw0KGgo=", "detail": "high"}
+    body = {
+        "model": "m",
+        "messages": [
+            {"role": "system", "content": "Plan."},
+            {
+                "role": "user",
+                "content": [
+                    {"type": "text", "text": "?"},
+                    {"type": "image_url", "image_url": picture},
+                ],
+            },
+        ],
+        "temperature": 0.0,
+        "seed": 3,
+        "stop": None,
+        "tools": importlib.import_module("openai").NOT_GIVEN,
+        "response_format": {
+            "type": "json_schema",
+            "json_schema": {"name": "plan", "strict": True, "schema": schema},
+        },
+    }
+
+    async def renamed(is_ours: bool) -> str:
+        token = CURRENT.set(Exchange(HttpClient(CONFIG), CONFIG) if is_ours else None)
+        try:
+            kind = form.CompletionCreateParamsNonStreaming
+            return json.dumps(await chats.async_maybe_transform(body, kind))
+        finally:
+            CURRENT.reset(token)
+
+    assert run(lambda: renamed(True)) == run(lambda: renamed(False))
+    assert chats.async_maybe_transform.__module__ == leave_out.__module__
