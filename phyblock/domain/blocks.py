@@ -68,7 +68,11 @@ class Shape:
     fold: int
     flips: bool
     kit_colors: tuple[Color, ...]
-    """The first is the one that designs use."""
+    """The first is the one that designs use; ValueError where there is none."""
+
+    def __post_init__(self) -> None:
+        if not self.kit_colors:
+            raise ValueError("a shape needs a color of the kit, which designs use")
 
     @property
     def mass_kg(self) -> float:
@@ -175,7 +179,7 @@ KIT_PALETTE: tuple[tuple[BlockType, Color], ...] = tuple(
         (block_type, color) for block_type, shape in SHAPES.items() for color in shape.kit_colors
     )
 )
-"""The twelve type-color pairs of the official kit."""
+"""The pairs of type and color of the official kit."""
 
 
 def euler_deg_to_quat_xyzw(euler_deg: Euler) -> NDArray[np.float64]:

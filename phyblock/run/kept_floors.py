@@ -6,7 +6,7 @@ Working them out takes half a second and more, most of it before anything can be
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,10 +27,18 @@ if TYPE_CHECKING:
 
 __all__ = ["kept_floors"]
 
-_DECIDES_NOTHING = {"name", "description", "models", "seeds", "limits", "limit", "tables"}
-"""Parts of a suite; seeds only where each shows candidates in another order."""
-_DECIDE = {"limit", "chosen", "tracks", "items"}
-"""Parts of a manifest."""
+_IDLE_IN_SUITE = {"name", "description", "models", "seeds", "limits", "limit", "tables"}
+"""Fields that decide no value, where any other does; seeds do where each shows candidates in
+another order, and a limit stands in the manifest.
+"""
+_IDLE_IN_MANIFEST: Mapping[str, bool | set[str]] = {
+    **dict.fromkeys(("identity", "created", "suite", "models", "floors", "versions"), True),
+    "dataset": {"root"},
+    "questions": {"root"},
+}
+"""The same of a manifest, in parts where only those decide nothing; the suite is digested by
+itself, versions with the code.
+"""
 _VALUES = TypeAdapter(dict[str, dict[str, dict[str, float]]])
 
 
@@ -69,8 +77,8 @@ def _key(manifest: Manifest, suite: SuiteSpec, dataset: Dataset) -> str | None:
         (one.candidates.order, copies, list(one.seeds) if shows_seeds(one) else [])
         for one, copies in floor_orders(suite)
     ]
-    asked = manifest.model_dump(mode="json", include=_DECIDE)
-    asks = suite.model_dump(mode="json", exclude=_DECIDES_NOTHING)
+    asked = manifest.model_dump(mode="json", exclude=_IDLE_IN_MANIFEST)
+    asks = suite.model_dump(mode="json", exclude=_IDLE_IN_SUITE)
     return digest_of(["floors", code, dataset.sha256, asked, asks, orders])
 
 

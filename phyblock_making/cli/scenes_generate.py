@@ -21,7 +21,7 @@ from phyblock_making.workers import open_workers
 __all__ = ["command"]
 
 _PALETTE_TEXT: dict[Palette, str] = {
-    "kit": "the official kit's twelve pairs of type and color",
+    "kit": f"the official kit's {len(PALETTES['kit'])} pairs of type and color",
     "full": f"all {len(PALETTES['full'])} pairs of type and color",
 }
 
@@ -56,7 +56,7 @@ def _levels(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int
     type=click.Choice(["kit", "full"]),
     default="kit",
     show_default=True,
-    help="The kit's twelve pairs of type and color, or all that there are.",
+    help=f"The kit's {len(PALETTES['kit'])} pairs of type and color, or all that there are.",
 )
 @jobs_option
 @ray_option

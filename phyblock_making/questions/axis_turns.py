@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from phyblock.domain.blocks import (
+    SHAPES,
     BlockType,
     Euler,
     euler_deg_to_matrix,
@@ -18,7 +19,7 @@ from phyblock.domain.scene import Block
 from phyblock.domain.symmetry import angles_deg
 from phyblock_making.questions.lengths import length_axis
 
-__all__ = ["AXIS_TURNS", "LONG_TYPES", "axis_turns", "tipped_over"]
+__all__ = ["AXIS_TURNS", "axis_turns", "tipped_over"]
 
 AXIS_TURNS: tuple[str, ...] = (
     "no turn at all",
@@ -27,8 +28,6 @@ AXIS_TURNS: tuple[str, ...] = (
     "a quarter turn about a level axis across its length",
 )
 """What a block that lies along the ground can be told to do; to which side does not matter."""
-LONG_TYPES = ("arch", "cuboid2", "cuboid3")
-"""Types with one longest side, and no round side on which a turn could not be seen."""
 _SAME = 1e-4
 
 
@@ -38,7 +37,7 @@ def axis_turns(block: Block, other: Block) -> tuple[str, ...]:
     None when they are of different types; UnfairError where `other` has no length that lies
     along the ground.
     """
-    if block.type != other.type or block.type not in LONG_TYPES:
+    if block.type != other.type or not SHAPES[block.type].is_long:
         return ()
     along = length_axis(other)
     return _turns(block.type, block.euler_deg, other.euler_deg, along)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from phyblock.domain.blocks import SHAPES
 from phyblock.domain.scene import Block
 from phyblock.sim.support import bounds_m
 from phyblock_making.questions.block_measures import top_m
@@ -14,7 +15,6 @@ from phyblock_making.questions.question_draft import UnfairError
 
 __all__ = ["LENGTHS", "PAIRED", "along_and_across_m", "grid_cm", "length_axis", "require_joined"]
 
-_BOXES = ("cube", "cuboid1", "cuboid2", "cuboid3")
 _SIDE_M = 0.001
 _LONGER = 1.3
 _EXACT_CM = 0.1
@@ -72,7 +72,7 @@ def _rise(one: Block, other: Block, blocks: Sequence[Block]) -> float:
 
 def _gap(one: Block, other: Block, blocks: Sequence[Block]) -> float:
     """The clear way between two boxes that face each other, with nothing between them."""
-    if any(block.type not in _BOXES or block.euler_deg[2] % 90 for block in (one, other)):
+    if any(not SHAPES[block.type].is_box or block.euler_deg[2] % 90 for block in (one, other)):
         raise UnfairError("the blocks do not face each other with flat sides")
     require_joined(one, other, blocks)
     low = np.minimum(bounds_m(one)[1], bounds_m(other)[1])

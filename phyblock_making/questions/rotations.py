@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from phyblock.domain.blocks import SHAPES
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.outcomes import holds
@@ -18,7 +19,7 @@ from phyblock.sim.support import (
     find_overlaps,
     support_graph,
 )
-from phyblock_making.questions.axis_turns import AXIS_TURNS, LONG_TYPES, axis_turns, tipped_over
+from phyblock_making.questions.axis_turns import AXIS_TURNS, axis_turns, tipped_over
 from phyblock_making.questions.block_measures import turned_about_vertical, vertical_turns_deg
 from phyblock_making.questions.choices import pick, shuffled
 from phyblock_making.questions.coloring import with_own_colors
@@ -110,7 +111,7 @@ class RotationMaker(StaticMaker):
     def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Pairs of a type, one of them oriented so that a phrase drawn comes out."""
         picture = goal_picture(scene, view)
-        long = [block for block in seen_blocks(picture, STUDIED) if block.type in LONG_TYPES]
+        long = [block for block in seen_blocks(picture, STUDIED) if SHAPES[block.type].is_long]
         for other in shuffled(rng, long)[:_LOOSE]:
             yield from _about_some_axis(view, scene, other, rng)
         carrying = {order for block in scene.blocks for order in block.depend}

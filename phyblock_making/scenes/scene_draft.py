@@ -15,7 +15,7 @@ from phyblock_making.scenes.sketch import Sketch
 __all__ = ["PALETTES", "Draft", "Palette", "Theme"]
 
 Palette = Literal["kit", "full"]
-"""The twelve type-color pairs of the official kit, or all pairs that there are."""
+"""The pairs of type and color of the official kit, or all that there are."""
 PALETTES: dict[Palette, tuple[tuple[BlockType, Color], ...]] = {
     "kit": KIT_PALETTE,
     "full": tuple(product(BLOCK_TYPES, COLORS)),

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from phyblock.records import Manifest
 from phyblock.resources import bundled
 from phyblock.run import code, floors
 from phyblock.run.floors import FloorValues
-from phyblock.run.plan import make_plan
+from phyblock.run.plan import RunPlan, make_plan
 from phyblock.specs import load_suite
 from tests.workspace import SCENES, Workspace
 
+Plans = Callable[..., RunPlan]
 Begin = Callable[..., FloorValues]
 DATA, PROMPTS = bundled("benchmarks", "data"), bundled("prompts")
 SHUFFLED = {"candidates": {"order": "shuffled"}}
@@ -34,19 +37,30 @@ def anew(monkeypatch: pytest.MonkeyPatch) -> list[FloorValues]:
     return values
 
 
+class LaterManifest(Manifest):
+    """What a run is to a version that says more of it."""
+
+    asked: str = ""
+
+
 @pytest.fixture
-def begin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Begin:
-    """The floors in the manifest of a new run of a suite."""
+def planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Plans:
+    """The plan of a new run of a suite."""
     workspace = Workspace(tmp_path, tmp_path / "pictures")
     monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
 
-    def begun(*scenes: dict[str, Any], limit: int | None = None, **suite: Any) -> FloorValues:
+    def made(*scenes: dict[str, Any], limit: int | None = None, **suite: Any) -> RunPlan:
         workspace.write_scenes(*scenes)
         loaded = load_suite(workspace.write_suite(**suite), data_dir=DATA, prompt_dirs=[PROMPTS])
-        plan = make_plan(loaded, {}, limit=limit)
-        return plan.begun().floors
+        return make_plan(loaded, {}, limit=limit)
 
-    return begun
+    return made
+
+
+@pytest.fixture
+def begin(planned: Plans) -> Begin:
+    """The floors in the manifest of a new run of a suite."""
+    return lambda *scenes, **suite: planned(*scenes, **suite).begun().floors
 
 
 def test_the_same_is_worked_out_once(begin: Begin, anew: list[FloorValues]) -> None:
@@ -81,6 +95,18 @@ def test_whatever_decides_the_values_is_in_the_key(
     monkeypatch.setattr(code, "version", lambda _: "99")
     changes[0]()
     assert len(anew) == len(changes) + 1
+
+
+def test_what_a_later_version_says_of_a_run_decides_unless_it_is_named(
+    planned: Plans, anew: list[FloorValues]
+) -> None:
+    floors = planned().floors
+    assert isinstance(floors, partial)
+    manifest, *others = floors.args
+    for asked in ("plainly", "politely", "plainly"):
+        later = LaterManifest.model_validate({**manifest.model_dump(), "asked": asked})
+        floors.func(later, *others)
+    assert len(anew) == 2
 
 
 def test_a_file_that_holds_no_values_costs_only_the_time(

@@ -35,7 +35,7 @@ _AWAY_M = 0.011
 _BESIDE_PT = 6.0
 """From the middle of an arrow to the middle of its number."""
 _FARTHER = 1.12
-"""Than what just frames the blocks: their dimensions stand beside them."""
+"""How much farther the camera is than would just frame the blocks: dimensions stand beside them."""
 _GRAMS = 1000
 
 

@@ -49,9 +49,9 @@ from phyblock.words import AnswerFormat, Matcher, PoseRotation, Setting
 __all__ = ["CARRY_VERSION", "Earlier", "PoseJudgement", "PoseRules", "judge_poses"]
 
 CARRY_VERSION = 2
-"""Of how plans are carried out and what stands in the end is measured, up by one where some plan
-may end otherwise: before 2 everything in the world was let go together, for 5 s where it crept,
-and voxels were whole or empty.
+"""Version of how plans are carried out and of how what stands in the end is measured; it goes up
+where some plan may end otherwise. Before 2 everything in the world was let go together, for 5 s
+where it crept, and voxels were whole or empty.
 """
 _ONE_AT_A_TIME = threading.Lock()
 _KEPT = 32

@@ -39,7 +39,7 @@ _BESIDE_IN = 0.6
 _FREE_IN = 0.15
 """Between a point and its name, and behind the name."""
 _MOST_OF_WIDTH = 0.7
-"""Of the plot, for a name: points need the rest."""
+"""A name takes at most this share of the plot: points need the rest."""
 _DECADE_IN = 1.4
 """There is room for three numbers in a decade from here on."""
 _STATED_SIZE = re.compile(r"(?<![A-Za-z0-9.])(\d+(?:\.\d+)?)[bB](?![A-Za-z0-9])")
