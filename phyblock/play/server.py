@@ -212,8 +212,8 @@ class _Handler(BaseHTTPRequestHandler):
             is_known = self.sitting.post(name, body if isinstance(body, dict) else {})
         except NotNowError:
             self._refuse(409)
-        except ValueError:
-            self._refuse(400)
+        except ValueError as error:
+            self._refuse(400, str(error).encode())
         else:
             if is_known:
                 self._send(200, "application/json", b"{}", _POLICY)

@@ -90,14 +90,17 @@ class Pick:
 def picks_of(places: Sequence[int], numbers: Sequence[Sequence[float]] = ()) -> tuple[Pick, ...]:
     """Picks by their places, and the numbers of each where there are any.
 
-    Raises ValueError where not every pick has its numbers.
+    Raises ValueError where not every pick has its numbers, and for a number that fits no float.
     """
     if not numbers:
         return tuple(map(Pick, places))
     if len(numbers) != len(places):
         raise ValueError(f"holds numbers of {len(numbers)} picks, and {len(places)} picks")
     pairs = zip(places, numbers, strict=True)
-    return tuple(Pick(place, tuple(map(float, own))) for place, own in pairs)
+    try:
+        return tuple(Pick(place, tuple(map(float, own))) for place, own in pairs)
+    except OverflowError:
+        raise ValueError("holds a number outside of the range of numbers") from None
 
 
 @dataclass(frozen=True)

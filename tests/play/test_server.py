@@ -143,6 +143,7 @@ def test_other_paths_hold_nothing(server: Server, path: str) -> None:
         (400, b'{"change": 1, "picks": [0], "numbers": [[true]]}', {}),
         (400, b'{"change": 1, "picks": [0], "numbers": [1]}', {}),
         (400, b'{"change": 1, "picks": [0], "numbers": [[1], [2]]}', {}),
+        (400, b'{"change": 1, "picks": [0], "numbers": [[1' + b"0" * 300 + b"]]}", {}),
         (409, b'{"change": 1, "picks": [0]}', {}),
     ],
 )
@@ -150,7 +151,9 @@ def test_what_is_no_answer_is_refused_and_changes_nothing(
     server: Server, desk: Desk, status: int, body: bytes | None, headers: dict[str, str | None]
 ) -> None:
     before = desk.state(-1)
-    assert ask(server, "POST", "/{token}/answer", body, **headers).status == status
+    answer = ask(server, "POST", "/{token}/answer", body, **headers)
+    assert answer.status == status
+    assert bool(answer.body) == (status == 400)
     assert desk.state(-1) == before
 
 

@@ -106,6 +106,7 @@ def test_places_and_turns_are_read_as_they_were_given(
         ([[1, 2, float("nan")]], "z nan outside"),
         ([[1, 2, float("inf")]], "z inf outside"),
         ([[0.125, 2, 3]], "x 0.125 with more than 2 decimals"),
+        ([[10**400, 2, 3]], "outside of the range of numbers"),
     ],
 )
 def test_numbers_that_are_lacking_or_not_allowed_are_refused(
