@@ -17,9 +17,14 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from phyblock.models import Message, Request
 from phyblock.play.answers import default_text
+from phyblock.play.desk import Desk
 from phyblock.play.page import default_consent
 from phyblock.play.person import digest_of
+from phyblock.play.server import Server
+from phyblock.play.shown import Place, shown
+from phyblock.tracks.by_hand import Choice, NumberField, Picking
 from tests.browser import Visit
 from tests.fork_server import Forked, fork_server
 from tests.vqa_set import questions, write_questions
@@ -335,6 +340,34 @@ def check_as_of_any_model(workspace: Workspace, run: Path) -> None:
 
 def strip(record: Raw) -> Raw:
     return {name: value for name, value in record.items() if name != "time"}
+
+
+def test_what_no_picture_shows_is_picked_by_a_button_beside_number_fields(browser: Browser) -> None:
+    names = {"A": "the red brick", "B": "the blue brick"}
+    picking = Picking(
+        tuple(Choice(name, text) for name, text in names.items()),
+        least=1,
+        most=2,
+        repeats=False,
+        noun="brick",
+        write=str,
+        fields=(NumberField("x", "cm", 10.0, decimals=1, step=0.5, leap=5.0),),
+    )
+    request = Request("a", 0, (Message("user", ("What goes where?",)),), {}, "v", None)
+    desk = Desk(lambda: Place(1, 1))
+    desk.welcome({"name": "ada", "consent": "May we?", "done": 0, "of": 1})
+    with Server(desk) as server:
+        page = opened(browser, server.address).page
+        main = (
+            'Picker.show(document.getElementById("main"), question, one => { window.sent = one; })'
+        )
+        page.evaluate(f"question => {{ {main}; }}", shown(request, picking, Place(1, 1), ()))
+        assert page.inner_text(".hint").startswith("Each brick that you pick asks for x.")
+        page.get_by_role("button", name=names["B"]).click()
+        page.get_by_label("x, cm").fill("2.5")
+        page.get_by_role("button", name="Submit 1 brick").click()
+        assert page.evaluate("window.sent") == {"picks": [1], "numbers": [[2.5]]}
+        page.context.close()
 
 
 BOB = ("play", "suite.yaml", "--name", "bob", "--consent", "consent.txt")

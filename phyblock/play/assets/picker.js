@@ -21,12 +21,13 @@ const Picker = (() => {
     const clear = el("button", { type: "button", class: "quiet", onclick: takeAll }, "Clear");
     const done = el("button", { type: "button", class: "primary", onclick: send });
     const buttons = question.choices.map((choice, place) => {
-      const isShown = !choice.spots.length || question.choices.length <= MOST_BUTTONS;
+      // Beside number fields there is room for those alone that no picture shows.
+      const isShown = !choice.spots.length || (!hasFields && question.choices.length <= MOST_BUTTONS);
       return isShown ? choiceButton(choice, place) : null;
     });
 
     const hint = rows && el("p", { class: "hint muted" },
-      `Pick a block; each ${question.noun} then asks for ${new Intl.ListFormat("en").format(question.fields.map((field) => field.name))}.`,
+      `Each ${question.noun} that you pick asks for ${new Intl.ListFormat("en").format(question.fields.map((field) => field.name))}.`,
       el("span", { class: "keys" }, " Enter goes on, behind the last number to the next pick; ↑ ↓ change a number, PageUp and PageDown by more."));
     const answer = el(
       "section",
