@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,3 +39,10 @@ class ReportVisit(Visit):
         """What the address says behind `#`."""
         found: str = self.page.evaluate("location.hash")
         return found.removeprefix("#")
+
+    def wait_for_hash(self, is_so: Callable[[str], bool]) -> None:
+        """Wait until the address says so; it is written once nothing has changed for a while."""
+        end = time.monotonic() + 10
+        while not is_so(self.hash):
+            assert time.monotonic() < end, self.hash
+            self.page.wait_for_timeout(50)

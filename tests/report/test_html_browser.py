@@ -334,10 +334,11 @@ def _lists_what_the_headline_leads_with(visit: ReportVisit, folder: Path) -> Non
     page.select_option("#filter-setting", label="C")
     page.select_option("#filter-error", label="Off in height")
     assert page.locator(".row-model").all_inner_texts() == ["oracle-2d"]
-    # What the address will say: it is written once nothing has changed for a while.
-    assert page.evaluate("Filters.asked().setting") == ""
+    visit.wait_for_hash(lambda said: "error=off_height" in said)
+    assert "setting" not in visit.hash
     page.select_option("#filter-setting", label="A")
     assert visit.count() == "2 samples"
+    visit.wait_for_hash(lambda said: "setting=A" in said)
 
 
 def test_a_hostile_reply_does_nothing(visit: ReportVisit) -> None:
@@ -387,6 +388,17 @@ def test_a_narrow_window_shows_list_or_sample(browser: Browser, made: Workspace)
     assert page.evaluate(wide)
     assert visit.complaints == []
     page.close()
+
+
+def test_data_that_were_dropped_while_they_came_come_to_all_who_asked(visit: ReportVisit) -> None:
+    page = visit.open()
+    asked = """async () => {
+        const { load, count } = chunksOf({ read: JSON.parse, noun: "report", most: 1 });
+        const names = ["index", "records-0", "index"];
+        const found = await Promise.all(names.map(load));
+        return [found[0] === found[2], found.every(Boolean), count()];
+    }"""
+    assert page.evaluate(asked) == [True, True, 1]
 
 
 def test_a_page_without_its_folder_says_so(

@@ -19,7 +19,8 @@ function chunksOf({ read, noun, most }) {
   };
 
   function load(name) {
-    const found = kept.get(name) || brought(name);
+    // What was dropped while it is under way is waited for together.
+    const found = kept.get(name) || waiting.get(name)?.found || brought(name);
     // The last one is the one that was used last.
     kept.delete(name);
     kept.set(name, found);
@@ -28,11 +29,12 @@ function chunksOf({ read, noun, most }) {
   }
 
   function brought(name) {
-    const found = new Promise((settle, fail) => waiting.set(name, { settle, fail }));
+    const waiter = {};
+    const found = waiter.found = new Promise((settle, fail) => Object.assign(waiter, { settle, fail }));
+    waiting.set(name, waiter);
     const script = document.createElement("script");
     script.src = `${folder}/${name}.js`;
     script.onload = script.onerror = () => {
-      const waiter = waiting.get(name);
       script.remove();
       waiting.delete(name);
       waiter.fail(new Error(`${folder}/${name}.js is not there: the folder ${folder}/ belongs beside this page.`));
