@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -38,7 +39,7 @@ def stack(
     """
     least_label *= WIDTH_IN / drawn_width_in()
     places, start = np.arange(len(models)), np.zeros(len(models))
-    for part, hatch in zip(parts, HATCHES, strict=False):
+    for part, hatch in zip(parts, cycle(HATCHES), strict=False):
         ax.barh(
             places,
             part.shares,
