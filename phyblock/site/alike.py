@@ -16,13 +16,19 @@ from phyblock.tracks.kind import kind_of
 
 __all__ = ["check_runs_alike"]
 
-_ASKED_ANEW = ("pictures", CARRYING, READER)
+_ASKED_ANEW = ("pictures", READER)
 """What a track's identity says that may differ: digests of pictures, which change with their size,
-who read the replies and how plans were carried out.
+and who read the replies.
 """
+_FIRST_CARRYING = 1
+"""How plans were carried out before runs said so."""
 _CONTROLS = frozenset({"blind", "wrong_image", "prompt", "path"})
 """What a track's section of the suite says that is shown with the run, or known by its digest."""
 _HINT = "make a site of each"
+_CARRYING_HINT = (
+    "run the older one again, as phyblock score leaves what was carried out as it was, or make a "
+    "site of each"
+)
 _SCENES = "dataset.sha256"
 _SCENES_HINT = "give all runs the same levels and --limit, or make a site of each"
 
@@ -59,7 +65,8 @@ def _differences(one: SiteRun, first: SiteRun) -> Iterator[Problem]:
             found, allowed = (_asked(side.run, shared) for side in (one, first))
             yield Problem(one.where, message, field, found, allowed, _SCENES_HINT)
         else:
-            yield Problem(one.where, message, field, str(value), str(other), _HINT)
+            hint = _CARRYING_HINT if field.endswith(f".{CARRYING}") else _HINT
+            yield Problem(one.where, message, field, str(value), str(other), hint)
 
 
 def _asked(run: Run, shared: Sequence[str]) -> str:
@@ -101,6 +108,8 @@ def _facts(run: Run, shared: Sequence[str]) -> Iterator[tuple[str, Any]]:
             yield from _said(section[0], run.section(*section[:2]), _CONTROLS)
         if ENGINE not in manifest.tracks.get(track, {}):
             yield f"tracks.{track}.{ENGINE}", "the engine of reference"
+        if CARRYING not in manifest.tracks.get(track, {}):
+            yield f"tracks.{track}.{CARRYING}", _FIRST_CARRYING
 
 
 def _said(name: str, section: BaseModel, without: Collection[str]) -> Iterator[tuple[str, Any]]:

@@ -208,6 +208,28 @@ def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(
     assert ("--limit" in problem.hint) == (field == "dataset.sha256")
 
 
+def carried_out(version: int | None) -> dict[str, Any]:
+    facts = in_track("pose_planning")
+    own = facts["tracks"]["pose_planning"]
+    named = {} if version is None else {"carrying": version}
+    return {**facts, "tracks": {"pose_planning": {**own, **named}}}
+
+
+@pytest.mark.parametrize(("before", "after"), [(None, 2), (2, None), (1, 2)])
+def test_plans_that_were_carried_out_otherwise_do_not_stand_in_one_table(
+    before: int | None, after: int | None
+) -> None:
+    first, other = (site_run(f"{n}", **carried_out(n)) for n in (before, after))
+    with pytest.raises(SpecError) as caught:
+        check_runs_alike([first, other])
+    (problem,) = caught.value.problems
+    assert problem.field == "tracks.pose_planning.carrying"
+    assert (problem.found, problem.allowed) == (str(after or 1), str(before or 1))
+    assert "run the older one again" in problem.hint
+    check_runs_alike([first, site_run("same", **carried_out(before))])
+    check_runs_alike([site_run("old", **carried_out(None)), site_run("1", **carried_out(1))])
+
+
 def test_a_recording_that_was_asked_elsewhere_stands_beside_any_prompt() -> None:
     first = site_run("one", **in_track("full_planning"))
     larger = site_run("two", **in_track("full_planning", **shown({"size_px": 512}, "b")))
