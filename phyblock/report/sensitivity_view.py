@@ -16,6 +16,8 @@ from phyblock.tracks.kind import kind_of
 from phyblock.variants import REPEAT
 
 __all__ = [
+    "FACTOR",
+    "LEVEL",
     "components_view",
     "factor_name",
     "in_terminal",
@@ -27,8 +29,8 @@ __all__ = [
 
 _NAMES = {REPEAT: "asked again", ITEMS: "between items"}
 _MODEL = Column("Model", is_text=True)
-_FACTOR = Column("Factor", is_text=True)
-_LEVEL = Column("Level", is_text=True)
+FACTOR = Column("Factor", is_text=True)
+LEVEL = Column("Level", is_text=True)
 
 
 def factor_name(factor: str) -> str:
@@ -65,7 +67,7 @@ def components_view(table: pd.DataFrame, run: Run) -> TextTable:
         notes.append("One factor alone without repeats cannot be told from noise in single items.")
     return TextTable(
         f"What the way of asking changes{run.design.of_suite}",
-        (_MODEL, *_track_column(run), _FACTOR, *pairs),
+        (_MODEL, *_track_column(run), FACTOR, *pairs),
         tuple(rows),
         tuple(notes),
     )
@@ -104,7 +106,7 @@ def levels_view(table: pd.DataFrame, run: Run) -> TextTable:
     names = ("Value", "Rank", "Difference", "95 % CI", "p (Holm)", "Detectable")
     return TextTable(
         f"Every level{run.design.of_suite}, beside the first of its factor",
-        (_MODEL, *_track_column(run), _FACTOR, _LEVEL, *map(Column, names)),
+        (_MODEL, *_track_column(run), FACTOR, LEVEL, *map(Column, names)),
         tuple(rows),
         (
             *(f"{what}." for what in _what(run, list(table["track"].unique()))),
@@ -142,7 +144,7 @@ def ranks_view(table: pd.DataFrame, run: Run) -> TextTable:
     names = ("Kendall's tau", "Pairs that flip", "beyond noise", "Detectable")
     return TextTable(
         f"Does the ranking survive{run.design.of_suite}?",
-        (*_track_column(run), _FACTOR, _LEVEL, *map(Column, names)),
+        (*_track_column(run), FACTOR, LEVEL, *map(Column, names)),
         tuple(rows),
         (
             "Against the first level of each factor. Beyond noise: the change of the pair's "

@@ -17,7 +17,7 @@ from phyblock.tables.intervals import parents_of
 from phyblock.tables.load import Run
 from phyblock.variants import REPEAT, Variant
 
-__all__ = ["Blocks", "ItemsAsked", "Varied", "varied"]
+__all__ = ["Blocks", "ItemsAsked", "Varied", "blocks_of", "varied"]
 
 _ENOUGH = 0.5
 """Share of the items of the model that has most, from which on a model is ranked."""
@@ -100,20 +100,24 @@ class Varied:
 
     def blocks(self, factor: str) -> Blocks:
         """Where a factor has all its levels."""
-        vary = self.vary
-        levels, repeats = vary.names(factor), vary.names(REPEAT) or ("1",)
-        places: dict[Variant, dict[tuple[str, str], int]] = {}
-        for place, variant in enumerate(vary.variants):
-            here = dict(variant.levels)
-            level = here.pop(factor, levels[0])
-            again = level if factor == REPEAT else here.pop(REPEAT, "1")
-            places.setdefault(Variant(tuple(here.items())), {})[level, again] = place
-        # Of repeats each level is one: all others stand beside it as blocks.
-        pairs = [[(n, again) for again in ((n,) if factor == REPEAT else repeats)] for n in levels]
-        every = {pair for row in pairs for pair in row}
-        whole = [found for found in places.values() if every <= set(found)]
-        numbers = [[[found[pair] for pair in row] for found in whole] for row in pairs]
-        return Blocks(factor, levels, np.array(numbers, dtype=np.intp))
+        return blocks_of(self.vary, factor)
+
+
+def blocks_of(vary: VarySpec, factor: str) -> Blocks:
+    """Where a factor has all its levels."""
+    levels, repeats = vary.names(factor), vary.names(REPEAT) or ("1",)
+    places: dict[Variant, dict[tuple[str, str], int]] = {}
+    for place, variant in enumerate(vary.variants):
+        here = dict(variant.levels)
+        level = here.pop(factor, levels[0])
+        again = level if factor == REPEAT else here.pop(REPEAT, "1")
+        places.setdefault(Variant(tuple(here.items())), {})[level, again] = place
+    # Of repeats each level is one: all others stand beside it as blocks.
+    pairs = [[(n, again) for again in ((n,) if factor == REPEAT else repeats)] for n in levels]
+    every = {pair for row in pairs for pair in row}
+    whole = [found for found in places.values() if every <= set(found)]
+    numbers = [[[found[pair] for pair in row] for found in whole] for row in pairs]
+    return Blocks(factor, levels, np.array(numbers, dtype=np.intp))
 
 
 def varied(run: Run, track: str) -> Varied | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
+from urllib.parse import parse_qs
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,7 @@ from phyblock.report import Run
 from phyblock.report.compare import compare_models
 from phyblock.report.compare_view import flipped_lines
 from phyblock.report.figures.sensitivity import moved_dots
+from phyblock.report.html.leads import table_leads
 from phyblock.report.sensitivity import (
     components_frame,
     levels_frame,
@@ -30,16 +32,18 @@ SEEDS = (0, 1)
 ITEMS = 12
 
 
-def facts(*models: str) -> dict[str, Any]:
+def facts(*models: str, vary: dict[str, Any] = VARY) -> dict[str, Any]:
     told = manifest(models=models, seeds=SEEDS, levels=(2,), settings=["A"], matchers=["optimal"])
-    told["suite"]["vary"] = VARY
+    told["suite"]["vary"] = vary
     return told
 
 
-def asked(models: dict[str, int], seed: int = 3) -> list[dict[str, Any]]:
+def asked(
+    models: dict[str, int], seed: int = 3, vary: dict[str, Any] = VARY
+) -> list[dict[str, Any]]:
     """Records of the first so many scenes of each model, in every way; of one more, in one way."""
     rng, records = np.random.default_rng(seed), []
-    variants = VarySpec(**VARY).variants
+    variants = VarySpec(**vary).variants
     for model, n_items in models.items():
         skill = 1 + len(records) % 3
         for place in range(ITEMS):
@@ -162,3 +166,53 @@ def test_what_flipped_says_in_which_way_it_was_asked() -> None:
     named = ",".join(f"{name}={level}" for name, level in variant.items())
     assert row["variant"] == named != ""
     assert flipped_lines(found) == (f"alpha is right where beta is not, 1: s00 ({named})",)
+
+
+def way_of(one: dict[str, Any]) -> str:
+    return ",".join(f"{factor}={level}" for factor, level in one["variant"].items())
+
+
+@pytest.mark.parametrize(
+    ("vary", "linked"),
+    [
+        # Alone, or beside references, a level is one way of asking; crossed, it is several.
+        ({"view": VARY["view"]}, {"view": VARY["view"]}),
+        ({**VARY, "design": "one_at_a_time"}, VARY),
+        (VARY, {}),
+        ({"view": VARY["view"], "repeats": 2}, {}),
+    ],
+)
+def test_a_level_leads_to_the_samples_that_its_value_is_of_or_nowhere(
+    vary: dict[str, Any], linked: dict[str, list[str]]
+) -> None:
+    records = asked({"alpha": ITEMS}, vary=vary)
+    run = run_of(records, facts("alpha", vary=vary))
+    view = levels_view(levels_frame(run), run)
+    leads = table_leads(run, "sensitivity_levels", view).rows
+    assert {row[1:3] for row, lead in zip(view.rows, leads, strict=True) if lead} == {
+        (factor, level) for factor, levels in linked.items() for level in levels
+    }
+    for row, lead in zip(view.rows, leads, strict=True):
+        if lead:
+            words = {name: word for name, (word,) in parse_qs(lead).items()}
+            assert (words["track"], words["model"]) == ("full_planning", "alpha")
+            way = "" if words["variant"] == "reference" else words["variant"]
+            of_way = [one for one in records if way_of(one) == way]
+            found = all_estimates(run_of(of_way, facts("alpha", vary=vary)))
+            found = found[(found["measure"] == "f1") & (found["cell"] == "overall")]
+            assert row[3] == number(100 * float(found["value"].iloc[0]))
+
+
+@pytest.mark.parametrize(
+    ("design", "led"),
+    [("crossed", {"background", "view", "between items"}), ("one_at_a_time", {"between items"})],
+)
+def test_what_all_ways_of_asking_gave_leads_to_all_samples(design: str, led: set[str]) -> None:
+    vary = {**VARY, "design": design}
+    run = run_of(asked({"alpha": 4}, vary=vary), facts("alpha", vary=vary))
+    view = components_view(components_frame(run), run)
+    leads = dict(
+        zip((row[1] for row in view.rows), table_leads(run, "sensitivity", view).rows, strict=True)
+    )
+    assert {name for name, lead in leads.items() if lead} == led
+    assert {lead for lead in leads.values() if lead} == {"track=full_planning&model=alpha"}

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from urllib.parse import urlencode
 
 from phyblock.plain_text import one_line
+from phyblock.report.sensitivity import ITEMS
+from phyblock.report.sensitivity_view import FACTOR, LEVEL, factor_name
+from phyblock.report.varied import blocks_of
 from phyblock.tables.load import Run
 from phyblock.tables.outcomes import HEADINGS
 from phyblock.tables.text_table import TextTable, level_name
@@ -16,6 +19,8 @@ __all__ = ["TableLeads", "mean_parts", "part_names", "samples_query", "table_lea
 
 _NOT_RUN = "Not run"
 """Heads numbers of samples that there are not."""
+_REFERENCE = "reference"
+"""What the page's address calls the way of asking that names nothing."""
 
 
 def samples_query(run: Run, track: str, cell: str) -> str:
@@ -82,15 +87,23 @@ def table_leads(run: Run, name: str, table: TextTable) -> TableLeads:
         known = words.get(column.group.lower(), {}) | words.get(column.name.lower(), {}) | named
         is_bare = column.is_text or column.name == _NOT_RUN
         columns.append(None if is_bare else urlencode(known))
-    rows, model = [], None
+    is_of_ways = FACTOR in table.columns
+    ways = _ways(run) if is_of_ways else {(): {}}
+    rows: list[str | None] = []
+    model = None
     for row in table.rows:
         # An empty name is the one above.
         model = models.get(row[0]) if row[0] else model
         chosen = {"track": of_table[0]} if len(of_table) == 1 else {}
         for cell, column in zip(row[1:], table.columns[1:], strict=True):
             chosen |= words.get(cell.lower(), {}) if column.is_text else {}
-        is_known = model is not None and "track" in chosen
-        rows.append(urlencode({**chosen, "model": model}) if is_known else None)
+        texts = zip(table.columns, row, strict=True)
+        of_way = (cell for column, cell in texts if is_of_ways and column in (FACTOR, LEVEL))
+        way = ways.get(tuple(of_way))
+        if model is None or "track" not in chosen or way is None:
+            rows.append(None)
+        else:
+            rows.append(urlencode({**chosen, **way, "model": model}))
     return TableLeads(tuple(columns), tuple(rows))
 
 
@@ -109,3 +122,26 @@ def _words(run: Run, tracks: Sequence[str]) -> Mapping[str, dict[str, str]]:
     for outcome, heading in HEADINGS.items():
         words[heading.lower()] = {"outcome": outcome}
     return words
+
+
+def _ways(run: Run) -> Mapping[tuple[str, ...], dict[str, str]]:
+    """What rows about a factor, or about one of its levels, choose among samples, by these texts.
+
+    Rows of several ways of asking among more are left out: no word of the address chooses them.
+    """
+    vary = run.design.suite.vary
+    every = set(range(vary.n_variants))
+    places: dict[tuple[str, ...], set[int]] = {(ITEMS,): every}
+    for factor in vary.factors:
+        blocks = blocks_of(vary, factor)
+        places[factor,] = set(blocks.places.flat)
+        for level, own in zip(blocks.levels, blocks.places, strict=True):
+            places[factor, level] = set(own.flat)
+    ways: dict[tuple[str, ...], dict[str, str]] = {}
+    for (factor, *level), chosen in places.items():
+        texts = (one_line(factor_name(factor)), *map(one_line, level))
+        if chosen == every:
+            ways[texts] = {}
+        elif len(chosen) == 1:
+            ways[texts] = {"variant": vary.variants[min(chosen)].key or _REFERENCE}
+    return ways
