@@ -84,7 +84,10 @@ def test_no_text_covers_another_or_leaves_the_figure_with_many_models(
         for draw in draws:
             figure = draw(some)
             assert figure is not None
-            assert figure.get_figwidth() <= max(width_in, LONG_NAMES_IN) + 0.01
+            if width_in >= LONG_NAMES_IN:
+                assert figure.get_figwidth() == pytest.approx(width_in)
+            else:
+                assert width_in <= figure.get_figwidth() <= LONG_NAMES_IN
             figure.draw_without_rendering()
             # Of a label with a line to its point, the label alone.
             boxes = [(t.get_text(), Text.get_window_extent(t)) for t in seen(figure)]

@@ -1,18 +1,23 @@
 from __future__ import annotations
 
+import io
 import re
-import sys
+from base64 import b64decode
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from PIL import Image
 
 from phyblock.errors import StoreError
 from phyblock.report.figures import Wanted, figure_names, write_figures, write_paper_figures
 from phyblock.run.folder import run_folder
-from phyblock.tables.drawing import COLORS, PAGE_LOOK
+from phyblock.tables.drawing import COLORS, GRID, MUTED, PAGE_LOOK, PALE
 from phyblock.tables.load import load_run
+from phyblock.tracks.stacked import HATCHES, Part, stack
 from phyblock.tracks.step_planning.figure import step_progress
 from phyblock.tracks.vqa.figure import accuracy_by_subtask, vqa_heat_map
 from tests.report.factory import LEVELS, manifest, record, run_of, score, write_run
@@ -20,6 +25,23 @@ from tests.report.factory import LEVELS, manifest, record, run_of, score, write_
 matplotlib = pytest.importorskip("matplotlib", reason="matplotlib is not installed")
 PLANNING = {"f1-levels", "f1-radar", "settings", "losses", "error-types", "f1-size", "f1-cost"}
 PLANNING |= {"scenes"}
+XLINK = "http://www.w3.org/1999/xlink"
+
+
+@pytest.fixture
+def _no_window(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """No figure stays open, and no backend is chosen, as all do that open windows.
+
+    A box plot imports pyplot, which does neither by itself.
+    """
+    from matplotlib import pyplot
+
+    chosen: list[object] = []
+    monkeypatch.setattr(pyplot, "_backend_mod", None)
+    monkeypatch.setattr(pyplot, "switch_backend", chosen.append)
+    yield
+    assert pyplot.get_fignums() == []
+    assert chosen == []
 
 
 def planned(model: str, tp: int) -> list[dict[str, Any]]:
@@ -87,11 +109,34 @@ def test_every_figure_is_drawn_and_drawing_again_gives_the_same_bytes(tmp_path: 
     drawn = [name for name in figure_names(run) if name not in on_request]
     assert [file.name for file in first] == [f"{name}.svg" for name in drawn]
     assert {file: file.read_bytes() for file in write_figures(run)} == first
-    for data in first.values():
+    for file, data in first.items():
         assert re.search(rb"<svg[^>]*width=\"[\d.]+pt\"", data)
         assert b"<dc:date>" not in data
+        # The size of one of the two models is known.
+        assert marks(ElementTree.fromstring(data)) >= (1 if file.stem == "f1-size" else 2), (
+            file.name
+        )
 
 
+def marks(drawn: ElementTree.Element) -> int:
+    """How much an SVG shows beside axes, grids, texts and legend; of a picture, how many colors."""
+    count = 0
+    for one in drawn:
+        tag = one.tag.rpartition("}")[2]
+        if tag == "defs" or one.get("id", "").startswith(("matplotlib.axis", "text_", "legend_")):
+            continue
+        if tag == "image":
+            _, _, data = one.get(f"{{{XLINK}}}href", "").partition("base64,")
+            with Image.open(io.BytesIO(b64decode(data))) as picture:
+                count += len(picture.convert("RGB").getcolors(20000) or [])
+        elif tag in ("path", "use"):
+            inks = set(re.findall(r"#[0-9a-f]{6}|url", one.get("style", "")))
+            count += not inks <= {"#ffffff", MUTED, GRID, PALE}
+        count += marks(one)
+    return count
+
+
+@pytest.mark.usefixtures("_no_window")
 def test_figures_for_slides_are_asked_for_and_what_a_run_drew_of_old_goes(tmp_path: Path) -> None:
     run = load_run(folder_of(tmp_path / "run"), texts=False)
     wanted = Wanted(("f1-levels", "losses"))
@@ -109,14 +154,12 @@ def test_figures_for_slides_are_asked_for_and_what_a_run_drew_of_old_goes(tmp_pa
     assert mine.read_bytes() == b"mine"
 
 
+@pytest.mark.usefixtures("_no_window")
 def test_what_a_run_has_no_numbers_for_is_not_drawn_and_no_window_is_opened(tmp_path: Path) -> None:
     run = load_run(write_run(tmp_path / "run", [], manifest()), texts=False)
     assert write_figures(run) == ()
     drawn = {file.stem for file in write_figures(load_run(folder_of(tmp_path / "other")))}
     assert drawn == PLANNING
-    # A box plot imports pyplot, which opens windows for figures of its own alone.
-    pyplot = sys.modules.get("matplotlib.pyplot")
-    assert pyplot is None or not pyplot.get_fignums()
 
 
 def test_a_figure_takes_no_style_of_the_user_and_leaves_none(tmp_path: Path) -> None:
@@ -141,6 +184,20 @@ def test_an_episode_that_ended_keeps_what_it_built(tmp_path: Path) -> None:
     more = [episode("alpha", "000", 1, 1, 2, 3), episode("alpha", "001", 1)]
     table = step_progress(load_run(folder_of(tmp_path / "run", *more)))
     assert table["alpha"].tolist() == [0, 25, 25, 37.5, 50]
+
+
+def test_all_parts_of_a_whole_are_drawn_however_many_there_are() -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    n_parts = 2 * len(HATCHES) + 1
+    shares = np.full(2, 100 / n_parts)
+    parts = [Part(f"{n}", shares, COLORS[n % len(COLORS)], "white") for n in range(n_parts)]
+    ax = figure.add_subplot()
+    stack(ax, ["a", "b"], parts, 0.7, 10.0)
+    assert [bar.get_label() for bar in ax.containers] == [part.name for part in parts]
+    ends = [bar.get_x() + bar.get_width() for bar in ax.containers[-1]]
+    assert ends == pytest.approx([100, 100])
 
 
 def test_colors_differ_in_lightness_or_hue_for_readers_who_see_no_red_or_green() -> None:

@@ -63,7 +63,13 @@ def begin(planned: Plans) -> Begin:
     return lambda *scenes, **suite: planned(*scenes, **suite).begun().floors
 
 
-def test_the_same_is_worked_out_once(begin: Begin, anew: list[FloorValues]) -> None:
+def kept_files(folder: Path) -> list[Path]:
+    files = [*(folder / "cache" / "goal-blind").glob("*.json")]
+    assert files
+    return files
+
+
+def test_the_same_is_worked_out_once(begin: Begin, anew: list[FloorValues], tmp_path: Path) -> None:
     first = begin()
     assert first["full_planning"]["goal-blind"]
     same: list[dict[str, Any]] = [
@@ -73,6 +79,11 @@ def test_the_same_is_worked_out_once(begin: Begin, anew: list[FloorValues]) -> N
     ]
     assert [begin(**suite) for suite in same] == [first] * 3
     assert anew == [first]
+    for count, suite in enumerate(same[1:], 2):
+        for file in kept_files(tmp_path):
+            file.unlink()
+        assert begin(**suite) == first
+        assert len(anew) == count
 
 
 def test_whatever_decides_the_values_is_in_the_key(
@@ -113,8 +124,7 @@ def test_a_file_that_holds_no_values_costs_only_the_time(
     begin: Begin, anew: list[FloorValues], tmp_path: Path
 ) -> None:
     first = begin()
-    files = [*(tmp_path / "cache" / "goal-blind").glob("*.json")]
-    assert files
+    files = kept_files(tmp_path)
     for content in (b"{", b'{"full_planning": 1}', b"\xff"):
         for file in files:
             file.write_bytes(content)

@@ -138,8 +138,8 @@ def _ways(run: Run) -> Mapping[tuple[str, ...], dict[str, str]]:
         for level, own in zip(blocks.levels, blocks.places, strict=True):
             places[factor, level] = set(own.flat)
     ways: dict[tuple[str, ...], dict[str, str]] = {}
-    for (factor, *level), chosen in places.items():
-        texts = (one_line(factor_name(factor)), *map(one_line, level))
+    for (factor, *levels), chosen in places.items():
+        texts = (one_line(factor_name(factor)), *map(one_line, levels))
         if chosen == every:
             ways[texts] = {}
         elif len(chosen) == 1:
