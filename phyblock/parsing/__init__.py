@@ -97,4 +97,6 @@ _HOMES = {
 def __getattr__(name: str) -> object:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"phyblock.parsing.{_HOMES[name]}"), name)
+    value: object = getattr(importlib.import_module(f"phyblock.parsing.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value

@@ -144,7 +144,12 @@ def _outer_line(text: str, reader: Reader) -> str | None:
     return named.pop() if len(named) == 1 else CONTRADICTION
 
 
-_LAST_SENTENCE = re.compile(r"[.!?:]\s(?P<letter>[A-Z])[.!]?\Z")
+_LAST_SENTENCE = re.compile(
+    r"(?:[.!?]|(?:\A|[.;!]\s)\W{0,4}(?i:(?:(?:my|the|your|final|best)\s){0,2}"
+    r"(?:choice|pick|selection|selected|chosen|correct|decision|result|solution)):)"
+    r"\s(?P<letter>[A-Z])[.!]?\Z"
+)
+"""A letter alone behind a sentence, or behind a label that states an answer."""
 _WAIT = words(TAKES_BACK)
 
 

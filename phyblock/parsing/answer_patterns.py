@@ -171,7 +171,7 @@ IS_REJECTED = re.compile(
     r"|\s{0,2}[:.)\u2013\u2014-]\s{0,3})"
     r"(?:(?i:incorrect|wrong|false\b|impossible|unlikely|excluded|eliminated|ruled out|out\b)"
     r"|(?i:not)\b(?!\s(?:option\s)?\(?[A-Z]\b)|(?i:no)\b(?!\s[a-z]))"
-    r"|[)\]}*_`\"']{0,3}\s{1,2}(?:isn['\u2019]t|doesn['\u2019]t|can['\u2019]t|cannot|differs)\b",
+    r"|[)\]}*_`\"']{0,3}\s{1,2}(?:isn['\u2019]t|doesn['\u2019]t|can['\u2019]t|cannot|differs|fails)\b",
 )
 """What stands behind a letter that a reply begins with to turn it down."""
 REJECTS = re.compile(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from phyblock.parsing.answer_patterns import IS_REJECTED
 from phyblock.parsing.speech import PLACES
 from phyblock.parsing.text_forms import plain_forms, unmarked
 
@@ -84,6 +85,7 @@ _WORD_NUMBERS = {
     **{"zero": "0", "one": "1", "two": "2", "three": "3", "four": "4", "five": "5", "six": "6"},
     **{"seven": "7", "eight": "8", "nine": "9", "ten": "10", "eleven": "11", "twelve": "12"},
 }
+_WORD = re.compile(r"[^\W\d_]+")
 
 
 class ChoiceReader:
@@ -155,7 +157,11 @@ class ChoiceReader:
         """What a text names by the option's number, where numbers cannot mean anything else."""
         value = unmarked(text).strip()
         ordinal = _ORDINAL.search(value)
-        if ordinal and not _NEGATION.search(value, 0, ordinal.start()):
+        if (
+            ordinal
+            and not _NEGATION.search(value, 0, ordinal.start())
+            and not IS_REJECTED.match(value, ordinal.end())
+        ):
             return self._nth(PLACES[ordinal["word"].lower()])
         if self._has_digits:
             return None
@@ -217,7 +223,7 @@ def plain(text: str) -> str:
     for spelled, as_usual in _SPELLED:
         value = spelled.sub(as_usual, value)
     value = _ARTICLES.sub("", unmarked(value).strip(EDGES))
-    return " ".join(_WORD_NUMBERS.get(word, word) for word in value.split(" "))
+    return _WORD.sub(lambda word: _WORD_NUMBERS.get(word[0], word[0]), value)
 
 
 def _closers(text: str) -> str:

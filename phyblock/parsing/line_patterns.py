@@ -58,8 +58,9 @@ NAMES_FIRST = re.compile(
 )
 LABELED = re.compile(
     r"\s{0,20}[-#>]{0,4}\s{0,3}(?:\d{1,2}[.)]\s)?(?P<label>[^:=：\[\n]{1,80}?)\s{0,3}(?:[:=：]"
-    r"|(?<=[^\W\d]\s)(?:→|->)(?=\s)|\b(?:is|are|would be|ist|lautet|est|es)\b"
-    r"(?:\s(?:then|therefore|thus|hence|now|also|daher|donc))?:?|是|为)\s{0,3}"
+    r"|(?<=[^\W\d]\s)(?:→|->)(?=\s)|\b(?:(?:is|are|ist|lautet|est|es)"
+    r"(?:\s(?:therefore|thus|hence|also|daher|donc))?|would be"
+    r"|(?:(?<=order )|(?<=sequence )|(?<=plan ))is\s(?:now|then))\b:?|是|为)\s{0,3}"
     r"(?P<value>[\s(\[{<#]{0,4}(?:(?:first|zuerst|erst|d'abord|primero)\s)?(?:(?:blocks?|index"
     r"|indices|(?<=[:：]\s)candidates?|积木)\s)?\d[^\n]{0,400})",
     re.IGNORECASE,

@@ -140,10 +140,13 @@ _SO_MANY = re.compile(
 )
 _OF_KIND = re.compile(r"\b(?:of|with|mit|index)\b", re.IGNORECASE)
 _SO_MANY_OF = re.compile(
-    r"(?<!step )(?<!layer )(?<!level )(?<!row )\b(?P<n>\d{1,2})\s(?:[^\W\d]{2,12}\s){0,2}\Z",
+    r"(?<!step )(?<!layer )(?<!level )(?<!row )(?<!stage )(?<!phase )(?<!height )(?<!position )"
+    rf"(?<![\d.,])(?<![x×] )\b(?P<n>\d{{1,2}}){_UNIT}"
+    r"(?!\s?(?:in(?:ch(?:es)?)?|ft|feet|foot|dm|units?|deg|percent|layers?|levels?|rows?|steps?)\b)"
+    rf"\s(?:(?!{VERB})[^\W\d]{{2,12}}\s){{0,2}}\Z",
     re.IGNORECASE,
 )
-"""How many, before several blocks of one number: "2 blocks of index 6"."""
+"""How many, before several blocks of one number: "2 blocks of index 6"; a length is no count."""
 _CORNER = re.compile(r"corner|ecke", re.IGNORECASE)
 SAYS_NUMBER = re.compile(rf"\d|{_WORD_NUMBER}", re.IGNORECASE)
 

@@ -70,10 +70,11 @@ _OR = re.compile(r"\b(?:or|oder|ou)\s{1,3}\Z", re.IGNORECASE)
 """An operation behind this is one of several, of which the others may be no number at all."""
 _FOLLOWS = re.compile(
     rf"\b(?:so|therefore|thus|hence),?\s(?:(?:block|candidate|index)\s){{0,2}}{INTEGER}"
-    r"\s(?:has to|must|should|needs to|is to|will)?\s?(?:be|is|comes?|goes?)\s(?:next|now)\b"
-    r"(?![^.;\n]{0,80}(?:\bor\b|\?))",
+    r"\s(?:has to|must|should|needs to|is to|will)?\s?(?:be next|is next|(?:come|go)(?:e?s)?"
+    r"\s(?:next|now))(?=\s{0,2}(?:[.,;!()\u2014]|\Z|\b(?:and|as|because|since|while|before)\b))(?![^.;\n]{0,80}(?:\bor\b|\?))",
     re.IGNORECASE,
 )
+"""What comes next, where that ends the clause: not "next to block 2", and not "is now stable"."""
 _COUNTED = re.compile(r"\d{1,2}[.)]\s")
 _DONE_SENTENCE = re.compile(
     rf"(?:\A|[.!?:\u2014]\s{{1,3}}|;\s{{0,3}}|(?:->|\u2192|(?P<then>\bthen))\s{{0,3}}){DONE}\s{{0,2}}[.!]?\Z",
@@ -162,7 +163,7 @@ def _concluded(_: str, lines: list[str]) -> list[Operation]:
     """The operation that the last sentence comes to: "Move(3) failed, so Move(5)"."""
     follows = [number_of(match["number"]) for match in _FOLLOWS.finditer(lines[-1])]
     if follows:
-        return [*follows]
+        return [*follows, *_in_last_line(_, lines)]
     concludes = _CONCLUDES.search(lines[-1]) if len({*mentions(lines[-1])}) > 1 else None
     return [operation_of(concludes)] if concludes else []
 

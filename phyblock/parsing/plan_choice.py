@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 from phyblock.parsing.listing import Listing
 from phyblock.parsing.plan_patterns import (
     CHOICE,
+    CORRECTS,
     EXPLANATION,
     FINAL_LABEL,
     HEADING_CHARS,
@@ -16,7 +18,7 @@ from phyblock.parsing.plan_patterns import (
     PART,
     REVISION,
 )
-from phyblock.parsing.speech import REVISED
+from phyblock.parsing.speech import TAKES_BACK, words
 
 __all__ = ["PlanLists", "chosen", "plans_of"]
 
@@ -91,17 +93,34 @@ def _relation(passed: list[str], plans: list[PlanLists], listing: Listing) -> st
 
 
 def _replaces(lines: list[str], listing: Listing, before: Listing) -> bool:
-    """Whether whole steps come anew behind an explanation that turns from those before it."""
+    """Whether whole steps come anew behind an explanation that corrects those before it.
+
+    Steps that are fewer go over a part of the plan, unless words take back what stands there.
+    """
     is_whole = listing.form == "steps" and listing.own[:1] == [1] and len(listing.own) > 1
-    is_other = is_whole and listing.numbers != before.numbers
-    return is_other and any(map(REVISED.search, lines))
+    if not is_whole or listing.numbers == before.numbers:
+        return False
+    is_as_long = len(listing.numbers) >= len(before.numbers)
+    return any(
+        _TAKES_BACK.search(line) or (is_as_long and CORRECTS.search(line) and _NUMBER.search(line))
+        for line in lines
+    )
+
+
+_TAKES_BACK = words(TAKES_BACK)
+_NUMBER = re.compile(r"\d")
 
 
 def _is_announced(lines: list[str], listing: Listing) -> bool:
     """Whether a list behind an explanation is said to be the plan after all."""
     if listing.form == "json" or (listing.form == "labeled" and FINAL_LABEL.search(listing.label)):
         return True
-    return len(lines) > 1 and len(lines[-1]) < HEADING_CHARS and bool(REVISION.search(lines[-1]))
+    last = _ARGUES.sub("", lines[-1]) if lines else ""
+    return len(lines) > 1 and len(lines[-1]) < HEADING_CHARS and bool(REVISION.search(last))
+
+
+_ARGUES = re.compile(r"\b(?:so|thus|therefore)\b(?!.*[:\uff1a]\W*\Z)", re.IGNORECASE)
+"""Words that conclude of the plan; of a list they do so with a colon."""
 
 
 def chosen(plans: list[PlanLists], answer: str) -> PlanLists | None:

@@ -19,22 +19,16 @@ from phyblock.parsing.mention import named_blocks
 from phyblock.parsing.plan_claims import PLACE_OR_TIMES, counts_hold, places_hold
 from phyblock.parsing.plan_patterns import (
     CATALOGUE_WORD,
+    CORRECTS,
     EXPLANATION,
     NOT_MEANT,
     REVISION,
 )
 from phyblock.parsing.plan_rank import LAST, NO, is_announced, rank_of
-from phyblock.parsing.speech import TAKES_BACK, words
 from phyblock.parsing.text_forms import SENTENCES
 
 __all__ = ["is_doubtful"]
 
-_CORRECTS = words(
-    TAKES_BACK,
-    r"\b(?:(?:should|must|has to|needs to) be|should (?:have been|read)|swap(?:ped)?|sondern"
-    r"|muss)\b"
-    r"|(?:^|[.;:!,]\s)(?:replace|insert|change)\s|应该是|改为|正しくは",
-)
 _DROPS = re.compile(
     r"\b(?:forget|scrap|disregard|vergiss|(?:don['\u2019]t|do not) (?:use|trust|take))"
     r"\s(?:the|that|this|it|what|any|d\w\w)\b"
@@ -195,7 +189,7 @@ def _is_corrected(lines: Sequence[str], order: Sequence[int]) -> bool:
     for line in lines:
         line = PLACE_OR_TIMES.sub(" ", line)
         is_explained = is_explained or bool(EXPLANATION.search(line))
-        if (_CORRECTS.search(line) and _NUMBER.search(line)) or _DROPS.search(line):
+        if (CORRECTS.search(line) and _NUMBER.search(line)) or _DROPS.search(line):
             return True
         again = _STEP_AGAIN.search(line)
         if again and (again["then"] or not again[0].lower().startswith("step")):

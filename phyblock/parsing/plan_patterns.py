@@ -13,6 +13,7 @@ __all__ = [
     "BLOCK_WORD",
     "CATALOGUE_WORD",
     "CHOICE",
+    "CORRECTS",
     "DOWNWARD",
     "EXAMPLE",
     "EXPLANATION",
@@ -103,6 +104,13 @@ REVISION = words(
     r"final|correct|revis|updat|actual|summar|complete|overall|optimi|improv|attempt|error"
     r"|\btry\b|new plan|reconsider|\b(?:instead|answer|again|better|so|thus|therefore|output)\b",
 )
+CORRECTS = words(
+    TAKES_BACK,
+    r"\b(?:(?:should|must|has to|needs to) be|should (?:have been|read)|swap(?:ped)?|sondern"
+    r"|muss)\b"
+    r"|(?:^|[.;:!,]\s)(?:replace|insert|change)\s|应该是|改为|正しくは",
+)
+"""That something else is to stand where something stands, in a line that says what by number."""
 PART = re.compile(
     r"structure|layer|level|\b(?:left|right|cent(?:er|re)|middle|upper|lower|bottom|top|base|part"
     r"|section|component|side"

@@ -74,6 +74,7 @@ def _rank_of_label(listing: Listing, heading: str, *, is_catalogue: bool) -> int
     if (
         NOT_MEANT.search(f"{label}:")
         or _names_catalogue(label)
+        or (_MEASURES.search(label) and not PLAN_WORD.search(label))
         or re.match(
             r"\W*(?:the )?(?:top|upper|roof)\b.*(?:bottom|base|ground|lower)\b(?! to)", label, re.I
         )
@@ -94,6 +95,14 @@ def _rank_of_label(listing: Listing, heading: str, *, is_catalogue: bool) -> int
     if len(parts) > 1 and not all(is_layer) and "[" not in label:
         return NO
     return LAST if many and not is_catalogue and (is_short or LAYERS.match(label)) else NO
+
+
+_MEASURES = re.compile(
+    r"\b(?:heights|widths|lengths|depths|sizes|distances|counts|supports)\W*\Z"
+    r"|\bthe (?:\w+ )?(?:layers|levels|rows|tiers|storeys|floors)\W*\Z",
+    re.IGNORECASE,
+)
+"""Labels of numbers that count or measure."""
 
 
 def _names_catalogue(title: str) -> bool:

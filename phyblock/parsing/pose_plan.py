@@ -23,7 +23,7 @@ from phyblock.parsing.pose_step import (
     read_step,
     step_label,
 )
-from phyblock.parsing.text_forms import answer_of, plain_line
+from phyblock.parsing.text_forms import BOX, TAG, answer_of, plain_line
 
 __all__ = [
     "MOST_POSE_STEPS",
@@ -156,6 +156,8 @@ def _of_text(text: str, *, free: bool) -> ParsedPoses:
         return ParsedPoses(PosePlan(), None, "thoughts_only")
     if not answer.strip():
         return ParsedPoses(PosePlan(), None, "empty")
+    for frame in (TAG, BOX):
+        answer = frame.sub(r"\n\g<value>\n", answer)
     lines = answer.replace(_MINUS, "-").splitlines()[:_MOST_LINES]
     entries = _entries(lines, free=free)
     if not entries:

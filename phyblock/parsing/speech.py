@@ -39,20 +39,27 @@ _IF = (
     r"(?! (?:I|we) (?:had|have|must)\b)|如果|否则|取决于"
 )
 _MAY = r"\b(?:could|might|let me know|könnte|peut|podría)\b|可以"
+_PICTURE = r"\b(?:image|picture|photo|goal|structure)"
 _DECLINES = (
     r"\bI(?:['\u2019]m| am) (?:sorry|unable|not able|afraid)"
     r"|\bI (?:cannot|can['\u2019]?t|could not|won['\u2019]t|am not able|apologi[sz]e)"
     r"|\b(?:cannot|can['\u2019]?t|not possible to|impossible to|unable to) (?:determine|give"
     r"|provide|build|produce|see|view|make|create|identify|plan|be built)"
-    r"|as an ai|please (?:provide|send|upload|share)|(?:is|are) not visible|need to see"
-    r"|\bno (?:image|picture|(?:valid )?plan)\b"
-    r"|ich kann (?:das |die |den |leider )?(?:\w+ )?(?:nicht|kein)|leider|无法|抱歉|不能确定"
+    r"|as an ai|please (?:provide|send|upload|share)"
+    r"|ich kann (?:das |die |den |leider )?(?:\w+ )?(?:nicht|kein)|无法|抱歉|不能确定"
     r"|lo siento|désolé|не могу"
 )
+_NO_PLAN = (
+    rf"\bno (?:valid )?plan\b|leider|(?<!of )(?<!of the ){_PICTURE}s? (?:is|are) not visible"
+    rf"|need to see (?:the |an? |your )?{_PICTURE}"
+    r"|\bno (?:image|picture)s? (?:(?:is|was|were|has|have) )?(?:been )?"
+    r"(?:here|attached|available|given|included|provided|sent|supplied|uploaded)\b"
+)
+"""Not to see the picture is a reason to decline, not to see the back of a block is none."""
 _CANNOT = (
     r"\b(?:cannot|can['\u2019]?t|could not|couldn['\u2019]t|unable to|not able to|impossible to"
     r"|not possible to|insufficient|not enough|(?:don['\u2019]t|do not) know|not sure|unclear"
-    r"|none of the|neither(?![^.;\n]{1,60}\bnor\b))\b"
+    r"|no (?:image|picture)|none of the|neither(?![^.;\n]{1,60}\bnor\b))\b"
 )
 
 
@@ -67,7 +74,7 @@ CONDITIONAL = words(_IF)
 """That what is said holds only under a condition."""
 SUPPOSES = words(_IF, _MAY)
 """That what is said is only thought of."""
-REFUSAL = words(_DECLINES)
+REFUSAL = words(_DECLINES, _NO_PLAN)
 UNSURE = words(_DECLINES, _CANNOT)
 """That the reply cannot tell, in a text as short as an answer is."""
 
@@ -83,12 +90,19 @@ BACKWARD = re.compile(
 )
 """That a list stands in the opposite order."""
 
+_ORDER = r"(?:order\w*|sequence|list|ranking|arrangement)"
+_MUST_BE = r"\s(?:ha(?:s|ve) to|must|should|needs? to|is to) be (?:\w+ )?"
 TURNED_ROUND = re.compile(
-    r"\b(?:ha(?:s|ve) to|must|should|needs? to|is to) be (?:\w+ )?(?:turned|reversed|flipped"
-    r"|inverted|read (?:backwards?|from))|\b(?:turn|reverse|flip) (?:it|this|that|the order)\b",
+    rf"\b{_ORDER}(?:[^.!?\n]{{0,60}}?\b(?:it|this|that|which))?{_MUST_BE}"
+    r"(?:turned|reversed|flipped|inverted)"
+    rf"|(?:\A|[.,;:!)\n\u2013\u2014-])\s{{0,3}}(?:\w+,? )?(?:it|this|that){_MUST_BE}"
+    r"(?:reversed|inverted)"
+    rf"|{_MUST_BE}read (?:backwards?|from)"
+    rf"|\b(?:turn|reverse|flip|invert) (?:the|this|that) (?:\w+ )?{_ORDER}\b"
+    r"|\breverse (?:it|this|that)\b(?! [^\W\d])",
     re.IGNORECASE,
 )
-"""That an order is to be taken the other way round."""
+"""That an order is to be taken the other way round; a block that "must be turned" says no such."""
 
 PLACES = {
     name: place

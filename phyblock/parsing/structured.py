@@ -26,7 +26,7 @@ from phyblock.parsing.json_keys import (
 )
 from phyblock.parsing.json_values import Fields, cut_off, decoded, objects, whole_number
 from phyblock.parsing.mention import MOST_AT_ONCE
-from phyblock.parsing.plan_patterns import DOWNWARD
+from phyblock.parsing.plan_patterns import DOWNWARD, NOT_REVERSED
 from phyblock.parsing.speech import BACKWARD, TAKES_BACK, words
 from phyblock.parsing.statement import read_statement
 from phyblock.parsing.text_forms import plain_line
@@ -137,15 +137,22 @@ def _object(fields: Fields, *, is_plan: bool) -> list[int]:
     if _is_step(fields):
         return _step(fields)
     found = _ordered(fields, is_plan=is_plan)
-    is_reversed = any(
-        BACKWARD.search(value) if isinstance(value, str) else _says_down(plain_line(key))
-        for key, value in fields
+    return (
+        found[::-1] if any(_says_down(plain_line(key), value) for key, value in fields) else found
     )
-    return found[::-1] if is_reversed else found
 
 
-def _says_down(key: str) -> bool:
-    return bool(BACKWARD.search(key) or DOWNWARD.search(key))
+_YES = ("true", "yes")
+
+
+def _says_down(key: str, value: Any) -> bool:
+    """Whether a field says that the list stands in the opposite order, by its text or its key.
+
+    A key says so of a list, or where it is answered with yes: `{"reverse": false}` denies it.
+    """
+    if isinstance(value, str) and value.strip(" .!").lower() not in _YES:
+        return bool(BACKWARD.search(value) and not NOT_REVERSED.search(value))
+    return bool(value and (BACKWARD.search(key) or DOWNWARD.search(key)))
 
 
 def _ordered(fields: Fields, *, is_plan: bool) -> list[int]:

@@ -32,7 +32,7 @@ _NEXT_TURN = re.compile(
 _STRUCK_OUT = re.compile(
     r"~~[^~\n]{1,400}~~|<(?:del|s)>[^<>\n]{1,400}</(?:del|s)>|<!--(?:(?!<!--).){0,4000}?-->"
 )
-_FRAMED = re.compile(r"<\|begin_of_box\|>([^<>{}]{1,4000})(?:<\|end_of_box\|>|\Z)")
+_FRAMED = re.compile(r"<\|begin_of_box\|>((?:[^<{}]|<(?!\|)){1,4000})(?:<\|end_of_box\|>|\Z)")
 _DEFINED = re.compile(
     r"(?P<before>(?:\(|: ?))(?P<name>[NX])(?P<between>\)?)"
     r",? (?:where|with) (?P=name) ?= ?(?P<value>\d{1,3}|[A-Z])\b"

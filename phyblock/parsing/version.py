@@ -10,8 +10,10 @@ READER_VERSION = 5
 """Of the readers of plans, answers and moves, and of the JSON forms in which they are asked for; it
 goes up when any reply can be read otherwise, or is asked for in another form.
 """
-POSE_READER_VERSION = 2
-"""Of the reader of plans with poses alone; raised when any reply can be read otherwise."""
+POSE_READER_VERSION = 3
+"""Of the reader of plans with poses; it goes up when any reply can be read otherwise, also by what
+it shares with the other readers (thoughts, frames, marks).
+"""
 
 
 def reader_version(parser: PlanParser) -> int:

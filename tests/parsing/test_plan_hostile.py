@@ -358,6 +358,59 @@ ALIKE: list[tuple[str, tuple[int, ...] | None]] = [
 ]  # fmt: skip
 """Written after that, of the same kinds: counts, ranges, what goes on with a number alone."""
 
+STEPS = "Step 1: block 3\nStep 2: block 5\nStep 3: block 7"
+ITEMS = "1. Block 3\n2. Block 5\n3. Block 7"
+NEIGHBOURS: list[tuple[str, tuple[int, ...] | None]] = [
+    # Explanations that go over a part of the plan, and corrections.
+    (f"{STEPS}\n\nExplanation:\nHowever, some supports matter.\nStep 1: block 3\nStep 2: block 5", (3, 5, 7)),
+    (f"{STEPS}\n\nCheck:\nBut block 3 is low.\nStep 1: block 3\nStep 2: block 5", (3, 5, 7)),
+    (f"{STEPS}\n\nVerification:\nTherefore it stands.\nStep 1: block 3\nStep 2: block 5", (3, 5, 7)),
+    (f"{STEPS}\n\nNote:\nSo far so good.\nStep 1: block 3\nStep 2: block 7", (3, 5, 7)),
+    (f"{STEPS}\n\nExplanation:\nBut blocks 5 and 3 carry.\nStep 1: block 5\nStep 2: block 3\nStep 3: block 7", (3, 5, 7)),
+    (f"{STEPS}\n\nCheck:\nSo step 2 has to be 6. The rest holds.\n\nStep 1: block 3\nStep 2: block 6\nStep 3: block 7", (3, 6, 7)),
+    (f"{STEPS}\n\nCheck:\nWait, I overlooked that 7 is a distractor.\nStep 1: block 3\nStep 2: block 5", (3, 5)),
+    (f"{STEPS}\n\nCheck:\nThe roof is heavy. So it goes:\nStep 1: block 5\nStep 2: block 3\nStep 3: block 7", (5, 3, 7)),
+    # Not to see the back is no refusal; not to see the picture is one.
+    (f"There is no picture of the back.\n{ITEMS}", (3, 5, 7)),
+    (f"{ITEMS}\nThere is no picture of the back.", (3, 5, 7)),
+    (f"No picture shows the rear.\n{ITEMS}", (3, 5, 7)),
+    (f"The back of the structure is not visible.\n{ITEMS}", (3, 5, 7)),
+    (f"I need to see the back, but here is a plan.\n{ITEMS}", (3, 5, 7)),
+    (f"The image is not visible.\n{ITEMS}", None),
+    (f"No image was provided. It could be:\n{ITEMS}", None),
+    # A length, a size, a height is no count.
+    ("1. Put the 3 cm tall blocks with index 6", (6,)),
+    ("1. Put the 5 mm thin blocks with index 6\n2. Put block 1", (6, 1)),
+    ("1. Put the 2.5 cm cubes with index 6\n2. Put block 1", (6, 1)),
+    ("1. Put the 4 inch blocks with index 6\n2. Put block 1", (6, 1)),
+    ("1. Put the 90 degrees turned blocks with index 6\n2. Put block 1", (6, 1)),
+    ("1. Put the 10 x 5 blocks with index 6\n2. Put block 1", (6, 1)),
+    ("1. At height 3 put blocks with index 6\n2. Put block 1", (6, 1)),
+    ("1. On stage 2 stack blocks of index 6\n2. Put block 1", (6, 1)),
+    ("1. Put the 3 red blocks with index 6\n2. Put block 1", (6, 6, 6, 1)),
+    ("1. Place 2 of the blocks with index 6\n2. Put block 1", (6, 6, 1)),
+    # Numbers that are said of the plan, and those that are it.
+    ("The layers are now 2, 3, 4.", None),
+    ("The layers are 2, 3, 4.", None),
+    ("The heights are 2, 3, 4.", None),
+    ("The supports are now 2, 3, 4.", None),
+    ("The top layer is now 2, 3, 4.", None),
+    ("The blocks left are now 2, 3, 4.", None),
+    ("The order is now 2, 3, 4.", (2, 3, 4)),
+    ("The steps are therefore 2, 3, 4.", (2, 3, 4)),
+    ("The full plan is therefore 2, 3, 4.", (2, 3, 4)),
+    ("The order of the layers is 2, 3, 4", (2, 3, 4)),
+    ("Layers: 2, 3, 4", (2, 3, 4)),
+]  # fmt: skip
+"""Replies beside those from which a rule was learned: alike in words and other in meaning."""
+
+
+@pytest.mark.parametrize(("text", "plan"), NEIGHBOURS)
+def test_what_is_only_alike_in_words_is_not_read_alike(
+    text: str, plan: tuple[int, ...] | None
+) -> None:
+    assert reading(text) == plan
+
 
 @pytest.mark.parametrize(("text", "plan"), PLANS)
 def test_a_hard_plan_is_read_as_it_is_meant(text: str, plan: tuple[int, ...]) -> None:

@@ -48,6 +48,16 @@ JSON: list[Row] = [
     ('{"moves": ["Move(3)", "Move(5)"], "done": true}', (3, 5)),
     ('[3, 5, 12]', (3, 5, 12)),
     ('{"计划": [3, 5, 12]}', (3, 5, 12)),
+    ('{"reverse": false, "plan": [3, 5, 7]}', (3, 5, 7)),
+    ('{"is_reversed": false, "plan": [3, 5, 7]}', (3, 5, 7)),
+    ('{"reversed": null, "plan": [3, 5, 7]}', (3, 5, 7)),
+    ('{"reversed": "no", "plan": [3, 5, 7]}', (3, 5, 7)),
+    ('{"top_down": 0, "plan": [3, 5, 7]}', (3, 5, 7)),
+    ('{"order": "not reversed", "plan": [3, 5, 7]}', (3, 5, 7)),
+    ('{"note": "Do not build it in reverse order", "plan": [3, 5, 7]}', (3, 5, 7)),
+    ('{"reverse_order": true, "plan": [3, 5, 7]}', (7, 5, 3)),
+    ('{"reversed": "Yes.", "plan": [3, 5, 7]}', (7, 5, 3)),
+    ('{"top_to_bottom": [3, 5, 7]}', (7, 5, 3)),
 ]  # fmt: skip
 
 FRAMES: list[Row] = [

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 
 import pytest
@@ -12,7 +13,13 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 from phyblock.domain import PoseStep
-from phyblock.parsing import MOST_POSE_STEPS, POSE_PROBLEMS, parse_poses, pose_form
+from phyblock.parsing import (
+    MOST_POSE_STEPS,
+    POSE_PROBLEMS,
+    POSE_READER_VERSION,
+    parse_poses,
+    pose_form,
+)
 
 P = [(3, (5.0, 10.0, 2.5)), (5, (0.0, -5.0, 7.5))]
 TWO = "Step1: block 3 at (5, 10, 2.5)\nStep2: block 5 at (0, -5, 7.5)"
@@ -59,6 +66,41 @@ def test_what_means_one_thing_is_read(text: str) -> None:
     parsed = parse_poses(text, 16, free=False)
     assert parsed.problem is None
     assert [(s.candidate, pytest.approx(s.center_cm)) for s in parsed.plan.steps] == P
+
+
+FRAMES = (
+    *("<answer>{}</answer>", "<answer>\n{}\n</answer>", "\\boxed{{{}}}", "$\\boxed{{\n{}\n}}$"),
+    *("<|begin_of_box|>{}<|end_of_box|>", "<|begin_of_box|>\n{}\n<|end_of_box|>"),
+    *("<think>It stands.</think>{}", "~~Step1: block 9 at (1, 1, 1)~~\n{}", "{}<|im_end|>user"),
+)
+FRAMED = [
+    TWO,
+    TWO.replace("5, 10", "5,\\ 10"),
+    TWO.replace("at", "->"),
+    plan(STEP),
+    "Step1: block 3 at (1, 2, 3)",
+]
+
+
+@pytest.mark.parametrize("text", FRAMED)
+def test_a_frame_around_a_plan_changes_nothing(text: str) -> None:
+    alone = parse_poses(text, 16, free=False)
+    assert alone.plan.steps
+    framed = {frame: parse_poses(frame.format(text), 16, free=False) for frame in FRAMES}
+    assert {frame: parsed.plan for frame, parsed in framed.items()} == dict.fromkeys(
+        FRAMES, alone.plan
+    )
+    if "{" not in text:
+        behind_a_draft = f"Step1: block 9 at (1, 1, 1)\n\\boxed{{{text}}}"
+        assert parse_poses(behind_a_draft, 16, free=False).problem == "two_plans"
+
+
+def test_readings_of_stored_texts_change_with_the_version_alone() -> None:
+    """A new row changes the digest; a row that is read otherwise than before raises the version."""
+    texts = [*READ, *(text for text, _ in REFUSED), *(f.format(t) for f in FRAMES for t in FRAMED)]
+    readings = [parse_poses(text, 16, free=free) for text in texts for free in (False, True)]
+    digest = hashlib.sha256(repr(readings).encode()).hexdigest()[:16]
+    assert (POSE_READER_VERSION, digest) == (3, "737bdc6a25256808")
 
 
 def one(rest: str, label: str = "Step1: ") -> str:
