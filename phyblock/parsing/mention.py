@@ -141,8 +141,8 @@ _SO_MANY = re.compile(
 _OF_KIND = re.compile(r"\b(?:of|with|mit|index)\b", re.IGNORECASE)
 _SO_MANY_OF = re.compile(
     r"(?<!step )(?<!layer )(?<!level )(?<!row )(?<!stage )(?<!phase )(?<!height )(?<!position )"
-    rf"(?<![\d.,])(?<![x×] )\b(?P<n>\d{{1,2}}){_UNIT}"
-    r"(?!\s?(?:in(?:ch(?:es)?)?|ft|feet|foot|dm|units?|deg|percent|layers?|levels?|rows?|steps?)\b)"
+    r"(?<![\d.,])(?<![x×] )\b(?P<n>\d{1,2})(?!\s?(?:[cdm]?m|in(?:ch(?:es)?)?|ft|feet|foot|units?"
+    r"|deg(?:rees?)?|percent|layers?|levels?|rows?|steps?)\b)"
     rf"\s(?:(?!{VERB})[^\W\d]{{2,12}}\s){{0,2}}\Z",
     re.IGNORECASE,
 )

@@ -162,7 +162,7 @@ def _labeled(_: str, lines: list[str]) -> list[Operation]:
 def _concluded(_: str, lines: list[str]) -> list[Operation]:
     """The operation that the last sentence comes to: "Move(3) failed, so Move(5)"."""
     follows = [number_of(match["number"]) for match in _FOLLOWS.finditer(lines[-1])]
-    if follows:
+    if follows and not _CHOSEN.search(lines[-1]):
         return [*follows, *_in_last_line(_, lines)]
     concludes = _CONCLUDES.search(lines[-1]) if len({*mentions(lines[-1])}) > 1 else None
     return [operation_of(concludes)] if concludes else []

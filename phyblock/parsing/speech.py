@@ -90,7 +90,7 @@ BACKWARD = re.compile(
 )
 """That a list stands in the opposite order."""
 
-_ORDER = r"(?:order\w*|sequence|list|ranking|arrangement)"
+_ORDER = r"(?:order\w*|sequence|list(?:ing)?|letters|ranking|arrangement)"
 _MUST_BE = r"\s(?:ha(?:s|ve) to|must|should|needs? to|is to) be (?:\w+ )?"
 TURNED_ROUND = re.compile(
     rf"\b{_ORDER}(?:[^.!?\n]{{0,60}}?\b(?:it|this|that|which))?{_MUST_BE}"

@@ -175,6 +175,7 @@ ORDERS: list[tuple[str, str | None]] = [
     ("Answer: B, A, C, D. The block must be reversed so that its flat side is below.", "BACD"),
     ("Answer: B, A, C, D. In this list the arch must be turned.", "BACD"),
     ("Answer: B, A, C, D. The order must be reversed.", None),
+    ("Answer: B, A, C, D. The letters must be reversed.", None),
     ("Answer: B, A, C, D. This sequence has to be turned around.", None),
     ("Answer: B, A, C, D. Reverse the order.", None),
     ("Answer: B, A, C, D. It should be read backwards.", None),

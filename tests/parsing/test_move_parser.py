@@ -176,6 +176,7 @@ REPLIES: tuple[tuple[str, Outcome], ...] = (
     ("Block 3 stands, so 4 comes next and 5 last.", 4),
     ("Therefore 12 must come next (it carries the roof).", 12),
     ("So block 3 is next, and Move(3) it is.", 3),
+    ("So 3 is next; I choose candidate 5.", 5),
     ("So block 3 comes next, but Move(4) first.", "several_moves"),
     ("Move(2) failed, so block 3 is next.", "several_moves"),
     ("Therefore block 3 is next. Done.", "move_and_done"),

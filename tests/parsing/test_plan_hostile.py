@@ -388,6 +388,7 @@ NEIGHBOURS: list[tuple[str, tuple[int, ...] | None]] = [
     ("1. At height 3 put blocks with index 6\n2. Put block 1", (6, 1)),
     ("1. On stage 2 stack blocks of index 6\n2. Put block 1", (6, 1)),
     ("1. Put the 3 red blocks with index 6\n2. Put block 1", (6, 6, 6, 1)),
+    ("1. Put 2 more blocks with index 6\n2. Put block 1", (6, 6, 1)),
     ("1. Place 2 of the blocks with index 6\n2. Put block 1", (6, 6, 1)),
     # Numbers that are said of the plan, and those that are it.
     ("The layers are now 2, 3, 4.", None),
