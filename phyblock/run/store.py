@@ -195,6 +195,13 @@ def _reasons(found: Manifest, wanted: Manifest) -> Iterator[str]:
     if engines[0] != engines[1] and engines[0].keys() == engines[1].keys():
         was, is_now = (one.engine or REFERENCE_ENGINE for one in (found, wanted))
         yield f"its blocks are let go in {was}, here in {is_now} ({PHYSICS_VARIABLE} chooses)"
+    read, reads = (one.versions.get("readers") for one in (found, wanted))
+    if read != reads:
+        yield (
+            f"its replies were read by readers {read or 1}, this version has readers {reads}: "
+            "phyblock score FOLDER reads and scores them again and asks nobody, and a run in "
+            "another folder takes them from the reply cache"
+        )
     for track, about in wanted.tracks.items():
         if track in found.tracks and found.tracks[track].get(CARRYING) != about.get(CARRYING):
             yield (

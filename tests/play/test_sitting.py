@@ -370,6 +370,8 @@ def test_what_no_picture_shows_is_picked_by_a_button_beside_number_fields(browse
         page.context.close()
 
 
+KEPT = "JSON.parse(localStorage.getItem(localStorage.key(0)))"
+"""What the page without a server has stored."""
 BOB = ("play", "suite.yaml", "--name", "bob", "--consent", "consent.txt")
 
 
@@ -387,6 +389,8 @@ def test_a_folder_without_a_server_gives_its_answers_as_a_file(
     for number in range(1, 11):
         task(page, number)
         if number == 3:
+            while (spent_s := page.evaluate(f"{KEPT}?.before") or 0.0) < 0.4:
+                page.wait_for_timeout(50)
             page.reload()
             page.get_by_text("8 tasks of 10 are left").wait_for()
             page.get_by_role("button", name="I agree").click()
@@ -418,6 +422,7 @@ def test_a_folder_without_a_server_gives_its_answers_as_a_file(
     assert done.code == 0, done.err
     records = answered(workspace.root / "bob")
     assert {record["model"] for record in records} == {"human:bob"}
+    assert content["answers"][2]["took_s"] > spent_s, "a reload sets the clock back"
     assert [*map(said, records[:3])] == [plan(4)] * 3
     assert {*map(said, records[3:7])} == {"Answer: D", "Answer: C, D, A, B"}
     assert {*map(said, records[7:])} == {poses("4 at (-1, 0.5, 2.5) turned (0, 0, 0)")}

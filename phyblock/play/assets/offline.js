@@ -15,20 +15,32 @@ const Desk = (() => {
 
   const key = (sitting) => `phyblock ${sitting.head.run} ${sitting.head.model}`;
   const ready = loaded.then((sitting) => {
-    takeUp(sitting);
+    takeUp(sitting, { isNew: true });
+    setInterval(() => keep(sitting), 500);
     if (state.answers.length === sitting.questions.length) state.phase = "saved";
     return sitting;
   });
 
-  /** Take up what another tab has stored since; whether it had. */
-  function takeUp(sitting) {
-    const kept = JSON.parse(localStorage.getItem(key(sitting)) || "null");
-    if (!kept || kept.answers.length <= state.answers.length) return false;
-    Object.assign(state, { agreed: kept.agreed, answers: kept.answers, since: null, before: 0 });
+  const stored = (sitting) => JSON.parse(localStorage.getItem(key(sitting)) || "null");
+
+  /** Take up what another tab has stored since, or what was stored before the page was opened;
+      whether there was any. */
+  function takeUp(sitting, { isNew } = {}) {
+    const kept = stored(sitting);
+    if (!kept || (!isNew && kept.answers.length <= state.answers.length)) return false;
+    Object.assign(state, { agreed: kept.agreed, answers: kept.answers, since: null, before: kept.before || 0 });
     return true;
   }
 
   const elapsed = () => state.before + (state.since === null ? 0 : (performance.now() - state.since) / 1000);
+
+  /** Store answers and how long the next has taken, so that a reload sets no clock back; unless
+      another tab is further. */
+  function keep(sitting) {
+    if (!state.agreed || (stored(sitting)?.answers.length ?? 0) > state.answers.length) return;
+    const { agreed, answers } = state;
+    localStorage.setItem(key(sitting), JSON.stringify({ agreed, answers, before: elapsed() }));
+  }
 
   function goTo(phase) {
     state.phase = phase;
@@ -73,7 +85,7 @@ const Desk = (() => {
       const { picks, numbers } = body;
       const answer = { number: state.answers.length + 1, picks, numbers, took_s: Math.round(1000 * elapsed()) / 1000 };
       const answers = [...state.answers, answer];
-      localStorage.setItem(key(sitting), JSON.stringify({ agreed: state.agreed, answers }));
+      localStorage.setItem(key(sitting), JSON.stringify({ agreed: state.agreed, answers, before: 0 }));
       Object.assign(state, { answers, since: null, before: 0 });
       question();
     }

@@ -49,8 +49,6 @@ PAPER = "paper"
 """The folder in a run's folder where figures for papers are, unless another is named."""
 _FOLDER = "figures"
 _FORMS: Mapping[str, Callable[[Figure], bytes]] = {"svg": svg_bytes}
-_EARLIER_FORMS = ("png",)
-"""What earlier versions drew as well: it would stay as it is while the figure changes."""
 _PAPER_FORMS: Mapping[str, Callable[[Figure], bytes]] = {
     "pdf": pdf_bytes,
     "svg": svg_bytes,
@@ -135,7 +133,6 @@ def write_figures(run: Run, names: Sequence[str] | None = None) -> tuple[Path, .
         return ()
     folder = run_folder(run.path)
     folder.check(figure_files(wanted))
-    folder.remove(f"{_FOLDER}/{name}.{ending}" for name in makers for ending in _EARLIER_FORMS)
     files: list[Path] = []
     with styled(PAGE_LOOK):
         for name in wanted:
