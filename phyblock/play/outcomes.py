@@ -53,7 +53,7 @@ def _track(
         if track not in other.design.suite.tracks:
             continue
         try:
-            check_alike(other, run, [part.cell], track)
+            check_alike(other, run, [part.cell], track, what.measure)
         except SpecError as error:
             notes.append(f"Left out, as it cannot be compared: {one_line(str(error))}")
         else:

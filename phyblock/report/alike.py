@@ -11,13 +11,14 @@ from phyblock.errors import Problem, SpecError
 from phyblock.plain_text import counted
 from phyblock.records.manifest import ManifestDataset, ManifestQuestions
 from phyblock.tables.load import Run
+from phyblock.tables.measures import Measure
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["check_alike"]
 
 
-def check_alike(run: Run, first: Run, cells: Sequence[str], track: str) -> None:
-    """Raise SpecError where `run` cannot be compared with `first` in these cells of a track.
+def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure: Measure) -> None:
+    """Raise SpecError where `run` cannot be compared with `first` by a measure in these cells.
 
     The track says what must agree in how the two were asked and scored; scenes of a name must be
     the same.
@@ -26,7 +27,7 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str) -> None:
     _check_variants(run, first)
     check = kind_of(track).report().check_alike
     if check is not None:
-        check(run, first, cells)
+        check(run, first, cells, measure)
     _check_scenes(run, first)
 
 

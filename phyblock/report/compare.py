@@ -163,7 +163,7 @@ def compare(
     sides = {side.label: side for pair in pairs for side in pair}
     runs = list({id(side.run): side.run for side in sides.values()}.values())
     for run in runs[1:]:
-        check_alike(run, runs[0], [part.cell for part in parts], what.track)
+        check_alike(run, runs[0], [part.cell for part in parts], what.track, what.measure)
     parents = pd.concat([parents_of(run) for run in runs]).groupby(level=0).first()
     labels = [(a.label, b.label) for a, b in pairs]
     tables: list[pd.DataFrame] = []

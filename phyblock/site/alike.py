@@ -11,7 +11,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.site.runs import SiteRun
 from phyblock.specs.sections import ImagesSpec
 from phyblock.tables.load import Run
-from phyblock.tracks.base import CARRYING, ENGINE, READER
+from phyblock.tracks.base import CARRYING, ENGINE, FIRST_CARRYING, READER
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["check_runs_alike"]
@@ -20,8 +20,6 @@ _ASKED_ANEW = ("pictures", READER)
 """What a track's identity says that may differ: digests of pictures, which change with their size,
 and who read the replies.
 """
-_FIRST_CARRYING = 1
-"""How plans were carried out before runs said so."""
 _CONTROLS = frozenset({"blind", "wrong_image", "prompt", "path"})
 """What a track's section of the suite says that is shown with the run, or known by its digest."""
 _HINT = "make a site of each"
@@ -109,7 +107,7 @@ def _facts(run: Run, shared: Sequence[str]) -> Iterator[tuple[str, Any]]:
         if ENGINE not in manifest.tracks.get(track, {}):
             yield f"tracks.{track}.{ENGINE}", "the engine of reference"
         if CARRYING not in manifest.tracks.get(track, {}):
-            yield f"tracks.{track}.{CARRYING}", _FIRST_CARRYING
+            yield f"tracks.{track}.{CARRYING}", FIRST_CARRYING
 
 
 def _said(name: str, section: BaseModel, without: Collection[str]) -> Iterator[tuple[str, Any]]:

@@ -188,9 +188,9 @@ class TrackReport:
 
     `tables`, `figures` and `paper_tables` (by their number in the paper) are its own. `main_figure`
     is the name of the figure of its main measure, else that of the track. `check_alike` raises
-    SpecError where the first run cannot be compared with the second in these cells. `part_names`
-    say what `Record.part` stands for. `items` opens, for the page of a run, what was asked about
-    where that is more than scenes; it raises DataError where that is not what the run was made on.
+    SpecError where the first run cannot be compared with the second in these cells by a measure.
+    `part_names` say what `Record.part` stands for. `items` opens, for the page of a run, what was
+    asked about where that is more than scenes; it raises DataError where that is not what the run was made on.
     `episodes` shows records that are episodes, `export` writes what is asked about. `listings` are
     the scores that the page of a run lists samples by, the one that the headline leads with first.
     `showing` says, in words that end every caption, what is unusual about how items were shown.
@@ -210,7 +210,7 @@ class TrackReport:
     main_figure: str = ""
     figures: Mapping[str, FigureMaker | SceneFigure] = field(default_factory=dict)
     paper_tables: Mapping[int, PaperTable] = field(default_factory=dict)
-    check_alike: Callable[[Run, Run, Sequence[str]], None] | None = None
+    check_alike: Callable[[Run, Run, Sequence[str], Measure], None] | None = None
     part_names: Mapping[str, str] = field(default_factory=dict)
     items: Callable[[Run, Dataset], PageItems] | None = None
     episodes: EpisodeView | None = None

@@ -15,6 +15,7 @@ from phyblock.records import Record
 __all__ = [
     "CARRYING",
     "ENGINE",
+    "FIRST_CARRYING",
     "READER",
     "AnyTrack",
     "Episode",
@@ -40,6 +41,8 @@ CARRYING = "carrying"
 """The same of the version of how plans are carried out and what stands is measured, as the records
 keep it.
 """
+FIRST_CARRYING = 1
+"""How plans were carried out before runs said so."""
 
 
 class Item(Protocol):

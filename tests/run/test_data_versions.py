@@ -14,6 +14,7 @@ from phyblock.records import read_manifest
 from phyblock.report.alike import check_alike
 from phyblock.report.compare import compare_runs
 from phyblock.tables.load import load_run
+from phyblock.tracks.headline import main_measure
 from tests.report.factory import manifest, run_of
 from tests.workspace import Workspace
 
@@ -60,4 +61,4 @@ def test_answers_to_two_versions_of_questions_are_not_mixed() -> None:
         for number in (1, 2)
     ]
     with pytest.raises(SpecError, match=r"is of another version of asked than .*\n.*found: 2"):
-        check_alike(runs[1], runs[0], [], "vqa")
+        check_alike(runs[1], runs[0], [], "vqa", main_measure(runs[0], "vqa"))

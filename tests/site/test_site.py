@@ -26,6 +26,8 @@ from phyblock.site.board import all_values, board_of
 from phyblock.site.entries import entries_of
 from phyblock.site.runs import SiteRun, open_runs
 from phyblock.site.values import values_of
+from phyblock.tracks.estimates import track_measures
+from phyblock.tracks.kind import kind_of
 from tests.report.factory import manifest, record, run_of, score
 from tests.workspace import Workspace
 
@@ -226,6 +228,12 @@ def test_plans_that_were_carried_out_otherwise_do_not_stand_in_one_table(
     assert problem.field == "tracks.pose_planning.carrying"
     assert (problem.found, problem.allowed) == (str(after or 1), str(before or 1))
     assert "run the older one again" in problem.hint
+    measures = {measure.name: measure for measure in track_measures("pose_planning")}
+    check = kind_of("pose_planning").report().check_alike
+    assert check is not None
+    check(other.run, first.run, [], measures["f1_c"])
+    with pytest.raises(SpecError, match="carried plans out otherwise"):
+        check(other.run, first.run, [], measures["final_iou"])
     check_runs_alike([first, site_run("same", **carried_out(before))])
     check_runs_alike([site_run("old", **carried_out(None)), site_run("1", **carried_out(1))])
 

@@ -11,6 +11,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.tables.cells import METRICS
 from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run
+from phyblock.tables.measures import Measure
 from phyblock.tables.paper_numbers import HUMAN_NOTE, published_table
 from phyblock.tables.showing import planning_words
 from phyblock.tables.track_report import (
@@ -103,7 +104,7 @@ def _notes(run: Run) -> Sequence[str]:
     return (how,)
 
 
-def _check_alike(run: Run, first: Run, levels: Sequence[str]) -> None:
+def _check_alike(run: Run, first: Run, levels: Sequence[str], _: Measure) -> None:
     suite, wanted = run.design.suite, first.design
     needed: list[tuple[str, Sequence[str], str]] = [
         ("settings", suite.settings, wanted.setting),

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
+from phyblock.errors import Problem, SpecError
 from phyblock.tables.design import OVERALL, Design
 from phyblock.tables.listing import Listing, by_settings
 from phyblock.tables.load import Run
+from phyblock.tables.measures import Measure
 from phyblock.tables.showing import planning_words
 from phyblock.tables.track_report import (
     EpisodeView,
@@ -17,7 +19,9 @@ from phyblock.tables.track_report import (
     TableMaker,
     TrackReport,
 )
+from phyblock.tracks.base import CARRYING, ENGINE, FIRST_CARRYING
 from phyblock.tracks.inference import inference
+from phyblock.tracks.pose_planning.counts import CARRIED, ERRORS
 from phyblock.tracks.pose_planning.figures import f1_by_tolerance, pose_error_bars
 from phyblock.tracks.pose_planning.film import pose_film, pose_table
 from phyblock.tracks.pose_planning.listing import LISTED_IN_C
@@ -60,6 +64,19 @@ def _notes(run: Run) -> Sequence[str]:
     )
 
 
+def _check_alike(run: Run, first: Run, _: Sequence[str], measure: Measure) -> None:
+    """What is counted of the world depends on how plans are carried out, F1 does not."""
+    if measure.counted not in (CARRIED, ERRORS):
+        return
+    for key, unsaid in ((CARRYING, FIRST_CARRYING), (ENGINE, None)):
+        found, wanted = (one.manifest.tracks.get(NAME, {}).get(key, unsaid) for one in (run, first))
+        if found != wanted:
+            message = f"carried plans out otherwise than {first.path}, which decides {measure.name}"
+            hint = "run the older one again, or compare by f1_c"
+            field = f"tracks.{NAME}.{key}"
+            raise SpecError(Problem(str(run.path), message, field, str(found), str(wanted), hint))
+
+
 def _listings(design: Design) -> tuple[Listing, ...]:
     return (LISTED_IN_C, *by_settings(design))
 
@@ -86,6 +103,7 @@ REPORT = TrackReport(
             "A plan with poses and what it built", partial(inference, view=_VIEW)
         ),
     },
+    check_alike=_check_alike,
     episodes=_VIEW,
     listings=_listings,
     showing=lambda run: planning_words(run, "pose"),

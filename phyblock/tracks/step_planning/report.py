@@ -8,6 +8,7 @@ from functools import partial
 from phyblock.errors import Problem, SpecError
 from phyblock.sim.registry import PHYSICS_VARIABLE, REFERENCE_ENGINE
 from phyblock.tables.load import Run
+from phyblock.tables.measures import Measure
 from phyblock.tables.showing import planning_words
 from phyblock.tables.track_report import (
     WHOLE,
@@ -81,7 +82,7 @@ def _notes(run: Run) -> Sequence[str]:
     )
 
 
-def _check_alike(run: Run, first: Run, _: Sequence[str]) -> None:
+def _check_alike(run: Run, first: Run, _: Sequence[str], __: Measure) -> None:
     settings, wanted = run.design.suite.settings, first.design.setting
     if wanted not in settings:
         hint = "phyblock score reads stored replies again under other rules"

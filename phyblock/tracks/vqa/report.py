@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from phyblock.domain import CATEGORIES, SUBTASK_NAMES
 from phyblock.errors import Problem, SpecError
 from phyblock.tables.load import Run
+from phyblock.tables.measures import Measure
 from phyblock.tables.paper_numbers import HUMAN_NOTE
 from phyblock.tables.showing import control_words
 from phyblock.tables.track_report import (
@@ -68,7 +69,7 @@ def _how_shown(run: Run) -> tuple[str, ...]:
     return (*circular, *control_words(run, NAME), *letters)
 
 
-def _check_alike(run: Run, first: Run, _: Sequence[str]) -> None:
+def _check_alike(run: Run, first: Run, _: Sequence[str], __: Measure) -> None:
     circular = [showing(one).circular for one in (run, first)]
     if circular[0] != circular[1]:
         found, allowed = (str(one).lower() for one in circular)
