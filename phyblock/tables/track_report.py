@@ -190,7 +190,8 @@ class TrackReport:
     is the name of the figure of its main measure, else that of the track. `check_alike` raises
     SpecError where the first run cannot be compared with the second in these cells by a measure.
     `part_names` say what `Record.part` stands for. `items` opens, for the page of a run, what was
-    asked about where that is more than scenes; it raises DataError where that is not what the run was made on.
+    asked about where that is more than scenes; it raises DataError where that is not what the run
+    was made on.
     `episodes` shows records that are episodes, `export` writes what is asked about. `listings` are
     the scores that the page of a run lists samples by, the one that the headline leads with first.
     `showing` says, in words that end every caption, what is unusual about how items were shown.

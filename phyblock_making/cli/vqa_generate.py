@@ -12,11 +12,12 @@ from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
 from phyblock.datasets.named import read_data_set
 from phyblock.domain import SUBTASKS, Question, Subtask
-from phyblock.errors import SpecError
+from phyblock.errors import Problem, SpecError
 from phyblock.plain_text import counted
 from phyblock_making.attacks.attack_card import attack_card
 from phyblock_making.attacks.attacks import Attacked, all_attacks, attack
 from phyblock_making.attacks.observed import Observed, observe
+from phyblock_making.auditing.boosting import can_boost
 from phyblock_making.cli.question_sets import (
     data_option,
     read_unseen,
@@ -70,6 +71,11 @@ def command(
     wanted = {subtask: per_subtask or PER_SUBTASK[subtask] for subtask in subtasks}
     read = read_data_set(data)
     other = read_unseen(unseen, unseen_data or data, out)
+    if other and not can_boost():
+        message = (
+            "learning from the texts of another set needs scikit-learn, which is not installed"
+        )
+        raise SpecError(Problem("--unseen", message, hint="pip install 'phyblock[audit]'"))
     scenes = [task.scene for task in read.tasks]
     console = make_console(stderr=True)
     with (
@@ -80,6 +86,8 @@ def command(
 
         def report(subtask: Subtask, total: int) -> None:
             if subtask not in bars:
+                if not console.is_terminal:
+                    click.echo(f"drafting {subtask} from {counted(total, 'scene')}", err=True)
                 bars[subtask] = progress.add_task(f"drafting {subtask}", total=total)
             progress.advance(bars[subtask])
 
@@ -98,6 +106,12 @@ def command(
     write_questions(out, questions, originals, read.name, made_by, audits, told)
     outcome = f"{counted(len(questions), 'question')} in {counted(len(subtasks), 'subtask')}"
     click.echo(f"{outcome}: {shown_path(out)}")
+    if not can_boost():
+        click.echo(
+            "CARD.md leaves out what is learned from texts and boosted probes, which need "
+            "scikit-learn: pip install 'phyblock[audit]'",
+            err=True,
+        )
 
 
 def _audited(

@@ -53,6 +53,7 @@ from phyblock.tracks.full_planning.settings import settings_frame, settings_view
 from phyblock.tracks.full_planning.views import (
     errors_in_terminal,
     errors_view,
+    how_counted,
     published_view,
     table1_in_terminal,
     table1_view,
@@ -100,8 +101,7 @@ def _orders(run: Run) -> pd.DataFrame:
 
 
 def _notes(run: Run) -> Sequence[str]:
-    how = f"F1 in percent, setting {run.design.setting}, matcher {run.design.matcher}."
-    return (how,)
+    return (f"F1 in percent. {how_counted(run.design)}",)
 
 
 def _check_alike(run: Run, first: Run, levels: Sequence[str], _: Measure) -> None:

@@ -26,6 +26,7 @@ __all__ = [
     "ERROR_NAMES",
     "errors_in_terminal",
     "errors_view",
+    "how_counted",
     "published_view",
     "table1_in_terminal",
     "table1_view",
@@ -67,7 +68,7 @@ def table1_view(table: pd.DataFrame, run: Run) -> TextTable:
         f"Assembly planning (%){design.of_suite}",
         (_MODEL, *columns, *uncertainty_columns(design, level_name(OVERALL))),
         rows,
-        (_how(design), *_table1_notes(run), _LABELS_NOTE),
+        (how_counted(design), *_table1_notes(run), _LABELS_NOTE),
     )
 
 
@@ -104,7 +105,8 @@ def _empty_plan_notes(cells: pd.DataFrame) -> list[str]:
     return notes
 
 
-def _how(design: Design) -> str:
+def how_counted(design: Design) -> str:
+    """Setting, matcher, criterion, and what becomes of missing replies, as a sentence."""
     scoring = design.suite.scoring
     level1 = f", Level-1 by {scoring.level1}" if 1 in design.suite.levels else ""
     missing = "left out" if scoring.missing == "skip" else "counted as empty plans"
