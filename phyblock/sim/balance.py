@@ -101,7 +101,8 @@ def surely_falls(blocks: Sequence[Block]) -> bool:
     count = forces.shape[1]
     # A mass, and the mass times each part of its shift: the shift alone would not be linear.
     octagon = np.column_stack([-np.ones(len(_SIDES)), _SIDES])
-    shifts = sparse.hstack([sparse.csr_matrix((16, count)), sparse.block_diag([octagon, octagon])])
+    both = sparse.csr_matrix(np.kron(np.eye(2), octagon))
+    shifts = sparse.hstack([sparse.csr_matrix((16, count)), both])
     free = (None, None)
     bounds = [(0, None)] * count + [(1.0, 1.0), free, free, MASS_FACTORS, free, free]
     unknown = np.hstack([forces, *(-load for load in loads)])
