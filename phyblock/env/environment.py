@@ -95,18 +95,8 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         )
         _check_together(action, setting, gating, physics, rotation)
         _check_limits(max_steps=max_steps, max_failures=max_failures)
-        if render_mode not in (None, *_RENDER_MODES):
-            allowed = ", ".join(_RENDER_MODES)
-            raise ValueError(f"render_mode is {render_mode!r}; allowed: {allowed}, or None")
-        if not _SMALLEST_PX <= size_px <= LARGEST_PX:
-            raise ValueError(f"size_px is {size_px}, allowed {_SMALLEST_PX}..{LARGEST_PX}")
-        tasks = read_tasks(data) if isinstance(data, str | Path) else tuple(data)
-        if levels is not None:
-            tasks = tuple(task for task in tasks if set(task.scene.levels) & set(levels))
-        if not tasks:
-            of_levels = "" if levels is None else f" of levels {sorted(levels)}"
-            raise ValueError(f"data holds no tasks{of_levels}")
-        self._tasks = {task.scene.id: task for task in tasks}
+        _check_pictures(render_mode, size_px)
+        self._tasks = {task.scene.id: task for task in _tasks_of(data, levels)}
         self._scene = None if scene is None else self._find(scene).scene.id
         self._observe = observe
         # Below the smallest that is drawn, whole pixels are put together.
@@ -281,6 +271,27 @@ def _check_limits(**limits: int | None) -> None:
     for name, most in limits.items():
         if most is not None and most < 1:
             raise ValueError(f"{name} is {most}; allowed: 1 or more, or None")
+
+
+def _check_pictures(render_mode: str | None, size_px: int) -> None:
+    if render_mode not in (None, *_RENDER_MODES):
+        allowed = ", ".join(_RENDER_MODES)
+        raise ValueError(f"render_mode is {render_mode!r}; allowed: {allowed}, or None")
+    if not _SMALLEST_PX <= size_px <= LARGEST_PX:
+        raise ValueError(f"size_px is {size_px}, allowed {_SMALLEST_PX}..{LARGEST_PX}")
+
+
+def _tasks_of(
+    data: str | Path | Sequence[AssemblyTask], levels: Collection[int] | None
+) -> tuple[AssemblyTask, ...]:
+    """The tasks to play, at least one; ValueError where there are none."""
+    tasks = read_tasks(data) if isinstance(data, str | Path) else tuple(data)
+    if levels is not None:
+        tasks = tuple(task for task in tasks if set(task.scene.levels) & set(levels))
+    if not tasks:
+        of_levels = "" if levels is None else f" of levels {sorted(levels)}"
+        raise ValueError(f"data holds no tasks{of_levels}")
+    return tasks
 
 
 def _space(observe: str, size_px: int, more: Mapping[str, spaces.Space[Any]]) -> spaces.Dict[Any]:

@@ -14,7 +14,7 @@ from phyblock.report.html.samples import IN_INDEX
 from phyblock.site.chunks import chunks
 from phyblock.site.entries import Entry
 from phyblock.site.runs import SiteRun
-from phyblock.site.values import AllValues
+from phyblock.site.values import AllValues, TrackValues
 from phyblock.tables.load import Run
 from phyblock.tracks.drawable import scene_entry
 from phyblock.tracks.kind import kind_of
@@ -48,6 +48,68 @@ class _Numbers:
         return list(self._numbers)
 
 
+class _Items:
+    """What was asked: columns, a row an item of a track."""
+
+    def __init__(self) -> None:
+        self._items = _Numbers()
+        self._about: dict[str, list[Any]] = {
+            name: [] for name in ("scene", "levels", "part", "question")
+        }
+
+    def __contains__(self, key: tuple[str, str]) -> bool:
+        return key in self._items
+
+    def add(self, record: Record, scene: int, question: int) -> None:
+        """Take the item of a record, whose scene and question have these numbers."""
+        self._items.of((record.track, record.item))
+        row = {"scene": scene, "levels": list(record.levels), "part": record.part}
+        for name, value in {**row, "question": question}.items():
+            self._about[name].append(value)
+
+    def number(self, record: Record) -> int:
+        return self._items.of((record.track, record.item))
+
+    def fields(self) -> dict[str, Any]:
+        tracks = _Numbers()
+        of_track = [tracks.of(track) for track, _ in self._items.values]
+        keys = [key for _, key in self._items.values]
+        return {
+            "tracks": tracks.values,
+            "items": {"track": of_track, "key": keys, **self._about},
+        }
+
+
+class _Samples:
+    """What became of it: columns, a row a sample."""
+
+    def __init__(self) -> None:
+        self._outcomes, self._ways = _Numbers(), _Numbers()
+        names = ("entry", "item", "seed", "way", "outcome", "score")
+        self._rows: dict[str, list[int | None]] = {name: [] for name in names}
+
+    def add(self, record: Record, entry: int, item: int, values: TrackValues) -> None:
+        samples = values.samples.get(record.model, {})
+        score = samples.get((record.scene, record.item, record.seed, record.way.key))
+        row = {
+            "entry": entry,
+            "item": item,
+            "seed": record.seed,
+            "way": self._ways.of(record.way.key),
+            "outcome": self._outcomes.of(record.outcome),
+            "score": None if score is None else round(score * _TENTHS),
+        }
+        for name, value in row.items():
+            self._rows[name].append(value)
+
+    def fields(self) -> dict[str, Any]:
+        return {
+            "outcomes": self._outcomes.values,
+            "ways": self._ways.values,
+            "rows": self._rows,
+        }
+
+
 def write_samples(
     folder: Path,
     build: str,
@@ -60,10 +122,7 @@ def write_samples(
     Raises OSError where the disk refuses, StoreError for a record that cannot be read.
     """
     packs = {kind: chunks(folder, kind, build) for kind in ("replays", "scenes", "questions")}
-    tracks, scenes, items, outcomes, ways = (_Numbers() for _ in range(5))
-    about: dict[str, list[Any]] = {name: [] for name in ("scene", "levels", "part", "question")}
-    names = ("entry", "item", "seed", "way", "outcome", "score")
-    rows: dict[str, list[int | None]] = {name: [] for name in names}
+    scenes, items, samples = _Numbers(), _Items(), _Samples()
     owner = {
         (number, track, entry.model.name): place
         for place, entry in enumerate(entries)
@@ -71,25 +130,15 @@ def write_samples(
     }
     for number, one in enumerate(runs):
         for record in _records(one.run):
-            item = (tracks.of(record.track), record.item)
-            if item not in items:
-                items.of(item)
-                about["scene"].append(scenes.of(record.scene))
-                about["levels"].append(list(record.levels))
-                about["part"].append(record.part)
-                about["question"].append(_question(one, record, packs["questions"]))
-            samples = values[number, record.track].samples.get(record.model, {})
-            score = samples.get((record.scene, record.item, record.seed, record.way.key))
-            row = {
-                "entry": owner[number, record.track, record.model],
-                "item": items.of(item),
-                "seed": record.seed,
-                "way": ways.of(record.way.key),
-                "outcome": outcomes.of(record.outcome),
-                "score": None if score is None else round(score * _TENTHS),
-            }
-            for name, value in row.items():
-                rows[name].append(value)
+            if (record.track, record.item) not in items:
+                question = _question(one, record, packs["questions"])
+                items.add(record, scenes.of(record.scene), question)
+            samples.add(
+                record,
+                owner[number, record.track, record.model],
+                items.number(record),
+                values[number, record.track],
+            )
             packs["replays"].add(_replay(record, one.run))
     drawn = [_scene(scene, runs) for scene in scenes.values]
     for entry in drawn:
@@ -97,16 +146,9 @@ def write_samples(
     for pack in packs.values():
         pack.close()
     return {
-        "tracks": tracks.values,
+        **items.fields(),
+        **samples.fields(),
         "scenes": scenes.values,
-        "outcomes": outcomes.values,
-        "ways": ways.values,
-        "items": {
-            "track": [track for track, _ in items.values],
-            "key": [key for _, key in items.values],
-            **about,
-        },
-        "rows": rows,
         "starts": {kind: pack.starts for kind, pack in packs.items()},
         "parts": _part_names(runs),
         "lacking": "" if any(drawn) else next((one.sources.lacking for one in runs), ""),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal
@@ -18,6 +18,7 @@ from phyblock.tables.headline import Value
 from phyblock.tables.load import Run
 from phyblock.tables.showing import captioned, varied_words
 from phyblock.tables.text_table import NO_VALUE, number, spread
+from phyblock.tables.track_report import HeadlineColumn
 from phyblock.tracks.headline import headline_columns, main_measure
 from phyblock.tracks.kind import kind_of
 
@@ -103,53 +104,18 @@ def _headline(run: Run, track: str) -> Headline:
     report = kind.report()
     main = main_heading(run, track)
     columns = sorted(headline_columns(run, track), key=lambda column: column.heading != main)
-    values = headline_of(run, track)
     headings = [column.heading for column in columns]
-    queries = {column.heading: samples_query(run, track, column.cell) for column in columns}
-    published = report.published(run)
     floors = headline_floors(run, track)
-    own_floors = floors_run(run, track)
-    ranks, lacking = rank_texts(run, track), shortfalls(run, track)
-    rows = []
-    for name, sort in kinds_of(run).items():
-        found = [values.get((name, heading)) for heading in headings]
-        held = {} if name in own_floors else floors
-        of_model = urlencode({"model": name})
-        cells = [
-            *(
-                _cell(value, held.get(head), f"{queries[head]}&{of_model}", seeds=head == main)
-                for value, head in zip(found, headings, strict=True)
-            ),
-            *([_plain(published.get(name), NO_VALUE)] if published else []),
-        ]
-        rows.append(
-            Row(
-                name,
-                sort,
-                tuple(cells),
-                _strip(found[0]),
-                ranks.get(name, ""),
-                lacking.get(name, ""),
-                f"{urlencode({'track': track})}&{of_model}",
-            )
-        )
-    is_ascending = main_measure(run, track).better == "lower"
-    rows.sort(key=partial(_place, is_ascending=is_ascending))
-    if floors:
-        own = {heading: floor.value for heading, floor in floors.items()}
-        names = ", ".join(dict.fromkeys(floor.name for floor in floors.values()))
-        floor_cells = [_plain(own.get(heading)) for heading in headings]
-        empty = [Cell("")] if published else []
-        rows.append(Row(f"Floor: {names}", "reference", (*floor_cells, *empty)))
     references = report.references(run)
-    for name, numbers in references.items():
-        cells = [_plain(numbers.get(heading)) for heading in headings]
-        rows.append(Row(name, "reference", (*cells, *([Cell("")] if published else []))))
+    rows = [
+        *_model_rows(run, track, columns, floors),
+        *_reference_rows(headings, floors, references, is_wider=bool(report.published(run))),
+    ]
     marked = {name: numbers.get(main) for name, numbers in references.items()}
     return Headline(
         track,
         captioned(kind.title, (*report.showing(run), *varied_words(run))),
-        (*headings, *(["Published"] if published else [])),
+        (*headings, *(["Published"] if report.published(run) else [])),
         tuple(rows),
         (" ".join(_notes(run, track, rows, has_floors=bool(floors))),),
         0,
@@ -160,6 +126,62 @@ def _headline(run: Run, track: str) -> Headline:
             if value is not None
         },
     )
+
+
+def _model_rows(
+    run: Run, track: str, columns: Sequence[HeadlineColumn], floors: Mapping[str, Floor]
+) -> list[Row]:
+    """Models and baselines by rank; the first column is the main one."""
+    values, published = headline_of(run, track), kind_of(track).report().published(run)
+    headings = [column.heading for column in columns]
+    main = headings[0]
+    queries = {column.heading: samples_query(run, track, column.cell) for column in columns}
+    own_floors = floors_run(run, track)
+    ranks, lacking = rank_texts(run, track), shortfalls(run, track)
+    rows = []
+    for name, sort in kinds_of(run).items():
+        of_name = [values.get((name, heading)) for heading in headings]
+        held = {} if name in own_floors else floors
+        of_model = urlencode({"model": name})
+        cells = [
+            *(
+                _cell(value, held.get(head), f"{queries[head]}&{of_model}", seeds=head == main)
+                for value, head in zip(of_name, headings, strict=True)
+            ),
+            *([_plain(published.get(name), NO_VALUE)] if published else []),
+        ]
+        rows.append(
+            Row(
+                name,
+                sort,
+                tuple(cells),
+                _strip(of_name[0]),
+                ranks.get(name, ""),
+                lacking.get(name, ""),
+                f"{urlencode({'track': track})}&{of_model}",
+            )
+        )
+    is_ascending = main_measure(run, track).better == "lower"
+    return sorted(rows, key=partial(_place, is_ascending=is_ascending))
+
+
+def _reference_rows(
+    headings: Sequence[str],
+    floors: Mapping[str, Floor],
+    references: Mapping[str, Mapping[str, float]],
+    *,
+    is_wider: bool,
+) -> Iterator[Row]:
+    """What models are held against; `is_wider` where the table has published values as well."""
+    empty = [Cell("")] if is_wider else []
+    numbers_of: dict[str, Mapping[str, float]] = {}
+    if floors:
+        names = ", ".join(dict.fromkeys(floor.name for floor in floors.values()))
+        own = {heading: floor.value for heading, floor in floors.items()}
+        numbers_of[f"Floor: {names}"] = own
+    for name, numbers in {**numbers_of, **references}.items():
+        cells = [_plain(numbers.get(heading)) for heading in headings]
+        yield Row(name, "reference", (*cells, *empty))
 
 
 def _place(row: Row, *, is_ascending: bool) -> tuple[bool, bool, float]:
