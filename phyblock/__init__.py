@@ -8,8 +8,9 @@ maps names to DataFrames, `.summary()` and `.compare(other)` say what came out.
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING
+
+from phyblock.lazy import lazy_names
 
 if TYPE_CHECKING:
     from phyblock.api.pictures import Picture, render
@@ -41,7 +42,7 @@ _HOMES = {
     "PhyblockError": "phyblock.errors",
     "Picture": "phyblock.api.pictures",
     "PlanScore": "phyblock.api.scores",
-    "Run": "phyblock.report.notebook",
+    "Run": "phyblock.report.notebook:LoadedRun",
     "SceneTask": "phyblock.api.suites",
     "Suite": "phyblock.api.suites",
     "load_run": "phyblock.report.notebook",
@@ -50,6 +51,7 @@ _HOMES = {
     "run_suite": "phyblock.api.running",
     "score": "phyblock.api.scores",
 }
+_public = lazy_names(__name__, _HOMES)
 
 
 def __getattr__(name: str) -> object:
@@ -58,10 +60,7 @@ def __getattr__(name: str) -> object:
         from importlib.metadata import version
 
         return version("phyblock")
-    if name in _HOMES:
-        module = importlib.import_module(_HOMES[name])
-        return getattr(module, "LoadedRun" if name == "Run" else name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return _public(name)
 
 
 def __dir__() -> list[str]:

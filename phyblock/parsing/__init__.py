@@ -6,8 +6,9 @@ of the readers take longer to compile than the rest of it to import.
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING
+
+from phyblock.lazy import lazy_names
 
 if TYPE_CHECKING:
     from phyblock.parsing.answer import ParsedAnswer, parse_answer
@@ -64,39 +65,32 @@ __all__ = [
 ]
 
 _HOMES = {
-    "ParsedAnswer": "answer",
-    "parse_answer": "answer",
-    "AnswerForm": "answer_form",
-    "choice_form": "asked",
-    "move_form": "asked",
-    "parse_asked_answer": "asked",
-    "parse_asked_move": "asked",
-    "parse_asked_plan": "asked",
-    "plan_form": "asked",
-    "MOVE_PROBLEMS": "move_problem",
-    "MOVE_RULES": "move",
-    "MoveProblem": "move_problem",
-    "ParsedMove": "move",
-    "parse_move": "move",
-    "PLAN_PROBLEMS": "plan",
-    "ParsedPlan": "plan",
-    "PlanProblem": "plan",
-    "parse_plan": "plan",
-    "MOST_POSE_STEPS": "pose_plan",
-    "POSE_PROBLEMS": "pose_plan",
-    "ParsedPoses": "pose_plan",
-    "PoseProblem": "pose_plan",
-    "parse_poses": "pose_plan",
-    "pose_form": "pose_plan",
-    "POSE_READER_VERSION": "version",
-    "READER_VERSION": "version",
-    "reader_version": "version",
+    "ParsedAnswer": "phyblock.parsing.answer",
+    "parse_answer": "phyblock.parsing.answer",
+    "AnswerForm": "phyblock.parsing.answer_form",
+    "choice_form": "phyblock.parsing.asked",
+    "move_form": "phyblock.parsing.asked",
+    "parse_asked_answer": "phyblock.parsing.asked",
+    "parse_asked_move": "phyblock.parsing.asked",
+    "parse_asked_plan": "phyblock.parsing.asked",
+    "plan_form": "phyblock.parsing.asked",
+    "MOVE_PROBLEMS": "phyblock.parsing.move_problem",
+    "MOVE_RULES": "phyblock.parsing.move",
+    "MoveProblem": "phyblock.parsing.move_problem",
+    "ParsedMove": "phyblock.parsing.move",
+    "parse_move": "phyblock.parsing.move",
+    "PLAN_PROBLEMS": "phyblock.parsing.plan",
+    "ParsedPlan": "phyblock.parsing.plan",
+    "PlanProblem": "phyblock.parsing.plan",
+    "parse_plan": "phyblock.parsing.plan",
+    "MOST_POSE_STEPS": "phyblock.parsing.pose_plan",
+    "POSE_PROBLEMS": "phyblock.parsing.pose_plan",
+    "ParsedPoses": "phyblock.parsing.pose_plan",
+    "PoseProblem": "phyblock.parsing.pose_plan",
+    "parse_poses": "phyblock.parsing.pose_plan",
+    "pose_form": "phyblock.parsing.pose_plan",
+    "POSE_READER_VERSION": "phyblock.parsing.version",
+    "READER_VERSION": "phyblock.parsing.version",
+    "reader_version": "phyblock.parsing.version",
 }
-
-
-def __getattr__(name: str) -> object:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value: object = getattr(importlib.import_module(f"phyblock.parsing.{_HOMES[name]}"), name)
-    globals()[name] = value
-    return value
+__getattr__ = lazy_names(__name__, _HOMES)

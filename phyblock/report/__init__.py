@@ -5,9 +5,9 @@ Names are imported when they are first used: pandas takes longer to import than 
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING
 
+from phyblock.lazy import lazy_names
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable
 
 if TYPE_CHECKING:
@@ -42,24 +42,19 @@ __all__ = [
 ]
 
 _HOMES = {
-    "coverage_frame": "tables.coverage",
-    "Design": "tables.design",
-    "read_design": "tables.design",
-    "files_of": "report.files",
-    "to_latex": "tables.latex",
-    "Run": "tables.load",
-    "load_run": "tables.load",
-    "to_markdown": "tables.markdown",
-    "published_table": "tables.paper_numbers",
-    "TablesWritten": "report.write",
-    "table_makers": "report.write",
-    "write_page": "report.html",
-    "write_report": "report.html",
-    "write_tables": "report.write",
+    "coverage_frame": "phyblock.tables.coverage",
+    "Design": "phyblock.tables.design",
+    "read_design": "phyblock.tables.design",
+    "files_of": "phyblock.report.files",
+    "to_latex": "phyblock.tables.latex",
+    "Run": "phyblock.tables.load",
+    "load_run": "phyblock.tables.load",
+    "to_markdown": "phyblock.tables.markdown",
+    "published_table": "phyblock.tables.paper_numbers",
+    "TablesWritten": "phyblock.report.write",
+    "table_makers": "phyblock.report.write",
+    "write_page": "phyblock.report.html",
+    "write_report": "phyblock.report.html",
+    "write_tables": "phyblock.report.write",
 }
-
-
-def __getattr__(name: str) -> object:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"phyblock.{_HOMES[name]}"), name)
+__getattr__ = lazy_names(__name__, _HOMES)
