@@ -67,7 +67,7 @@ def rescore(
     return target
 
 
-def judged_anew(folder: Path, data: Path | None = None) -> tuple[Manifest, list[Record]]:
+def judged_anew(folder: Path) -> tuple[Manifest, list[Record]]:
     """The manifest and the newest records of a run, made again of its replies and its data.
 
     All tracks are judged, and what records say of their items is taken from the data, as is how
@@ -77,7 +77,7 @@ def judged_anew(folder: Path, data: Path | None = None) -> tuple[Manifest, list[
     """
     manifest = read_manifest(folder)
     suite = recorded_suite(folder, manifest)
-    scored = _scored(folder, manifest, suite, suite.tracks, data, anew=True)
+    scored = _scored(folder, manifest, suite, suite.tracks, None, anew=True)
     scenes = [task.scene for task in scored.asked]
     told = {
         "floors": scored.floors,

@@ -11,13 +11,17 @@ import pandas as pd
 from phyblock.tables.design import OVERALL
 from phyblock.tables.flat import BLOCK_COLUMNS
 from phyblock.tables.load import Run, made_once
+from phyblock.tables.measures import CELL, Cell
 from phyblock.tables.outcomes import has_reply
+from phyblock.tables.text_table import level_name
 
 __all__ = [
     "METRICS",
     "METRIC_NAMES",
     "SIDE_METRICS",
     "cell_scores",
+    "in_levels",
+    "level_cells",
     "measured",
     "with_levels",
 ]
@@ -32,6 +36,16 @@ _COLUMNS = (
     *("tp", "fp", "fn", *BLOCK_COLUMNS.values(), "kept"),
 )
 """Those of scores that cells need."""
+
+
+def level_cells(run: Run) -> tuple[Cell, ...]:
+    """The levels of the suite, then all scenes together."""
+    return tuple(Cell(level, level_name(level)) for level in run.design.levels)
+
+
+def in_levels(rows: pd.DataFrame, run: Run) -> pd.DataFrame:
+    """Rows of samples, repeated for each of `level_cells` that their scene is in."""
+    return with_levels(rows, run).rename(columns={"level": CELL})
 
 
 def with_levels(frame: pd.DataFrame, run: Run) -> pd.DataFrame:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pandas as pd
 
 from phyblock.scoring import ERROR_TYPES
-from phyblock.tables.cells import with_levels
+from phyblock.tables.cells import level_cells, with_levels
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL
 from phyblock.tables.outcomes import has_reply
 from phyblock.tables.shares import joined_shares, shares_of
-from phyblock.tracks.full_planning.measures import NAME, level_cells
+from phyblock.tracks.full_planning.measures import NAME
 
 __all__ = ["errors_frame", "levels_in_order"]
 

@@ -11,12 +11,11 @@ import pandas as pd
 
 from phyblock.scoring import BLOCK_OUTCOMES, BlockOutcome
 from phyblock.scoring.ratios import Floats, f1_of, precision_of, ratio_of, recall_of
-from phyblock.tables.cells import cell_scores, with_levels
+from phyblock.tables.cells import cell_scores
 from phyblock.tables.flat import BLOCK_COLUMNS
 from phyblock.tables.load import Run
-from phyblock.tables.measures import CELL, Cell, Measure, SampleCounts
+from phyblock.tables.measures import CELL, Measure, SampleCounts
 from phyblock.tables.outcomes import has_reply
-from phyblock.tables.text_table import level_name
 from phyblock.tracks.full_planning.baselines import PLAN_FLOORS
 from phyblock.tracks.poses import POSE_MEASURES
 
@@ -27,9 +26,7 @@ __all__ = [
     "PLANNING_MEASURES",
     "SUPPORT_MISSING",
     "block_measure",
-    "in_levels",
     "is_asked",
-    "level_cells",
 ]
 
 NAME = "full_planning"
@@ -38,16 +35,6 @@ NAME = "full_planning"
 def is_asked(run: Run) -> bool:
     """Whether the run has plans."""
     return NAME in run.design.suite.tracks
-
-
-def level_cells(run: Run) -> tuple[Cell, ...]:
-    """The levels of the suite, then all scenes together."""
-    return tuple(Cell(level, level_name(level)) for level in run.design.levels)
-
-
-def in_levels(rows: pd.DataFrame, run: Run) -> pd.DataFrame:
-    """Rows of samples, repeated for each level of their scene."""
-    return with_levels(rows, run).rename(columns={"level": CELL})
 
 
 def _scored(run: Run) -> pd.DataFrame:

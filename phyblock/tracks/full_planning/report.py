@@ -8,7 +8,7 @@ from functools import partial
 import pandas as pd
 
 from phyblock.errors import Problem, SpecError
-from phyblock.tables.cells import METRICS
+from phyblock.tables.cells import METRICS, in_levels, level_cells
 from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run
 from phyblock.tables.measures import Measure
@@ -30,12 +30,7 @@ from phyblock.tracks.full_planning.figures.losses import loss_bars
 from phyblock.tracks.full_planning.figures.scatter import f1_by_cost, f1_by_size
 from phyblock.tracks.full_planning.film import PLAN_VIEW
 from phyblock.tracks.full_planning.losses import losses_frame, losses_view
-from phyblock.tracks.full_planning.measures import (
-    NAME,
-    PLANNING_MEASURES,
-    in_levels,
-    level_cells,
-)
+from phyblock.tracks.full_planning.measures import NAME, PLANNING_MEASURES
 from phyblock.tracks.full_planning.published import (
     PUBLISHED_SETTING,
     published_frame,

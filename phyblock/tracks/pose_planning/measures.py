@@ -8,14 +8,11 @@ import math
 from functools import partial
 
 import numpy as np
-import pandas as pd
 
 from phyblock.scoring import POSE_ERRORS, POSE_FRAMES, TOLERANCES_CM, PoseError, PoseFrame
 from phyblock.scoring.ratios import Floats, f1_of, ratio_of
-from phyblock.tables.cells import with_levels
 from phyblock.tables.load import Run
-from phyblock.tables.measures import CELL, Cell, Measure, SampleCounts
-from phyblock.tables.text_table import level_name
+from phyblock.tables.measures import Measure, SampleCounts
 from phyblock.tracks.pose_planning.baselines import POSE_FLOORS
 from phyblock.tracks.pose_planning.counts import CARRIED, ERRORS, FITS, PLANS, RIGHT
 from phyblock.words import Setting
@@ -25,9 +22,7 @@ __all__ = [
     "NAME",
     "POSE_PLANNING_MEASURES",
     "error_measure",
-    "in_levels",
     "is_asked",
-    "level_cells",
     "tolerance_measure",
 ]
 
@@ -58,16 +53,6 @@ _ERROR_MEANINGS: dict[PoseError, str] = {
 def is_asked(run: Run) -> bool:
     """Whether the run has plans with poses."""
     return NAME in run.design.suite.tracks
-
-
-def level_cells(run: Run) -> tuple[Cell, ...]:
-    """The levels of the suite, then all scenes together; order counts in Level 1 too."""
-    return tuple(Cell(level, level_name(level)) for level in run.design.levels)
-
-
-def in_levels(rows: pd.DataFrame, run: Run) -> pd.DataFrame:
-    """Rows of samples, repeated for each level of their scene."""
-    return with_levels(rows, run).rename(columns={"level": CELL})
 
 
 def _f1(frame: PoseFrame, tolerances_cm: tuple[float, ...], sums: Floats) -> Floats:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from phyblock.errors import Problem, SpecError
+from phyblock.tables.cells import in_levels, level_cells
 from phyblock.tables.design import OVERALL, Design
 from phyblock.tables.listing import Listing, by_settings
 from phyblock.tables.load import Run
@@ -25,12 +26,7 @@ from phyblock.tracks.pose_planning.counts import CARRIED, ERRORS
 from phyblock.tracks.pose_planning.figures import f1_by_tolerance, pose_error_bars
 from phyblock.tracks.pose_planning.film import pose_film, pose_table
 from phyblock.tracks.pose_planning.listing import LISTED_IN_C
-from phyblock.tracks.pose_planning.measures import (
-    NAME,
-    POSE_PLANNING_MEASURES,
-    in_levels,
-    level_cells,
-)
+from phyblock.tracks.pose_planning.measures import NAME, POSE_PLANNING_MEASURES
 from phyblock.tracks.pose_planning.tables import (
     pose_errors_frame,
     pose_errors_view,
