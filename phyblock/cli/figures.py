@@ -79,7 +79,8 @@ def command(
 
     Draws all figures of numbers, unless you name some with --only. Name figures of scenes
     (inference, subtask-cards, perturbations) to draw them. Leaves out figures that the run has no
-    numbers for. Draws a figure that cannot be read at the chosen width as wide as it needs.
+    numbers for. Draws a figure that cannot be read at the chosen width as wide as it needs,
+    and says so.
     """
     loaded = of_models(load_run(run, texts=False), split_names(models))
     known = figure_names(loaded)
@@ -87,9 +88,12 @@ def command(
         found, allowed = ", ".join(unknown), ", ".join(known)
         raise SpecError(Problem(str(run), "has no such figure", "--only", found, allowed))
     look = Look(width, font, not no_title)
-    files = write_paper_figures(loaded, Wanted(names, scene, data), look, out)
+    drawn = write_paper_figures(loaded, Wanted(names, scene, data), look, out)
     console = make_console()
-    for file in files:
+    for file in drawn.files:
         console.print(shown_path(file), markup=False, soft_wrap=True)
-    if not files:
+    for name, width_in in drawn.wider.items():
+        wider = f"{name} is {_MM * width_in:.1f} mm wide instead of {_MM * width:g} mm"
+        console.print(f"{wider}: its names and numbers need the room.", soft_wrap=True)
+    if not drawn.files:
         console.print("The run has no numbers for a figure.")

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from phyblock.cli.main import phyblock
 from phyblock.errors import SpecError, StoreError
 from phyblock.report.compare import compare_models
 from phyblock.report.figures import Wanted, of_models, write_paper_figures
@@ -118,9 +119,9 @@ def is_within(box: Bbox, page: Bbox) -> bool:
 
 def test_text_is_text_in_both_formats_and_the_same_run_gives_the_same_bytes(folder: Path) -> None:
     look, wanted = Look(COLUMN_IN, "serif", titled=False), Wanted(("f1-levels", "kit"))
-    files = write_paper_figures(load_run(folder, texts=False), wanted, look)
+    files = write_paper_figures(load_run(folder, texts=False), wanted, look).files
     first = {path: path.read_bytes() for path in files}
-    again = write_paper_figures(load_run(folder, texts=False), Wanted(("f1-levels",)), look)
+    again = write_paper_figures(load_run(folder, texts=False), Wanted(("f1-levels",)), look).files
     assert {path: path.read_bytes() for path in again} == {path: first[path] for path in again}
     for path, data in first.items():
         if path.suffix == ".pdf":
@@ -152,6 +153,23 @@ def test_a_caption_holds_what_a_figure_without_title_leaves_out(folder: Path) ->
         assert r"\begin{figure}[t]" in narrow
         assert r"\begin{figure*}[t]" in wide
         assert rf"\includegraphics{{{name}.pdf}}" in narrow
+
+
+def test_a_figure_that_is_wider_than_was_asked_for_is_named(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = ("error-types", "kit")
+    words = [word for name in names for word in ("--only", name)]
+    given = ["figures", str(folder), *words, "--width", "60", "--out", str(tmp_path)]
+    phyblock(given, standalone_mode=False)
+    *files, last = capsys.readouterr().out.splitlines()
+    drawn = (tmp_path / "error-types.svg").read_text("utf-8")
+    (points,) = re.findall(r'<svg [^>]*?width="([\d.]+)pt"', drawn)
+    width = f"{float(points) / 72 * 25.4:.1f}"
+    assert float(width) > 60
+    told = f"error-types is {width} mm wide instead of 60 mm: its names and numbers need the room."
+    assert last == told
+    assert len(files) == 10
 
 
 def test_a_users_file_is_never_written_over(folder: Path, tmp_path: Path) -> None:

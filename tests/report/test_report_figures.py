@@ -140,7 +140,8 @@ def marks(drawn: ElementTree.Element) -> int:
 def test_figures_for_slides_are_asked_for_and_old_ones_stay(tmp_path: Path) -> None:
     run = load_run(folder_of(tmp_path / "run"), texts=False)
     wanted = Wanted(("f1-levels", "losses"))
-    pictures = [f for f in write_paper_figures(run, wanted, PAGE_LOOK) if f.suffix == ".png"]
+    files = write_paper_figures(run, wanted, PAGE_LOOK).files
+    pictures = [file for file in files if file.suffix == ".png"]
     assert [file.stem for file in pictures] == [*wanted.names]
     for file in pictures:
         with Image.open(file) as picture:

@@ -82,7 +82,7 @@ def test_every_figure_of_scenes_is_drawn_alike_twice(
     loaded = phyblock.load_suite(suite, *overrides)
     run = phyblock.run_suite(loaded, models=models, limit=4, out=tmp_path / "run")
     for look in (Look(), Look(COLUMN_IN, "serif", titled=False)):
-        files = write_paper_figures(run, Wanted(names), look)
+        files = write_paper_figures(run, Wanted(names), look).files
         assert {path.stem for path in files} == set(names)
         first = {path: path.read_bytes() for path in files}
         write_paper_figures(run, Wanted(names), look)

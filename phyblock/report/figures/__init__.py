@@ -3,6 +3,7 @@
 from phyblock.report.figures.choice import of_models
 from phyblock.report.figures.write import (
     PAPER,
+    PaperFigures,
     Wanted,
     figure_files,
     figure_names,
@@ -13,6 +14,7 @@ from phyblock.report.figures.write import (
 
 __all__ = [
     "PAPER",
+    "PaperFigures",
     "Wanted",
     "figure_files",
     "figure_names",

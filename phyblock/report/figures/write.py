@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "PAPER",
+    "PaperFigures",
     "Wanted",
     "figure_files",
     "figure_names",
@@ -69,6 +70,18 @@ class Wanted:
     names: Sequence[str] = ()
     scene: str = ""
     data: Path | None = None
+
+
+@dataclass(frozen=True)
+class PaperFigures:
+    """What `write_paper_figures` wrote.
+
+    `wider` are widths [inches] by name of the figures that are wider than was asked for, as their
+    texts need.
+    """
+
+    files: tuple[Path, ...]
+    wider: Mapping[str, float]
 
 
 def _makers(run: Run | None = None) -> dict[str, _Maker]:
@@ -146,7 +159,7 @@ def write_figures(run: Run, names: Sequence[str] | None = None) -> tuple[Path, .
 
 def write_paper_figures(
     run: Run, wanted: Wanted, look: Look, out: Path | None = None
-) -> tuple[Path, ...]:
+) -> PaperFigures:
     """Draw figures for a paper into `out`, else into `paper/` of the run's folder: NAME.pdf,
     NAME.svg, NAME.png, and the caption as NAME.txt and as NAME.tex.
 
@@ -168,16 +181,19 @@ def write_paper_figures(
     endings = (*_PAPER_FORMS, "txt", "tex")
     folder.check(f"{below}{name}.{ending}" for name in names for ending in endings)
     files: list[Path] = []
+    wider: dict[str, float] = {}
     with styled(look):
         for name in names:
             figure = _drawn(run, makers[name], wanted)
             if figure is not None:
                 made: dict[str, bytes | str] = {**_rendered(figure, _PAPER_FORMS)}
                 made |= caption_files(run, name, figure)
+                if figure.get_figwidth() > look.width_in:
+                    wider[name] = float(figure.get_figwidth())
                 files += folder.write(
                     {f"{below}{name}.{form}": data for form, data in made.items()}
                 )
-    return tuple(files)
+    return PaperFigures(tuple(files), wider)
 
 
 def _drawn(run: Run, maker: _Maker, wanted: Wanted) -> Figure | None:
