@@ -8,11 +8,13 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from phyblock.bounded import load_json, read_bytes
+from phyblock.bounded import load_json, read_bytes, read_text
+from phyblock.datasets.raw import parse_json
 from phyblock.errors import DataError, Problem, said
 from phyblock.models import HaltedError, Request
 from phyblock.play.page import default_consent
 from phyblock.play.person import Given, Person, digest_of, picking_of
+from phyblock.records.decode import problem_of
 from phyblock.records.line import Amount
 from phyblock.run.plan import RunPlan
 from phyblock.tracks.base import shown_item
@@ -22,6 +24,8 @@ __all__ = ["ANSWERS_FORMAT", "AnswersFile", "FileAnswers", "default_text", "read
 
 ANSWERS_FORMAT = 1
 _LARGEST_BYTES = 4 * 1024 * 1024
+_IS_NOT = "is no file of answers"
+_AS_SAVED = "give the file as the page saved it"
 
 
 class _Strict(BaseModel):
@@ -70,13 +74,16 @@ def read_answers(path: Path, plan: RunPlan, person: Person) -> dict[int, Given]:
     Raises DataError for a file that is none, or is of another person or run.
     """
     try:
-        found = AnswersFile.model_validate(load_json(read_bytes(path, _LARGEST_BYTES), unique=True))
+        text = read_text(path, _LARGEST_BYTES)
     except OSError as error:
         raise DataError(Problem(str(path), f"cannot be read: {said(error)}")) from error
-    except ValidationError as error:
-        raise DataError([_problem(path, fault) for fault in error.errors()]) from error
     except ValueError as error:
-        raise DataError(Problem(str(path), f"is no file of answers: {error}")) from error
+        raise DataError(Problem(str(path), f"{_IS_NOT}: {error}")) from error
+    try:
+        found = AnswersFile.model_validate(parse_json(text, path))
+    except ValidationError as error:
+        faults = error.errors(include_url=False)
+        raise DataError(problem_of(one, str(path), _IS_NOT, _AS_SAVED) for one in faults) from error
     given: dict[int, Given] = {}
     problems: list[Problem] = []
     for field, value, wanted in (
@@ -127,18 +134,6 @@ def _check_picks(path: Path, given: Mapping[int, Given], plan: RunPlan, person: 
             problems.append(Problem(str(path), str(error), field, found))
     if problems:
         raise DataError(problems)
-
-
-def _problem(path: Path, fault: Mapping[str, object]) -> Problem:
-    steps = fault["loc"]
-    assert isinstance(steps, tuple)
-    names = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps)
-    field = "".join(names).removeprefix(".")
-    return Problem(str(path), "is no file of answers", field, _words(fault))
-
-
-def _words(fault: Mapping[str, object]) -> str:
-    return "no mapping" if fault["type"] == "model_type" else str(fault["msg"])
 
 
 class FileAnswers:

@@ -15,7 +15,7 @@ from phyblock.records.line import encodable
 __all__ = ["decode", "dotted", "is_cut", "problem_of", "shown"]
 
 _LONGEST_SHOWN = 60
-_MISSING = "missing"
+_PLAIN: Mapping[str, str] = {"missing": "missing", "extra_forbidden": "has no such field"}
 _ENCODER = json.JSONEncoder(ensure_ascii=False, default=lambda value: type(value).__name__)
 
 
@@ -47,8 +47,8 @@ def is_cut(line: bytes) -> bool:
 def problem_of(error: Any, where: str, is_not: str, hint: str) -> Problem:
     """What pydantic found, in our words."""
     field = dotted(error["loc"])
-    if error["type"] == _MISSING:
-        return Problem(where, f"{is_not}: missing", field, hint=hint)
+    if error["type"] in _PLAIN:
+        return Problem(where, f"{is_not}: {_PLAIN[error['type']]}", field, hint=hint)
     allowed = _ALLOWED.get(error["type"], _expected)(error.get("ctx") or {}, error["msg"])
     found = shown(error["input"])
     message = f"{is_not}: of the wrong type or out of range"
@@ -84,6 +84,8 @@ def _expected(_: Mapping[str, Any], message: str) -> str:
 
 _ALLOWED: Mapping[str, Callable[[Mapping[str, Any], str], str]] = {
     "literal_error": lambda context, _: str(context["expected"]),
+    "model_type": lambda *_: "an object",
+    "string_pattern_mismatch": lambda context, _: f"a text of the form {context['pattern']}",
 }
 
 

@@ -6,6 +6,7 @@ What is answered here is a script's, to test the page: it says nothing of what p
 from __future__ import annotations
 
 import json
+import math
 import re
 import shutil
 import time
@@ -17,8 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from phyblock.errors import DataError
 from phyblock.models import Message, Request
-from phyblock.play.answers import default_text
+from phyblock.play.answers import default_text, read_answers
 from phyblock.play.desk import Desk
 from phyblock.play.page import default_consent
 from phyblock.play.person import digest_of
@@ -361,13 +363,46 @@ def test_what_no_picture_shows_is_picked_by_a_button_beside_number_fields(browse
         main = (
             'Picker.show(document.getElementById("main"), question, one => { window.sent = one; })'
         )
-        page.evaluate(f"question => {{ {main}; }}", shown(request, picking, Place(1, 1), ()))
+        keys = f'document.addEventListener("keydown", {main})'
+        page.evaluate(f"question => {{ {keys}; }}", shown(request, picking, Place(1, 1), ()))
         assert page.inner_text(".hint").startswith("Each brick that you pick asks for x.")
         page.get_by_role("button", name=names["B"]).click()
         page.get_by_label("x, cm").fill("2.5")
-        page.get_by_role("button", name="Submit 1 brick").click()
-        assert page.evaluate("window.sent") == {"picks": [1], "numbers": [[2.5]]}
+        page.get_by_role("button", name=names["A"]).click()
+        mend_by_keys(page)
+        page.keyboard.press("Control+Enter")
+        assert page.evaluate("window.sent") == {"picks": [1, 0], "numbers": [[3.5], [1]]}
         page.context.close()
+
+
+def mend_by_keys(page: Page) -> None:
+    """A fault stays at its field until it is none, and Enter goes from one to the next."""
+    fields, faults = page.get_by_label("x, cm"), page.locator(".fault:not(:empty)")
+    # A field that was only come to is no fault yet.
+    page.get_by_role("button", name="Clear").focus()
+    assert faults.count() == 0
+    fields.first.fill("2 cm")
+    fields.last.fill("1,55")
+    page.keyboard.press("Control+Enter")
+    assert faults.all_inner_texts() == ["Give a number alone, in cm.", "Give 1 decimal at most."]
+    assert page.inner_text("#said") == "2 numbers missing or wrong"
+    page.get_by_role("button", name="Undo").click()
+    assert faults.all_inner_texts() == ["Give a number alone, in cm.", "Give a number."]
+    assert page.inner_text("#said") == "Undone; 2 numbers missing or wrong"
+    for field, fault in zip(fields.all(), faults.all(), strict=True):
+        assert field.get_attribute("aria-invalid") == "true"
+        assert field.get_attribute("aria-describedby") == fault.get_attribute("id")
+    fields.first.fill("1.2.3")
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.id") == fields.first.get_attribute("id")
+    fields.first.fill("1000")
+    assert page.inner_text("#said") == "x of brick 1: Give one from \N{MINUS SIGN}10 to 10."
+    fields.first.fill("3.5")
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.id") == fields.last.get_attribute("id")
+    page.keyboard.type("1\n")
+    assert faults.count() == 0
+    assert page.inner_text("#said") == "All numbers are there, Ctrl+Enter submits"
 
 
 KEPT = "JSON.parse(localStorage.getItem(localStorage.key(0)))"
@@ -493,6 +528,31 @@ def test_the_text_to_agree_to_says_where_answers_are(tmp_path: Path) -> None:
         assert default_text(file) == text
     file.write_text("[]", encoding="utf-8")
     assert default_text(file) == texts[0]
+
+
+@pytest.mark.parametrize(
+    ("held", "field", "shown", "allowed"),
+    [
+        ({"took_s": math.nan}, "took_s", "NaN", "a finite number"),
+        ({"numbers": [[1, -math.inf]]}, "numbers[0][1]", "-Infinity", "a finite number"),
+        ({"numbers": [["NaN"]]}, "numbers[0][0]", '"NaN"', "a valid number"),
+        ({"picks": [math.nan]}, "picks[0]", "NaN", "a valid integer"),
+    ],
+)
+def test_what_is_no_number_in_a_file_of_answers_is_named_with_its_field(
+    tmp_path: Path, held: Raw, field: str, shown: str, allowed: str
+) -> None:
+    file = tmp_path / "answers.json"
+    sound: Raw = {"number": 1, "picks": [0], "took_s": 1.0}
+    head = {"format": 1, "run": "r", "model": "human:eve", "consent": "c"}
+    answers = {**head, "agreed": "2026-01-01T00:00:00Z", "answers": [{**sound, **held}]}
+    file.write_text(json.dumps(answers), encoding="utf-8")
+    nothing: Any = None
+    with pytest.raises(DataError) as error:
+        read_answers(file, nothing, nothing)
+    (problem,) = error.value.problems
+    assert (problem.where, problem.field) == (str(file), f"answers[0].{field}")
+    assert (problem.found, problem.allowed) == (shown, allowed)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,5 @@
 /* Picks as rows of number fields: typed, stepped by buttons and keys, moved, removed. What is no
-   number is said at its field; no unit is ever guessed. */
+   number is said at its field for as long as it is none; no unit is ever guessed. */
 "use strict";
 
 const Fields = (() => {
@@ -24,12 +24,17 @@ const Fields = (() => {
 
   /**
    * The rows of `picks`. `head(pick, n)` shows which choice it is; `painted` is called when picks
-   * have changed, `leave` when the fields are left for the next pick.
+   * have changed, with words where there is something to say, `leave` when the fields are left for
+   * the next pick.
    */
   function rows(picks, question, { head, painted, leave }) {
     const { fields, noun } = question;
     const list = el("ol", { class: "entries", "aria-label": "Your answer so far" });
     const inputs = () => [...list.querySelectorAll("input")];
+    /** Fields at which a fault was said: a row that is made anew says it again. */
+    const told = new Set();
+    /** Whether an answer was held back for its faults: Enter goes from one to the next then. */
+    let isMending = false;
 
     function paint() {
       list.replaceChildren(...picks.list.map(row));
@@ -49,14 +54,16 @@ const Fields = (() => {
     }
 
     function control(pick, n, field, k) {
-      const id = `field-${n}-${k}`, fault = `${id}-fault`;
+      const id = `field-${n}-${k}`;
+      const fault = el("p", { class: "fault", id: `${id}-fault` });
       let isMarked = false;
       const input = el("input", {
         id, type: "text", role: "spinbutton", autocomplete: "off", "aria-valuemin": -field.most, "aria-valuemax": field.most,
-        "aria-describedby": fault, value: pick.texts[k],
+        "aria-describedby": fault.id, value: pick.texts[k],
         onfocus: () => { isMarked = false; },
         oninput: () => change(input.value),
-        onblur: () => say(input),
+        // A field that nobody has come to yet may stay empty until the answer is given.
+        onblur: () => (input.value.trim() || told.has(input.key)) && tell(input),
         onkeydown: (event) => onKey(event, n, (kind, sign) => step(sign * field[kind])),
       });
       const step = (by) => {
@@ -66,14 +73,14 @@ const Fields = (() => {
           const to = Math.max(-field.most, Math.min(field.most, from + by));
           change(String(Number(to.toFixed(field.decimals))));
         }
-        say(input);
+        tell(input);
       };
       const change = (text) => {
         if (!isMarked) picks.mark();
         isMarked = true;
         input.value = pick.texts[k] = text;
         picks.keep();
-        if (input.getAttribute("aria-invalid")) say(input);
+        if (input.getAttribute("aria-invalid")) tell(input);
         valueNow();
         painted();
       };
@@ -89,12 +96,13 @@ const Fields = (() => {
           step(by);
         },
       }, text);
-      input.field = field;
+      Object.assign(input, { field, fault, key: `${pick.id}.${k}`, name: `${field.name} of ${noun} ${n + 1}` });
+      if (told.has(input.key)) say(input);
       valueNow();
       return el("div", { class: "field" },
         el("label", { for: id }, `${field.name}, ${SIGNS[field.unit] || field.unit}`),
         el("span", { class: "stepper" }, button("−", "Less", -field.step), input, button("+", "More", field.step)),
-        el("p", { class: "fault", id: fault }));
+        fault);
     }
 
     /** Say at a field what is wrong with it; whether anything is. */
@@ -102,8 +110,40 @@ const Fields = (() => {
       const { fault } = read(input.value, input.field);
       if (fault) input.setAttribute("aria-invalid", "true");
       else input.removeAttribute("aria-invalid");
-      document.getElementById(`${input.id}-fault`).textContent = fault || "";
+      if (fault) told.add(input.key);
+      input.fault.textContent = fault || "";
       return Boolean(fault);
+    }
+
+    /** The same, and aloud where it is news. */
+    function tell(input) {
+      const before = input.fault.textContent;
+      const isNews = input.isConnected && say(input) && input.fault.textContent !== before;
+      if (isNews) painted(`${input.name}: ${input.fault.textContent}`);
+    }
+
+    const isWrong = (input) => Boolean(read(input.value, input.field).fault);
+
+    /** How many numbers hold an answer back that was to be given, in words; "" where none does. */
+    function faults() {
+      const count = isMending ? inputs().filter(isWrong).length : 0;
+      return count ? `${Words.count(count, "number")} missing or wrong` : "";
+    }
+
+    function goTo(input) {
+      input.focus();
+      input.select();
+    }
+
+    /** Go on to the next fault behind a field, from the last to the first; leave where none is. */
+    function goOn(from) {
+      if (isWrong(from)) return tell(from);
+      const all = inputs(), here = all.indexOf(from);
+      const next = [...all.slice(here), ...all.slice(0, here)].find(isWrong);
+      if (next) return goTo(next);
+      isMending = false;
+      leave();
+      painted("All numbers are there, Ctrl+Enter submits");
     }
 
     function onKey(event, n, stepped) {
@@ -117,9 +157,10 @@ const Fields = (() => {
       if (STEPS[event.key]) return taken(() => stepped(...STEPS[event.key]));
       if (event.key === "Escape") return taken(leave);
       if (event.key !== "Enter") return;
+      if (isMending) return taken(() => goOn(event.target));
       const all = inputs(), next = all.indexOf(event.target) + 1;
       // Behind the last field of a step comes the next pick.
-      return taken(() => (next % fields.length ? all[next].select() : leave()));
+      return taken(() => (next % fields.length ? goTo(all[next]) : leave()));
     }
 
     function move(n, by, focused = "") {
@@ -144,8 +185,9 @@ const Fields = (() => {
     /** Numbers of every pick; null where a field is wrong, which is said and gone to. */
     function numbers() {
       const wrong = inputs().filter(say);
-      wrong[0]?.focus();
-      return wrong.length ? null : picks.list.map((pick) => pick.texts.map((text, k) => read(text, fields[k]).value));
+      isMending = wrong.length > 0;
+      if (isMending) goTo(wrong[0]);
+      return isMending ? null : picks.list.map((pick) => pick.texts.map((text, k) => read(text, fields[k]).value));
     }
 
     /** Bring the last pick into sight, and into its first field if that is to be `typed` into. */
@@ -155,7 +197,7 @@ const Fields = (() => {
       if (typed) last.querySelector("input").focus({ preventScroll: true });
     }
 
-    return { list, paint, numbers, enter };
+    return { list, paint, numbers, faults, enter };
   }
 
   return { rows, blank };

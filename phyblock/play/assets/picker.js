@@ -123,7 +123,7 @@ const Picker = (() => {
       if (!isOne && list.length >= question.most) return paint("No more can be picked");
       picks.change((all) => {
         if (isOne) all.length = 0;
-        all.push({ place, texts: Fields.blank(question.fields) });
+        all.push(picks.made(place, Fields.blank(question.fields)));
       });
       repaint(`${isOne ? "Picked" : `${question.noun} ${picks.list.length}:`} ${name}`);
       // A touch on a field opens a keyboard, which hides half the page: that is left to the person.
@@ -131,7 +131,9 @@ const Picker = (() => {
     }
 
     function takeBack() {
-      repaint(picks.undo() ? "Undone" : "Nothing to undo");
+      const words = picks.undo() ? "Undone" : "Nothing to undo";
+      rows?.paint();
+      paint([words, rows?.faults()].filter(Boolean).join("; "));
     }
 
     function takeAll() {
@@ -151,7 +153,7 @@ const Picker = (() => {
       }
       const numbers = rows?.numbers();
       if (numbers === null) {
-        paint("A number is missing or wrong");
+        paint(rows.faults());
         return;
       }
       done.disabled = true;

@@ -1,6 +1,6 @@
 /* What was picked so far, with every state before, so that any change can be undone; kept while the
-   page lives, so that reloading it loses nothing. A pick is {place, texts}: which choice, and what is
-   typed into the number fields that go with it. */
+   page lives, so that reloading it loses nothing. A pick is {id, place, texts}: which it is wherever
+   it is moved, which choice, and what is typed into the number fields that go with it. */
 "use strict";
 
 class Picks {
@@ -19,6 +19,13 @@ class Picks {
     } catch {
       // Nothing that can be read is kept: it begins with nothing.
     }
+    this.lastId = Math.max(0, ...[this.list, ...this.past].flat().map(({ id }) => id));
+  }
+
+  /** A pick of a choice that is told from all others for good. */
+  made(place, texts) {
+    this.lastId += 1;
+    return { id: this.lastId, place, texts };
   }
 
   /** Change the list by a function, as one step that can be undone. */
