@@ -17,7 +17,14 @@ from phyblock.report.measure_table import main_heading
 from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Measure, value_key
-from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
+from phyblock.tables.text_table import (
+    NO_VALUE,
+    Column,
+    TextTable,
+    number,
+    track_column,
+    track_text,
+)
 from phyblock.tracks.estimates import track_estimates, track_measures
 from phyblock.tracks.headline import headline_columns
 from phyblock.tracks.kind import kind_of
@@ -140,8 +147,8 @@ def _known_floors(run: Run, track: str, measure: Measure) -> Iterator[tuple[str,
 
 def floors_view(table: pd.DataFrame, run: Run) -> TextTable:
     """A row a part and setting out of `floors_frame`: the floor, and who is above it or not."""
-    rows = []
-    for track in run.design.suite.tracks:
+    rows, tracks = [], run.design.suite.tracks
+    for track in tracks:
         cells = {cell.name: cell for cell in kind_of(track).report().cells(run)}
         parts = {name for cell in cells.values() for name in cell.of if not cells[name].of}
         for measure in track_measures(track):
@@ -152,12 +159,18 @@ def floors_view(table: pd.DataFrame, run: Run) -> TextTable:
                 key = (row["setting"], row["criterion"], row[CELL])
                 groups.setdefault(key, []).append(row)
             for (setting, criterion, cell), group in groups.items():
-                heading = f"{measure.heading}, {cells[cell].heading}"
-                rows.append(_row(heading, setting, criterion, group, measure))
-    columns = ("Measure", "Setting", "Counted by", "Strongest floor", "Floor", "Above", "Not above")
+                named = (*track_text(track, tracks), measure.heading, cells[cell].heading)
+                rows.append((*named, *_texts(setting, criterion, group, measure)))
+    columns = (
+        *("Measure", "Part", "Setting", "Counted by"),
+        *("Strongest floor", "Floor", "Above", "Not above"),
+    )
     return TextTable(
         "Floors: what is reached without seeing the goal",
-        tuple(Column(name, is_text=name != "Floor") for name in columns),
+        (
+            *track_column(tracks),
+            *(Column(name, is_text=name != "Floor") for name in columns),
+        ),
         tuple(rows),
         (
             "Above: the whole 95 % interval is. In brackets: those of which a single base scene "
@@ -166,8 +179,7 @@ def floors_view(table: pd.DataFrame, run: Run) -> TextTable:
     )
 
 
-def _row(
-    heading: str,
+def _texts(
     setting: str,
     criterion: str,
     group: Sequence[Mapping[Hashable, Any]],
@@ -180,7 +192,6 @@ def _row(
     }
     unclear = [f"({name})" for name in models["cannot tell"]]
     return (
-        heading,
         setting or NO_VALUE,
         criterion or NO_VALUE,
         str(first["floor"]),

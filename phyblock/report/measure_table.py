@@ -11,7 +11,14 @@ from phyblock.plain_text import counted
 from phyblock.tables.headline import Value, headline_rows, headline_values
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
-from phyblock.tables.text_table import Column, TextTable, between, number
+from phyblock.tables.text_table import (
+    Column,
+    TextTable,
+    between,
+    number,
+    track_column,
+    track_text,
+)
 from phyblock.tracks.estimates import samples_lacking, track_estimates, track_measures
 from phyblock.tracks.headline import headline_columns, main_column
 from phyblock.tracks.kind import kind_of
@@ -91,9 +98,8 @@ def measures_frame(run: Run) -> pd.DataFrame:
 
 def measures_view(table: pd.DataFrame, run: Run) -> TextTable:
     """A row a model and measure out of `measures_frame`, with its value over everything."""
-    whole = {
-        track: kind_of(track).report().cells(run)[-1].name for track in run.design.suite.tracks
-    }
+    tracks = run.design.suite.tracks
+    whole = {track: kind_of(track).report().cells(run)[-1].name for track in tracks}
     rows, notes = [], {}
     for row in table.to_dict("records"):
         if row[CELL] != whole[row["track"]]:
@@ -101,18 +107,24 @@ def measures_view(table: pd.DataFrame, run: Run) -> TextTable:
         (measure,) = (m for m in track_measures(row["track"]) if m.name == row["measure"])
         unit = f" ({measure.unit})" if measure.unit else ""
         value, interval = number(row["value"], 2), between(row["lo"], row["hi"])
-        rows.append((row["model"], f"{measure.heading}{unit}", value, interval, str(row["n"])))
-        notes[measure.name] = f"{measure.heading}: {measure.meaning}; {measure.better} is better."
+        named = (*track_text(row["track"], tracks), f"{measure.heading}{unit}")
+        rows.append((row["model"], *named, value, interval, str(row["n"])))
+        key = row["track"], measure.name
+        notes[key] = (
+            f"{measure.heading}: {measure.meaning}; counted over {measure.over}; "
+            f"{measure.better} is better."
+        )
         if lacking := samples_lacking(run, row["track"], measure.counted):
-            notes[measure.name] += (
+            notes[key] += (
                 f" Not in it: {counted(lacking, 'sample')} judged before it was there, which "
                 "phyblock score counts."
             )
     columns = (
         Column("Model", is_text=True),
+        *track_column(tracks),
         Column("Measure", is_text=True),
         Column("Value"),
         Column("95 % CI"),
         Column("Samples"),
     )
-    return TextTable("Further measures", columns, tuple(rows), tuple(notes.values()))
+    return TextTable("Further measures", columns, tuple(rows), tuple(dict.fromkeys(notes.values())))

@@ -11,7 +11,14 @@ from phyblock.report.compare_view import p_text
 from phyblock.report.sensitivity import ITEMS, levels_frame
 from phyblock.scoring.uncertainty import CONFIDENCE
 from phyblock.tables.load import Run
-from phyblock.tables.text_table import Column, TextTable, between, number
+from phyblock.tables.text_table import (
+    Column,
+    TextTable,
+    between,
+    number,
+    track_column,
+    track_text,
+)
 from phyblock.tracks.kind import kind_of
 from phyblock.variants import REPEAT
 
@@ -43,7 +50,7 @@ def components_view(table: pd.DataFrame, run: Run) -> TextTable:
     rows = [
         (
             row["model"],
-            *_track(row, run),
+            *track_text(row["track"], run.design.suite.tracks),
             factor_name(row["factor"]),
             *(
                 text
@@ -67,7 +74,7 @@ def components_view(table: pd.DataFrame, run: Run) -> TextTable:
         notes.append("One factor alone without repeats cannot be told from noise in single items.")
     return TextTable(
         f"What the way of asking changes{run.design.of_suite}",
-        (_MODEL, *_track_column(run), FACTOR, *pairs),
+        (_MODEL, *track_column(run.design.suite.tracks), FACTOR, *pairs),
         tuple(rows),
         tuple(notes),
     )
@@ -91,7 +98,7 @@ def levels_view(table: pd.DataFrame, run: Run) -> TextTable:
     rows = [
         (
             row["model"],
-            *_track(row, run),
+            *track_text(row["track"], run.design.suite.tracks),
             factor_name(row["factor"]),
             row["level"],
             number(row["value"]),
@@ -106,7 +113,7 @@ def levels_view(table: pd.DataFrame, run: Run) -> TextTable:
     names = ("Value", "Rank", "Difference", "95 % CI", "p (Holm)", "Detectable")
     return TextTable(
         f"Every level{run.design.of_suite}, beside the first of its factor",
-        (_MODEL, *_track_column(run), FACTOR, LEVEL, *map(Column, names)),
+        (_MODEL, *track_column(run.design.suite.tracks), FACTOR, LEVEL, *map(Column, names)),
         tuple(rows),
         (
             *(f"{what}." for what in _what(run, list(table["track"].unique()))),
@@ -131,7 +138,7 @@ def ranks_view(table: pd.DataFrame, run: Run) -> TextTable:
     """What becomes of the ranking of models out of `ranks_frame`, a row a level."""
     rows = [
         (
-            *_track(row, run),
+            *track_text(row["track"], run.design.suite.tracks),
             factor_name(row["factor"]),
             row["level"],
             number(row["tau"], 2),
@@ -144,7 +151,7 @@ def ranks_view(table: pd.DataFrame, run: Run) -> TextTable:
     names = ("Kendall's tau", "Pairs that flip", "beyond noise", "Detectable")
     return TextTable(
         f"Does the ranking survive{run.design.of_suite}?",
-        (*_track_column(run), FACTOR, LEVEL, *map(Column, names)),
+        (*track_column(run.design.suite.tracks), FACTOR, LEVEL, *map(Column, names)),
         tuple(rows),
         (
             "Against the first level of each factor. Beyond noise: the change of the pair's "
@@ -182,12 +189,3 @@ def _what(run: Run, tracks: Sequence[str]) -> list[str]:
         + (f" ({measure.unit})" if measure.unit else "")
         for track, measure in zip(tracks, measures, strict=True)
     ]
-
-
-def _track_column(run: Run) -> tuple[Column, ...]:
-    return (Column("Track", is_text=True),) if len(run.design.suite.tracks) > 1 else ()
-
-
-def _track(row: dict[str, object] | object, run: Run) -> tuple[str, ...]:
-    assert isinstance(row, dict)
-    return (str(row["track"]).replace("_", " "),) if len(run.design.suite.tracks) > 1 else ()

@@ -10,7 +10,14 @@ import pandas as pd
 from phyblock.tables.flat import TOKENS
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.outcomes import HEADINGS, OUTCOMES
-from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
+from phyblock.tables.text_table import (
+    NO_VALUE,
+    Column,
+    TextTable,
+    number,
+    track_column,
+    track_text,
+)
 
 __all__ = ["coverage_frame", "coverage_in_terminal", "coverage_view"]
 
@@ -88,9 +95,9 @@ def coverage_view(table: pd.DataFrame, run: Run) -> TextTable:
     counts = {"expected": "Expected", "not_run": "Not run"}
     counts |= {outcome: HEADINGS[outcome] for outcome in OUTCOMES}
     parts: list[tuple[Column, list[str]]] = [(Column("Model", is_text=True), list(table["model"]))]
-    if len(run.design.suite.tracks) > 1:
-        tracks = [track.replace("_", " ") for track in table["track"]]
-        parts.append((Column("Track", is_text=True), tracks))
+    tracks = run.design.suite.tracks
+    texts = [text for track in table["track"] for text in track_text(track, tracks)]
+    parts += [(column, texts) for column in track_column(tracks)]
     parts += [
         (Column(heading), [str(count) for count in table[name]]) for name, heading in counts.items()
     ]

@@ -64,11 +64,11 @@ class Measure:
     """One number about a model.
 
     `value` makes it of summed counts, shape (..., columns of `counted`), NaN where it is not
-    defined. `heading` and `meaning` are for people; `unit` "%" stands for values in [0, 1] that
-    tables show times 100. `over` names what is counted. `chance` says what guessing gives in a
-    cell, `floors` names baselines that never see the goal. One that is not `in_tables` is in the
-    frame of estimates alone. One that `is_difference` of two shares may be below zero. Values in
-    another unit are from 0 to `most` where that is given, infinity for no end.
+    defined. `heading`, `meaning` and `over` (what is counted) are for people; `unit` "%" stands for
+    values in [0, 1] that tables show times 100. `chance` says what guessing gives in a cell,
+    `floors` names baselines that never see the goal. One that is not `in_tables` is in the frame of
+    estimates alone. One that `is_difference` of two shares may be below zero. Values in another
+    unit are from 0 to `most` where that is given, infinity for no end.
     """
 
     name: str

@@ -17,6 +17,8 @@ __all__ = [
     "level_name",
     "number",
     "spread",
+    "track_column",
+    "track_text",
 ]
 
 NO_VALUE = "–"  # noqa: RUF001
@@ -94,5 +96,15 @@ def between(lo: float, hi: float, *, signed: bool = False) -> str:
 
 
 def level_name(level: str) -> str:
-    """`Level-3` or `Overall`."""
-    return f"Level-{level}" if level.isdigit() else level.capitalize()
+    """`Level 3` or `Overall`."""
+    return f"Level {level}" if level.isdigit() else level.capitalize()
+
+
+def track_column(tracks: Sequence[str]) -> tuple[Column, ...]:
+    """The column that says of which track a row is; none where there is one track alone."""
+    return (Column("Track", is_text=True),) if len(tracks) > 1 else ()
+
+
+def track_text(track: str, tracks: Sequence[str]) -> tuple[str, ...]:
+    """What stands in the `track_column`."""
+    return (track.replace("_", " "),) if len(tracks) > 1 else ()

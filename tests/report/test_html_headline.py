@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from urllib.parse import urlencode
+
 import pytest
 
 from phyblock.report import Run, load_run
 from phyblock.report.html.headline import headlines
+from phyblock.report.html.leads import table_leads
 from phyblock.report.html.standing import cautions, samples_done
+from phyblock.report.write import make_tables
+from phyblock.tables.text_table import NO_VALUE
 from phyblock.tracks.full_planning.assembly import assembly_frame
 from phyblock.tracks.step_planning.table3 import step_intervals, table3_frame
 from phyblock.tracks.vqa.accuracy import questions_frame
@@ -91,6 +96,27 @@ def test_models_stand_by_rank_with_the_places_that_tests_leave_open() -> None:
     }
     level = dict(zip(headline.columns, models[0].cells, strict=True))["Level 2"]
     assert level.query == "track=full_planning&level=2&model=high"
+
+
+def test_numbers_of_tables_of_all_tracks_lead_to_samples_of_their_own(made: Workspace) -> None:
+    run = load_run(made.out, texts=False)
+    _, views = make_tables(run, ())
+
+    def leads(name: str) -> list[tuple[tuple[str, ...], str | None]]:
+        return list(zip(views[name].rows, table_leads(run, name, views[name]).rows, strict=True))
+
+    measures = leads("measures")
+    for row, lead in measures:
+        assert lead == urlencode({"track": row[1].replace(" ", "_"), "model": row[0]})
+    assert {row[1] for row, _ in measures} == {"full planning", "step planning"}
+    for row, lead in leads("floors"):
+        # Nothing was asked of chance, nor of floors that were worked out.
+        assert bool(lead) == (row[5] == "random"), row
+    known = {row[:5]: lead for row, lead in leads("floors")}
+    steps = known["step planning", "F1", "Overall", "A", "placed"]
+    assert steps == "track=step_planning&setting=A&model=random"
+    part = known["vqa", "Accuracy", "Property", NO_VALUE, NO_VALUE]
+    assert part == "track=vqa&subtask=object_property&model=random"
 
 
 def test_headlines_of_questions_and_episodes(made: Workspace) -> None:

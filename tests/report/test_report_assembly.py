@@ -343,7 +343,7 @@ def test_a_level_that_asks_for_no_order_has_no_types_of_wrong_steps(
     table = errors_frame(run)
     assert table["level"].tolist() == wanted
     (note,) = errors_view(table, run).notes
-    assert ("Level-1 asks for no order" in note) == (level1 == "selection")
+    assert ("Level 1 asks for no order" in note) == (level1 == "selection")
 
 
 def test_settings_are_not_compared_where_a_model_has_no_reply() -> None:

@@ -221,7 +221,7 @@ def test_levels_are_rows_of_one_pair_alone() -> None:
     what = comparable(run, "full_planning")
     parts = [part for part in what.parts if part.name in ("2", "overall")]
     one = compare_view(compare([(sides[0], sides[1])], parts, what))
-    assert [row[:3] for row in one.rows] == [("alpha", "beta", "Level-2"), ("", "", "Overall")]
+    assert [row[:3] for row in one.rows] == [("alpha", "beta", "Level 2"), ("", "", "Overall")]
     assert "Part" not in [
         column.name
         for column in compare_view(compare([(sides[0], sides[1])], parts[-1:], what)).columns

@@ -187,7 +187,7 @@ def test_table1_says_how_it_was_made(tmp_path: Path) -> None:
     )
     assert re.search(r"alpha +\|.* 60.0 \|", text)
     assert "- Values pool the samples of 2 seeds." in text
-    assert "- Setting A, matcher optimal, Level-1 by selection;" in text
+    assert "- Setting A, matcher optimal, Level 1 by selection;" in text
     assert "- Scored of 10 samples: alpha 6, beta 0." in text
     assert "- alpha: seed unsupported: 2 independent repeats." in text
     assert "only its Random row is as that header says" in text

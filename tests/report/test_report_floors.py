@@ -56,7 +56,7 @@ def test_the_strongest_floor_is_named_and_whose_interval_is_above_it() -> None:
     whole = "Full planning, Overall F1: goal-blind 30.0"
     assert line == f"{whole}; above it: good; not above it: middling, bad"
     view = floors_view(floors_frame(run), run)
-    assert ("F1, Overall", "A", "aov", "goal-blind", "30.0", "good", "middling, bad") in view.rows
+    assert ("F1", "Overall", "A", "aov", "goal-blind", "30.0", "good", "middling, bad") in view.rows
     assert title.startswith("Floors")
 
 

@@ -76,9 +76,9 @@ def check_everywhere(folder: Path) -> None:
     row = whole["all-candidates"]
     assert 0.5 < float(row["lo"]) <= float(row["value"]) <= float(row["hi"]) < 1
     assert {row["cell"] for row in rows} == {"1", "2", "3", "4", "overall"}
-    assert "| all-candidates | Needless steps" in (folder / "tables" / "measures.md").read_text(
-        "utf-8"
-    )
+    table = (folder / "tables" / "measures.md").read_text("utf-8")
+    assert "| all-candidates | Needless steps" in table
+    assert f"{NEEDLESS.meaning}; counted over steps; lower is better." in table
     assert "Needless steps (%)" in (folder / "report.html").read_text("utf-8")
     command("compare", folder, "--measure", "needless", "--out", folder / "compared")
     with (folder / "compared" / "comparison.csv").open(newline="") as file:

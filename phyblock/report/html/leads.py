@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from urllib.parse import urlencode
 
 from phyblock.plain_text import one_line
@@ -12,7 +13,7 @@ from phyblock.report.sensitivity_view import FACTOR, LEVEL, factor_name
 from phyblock.report.varied import blocks_of
 from phyblock.tables.load import Run
 from phyblock.tables.outcomes import HEADINGS
-from phyblock.tables.text_table import TextTable, level_name
+from phyblock.tables.text_table import TextTable, level_name, track_text
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["TableLeads", "mean_parts", "part_names", "samples_query", "table_leads"]
@@ -91,12 +92,22 @@ def table_leads(run: Run, name: str, table: TextTable) -> TableLeads:
     ways = _ways(run) if is_of_ways else {(): {}}
     rows: list[str | None] = []
     model = None
+    # What is said behind the numbers of a row, as who is above a floor, is not what they are of.
+    n_naming = len(list(takewhile(lambda column: column.is_text, table.columns)))
     for row in table.rows:
-        # An empty name is the one above.
-        model = models.get(row[0]) if row[0] else model
-        chosen = {"track": of_table[0]} if len(of_table) == 1 else {}
-        for cell, column in zip(row[1:], table.columns[1:], strict=True):
-            chosen |= words.get(cell.lower(), {}) if column.is_text else {}
+        chosen, naming = {"track": of_table[0]} if len(of_table) == 1 else {}, row[:n_naming]
+        if row[0] in models:
+            model, naming = models[row[0]], naming[1:]
+        elif row[0]:
+            # An empty name is the one above.
+            model = None
+        for text in naming:
+            if text in settings:
+                chosen["setting"] = text
+            elif text.lower() in words:
+                chosen |= words[text.lower()]
+            elif model is None:
+                model = models.get(text)
         texts = zip(table.columns, row, strict=True)
         of_way = (cell for column, cell in texts if is_of_ways and column in (FACTOR, LEVEL))
         way = ways.get(tuple(of_way))
@@ -113,7 +124,8 @@ def _words(run: Run, tracks: Sequence[str]) -> Mapping[str, dict[str, str]]:
     for level in run.design.suite.levels:
         words[level_name(str(level)).lower()] = {"level": str(level)}
     for track in tracks:
-        words[kind_of(track).title.lower()] = {"track": track}
+        for name in (kind_of(track).title.lower(), *track_text(track, run.design.suite.tracks)):
+            words[name] = {"track": track}
         for short in kind_of(track).report().part_names:
             words[short.lower()] = {"subtask": short}
         for group, (heading, _) in _part_groups(run, track).items():

@@ -116,8 +116,14 @@ PLANNING_MEASURES = (
         "f1", "F1", _STEPS, f1_of, "harmonic mean of precision and recall", over="steps",
         floors=PLAN_FLOORS,
     ),
-    Measure("precision", "Precision", _STEPS, precision_of, "right steps of those proposed"),
-    Measure("recall", "Recall", _STEPS, recall_of, "blocks of the goal that a right step placed"),
+    Measure(
+        "precision", "Precision", _STEPS, precision_of, "right steps of those proposed",
+        over="steps",
+    ),
+    Measure(
+        "recall", "Recall", _STEPS, recall_of, "blocks of the goal that a right step placed",
+        over="blocks",
+    ),
     Measure(
         "success", "Whole plans", _STEPS, partial(_mean, _STEPS, "whole"),
         "plans that place every block, by right steps alone", over="plans",
@@ -130,7 +136,7 @@ PLANNING_MEASURES = (
         "distance", "Distance to a valid order", BLOCK_COUNTS,
         partial(_mean, BLOCK_COUNTS, "distance"),
         "fewest steps to leave out and blocks to put in until a plan is a valid order, of steps "
-        "and blocks together; mean over plans", better="lower", over="plans",
+        "and blocks together", better="lower", over="plans",
     ),
     *(
         Measure(

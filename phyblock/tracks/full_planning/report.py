@@ -14,6 +14,7 @@ from phyblock.tables.load import Run
 from phyblock.tables.measures import Measure
 from phyblock.tables.paper_numbers import HUMAN_NOTE, published_table
 from phyblock.tables.showing import planning_words
+from phyblock.tables.text_table import level_name
 from phyblock.tables.track_report import (
     FigureMaker,
     HeadlineColumn,
@@ -64,7 +65,7 @@ _MAIN = "Overall F1"
 
 def _headline(run: Run) -> tuple[HeadlineColumn, ...]:
     levels = [
-        HeadlineColumn("f1", level, _MAIN if level == OVERALL else f"Level {level}", "")
+        HeadlineColumn("f1", level, _MAIN if level == OVERALL else level_name(level), "")
         for level in run.design.levels
     ]
     sides = [HeadlineColumn(name, OVERALL, name.capitalize()) for name in METRICS[:2]]

@@ -108,7 +108,7 @@ def _empty_plan_notes(cells: pd.DataFrame) -> list[str]:
 def how_counted(design: Design) -> str:
     """Setting, matcher, criterion, and what becomes of missing replies, as a sentence."""
     scoring = design.suite.scoring
-    level1 = f", Level-1 by {scoring.level1}" if 1 in design.suite.levels else ""
+    level1 = f", Level 1 by {scoring.level1}" if 1 in design.suite.levels else ""
     missing = "left out" if scoring.missing == "skip" else "counted as empty plans"
     return (
         f"Setting {design.setting}, matcher {design.matcher}{level1}; micro averages; "
@@ -189,7 +189,7 @@ def _difference_notes(table: pd.DataFrame, design: Design) -> list[str]:
     matchers = "/".join(sorted(set(table["matcher"]) - {""})) or NO_VALUE
     seeds = len(design.suite.seeds)
     pooled = f", pooled over {seeds} seeds" if seeds > 1 else ""
-    level1 = f", Level-1 by {design.suite.scoring.level1}" if 1 in design.suite.levels else ""
+    level1 = f", Level 1 by {design.suite.scoring.level1}" if 1 in design.suite.levels else ""
     return [
         *comparison_notes(table, design),
         f"Ours: setting {PUBLISHED_SETTING}, matcher {matchers}{level1}; micro averages{pooled}. "

@@ -12,6 +12,7 @@ from phyblock.tables.listing import Listing, by_settings
 from phyblock.tables.load import Run
 from phyblock.tables.measures import Measure
 from phyblock.tables.showing import planning_words
+from phyblock.tables.text_table import level_name
 from phyblock.tables.track_report import (
     EpisodeView,
     FigureMaker,
@@ -43,7 +44,7 @@ _VIEW = EpisodeView(NAME, pose_table, pose_film)
 
 def _headline(run: Run) -> tuple[HeadlineColumn, ...]:
     levels = [
-        HeadlineColumn("f1_c", cell.name, _MAIN if cell.name == OVERALL else f"Level {cell.name}")
+        HeadlineColumn("f1_c", cell.name, _MAIN if cell.name == OVERALL else level_name(cell.name))
         for cell in level_cells(run)
     ]
     sides = [

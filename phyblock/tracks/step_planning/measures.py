@@ -56,8 +56,13 @@ STEP_MEASURES = (
         "f1", "F1", _MOVES, f1_of, "harmonic mean of precision and recall", over="moves",
         floors=STEP_FLOORS,
     ),
-    Measure("precision", "Precision", _MOVES, precision_of, "right moves of those counted"),
-    Measure("recall", "Recall", _MOVES, recall_of, "blocks of the goal that were placed"),
+    Measure(
+        "precision", "Precision", _MOVES, precision_of, "right moves of those counted",
+        over="moves",
+    ),
+    Measure(
+        "recall", "Recall", _MOVES, recall_of, "blocks of the goal that were placed", over="blocks"
+    ),
     Measure(
         "completion", "Completed", _ENDS, ratio_of, "episodes that placed the whole goal",
         over="episodes",
