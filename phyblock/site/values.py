@@ -27,7 +27,9 @@ class Facts:
     """What a model's samples of a track took and came to; None where it is not known.
 
     `solved` samples are worth all that a sample can be. Costs [US dollars] are at the prices of the
-    replies, cached ones included.
+    replies, cached ones included. `asked` are the first and the last day, UTC, on which the run got
+    a reply that it had asked for itself, one of recordings and of cached replies being unknown;
+    `cached` counts the latter.
     """
 
     expected: int
@@ -39,6 +41,8 @@ class Facts:
     latency_s: float | None
     usd_per_100: float | None
     usd_per_solved: float | None
+    asked: tuple[str, str] | None
+    cached: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +102,7 @@ def _facts(
     of_model = costs[costs["track"] == track].set_index("model").to_dict("index")
     outcomes = coverage_frame(run)
     outcomes = outcomes[outcomes["track"] == track].set_index("model")
+    days = _days_asked(run, track)
     found = {}
     for model, row in outcomes.to_dict("index").items():
         cost = of_model[model]
@@ -114,8 +119,21 @@ def _facts(
             _known(cost["latency_median_s"]),
             price,
             whole / solved if whole is not None and solved else None,
+            days.get(str(model)),
+            int(row["cached"]),
         )
     return found
+
+
+def _days_asked(run: Run, track: str) -> dict[str, tuple[str, str]]:
+    """By model, the first and the last day of replies for which a request was sent."""
+    records = run.records[run.records["track"] == track]
+    sent = records["attempts"].fillna(0).astype("int64") > 0
+    times = records.loc[sent & records["time"].notna(), ["model", "time"]]
+    return {
+        str(model): (min(of_model)[:10], max(of_model)[:10])
+        for model, of_model in times.groupby("model")["time"]
+    }
 
 
 def _known(number: float) -> float | None:

@@ -114,6 +114,32 @@ def test_a_model_of_which_samples_were_left_out_has_no_rank() -> None:
     assert lacking == {"cherry": f"1 of {len(SCENES)} answered", "a": None, "b": None}
 
 
+def test_days_are_those_on_which_a_reply_was_asked_for_and_else_not_known() -> None:
+    sent, cached = {"attempts": 1}, {"attempts": 0, "cached": True}
+    how = {
+        "called": (sent, sent),
+        "partly": (sent, cached),
+        "cached": (cached, cached),
+        "recorded": ({"attempts": 0}, {"attempts": 0}),
+    }
+    records = [
+        {
+            **record(model, f"00{n}", 0, [score(1, 1, 1)], **reply),
+            "time": f"2026-11-2{n}T23:59:59+00:00",
+        }
+        for model, each in how.items()
+        for n, reply in enumerate(each)
+    ]
+    run = run_of(records, manifest(models=how, seeds=[0]))
+    facts = values_of(run, "full_planning").facts
+    assert {model: (fact.asked, fact.cached) for model, fact in facts.items()} == {
+        "called": (("2026-11-20", "2026-11-21"), 0),
+        "partly": (("2026-11-20", "2026-11-20"), 1),
+        "cached": (None, 2),
+        "recorded": (None, 0),
+    }
+
+
 def test_a_sample_without_a_value_has_none() -> None:
     nothing = [score(0, 0, 0, setting=setting) for setting in "AB"]
     records = [record("a", "000", 0, nothing), record("a", "001", 0, [score(1, 1, 1)])]

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, urlencode
 
 import pytest
+from PIL import Image
 
 from tests.browser import Visit, expect
 from tests.site.site_runs import HOSTILE, make_hostile
 from tests.workspace import Workspace
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, Locator, Page
 
 PHONE = {"width": 390, "height": 844}
 
@@ -167,6 +170,10 @@ def test_the_table_is_sorted_and_its_columns_are_chosen_by_keyboard(visit: SiteV
     assert page.locator("details[open]").count() == 1
     page.go_back()
     expect(page.locator(".board thead button")).to_have_count(len(before))
+    # What no model was asked for has no day, whenever its run was begun.
+    assert before[-1] == "Asked on"
+    last = page.locator(".board tbody tr td:last-child").all_inner_texts()
+    assert {*last} == {"\u2013"}
     page.select_option("#by", label="VQA: Overall")
     expect(page.locator("caption")).to_have_text("Models ranked by VQA, Overall")
     assert page.locator(".board tbody tr").first.locator(".rank").inner_text() == "\u2013"
@@ -180,7 +187,7 @@ CROWD = """(count) => {
   })) };
   const column = { id: "f1", heading: "F1", unit: "%" };
   const { drawing } = Chart.draw(board, { name: "plan" }, column, "completion_tokens");
-  document.querySelector("main").replaceChildren(drawing);
+  document.querySelector("main").replaceChildren(el("div", { class: "scroll" }, drawing));
   const boxes = (selector) => [...drawing.querySelectorAll(selector)].map((one) => one.getBBox());
   const meet = (a, b) => a.x < b.x + b.width && b.x < a.x + a.width
     && a.y < b.y + b.height && b.y < a.y + a.height;
@@ -202,6 +209,21 @@ def test_names_in_the_chart_meet_nothing(visit: SiteVisit, count: int) -> None:
         page.set_viewport_size(PHONE)
     assert page.evaluate(CROWD, count) == {"met": 0, "outside": 0, "cut": 1}
     expect(page.locator(".chart .tick").first).to_be_visible()
+    # On a phone an edge behind which more lies is shaded; where all is shown, none is.
+    scroll = page.locator(".scroll")
+    for place in (0, 10_000):
+        scroll.evaluate("(one, place) => { one.scrollLeft = place; }", place)
+        shaded = [count == 1 and place > 0, count == 1 and place == 0]
+        assert shaded_edges(scroll) == shaded
+
+
+def shaded_edges(region: Locator) -> list[bool]:
+    """Whether the left and the right edge of a region are darker than the paper within."""
+    with Image.open(BytesIO(region.screenshot())) as picture:
+        gray = picture.convert("L")
+    columns = [gray.crop((x, 0, x + 1, gray.height)) for x in (0, gray.width - 1)]
+    paper = median(gray.tobytes())
+    return [median(column.tobytes()) < paper - 20 for column in columns]
 
 
 def test_baselines_do_not_tell_how_hard_a_scene_is(visit: SiteVisit) -> None:

@@ -27,7 +27,7 @@ const Views = (() => {
     const facts = [
       ["Models", data.rows.length], ["Samples", samples.toLocaleString("en")], ["Runs", runs.length],
       ["Data", runs[0].data ? `${runs[0].data}, version ${runs[0].version}` : DASH],
-      ["Made", dates.length ? (dates[0] === dates.at(-1) ? dates[0] : `${dates[0]} to ${dates.at(-1)}`) : DASH],
+      ["Runs begun", dates.length ? (dates[0] === dates.at(-1) ? dates[0] : `${dates[0]} to ${dates.at(-1)}`) : DASH],
       ["Scored again", `${runs.filter((run) => run.verified).length} of ${plural(runs.length, "run")}`],
     ];
     return [
@@ -119,6 +119,7 @@ const Views = (() => {
     return el("div", { class: "notes" },
       el("p", {}, `Rank: the best and the worst place that a model may have by ${track.title}, ${track.main}, from tests of every pair of models on the samples that both have, corrected for their number (Holm, 95 %). Models whose ranks overlap may be equally good. Baselines have no rank, nor have models that were not asked everything.`),
       el("p", {}, "Under a value stands its 95 % interval, from leaving out each base scene in turn."),
+      state.wanted.includes("date") ? el("p", {}, `Asked on: ${Table.ASKED[0].toLowerCase()}${Table.ASKED.slice(1)}.`) : null,
       track.notes.map((note) => el("p", {}, note)),
       el("p", {}, "“Scored again” are runs that came as a bundle, whose replies were scored again when this page was made and came out the same. What replies cost, how long they took, and which model gave them no scoring can tell: that is taken from the records."),
       track.physics ? el("p", {}, `${track.title}: physics is not carried out again, what fell is taken from the records.`) : null);
@@ -155,7 +156,8 @@ const Views = (() => {
     const facts = [
       ["Kind", { litellm: "asked over the network", replay: "a recording", baseline: "a baseline: a rule" }[row.kind] || row.kind],
       ["Parameters", row.size_b === null ? null : `${row.size_b} billion`],
-      ...runs.flatMap((run) => [["Run", `${run.suite || "run"} ${run.id}, ${run.date}`],
+      ["Asked on", Table.asked(row)],
+      ...runs.flatMap((run) => [["Run", `${run.suite || "run"} ${run.id}, begun ${run.date || "on an unknown day"}`],
         ["Scored again", run.verified ? "yes, from a bundle" : "no: taken from a run folder"],
         ["Seeds", String(run.seeds)], ["Asked how", run.asked.join(", ") || null]]),
     ];
