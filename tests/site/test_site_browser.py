@@ -170,13 +170,21 @@ def test_the_table_is_sorted_and_its_columns_are_chosen_by_keyboard(visit: SiteV
     assert page.locator("details[open]").count() == 1
     page.go_back()
     expect(page.locator(".board thead button")).to_have_count(len(before))
-    # What no model was asked for has no day, whenever its run was begun.
-    assert before[-1] == "Asked on"
-    last = page.locator(".board tbody tr td:last-child").all_inner_texts()
-    assert {*last} == {"\u2013"}
+    # Nobody was asked, so that there is no day to show; it is that of the run that is known.
+    assert "Asked on" not in before
+    page.get_by_label("Asked on").check()
+    page.get_by_label("Run begun").check()
+    days = page.locator(".board tbody tr").first.locator("td.text").all_inner_texts()
+    assert days == ["\u2013", page.inner_text(".about div:nth-child(5) dd")]
+    rows = [{"facts": {"a": {"asked": [day, "2026-11-21"]}, "b": {"asked": None}}} for day in DAYS]
+    said = page.evaluate("rows => rows.map(Table.asked)", rows)
+    assert said == ["2026-11-20 to 2026-11-21", "2026-11-21"]
     page.select_option("#by", label="VQA: Overall")
     expect(page.locator("caption")).to_have_text("Models ranked by VQA, Overall")
     assert page.locator(".board tbody tr").first.locator(".rank").inner_text() == "\u2013"
+
+
+DAYS = ("2026-11-20", "2026-11-21")
 
 
 CROWD = """(count) => {

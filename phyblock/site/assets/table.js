@@ -112,7 +112,7 @@ const Table = (() => {
     return [
       ...mainFirst(of(first).filter((column) => column.setting === main(first).setting), first).map((column) => column.id),
       `${first.name}/${priced ? "usd_per_solved" : "solved"}`, told ? `${first.name}/completion_tokens` : null,
-      ...others.map((track) => main(track).id), "date",
+      ...others.map((track) => main(track).id), board.rows.some(asked) ? "date" : null,
     ].filter(Boolean);
   }
 
