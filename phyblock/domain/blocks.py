@@ -98,7 +98,7 @@ class Shape:
     @property
     def is_round(self) -> bool:
         """Whether turns about the body z axis can hardly be seen."""
-        return self.fold > 4
+        return self.fold > _MOST_SEEN_TURNS
 
     @property
     def is_long(self) -> bool:
@@ -109,6 +109,8 @@ class Shape:
 
 _LONG = 1.5
 """The longest side of a long block is more than so many times the second."""
+_MOST_SEEN_TURNS = 8
+"""Of a prism with more sides, a turn by one side can hardly be seen."""
 _FACETS = 18
 _CYLINDER_RADIUS_M = 0.025
 _CYLINDER_AREA_M2 = 0.5 * _FACETS * _CYLINDER_RADIUS_M**2 * math.sin(2 * math.pi / _FACETS)

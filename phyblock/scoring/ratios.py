@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Floats", "Metric", "f1_of", "precision_of", "ratio_of", "recall_of"]
+__all__ = ["Floats", "Metric", "f1_of", "mean_of", "precision_of", "ratio_of", "recall_of"]
 
 Floats = NDArray[np.float64]
 Metric = Callable[[Floats], Floats]
@@ -41,4 +41,12 @@ def ratio_of(sums: Floats) -> Floats:
     part, whole = sums[..., 0], sums[..., 1]
     out = np.full(part.shape, np.nan)
     np.divide(part, whole, out=out, where=(whole > 0) & (part <= whole))
+    return out
+
+
+def mean_of(sums: Floats) -> Floats:
+    """Sum / number of counts (..., [sum, number]), in the unit of the sum; NaN for none."""
+    total, number = sums[..., 0], sums[..., 1]
+    out = np.full(total.shape, np.nan)
+    np.divide(total, number, out=out, where=number > 0)
     return out

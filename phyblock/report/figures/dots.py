@@ -67,7 +67,7 @@ def measure_dots(run: Run, *, track: str) -> Figure | None:
     if not models:
         return None
     shown = [np.array([values.get(name, _NONE) for name in models]) for values in drawn]
-    longest = float(np.nanmax(np.concatenate(shown)))
+    least, longest = _range(np.concatenate(shown))
     if measure.unit == "%":
         longest = max(_STEP, _STEP * math.ceil(longest / _STEP))
     names_in = names_width_in(models)
@@ -76,8 +76,9 @@ def measure_dots(run: Run, *, track: str) -> Figure | None:
     figure = new_figure(1.0 + _ROW_IN * len(models), names_in + _LEAST_PLOT_IN)
     axes = figure.subplots(1, n_panels, sharey=True, squeeze=False)[0]
     for ax, column, values in zip(axes, columns, shown, strict=False):
-        edge = longest * (1 + _NUMBER_IN / (room_in / n_panels - _NUMBER_IN - _BETWEEN_IN))
-        _dots(ax, values, edge, INK if column is columns[0] else ACCENT)
+        beside = _NUMBER_IN / (room_in / n_panels - _NUMBER_IN - _BETWEEN_IN)
+        edge = longest + (longest - least) * beside
+        _dots(ax, values, (least, edge), INK if column is columns[0] else ACCENT)
         unit = f" ({measure.unit})" if measure.unit else ""
         ax.set(title=column.heading, xlabel=f"{measure.heading}{unit}")
         if measure.unit == "%":
@@ -91,6 +92,12 @@ def measure_dots(run: Run, *, track: str) -> Figure | None:
     title = f"{kind_of(track).title}: {measure.heading}"
     headed(figure, title, _subtitle(run, track, int(found["n_clusters"].max())))
     return figure
+
+
+def _range(shown: NDArray[np.float64]) -> tuple[float, float]:
+    """From where to where values and ends of intervals go, 0 included; never a single place."""
+    least, longest = min(0.0, float(np.nanmin(shown))), max(0.0, float(np.nanmax(shown)))
+    return least, longest if longest > least else least + 1.0
 
 
 def _ticks(panel_in: float) -> int:
@@ -124,8 +131,10 @@ def _values(
     }
 
 
-def _dots(ax: Axes, values: NDArray[np.float64], edge: float, color: str) -> None:
-    """Draw a dot a row of `values` (value, low, high; NaN: not measured), its number beside it."""
+def _dots(ax: Axes, values: NDArray[np.float64], ends: tuple[float, float], color: str) -> None:
+    """Draw a dot a row of `values` (value, low, high; NaN: not measured), its number beside it;
+    `ends` are those of the axis.
+    """
     value, lo, hi = values.T
     places = np.arange(len(value))
     sure = ~np.isnan(value) & ~np.isnan(lo)
@@ -133,9 +142,15 @@ def _dots(ax: Axes, values: NDArray[np.float64], edge: float, color: str) -> Non
     ax.plot(value, places, "o", color=color, markersize=3.6, clip_on=False)
     for place in np.flatnonzero(~np.isnan(value)).tolist():
         ax.text(
-            edge, place, f"{value[place]:.1f}", ha="right", va="center", fontsize=6.5, color=MUTED
+            ends[1],
+            place,
+            f"{value[place]:.1f}",
+            ha="right",
+            va="center",
+            fontsize=6.5,
+            color=MUTED,
         )
-    ax.set_xlim(0, edge)
+    ax.set_xlim(*ends)
 
 
 def _marks(figure: Figure, ax: Axes, others: Mapping[str, NDArray[np.float64]]) -> None:

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from phyblock.scoring import POSE_ERRORS, POSE_FRAMES, TOLERANCES_CM, PoseError, PoseFrame
-from phyblock.scoring.ratios import Floats, f1_of, ratio_of
+from phyblock.scoring.ratios import Floats, f1_of, mean_of, ratio_of
 from phyblock.tables.load import Run
 from phyblock.tables.measures import Measure, SampleCounts
 from phyblock.tracks.pose_planning.baselines import POSE_FLOORS
@@ -68,17 +68,16 @@ def _f1(frame: PoseFrame, tolerances_cm: tuple[float, ...], sums: Floats) -> Flo
 
 def _share(counted: SampleCounts, part: str, whole: str, sums: Floats) -> Floats:
     """Share of a column in another."""
-    columns = counted.columns
-    return ratio_of(sums[..., [columns.index(part), columns.index(whole)]])
+    return ratio_of(_two(counted, part, whole, sums))
 
 
 def _mean(counted: SampleCounts, column: str, number: str, sums: Floats) -> Floats:
-    """Mean of what was summed in a column; NaN for none."""
-    columns = counted.columns
-    part, whole = (sums[..., columns.index(name)] for name in (column, number))
-    out = np.full(part.shape, np.nan)
-    np.divide(part, whole, out=out, where=whole > 0)
-    return out
+    """Mean of what was summed in a column."""
+    return mean_of(_two(counted, column, number, sums))
+
+
+def _two(counted: SampleCounts, first: str, second: str, sums: Floats) -> Floats:
+    return sums[..., [counted.columns.index(first), counted.columns.index(second)]]
 
 
 def tolerance_measure(frame: PoseFrame, cm: float) -> str:

@@ -1,0 +1,90 @@
+"""What leads the headline of a track is drawn, compared and ranked by, wherever else it stands."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from phyblock import registry
+from phyblock.cli.main import phyblock
+from phyblock.errors import SpecError
+from phyblock.report.comparable import comparable
+from phyblock.report.compare import compare_models
+from phyblock.report.figures import figure_files, figure_titles
+from phyblock.report.figures.dots import measure_dots
+from phyblock.report.html.headline import headlines
+from phyblock.site.values import values_of
+from phyblock.tables.load import Run, load_run
+from phyblock.tables.measures import Measure
+from phyblock.tables.track_report import WHOLE, HeadlineColumn
+from phyblock.tracks import TrackKind
+from tests.tracks.test_fourth_track import ERROR, EXACT, TRACK
+from tests.workspace import Workspace
+
+
+def led_by(leading: Measure, *measures: Measure) -> TrackKind:
+    """The track with these measures, the leading one behind what stands first."""
+    columns = tuple(HeadlineColumn(m.name, WHOLE.name, m.heading) for m in measures)
+    main = leading.heading
+    report = replace(TRACK.report(), measures=measures, headline=lambda _: columns, main=main)
+    return replace(TRACK, report=lambda: report)
+
+
+@pytest.fixture
+def run(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Iterator[Run]:
+    registry.register_track(TRACK)
+    monkeypatch.chdir(workspace.root)
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+    monkeypatch.setattr(sys, "argv", ["phyblock"])
+    workspace.write_suite(tracks=["counting"], models=["oracle", "random"])
+    words = ["run", "suite.yaml", "--out", "out", "--no-report"]
+    assert not phyblock.main(words, standalone_mode=False)
+    yield load_run(workspace.out)
+    registry.unregister_track(TRACK.name)
+
+
+def show(kind: TrackKind) -> None:
+    registry.unregister_track(TRACK.name)
+    registry.register_track(kind)
+
+
+def test_the_leading_measure_leads_everywhere(run: Run) -> None:
+    for kind, leading in ((TRACK, ERROR), (led_by(EXACT, ERROR, EXACT), EXACT)):
+        show(kind)
+        figure = measure_dots(run, track="counting")
+        assert figure is not None
+        label = f"{leading.heading} ({leading.unit})"
+        assert [panel.get_xlabel() for panel in figure.axes] == [label]
+        assert figure_titles(run)["counting"] == f"Counting: {leading.heading}"
+        assert "figures/counting.svg" in figure_files()
+        assert comparable(run, "counting").measure == leading
+        assert compare_models(run).name == leading.heading
+        assert [table.strip_name for table in headlines(run)] == [kind.report().main or "Overall"]
+        worth = values_of(run, "counting").samples["oracle"].values()
+        assert set(worth) == {leading.best}
+
+
+@pytest.mark.parametrize("factor", [0, -1], ids=["nothing", "below zero"])
+def test_values_that_are_all_zero_or_below_are_drawn(run: Run, factor: int) -> None:
+    """In a unit of its own; matplotlib warns of an axis without length, which is an error here."""
+    measure = replace(ERROR, value=lambda sums: factor * ERROR.value(sums), most=None)
+    show(led_by(measure, measure))
+    figure = measure_dots(run, track="counting")
+    assert figure is not None
+    left, right = figure.axes[0].get_xlim()
+    (dots,) = (line for line in figure.axes[0].lines if len(line.get_xdata()) == 2)
+    values = np.asarray(dots.get_xdata(), dtype=float)
+    assert left <= values.min() <= values.max() < right
+
+
+@pytest.mark.usefixtures("run")
+def test_what_a_track_has_not_is_refused() -> None:
+    asked = ["run", "suite.yaml", "--set", "answer_format=json_schema", "--out", "json"]
+    with pytest.raises(SpecError, match="cannot be asked for as JSON"):
+        phyblock.main(asked, standalone_mode=False)
+    with pytest.raises(SpecError, match="is a person, who cannot answer in counting"):
+        phyblock.main(["play", "suite.yaml", "--name", "ada"], standalone_mode=False)
