@@ -9,6 +9,7 @@ import click
 
 from phyblock.cli.paths import UserPath, moved_data_option
 from phyblock.cli.report import show_tables
+from phyblock.plain_text import plain_lines
 from phyblock.run.rescore import rescore
 from phyblock.words import MATCHERS, PLAN_PARSERS, Matcher, PlanParser
 
@@ -30,4 +31,8 @@ def command(
     Writes the new scores to RUN/scores/PARSER-MATCHER (or --out), and leaves RUN as it is.
     """
     chosen = cast("PlanParser | None", parser), cast("Matcher | None", matcher)
-    show_tables(rescore(run, *chosen, out, data), data)
+    show_tables(rescore(run, *chosen, out, data, _tell), data)
+
+
+def _tell(text: str) -> None:
+    click.echo(plain_lines(text), err=True)

@@ -20,11 +20,14 @@ async def counted_again(
     record: Record,
     where: str,
     about: Mapping[str, Any] | None = None,
+    *,
+    or_kept: bool = False,
 ) -> Record:
     """A record of an episode with what measures count of it now; all else stays as it is.
 
     Where `about`, what it should say of its item, is given, that and every turn are held against
-    it, too. Raises StoreError, which names `where`, for an episode that goes otherwise than it did.
+    it, too. For an episode that goes otherwise than it did, StoreError, which names `where`, is
+    raised, or, with `or_kept`, the same record returned.
     """
     episode = await _played(track, item, record)
     given = {**record.as_given(), **(about or {})}
@@ -32,6 +35,8 @@ async def counted_again(
     again = judged(given, item, episode, turns if about is None else _turns(episode, record))
     was, now = record.fields(), again.fields()
     changed = [name for name in was if name != "counts" and was[name] != now.get(name)]
+    if changed and or_kept:
+        return record
     if changed:
         message = "goes otherwise than it did, in another version"
         raise StoreError(Problem(where, message, changed[0], record.sample))

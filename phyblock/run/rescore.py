@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Collection, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
-from phyblock.datasets import AssemblyTask
-from phyblock.errors import Problem, SpecError, StoreError
-from phyblock.parsing import reader_version
+from phyblock.datasets import AssemblyTask, Dataset
+from phyblock.errors import DataError, Problem, SpecError, StoreError
+from phyblock.parsing import READER_VERSION, reader_version
+from phyblock.plain_text import counted
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
 from phyblock.records.reading import read_records
 from phyblock.run.data import asked_about, recorded_dataset
@@ -41,13 +43,16 @@ def rescore(
     matcher: Matcher | None,
     out: Path | None,
     data: Path | None = None,
+    tell: Callable[[str], object] = lambda _: None,
 ) -> Path:
     """Score a run again, with another parser or headline matcher, into a run folder of its own.
 
     The new folder (`<run>/scores/<parser>-<matcher>` when `out` is None) holds a manifest and
     records like any run, so that tables and notebooks read it. Parser and matcher are those of
     plans. Of other tracks, what measures count of each sample is counted again; where nothing is,
-    their records are taken over as they are. `data` is where the data set is now, if it has moved.
+    their records are taken over as they are, unless an earlier version of the readers read them.
+    `data` is where the data set is now, if it has moved. `tell` is called with what could not be
+    read again and stays as it was.
     Raises SpecError for a parser that cannot read what was asked for, StoreError for a folder that
     is no run or cannot be written, DataError when the data are not what the run was made on.
     """
@@ -60,8 +65,11 @@ def rescore(
     if out is None:
         run_folder(folder).check([f"{name}/"])
     _check_target(target, identity)
+    dataset = recorded_dataset(folder, manifest, suite.levels, data)
     names = [name for name in suite.tracks if kind_of(name).rescored or counts_samples(name)]
-    scored = _scored(folder, manifest, suite, names, data)
+    if _read_otherwise(manifest):
+        names += _read_anew(folder, manifest, suite, names, dataset, tell)
+    scored = _scored(folder, manifest, suite, names, dataset, tell)
     told = {"identity": identity, "suite": suite.model_dump(mode="json"), "floors": scored.floors}
     write_run(target, manifest.model_copy(update=told), scored.records)
     return target
@@ -107,12 +115,10 @@ def _scored(
     manifest: Manifest,
     suite: SuiteSpec,
     names: Collection[str],
-    data: Path | None,
-    *,
-    anew: bool = False,
+    dataset: Dataset,
+    tell: Callable[[str], object] | None,
 ) -> _Scored:
-    """The records of a run, those of the tracks in `names` judged again."""
-    dataset = recorded_dataset(folder, manifest, suite.levels, data)
+    """The records of a run, those of the tracks in `names` judged again; see `_judged_again`."""
 
     def reopened(name: str, one: SuiteSpec) -> AnyTrack:
         return reopen_tracks(folder, manifest, one, [name], dataset)[name]
@@ -121,7 +127,7 @@ def _scored(
         variant.key: reopen_tracks(folder, manifest, suite.at(variant), names, dataset)
         for variant in dict.fromkeys(variant.shown for variant in suite.vary.variants)
     }
-    records = asyncio.run(_judged_again(folder, manifest, tracks, anew=anew))
+    records = asyncio.run(_judged_again(folder, manifest, tracks, tell))
     told = {"suite": suite.model_dump(mode="json")}
     floors = kept_floors(manifest.model_copy(update=told), suite, reopened, dataset)
     asked = asked_about(manifest, suite.levels, dataset).tasks
@@ -133,10 +139,16 @@ async def _judged_again(
     folder: Path,
     manifest: Manifest,
     variants: Mapping[str, Mapping[str, AnyTrack]],
-    *,
-    anew: bool,
+    tell: Callable[[str], object] | None,
 ) -> list[Record]:
-    """The records of a run, those of the tracks of `variants` judged again; see `judged_anew`."""
+    """The records of a run, those of the tracks of `variants` judged again.
+
+    Without `tell` they are made anew, as `judged_anew` says. Else it is told of episodes that stay
+    as they were, since readers of this version would have played them otherwise.
+    """
+    anew = tell is None
+    or_kept = not anew and _read_otherwise(manifest)
+    kept: Counter[str] = Counter()
     where = str(folder / RECORDS)
     tracks = variants[""]
     items = {(name, item.key): item for name, track in tracks.items() for item in track.items}
@@ -153,7 +165,9 @@ async def _judged_again(
         item = shown_item(track, item, record.seed)
         about = {**about_item(item), **track.about(item)} if anew else None
         if isinstance(track, EpisodeTrack):
-            records.append(await counted_again(track, item, record, where, about))
+            again = await counted_again(track, item, record, where, about, or_kept=or_kept)
+            kept[track.name] += again is record
+            records.append(again)
             continue
         text = None if record.reply is None else record.reply.text
         given = {**record.as_given(), **(about or {})}
@@ -162,7 +176,43 @@ async def _judged_again(
             # What it holds is of no plan that was carried out.
             given["error"] = earlier = None
         records.append(await judged_apart(track, item, text, given, earlier))
+    for name, count in kept.items():
+        if count and tell is not None:
+            tell(
+                f"{kind_of(name).title}: {counted(count, 'episode')} of the run would go otherwise "
+                f"under readers {READER_VERSION}, and stay as they were: what was asked next "
+                "followed from what was read. A run in another folder asks on from there."
+            )
     return records
+
+
+def _read_otherwise(manifest: Manifest) -> bool:
+    """Whether readers of another version read the replies of a run."""
+    return manifest.versions.get("readers") != str(READER_VERSION)
+
+
+def _read_anew(
+    folder: Path,
+    manifest: Manifest,
+    suite: SuiteSpec,
+    known: Collection[str],
+    dataset: Dataset,
+    tell: Callable[[str], object],
+) -> list[str]:
+    """The tracks beside `known` whose replies can be read again: they are asked one by one, about
+    data that are still those of the run.
+    """
+    names: list[str] = []
+    for name in suite.tracks:
+        if name in known or kind_of(name).plays:
+            continue
+        try:
+            reopen_tracks(folder, manifest, suite, [name], dataset)
+        except (DataError, SpecError) as error:
+            tell(f"{kind_of(name).title}: replies stay as they were read: {error}")
+        else:
+            names.append(name)
+    return names
 
 
 def _variant(record: Record, known: Collection[str], where: str) -> Variant:

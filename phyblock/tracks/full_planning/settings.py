@@ -81,7 +81,9 @@ def settings_frame(run: Run) -> pd.DataFrame:
 
 
 def _paired(estimate: Estimate) -> dict[str, Floats]:
-    return {"difference": estimate.value, "lo": estimate.lo, "hi": estimate.hi}
+    """A difference of two shares ends, with its interval, at 1 to either side."""
+    lo, hi = (np.clip(end, -1.0, 1.0) for end in (estimate.lo, estimate.hi))
+    return {"difference": estimate.value, "lo": lo, "hi": hi}
 
 
 def _estimates(run: Run) -> dict[Hashable, Any]:
