@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,22 +12,17 @@ from pydantic import ValidationError
 
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.errors import DataError, Problem, SpecError, StoreError
-from phyblock.parsing import READER_VERSION, reader_version
-from phyblock.plain_text import counted
-from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
-from phyblock.records.reading import read_records
+from phyblock.parsing import reader_version
+from phyblock.records import MANIFEST, Manifest, Record, read_manifest
 from phyblock.run.data import asked_about, recorded_dataset
 from phyblock.run.folder import check_place, run_folder
-from phyblock.run.judging import judged_apart
+from phyblock.run.judged_again import Tell, is_read_otherwise, judged_again, untold
 from phyblock.run.kept_floors import kept_floors
-from phyblock.run.records import about_item
 from phyblock.run.reopen import reopen_tracks
-from phyblock.run.replayed import counted_again
 from phyblock.run.rewritten import write_run
 from phyblock.specs import SuiteSpec, suite_model
-from phyblock.tracks import AnyTrack, EpisodeTrack, kind_of, shown_item
+from phyblock.tracks import AnyTrack, kind_of
 from phyblock.tracks.counting import counts_samples
-from phyblock.variants import Variant
 from phyblock.words import Matcher, PlanParser
 
 if TYPE_CHECKING:
@@ -43,7 +37,7 @@ def rescore(
     matcher: Matcher | None,
     out: Path | None,
     data: Path | None = None,
-    tell: Callable[[str], object] = lambda _: None,
+    tell: Tell = untold,
 ) -> Path:
     """Score a run again, with another parser or headline matcher, into a run folder of its own.
 
@@ -67,7 +61,7 @@ def rescore(
     _check_target(target, identity)
     dataset = recorded_dataset(folder, manifest, suite.levels, data)
     names = [name for name in suite.tracks if kind_of(name).rescored or counts_samples(name)]
-    if _read_otherwise(manifest):
+    if is_read_otherwise(manifest):
         names += _read_anew(folder, manifest, suite, names, dataset, tell)
     scored = _scored(folder, manifest, suite, names, dataset, tell)
     told = {"identity": identity, "suite": suite.model_dump(mode="json"), "floors": scored.floors}
@@ -85,7 +79,8 @@ def judged_anew(folder: Path) -> tuple[Manifest, list[Record]]:
     """
     manifest = read_manifest(folder)
     suite = recorded_suite(folder, manifest)
-    scored = _scored(folder, manifest, suite, suite.tracks, None, anew=True)
+    dataset = recorded_dataset(folder, manifest, suite.levels, None)
+    scored = _scored(folder, manifest, suite, suite.tracks, dataset, untold, anew=True)
     scenes = [task.scene for task in scored.asked]
     told = {
         "floors": scored.floors,
@@ -116,9 +111,11 @@ def _scored(
     suite: SuiteSpec,
     names: Collection[str],
     dataset: Dataset,
-    tell: Callable[[str], object] | None,
+    tell: Tell,
+    *,
+    anew: bool = False,
 ) -> _Scored:
-    """The records of a run, those of the tracks in `names` judged again; see `_judged_again`."""
+    """The records of a run, those of the tracks in `names` judged again; see `judged_again`."""
 
     def reopened(name: str, one: SuiteSpec) -> AnyTrack:
         return reopen_tracks(folder, manifest, one, [name], dataset)[name]
@@ -127,68 +124,12 @@ def _scored(
         variant.key: reopen_tracks(folder, manifest, suite.at(variant), names, dataset)
         for variant in dict.fromkeys(variant.shown for variant in suite.vary.variants)
     }
-    records = asyncio.run(_judged_again(folder, manifest, tracks, tell))
+    records = asyncio.run(judged_again(folder, manifest, tracks, tell, anew=anew))
     told = {"suite": suite.model_dump(mode="json")}
     floors = kept_floors(manifest.model_copy(update=told), suite, reopened, dataset)
     asked = asked_about(manifest, suite.levels, dataset).tasks
     items = {name: len(track.items) for name, track in tracks[""].items()}
     return _Scored(records, floors, asked, items)
-
-
-async def _judged_again(
-    folder: Path,
-    manifest: Manifest,
-    variants: Mapping[str, Mapping[str, AnyTrack]],
-    tell: Callable[[str], object] | None,
-) -> list[Record]:
-    """The records of a run, those of the tracks of `variants` judged again.
-
-    Without `tell` they are made anew, as `judged_anew` says. Else it is told of episodes that stay
-    as they were, since readers of this version would have played them otherwise.
-    """
-    anew = tell is None
-    or_kept = not anew and _read_otherwise(manifest)
-    kept: Counter[str] = Counter()
-    where = str(folder / RECORDS)
-    tracks = variants[""]
-    items = {(name, item.key): item for name, track in tracks.items() for item in track.items}
-    records: list[Record] = []
-    for record in read_records(folder, manifest):
-        track = variants[_variant(record, variants, where).shown.key].get(record.track)
-        if track is None:
-            records.append(record)
-            continue
-        item = items.get((track.name, record.item))
-        if item is None:
-            message, hint = "names an item that the run has not", "restore the file from a copy"
-            raise StoreError(Problem(where, message, "key", record.item, hint=hint))
-        item = shown_item(track, item, record.seed)
-        about = {**about_item(item), **track.about(item)} if anew else None
-        if isinstance(track, EpisodeTrack):
-            again = await counted_again(track, item, record, where, about, or_kept=or_kept)
-            kept[track.name] += again is record
-            records.append(again)
-            continue
-        text = None if record.reply is None else record.reply.text
-        given = {**record.as_given(), **(about or {})}
-        earlier: Record | None = record
-        if not record.is_judged:
-            # What it holds is of no plan that was carried out.
-            given["error"] = earlier = None
-        records.append(await judged_apart(track, item, text, given, earlier))
-    for name, count in kept.items():
-        if count and tell is not None:
-            tell(
-                f"{kind_of(name).title}: {counted(count, 'episode')} of the run would go otherwise "
-                f"under readers {READER_VERSION}, and stay as they were: what was asked next "
-                "followed from what was read. A run in another folder asks on from there."
-            )
-    return records
-
-
-def _read_otherwise(manifest: Manifest) -> bool:
-    """Whether readers of another version read the replies of a run."""
-    return manifest.versions.get("readers") != str(READER_VERSION)
 
 
 def _read_anew(
@@ -197,7 +138,7 @@ def _read_anew(
     suite: SuiteSpec,
     known: Collection[str],
     dataset: Dataset,
-    tell: Callable[[str], object],
+    tell: Tell,
 ) -> list[str]:
     """The tracks beside `known` whose replies can be read again: they are asked one by one, about
     data that are still those of the run.
@@ -213,15 +154,6 @@ def _read_anew(
         else:
             names.append(name)
     return names
-
-
-def _variant(record: Record, known: Collection[str], where: str) -> Variant:
-    """The way of asking of a record; StoreError for one that the run has not."""
-    variant = record.way
-    if variant.shown.key not in known:
-        message, hint = "was asked in no way of the run", "restore the file from a copy"
-        raise StoreError(Problem(where, message, "variant", variant.key, hint=hint))
-    return variant
 
 
 def _check_target(target: Path, identity: str) -> None:

@@ -1,0 +1,103 @@
+"""Stored replies and episodes judged again, record by record: nothing is asked, nothing written."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+from phyblock.errors import Problem, StoreError
+from phyblock.parsing import READER_VERSION
+from phyblock.plain_text import counted
+from phyblock.records import RECORDS, Manifest, Record
+from phyblock.records.reading import read_records
+from phyblock.run.judging import judged_apart
+from phyblock.run.records import about_item
+from phyblock.run.replayed import counted_again
+from phyblock.tracks import AnyTrack, EpisodeTrack, SingleTrack, kind_of, shown_item
+from phyblock.variants import Variant
+
+__all__ = ["Tell", "is_read_otherwise", "judged_again", "untold"]
+
+Tell = Callable[[str], object]
+"""Takes what a person should know of what was done."""
+
+
+def untold(_: str) -> None:
+    """Tell nobody."""
+
+
+def is_read_otherwise(manifest: Manifest) -> bool:
+    """Whether readers of another version read the replies of a run."""
+    return manifest.versions.get("readers") != str(READER_VERSION)
+
+
+async def judged_again(
+    folder: Path,
+    manifest: Manifest,
+    variants: Mapping[str, Mapping[str, AnyTrack]],
+    tell: Tell,
+    *,
+    anew: bool,
+) -> list[Record]:
+    """The records of the run in `folder`, those of the tracks of `variants` judged again.
+
+    With `anew`, what they say of their items is taken from the data as well. An episode that would
+    go otherwise under readers of this version than under those of the run stays as it was, which
+    `tell` is told; with `anew`, or where the readers are the same, it is a fault.
+    Raises StoreError for a record that is not of the run, and for such a fault.
+    """
+    or_kept = not anew and is_read_otherwise(manifest)
+    kept: Counter[str] = Counter()
+    where = str(folder / RECORDS)
+    tracks = variants[""]
+    items = {(name, item.key): item for name, track in tracks.items() for item in track.items}
+    records: list[Record] = []
+    for record in read_records(folder, manifest):
+        track = variants[_variant(record, variants, where).shown.key].get(record.track)
+        if track is None:
+            records.append(record)
+            continue
+        item = items.get((track.name, record.item))
+        if item is None:
+            message, hint = "names an item that the run has not", "restore the file from a copy"
+            raise StoreError(Problem(where, message, "key", record.item, hint=hint))
+        item = shown_item(track, item, record.seed)
+        about = {**about_item(item), **track.about(item)} if anew else None
+        if isinstance(track, EpisodeTrack):
+            again = await counted_again(track, item, record, where, about, or_kept=or_kept)
+            kept[track.name] += again is record
+            records.append(again)
+        else:
+            records.append(await _of_reply(track, item, record, about or {}))
+    for name, count in kept.items():
+        if count:
+            tell(
+                f"{kind_of(name).title}: {counted(count, 'episode')} of the run would go otherwise "
+                f"under readers {READER_VERSION}, and stay as they were: what was asked next "
+                "followed from what was read. A run in another folder asks on from there."
+            )
+    return records
+
+
+async def _of_reply(
+    track: SingleTrack[Any], item: Any, record: Record, about: Mapping[str, Any]
+) -> Record:
+    """The record of a stored reply, judged again."""
+    text = None if record.reply is None else record.reply.text
+    given = {**record.as_given(), **about}
+    earlier: Record | None = record
+    if not record.is_judged:
+        # What it holds is of no plan that was carried out.
+        given["error"] = earlier = None
+    return await judged_apart(track, item, text, given, earlier)
+
+
+def _variant(record: Record, known: Collection[str], where: str) -> Variant:
+    """The way of asking of a record; StoreError for one that the run has not."""
+    variant = record.way
+    if variant.shown.key not in known:
+        message, hint = "was asked in no way of the run", "restore the file from a copy"
+        raise StoreError(Problem(where, message, "variant", variant.key, hint=hint))
+    return variant
