@@ -34,7 +34,7 @@ async def counted_again(
     turns = {"turns": given["turns"]} if "turns" in given else {}
     again = judged(given, item, episode, turns if about is None else _turns(episode, record))
     was, now = record.fields(), again.fields()
-    changed = [name for name in was if name != "counts" and was[name] != now.get(name)]
+    changed = [name for name in was if name != "counts" and not _alike(was[name], now.get(name))]
     if changed and or_kept:
         return record
     if changed:
@@ -47,6 +47,15 @@ def _turns(episode: Episode, record: Record) -> dict[str, Any]:
     """The turns of a record with what became of them now."""
     asked, now = record.asked_turns, episode.fields()["turns"]
     return {"turns": [{**was.fields(), **more} for was, more in zip(asked, now, strict=False)]}
+
+
+def _alike(was: object, now: object) -> bool:
+    """Whether two values say the same; what a line of an earlier version lacks says nothing."""
+    if isinstance(was, Mapping) and isinstance(now, Mapping):
+        return all(_alike(was.get(name), now.get(name)) for name in was.keys() | now.keys())
+    if isinstance(was, (list, tuple)) and isinstance(now, (list, tuple)):
+        return len(was) == len(now) and all(map(_alike, was, now))
+    return was == now
 
 
 async def _played(track: EpisodeTrack[Item], item: Item, record: Record) -> Episode:

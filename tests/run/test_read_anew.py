@@ -40,6 +40,9 @@ def earlier(workspace: Workspace, told: list[str]) -> Callable[[], list[Raw]]:
             answer = {**line["answer"], "given": None, "correct": False}
             unread = {"rule": None, "letters": None}
             line.update(outcome="parse_failure", parse=unread, answer=answer)
+        else:
+            # A field that came later.
+            del line["parse"]["file_plan"]
     episode = next(line for line in lines if line["track"] == "step_planning")
     episode["turns"][0]["reply"]["text"] = "Next plan: Done"
     path = workspace.out / "records.jsonl"
