@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 
 from phyblock.parsing.line_patterns import STEP
+from phyblock.parsing.speech import words
 
 __all__ = ["as_steps", "as_unknown_steps", "counted_lines"]
 
@@ -14,24 +15,20 @@ _LINE = re.compile(
     r"(?P<before>[^\d\n]{0,30})(?P<n>\d{1,2})(?P<between>[^\d\n]{1,60})(?P<block>\d{1,3})(?P<after>[^\d\n]{0,120})"
 )
 _ALIKE = re.compile(
-    r"^(?P<before>[ \t]{0,4}(?:#|[a-z]{1,7}[ _]?))1(?P<between>\s?[:.=→▸)-]{1,2}\s?(?:block "
-    r"|index |#)?)\d{1,2}(?P<after>[^\n\d]{0,40})\n"
-    r"(?:\s{0,4}\n)?(?:(?P=before)\d{1,2}(?P=between)\d{1,2}[^\n\d]{0,40}(?:\n|\Z)){1,30}",
+    r"^(?P<before>[ \t]{0,4}(?:#|[a-z]{1,7}[ _]?|(?=1 ?(?:->"
+    r"|→))))1(?P<between>\s?(?:[:.=→▸)-]{1,2}|->)\s?(?:block |index "
+    r"|#)?)\d{1,2}(?P<after>[^\n\d]{0,40})\n(?:\s{0,4}\n)?(?:(?P=before)\d{1,2}(?P=between)\d{1,2}"
+    r"[^\n\d]{0,40}(?:\n|\Z)){1,30}",
     re.MULTILINE | re.IGNORECASE,
 )
 _ALIKE_LINE = re.compile(r"^\D*(?P<n>\d{1,2})\D+(?P<block>\d{1,2})(?P<after>\D*)$")
-_NO_STEPS = re.compile(
-    r"\s*(?:block|candid|piece|cube|layer|level|tier|row|index|id|option|l|c"
-    r"|b)",
-    re.I,
-)
-_COUNTS = re.compile(
+_NO_STEPS = words(r"\s*(?:block|candid|piece|cube|layer|level|tier|row|index|id|option|l|c|b)")
+_COUNTS = words(
     r"layer|level|tier|row|block|candidate|piece|cube|index|option|ebene|schicht|couche|niveau|capa"
-    r"|nivel|strato|camada|слой|уровень|层|層|段|층|طبقة|lớp|kat\b|परत|figure|picture|%|confidence",
-    re.IGNORECASE,
+    r"|nivel|strato|camada|слой|уровень|层|層|段|층|طبقة|lớp|kat\b|परत|figure|picture|%|confidence"
 )
 """What else lines may count: layers with the number of their blocks, or the candidates."""
-_MANY = re.compile(r"\s?(?:\w+s\b|[cm]?m\b|%|°|[x×](?!\w)|blöcke|个|块|個|개)", re.IGNORECASE)
+_MANY = words(r"\s?(?:\w+s\b|[cm]?m\b|%|°|[x×](?!\w)|blöcke|个|块|個|개)")
 """What stands behind a number that says how many, or how long."""
 
 

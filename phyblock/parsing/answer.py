@@ -31,6 +31,8 @@ from phyblock.parsing.answer_patterns import (
     CHOSEN,
     CONFIRMED,
     CORRECTED,
+    DENIED,
+    DENIED_BEHIND,
     IS_RIGHT,
     JSON,
     LINE,
@@ -50,7 +52,7 @@ from phyblock.parsing.answer_statements import (
 )
 from phyblock.parsing.answer_value import CONTRADICTION, ChoiceReader
 from phyblock.parsing.slips import without_letter_slips
-from phyblock.parsing.speech import TAKES_BACK, words
+from phyblock.parsing.speech import CONDITIONAL, TAKES_BACK, words
 from phyblock.parsing.text_forms import BOX, TAG, answer_of
 
 __all__ = ["ParsedAnswer", "parse_answer"]
@@ -106,7 +108,7 @@ def _stated(text: str, reader: Reader) -> str | None:
             stated.append(statement)
     stated += statements(text, CORRECTED, reader.read, 2)
     if isinstance(reader, ChoiceReader):
-        stated += statements(text, CHOSEN, reader.letter, 0)
+        stated += statements(text, CHOSEN, reader.letter_or_place, 0)
         stated += statements(text, IS_RIGHT, reader.exact, 0)
         stated += statements(text, CONFIRMED, reader.exact, 0)
     else:
@@ -119,14 +121,23 @@ def _stated(text: str, reader: Reader) -> str | None:
 
 
 def _verdicts(text: str, reader: ChoiceReader) -> str | None:
-    """The one option that is called right where every option is called right or wrong."""
+    """The one option that is called right, or left, where all others are called right or wrong."""
     found = {match["letter"].upper(): bool(match["yes"]) for match in VERDICT.finditer(text)}
-    if len(found) < max(len(reader.letters), _MANY):
-        return None
+    for match in (*DENIED.finditer(text), *DENIED_BEHIND.finditer(text)):
+        found |= dict.fromkeys(
+            re.findall("(?<![A-Za-z])[A-Z](?![A-Za-z])", match["letters"]), False
+        )
     right = [letter for letter, is_right in found.items() if is_right]
+    left = set(reader.letters) - set(found)
+    if left and (_WAIT.search(text) or CONDITIONAL.search(text) or not _LEAVES.search(text)):
+        return None
+    if len(left) > 1 or len(found) + len(left) < _MANY or (right and left):
+        return None
+    right += left
     return right[0] if len(right) == 1 and right[0] in reader.letters else CONTRADICTION
 
 
+_LEAVES = words(r"\b(?:leav\w+|left|remain\w*|only|bleibt|reste|queda|rest[ao]|оста\w+)\b|剩|只有")
 _MANY = 3
 
 
@@ -145,9 +156,8 @@ def _outer_line(text: str, reader: Reader) -> str | None:
 
 
 _LAST_SENTENCE = re.compile(
-    r"(?:[.!?]|(?:\A|[.;!]\s)\W{0,4}(?i:(?:(?:my|the|your|final|best)\s){0,2}"
-    r"(?:choice|pick|selection|selected|chosen|correct|decision|result|solution)):)"
-    r"\s(?P<letter>[A-Z])[.!]?\Z"
+    r"(?:[.!?]|(?:\A|[.;!]\s)\W{0,4}(?i:(?:(?:my|the|your|final|best)\s){0,2}(?:choice|pick"
+    r"|selection|selected|chosen|correct|decision|result|solution)):)\s(?P<letter>[A-Z])[.!]?\Z"
 )
 """A letter alone behind a sentence, or behind a label that states an answer."""
 _WAIT = words(TAKES_BACK)
@@ -169,8 +179,8 @@ _CHOICE_RULES: tuple[_Rule, ...] = (
     *_STATED,
     ("verdicts", _verdicts),
     ("outer_line", _outer_line),
-    ("leading", leading),
     ("concluded", concluded),
+    ("leading", leading),
     ("only_one_named", only_one_named),
     ("counted", counted),
     ("only_text", only_text),

@@ -48,9 +48,16 @@ def leading(text: str, reader: ChoiceReader) -> str | None:
     first = first_line(text)
     if CONDITIONAL.search(first) or first.count("%") > 1:
         return CONTRADICTION
-    found = reader.letter(first_line(text))
+    found = reader.letter(first)
     labels = {match["letter"] for match in LABEL.finditer(text)} & set(reader.letters)
+    if _SAYS.match(text, head.end()):
+        labels |= set(_SUBJECT.findall(text)) & set(reader.letters)
     return found if found is None or labels <= {found} else None
+
+
+_SAYS = re.compile(r" (?:is|has|shows|lies|stands|looks|seems|would|does|can)\b")
+_SUBJECT = re.compile(rf"(?<![\w'])[A-Z](?={_SAYS.pattern})")
+"""A letter of which a sentence says something: where several are, the first is no answer."""
 
 
 def concluded(text: str, reader: ChoiceReader) -> str | None:

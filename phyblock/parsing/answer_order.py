@@ -5,19 +5,27 @@ from __future__ import annotations
 import re
 
 from phyblock.parsing.answer_value import CONTRADICTION, EDGES, LETTERS
-from phyblock.parsing.speech import BACKWARD, PLACES
+from phyblock.parsing.speech import BACKWARD, PLACES, words
 from phyblock.parsing.text_forms import unmarked
 
 __all__ = ["OrderReader"]
 
 _BETWEEN = (
-    r"(?:[\s,;>|/.:()\[\]{}<=\-\u2010-\u2015→⇒➔➜、\uff0c]"
-    r"|\b(?:and|then|to|first|next|finally|lastly|followed|by|comes|goes)\b){1,16}"
+    r"(?:[\s,;>|/.:()\[\]{}<=\-\u2010-\u2015→⇒➔➜、\uff0c]|\b(?:and|then|to|first|next|finally"
+    r"|lastly|followed|by|comes|goes|last|end|after that|und|dann|danach|zuletzt|et|puis|ensuite"
+    r"|enfin|y|luego|después|por último|finalmente|e|poi|infine|depois|por fim|и|затем|потом"
+    r"|наконец)\b|然后|再|最后|接着){1,16}"
 )
 _RANKS = f"({'|'.join(PLACES)}|last)"
-_ORDINAL = re.compile(r"\b(?:first|second|third|fourth)\b", re.IGNORECASE)
+_ORDINAL = words(r"\b(?:first|second|third|fourth)\b")
 _CLAUSE = re.compile(r"[.;!?\n](?=\s)")
-_DENIED = re.compile(r"\b(?:not|nicht)\W{0,3}\Z|不是\s?\Z", re.IGNORECASE)
+_DENIED = words(r"\b(?:not|nicht)\W{0,3}\Z|不是\s?\Z")
+_CALLED_BACKWARD = words(
+    rf"[\s,(]{{0,3}}(?:(?:is|in|are|as|the|order|sequence|pictures|listed|given"
+    rf"|read)\s){{0,6}}(?:{BACKWARD.pattern})"
+)
+"""What calls the order before it one that goes from last to first."""
+_ALL_BACKWARD = words(rf"\s?\((?:in )?(?:{BACKWARD.pattern})\)")
 _REMARK = re.compile(r"\s?\((?![A-Za-z1-9]\))[^()\n]{1,40}\)|(?<=[A-Z])\s?\(\d{1,2}\)")
 _THING = r"(?:(?:picture|image|option|figure|stage|step|photo|frame|img)\s{0,2}[(\[<]{0,1})?"
 
@@ -36,7 +44,7 @@ class OrderReader:
             for one in (one_letter, one_number)
             for between in ("", _BETWEEN)
         ]
-        self._order = re.compile(rf"{guard}(?:{'|'.join(ways)}){stop}", re.IGNORECASE)
+        self._order = words(rf"{guard}(?:{'|'.join(ways)}){stop}")
         self._item = re.compile(
             rf"^[\s>*+\-|]{{0,6}}(?:step\s)?([1-{n}])(?:st|nd|rd|th)?(?:\s(?:picture|image|step|place))?\s?[.):\-|]{{1,2}}\s{{0,3}}"
             rf"[(\[]?{_THING}([{self.letters}])(?![A-Za-z0-9'])",
@@ -62,13 +70,16 @@ class OrderReader:
 
     def orders(self, text: str) -> list[str]:
         """All orders in a text, each naming every option once."""
-        value = _REMARK.sub("", unmarked(text))
+        value = _REMARK.sub(
+            lambda remark: remark[0] * bool(_ALL_BACKWARD.fullmatch(remark[0])), unmarked(text)
+        )
         found = []
         for match in self._order.finditer(value):
             before = _CLAUSE.split(value[max(0, match.start() - 60) : match.start()])[-1]
             order = None if _DENIED.search(before) else self._letters(match)
             if order:
-                found.append(order[::-1] if BACKWARD.search(before) else order)
+                is_down = BACKWARD.search(before) or _CALLED_BACKWARD.match(value, match.end())
+                found.append(order[::-1] if is_down else order)
         return found
 
     def ranked(self, text: str) -> str | None:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from phyblock.parsing.answer_patterns import IS_REJECTED
-from phyblock.parsing.speech import PLACES
+from phyblock.parsing.answer_patterns import REJECTS
+from phyblock.parsing.speech import PLACES, words
 from phyblock.parsing.text_forms import plain_forms, unmarked
 
 __all__ = ["CONTRADICTION", "EDGES", "LETTERS", "ChoiceReader", "plain"]
@@ -20,46 +20,47 @@ CONTRADICTION = ""
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _SPACE = re.compile(r"\s+")
 _NOUN = r"(?:option|choice|answer|letter|alternative|picture|image|figure|place|position|spot)"
-_LEAD = re.compile(
+_LEAD = words(
     rf"(?:(?:(?:the|la|correct|best|right|definitely|clearly|likely|most|selected)\s{{1,3}}){{0,3}}"
     rf"(?P<noun>{_NOUN})\s{{0,3}}(?P<is>is\s{{1,3}})?:?\s{{0,3}}"
-    rf"|(?:la|le|el|die|il)\s(?=\(?[A-Z]\)?(?:[\s.,:]|\Z))"
-    rf"|(?:la\s|a\s)?(?:选项|选|選択肢|вариант|opción|opção)\s{{0,3}})",
-    re.IGNORECASE,
+    rf"|(?:la|le|el|die|il|(?-i:[ao]))\s(?=\(?[A-Z]\)?(?:[\s.,:]|\Z))"
+    rf"|(?:la\s|a\s)?(?:选项|选|選択肢|вариант|opción|opção)\s{{0,3}})"
 )
 _LETTER = re.compile(
     r"(?P<open>[(\[<{]{0,2})\s?(?P<letter>[A-Za-z])(?![A-Za-z0-9\-]|['\u2019][a-z])"
 )
 _CLOSERS = re.compile(r"[\s)\]}>.:,;!。\uff0e、]*")
-_ALSO = re.compile(
+_ALSO = words(
     r"[\s)\]}.]{0,4}(?:(?:,|/|&|\+|\bor\b|\band\b|\bund\b|\boder\b|\bou\b|\bo\b|\by\b|或|和|、)"
-    r"[\s(\[]{0,3}){1,2}(?:option\s|choice\s)?[(\[]?(?P<letter>[A-Za-z])(?![A-Za-z0-9\-'])",
-    re.IGNORECASE,
+    r"[\s(\[]{0,3}){1,2}(?:option\s|choice\s)?[(\[]?(?P<letter>[A-Za-z])(?![A-Za-z0-9\-'])"
 )
-_AFTER_LETTER = re.compile(
+_AFTER_LETTER = words(
     r"(?:because|since|as|is|was|would|which|with|due|for|from|given|based|matches|shows|if|and"
-    r"|but|not|over|rather|instead|\()\b",
-    re.IGNORECASE,
+    r"|but|not|over|rather|instead|\()\b"
 )
-_NEGATION = re.compile(
+_NEGATION = words(
     r"\b(?:not|no|neither|nor|never|isn't|aren't|wrong|incorrect|none|cannot|can't|except|nicht"
-    r"|kein\w*)\b|不是|n't\b",
-    re.IGNORECASE,
+    r"|kein\w*)\b|不是|n't\b"
 )
 _SENTENCE_END = re.compile(r"[.!?。](?:\s|\Z)")
 _ARTICLES = re.compile(r"^(?:the|an|a)\s")
 EDGES = " \t\n.,:;!?()[]{}<>-\u2013\u2014。，"  # noqa: RUF001
-_NUMBERED = re.compile(
+_NUMBERED = words(
     r"(?:the\s)?(?:option|choice|alternative)\s{0,2}(?:number\s{1,2}|no\.?\s{0,2}|#)?"
-    r"\(?(?P<number>\d{1,2})(?![\d.,]?\d)",
-    re.IGNORECASE,
+    r"\(?(?P<number>\d{1,2})(?![\d.,]?\d)"
 )
 _BARE_NUMBER = re.compile(r"[(\[]?(?P<number>\d{1,2})[)\].]{0,2}\s{0,3}\Z")
-_ORDINAL = re.compile(
-    r"\b(?:the\s{1,2})?(?P<word>first|second|third|fourth|1st|2nd|3rd|4th)\s{1,2}"
-    r"(?:(?:of\s(?:the\s)?(?:\w+\s)?)?(?:option|choice|answer|alternative)s?|one\Z)\b",
-    re.IGNORECASE,
+_ORDINAL = words(
+    rf"\b(?:the\s{{1,2}})?(?P<word>{'|'.join(PLACES)})\s{{1,2}}(?:(?:of\s(?:the\s)?(?:\w+\s)?)?(?:"
+    r"option|choice|answer|alternative|opción|opção|opzione|antwort)s?\b|one(?=\W*\Z))"
 )
+_SAYS_MORE = words(r"\s(?!from|in|of|on|with|since|because|as|where|which|that|for)[a-z]")
+_AGREES = words(
+    r"\s(?:is|must be|seems|appears to be|looks|fits|matches|shows|ist|es|est|è"
+    r"|é)\b(?![^.;\n]*\b(?:not|less|too|but|yet)\b)[^.;\n]{0,30}?(?:\b(?:correct[ae]?|right|best"
+    r"|answer|one|picture|goal|it|richtig\w*|bonne|giusta)\b|\Z|(?<=fits)|(?<=matches))"
+)
+"""What is said of an option by its place: more than where it stands is agreed to, or it is none."""
 _DIGITS = re.compile(r"(?<![\w.,/])\d{1,6}(?:\.\d{1,6})?(?![\d/]|[.,]\d)")
 _UNIT = re.compile(r"(?P<space>\s?)(?P<unit>[a-z\"]*)")
 _LENGTHS = re.compile(r"(?:[mdk]?m|(?:milli|deci|kilo)?met\w+|in|inch\w*|ft|feet|foot|\")\Z")
@@ -69,16 +70,13 @@ _SPELLED = (
     (re.compile(r" ?°"), " degrees"),
 )
 """Ways of writing that tell no options apart."""
-_HEDGE = re.compile(
+_HEDGE = words(
     r"(?:(?:most|very|almost)\s)?(?:probably|likely|certainly|surely|clearly|definitely|therefore"
-    r"|thus|hence|indeed|simply|obviously|evidently|actually)[\s,]{1,3}",
-    re.IGNORECASE,
+    r"|thus|hence|indeed|simply|obviously|evidently|actually)[\s,]{1,3}"
 )
-_TAKEN_BACK = re.compile(
-    r"[)\]]?\s?(?:\?|\.{2,}|…)\s{0,3}(?:no|wait|or|hmm+|actually)\b"
-    r"|(?:(?!because|since|as\b|while|but|not)[^.,;\n]){0,40}?"
-    r"\b(?:and|or)\s{1,2}(?:option\s)?[(\[]?[A-Z][)\]]",
-    re.IGNORECASE,
+_TAKEN_BACK = words(
+    r"[)\]]?\s?(?:\?|\.{2,}|…)\s{0,3}(?:no|wait|or|hmm+|actually)\b|(?:(?!because|since|as\b|while"
+    r"|but|not)[^.,;\n]){0,40}?\b(?:and|or)\s{1,2}(?:option\s)?[(\[]?[A-Z][)\]]"
 )
 _COUNTS = re.compile(r"(?<![a-z])\d|\b(?:half|twice|once|quarter)\b")
 _WORD_NUMBERS = {
@@ -102,6 +100,9 @@ class ChoiceReader:
         # "5 cm" is not in "7.5 cm", and a half cylinder is no cylinder.
         self._any_text = re.compile(
             rf"(?<!\w)(?<!\d[.,/])(?<!half )(?<!semi )(?:{alternatives})(?!\w|[.,/]\d)"
+        )
+        self._not_this = re.compile(
+            rf", (?:and )?(?:not|nicht) (?:\w{{1,4}} )?(?:{alternatives})(?!\w)"
         )
 
     def read(self, text: str) -> str | None:
@@ -128,14 +129,18 @@ class ChoiceReader:
         letter = head["letter"].upper()
         also = _ALSO.match(rest)
         second = also["letter"] if also else ""
-        if second and not (
-            second in "aA" and re.match(r"\s\w", rest[also.end() :] if also else "")
-        ):
-            return letter if second.upper() == letter else CONTRADICTION
+        is_word = second in "aA" or (second == "I" and "I" not in self.letters)
+        if second and not (is_word and re.match(r"\s\w", rest[also.end() :] if also else "")):
+            return letter if second.upper() == letter in self.letters else CONTRADICTION
         if letter not in self.letters:
             return CONTRADICTION
         named_text = self._exact(after)
         return letter if named_text in (None, letter) else CONTRADICTION
+
+    def letter_or_place(self, text: str) -> str | None:
+        """What a text names by a letter that it begins with, else by a place."""
+        found = self.letter(text)
+        return self.number(_SENTENCE_END.split(text, maxsplit=1)[0]) if found is None else found
 
     def option_text(self, text: str, *, exact: bool = False) -> str | None:
         """What a text names by the words of an option: all of it, its beginning, or a part."""
@@ -146,6 +151,7 @@ class ChoiceReader:
         if _NUMBERED.match(value) and self._has_digits:
             # "Option 3" where 3 is also the text of another option.
             return CONTRADICTION
+        value = self._not_this.sub("", value)
         if _NEGATION.search(value):
             return None
         matches = {match.group() for match in self._any_text.finditer(value)}
@@ -159,8 +165,8 @@ class ChoiceReader:
         ordinal = _ORDINAL.search(value)
         if (
             ordinal
-            and not _NEGATION.search(value, 0, ordinal.start())
-            and not IS_REJECTED.match(value, ordinal.end())
+            and not REJECTS.search(value, 0, ordinal.start())
+            and (not _SAYS_MORE.match(value, ordinal.end()) or _AGREES.match(value, ordinal.end()))
         ):
             return self._nth(PLACES[ordinal["word"].lower()])
         if self._has_digits:
@@ -170,7 +176,7 @@ class ChoiceReader:
 
     def exact(self, text: str) -> str | None:
         """What a whole text is: a letter alone, a letter with its option, or an option alone."""
-        value = unmarked(text)
+        value = _HEDGE.sub("", unmarked(text), count=1)
         head, _ = _head(value)
         if head is not None:
             after = plain(value[head.end() :])

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import re
 
+from phyblock.parsing.speech import words
+
 __all__ = ["chain"]
 
-_CHAIN = re.compile(
-    r"[\s(\[{<]{0,4}(?:(?:blocks?|index|indices|candidates?|积木|#)[\s:#]{0,3})?(?P<list>\d{1,6}(?:\s{0,3}"
-    r"(?P<sign>,|、|;|·|\||->|→|>|=>|-|\u2013|/|then|and|dann|und|puis|luego|\s)(?:\s?(?:and|then|dann|puis|luego|block|index"
-    r"|#)){0,2}[\s#]{0,3}\d{1,6}){0,63})"
-    r"[\s)\]}>.]{0,4}\Z",
-    re.IGNORECASE,
+_CHAIN = words(
+    r"[\s(\[{<]{0,4}(?:(?:maybe|probably|perhaps|vermutlich|quizás)\s)?(?:(?:blocks?|index|indices"
+    r"|candidates?|积木|#)[\s:#]{0,3})?(?P<list>\d{1,6}(?:\s{0,3}(?P<sign>,|、|;|·|\||->|→|>|=>|-"
+    r"|\u2013|/|then|and|dann|und|puis|luego|\s)(?:\s?(?:and|then|dann|puis|luego|another|block"
+    r"|index|#)){0,2}[\s#]{0,3}\d{1,6}){0,63})[\s)\]}>.]{0,4}\Z"
 )
-_REMARKS = re.compile(
-    r"(?<=\d)[号號番]|\b(?:zuerst|first|d'abord|primero)\b|"
-    r"\s{0,3}\([^()\d\n]{0,80}\)|\s(?:→|->|=>|\u2014|\u2013)\s[^\d\n]{1,200}\Z"
-    r"|(?:(?<=[→>] \d)|(?<=[→>] \d\d))\.\s[^\d\n]{1,120}\Z",
-    re.IGNORECASE,
+_REMARKS = words(
+    r"(?<=\d)[号號番]|\b(?:zuerst|first|d'abord|primero)\b|\s{0,3}\((?![^()\n]{0,40}\b(?:twice"
+    r"|thrice|times|two|three|zwei\w*|drei\w*|mal|fois|veces)\b)[^()\d\n]{0,80}\)|\s(?:→|->|=>"
+    r"|\u2014|\u2013)\s[^\d\n]{1,200}\Z|(?:(?<=[→>] \d)|(?<=[→>] \d\d))\.\s[^\d\n]{1,120}\Z"
 )
 """What a list says of its blocks, or behind its end, without a number."""
 _NUMBER = re.compile(r"\d{1,6}")

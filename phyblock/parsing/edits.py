@@ -6,7 +6,8 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 
-from phyblock.parsing.speech import SUPPOSES
+from phyblock.parsing.line_patterns import STEP_WORD
+from phyblock.parsing.speech import SUPPOSES, words
 from phyblock.parsing.text_forms import SENTENCES
 
 __all__ = ["edited"]
@@ -14,30 +15,33 @@ __all__ = ["edited"]
 _Numbers = list[int]
 _Edit = Callable[[_Numbers, re.Match[str]], _Numbers | None]
 
-_IF = re.compile(
-    r"\b(?:would|may|alternativ\w*|should you|in case|optional\w*|also|either"
-    r"|same|earlier|previous(?:ly)?|first attempt)\b|\?"
-    r"|['\u2018\u2019\"](?=\w)[^'\n]{0,20}\d",
-    re.IGNORECASE,
+_IF = words(
+    r"\b(?:would|may|alternativ\w*|should you|in case|optional\w*|also|either|same|earlier"
+    r"|previous(?:ly)?|first attempt)\b|\?|(?<!\w)['\u2018\u2019\"](?=\w)[^'\n]{0,20}\d"
 )
 """What makes an edit one that is only thought of, or somebody else's."""
-_STEP_LINE = re.compile(r"\W{0,8}step\s?\d{1,2}\W{0,3}[:.=)\u2192-]", re.IGNORECASE)
+_STEP_LINE = words(r"\W{0,8}step\s?\d{1,2}\W{0,3}[:.=)\u2192-]")
 _DIGITS = re.compile(r"\d{1,3}")
-_EVERY = re.compile(r"\b(?:all|both|every|each|wherever|always|everywhere)\b|\ds\b", re.IGNORECASE)
+_EVERY = words(r"\b(?:all|both|every|each|wherever|always|everywhere)\b|\ds\b")
 
 _THE = (
-    r"(?:(?:the|block|blocks|index|candidate|number|with|all|both|every|each|cube|no\.|#)\s?){0,4}"
+    r"(?:(?:the|block|blocks|index|candidate|number|with|all|both|every|each|cube|no\.|#|baustein"
+    r"|stein|bloc|bloque|blocco|bloco|le|el|il|o|der|блок|积木)\s?){0,4}"
 )
 _NEW = rf"{_THE}(?P<new>\d{{1,3}})s?(?![\w])"
 _OLD = rf"{_THE}(?P<old>\d{{1,3}})s?(?![\w])"
 _STEP = (
     r"(?:(?P<last>the (?:last (?:one|step|block)|final (?:step|block)))"
-    r"|(?:in |to |of )?step\s?(?P<step>\d{1,2}))"
+    rf"|(?:in |to |of )?{STEP_WORD}\s?(?P<step>\d{{1,2}}))"
 )
-_AT_STEP = r"step\s?(?P<step>\d{1,2})"
-_IS = r"(?:should be|must be|has to be|needs to be|should read|should use|is|:|=|->|\u2192)"
+_AT_STEP = rf"{STEP_WORD}\s?(?P<step>\d{{1,2}})"
+_IS = (
+    r"(?:should be|must be|has to be|needs to be|should read|should use|is|:|=|->|\u2192|muss"
+    r"|sollte|ist|d(?:oi|evrai)t être|deb(?:e|ería) ser|dev(?:e|rebbe|eria) (?:ser|essere)"
+    r"|должен быть|应该?是)"
+)
 _NOT = rf"(?:,?\s(?:and )?(?:not|instead of|rather than)\s{_OLD})?"
-_END = r"(?=\s?(?:[.,;!)]|\Z|since|because|as\b|which|\u2013|\u2014|-))"
+_END = r"(?=\s?(?:[.,;!)。]|\Z|since|because|as\b|which|instead|sein\b|\u2013|\u2014|-))"
 _NEEDLESS = (
     r"(?:not (?:needed|necessary|required|there)|unnecessary|superfluous|too many|redundant)"
 )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from phyblock.parsing.chain import chain
 from phyblock.parsing.line_patterns import ARRAY, LABELED, NOUN_LABEL, SENTENCE_END
 from phyblock.parsing.plan_patterns import FINAL_LABEL, PLAN_WORD
+from phyblock.parsing.speech import words
 from phyblock.parsing.statement import read_statement
 from phyblock.parsing.text_forms import SENTENCES
 
@@ -16,12 +17,11 @@ __all__ = ["LabeledNumbers", "labeled_numbers"]
 _NAMED_LIST = re.compile(
     r"\s{0,20}[-#>]{0,4}\s{0,3}(?P<label>[^:\d\n]{1,80}?):\s{1,3}(?P<value>[^\W\d][^:\n]{1,300})"
 )
-_APART = re.compile(r",?\s(?:and\s)?then\s|,\s(?:and\s)?|;\s|\s(?:→|->|>)\s", re.IGNORECASE)
-_PIECE = re.compile(
+_APART = words(r",?\s(?:and\s)?then\s|,\s(?:and\s)?|;\s|\s(?:→|->|>)\s")
+_PIECE = words(
     r"(?!.*\b(?:on|onto|over|under|beside|to|with|at|of|not|no|without|except|steps?|layers?|x"
     r"|two|three|four|twice|times|both|zwei|drei|zweimal|deux|trois|fois|dos|tres|veces)\b)"
-    r"[^\W\d][^\d()]{0,30}\s\(?#?(?P<number>\d{1,3})\)?",
-    re.IGNORECASE,
+    r"[^\W\d][^\d()]{0,30}\s[(\[]?#?(?P<number>\d{1,3})[)\]]?"
 )
 """A block by its looks and its number, as "red arch (3)" or "slab 2"."""
 _LABEL_CHARS = 30
@@ -57,7 +57,7 @@ def labeled_numbers(line: str) -> LabeledNumbers | None:
     value, rest = "", ""
     if labeled:
         value, _, rest = SENTENCE_END.sub("\n", labeled["value"], count=1).partition("\n")
-        value = value.rstrip(" .}")
+        value = value.rstrip(" .}。").removesuffix("です")
         numbers, _ = chain(value)
         is_short = len(labeled["label"]) < _LABEL_CHARS
         if not numbers and is_short and not read_statement(line, is_item=False).has_verb:

@@ -55,7 +55,7 @@ class LineReader:
         """Add a list of a form of its own."""
         listing = self._new(found.form, number)
         listing.numbers, listing.n_named = list(found.numbers), len(found.numbers)
-        listing.n_moves = listing.n_named
+        listing.n_moves = listing.n_named * found.says_moves
         self._steps = self._numbered = self._open = None
 
     def read(self, number: int, raw: str) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 
+from phyblock.parsing.speech import words
 from phyblock.parsing.text_forms import number_of_word
 
 __all__ = [
@@ -30,16 +31,14 @@ STATEMENT_CHARS = 600
 
 VERB = (
     r"(?:\b(?:mov(?:e[sd]?|ing)|plac(?:e[sd]?|ing)|put(?:s|ting)?|add(?:s|ed|ing)?|stack(?:s|ed"
-    r"|ing)?"
-    r"|position(?:s|ed|ing)?(?=\s(?:the|a|block|index|#))|set(?:s|ting)?|us(?:e[sd]?|ing)|lay(?:s"
-    r"|ing)?|insert(?:s|ed|ing)?"
-    r"|attach(?:es|ed|ing)?|install(?:s|ed|ing)?|drop(?:s|ped)?|pick(?:s|ed)?(?: up)?|take|grab"
-    r"|(?:start|begin|continue|finish|end)(?:e?s|ing)? with|stand"
+    r"|ing)?|position(?:s|ed|ing)?(?=\s(?:the|a|block|index|#))|set(?:s|ting)?|us(?:e[sd]?|ing)"
+    r"|lay(?:s|ing)?|insert(?:s|ed|ing)?|attach(?:es|ed|ing)?|install(?:s|ed|ing)?|drop(?:s|ped)?"
+    r"|pick(?:s|ed)?(?: up)?|take|grab|(?:start|begin|continue|finish|end)(?:e?s|ing)? with|stand"
     r"|beweg(?:e|en|t)|verschieb(?:e|en|t)|platzier(?:e|en|t)|leg(?:e|en|t)|setz(?:e|en|t)"
-    r"|stell(?:e|en|t)|nimm|nehme|stapel[en]|stapl\w{1,3}|füge"
-    r"|déplace[rz]?|place[rz]|pose[rz]?|met(?:s|tre|tez)|ajoute[rz]?|empile[rz]?"
-    r"|mueve|mover|coloca(?:r|mos)?|coloque|pon(?:er)?|añad(?:e|ir)|apila[r]?|mova|sposta(?:re)?"
-    r"|posiziona(?:re)?|metti|aggiungi|перемест\w{1,5}|постав\w{1,5}|полож\w{1,5}|возьм\w{1,5})\b"
+    r"|stell(?:e|en|t)|nimm|nehme|stapel[en]|stapl\w{1,3}|füge|déplace[rz]?|place[rz]|pose[rz]?"
+    r"|met(?:s|tre|tez)|ajoute[rz]?|empile[rz]?|m(?:ue|o)v(?:e|o|er|a)|coloc(?:a(?:r|mos)?|o)"
+    r"|coloque|pon(?:er|go|ho)?|añad(?:e|ir|o)|apil(?:ar?|o)|spost(?:are?|o)|posizion(?:are?|o)"
+    r"|mett[io]|aggiung[io]|перемест\w{1,5}|(?:по)?став\w{1,5}|полож\w{1,5}|возьм\w{1,5}|кладу)\b"
     r"|移动|移動|放置|摆放|放入|放|搬|(?<!未)使用|取出|将|把|置く|置|積む|옮|놓)"
 )
 _NOUN = (
@@ -49,11 +48,10 @@ _NOUN = (
     r"|nummern?|no\.?|nr\.?|n°|ids?|блоки?|блока|кубик|индекс(?:ом)?|номер)(?![a-zа-я])"
     r"|积木|方块|木块|块|编号|索引|序号|ブロック|インデックス|番号|블록|번호)"
 )
-_PLURAL = re.compile(
+_PLURAL = words(
     r"\b(?:ind(?:ices|exes|izes)|blocks|cubes|arches|cylinders|pieces|bricks|candidates|numbers|ids"
     r"|blöcken?|bausteinen?|steinen?"
-    r"|klötze|bloques|blocs|blocos|blocchi|piezas|peças|pièces|блоки)\b|积木|方块|木块|块",
-    re.IGNORECASE,
+    r"|klötze|bloques|blocs|blocos|blocchi|piezas|peças|pièces|блоки)\b|积木|方块|木块|块"
 )
 _WORD_NUMBER = (
     r"(?:one|two|three|four|five|six|seven|eight|nine|ten|eleven|twelve|thirteen|fourteen|fifteen"
@@ -70,8 +68,7 @@ _EACH = (
 _MULTIPLIED = r"[x×]\s(?!\d{1,2}\b(?!\s?(?:[x×]|[cm]?m\b)))"
 """A sign behind a number that says how many; "block 6 × 2" says so behind it."""
 _UNIT = (
-    rf"(?!\s?(?:{_MULTIPLIED}|times?\b|mal\b|fois|veces|cm|mm|m\b|°|degrees?\b"
-    r"|%|次|个|块|more\b))"
+    rf"(?!\s?(?:{_MULTIPLIED}|times?\b|mal\b|fois|veces|cm|mm|m\b|°|degrees?\b|%|次|个|块|more\b))"
 )
 _SHARED_OUT = rf"\s?(?:per\b|{_EACH})"
 """What stands behind a number that says how many; a number that is called a block's is none."""
@@ -82,9 +79,7 @@ _TO = r"\s{0,2}(?:-|\u2013|\u2014|~|\bto\b|\bthrough\b|\bthru\b|\bbis\b|至|到)
 _OR = r"\s{0,3},?\s{0,3}(?:\bor\b|\boder\b|\bou\b|/|或者?)\s{0,3}"
 _AND = (
     r"\s{0,3}(?:, ?(?:and|then|und)\b|,|、|&|\+|\band then\b|\band\b|\bund\b|\bet\b|\by\b|\bthen\b"
-    r"|和"
-    r"|与|及)"
-    r"\s{0,3}"
+    r"|和|与|及)\s{0,3}"
 )
 _LINK = rf"(?:{_OR}|{_TO}|{_AND})#?"
 GROUP = (
@@ -96,59 +91,56 @@ _NEXT = (
     r"|luego|después)\b|然后|接着|最后)"
 )
 """Words behind which a number alone goes on with what is moved."""
+_GOES_ON = (
+    r"(?:on|onto|to|at|next|and|then|in|into|beside|over|above|across|along|alongside|atop|upon"
+    r"|against|between|behind|under|around|down(?! from)|as|last|again|once|twice|also|too|now"
+    r"|directly|first(?!-|\s(?:layer|level|row))|auf|und|noch|quer|darauf|darüber|daneben|zuerst"
+    r"|hin|sur|et|sobre|y|encima|su|e|accanto|sopra|em)\b"
+)
+"""Words behind a number alone that is a block's; one that says how many has a noun behind it."""
 _BETWEEN = r"[\s:=#(\[{<.\-→]{0,5}"
-MENTION = re.compile(
-    rf"(?<![a-zа-я])(?P<noun>{_NOUN}(?:{_BETWEEN}(?:with|mit|the|of|is|con|avec|com|dem|der|为|是"
-    rf"|{_NOUN}))"
-    rf"{{0,4}}{_BETWEEN}){GROUP}"
-    rf"|(?P<call>{VERB}(?:[ ]?block)?\s?[(\[]\s{{0,3}}(?:(?:block|id|index|n)\s?[=:]\s?)?#?)"
-    rf"(?P<called>[0-9]{{1,6}})(?=\s{{0,3}}[,)\]])"
-    rf"|(?P<verb>{VERB}\s(?:the\s)?#?)(?P<moved>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})"
-    rf"(?=\s{{0,3}}(?:\Z|[.,;:()\u2014\u2013]|(?:on|onto|to|at|next|and|then|in|beside|over|above"
-    rf"|auf)\b))"
-    rf"|(?P<then>{_NEXT}\s?#?)(?P<next>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})"
-    r"(?=\s{0,3}(?:\Z|[.,;:()，。；\u2014\u2013]|(?:on|onto|at|next|and|then|in|beside|over|above"
-    r"|as|goes)\b))"
+MENTION = words(
+    rf"(?<![a-zа-я])(?P<noun>{_NOUN}(?:{_BETWEEN}(?:with|mit|the|of|is|ist|est|es|con|avec|com|dem"
+    rf"|der|el|le|为|是|{_NOUN})){{0,4}}{_BETWEEN}){GROUP}"
+    rf"|(?P<call>{VERB}(?:[ ]?block)?\s?[(\[]\s{{0,3}}(?:(?:block|id|index"
+    rf"|n)\s?[=:]\s?)?#?)(?P<called>[0-9]{{1,6}})(?=\s{{0,3}}[,)\]])|(?P<verb>{VERB}\s(?:(?:the"
+    rf"|first|then|now|zuerst|dann|jetzt"
+    rf"|nun)\s){{0,2}}#?)(?P<moved>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})(?=\s{{0,3}}(?:\Z"
+    rf"|[.,;:()\u2014\u2013]|{_GOES_ON}))"
+    rf"|(?P<then>{_NEXT}\s?#?)(?P<next>{_DIGITS}(?:{_AND}{_DIGITS}){{0,40}})(?=\s{{0,3}}(?:\Z"
+    rf"|[.,;:()，。；\u2014\u2013]|{_GOES_ON}|goes\b))"
     r"|(?:(?<=\()#?(?=[0-9][^()]{0,40}\))|(?<!\w)#)(?P<bare>[0-9]{1,6}(?:(?:, ?|\s?&\s?|/| or "
     r"|,? and | und |、)[0-9]{1,6}){0,8})(?=\s?(?:[,;:)/\]×→]|\Z)|\sx\s?\d|(?<=#\d)(?!\w)"
     r"|(?<=#\d\d)(?!\w))(?!\.[0-9])"
-    r"|(?P<cjk>[0-9]{1,6}(?:(?:、|,|和|-|至|到)[0-9]{1,6}){0,20})(?=\s?(?:号|號|番))",
-    re.IGNORECASE,
+    r"|(?P<cjk>[0-9]{1,6}(?:(?:、|,|和|-|至|到)[0-9]{1,6}){0,20})(?=\s?(?:号|號|番|번))"
 )
 _GOES = (
     r"(?:(?:goes|comes|is|are|must|be|placed|put|used|needed|on|in|at|onto|it|them|there)\s){0,6}"
 )
-TIMES = re.compile(
-    r"[\s)\]}]{0,3}(?:\s?\([^()\d\n]{0,60}\))?[\s,]{0,2}[(\[]?\s?(?:"
-    r"[x×]\s?(?P<a>\d{1,2})(?!\d)|(?P<b>\d{1,2})\s?(?:[x×](?!\w)"
-    r"|of (?:them|these)\b|copies\b|pieces\b"
-    r"|times\b|mal\b|fois\b|veces\b|次)"
-    rf"|{_GOES}(?P<twice>twice|zweimal|deux fois|dos veces|两次|二次)"
-    r"|(?P<thrice>thrice|dreimal|三次)"
-    r"|[号號番]?(?P<cjk>[两二三四五六])[个块個塊]"
-    r"|(?P<word>[^\W\d_]{2,8})\s(?:times|mal|fois|veces)\b"
-    rf"|(?:(?P<each>\d{{1,2}})|(?P<each_word>one|two|eine[rn]?|zwei))\s(?:\w{{2,8}}\s)?{_EACH})",
-    re.IGNORECASE,
+TIMES = words(
+    r"[\s)\]}]{0,3}(?:\s?\([^()\d\n]{0,60}\))?[\s,]{0,2}[(\[]?\s?(?:[x×]\s?(?P<a>\d{1,2}"
+    r")(?!\d)|(?P<b>\d{1,2})\s?(?:[x×](?!\w)|of (?:them|these)\b|copies\b|pieces\b|times\b"
+    rf"|mal\b|fois\b|veces\b|次)|{_GOES}(?P<twice>twice|zweimal|deux fois|dos veces|两次|二次)"
+    r"|(?P<thrice>thrice|dreimal|三次)|[号號番]?(?P<cjk>[两二三四五六])[个块個塊]"
+    r"|(?P<word>[^\W\d_]{2,8})\s(?:times|mal|fois|veces)\b|(?:(?P<each>\d{1,2})"
+    rf"|(?P<each_word>one|two|eine[rn]?|zwei))\s(?:\w{{2,8}}\s)?{_EACH})"
 )
-_SO_MANY = re.compile(
+_SO_MANY = words(
     r"(?:(?P<twice>\b(?:twice|zweimal|deux fois|dos veces)\s|两次)|(?P<n>\d{1,2})\s?(?:[x×]|times"
-    r"|mal|个|块)\s{0,2}|(?P<cjk_word>[二两三四五六])(?:个|块)"
-    r"|\b(?P<word>two|three|four|five|six|zwei|drei|vier|deux|trois|quatre|dos|tres|cuatro|due|tre"
-    r"|quattro|dois|duas|três|quatro|два|две|три|четыре)"
-    r"\s(?:\w{2,12}\s){0,3}?)\(?\Z",
-    re.IGNORECASE,
+    r"|mal|个|块)\s{0,2}|(?P<cjk_word>[二两三四五六])(?:个|块)|\b(?P<word>two|three|four|five|six"
+    r"|zwei|drei|vier|deux|trois|quatre|dos|tres|cuatro|due|tre|quattro|dois|duas|três|quatro|два"
+    r"|две|три|четыре)\s(?:\w{2,12}\s){0,3}?)\(?\Z"
 )
-_OF_KIND = re.compile(r"\b(?:of|with|mit|index)\b", re.IGNORECASE)
-_SO_MANY_OF = re.compile(
+_OF_KIND = words(r"\b(?:of|with|mit|index)\b")
+_SO_MANY_OF = words(
     r"(?<!step )(?<!layer )(?<!level )(?<!row )(?<!stage )(?<!phase )(?<!height )(?<!position )"
     r"(?<![\d.,])(?<![x×] )\b(?P<n>\d{1,2})(?!\s?(?:[cdm]?m|in(?:ch(?:es)?)?|ft|feet|foot|units?"
     r"|deg(?:rees?)?|percent|layers?|levels?|rows?|steps?)\b)"
-    rf"\s(?:(?!{VERB})[^\W\d]{{2,12}}\s){{0,2}}\Z",
-    re.IGNORECASE,
+    rf"\s(?:(?!{VERB})[^\W\d]{{2,12}}\s){{0,2}}\Z"
 )
 """How many, before several blocks of one number: "2 blocks of index 6"; a length is no count."""
-_CORNER = re.compile(r"corner|ecke", re.IGNORECASE)
-SAYS_NUMBER = re.compile(rf"\d|{_WORD_NUMBER}", re.IGNORECASE)
+_CORNER = words(r"corner|ecke")
+SAYS_NUMBER = words(rf"\d|{_WORD_NUMBER}")
 
 
 def named_blocks(text: str) -> set[int]:

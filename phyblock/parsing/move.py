@@ -32,7 +32,7 @@ from phyblock.parsing.operation import (
     operations_of,
 )
 from phyblock.parsing.slips import without_slips
-from phyblock.parsing.speech import CONDITIONAL, TAKES_BACK, words
+from phyblock.parsing.speech import CONDITIONAL, TAKES_BACK, UNSURE, words
 from phyblock.parsing.statement import read_statement
 from phyblock.parsing.text_forms import answer_of
 
@@ -55,38 +55,51 @@ class ParsedMove:
 
 _Find = Callable[[str, list[str]], Sequence[Operation]]
 
-_LABELED = re.compile(rf"(?<![\w]){LABEL}[`*\"'_ ]{{0,6}}{OPERATION}(?![\w?])", re.IGNORECASE)
-_MORE = re.compile(
-    rf"[\s,;&+`*]{{1,4}}(?:(?:and|then|or)\s{{1,3}}){{0,2}}{named(CALL, 'call')}", re.IGNORECASE
-)
+_LABELED = words(rf"(?<![\w]){LABEL}[`*\"'_ ]{{0,6}}{OPERATION}(?![\w?])")
+_MORE = words(rf"[\s,;&+`*]{{1,4}}(?:(?:and|then|or)\s{{1,3}}){{0,2}}{named(CALL, 'call')}")
 """A further operation behind one, with nothing said between them."""
 _TAKES_BACK = words(TAKES_BACK, r"\b(?:actually|instead|no\.)")
-_CONCLUDES = re.compile(
+_CONCLUDES = words(
     rf"\b(?:so|therefore|thus|hence)\b[:,]?\s(?:[^\d\n.;]{{0,30}}\s)?{named(CALL, 'call')}"
-    r"(?:\s(?:is\s)?(?:next|now))?\W{0,3}\Z",
-    re.IGNORECASE,
+    r"(?:\s(?:is\s)?(?:next|now))?\W{0,3}\Z"
 )
-_OR = re.compile(r"\b(?:or|oder|ou)\s{1,3}\Z", re.IGNORECASE)
+_OR = words(r"\b(?:or|oder|ou)\s{1,3}\Z")
 """An operation behind this is one of several, of which the others may be no number at all."""
-_FOLLOWS = re.compile(
-    rf"\b(?:so|therefore|thus|hence),?\s(?:(?:block|candidate|index)\s){{0,2}}{INTEGER}"
-    r"\s(?:has to|must|should|needs to|is to|will)?\s?(?:be next|is next|(?:come|go)(?:e?s)?"
-    r"\s(?:next|now))(?=\s{0,2}(?:[.,;!()\u2014]|\Z|\b(?:and|as|because|since|while|before)\b))(?![^.;\n]{0,80}(?:\bor\b|\?))",
-    re.IGNORECASE,
+_FOLLOWS = words(
+    rf"\b(?:so|therefore|thus|hence),?\s(?:(?:block|candidate|index)\s){{0,2}}{INTEGER}\s(?:has to"
+    r"|must|should|needs to|is to|will)?\s?(?:be next|is next|(?:come|go)(?:e?s)?\s(?:next"
+    r"|now))(?=\s{0,2}(?:[.,;!()\u2014]|\Z|\b(?:and|as|because|since|while"
+    r"|before)\b))(?![^.;\n]{0,80}(?:\bor\b|\?))"
 )
 """What comes next, where that ends the clause: not "next to block 2", and not "is now stable"."""
+_ONE_OR_ANOTHER = words(r"\d\s?(?:or|oder|ou|/|或)\s?(?:\w+\s)?\d")
 _COUNTED = re.compile(r"\d{1,2}[.)]\s")
-_DONE_SENTENCE = re.compile(
-    rf"(?:\A|[.!?:\u2014]\s{{1,3}}|;\s{{0,3}}|(?:->|\u2192|(?P<then>\bthen))\s{{0,3}}){DONE}\s{{0,2}}[.!]?\Z",
-    re.IGNORECASE,
+_DONE_SENTENCE = words(
+    rf"(?:\A|[.!?:\u2014]\s{{1,3}}|\b(?:so|thus|hence|therefore|also|daher|donc)[,:]?\s{{1,3}}"
+    rf"|;\s{{0,3}}|(?:->|\u2192|(?P<then>\bthen))\s{{0,3}}){DONE}\s{{0,2}}[.!]?\Z"
 )
-_OTHER_CALL = re.compile(
-    rf"(?:{LABEL})(?!move|place|put|done)[a-z_]{{3,20}}\s?\([^()\n]{{0,20}}\)\W{{0,3}}",
-    re.IGNORECASE,
+_DONE_FIRST = re.compile(
+    rf"(?:{LABEL})?{DONE}(?:[.!,\n]|\s[\u2013\u2014-])(?!.*(?:{TAKES_BACK}|\b(?:not?|but|next|then"
+    rf"|missing|if|with)\b))",
+    re.IGNORECASE | re.DOTALL,
+)
+"""A reply that begins with the answer and says nothing behind it that may undo it."""
+_OTHER_CALL = words(
+    rf"(?:{LABEL})(?!move|place|put|done)[a-z_]{{3,20}}\s?\([^()\n]{{0,20}}\)\W{{0,3}}"
 )
 """An answer that is another operation than those there are."""
-_CHOSEN = re.compile(r"\b(?:choose|select|pick|wähle|elijo|choisis)\b|选择?", re.IGNORECASE)
-_BARE = re.compile(rf"(?:{LABEL})?(?:(?:candidate|block)\s)?[#(\[]?{INTEGER}[)\].]?", re.IGNORECASE)
+_CHOSEN = words(r"\b(?:choose|select|pick|wähle|elijo|choisis)\b|选择?")
+_IS_NEXT = words(
+    r"\b(?:(?:comes|goes|is) next(?! to)|is (?:still )?missing|go(?:ing)? with|now comes?"
+    r"|next (?:block|one|piece|step|move|candidate)(?: \w+)? (?:is|should be|will be)"
+    r"|(?:als )?nächste[rs]?\b.{0,30}\b(?:ist|kommt|folgt)|fehlt|siguiente|falta|prochaine?|manque"
+    r"|prossimo|próximo|следующ\w{2})\b|\A(?:so |and )?now,? (?:(?:block|candidate) )?\d+\W*\Z|下一"
+    r"|次は|다음"
+)
+"""That the one block named is the next; what already stands is named with a verb of its own."""
+_BARE = words(
+    rf"(?:{LABEL})?(?:(?:candidate|block)\s)?[#(\[]?{INTEGER}[)\].]?(?:\s\([^()\d]{{1,40}}\)\.?)?"
+)
 _FENCE = re.compile(r"(?:`{3,}|~{3,})\s{0,3}[\w+-]{0,16}")
 _MARKUP = re.compile(r"</?(?:final_)?answer>|[*`_~]{1,3}|\\boxed\{|[{}]")
 _EDGES = " \t\r\f\v>#-*+\u2022|\"'"
@@ -180,7 +193,8 @@ def _in_last_line(_: str, lines: list[str]) -> list[Operation]:
 
 
 def _anywhere(_: str, lines: list[str]) -> list[Operation]:
-    return [operation for line in lines for operation in mentions(line)]
+    found = [operation for line in lines for operation in mentions(line)]
+    return found or (["done"] if _DONE_FIRST.match("\n".join(lines)) else [])
 
 
 def _loose(_: str, lines: list[str]) -> list[int]:
@@ -195,9 +209,10 @@ def _moved(line: str) -> list[int]:
     if MENTION.search(line) and not mentions(line):
         return []
     statement = read_statement(line.replace("_", " "), is_item=False)
-    if statement.loose - {*statement.numbers}:
+    if statement.loose - {*statement.numbers} or _ONE_OR_ANOTHER.search(line):
         return []
-    return list(statement.numbers) if statement.has_verb or _CHOSEN.search(line) else []
+    is_next = _CHOSEN.search(line) or (_IS_NEXT.search(line) and not UNSURE.search(line))
+    return list(statement.numbers) if statement.has_verb or is_next else []
 
 
 def _bare(_: str, lines: list[str]) -> list[int]:

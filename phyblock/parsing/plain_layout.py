@@ -7,8 +7,10 @@ from __future__ import annotations
 import re
 
 from phyblock.parsing.alike_lines import counted_lines
+from phyblock.parsing.line_patterns import STEP_WORD
 from phyblock.parsing.plan_patterns import OPTION
-from phyblock.parsing.speech import REVISED
+from phyblock.parsing.speech import REVISED, words
+from phyblock.parsing.text_forms import number_of_word
 from phyblock.parsing.text_tables import markdown_tables
 from phyblock.parsing.yaml_text import yaml_as_json
 
@@ -20,21 +22,22 @@ _NTH_STEP = re.compile(
     r"(?:단계|schritt\b|paso\b|passo\b|étape\b|шаг\b|adım\b|stap\b|krok\b)",
     re.IGNORECASE | re.MULTILINE,
 )
-_COUNTED_OUT = re.compile(r"^[^\n]{0,80}?\(1\) [^\n]{1,400}?\s\(2\) [^\n]{1,2000}", re.MULTILINE)
-_COUNT = re.compile(r"(?<!\S)\((?P<n>\d{1,2})\)(?= )")
+_COUNTED_OUT = re.compile(
+    r"^[^\n]{0,80}?(?:\(?1\)|1st:) [^\n]{1,400}?\s(?:\(?2\)|2nd:) [^\n]{1,2000}", re.MULTILINE
+)
+_COUNT = re.compile(r"(?<!\S)(?:\((?=\d+\)))?(?P<n>\d{1,2})(?:\)|(?:st|nd|rd|th):)(?= )")
+_SPELLED_STEP = words(rf"\b(?P<step>{STEP_WORD}\s?)(?P<n>[^\W\d_]{{1,10}})(?=\s?[:.)\u2013-])")
 _ARRAY_REMARK = re.compile(r"\]\s{1,4}#\s[^\n\d]{0,80}$", re.MULTILINE)
 _NAME = r"(?:block|candidate|piece|cube|index|idx|id|number|n)"
-_STEP_ELEMENT = re.compile(
+_STEP_ELEMENT = words(
     r"<(?P<name>step|move|action)[_ -]?(?P<n>\d{1,2})>\s{0,9}(?P<held>[^<>\n]{1,200}?)\s{0,9}"
-    r"</(?P=name)[_ -]?(?P=n)>",
-    re.IGNORECASE,
+    r"</(?P=name)[_ -]?(?P=n)>"
 )
-_INDEX_ELEMENT = re.compile(
+_INDEX_ELEMENT = words(
     rf"<(?:(?:parameter|param|arg|argument)(?:\s?=\s?|\sname=)[\"']?(?:{_NAME}[_ ]?){{1,2}}[\"']?"
-    rf"|(?:{_NAME}[_ ]?){{1,2}})>\s{{0,9}}(?P<number>\d{{1,6}})\s{{0,9}}</\w{{1,20}}>",
-    re.IGNORECASE,
+    rf"|(?:{_NAME}[_ ]?){{1,2}})>\s{{0,9}}(?P<number>\d{{1,6}})\s{{0,9}}</\w{{1,20}}>"
 )
-_CALL_ELEMENT = re.compile(r"</?(?:function|invoke|tool|parameter)[^<>\n]{0,80}>", re.IGNORECASE)
+_CALL_ELEMENT = words(r"</?(?:function|invoke|tool|parameter)[^<>\n]{0,80}>")
 _CALL = re.compile(
     r"^(?P<indent>[ \t>\-]{0,12})(?:await )?(?:\w{1,20}\.){0,3}(?P<name>[a-z_]{3,30})\("
     r"(?P<held>[^()\n]{0,120}(?:\([^()\n]{0,60}\)[^()\n]{0,60}){0,4})\)[ \t]*;?[ \t]*"
@@ -42,13 +45,11 @@ _CALL = re.compile(
     re.MULTILINE | re.IGNORECASE,
 )
 _COMMENT = re.compile(r"^[ \t]*(?:#|//)[^\n\d]{0,200}\n", re.MULTILINE)
-_TAKES = re.compile(r"pick|grab|grasp|lift|take|get|select", re.IGNORECASE)
-_PUTS = re.compile(r"place|put|move|stack|drop|release|add|insert|set", re.IGNORECASE)
-_FIRST = re.compile(
-    rf"\s{{0,3}}\{{?\s{{0,3}}[\"']?(?:(?:{_NAME}_?){{1,2}}[\"']?\s?[:=]\s?)?[\"']?"
-    rf"(?:{_NAME}[_ #-]?){{0,2}}"
-    r"(?P<number>\d{1,6})[\"']?\s{0,3}(?=[,})]|\Z)",
-    re.IGNORECASE,
+_TAKES = words(r"pick|grab|grasp|lift|take|get|select")
+_PUTS = words(r"place|put|move|stack|drop|release|add|insert|set")
+_FIRST = words(
+    rf"\s{{0,3}}\{{?\s{{0,3}}[\"']?(?:(?:{_NAME}_?){{1,2}}[\"']?\s?[:=]\s?)?[\"']?(?:{_NAME}[_ "
+    r"#-]?){0,2}(?P<number>\d{1,6})[\"']?\s{0,3}(?=[,})]|\Z)"
 )
 
 
@@ -56,6 +57,7 @@ def plain_layout(text: str) -> str:
     """A text without layouts of its own; everything else stands as it stood."""
     text = _KEYCAP.sub(r"\1. ", text)
     text = _NTH_STEP.sub(r"\g<before>Step \g<n>", text)
+    text = _SPELLED_STEP.sub(lambda s: f"{s['step']}{number_of_word(s['n']) or s['n']}", text)
     text = _ARRAY_REMARK.sub("]", text)
     text = counted_lines(text)
     text = _COUNTED_OUT.sub(_line_by_line, text)

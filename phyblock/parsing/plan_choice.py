@@ -18,7 +18,8 @@ from phyblock.parsing.plan_patterns import (
     PART,
     REVISION,
 )
-from phyblock.parsing.speech import TAKES_BACK, words
+from phyblock.parsing.speech import CONDITIONAL, TAKES_BACK, words
+from phyblock.parsing.text_forms import SENTENCES
 
 __all__ = ["PlanLists", "chosen", "plans_of"]
 
@@ -119,8 +120,11 @@ def _is_announced(lines: list[str], listing: Listing) -> bool:
     return len(lines) > 1 and len(lines[-1]) < HEADING_CHARS and bool(REVISION.search(last))
 
 
-_ARGUES = re.compile(r"\b(?:so|thus|therefore)\b(?!.*[:\uff1a]\W*\Z)", re.IGNORECASE)
+_ARGUES = words(r"\b(?:so|thus|therefore)\b(?!.*[:\uff1a]\W*\Z)")
 """Words that conclude of the plan; of a list they do so with a colon."""
+
+
+_DENIES = words(r"(?:\b(?:not|never|cannot|nicht|kein\w*)\b|n['\u2019]t\b)[^.,;]{0,40}\Z")
 
 
 def chosen(plans: list[PlanLists], answer: str) -> PlanLists | None:
@@ -130,7 +134,13 @@ def chosen(plans: list[PlanLists], answer: str) -> PlanLists | None:
     if options and last.option:
         if len({tuple(plan.numbers) for plan in plans}) == 1:
             return last
-        said = [match[match.lastgroup or 0] for match in CHOICE.finditer(answer)]
+        said = [
+            match[match.lastgroup or 0]
+            for sentence in SENTENCES.split(answer)
+            if not CONDITIONAL.search(sentence)
+            for match in CHOICE.finditer(sentence)
+            if not _DENIES.search(sentence, 0, match.start())
+        ]
         ordinal = ORDINALS.get(said[-1].lower()) if said and len(plans) == 2 else None
         if ordinal is not None:
             return plans[ordinal]

@@ -25,25 +25,24 @@ from phyblock.parsing.plan_patterns import (
     REVISION,
 )
 from phyblock.parsing.plan_rank import LAST, NO, is_announced, rank_of
+from phyblock.parsing.speech import words
 from phyblock.parsing.text_forms import SENTENCES
+from phyblock.parsing.tiers import tier_of
 
 __all__ = ["is_doubtful"]
 
-_DROPS = re.compile(
-    r"\b(?:forget|scrap|disregard|vergiss|(?:don['\u2019]t|do not) (?:use|trust|take))"
-    r"\s(?:the|that|this|it|what|any|d\w\w)\b"
-    r"|\b(?:not sure|unsure|uncertain|don['\u2019]t know) which\b"
-    r"|\bnot (?:at all )?sure (?:about|of) (?:any|all|this|these|the plan)",
-    re.IGNORECASE,
+_DROPS = words(
+    r"\b(?:forget|scrap|disregard|vergiss|(?:don['\u2019]t|do not) (?:use|trust|take))\s(?:the"
+    r"|that|this|it|what|any|d\w\w)\b|\b(?:not sure|unsure|uncertain|don['\u2019]t know) which\b"
+    r"|\b(?:swap|switch|exchange|remove|delete|drop|skip)\s(?:the\s)?(?:first|last|second|third"
+    r"|final)\b|\bnot (?:at all )?sure (?:about|of) (?:any|all|this|these|the plan)"
 )
 _NUMBER = re.compile(r"\d")
-_ASIDE = re.compile(
-    r"\b(?:not?|never|none|un\w+|distract\w*|decoy\w*|similar|alternativ\w*|could|would|might"
-    r"|may|if"
-    r"|other|looks? like|mirror\w*|resembl\w*"
-    r"|left|remaining|example|extra|nicht|kein\w*|ähnlich\w*|autres?|otros?|no)\b|n['\u2019]t\b"
-    r"|不|未|没",
-    re.IGNORECASE,
+_ASIDE = words(
+    r"\b(?:not?|never|none|un\w+|distract\w*|decoy\w*|similar|alternativ\w*|could|would|might|may"
+    r"|if|other|looks? like|mirror\w*|resembl\w*|left|remaining|example|extra|same (?:shape|size"
+    r"|kind|colou?r)|looks? \w+ like|\w+er than|nicht|kein\w*|ähnlich\w*|autres?|pas|jamais|otros?"
+    r"|no|tampoco|non|não|nem|не|нет|похож\w*)\b|n['\u2019]t\b|不|未|没|ません|ない|않|안 "
 )
 """Words of a sentence about blocks that are no part of the plan."""
 _LOOSE_FORMS = ("labeled", "chain", "numbers", "sentences", "marked")
@@ -61,22 +60,24 @@ _ROLE = re.compile(
 )
 """Numbers that are no block's: places, sizes, counts, coordinates."""
 _BRACKETS = re.compile(r"\([^()\n]{0,200}\)|\[[^\[\]\n]{0,200}\]")
-_STEP_AGAIN = re.compile(
+_STEP_AGAIN = words(
     r"(?:\b(?:swap\w*|skip|remov\w+|drop|wrong|replac\w+|should|must|has to|needs? to|exchange"
     r"|delete|ignore|unnecessary|(?:not|n't) (?:needed|required|necessary))\b.{0,60})?"
     r"\bsteps?\s?\d(?P<then>.{0,60}\b(?:swap\w*|skip\w*|remov\w+|drop\w*|wrong|replac\w+|should"
     r"|must"
-    r"|has to|needs? to|exchange\w*|unnecessary|(?:not|n't) (?:needed|required|necessary)))?",
-    re.IGNORECASE,
+    r"|has to|needs? to|exchange\w*|unnecessary|(?:not|n't) (?:needed|required|necessary)))?"
 )
 """A step named again, to take it back."""
-_ONCE_MORE = re.compile(
+_MAY_BE_SWAPPED = words(
+    r"\b(?:may|can|could|might) (?:also |as well )?be (?:swap|switch|exchang|interchang)\w+"
+)
+_ONCE_MORE = words(
     r"\bstep\W{0,3}\d{1,2}\W.{0,20}\b(?:repeat|again|same|another|likewise|also|mirror"
-    r"|duplicate|copy)\b",
-    re.IGNORECASE,
+    r"|duplicate|copy)\b"
 )
 """A step that names no block but moves one."""
-_TWICE = re.compile(r"\b(?:twice|thrice|zweimal|dreimal|dos veces|deux fois)\b", re.IGNORECASE)
+_TWICE = words(r"\b(?:twice|thrice|zweimal|dreimal|dos veces|deux fois)\b")
+_LEAVES_OUT = re.compile(r"\W*(?:\.{3}|…)\W*")
 _FRAGMENT = 3
 """Steps of a list that may go on from what stands there already."""
 _MOST_LEFT_OUT = 4
@@ -130,6 +131,7 @@ def _is_torn(lists: Sequence[Listing]) -> bool:
     return (
         bool(own and 1 < own[0] <= _MOST_LEFT_OUT)
         or any(1 < b.own[0] <= a.own[-1] for a, b in pairwise(lists) if a.own and b.own)
+        or bool(lists[-1].lines and _LEAVES_OUT.fullmatch(lists[-1].lines[-1]))
         or any(
             not re.search(r"\w", line) or _ONCE_MORE.search(line)
             for listing in lists
@@ -164,7 +166,9 @@ def _is_beside(before: Listing, listing: Listing) -> bool:
     """Whether labels of one kind stand line by line, of which one alone was taken."""
     is_next = listing.first_line - before.last_line <= 1
     return (
-        before.form == listing.form == "labeled" and is_next and not REVISION.search(listing.label)
+        before.form == listing.form in ("labeled", "chain")
+        and is_next
+        and not REVISION.search(listing.label)
     )
 
 
@@ -187,7 +191,7 @@ def _is_corrected(lines: Sequence[str], order: Sequence[int]) -> bool:
     is_explained = False
     numbers = {*order}
     for line in lines:
-        line = PLACE_OR_TIMES.sub(" ", line)
+        line = PLACE_OR_TIMES.sub(" ", _MAY_BE_SWAPPED.sub(" ", line))
         is_explained = is_explained or bool(EXPLANATION.search(line))
         if (CORRECTS.search(line) and _NUMBER.search(line)) or _DROPS.search(line):
             return True
@@ -216,7 +220,8 @@ def _says_otherwise(listing: Listing, order: list[int], known: set[int]) -> bool
     is_as_long = len(listing.numbers) == len(order)
     if is_as_long and sorted(listing.numbers) == sorted(order) and not _is_no_plan(listing.label):
         return listing.numbers not in (order, sorted(order))
-    is_plan = rank_of(listing) > (NO if listing.n_moves else LAST)
+    is_layer = tier_of(listing.label) is not None and not _ASIDE.search(listing.label)
+    is_plan = is_layer or rank_of(listing) > (NO if listing.n_moves else LAST)
     return is_plan and bool({*listing.numbers} - known)
 
 

@@ -20,6 +20,7 @@ from phyblock.parsing.plan_patterns import (
     PLAN_WORD,
     REVISION,
 )
+from phyblock.parsing.speech import words
 
 __all__ = ["ASKED", "LAST", "MARKED", "MOVES", "NO", "is_announced", "rank_of"]
 
@@ -30,14 +31,16 @@ NO, LAST, MARKED, MOVES, ASKED = range(5)
 def rank_of(listing: Listing) -> int:
     """How surely a list is a plan, by its form, its label and the heading above it."""
     heading = "" if listing.heading.endswith((".", "。")) else listing.heading
-    if listing.above and (EXAMPLE.search(listing.above[-1]) or NOT_MEANT.search(listing.above[-1])):
+    title = listing.above[-1] if listing.above else ""
+    if EXAMPLE.search(title) or (NOT_MEANT.search(title) and not OPTION.match(listing.label)):
         return NO
     if listing.form == "numbers":
         is_list = len(listing.numbers) > 1 and (not heading or PLAN_WORD.search(heading))
         return LAST if is_list else NO
     is_catalogue = _names_catalogue(heading)
     if listing.form == "layers":
-        return NO if is_catalogue else MARKED
+        is_seen = not listing.n_moves and any(map(CATALOGUE_WORD.search, listing.above))
+        return NO if is_catalogue or is_seen else MARKED if listing.n_moves else LAST
     if listing.form == "labeled":
         return _rank_of_label(listing, heading, is_catalogue=is_catalogue)
     if listing.form == "steps" and 2 * listing.n_named <= len(listing.own) > 1:
@@ -97,10 +100,9 @@ def _rank_of_label(listing: Listing, heading: str, *, is_catalogue: bool) -> int
     return LAST if many and not is_catalogue and (is_short or LAYERS.match(label)) else NO
 
 
-_MEASURES = re.compile(
+_MEASURES = words(
     r"\b(?:heights|widths|lengths|depths|sizes|distances|counts|supports)\W*\Z"
-    r"|\bthe (?:\w+ )?(?:layers|levels|rows|tiers|storeys|floors)\W*\Z",
-    re.IGNORECASE,
+    r"|\bthe (?:\w+ )?(?:layers|levels|rows|tiers|storeys|floors)\W*\Z"
 )
 """Labels of numbers that count or measure."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from phyblock.parsing.speech import SLIPS
+from phyblock.parsing.speech import SLIPS, words
 
 __all__ = ["without_letter_slips", "without_slips"]
 
@@ -13,14 +13,12 @@ _CALLED = r"(?:(?:it['\u2019]s|it is|make that|should be|that['\u2019]s|to|zu)\s
 _BLOCK = r"(?:(?:the|block|index|candidate|number|no\.|with|#|move\(|kandidat|der|den)\s?){0,4}"
 _LEADS = r"[^\w\n,;]{0,2}(?:\.{2,3}|[,;(\u2013\u2014\-\u2192]|->|[.)]\s)[^\w\n]{0,3}"
 _LIST = r"\d{1,3}(?:(?:\s?(?:,|->|\u2192|>|\u2013|-)\s?|\s)\d{1,3}){1,40}"
-_LIST_AGAIN = re.compile(
-    rf"(?<![\w.])(?P<old>{_LIST}){_LEADS}{_SLIP}\b[\s,.:!]{{1,3}}{_CALLED}(?P<new>{_LIST})(?![\w])",
-    re.IGNORECASE,
+_LIST_AGAIN = words(
+    rf"(?<![\w.])(?P<old>{_LIST}){_LEADS}{_SLIP}\b[\s,.:!]{{1,3}}{_CALLED}(?P<new>{_LIST})(?![\w])"
 )
-_ONE_AGAIN = re.compile(
+_ONE_AGAIN = words(
     rf"(?<![\w.])(?P<old>\d{{1,3}})s?\)?{_LEADS}(?:{_SLIP}\b(?<!\bno)|no(?=,))[\s,.:!]{{1,3}}"
-    rf"{_CALLED}{_BLOCK}(?P<new>\d{{1,3}})(?=\s?(?:[).;!(\n]|,\s?\D|\Z|instead\b))(?P<end>\)?)",
-    re.IGNORECASE,
+    rf"{_CALLED}{_BLOCK}(?P<new>\d{{1,3}})(?=\s?(?:[).;!(\n]|,\s?\D|\Z|instead\b))(?P<end>\)?)"
 )
 _STEP_AGAIN = re.compile(
     r"^(?P<head>[ \t>*_#-]{0,8}step\s?(?P<n>\d{1,2}))\s?\((?:corrected|correction|revised|fixed"
@@ -29,11 +27,10 @@ _STEP_AGAIN = re.compile(
 )
 
 
-_LETTER_AGAIN = re.compile(
-    r"(?<![\w'])[A-Z][.,;]?\s?(?:[\u2013\u2014(\u2192-]\s?)?"
+_LETTER_AGAIN = words(
+    r"(?<![\w'])[A-Z][.,;?]?\s?(?:[\u2013\u2014(\u2192-]\s?)?"
     rf"(?:(?:{SLIPS}|no|actually|rather)[,.:]?\s){{1,3}}"
-    r"(?:it is\s|it['\u2019]s\s)?(?P<new>(?-i:[A-Z]))(?=\)?[.!]?(?:\s|\Z))",
-    re.IGNORECASE,
+    r"(?:it is\s|it['\u2019]s\s)?(?P<new>(?-i:[A-Z]))(?=\)?[.!]?(?:\s|\Z))"
 )
 
 

@@ -130,7 +130,7 @@ def _moved(piece: str, rest: _Rest) -> list[int]:
             if mention["noun"] or mention["cjk"]:
                 kind.update(counted(mention, piece))
             continue
-        goes_on = mention["then"] or (last and mention["call"] and last["call"])
+        goes_on = mention["then"] or mention["verb"] or (last and mention["call"] and last["call"])
         if last is not None and not goes_on:
             between = piece[last.end() : start]
             times = TIMES.match(piece, last.end())

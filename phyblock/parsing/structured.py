@@ -42,13 +42,15 @@ _REVISES = words(TAKES_BACK, r"\b(?:instead|example|or|again|no)\b")
 class Found:
     """A list in a form of its own: where it stands, the blocks it names, and whether it is a plan.
 
-    What is no plan (a catalogue of the candidates) stands there all the same, with no numbers.
+    What is no plan (a catalogue of the candidates) stands there all the same, with no numbers;
+    what may only describe what is seen does not say that it moves.
     """
 
     start: int
     end: int
     form: str
     numbers: tuple[int, ...]
+    says_moves: bool = True
 
 
 def find_json(text: str) -> list[Found]:

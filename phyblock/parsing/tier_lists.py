@@ -5,7 +5,11 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
+from phyblock.parsing.line_patterns import MARKED
+from phyblock.parsing.speech import words
+from phyblock.parsing.statement import read_statement
 from phyblock.parsing.structured import Found, line_numbers
 from phyblock.parsing.text_forms import plain_line
 from phyblock.parsing.tiers import lowest_first, tier_of
@@ -21,16 +25,19 @@ _NUMBERS_AHEAD = re.compile(
     r"(?P<value>\d{1,3}(?:(?:,\s?|\s?\+\s?|\sand\s)\d{1,3}){0,9})\s?\((?P<label>[^()\d\n]{2,30})\)"
 )
 _APART = re.compile(r"\s?[|;]\s?|(?<=\w)\.\s(?=\S)")
-_COUNTED = re.compile(
-    r"\d\s(?:\w+\s){0,2}?(?:blocks|cubes|arches|cylinders|cuboids|prisms|cones|pieces|bricks)\b|\d\s?cm\b|%",
-    re.IGNORECASE,
+_COUNTED = words(
+    r"\d\s(?:\w+\s){0,2}?(?:blocks|cubes|arches|cylinders|cuboids|prisms|cones|pieces|bricks)\b|\d\s?cm\b|%"
 )
-_NAMED = re.compile(
-    r"\d\D{1,4}\d|\b(?:blocks?|index|candidates?|baustein)\b|#\d|\(\d|号", re.IGNORECASE
+_NAMED = words(
+    r"^\d{1,2}: ?[^\W\d]|\d\D{1,4}\d|\b(?:bloc\w*|bloque|index|candidates?|baustein|блок)\b|积木"
+    r"|ブロック|블록|#\d|\(\d|号"
 )
-_IS_PLAN = re.compile(r"\b(?:option|plan|order|sequence|attempt|version|answer|steps?)\b", re.I)
+_IS_PLAN = words(r"\b(?:option|plan|order|sequence|attempt|version|answer|steps?)\b")
 """A label of a whole plan, not of a part of it."""
 _LINE_CHARS = 240
+_HEAD = re.compile(r"[#+\-\u2022 ]{0,8}[^\d\n:.,;]{0,24}\d{0,2}[^\d\n:.,;]{0,24}:?")
+"""A heading of a layer, whose blocks stand below it as items."""
+_STAR = re.compile(r"\A\s{0,40}\*(?=\s)")
 _Part = tuple[str, list[int]]
 
 
@@ -42,9 +49,21 @@ def find_tier_lists(text: str) -> list[Found]:
     """
     found: list[Found] = []
     run: list[tuple[int, int, _Part, bool]] = []
+    headed: list[tuple[int, int, _Part, bool]] = []
     at = 0
     for line in [*text.splitlines(keepends=True), ""]:
         bare = plain_line(line).strip()
+        item = _item(line) if headed else None
+        if item is not None:
+            start, _, (label, numbers), is_sure = headed[-1]
+            sure = is_sure or bool(_NAMED.search(bare))
+            headed[-1] = (start, at + len(line), (label, [*numbers, *item]), sure)
+        elif _HEAD.fullmatch(bare) and tier_of(bare):
+            headed.append((at, at + len(line), (bare, []), False))
+        elif bare or not line:
+            is_whole = all(part[2][1] for part in headed)
+            found += [replace(f, says_moves=False) for f in _rising(headed) if is_whole]
+            headed = []
         part = _part(bare)
         if part is None or not (run or tier_of(part[0][0])):
             found += _rising(run)
@@ -60,6 +79,16 @@ def find_tier_lists(text: str) -> list[Found]:
     return found
 
 
+def _item(line: str) -> list[int] | None:
+    """The blocks of an item below the heading of a layer, which names them and moves none."""
+    line = plain_line(_STAR.sub("-", line))
+    marked = MARKED.match(line)
+    value = line[marked.end() :].rstrip(" .\n") if marked else ""
+    if _COUNTED.search(value) or read_statement(value, is_item=True).has_verb:
+        return None
+    return _all_blocks(value)
+
+
 def _part(text: str) -> tuple[_Part, bool] | None:
     """A label with the blocks behind it, and whether they are blocks for certain."""
     text = text.rstrip("。")
@@ -68,10 +97,15 @@ def _part(text: str) -> tuple[_Part, bool] | None:
     match = _LINE.fullmatch(text) if text[-1:].isalnum() or text[-1:] in ".)]" else None
     if match is None or _COUNTED.search(match["value"]) or _IS_PLAN.search(match["label"]):
         return None
-    numbers = list(line_numbers(match["value"].rstrip(". ")))
-    digits = [int(n) for n in re.findall(r"(?<![x×\d])\d{1,3}(?!\s?[x×\d])", match["value"])]
-    is_whole = bool(numbers) and {*digits} <= {*numbers}
-    return ((match["label"], numbers), bool(_NAMED.search(match["value"]))) if is_whole else None
+    numbers = _all_blocks(match["value"].rstrip(". "))
+    return ((match["label"], numbers), bool(_NAMED.search(match["value"]))) if numbers else None
+
+
+def _all_blocks(value: str) -> list[int] | None:
+    """The blocks that a text names, where every number of it is one or says how many."""
+    numbers = list(line_numbers(value))
+    digits = {int(n) for n in re.findall(r"(?<![x×\d])\d{1,3}(?!\s?[x×\d])", value)}
+    return numbers if numbers and digits <= {*numbers} else None
 
 
 def _rising(run: list[tuple[int, int, _Part, bool]]) -> list[Found]:

@@ -5,27 +5,28 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from phyblock.parsing.speech import PLACES
+from phyblock.parsing.speech import PLACES, words
+from phyblock.parsing.text_forms import number_of_word
 
 __all__ = ["lowest_first", "tier_of"]
 
 _TIERS = (
-    "ground base bottom lowest lower foundation unten boden fundament bas base abajo inferior 底",
-    "middle mid mitte milieu medio 中",
+    "ground base bottom lowest lower foundation unten untere unterste boden fundament bas abajo"
+    " inferior inferiore 底",
+    "middle mid mitte mittlere milieu medio 中",
     "upper",
-    "top topmost highest oben haut arriba superior 顶 頂",
+    "top topmost highest oben obere oberste haut arriba superior superiore 顶 頂",
     "roof dach toit",
 )
 _RANKS = {word: rank for rank, words in enumerate(_TIERS) for word in words.split()}
 _TOPS = ((1, len(_TIERS) - 2), (1, len(_TIERS) - 1))
 _WORD = re.compile(r"[^\W\d_]+")
 _PART = r"(?:layers?|levels?|rows?|tiers?|stor(?:e?y|ies)|floors?)"
-_NUMBER = re.compile(
-    rf"(?:\b(?:{_PART}|ebene|schicht|couche|niveau|capa|nivel|l)|层"
+_NUMBER = words(
+    rf"(?:\b(?:{_PART}|ebene|schicht|couche|niveau|capa|nivel|strato|livello|camada|слой|l)|层"
     rf"|層)\s{{0,2}}#?(?P<after>\d{{1,2}})\b"
-    r"|第?(?P<cjk>\d{1,2})[层層]|^\W*(?P<alone>\d{1,2})\W*\Z"
-    rf"|\b(?P<ordinal>first|second|third|fourth|fifth|sixth)\s{_PART}\b",
-    re.IGNORECASE,
+    r"|第?(?P<cjk>\d{1,2}|[一二三四五六七八九])[层層段층]|^\W*(?P<alone>\d{1,2})\W*\Z"
+    rf"|\b(?P<ordinal>first|second|third|fourth|fifth|sixth)\s{_PART}\b"
 )
 
 
@@ -39,7 +40,7 @@ def tier_of(label: str) -> tuple[int, int] | None:
     if numbered:
         ordinal = (numbered["ordinal"] or "").lower()
         digits = numbered["after"] or numbered["cjk"] or numbered["alone"]
-        return (0, int(digits) if digits else PLACES[ordinal])
+        return (0, (number_of_word(digits) or int(digits)) if digits else PLACES[ordinal])
     ranks = [_RANKS[word] for word in _WORD.findall(label.lower()) if word in _RANKS]
     ranks += [_RANKS[sign] for sign in "底中顶頂" if sign in label]
     return (1, ranks[0]) if ranks else None
@@ -60,7 +61,7 @@ def lowest_first(labels: Sequence[str]) -> list[int] | None:
         return None
     kinds = {kind for kind, _ in known}
     if len(kinds) > 1:
-        low = known[0] == (1, 0) and {kind for kind, _ in known[1:]} == {0}
-        rising = [rank for _, rank in known[1:]]
-        return list(range(len(known))) if low and rising == sorted(rising) else None
+        counted_parts = known[known[0] == (1, 0) : len(known) - (known[-1] in _TOPS)]
+        is_rising = {kind for kind, _ in counted_parts} == {0} and counted == sorted(counted)
+        return list(range(len(known))) if is_rising else None
     return sorted(range(len(known)), key=lambda i: known[i])

@@ -6,7 +6,7 @@ from phyblock.words import PlanParser
 
 __all__ = ["POSE_READER_VERSION", "READER_VERSION", "reader_version"]
 
-READER_VERSION = 5
+READER_VERSION = 6
 """Of the readers of plans, answers and moves, and of the JSON forms in which they are asked for; it
 goes up when any reply can be read otherwise, or is asked for in another form.
 """

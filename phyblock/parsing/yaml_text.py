@@ -44,7 +44,8 @@ def _json_of(text: str) -> str:
         if plain.strip() and plain.strip() not in ("---", "..."):
             lines.append((len(plain) - len(plain.lstrip()), plain.strip()))
     value, rest = _value(lines, 0) if lines else (None, [])
-    is_whole = isinstance(value, (dict, list)) and value and not rest
+    is_text = isinstance(value, list) and all(isinstance(item, str) for item in value)
+    is_whole = isinstance(value, (dict, list)) and value and not rest and not is_text
     return f"\n{json.dumps(value, ensure_ascii=False)}\n" if is_whole else ""
 
 

@@ -159,7 +159,7 @@ TURNED_DOWN = [
     "Option A is wrong.", "It is not option A.", "Option A shows a cube, which does not match.",
     "A: incorrect. The block is round.", "A. No, that is a cube.", "A is wrong", "C is incorrect.",
     "Let me look closely. Option A shows a cube, which", "First (A): its top is round and,",
-    "C isn't it", "B) not round", "B cannot be it", "Answer: B? No, C.", "Answer: A) cube and B) arch",
+    "C isn't it", "B) not round", "B cannot be it", "Answer: A) cube and B) arch",
 ]  # fmt: skip
 NEARLY_OPTIONS = [
     (LENGTHS, "Answer: 7.5 cm", None), (LENGTHS, "12.5 cm", None), (LENGTHS, "Answer: 10 mm", None),

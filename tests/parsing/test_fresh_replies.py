@@ -10,7 +10,7 @@ from tests.parsing.fresh_replies import KINDS, fresh_replies
 
 PLANS = st.lists(st.integers(1, 16), min_size=3, max_size=12)
 BLOCKS = st.integers(1, 16)
-ROUNDS = range(1, 15)
+ROUNDS = range(1, 17)
 MOST_HARD = 0.12
 """The part of the replies that hold an answer of which a reader may admit that it fails."""
 
@@ -96,8 +96,32 @@ def test_layers_are_built_from_the_ground_however_they_stand(
     layers: list[list[int]], is_down: bool
 ) -> None:
     lines = [f"Layer {i}: {', '.join(map(str, blocks))}" for i, blocks in enumerate(layers, 1)]
-    text = "\n".join(lines[::-1] if is_down else lines)
-    assert reading(text) == [block for blocks in layers for block in blocks]
+    headed = [
+        "\n".join([f"**Layer {i}**", *(f"- Block {block}, lying" for block in blocks)]) + "\n"
+        for i, blocks in enumerate(layers, 1)
+    ]
+    for parts in (lines, headed):
+        text = "\n".join(parts[::-1] if is_down else parts)
+        assert reading(text) == [block for blocks in layers for block in blocks]
+    assert reading("Candidates:\n" + "\n".join(headed)) is None
+
+
+@settings(deadline=None, max_examples=40)
+@given(plans=st.lists(PLANS, min_size=2, max_size=2, unique_by=tuple), n=st.integers(1, 2))
+def test_of_two_plans_that_is_read_which_a_sentence_chooses(plans: list[list[int]], n: int) -> None:
+    lines = [f"Plan {i}: {', '.join(map(str, plan))}" for i, plan in enumerate(plans, 1)]
+    place = ("first", "second")[n - 1]
+    chooses = {
+        f"I take plan {n}.": plans[n - 1],
+        f"Plan {3 - n} is not stable, so plan {n}.": plans[n - 1],
+        f"The {place} one fits the picture better.": plans[n - 1],
+        f"I would take plan {n} if the block in the middle were a cube.": None,
+        f"I cannot recommend plan {n}.": None,
+        f"The {place} holds if the block is a cube; I cannot decide.": None,
+    }
+    for heading in ("", "Two plans come into question:\n\n"):
+        for said, meant in chooses.items():
+            assert reading(heading + "\n".join(lines) + f"\n\n{said}") == meant, said
 
 
 @settings(deadline=None, max_examples=40)
