@@ -15,9 +15,10 @@ _CHAIN = words(
     r"|index|#)){0,2}[\s#]{0,3}\d{1,6}){0,63})[\s)\]}>.]{0,4}\Z"
 )
 _REMARKS = words(
-    r"(?<=\d)[号號番]|\b(?:zuerst|first|d'abord|primero)\b|\s{0,3}\((?![^()\n]{0,40}\b(?:twice"
-    r"|thrice|times|two|three|zwei\w*|drei\w*|mal|fois|veces)\b)[^()\d\n]{0,80}\)|\s(?:→|->|=>"
-    r"|\u2014|\u2013)\s[^\d\n]{1,200}\Z|(?:(?<=[→>] \d)|(?<=[→>] \d\d))\.\s[^\d\n]{1,120}\Z"
+    r"(?<=\d)[号號番]|,? in (?:this|that) order\b|\b(?:zuerst|first|d'abord|primero)\b"
+    r"|\s{0,3}\((?![^()\n]{0,40}\b(?:twice|thrice|times|two|three|zwei\w*|drei\w*|mal|fois"
+    r"|veces)\b)[^()\d\n]{0,80}\)|\s(?:→|->|=>|\u2014|\u2013)\s[^\d\n]{1,200}\Z|(?:(?<=[→>] \d)"
+    r"|(?<=[→>] \d\d))\.\s[^\d\n]{1,120}\Z"
 )
 """What a list says of its blocks, or behind its end, without a number."""
 _NUMBER = re.compile(r"\d{1,6}")

@@ -57,7 +57,7 @@ NAMES_FIRST = words(
 )
 LABELED = words(
     r"\s{0,20}[-#>]{0,4}\s{0,3}(?:\d{1,2}[.)]\s)?(?P<label>[^:=：\[\n]{1,80}?)\s{0,3}(?:[:=：]"
-    r"|(?<=[^\W\d]\s)(?:→|->)(?=\s)|\b(?:(?:is|are|ist|lautet|est|es)(?:\s(?:therefore|thus|hence"
+    r"|(?<=[^\W\d]\s)(?:→|->)(?=\s)|\b(?:(?:is|are|ist|lautet|est|es|è|é)(?:\s(?:therefore|thus|hence"
     r"|also|daher|donc))?|would be|(?<=\bit)['\u2019]s|(?:(?<=order )|(?<=sequence )|(?<=plan )"
     r"|(?<=\bit ))(?:is\s(?:now|then)|(?:should|must|has to) be))\b:?|是|为"
     r"|は)\s{0,3}(?P<value>[\s(\[{<#]{0,4}(?:(?:first|zuerst|erst|d'abord|primero)\s)?(?:(?:blocks?"

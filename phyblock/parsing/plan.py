@@ -18,6 +18,7 @@ from typing import Literal, get_args
 from phyblock.domain import Plan
 from phyblock.parsing.alike_lines import as_steps, as_unknown_steps
 from phyblock.parsing.answer_form import FormProblem
+from phyblock.parsing.answer_patterns import DANGLES
 from phyblock.parsing.edits import edited
 from phyblock.parsing.legend import with_numbers
 from phyblock.parsing.listing import Listing
@@ -136,7 +137,8 @@ def _choose(answer: str) -> _Read:
         )
     if REFUSAL.search(answer) and (best == LAST or _is_declined(named)):
         return "refusal"
-    if best == LAST and OFFER.search(answer):
+    is_begun = named[-1].form == "layers" and DANGLES.search(answer.rstrip())
+    if best == LAST and (is_begun or OFFER.search(answer)):
         return "no_plan"
     plans = plans_of(named, ranks, best, found)
     plans[-1].below = below
@@ -189,9 +191,8 @@ def _is_declined(named: list[Listing]) -> bool:
 
 def _is_reversed(plan: PlanLists, form: str) -> bool:
     """Whether the reply says that its list is to be built from its end."""
-    said = [plan.title, *plan.lists[-1].above[-3:], plan.lists[-1].label, *plan.below[:4]]
+    titles = [plan.title, *plan.lists[-1].above[-3:], plan.lists[-1].label]
+    said = [*titles, *plan.below[:4]]
     if any(BACKWARD.search(line) and not NOT_REVERSED.search(line) for line in said):
         return True
-    return form in ("labeled", "chain", "marked") and bool(
-        DOWNWARD.search(" ".join(said[:-4] or said))
-    )
+    return form in ("labeled", "chain", "marked") and bool(DOWNWARD.search(" ".join(titles)))

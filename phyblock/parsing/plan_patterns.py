@@ -34,7 +34,7 @@ __all__ = [
 PLAN_WORD = words(
     r"order|sequence|plan\b|assembl|build|\bsteps?\b|instruction|answer|solution|\bmoves?\b"
     r"|placement|construct|result|final list|reihenfolge|anleitung|antwort|schritt|aufbau|ordre"
-    r"|étapes|réponse|orden|pasos|respuesta|secuencia|ordine|bottom[- ](?:to|up)"
+    r"|étapes|réponse|orden|pasos|respuesta|secuencia|ordine|ordem|bottom[- ](?:to|up|first)"
     r"|from the (?:bottom|ground)|von unten|从下到上|порядок|план|ответ|顺序|步骤|答案|计划|方案"
     r"|顺|序列|手順|順序|순서"
 )
@@ -127,7 +127,8 @@ NOT_REVERSED = words(
 )
 DOWNWARD = words(
     r"top[- ](?:to|down)[- ]?(?:bottom)?\b|\b(?:from|at) the top\W*\Z|von oben nach unten|从上到下"
-    r"|de haut en bas|de arriba (?:a|hacia) abajo"
+    r"|de haut en bas|de arriba (?:a|hacia) abajo|\b(?:from (?:the )?(?:top|roof|tip)|vom dach)"
+    r"(?: \w+){0,4}? (?:to|zum) (?:the )?(?:very )?(?:base|bottom|ground|floor|boden)\b"
 )
 LABEL_CHARS = 20
 BLOCK_WORD = words("block|index|indices")

@@ -35,7 +35,9 @@ _NAMED = words(
 _IS_PLAN = words(r"\b(?:option|plan|order|sequence|attempt|version|answer|steps?)\b")
 """A label of a whole plan, not of a part of it."""
 _LINE_CHARS = 240
-_HEAD = re.compile(r"[#+\-\u2022 ]{0,8}[^\d\n:.,;]{0,24}\d{0,2}[^\d\n:.,;]{0,24}:?")
+_HEAD = re.compile(
+    r"(?=[^\n]*[^\W\d])[#+\-\u2022 ]{0,8}[^\d\n:.,;]{0,24}\d{0,2}[^\d\n:.,;]{0,24}:?"
+)
 """A heading of a layer, whose blocks stand below it as items."""
 _STAR = re.compile(r"\A\s{0,40}\*(?=\s)")
 _Part = tuple[str, list[int]]
@@ -55,9 +57,9 @@ def find_tier_lists(text: str) -> list[Found]:
         bare = plain_line(line).strip()
         item = _item(line) if headed else None
         if item is not None:
-            start, _, (label, numbers), is_sure = headed[-1]
-            sure = is_sure or bool(_NAMED.search(bare))
-            headed[-1] = (start, at + len(line), (label, [*numbers, *item]), sure)
+            start, _, part, is_sure = headed[-1]
+            part[1].extend(item)
+            headed[-1] = (start, at + len(line), part, is_sure or bool(_NAMED.search(bare)))
         elif _HEAD.fullmatch(bare) and tier_of(bare):
             headed.append((at, at + len(line), (bare, []), False))
         elif bare or not line:

@@ -62,6 +62,9 @@ PLANS: list[tuple[str, list[int] | None]] = [
     ("Obere Schicht:\n- Baustein 9\n\nUntere Schicht:\n- Baustein 3\n- Baustein 5", [3, 5, 9]),
     ("Layer 1:\n- 2 cubes\n- 1 arch\n\nLayer 2:\n- 1 roof", None),
     ("Layer 1:\n- 2\n- 3\n\nLayer 2:\n- 1", None),
+    ("Layer 1:\n- Block 3\n\nLayer 2:\n- Block 9\n\nNow I look for the roof. It is", None),
+    ("Vom Dach bis zum Boden: 14, 9, 3, 3", [3, 3, 9, 14]),
+    ("From the top: 14, 9, 3, 3. So build 3, 3, 9, 14.", [3, 3, 9, 14]),
     ("Blocks I see:\n- block 4: red\n- block 2: blue", None),
     ("order:\n- block: 4\n- block: 2", [4, 2]),
 ]  # fmt: skip
