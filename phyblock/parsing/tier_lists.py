@@ -57,9 +57,9 @@ def find_tier_lists(text: str) -> list[Found]:
         bare = plain_line(line).strip()
         item = _item(line) if headed else None
         if item is not None:
-            start, _, part, is_sure = headed[-1]
-            part[1].extend(item)
-            headed[-1] = (start, at + len(line), part, is_sure or bool(_NAMED.search(bare)))
+            start, _, layer, is_sure = headed[-1]
+            layer[1].extend(item)
+            headed[-1] = (start, at + len(line), layer, is_sure or bool(_NAMED.search(bare)))
         elif _HEAD.fullmatch(bare) and tier_of(bare):
             headed.append((at, at + len(line), (bare, []), False))
         elif bare or not line:
