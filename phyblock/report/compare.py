@@ -190,11 +190,15 @@ def compare(
 
 
 def _asked(runs: Sequence[Run], track: str) -> Iterator[str]:
-    """What is unusual about how each run asked, where there is anything."""
+    """What is unusual about how each run asked and read, where there is anything."""
     for run in runs:
         words = (*kind_of(track).report().showing(run), *varied_words(run))
         if words:
             yield f"Run {run.path.name}: {', '.join(words)}."
+    readers = {run.path.name: run.manifest.versions.get("readers", "1") for run in runs}
+    if len(set(readers.values())) > 1:
+        names = ", ".join(f"{name} by readers {version}" for name, version in readers.items())
+        yield f"Replies were read: {names}; phyblock score reads a run with those of this version."
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.errors import DataError, Problem, SpecError, StoreError
-from phyblock.parsing import reader_version
+from phyblock.parsing import READER_VERSION, reader_version
 from phyblock.records import MANIFEST, Manifest, Record, read_manifest
 from phyblock.run.data import asked_about, recorded_dataset
 from phyblock.run.folder import check_place, run_folder
@@ -60,12 +60,22 @@ def rescore(
         run_folder(folder).check([f"{name}/"])
     _check_target(target, identity)
     dataset = recorded_dataset(folder, manifest, suite.levels, data)
+    stayed: list[str] = []
     names = [name for name in suite.tracks if kind_of(name).rescored or counts_samples(name)]
     if is_read_otherwise(manifest):
-        names += _read_anew(folder, manifest, suite, names, dataset, tell)
-    scored = _scored(folder, manifest, suite, names, dataset, tell)
-    told = {"identity": identity, "suite": suite.model_dump(mode="json"), "floors": scored.floors}
+        names += _read_anew(folder, manifest, suite, names, dataset, stayed.append)
+    scored = _scored(folder, manifest, suite, names, dataset, stayed.append)
+    # As long as some stay as earlier readers read them, the folder is not one of this version's.
+    readers = {} if stayed else {"readers": str(READER_VERSION)}
+    told = {
+        "identity": identity,
+        "suite": suite.model_dump(mode="json"),
+        "floors": scored.floors,
+        "versions": {**manifest.versions, **readers},
+    }
     write_run(target, manifest.model_copy(update=told), scored.records)
+    for text in stayed:
+        tell(text)
     return target
 
 

@@ -10,7 +10,10 @@ from collections.abc import Callable
 import pytest
 
 from phyblock.parsing import READER_VERSION
+from phyblock.records import read_manifest
+from phyblock.report.compare import compare_runs
 from phyblock.run.rescore import rescore
+from phyblock.tables.load import load_run
 from tests.vqa_set import write_questions
 from tests.workspace import Raw, Workspace
 
@@ -65,6 +68,7 @@ def test_answers_are_read_again_and_episodes_that_would_go_otherwise_stay(
     answers = {line["sample"]: line for line in today if line["track"] == "vqa"}
     assert {line["outcome"] for line in answers.values()} == {"ok"}
     assert again == stored | answers
+    assert read_manifest(workspace.root / "again").versions["readers"] == "1"
     (kept,) = told
     assert kept.startswith("Step planning: 1 episode of the run would go otherwise")
 
@@ -76,3 +80,20 @@ def test_answers_stay_as_they_were_read_where_the_questions_are_gone(
     assert earlier() == workspace.records()
     assert told[0].startswith("VQA: replies stay as they were read: ")
     assert "holds no questions" in told[0]
+
+
+def test_what_is_read_again_as_a_whole_is_of_this_version_and_a_comparison_names_both(
+    workspace: Workspace, told: list[str]
+) -> None:
+    workspace.write_suite(models=["oracle"])
+    assert workspace.run("--no-report").code == 0
+    manifest = workspace.out / "run.yaml"
+    manifest.write_text(
+        manifest.read_text().replace(f"readers: '{READER_VERSION}'", "readers: '1'")
+    )
+    again = rescore(workspace.out, None, None, workspace.root / "again", tell=told.append)
+    assert not told
+    assert read_manifest(again).versions["readers"] == str(READER_VERSION)
+    said = compare_runs(load_run(workspace.out), load_run(again)).how
+    assert f"out by readers 1, again by readers {READER_VERSION}; phyblock score reads" in said
+    assert "readers" not in compare_runs(load_run(again), load_run(again)).how
