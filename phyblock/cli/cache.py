@@ -1,4 +1,4 @@
-"""`phyblock cache`: what paid replies and learned plans are kept, and clearing them."""
+"""`phyblock cache`: which paid replies and files of floors are kept, and clearing them."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def _clear_learned() -> None:
 
 
 def _learned() -> dict[Path, int]:
-    """The files of learned plans and their sizes [bytes]; others that lie there are not ours."""
+    """Files of floors' plans and values, and sizes [bytes]; others that lie there are not ours."""
     sizes: dict[Path, int] = {}
     with contextlib.suppress(OSError), os.scandir(learned_dir()) as entries:
         for entry in entries:
@@ -85,4 +85,4 @@ def _learned() -> dict[Path, int]:
 
 
 def _sizes_text(sizes: list[int]) -> str:
-    return f"{counted(len(sizes), 'file')} of learned plans, {sum(sizes) / 1e6:,.1f} MB"
+    return f"{counted(len(sizes), 'file')} of floors' plans and values, {sum(sizes) / 1e6:,.1f} MB"

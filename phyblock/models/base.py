@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
+from phyblock.digests import hex_digest
 from phyblock.errors import PhyblockError
 from phyblock.words import Finish, Role
 
@@ -35,7 +35,7 @@ class Image:
     @functools.cached_property
     def sha256(self) -> str:
         """Hex digest of the encoded bytes."""
-        return hashlib.sha256(self.data).hexdigest()
+        return hex_digest(self.data)
 
 
 @dataclass(frozen=True)

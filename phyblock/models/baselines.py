@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
-
 import numpy as np
 
+from phyblock.digests import drawn_bytes
 from phyblock.errors import Problem, SpecError
 from phyblock.models.base import Reply, Request, Usage
 from phyblock.models.config import ModelConfig
@@ -42,7 +41,7 @@ class BaselineModel:
             problem = Problem(f"model {self.name}", "has no rule for this track")
             raise SpecError(problem)
         seed_text = f"{self._id}|{request.seed}|{request.key}"
-        digest = hashlib.sha256(seed_text.encode()).digest()
+        digest = drawn_bytes(seed_text)
         rng = np.random.default_rng(int.from_bytes(digest, "big"))
         text = rule(request.subject, rng)
         return Reply(text, usage=Usage(0, 0), cost_usd=0.0, provider_model=self._id, attempts=0)

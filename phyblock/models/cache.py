@@ -9,7 +9,6 @@ empty, truncated or refused reply, no picture, no key.
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import re
 import sqlite3
@@ -19,6 +18,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
 
+from phyblock.digests import hex_digest
 from phyblock.errors import Problem, StoreError
 from phyblock.models.base import Image, Message, Reply, Request, Usage
 from phyblock.models.config import ModelConfig
@@ -100,7 +100,7 @@ def _key(request: Request, config: ModelConfig, identity: Mapping[str, object]) 
         "prompt_version": request.prompt_version,
     }
     canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return hashlib.sha256(canonical.encode()).hexdigest()
+    return hex_digest(canonical)
 
 
 def _message(message: Message) -> list[object]:

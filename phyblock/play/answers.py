@@ -10,10 +10,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from phyblock.bounded import load_json, read_bytes, read_text
 from phyblock.datasets.raw import parse_json
+from phyblock.digests import hex_digest
 from phyblock.errors import DataError, Problem, said
 from phyblock.models import HaltedError, Request
 from phyblock.play.page import default_consent
-from phyblock.play.person import Given, Person, digest_of, picking_of
+from phyblock.play.person import Given, Person, picking_of
 from phyblock.records.decode import problem_of
 from phyblock.records.line import Amount
 from phyblock.run.plan import RunPlan
@@ -65,7 +66,7 @@ def default_text(path: Path) -> str:
     except (OSError, ValueError):
         return texts[0]
     agreed = found.get("consent") if isinstance(found, dict) else None
-    return next((text for text in texts if digest_of(text) == agreed), texts[0])
+    return next((text for text in texts if hex_digest(text) == agreed), texts[0])
 
 
 def read_answers(path: Path, plan: RunPlan, person: Person) -> dict[int, Given]:

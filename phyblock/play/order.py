@@ -9,10 +9,10 @@ twice as many.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from typing import TypeVar
 
+from phyblock.digests import drawn_bytes
 from phyblock.tracks import Item
 
 __all__ = ["arranged", "row_of_name", "williams_row", "williams_rows"]
@@ -36,7 +36,7 @@ def williams_row(n: int, row: int) -> tuple[int, ...]:
 
 def row_of_name(name: str) -> int:
     """A row for a person of whom only the name is known: by chance, the same every time."""
-    return int.from_bytes(hashlib.sha256(f"row|{name}".encode()).digest()[:6], "big")
+    return int.from_bytes(drawn_bytes("row", name)[:6], "big")
 
 
 def arranged(items: Sequence[_ItemT], row: int) -> tuple[_ItemT, ...]:
@@ -45,7 +45,7 @@ def arranged(items: Sequence[_ItemT], row: int) -> tuple[_ItemT, ...]:
     """
 
     def drawn(item: _ItemT) -> bytes:
-        return hashlib.sha256(f"place|{item.key}".encode()).digest()
+        return drawn_bytes("place", item.key)
 
     mixed = sorted(items, key=drawn)
     return tuple(mixed[place] for place in williams_row(len(mixed), row))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
+from phyblock.digests import hex_digest
 from phyblock.errors import Problem, SpecError
 from phyblock.models import ModelConfig, Reply, Request, Usage
 from phyblock.play.order import arranged, row_of_name
@@ -17,7 +17,7 @@ from phyblock.specs import HUMAN, LoadedSuite, SuiteSpec
 from phyblock.tracks.by_hand import Pick, Picking
 from phyblock.tracks.kind import kinds
 
-__all__ = ["Given", "Person", "PersonModel", "digest_of", "picking_of", "plan_sitting"]
+__all__ = ["Given", "Person", "PersonModel", "picking_of", "plan_sitting"]
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")
 
@@ -50,7 +50,7 @@ class Person:
     @property
     def consent_sha256(self) -> str:
         """Digest of the text that is agreed to."""
-        return digest_of(self.consent)
+        return hex_digest(self.consent)
 
     def planned(self) -> PlannedModel:
         """The person in a plan; number and text make runs that are not the same."""
@@ -58,11 +58,6 @@ class Person:
         params = {**number, "consent": self.consent_sha256}
         config = ModelConfig(self.model, "human", self.model, params=params, max_concurrency=1)
         return PlannedModel(self.model, config)
-
-
-def digest_of(consent: str) -> str:
-    """SHA-256 [hex] of a text that is agreed to."""
-    return hashlib.sha256(consent.encode()).hexdigest()
 
 
 def plan_sitting(loaded: LoadedSuite, person: Person, limit: int | None) -> RunPlan:

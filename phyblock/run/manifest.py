@@ -13,6 +13,7 @@ from typing import Any
 
 from phyblock.datasets import Dataset
 from phyblock.datasets.version import UNNUMBERED, read_version
+from phyblock.digests import hex_digest
 from phyblock.parsing import READER_VERSION
 from phyblock.records import FORMAT, Manifest
 from phyblock.records.manifest import ManifestChoice
@@ -106,7 +107,7 @@ def _digest(inputs: Mapping[str, Any]) -> str:
     by_name = sorted(inputs["models"], key=lambda model: str(model["name"]))
     decided = {**inputs, "models": by_name, "readers": READER_VERSION}
     canonical = json.dumps(decided, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(canonical.encode()).hexdigest()
+    return hex_digest(canonical)
 
 
 def _dataset(dataset: Dataset, data_version: int) -> dict[str, object]:

@@ -6,11 +6,11 @@ records.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from phyblock.digests import hex_digest
 from phyblock.models.base import Image, Message
 from phyblock.records import PictureMark, Prompt, PromptLines, PromptMessage
 from phyblock.records.line import encodable
@@ -31,7 +31,7 @@ class PromptFile:
         content = tuple(_content(message) for message in messages)
         fields = [message.fields() for message in content]
         canonical = json.dumps(fields, sort_keys=True, separators=(",", ":"))
-        digest = hashlib.sha256(canonical.encode()).hexdigest()
+        digest = hex_digest(canonical)
         if digest not in self._known:
             self._known.add(digest)
             self._file.append([Prompt(sha256=digest, messages=content).fields()])

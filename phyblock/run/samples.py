@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
 from collections.abc import Awaitable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
+from phyblock.digests import drawn_bytes
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
 from phyblock.models import Halt, Model, ModelConfig, Reply, Request, Usage
 from phyblock.models.stored import reply_of, stored
@@ -56,7 +56,7 @@ class Sample:
         repeat = self.variant.repeat
         if repeat == 1:
             return request
-        digest = hashlib.sha256(f"repeat|{request.seed}|{repeat}".encode()).digest()
+        digest = drawn_bytes("repeat", request.seed, repeat)
         return replace(request, seed=int.from_bytes(digest[:8], "big") % _SEEDS)
 
     def shown(self) -> Sample:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import re
@@ -13,6 +12,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from phyblock.digests import hex_digest
 from phyblock.errors import Problem, SpecError, StoreError
 from phyblock.files import writing
 from phyblock.folders import LIST, OutFolder
@@ -110,4 +110,4 @@ def _build(runs: Sequence[SiteRun], title: str) -> str:
             # Its manifest names this machine's data.
             digests[0] = one.run.manifest.identity
         told.append([*digests, one.is_verified, bool(one.sources.lacking)])
-    return hashlib.sha256(json.dumps(told).encode()).hexdigest()[:12]
+    return hex_digest(json.dumps(told))[:12]

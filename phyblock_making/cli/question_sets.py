@@ -72,7 +72,7 @@ def read_unseen(unseen: str | None, scenes: str, mine: Path) -> list[Question]:
         return []
     other = read_question_set(unseen, scenes)
     if other.root.resolve() == mine.resolve():
-        raise click.BadParameter(f"{unseen} is the set that is audited", param_hint="--unseen")
+        raise click.BadParameter(f"{unseen} is the set itself", param_hint="--unseen")
     return [task.question for task in other.tasks]
 
 

@@ -71,7 +71,8 @@ def command(
     wanted = {subtask: per_subtask or PER_SUBTASK[subtask] for subtask in subtasks}
     read = read_data_set(data)
     other = read_unseen(unseen, unseen_data or data, out)
-    if other and not can_boost():
+    learns = can_boost()
+    if other and not learns:
         message = (
             "learning from the texts of another set needs scikit-learn, which is not installed"
         )
@@ -101,27 +102,17 @@ def command(
     if unseen is not None:
         made_by += f" --unseen {Path(unseen).name}"
     originals = {scene.id: scene for scene in scenes}
-    audits, attacked = _audited(questions, observed, other)
+    audits, attacked = _figures(questions, observed, other, with_texts=learns)
     told = attack_card(attacked, observed)
     write_questions(out, questions, originals, read.name, made_by, audits, told)
     outcome = f"{counted(len(questions), 'question')} in {counted(len(subtasks), 'subtask')}"
     click.echo(f"{outcome}: {shown_path(out)}")
-    if not can_boost():
+    if not learns:
         click.echo(
             "CARD.md leaves out what is learned from texts and boosted probes, which need "
             "scikit-learn: pip install 'phyblock[audit]'",
             err=True,
         )
-
-
-def _audited(
-    questions: Sequence[Question], observed: Sequence[Observed], other: Sequence[Question]
-) -> tuple[list[SubtaskAudit], list[Attacked]]:
-    """Audit and attacks for the data card; without what learns where scikit-learn is not."""
-    try:
-        return _figures(questions, observed, other, with_texts=True)
-    except SpecError:
-        return _figures(questions, observed, other, with_texts=False)
 
 
 def _figures(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from phyblock.datasets.version import VERSION_FILE
+from phyblock.digests import hex_digest
 from phyblock.domain.question import Question
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
@@ -59,7 +59,7 @@ def write_questions(
         QUESTIONS_FILE: lines.encode(),
         VERSION_FILE: f"{SET_VERSION}\n".encode(),
     }
-    sums = "".join(f"{hashlib.sha256(d).hexdigest()}  {name}\n" for name, d in files.items())
+    sums = "".join(f"{hex_digest(d)}  {name}\n" for name, d in files.items())
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for name, data in {**files, _SUMS_FILE: sums.encode()}.items():

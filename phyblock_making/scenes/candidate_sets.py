@@ -7,10 +7,10 @@ needed in the same share of the sets that offer it.
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections import Counter
 
+from phyblock.digests import drawn_bytes
 from phyblock.domain.blocks import KIT_PALETTE, BlockType
 from phyblock.domain.candidates import MAX_CANDIDATES, Candidate, CandidateSet
 from phyblock.domain.scene import Kind, Look, Scene
@@ -108,7 +108,7 @@ def _place(candidate: Candidate, salt: str) -> tuple[int, float]:
 
 def _drawn(candidate: Candidate, salt: str) -> float:
     """A number in (0, 1) by a hash: the same on every platform and Python."""
-    digest = hashlib.sha256(f"{salt}/{candidate}".encode()).digest()
+    digest = drawn_bytes(f"{salt}/{candidate}")
     return (int.from_bytes(digest[:6], "big") + 0.5) / 2**48
 
 

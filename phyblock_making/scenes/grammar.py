@@ -6,12 +6,12 @@ requests of the scenes it is made from. So any process can draw any scene, in an
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
+from phyblock.digests import drawn_bytes
 from phyblock.domain.aov import CycleError
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.scene import Block, Kind, Scene
@@ -66,9 +66,7 @@ class Request:
         """A random source of this request's own."""
         kind = "variation" if self.parents else "base"
         text = f"{self.seed}/{self.palette}/{self.group}/{kind}/{self.number}"
-        return np.random.default_rng(
-            int.from_bytes(hashlib.sha256(text.encode()).digest()[:16], "big")
-        )
+        return np.random.default_rng(int.from_bytes(drawn_bytes(text)[:16], "big"))
 
 
 def draw(request: Request) -> Scene | None:

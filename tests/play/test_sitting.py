@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from phyblock.digests import hex_digest
 from phyblock.errors import DataError
 from phyblock.models import Message, Request
 from phyblock.play.answers import default_text, read_answers
 from phyblock.play.desk import Desk
 from phyblock.play.page import default_consent
-from phyblock.play.person import digest_of
 from phyblock.play.server import Server
 from phyblock.play.shown import Place, shown
 from phyblock.tracks.by_hand import Choice, NumberField, Picking
@@ -524,7 +524,7 @@ def test_the_text_to_agree_to_says_where_answers_are(tmp_path: Path) -> None:
     assert ["in this browser" in text for text in texts] == [True, False]
     file = tmp_path / "answers.json"
     for text in texts:
-        file.write_text(json.dumps({"consent": digest_of(text)}), encoding="utf-8")
+        file.write_text(json.dumps({"consent": hex_digest(text)}), encoding="utf-8")
         assert default_text(file) == text
     file.write_text("[]", encoding="utf-8")
     assert default_text(file) == texts[0]

@@ -91,11 +91,11 @@ def test_what_was_learned_is_told_and_removed_by_the_user(
     mine = folder / "mine.json"
     mine.write_text("{}", encoding="utf-8")
     told = CliRunner().invoke(command, ["stats"])
-    assert "2 files of learned plans" in told.output
+    assert "2 files of floors' plans and values" in told.output
     assert CliRunner().invoke(command, ["clear", "--learned", "--model", "m"]).exit_code == 2
     assert "Deleted 2 files" in CliRunner().invoke(command, ["clear", "--learned"]).output
     assert files(tmp_path) == [mine]
-    assert "learned plans" not in CliRunner().invoke(command, ["stats"]).output
+    assert "floors'" not in CliRunner().invoke(command, ["stats"]).output
     kept_plans(SCENES, SETS, "A")
     assert learned == ["A", "B", "A"]
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from phyblock.digests import hex_digest
 from phyblock.extras import needs
 from phyblock.records import PromptMessage, Record, StoredReply
 from phyblock.records import Score as StoredScore
@@ -60,7 +60,7 @@ def inspect_log(
     track, model = records[0].track, records[0].model
     seeds = run.design.suite.seeds
     name = f"phyblock/{track}"
-    digest = hashlib.sha256(f"{run.manifest.identity} {track} {model}".encode()).hexdigest()[:22]
+    digest = hex_digest(f"{run.manifest.identity} {track} {model}")[:22]
     data = run.manifest.dataset
     samples = [_sample(record, prompts, seeds) for record in records]
     keys = sorted({str(sample.id) for sample in samples})
