@@ -157,7 +157,7 @@ class Manifest(Line):
     """The physics engine that blocks are let go in, with its version; null where nothing of the run
     depends on one, and in runs from before there was a choice (PyBullet)."""
     versions: dict[str, str] = Field(default_factory=dict)
-    """Versions of Python and of libraries."""
+    """Versions of Python, of libraries, and of the readers that read the replies."""
 
     @property
     def scenes_chosen(self) -> frozenset[str] | None:

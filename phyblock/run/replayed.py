@@ -39,7 +39,8 @@ async def counted_again(
         return record
     if changed:
         message = "goes otherwise than it did, in another version"
-        raise StoreError(Problem(where, message, changed[0], record.sample))
+        hint = "the version of phyblock that made the run plays it as it went"
+        raise StoreError(Problem(where, message, changed[0], record.sample, hint=hint))
     return record.model_copy(update={"counts": again.counts})
 
 
@@ -50,7 +51,9 @@ def _turns(episode: Episode, record: Record) -> dict[str, Any]:
 
 
 def _alike(was: object, now: object) -> bool:
-    """Whether two values say the same; what a line of an earlier version lacks says nothing."""
+    """Whether two values say the same; a part that one of them lacks is null, as lines of earlier
+    versions lack what came later.
+    """
     if isinstance(was, Mapping) and isinstance(now, Mapping):
         return all(_alike(was.get(name), now.get(name)) for name in was.keys() | now.keys())
     if isinstance(was, (list, tuple)) and isinstance(now, (list, tuple)):

@@ -67,13 +67,13 @@ def rescore(
     scored = _scored(folder, manifest, suite, names, dataset, stayed.append)
     # As long as some stay as earlier readers read them, the folder is not one of this version's.
     readers = {} if stayed else {"readers": str(READER_VERSION)}
-    told = {
+    changes = {
         "identity": identity,
         "suite": suite.model_dump(mode="json"),
         "floors": scored.floors,
         "versions": {**manifest.versions, **readers},
     }
-    write_run(target, manifest.model_copy(update=told), scored.records)
+    write_run(target, manifest.model_copy(update=changes), scored.records)
     for text in stayed:
         tell(text)
     return target
@@ -92,7 +92,7 @@ def judged_anew(folder: Path) -> tuple[Manifest, list[Record]]:
     dataset = recorded_dataset(folder, manifest, suite.levels, None)
     scored = _scored(folder, manifest, suite, suite.tracks, dataset, untold, anew=True)
     scenes = [task.scene for task in scored.asked]
-    told = {
+    changes = {
         "floors": scored.floors,
         "items": scored.items,
         "scenes": len(scenes),
@@ -100,7 +100,7 @@ def judged_anew(folder: Path) -> tuple[Manifest, list[Record]]:
             level: sum(level in scene.levels for scene in scenes) for level in suite.levels
         },
     }
-    return manifest.model_copy(update=told), scored.records
+    return manifest.model_copy(update=changes), scored.records
 
 
 @dataclass(frozen=True)
@@ -135,8 +135,8 @@ def _scored(
         for variant in dict.fromkeys(variant.shown for variant in suite.vary.variants)
     }
     records = asyncio.run(judged_again(folder, manifest, tracks, tell, anew=anew))
-    told = {"suite": suite.model_dump(mode="json")}
-    floors = kept_floors(manifest.model_copy(update=told), suite, reopened, dataset)
+    changes = {"suite": suite.model_dump(mode="json")}
+    floors = kept_floors(manifest.model_copy(update=changes), suite, reopened, dataset)
     asked = asked_about(manifest, suite.levels, dataset).tasks
     items = {name: len(track.items) for name, track in tracks[""].items()}
     return _Scored(records, floors, asked, items)
