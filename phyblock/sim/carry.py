@@ -13,7 +13,7 @@ an engine goes through contacts, and with it whether a block that lies on a narr
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,7 +36,17 @@ from phyblock.sim.support import (
 from phyblock.sim.world import World
 from phyblock.words import StepEnd
 
-__all__ = ["LONGEST_S", "Carried", "CarriedStep", "CarryLimits", "Carrying", "carry_out"]
+__all__ = [
+    "LONGEST_S",
+    "Carried",
+    "CarriedStep",
+    "CarryLimits",
+    "Carrying",
+    "carry_out",
+    "depth_cm",
+    "end_of",
+    "moved_between",
+]
 
 _COLLAPSE_S = 3.0
 LONGEST_S = 600.0
@@ -151,9 +161,9 @@ class Carrying:
         return self._put(replace(block, order=self._steps))
 
     def _put(self, block: Block) -> CarriedStep:
-        depth_cm = -float(bounds_m(block)[0, 2]) * _CM
-        if depth_cm > self._limits.overlap_cm:
-            return CarriedStep("under_floor", overlap_cm=round(depth_cm, _DIGITS))
+        below_cm = depth_cm(block)
+        if below_cm > self._limits.overlap_cm:
+            return CarriedStep("under_floor", overlap_cm=round(below_cm, _DIGITS))
         others = self.blocks
         most_m = self._limits.overlap_cm / _CM
         free, given_m = _out_of_others(block, others, most_m)
@@ -164,15 +174,15 @@ class Carrying:
             x, y, z = free.position_m
             free = replace(free, position_m=(x, y, z - gap_m))
         after = self._let_go(free)
-        moved_cm, turned_deg = _moved(Pose.goal(block), after[block.order])
+        moved_cm, turned_deg = moved_between(Pose.goal(block), after[block.order])
         knocked = tuple(
             other.order
             for other in others
             if other.order in after
-            and not self._is_still(*_moved(Pose.goal(other), after[other.order]))
+            and not self._is_still(*moved_between(Pose.goal(other), after[other.order]))
         )
         is_still = self._is_still(moved_cm, turned_deg)
-        end: StepEnd = "knocks_over" if knocked else "stands" if is_still else "falls"
+        end = end_of(knocked, is_still)
         numbers = (moved_cm, turned_deg, gap_m * _CM, given_m * _CM)
         moved, turned, gap, given = (round(number, _DIGITS) + 0.0 for number in numbers)
         return CarriedStep(end, moved, turned, gap, given, knocked)
@@ -245,8 +255,19 @@ def _reached(
     return found
 
 
-def _moved(start: Pose, end: Pose) -> tuple[float, float]:
+def depth_cm(block: Block) -> float:
+    """How far a block reaches below the floor [cm]; negative above it."""
+    return -float(bounds_m(block)[0, 2]) * _CM
+
+
+def moved_between(start: Pose, end: Pose) -> tuple[float, float]:
+    """How far a block moved [cm] and turned [degrees]."""
     return start.distance_m(end) * _CM, start.angle_deg(end)
+
+
+def end_of(knocked: Collection[int], is_still: bool) -> StepEnd:
+    """How a step ended whose block was let go."""
+    return "knocks_over" if knocked else "stands" if is_still else "falls"
 
 
 def _out_of_others(

@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 
 from phyblock.domain import Block
 from phyblock.scoring import blocks_reached
-from phyblock.sim.carry import CarriedStep, CarryLimits
+from phyblock.sim.carry import CarriedStep, CarryLimits, depth_cm, end_of, moved_between
 from phyblock.sim.pose import Pose
 from phyblock.sim.stability import DEFAULT_TRIAL
-from phyblock.sim.support import bounds_m
 from phyblock.sim.voxels import voxel_iou
 from phyblock.tracks.pose_planning.resting import Rest, worlds_of
 from phyblock.words import REFUSED_ENDS, StepEnd
@@ -97,7 +96,7 @@ def _refused(block: Block | None, step: CarriedStep, limits: CarryLimits) -> Car
     end: StepEnd = "overlaps" if step.end == "overlaps" else "stands"
     if block is None:
         end = "no_block"
-    elif -float(bounds_m(block)[0, 2]) * _CM > limits.overlap_cm:
+    elif depth_cm(block) > limits.overlap_cm:
         end = "under_floor"
     is_alike = end == step.end or (end == "stands" and step.end not in REFUSED_ENDS)
     return step if is_alike else replace(step, end=end)
@@ -115,13 +114,13 @@ def _step(
         return step
     before = _poses(worlds[0]) if len(worlds) > 1 else {}
     after = _poses(worlds[-1])
-    way = _way(Pose.goal(block), after[number])
-    ways = {order: _way(pose, after[order]) for order, pose in before.items()}
+    way = moved_between(Pose.goal(block), after[number])
+    ways = {order: moved_between(pose, after[order]) for order, pose in before.items()}
     knocked = tuple(
         order for order, far in ways.items() if _is_past(far, order in step.knocked, limits)
     )
     is_past = _is_past(way, step.end != "stands", limits)
-    end: StepEnd = "knocks_over" if knocked else "falls" if is_past else "stands"
+    end = end_of(knocked, not is_past)
     told = {}
     if abs(step.moved_cm - way[0]) > _SET_BACK_CM:
         told["moved_cm"] = round(way[0], _DIGITS)
@@ -132,10 +131,6 @@ def _step(
 
 def _poses(world: Sequence[Block]) -> Mapping[int, Pose]:
     return {block.order: Pose.goal(block) for block in world}
-
-
-def _way(start: Pose, end: Pose) -> tuple[float, float]:
-    return start.distance_m(end) * _CM, start.angle_deg(end)
 
 
 def _is_past(way: tuple[float, float], said: bool, limits: CarryLimits) -> bool:
