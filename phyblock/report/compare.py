@@ -178,7 +178,9 @@ def compare(
                 _flipped(*pair, one, what, part) for pair, one in zip(labels, counted, strict=True)
             ]
     table = with_verdicts(pd.concat(tables, ignore_index=True), what.measure)
-    flipped = pd.concat([pd.DataFrame(columns=_FLIPPED), *(f for f in flips if len(f))])
+    # Some versions of pandas warn of an empty frame among others.
+    flips = [flip for flip in flips if len(flip)] or [pd.DataFrame(columns=_FLIPPED)]
+    flipped = pd.concat(flips)[_FLIPPED]
     return Comparison(
         table,
         flipped.reset_index(drop=True),
