@@ -16,7 +16,7 @@ import pandas as pd
 from phyblock.report.measure_table import main_heading
 from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
-from phyblock.tables.measures import CELL, SCORED_BY, Measure, value_key
+from phyblock.tables.measures import CELL, SCORED_BY, Better, Measure, value_key
 from phyblock.tables.text_table import (
     NO_VALUE,
     Column,
@@ -55,7 +55,7 @@ class Floor:
     name: str
     value: float
 
-    def is_below(self, lo: float, hi: float, better: str = "higher") -> bool | None:
+    def is_below(self, lo: float, hi: float, better: Better) -> bool | None:
         """Whether an interval lies wholly on the better side; None where there is none."""
         if math.isnan(lo) or math.isnan(hi):
             return None
@@ -111,7 +111,7 @@ def floors_run(run: Run, track: str) -> set[str]:
 def headline_floors(run: Run, track: str) -> dict[str, Floor]:
     """The strongest floor of the columns of a track's headline that have one, by heading.
 
-    Values are as shown, in percent.
+    Values are as tables show them, in the unit of the measure.
     """
     rows = headline_rows(track_estimates(run, track), run.design)
     found: dict[str, Floor] = {}

@@ -13,7 +13,16 @@ if TYPE_CHECKING:
     from phyblock.scoring.ratios import Metric
     from phyblock.tables.load import Run
 
-__all__ = ["CELL", "SCORED_BY", "VALUE_KEY", "Cell", "Measure", "SampleCounts", "value_key"]
+__all__ = [
+    "CELL",
+    "SCORED_BY",
+    "VALUE_KEY",
+    "Better",
+    "Cell",
+    "Measure",
+    "SampleCounts",
+    "value_key",
+]
 
 SCORED_BY = ("setting", "matcher", "criterion")
 """Columns that say how a sample was scored; "" where its track knows no such choice."""
@@ -23,6 +32,7 @@ CELL = "cell"
 VALUE_KEY = ("measure", CELL, *SCORED_BY)
 """What tells the values of one model apart."""
 
+Better = Literal["higher", "lower"]
 Unit = Literal["%", "cm", "degrees", "steps", "blocks", ""]
 
 
@@ -77,7 +87,7 @@ class Measure:
     value: Metric
     meaning: str = ""
     unit: Unit = "%"
-    better: Literal["higher", "lower"] = "higher"
+    better: Better = "higher"
     over: str = "samples"
     chance: Callable[[Run, str], float] | None = None
     floors: tuple[str, ...] = ()

@@ -68,6 +68,19 @@ def test_the_leading_measure_leads_everywhere(run: Run) -> None:
         assert set(worth) == {leading.best}
 
 
+@pytest.mark.parametrize("measure", [ERROR, EXACT], ids=["lower", "higher"])
+def test_what_is_not_better_than_the_floor_is_marked(run: Run, measure: Measure) -> None:
+    """Whichever way is better: the oracle is right everywhere, guesses are off."""
+    floor = 0.3
+    show(led_by(floored := replace(measure, chance=lambda *_: floor), floored))
+    (table,) = headlines(run)
+    rows = {row.name: row.cells[table.main] for row in table.rows}
+    assert rows["Floor: chance"].value == floor * measure.scale
+    assert "†" not in rows["oracle"].below[0]
+    assert rows["random"].below[0].endswith(" †")
+    assert "best that is reached" in table.notes[0]
+
+
 @pytest.mark.parametrize("factor", [0, -1], ids=["nothing", "below zero"])
 def test_values_that_are_all_zero_or_below_are_drawn(run: Run, factor: int) -> None:
     """In a unit of its own; matplotlib warns of an axis without length, which is an error here."""

@@ -16,10 +16,12 @@ from phyblock.report.html.standing import shortfalls
 from phyblock.report.measure_table import headline_of, main_heading
 from phyblock.tables.headline import Value
 from phyblock.tables.load import Run
+from phyblock.tables.measures import Better
 from phyblock.tables.showing import captioned, varied_words
 from phyblock.tables.text_table import NO_VALUE, number, spread
 from phyblock.tables.track_report import HeadlineColumn
-from phyblock.tracks.headline import headline_columns, main_measure
+from phyblock.tracks.estimates import track_measures
+from phyblock.tracks.headline import headline_columns
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["Cell", "Headline", "Row", "headlines"]
@@ -87,10 +89,10 @@ _SEEDS = (
 _RANKS = (
     "Rank: the places that a model may have, by paired tests of all models with Holm's correction."
 )
-_NOT_ABOVE = "†"
+_NOT_BETTER = "†"
 _FLOOR = (
-    "The floor is the most that is reached without seeing the goal; "
-    f"{_NOT_ABOVE} marks intervals that are not above it."
+    "The floor is the best that is reached without seeing the goal; "
+    f"{_NOT_BETTER} marks intervals that are not wholly better than it."
 )
 
 
@@ -135,6 +137,8 @@ def _model_rows(
     values, published = headline_of(run, track), kind_of(track).report().published(run)
     headings = [column.heading for column in columns]
     main = headings[0]
+    measures = {measure.name: measure for measure in track_measures(track)}
+    better = [measures[column.measure].better for column in columns]
     queries = {column.heading: samples_query(run, track, column.cell) for column in columns}
     own_floors = floors_run(run, track)
     ranks, lacking = rank_texts(run, track), shortfalls(run, track)
@@ -145,8 +149,8 @@ def _model_rows(
         of_model = urlencode({"model": name})
         cells = [
             *(
-                _cell(value, held.get(head), f"{queries[head]}&{of_model}", seeds=head == main)
-                for value, head in zip(of_name, headings, strict=True)
+                _cell(value, held.get(head), way, f"{queries[head]}&{of_model}", seeds=head == main)
+                for value, head, way in zip(of_name, headings, better, strict=True)
             ),
             *([_plain(published.get(name), NO_VALUE)] if published else []),
         ]
@@ -161,8 +165,7 @@ def _model_rows(
                 f"{urlencode({'track': track})}&{of_model}",
             )
         )
-    is_ascending = main_measure(run, track).better == "lower"
-    return sorted(rows, key=partial(_place, is_ascending=is_ascending))
+    return sorted(rows, key=partial(_place, is_ascending=better[0] == "lower"))
 
 
 def _reference_rows(
@@ -202,12 +205,14 @@ def _notes(run: Run, track: str, rows: Sequence[Row], *, has_floors: bool) -> li
     ]
 
 
-def _cell(value: Value | None, floor: Floor | None, query: str, *, seeds: bool) -> Cell:
+def _cell(
+    value: Value | None, floor: Floor | None, better: Better, query: str, *, seeds: bool
+) -> Cell:
     if value is None or math.isnan(value.value):
         return Cell(NO_VALUE, query=query)
     below = [] if math.isnan(value.lo) else [f"{number(value.lo)} to {number(value.hi)}"]
-    if below and floor is not None and not floor.is_below(value.lo, value.hi):
-        below[0] += f" {_NOT_ABOVE}"
+    if below and floor is not None and not floor.is_below(value.lo, value.hi, better):
+        below[0] += f" {_NOT_BETTER}"
     if seeds and not math.isnan(value.sd):
         below.append(f"seeds {spread(value.mean, value.sd)}")
     return Cell(number(value.value), value.value, tuple(below), query)
