@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from xml.etree.ElementTree import fromstring
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from phyblock.report.compare import compare_models
 from phyblock.report.figures import figure_files, figure_titles
 from phyblock.report.figures.dots import measure_dots
 from phyblock.report.html.headline import headlines
+from phyblock.report.html.page import render_page
 from phyblock.site.values import values_of
 from phyblock.tables.load import Run, load_run
 from phyblock.tables.measures import Measure
@@ -66,6 +69,24 @@ def test_the_leading_measure_leads_everywhere(run: Run) -> None:
         assert [table.strip_name for table in headlines(run)] == [kind.report().main or "Overall"]
         worth = values_of(run, "counting").samples["oracle"].values()
         assert set(worth) == {leading.best}
+
+
+@pytest.mark.parametrize("measure", [ERROR, EXACT], ids=["blocks", "share"])
+def test_shares_alone_are_drawn_on_a_scale_to_100(run: Run, measure: Measure) -> None:
+    show(led_by(measure, measure))
+    tables = headlines(run)
+    page = render_page(
+        about={"title": "Run", "facts": [], "description": ""}, cautions=(), headlines=tables,
+        figures=(), tables=(), models=run.design.model_names, folder="report", build="build",
+    )  # fmt: skip
+    (found,) = re.findall("<table.*?</table>", page, re.DOTALL)
+    table = fromstring(found)
+    n_drawn = len(run.design.model_names) if measure.is_share else 0
+    assert sum(bool(row.strip) for row in tables[0].rows) == n_drawn
+    assert len(table.findall(".//svg")) == n_drawn
+    assert ("[%]" in "".join(table.itertext())) == measure.is_share
+    widths = {sum(int(cell.get("colspan", 1)) for cell in row) for row in table.findall("*/tr")}
+    assert len(widths) == 1
 
 
 @pytest.mark.parametrize("measure", [ERROR, EXACT], ids=["lower", "higher"])

@@ -21,7 +21,7 @@ from phyblock.tables.showing import captioned, varied_words
 from phyblock.tables.text_table import NO_VALUE, number, spread
 from phyblock.tables.track_report import HeadlineColumn
 from phyblock.tracks.estimates import track_measures
-from phyblock.tracks.headline import headline_columns
+from phyblock.tracks.headline import headline_columns, main_measure
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["Cell", "Headline", "Row", "headlines"]
@@ -44,8 +44,9 @@ class Cell:
 
 @dataclass(frozen=True)
 class Row:
-    """A model, or a value to hold models against; `strip` is its overall value and interval [%].
+    """A model, or a value to hold models against; `strip` is its main value and interval [%].
 
+    There is none without a value, and for a main measure that is no share.
     `rank` is the place that a model may have (`2`, or `1 to 3` where tests cannot tell), `lacking`
     says how many samples have no reply and why.
     """
@@ -61,10 +62,11 @@ class Row:
 
 @dataclass(frozen=True)
 class Headline:
-    """A headline table: `columns` head the cells, `references` [%] are marked in every strip.
+    """A headline table: `columns` head the cells, `references` are marked in every strip.
 
-    The column with number `main`, from 0, is what models are ranked by and what the strips draw;
-    it is called `strip_name`. Models stand in the order of their rank.
+    The column with number `main`, from 0, is what models are ranked by; it is called `strip_name`.
+    Where it `has_strips`, as a share has, they draw it from 0 to 100 %. Models stand in the order
+    of their rank.
     """
 
     track: str
@@ -74,6 +76,7 @@ class Headline:
     notes: tuple[str, ...]
     main: int
     strip_name: str
+    has_strips: bool
     references: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -122,6 +125,7 @@ def _headline(run: Run, track: str) -> Headline:
         (" ".join(_notes(run, track, rows, has_floors=bool(floors))),),
         0,
         main,
+        main_measure(run, track).is_share,
         {
             name.partition(" ")[0].rstrip(","): value
             for name, value in marked.items()
@@ -139,6 +143,7 @@ def _model_rows(
     main = headings[0]
     measures = {measure.name: measure for measure in track_measures(track)}
     better = [measures[column.measure].better for column in columns]
+    is_share = measures[columns[0].measure].is_share
     queries = {column.heading: samples_query(run, track, column.cell) for column in columns}
     own_floors = floors_run(run, track)
     ranks, lacking = rank_texts(run, track), shortfalls(run, track)
@@ -159,7 +164,7 @@ def _model_rows(
                 name,
                 sort,
                 tuple(cells),
-                _strip(of_name[0]),
+                _strip(of_name[0]) if is_share else None,
                 ranks.get(name, ""),
                 lacking.get(name, ""),
                 f"{urlencode({'track': track})}&{of_model}",
@@ -226,5 +231,5 @@ def _strip(value: Value | None) -> tuple[float, float, float] | None:
 
 
 def _plain(value: float | None, blank: str = "") -> Cell:
-    """A percentage with nothing under it."""
+    """A number with nothing under it."""
     return Cell(blank) if value is None else Cell(number(value), value)
