@@ -57,8 +57,8 @@ class Comparison:
     of several models were compared as a whole: model, value, best and worst rank that the model may
     have. `flipped` has one row a pair and sample that one side alone got wholly right: a, b, scene,
     item (scene or question), seed, variant (what differs from the reference of the run), right
-    (that side's label), value_a, value_b. `name` is what the values are called, `unit` theirs,
-    `how` says what they are.
+    (that side's label), value_a, value_b; by a measure without a best value it has none. `name` is
+    what the values are called, `unit` theirs, `how` says what they are.
     """
 
     table: pd.DataFrame

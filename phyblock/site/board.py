@@ -72,7 +72,7 @@ def _track(track: str, one: SiteRun) -> dict[str, Any]:
         "main": main.heading,
         "unit": measure.unit,
         "better": measure.better,
-        "best": measure.best,
+        "best": None if math.isnan(measure.best) else measure.best,
         "notes": list(kind.report().notes(run)),
         "physics": kind.physics(run.manifest.suite),
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from phyblock.records.manifest import ManifestModel
@@ -26,16 +26,16 @@ Key = tuple[str, str, int, str]
 class Facts:
     """What a model's samples of a track took and came to; None where it is not known.
 
-    `solved` samples are worth all that a sample can be. Costs [US dollars] are at the prices of the
-    replies, cached ones included. `asked` are the first and the last day, UTC, on which the run got
-    a reply that it had asked for itself, one of recordings and of cached replies being unknown;
-    `cached` counts the latter.
+    `solved` samples are worth all that a sample can be; None where a sample may always be worth
+    more. Costs [US dollars] are at the prices of the replies, cached ones included. `asked` are the
+    first and the last day, UTC, on which the run got a reply that it had asked for itself, one of
+    recordings and of cached replies being unknown; `cached` counts the latter.
     """
 
     expected: int
     done: int
     failed: int
-    solved: int
+    solved: int | None
     prompt_tokens: float | None
     completion_tokens: float | None
     latency_s: float | None
@@ -106,7 +106,7 @@ def _facts(
     found = {}
     for model, row in outcomes.to_dict("index").items():
         cost = of_model[model]
-        solved = sum(value == measure.best for value in samples.get(str(model), {}).values())
+        solved = _solved(samples.get(str(model), {}).values(), measure.best)
         price = _known(cost["cost_per_100_usd"])
         whole = None if price is None else price / 100 * int(row["replies"])
         found[str(model)] = Facts(
@@ -123,6 +123,10 @@ def _facts(
             int(row["cached"]),
         )
     return found
+
+
+def _solved(values: Iterable[float], best: float) -> int | None:
+    return None if math.isnan(best) else sum(value == best for value in values)
 
 
 def _days_asked(run: Run, track: str) -> dict[str, tuple[str, str]]:

@@ -109,8 +109,10 @@ class Measure:
 
     @property
     def best(self) -> float:
-        """The value of a perfect sample, as it is shown."""
-        return self.scale if self.better == "higher" else 0.0
+        """The value of a perfect sample, as it is shown; NaN where no value is the best."""
+        if self.better == "lower":
+            return math.nan if math.isnan(self.end_of_range) else 0.0
+        return self.scale * self.end_of_range if math.isfinite(self.end_of_range) else math.nan
 
     @property
     def scale(self) -> float:

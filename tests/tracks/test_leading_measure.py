@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import math
 import re
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 from xml.etree.ElementTree import fromstring
 
 import numpy as np
@@ -20,6 +23,10 @@ from phyblock.report.figures import figure_files, figure_titles
 from phyblock.report.figures.dots import measure_dots
 from phyblock.report.html.headline import headlines
 from phyblock.report.html.page import render_page
+from phyblock.report.html.sources import Sources
+from phyblock.site.board import all_values, board_of
+from phyblock.site.entries import entries_of
+from phyblock.site.runs import SiteRun
 from phyblock.site.values import values_of
 from phyblock.tables.load import Run, load_run
 from phyblock.tables.measures import Measure
@@ -100,6 +107,36 @@ def test_what_is_not_better_than_the_floor_is_marked(run: Run, measure: Measure)
     assert "†" not in rows["oracle"].below[0]
     assert rows["random"].below[0].endswith(" †")
     assert "best that is reached" in table.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("better", "most", "best"),
+    [
+        *(("higher", 8, 8), ("higher", math.inf, math.nan), ("higher", None, math.nan)),
+        *(("lower", 8, 0), ("lower", math.inf, 0), ("lower", None, math.nan)),
+    ],
+)
+def test_a_sample_is_solved_where_it_has_the_best_value_that_there_is(
+    run: Run, better: Any, most: float | None, best: float
+) -> None:
+    """The oracle has it everywhere, guesses nowhere: they are off by one block or more."""
+    far = {"higher": lambda sums: 8 - ERROR.value(sums), "lower": ERROR.value}
+    measure = replace(ERROR, value=far[better], better=better, most=most)
+    show(led_by(measure, measure))
+    assert measure.best == pytest.approx(best, nan_ok=True)
+    has_best = not math.isnan(best)
+    flipped = compare_models(run).flipped
+    assert set(flipped["right"]) == ({"oracle"} if has_best else set())
+    sites = [SiteRun("run", run, False, Sources())]
+    board = board_of(sites, entries_of(sites), all_values(sites))
+    assert json.loads(json.dumps(board, allow_nan=False))["tracks"][0]["best"] == (
+        best if has_best else None
+    )
+    solved = {row["name"]: row["facts"]["counting"]["solved"] for row in board["rows"]}
+    asked = run.design.samples("counting")
+    assert solved == (
+        {"oracle": asked, "random": 0} if has_best else {"oracle": None, "random": None}
+    )
 
 
 @pytest.mark.parametrize("factor", [0, -1], ids=["nothing", "below zero"])

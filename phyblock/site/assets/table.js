@@ -15,6 +15,8 @@ const Table = (() => {
   ];
   /** What no scoring can tell. */
   const RECORDED = ["usd_per_solved", "usd_per_100", "prompt_tokens", "completion_tokens", "latency_s"];
+  /** What there is only where a sample can be worth all that there is. */
+  const OF_SOLVED = ["solved", "usd_per_solved"];
   const LOWER_FIRST = [...RECORDED, "failed", "rank"];
 
   const text = (value, digits = 1) => (value === null || value === undefined ? DASH
@@ -85,6 +87,8 @@ const Table = (() => {
 
   const mainFirst = (columns, track) => [...columns].sort((a, b) => (b.heading === track.main) - (a.heading === track.main));
 
+  const factsOf = (track) => FACTS.filter(([name]) => track.best !== null || !OF_SOLVED.includes(name));
+
   /** Every column there is, in groups [{title, columns}]. */
   function groups(board) {
     const several = board.tracks.length > 1;
@@ -96,7 +100,7 @@ const Table = (() => {
           title: track.title + (setting ? `, setting ${setting}` : ""),
           columns: mainFirst(mine.filter((column) => column.setting === setting), track).map((column) => valueColumn(column, track, several)),
         })),
-        { title: `${track.title}, samples and cost`, columns: FACTS.map((fact) => factColumn(fact, track, several)) },
+        { title: `${track.title}, samples and cost`, columns: factsOf(track).map((fact) => factColumn(fact, track, several)) },
       ];
     });
     return [...found, { title: "Model and run", columns: rowColumns(board) }];
@@ -108,10 +112,11 @@ const Table = (() => {
     const of = (track) => board.columns.filter((column) => column.track === track.name);
     const main = (track) => of(track).find((column) => column.heading === track.main);
     const priced = board.rows.some((row) => row.facts[first.name]?.usd_per_solved);
+    const solved = first.best === null ? null : `${first.name}/${priced ? "usd_per_solved" : "solved"}`;
     const told = board.rows.some((row) => row.facts[first.name]?.completion_tokens);
     return [
       ...mainFirst(of(first).filter((column) => column.setting === main(first).setting), first).map((column) => column.id),
-      `${first.name}/${priced ? "usd_per_solved" : "solved"}`, told ? `${first.name}/completion_tokens` : null,
+      solved, told ? `${first.name}/completion_tokens` : null,
       ...others.map((track) => main(track).id), board.rows.some(asked) ? "date" : null,
     ].filter(Boolean);
   }

@@ -179,7 +179,7 @@ const Views = (() => {
     const took = [
       ["Rank", rank === DASH ? null : `${rank} by ${track.main}`],
       ["Samples", fact.done < fact.expected ? `${fact.done.toLocaleString("en")} of ${fact.expected.toLocaleString("en")} done` : fact.done.toLocaleString("en")],
-      ["Solved", `${fact.solved.toLocaleString("en")}`],
+      ["Solved", fact.solved === null ? null : fact.solved.toLocaleString("en")],
       ["Not read or failed", fact.failed.toLocaleString("en")],
       ["Tokens in", fact.prompt_tokens && text(fact.prompt_tokens, 0)], ["Tokens out", fact.completion_tokens && text(fact.completion_tokens, 0)],
       ["100 replies", fact.usd_per_100 && `$${Table.dollars(fact.usd_per_100)}`],
@@ -226,7 +226,7 @@ const Views = (() => {
 
   /** A score with a shade behind it; the number says it all without the shade. */
   function shade(score, track, outcome) {
-    const share = score === null ? 0 : track.better === "lower" ? 0 : Math.max(0, Math.min(1, score / (track.best || 100)));
+    const share = score === null ? 0 : track.better === "lower" || track.best === null ? 0 : Math.max(0, Math.min(1, score / track.best));
     const made = el("span", { class: `shade number shade-${Math.round(share * 5)}` }, score === null ? Words.named(outcome || "missing") : text(score, score === 100 ? 0 : 1));
     return made;
   }
