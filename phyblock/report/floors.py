@@ -13,8 +13,7 @@ from typing import Any
 
 import pandas as pd
 
-from phyblock.report.measure_table import main_heading
-from phyblock.tables.headline import headline_rows
+from phyblock.tables.headline import headline_rows, rows_of
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Better, Measure, value_key
 from phyblock.tables.text_table import (
@@ -26,7 +25,7 @@ from phyblock.tables.text_table import (
     track_text,
 )
 from phyblock.tracks.estimates import track_estimates, track_measures
-from phyblock.tracks.headline import headline_columns
+from phyblock.tracks.headline import headline_columns, main_column, main_measure
 from phyblock.tracks.kind import kind_of
 
 __all__ = [
@@ -114,12 +113,12 @@ def headline_floors(run: Run, track: str) -> dict[str, Floor]:
     Values are as tables show them, in the unit of the measure.
     """
     rows = headline_rows(track_estimates(run, track), run.design)
+    measures = {measure.name: measure for measure in track_measures(track)}
     found: dict[str, Floor] = {}
     for column in headline_columns(run, track):
-        mine = rows[(rows["measure"] == column.measure) & (rows[CELL] == column.cell)]
-        mine = mine[(mine["criterion"] == column.criterion) | (not column.criterion)]
+        mine = rows_of(rows, column)
         if len(mine):
-            (measure,) = (m for m in track_measures(track) if m.name == column.measure)
+            measure = measures[column.measure]
             floor = strongest_floors(run, track, measure).get(value_key(mine.iloc[0].to_dict()))
             if floor is not None:
                 found[column.heading] = Floor(floor.name, measure.scale * floor.value)
@@ -205,14 +204,10 @@ def floor_lines(table: pd.DataFrame, run: Run) -> Sequence[str]:
     """For the terminal: the strongest floor of each track's main number, and who is not above."""
     lines = ["Floors: what is reached without seeing the goal"]
     for track in run.design.suite.tracks:
-        heading = main_heading(run, track)
-        (main,) = (shown for shown in headline_columns(run, track) if shown.heading == heading)
-        mine = headline_rows(table[table["track"] == track], run.design)
-        mine = mine[(mine["measure"] == main.measure) & (mine[CELL] == main.cell)]
-        mine = mine[(mine["criterion"] == main.criterion) | (not main.criterion)]
+        main, measure = main_column(run, track), main_measure(run, track)
+        mine = rows_of(headline_rows(table[table["track"] == track], run.design), main)
         if len(mine):
-            (measure,) = (m for m in track_measures(track) if m.name == main.measure)
-            lines.append(f"{kind_of(track).title}, {heading}: {_told(mine, measure)}")
+            lines.append(f"{kind_of(track).title}, {main.heading}: {_told(mine, measure)}")
     return lines if len(lines) > 1 else ()
 
 

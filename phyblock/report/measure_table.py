@@ -105,9 +105,8 @@ def measures_view(table: pd.DataFrame, run: Run) -> TextTable:
         if row[CELL] != whole[row["track"]]:
             continue
         (measure,) = (m for m in track_measures(row["track"]) if m.name == row["measure"])
-        unit = f" ({measure.unit})" if measure.unit else ""
         value, interval = number(row["value"], 2), between(row["lo"], row["hi"])
-        named = (*track_text(row["track"], tracks), f"{measure.heading}{unit}")
+        named = (*track_text(row["track"], tracks), measure.heading_in_unit)
         rows.append((row["model"], *named, value, interval, str(row["n"])))
         key = row["track"], measure.name
         notes[key] = (

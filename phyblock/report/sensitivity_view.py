@@ -185,7 +185,6 @@ def _what(run: Run, tracks: Sequence[str]) -> list[str]:
     """What is measured in each track."""
     measures = [comparable(run, track).measure for track in tracks]
     return [
-        f"{kind_of(track).title}: {measure.heading}"
-        + (f" ({measure.unit})" if measure.unit else "")
+        f"{kind_of(track).title}: {measure.heading_in_unit}"
         for track, measure in zip(tracks, measures, strict=True)
     ]

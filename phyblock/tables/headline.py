@@ -22,6 +22,7 @@ __all__ = [
     "interval_frame",
     "interval_view",
     "narrower",
+    "rows_of",
     "seeds_notes",
     "uncertainty_cells",
     "uncertainty_columns",
@@ -55,6 +56,12 @@ def headline_rows(estimates: pd.DataFrame, design: Design) -> pd.DataFrame:
     ]
 
 
+def rows_of(rows: pd.DataFrame, column: HeadlineColumn) -> pd.DataFrame:
+    """The rows of a frame of estimates that stand in a headline column."""
+    mine = rows[(rows["measure"] == column.measure) & (rows[CELL] == column.cell)]
+    return mine[mine["criterion"] == column.criterion] if column.criterion else mine
+
+
 def headline_values(
     estimates: pd.DataFrame,
     design: Design,
@@ -66,10 +73,7 @@ def headline_values(
     rows = headline_rows(estimates, design)
     values = {}
     for column in columns:
-        mine = rows[(rows["measure"] == column.measure) & (rows[CELL] == column.cell)]
-        if column.criterion:
-            mine = mine[mine["criterion"] == column.criterion]
-        for row in mine.to_dict("records"):
+        for row in rows_of(rows, column).to_dict("records"):
             names = ("value", "mean", "sd", "lo", "hi")
             numbers = (scale[column.measure] * float(row[name]) for name in names)
             values[str(row["model"]), column.heading] = Value(*numbers)

@@ -96,6 +96,11 @@ class Measure:
     most: float | None = None
 
     @property
+    def heading_in_unit(self) -> str:
+        """The heading with the unit of values in brackets, where they have one."""
+        return f"{self.heading} ({self.unit})" if self.unit else self.heading
+
+    @property
     def is_share(self) -> bool:
         """Whether values are parts of a whole, which bounds their intervals."""
         return self.unit == "%" and not self.is_difference

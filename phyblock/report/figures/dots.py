@@ -22,9 +22,9 @@ from phyblock.tables.drawing import (
     names_width_in,
     new_figure,
 )
-from phyblock.tables.headline import headline_rows
+from phyblock.tables.headline import headline_rows, rows_of
 from phyblock.tables.load import Run
-from phyblock.tables.measures import CELL, Measure
+from phyblock.tables.measures import Measure
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.headline import headline_columns, main_column, main_measure
 from phyblock.tracks.kind import kind_of
@@ -79,8 +79,7 @@ def measure_dots(run: Run, *, track: str) -> Figure | None:
         beside = _NUMBER_IN / (room_in / n_panels - _NUMBER_IN - _BETWEEN_IN)
         edge = longest + (longest - least) * beside
         _dots(ax, values, (least, edge), INK if column is columns[0] else ACCENT)
-        unit = f" ({measure.unit})" if measure.unit else ""
-        ax.set(title=column.heading, xlabel=f"{measure.heading}{unit}")
+        ax.set(title=column.heading, xlabel=measure.heading_in_unit)
         if measure.unit == "%":
             ax.set_xticks(np.linspace(0, longest, _ticks(room_in / n_panels)))
     axes[0].set_yticks(np.arange(len(models)), models)
@@ -122,12 +121,9 @@ def _values(
     rows: pd.DataFrame, column: HeadlineColumn, measure: Measure
 ) -> dict[str, tuple[float, ...]]:
     """By model, the value of a cell and the ends of its interval, in the measure's unit."""
-    rows = rows[rows[CELL] == column.cell]
-    if column.criterion:
-        rows = rows[rows["criterion"] == column.criterion]
     return {
         row["model"]: tuple(measure.scale * float(row[name]) for name in ("value", "lo", "hi"))
-        for row in rows.to_dict("records")
+        for row in rows_of(rows, column).to_dict("records")
     }
 
 

@@ -73,12 +73,10 @@ def moved_dots(run: Run, *, track: str) -> Figure | None:
     axes[0].set_xlim(left=0)
     bare_axes(axes)
     legend_below(figure, *axes[0].get_legend_handles_labels())
-    measure = main_measure(run, track)
-    unit = f" ({measure.unit})" if measure.unit else ""
     headed(
         figure,
         f"{kind_of(track).title}: what the way of asking changes",
-        f"Standard deviation of {measure.heading}{unit}; lines: 95 % intervals, "
-        + sizes_text(table),
+        f"Standard deviation of {main_measure(run, track).heading_in_unit}; "
+        "lines: 95 % intervals, " + sizes_text(table),
     )
     return figure
