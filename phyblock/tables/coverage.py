@@ -9,7 +9,7 @@ import pandas as pd
 
 from phyblock.tables.flat import TOKENS
 from phyblock.tables.load import Run, made_once_copied
-from phyblock.tables.outcomes import HEADINGS, OUTCOMES
+from phyblock.tables.outcomes import HEADINGS, NOT_RUN, OUTCOMES
 from phyblock.tables.text_table import (
     NO_VALUE,
     Column,
@@ -92,7 +92,7 @@ def coverage_view(table: pd.DataFrame, run: Run) -> TextTable:
     Tokens, latency, cached and requests are left out where no model has any, and the track where
     there is one.
     """
-    counts = {"expected": "Expected", "not_run": "Not run"}
+    counts = {"expected": "Expected", "not_run": NOT_RUN}
     counts |= {outcome: HEADINGS[outcome] for outcome in OUTCOMES}
     parts: list[tuple[Column, list[str]]] = [(Column("Model", is_text=True), list(table["model"]))]
     tracks = run.design.suite.tracks
@@ -158,7 +158,7 @@ def coverage_in_terminal(view: TextTable, table: pd.DataFrame) -> tuple[TextTabl
     if not (table["ok"] < table["expected"]).any():
         return ()
     always = ("Model", "Track", "Expected", "OK")
-    missing = ("Not run", *HEADINGS.values())
+    missing = (NOT_RUN, *HEADINGS.values())
     dropped = [
         column.name
         for i, column in enumerate(view.columns)

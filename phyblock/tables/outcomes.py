@@ -9,7 +9,7 @@ from phyblock.words import Outcome
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["FAILURES", "HEADINGS", "OUTCOMES", "WITHOUT_REPLY", "has_reply"]
+__all__ = ["FAILURES", "HEADINGS", "NOT_RUN", "OUTCOMES", "WITHOUT_REPLY", "has_reply"]
 
 OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 """Every outcome, in the order of columns."""
@@ -29,6 +29,9 @@ HEADINGS: dict[Outcome, str] = {
     "missing": "Missing",
 }
 """What heads the column of each outcome."""
+
+NOT_RUN = "Not run"
+"""What heads numbers of samples that there are not."""
 
 
 def has_reply(rows: pd.DataFrame) -> pd.Series[bool]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from urllib.parse import urlencode
@@ -12,14 +12,12 @@ from phyblock.report.sensitivity import ITEMS
 from phyblock.report.sensitivity_view import FACTOR, LEVEL, factor_name
 from phyblock.report.varied import blocks_of
 from phyblock.tables.load import Run
-from phyblock.tables.outcomes import HEADINGS
-from phyblock.tables.text_table import TextTable, level_name, track_text
+from phyblock.tables.outcomes import HEADINGS, NOT_RUN
+from phyblock.tables.text_table import Column, TextTable, level_name, track_text
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["TableLeads", "mean_parts", "part_names", "samples_query", "table_leads"]
 
-_NOT_RUN = "Not run"
-"""Heads numbers of samples that there are not."""
 _REFERENCE = "reference"
 """What the page's address calls the way of asking that names nothing."""
 
@@ -77,45 +75,88 @@ def table_leads(run: Run, name: str, table: TextTable) -> TableLeads:
     """What the headings and the texts of a table say of the samples behind its numbers."""
     tracks = run.design.suite.tracks
     of_table = [track for track in tracks if name in kind_of(track).report().tables] or tracks
-    words = _words(run, of_table)
+    words = _Vocabulary(
+        _words(run, of_table),
+        frozenset(
+            listed.name
+            for track in of_table
+            for listed in kind_of(track).report().listings(run.design)
+        ),
+    )
+    shared = {"track": of_table[0]} if len(of_table) == 1 else {}
+    named, ways = _named_in_rows(run, table, words), _ways_of_rows(run, table)
+    return TableLeads(
+        tuple(_column_lead(column, words) for column in table.columns),
+        tuple(
+            _row_lead({**shared, **chosen}, way, model)
+            for (model, chosen), way in zip(named, ways, strict=True)
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class _Vocabulary:
+    """What texts of tables choose among samples: `of_names` in small letters, and `settings`."""
+
+    of_names: Mapping[str, dict[str, str]]
+    settings: frozenset[str]
+
+    def chosen_by(self, text: str) -> dict[str, str] | None:
+        """What a text in a row chooses; None for one that is no such word."""
+        return {"setting": text} if text in self.settings else self.of_names.get(text.lower())
+
+
+def _column_lead(column: Column, words: _Vocabulary) -> str | None:
+    if column.is_text or column.name == NOT_RUN:
+        return None
+    named = {"setting": column.name} if column.name in words.settings else {}
+    of_group, of_name = (
+        words.of_names.get(text.lower(), {}) for text in (column.group, column.name)
+    )
+    return urlencode(of_group | of_name | named)
+
+
+def _row_lead(
+    chosen: Mapping[str, str], way: Mapping[str, str] | None, model: str | None
+) -> str | None:
+    if model is None or "track" not in chosen or way is None:
+        return None
+    return urlencode({**chosen, **way, "model": model})
+
+
+def _named_in_rows(
+    run: Run, table: TextTable, words: _Vocabulary
+) -> Iterator[tuple[str | None, dict[str, str]]]:
+    """The model that each row is of, None for none, and what its other names choose."""
     models = {one_line(model): model for model in run.design.model_names}
-    settings = {
-        one.name for track in of_table for one in kind_of(track).report().listings(run.design)
-    }
-    columns = []
-    for column in table.columns:
-        named = {"setting": column.name} if column.name in settings else {}
-        known = words.get(column.group.lower(), {}) | words.get(column.name.lower(), {}) | named
-        is_bare = column.is_text or column.name == _NOT_RUN
-        columns.append(None if is_bare else urlencode(known))
-    is_of_ways = FACTOR in table.columns
-    ways = _ways(run) if is_of_ways else {(): {}}
-    rows: list[str | None] = []
-    model = None
     # What is said behind the numbers of a row, as who is above a floor, is not what they are of.
     n_naming = len(list(takewhile(lambda column: column.is_text, table.columns)))
+    model = None
     for row in table.rows:
-        chosen, naming = {"track": of_table[0]} if len(of_table) == 1 else {}, row[:n_naming]
+        naming = row[:n_naming]
         if row[0] in models:
             model, naming = models[row[0]], naming[1:]
         elif row[0]:
             # An empty name is the one above.
             model = None
+        chosen: dict[str, str] = {}
         for text in naming:
-            if text in settings:
-                chosen["setting"] = text
-            elif text.lower() in words:
-                chosen |= words[text.lower()]
+            of_text = words.chosen_by(text)
+            if of_text is not None:
+                chosen |= of_text
             elif model is None:
                 model = models.get(text)
+        yield model, chosen
+
+
+def _ways_of_rows(run: Run, table: TextTable) -> Iterator[dict[str, str] | None]:
+    """What each row chooses among ways of asking; None where no word of the address does."""
+    is_of_ways = FACTOR in table.columns
+    ways = _ways(run) if is_of_ways else {(): {}}
+    for row in table.rows:
         texts = zip(table.columns, row, strict=True)
-        of_way = (cell for column, cell in texts if is_of_ways and column in (FACTOR, LEVEL))
-        way = ways.get(tuple(of_way))
-        if model is None or "track" not in chosen or way is None:
-            rows.append(None)
-        else:
-            rows.append(urlencode({**chosen, **way, "model": model}))
-    return TableLeads(tuple(columns), tuple(rows))
+        of_way = (text for column, text in texts if is_of_ways and column in (FACTOR, LEVEL))
+        yield ways.get(tuple(of_way))
 
 
 def _words(run: Run, tracks: Sequence[str]) -> Mapping[str, dict[str, str]]:
