@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from phyblock.parsing.listing import Listing
-from phyblock.parsing.mention import named_blocks
+from phyblock.parsing.mention import VERB, named_blocks
 from phyblock.parsing.plan_claims import PLACE_OR_TIMES, counts_hold, places_hold
 from phyblock.parsing.plan_patterns import (
     CATALOGUE_WORD,
@@ -60,6 +60,15 @@ _ROLE = re.compile(
 )
 """Numbers that are no block's: places, sizes, counts, coordinates."""
 _BRACKETS = re.compile(r"\([^()\n]{0,200}\)|\[[^\[\]\n]{0,200}\]")
+_EXPLAINS = words(
+    r"\b(?:explanation|rationale|reasoning|justification)|erklärung|begründung"
+    r"|解释|说明|理由"
+)
+"""A label behind which blocks are named that need not be of the plan."""
+_PUTS = words(
+    rf"{VERB}|\b(?:goes|comes|belongs|missing|needed|chang\w+|replac\w+|swap\w*|kommt|gehört"
+    r"|fehlt)\b"
+)
 _STEP_AGAIN = words(
     r"(?:\b(?:swap\w*|skip|remov\w+|drop|wrong|replac\w+|should|must|has to|needs? to|exchange"
     r"|delete|ignore|unnecessary|(?:not|n't) (?:needed|required|necessary))\b.{0,60})?"
@@ -151,14 +160,24 @@ def _is_contradicted(
     beside = [line for listing in lists for line in listing.between]
     beside += [line for listing in later for line in listing.above]
     after = list(_unexplained(later))
+    explained: list[str] = []
     for listing in after:
-        if listing.form == "labeled" and not _ASIDE.search(listing.label):
+        if listing.form != "labeled" or _ASIDE.search(listing.label):
+            continue
+        if _EXPLAINS.search(listing.label):
+            explained += listing.lines
+            sentences = SENTENCES.split("\n".join(listing.lines))
+            beside += filter(_PUTS.search, sentences)
+        else:
             beside += listing.lines
     said = "\n".join([*beside, *below, *(line for listing in after for line in listing.lines)])
     if not places_hold(said, order):
         return True
-    return _is_corrected([*beside, *below], order) or any(
-        _says_otherwise(listing, order, known) for listing in after
+    is_explained = bool(explained) or any(map(EXPLANATION.search, beside))
+    return (
+        _is_corrected(beside, order, is_explained=False)
+        or _is_corrected([*explained, *below], order, is_explained=is_explained)
+        or any(_says_otherwise(listing, order, known) for listing in after)
     )
 
 
@@ -186,9 +205,11 @@ def _unless_aside(brackets: re.Match[str]) -> str:
     return " " if _ASIDE.search(brackets[0]) else brackets[0]
 
 
-def _is_corrected(lines: Sequence[str], order: Sequence[int]) -> bool:
-    """Whether lines beside a plan take a step back, or name blocks that it lacks."""
-    is_explained = False
+def _is_corrected(lines: Sequence[str], order: Sequence[int], *, is_explained: bool) -> bool:
+    """Whether lines beside a plan take a step back, or name blocks that it lacks.
+
+    What explains the plan may name others.
+    """
     numbers = {*order}
     for line in lines:
         line = PLACE_OR_TIMES.sub(" ", _MAY_BE_SWAPPED.sub(" ", line))

@@ -34,6 +34,12 @@ _IS_WHOLE = re.compile(
     rf"(?:[^\d:：,.;]{{1,40}}[:：→]\s)?[\s#(\[]{{0,4}}{GROUP}[\s)\]]{{0,3}}(?=\Z|[(:,;.\-\u2013\u2014|x×])",
     re.IGNORECASE,
 )
+_AND_TO_FINISH = re.compile(
+    r"(?<=\band )to finish(?=, |\s(?:with\s)?(?:the|a)\s(?:(?!of\b|on\b)[^\W\d]{1,16}\s){1,4}"
+    r"\(#?\d{1,3}\)\s?(?:[.;]|\Z))",
+    re.IGNORECASE,
+)
+"""Words before the last block; "to finish the row of block 3" says what another one is for."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +78,7 @@ def read_statement(text: str, *, is_item: bool) -> Statement:
 def _read(text: str, is_item: bool) -> Statement:
     if not SAYS_NUMBER.search(text):
         return Statement(())
-    text = HERE.sub(" ", text)
+    text = _AND_TO_FINISH.sub("finally", HERE.sub(" ", text))
     bare: tuple[int, ...] = ()
     moved: list[int] = []
     rest = _Rest()

@@ -1,14 +1,16 @@
 """Tables of a reply, read by their columns."""
 
+# ruff: noqa: RUF001, RUF002 -- replies come in other scripts
+
 from __future__ import annotations
 
 import re
+from collections import Counter
 
 from phyblock.parsing.json_keys import TIMES_KEY
-from phyblock.parsing.json_values import whole_number
 from phyblock.parsing.mention import MOST_AT_ONCE
 from phyblock.parsing.structured import Found, line_numbers
-from phyblock.parsing.text_forms import plain_line
+from phyblock.parsing.text_forms import number_of_word, plain_line
 from phyblock.parsing.tiers import lowest_first
 
 __all__ = ["find_tables", "markdown_tables"]
@@ -31,6 +33,15 @@ _COUNT_COLUMN = re.compile(
     r"(?:number|no\.?|n|count|how many|anzahl)\b.{0,9}\b\w+s\b", re.IGNORECASE
 )
 """A column that says how many blocks there are, not which."""
+_TIMES_COLUMN = re.compile(
+    rf"(?:{TIMES_KEY.pattern}|how (?:many|often)|(?:number|no\.?) of (?:copies|pieces|times|blocks)"
+    r"|amount|pieces|×|wie (?:viele|oft)|stück(?:zahl)?|menge|combien|cu[aá]nt[ao]s|個数|个数)"
+    r"(?: (?:needed|required|used|times|of (?:each|them)))?",
+    re.IGNORECASE,
+)
+"""A column that says how many of the block of its row."""
+_SAYS_TIMES = re.compile(r"[x×]?\s?(?P<n>\d{1,2})(?:\s?[x×]|\s[^\W\d]{1,12})?(?:\s?\([^()]*\))?")
+_ONCE_OR_TWICE = {"once": 1, "twice": 2}
 _NTH = re.compile(r"(?:step|schritt|paso|étape|步骤)\s{0,2}(?P<n>\d{1,2})", re.IGNORECASE)
 _TABLE_CHARS = 20_000
 _HTML = re.compile(r"<table\b(?:(?!<table).){1,20000}?</table>", re.IGNORECASE | re.DOTALL)
@@ -127,7 +138,7 @@ def _of_columns(rows: list[list[str]]) -> list[int]:
 
 def _of_rows(head: list[str], rows: list[list[str]]) -> list[int]:
     steps = next((i for i, name in enumerate(head) if _STEP_COLUMN.search(name)), None)
-    times = next((i for i, name in enumerate(head) if TIMES_KEY.fullmatch(name)), None)
+    times = next((i for i, name in enumerate(head) if _TIMES_COLUMN.fullmatch(name)), None)
     is_layers = steps is None
     if steps is None:
         steps = next((i for i, name in enumerate(head) if _LAYER_COLUMN.search(name)), None)
@@ -156,13 +167,31 @@ def _of_rows(head: list[str], rows: list[list[str]]) -> list[int]:
             continue
         if rows and all(named):
             counts = times is not None and not is_counted_out
-            many = [(whole_number(row[times or 0]) if counts else None) or 1 for row in rows]
+            many = [_times(row[times or 0]) if counts else 1 for row in rows]
+            if _are_totals(named, many):
+                return []
             return [
                 n
                 for numbers, k in zip(named, many, strict=True)
-                for n in numbers * min(k, MOST_AT_ONCE)
+                for n in numbers * (1 if k == len(numbers) else min(k, MOST_AT_ONCE))
             ]
     return []
+
+
+def _times(cell: str) -> int:
+    """How many a cell says, as "2", "×2", "two" or "twice"; one where it says nothing of it."""
+    digits = _SAYS_TIMES.fullmatch(cell)
+    said = _ONCE_OR_TWICE.get(cell.lower()) or number_of_word(cell)
+    return int(digits["n"]) if digits else said or 1
+
+
+def _are_totals(named: list[list[int]], many: list[int]) -> bool:
+    """Whether counts beside blocks may be those of the whole plan, or of the plan so far."""
+    rows_of = Counter(numbers[0] for numbers in named if len(numbers) == 1)
+    is_so_far = len(many) > 2 and many == [*range(1, len(many) + 1)]
+    return is_so_far or any(
+        1 < k == rows_of[numbers[0]] for numbers, k in zip(named, many, strict=True)
+    )
 
 
 def _places(cell: str) -> list[int]:

@@ -10,7 +10,7 @@ from tests.parsing.fresh_replies import KINDS, fresh_replies
 
 PLANS = st.lists(st.integers(1, 16), min_size=3, max_size=12)
 BLOCKS = st.integers(1, 16)
-ROUNDS = range(1, 17)
+ROUNDS = range(1, 19)
 MOST_HARD = 0.12
 """The part of the replies that hold an answer of which a reader may admit that it fails."""
 
