@@ -25,6 +25,8 @@ LATE = 10
 """Rounds from this one on were read at first sight by version 4, or by what became it."""
 MARKED = 13
 """Rounds from this one on say which replies their authors meant to be hard."""
+PAIRS = ((13, 14), (15, 16), (17, 18))
+"""Rounds of two authors who knew nothing of each other, read at the same time."""
 EARLIER = {
     "written first": {"right": 31, "failed": 4, "wrong": 5},
     "written then": {"right": 14, "failed": 3, "wrong": 3},
@@ -69,20 +71,25 @@ def main() -> None:
     before = [reply for reply in replies if LATE <= reply.round < MARKED]
     marked = [reply for reply in replies if reply.round >= MARKED]
     print(f"rounds {LATE} to {MARKED - 1}, then: {_then(before)}")
-    print(f"rounds {MARKED} and later, then: {_then(marked)}")
     parts = {f"rounds {MARKED} and later": marked}
+    for pair in PAIRS:
+        name = " and ".join(map(str, pair))
+        parts[f"rounds {name}"] = [reply for reply in marked if reply.round in pair]
     for number in sorted({reply.round for reply in marked}):
         parts[f"round {number}"] = [reply for reply in marked if reply.round == number]
     for name, part in parts.items():
+        print(f"{name}, then: {_then(part)}")
         print(f"{name}, plain, then: {_then([r for r in part if r.plain])}")
         print(f"{name}, meant to be hard, then: {_then([r for r in part if not r.plain])}")
 
 
 def _then(replies: Sequence[Fresh]) -> str:
-    """What came of replies at first sight, and how many of them hold an answer."""
+    """What came of replies at first sight, as parts of all and of those that hold an answer."""
     counts = Counter(reply.verdict(reply.first) for reply in replies)
     holding = sum(reply.meant is not None for reply in replies)
-    return f"{_shown(counts)}; {holding} of {len(replies)} hold an answer"
+    misread = f"{counts['wrong']} of {len(replies)} misread ({counts['wrong'] / len(replies):.1%})"
+    not_read = f"{counts['failed']} of {holding} not read ({counts['failed'] / holding:.1%})"
+    return f"right {counts['right']}, {misread}, {not_read}"
 
 
 def _shown(counts: Mapping[str, int]) -> str:

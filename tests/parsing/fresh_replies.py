@@ -5,7 +5,7 @@ is meant (null: nothing may be read), what was read at first sight, before anyth
 whether it is `hard`: a person reads it, a reader may admit that it does not. From round 13 on
 `plain` are those that their author did not mean to be hard. After a round the causes of what was
 misread were mended, and the next round was written; rounds 13 and 14, of two authors who knew
-nothing of each other, were written at the same time, and so were rounds 15 and 16.
+nothing of each other, were written at the same time, and so were rounds 15 and 16, and 17 and 18.
 """
 
 from __future__ import annotations
