@@ -117,6 +117,16 @@ class ProgressView:
         return f"${spent:,.2f}" + (" and replies whose cost is not known" if unknown else "")
 
     @property
+    def cached_text(self) -> str:
+        """How many samples were answered from the reply cache; "" where none was."""
+        cached = {name: tally.cached for name, tally in self._tallies.items() if tally.cached}
+        if not cached:
+            return ""
+        names = ", ".join(map(one_line, cached))
+        answers = counted(sum(cached.values()), "sample")
+        return f"Nobody was asked about {answers} of {names}: the replies were in the cache"
+
+    @property
     def concurrency_text(self) -> str:
         """How many calls were under way at once where that was found out; "" where it was said."""
         return "; ".join(

@@ -187,6 +187,8 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
         f"{done}{reason}. Cost so far: {view.cost_text}. The run is in {where}",
         soft_wrap=True,
     )
+    if view.cached_text:
+        console.print(f"{view.cached_text} (--no-cache asks anew)", soft_wrap=True, markup=False)
     if view.concurrency_text:
         console.print(view.concurrency_text, soft_wrap=True, markup=False)
     if result.failed:

@@ -61,6 +61,26 @@ def test_results_stand_in_the_page_before_anything_is_loaded(visit: ReportVisit)
     assert page.get_by_text("Expected").first.is_visible()
 
 
+def test_numbers_on_the_page_are_rounded_as_in_tables(visit: ReportVisit) -> None:
+    """Ties go to even, and what only looks like one when it is printed goes where it lies."""
+    page = visit.open()
+    values = [sign * n / 32 for n in range(400) for sign in (1, -1) if n] + [
+        0.15,
+        1.005,
+        2.675,
+        99.95,
+    ]
+    for digits in (0, 1, 2):
+        script = "([values, digits]) => values.map(value => Words.fixed(value, digits))"
+        shown = page.evaluate(script, [values, digits])
+        differ = [
+            (value, text)
+            for value, text in zip(values, shown, strict=True)
+            if text.replace("-0", "0") != f"{value:.{digits}f}".replace("-0", "0")
+        ]
+        assert not differ
+
+
 def test_numbers_of_all_tables_lead_to_the_samples_that_they_were_made_from(
     visit: ReportVisit,
 ) -> None:

@@ -3,7 +3,7 @@
 
 const Results = (() => {
   const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
-  const number = (value) => (value === null || value === undefined ? "–" : value.toFixed(1));
+  const number = (value) => (value === null || value === undefined ? "–" : Words.fixed(value));
 
   function page(results, finish) {
     return el("div", { class: "results" },

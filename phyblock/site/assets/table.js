@@ -20,7 +20,7 @@ const Table = (() => {
   const LOWER_FIRST = [...RECORDED, "failed", "rank"];
 
   const text = (value, digits = 1) => (value === null || value === undefined ? DASH
-    : value.toLocaleString("en", { minimumFractionDigits: digits, maximumFractionDigits: digits }));
+    : Number(Words.fixed(value, digits)).toLocaleString("en", { minimumFractionDigits: digits, maximumFractionDigits: digits }));
   const dollars = (value) => (value === null || value === undefined ? DASH
     : value === 0 ? "0" : value >= 1 ? text(value, 2) : value.toPrecision(2));
 

@@ -96,7 +96,7 @@ const Views = (() => {
     }
     const above = columns.some(over) ? el("tr", {}, el("td", { colspan: 2 }), spans.map(({ name, span }) =>
       (name ? el("th", { scope: "colgroup", colspan: span, class: "over" }, capital(name)) : el("td", { colspan: span })))) : null;
-    return el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Ranking" },
+    return el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Table of the ranking" },
       el("table", { class: "board" },
         el("caption", { class: "unseen" }, `Models ranked by ${state.track.title}, ${state.track.main}`),
         el("thead", {}, above, el("tr", {}, el("th", { scope: "col", class: "rank" }, "Rank"), el("th", { scope: "col", class: "text name" }, "Model"), heads)),
@@ -189,7 +189,7 @@ const Views = (() => {
     return el("section", { "aria-labelledby": id }, el("h2", { id }, track.title),
       el("dl", { class: "about small" }, took.filter(([, value]) => value).map(([name, value]) => el("div", {}, el("dt", {}, name), el("dd", { class: "number" }, value)))),
       el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": `${track.title}, values` }, el("table", { class: "values" },
-        el("thead", {}, el("tr", {}, el("th", { scope: "col", class: "text" }, settings[0] ? "Setting" : ""),
+        el("thead", {}, el("tr", {}, settings[0] ? el("th", { scope: "col", class: "text" }, "Setting") : el("td"),
           headings.map((heading) => el("th", { scope: "col" }, heading)))),
         el("tbody", {}, settings.map((setting) => el("tr", {}, el("th", { scope: "row", class: "text" }, setting || "All"),
           headings.map((heading) => {

@@ -74,7 +74,7 @@ def test_the_card_tells_what_was_learned_from_another_set(folder: Path, tmp_path
     assert "`--unseen` above" in card
     assert "unseen" not in (folder / "q" / "CARD.md").read_text(encoding="utf-8")
     assert re.search(r"\| text, unseen set \| all \| 8 \| 25 \| \d+ \|", card)
-    with pytest.raises(click.BadParameter, match="is the set that is audited"):
+    with pytest.raises(click.BadParameter, match="is the set itself"):
         vqa("generate", "--out", folder / "q", "--replace", *SMALL, "--unseen", folder / "q")
 
 

@@ -44,8 +44,15 @@ const Words = (() => {
    */
   const reason = (why, block = "such block", turned = "", below = "") =>
     (reasons[why] ? reasons[why](block, turned, below) : named(why));
-  const percent = (share) => (share === null || share === undefined ? "–" : (100 * share).toFixed(1));
+  /** With so many decimals, ties to even as in tables: toFixed goes up, so that 6.25 would be 6.3. */
+  const fixed = (value, digits = 1) => {
+    // A tie is an odd number of halves of the last place, which only such sums of halves can be.
+    const isTie = Math.abs((value * 2 ** (digits + 1)) % 2) === 1;
+    const below = Math.floor(Math.abs(value) * 10 ** digits);
+    return isTie && below % 2 === 0 ? (Math.sign(value) * (below / 10 ** digits)).toFixed(digits) : value.toFixed(digits);
+  };
+  const percent = (share) => (share === null || share === undefined ? "–" : fixed(100 * share));
   const count = (n, noun) => `${n.toLocaleString("en")} ${noun}${n === 1 ? "" : "s"}`;
   const block = (one) => `${one.color} ${named(one.type)}`;
-  return { named, reason, percent, count, block };
+  return { named, reason, fixed, percent, count, block };
 })();
