@@ -28,7 +28,8 @@ _HEAD = "# What phyblock wrote here and may write again; all else is never touch
 _LINK = "cannot be written: it is a link, and links are never followed or replaced"
 _HINT = "move it away; phyblock writes over nothing that it did not make"
 _ELSEWHERE = "choose another folder with --out"
-_CLOSED = "cannot be written in"
+_CLOSED = "cannot be written in: permission denied"
+_OPEN = "let yourself write there, or choose another folder"
 _OUTSIDE = "cannot be written: its name leads out of the folder"
 
 
@@ -76,7 +77,12 @@ class OutFolder:
             ):
                 problems[path] = wrong
         if problems:
-            raise StoreError([Problem(str(p), wrong, hint=_HINT) for p, wrong in problems.items()])
+            raise StoreError(
+                [
+                    Problem(str(path), wrong, hint=_OPEN if wrong == _CLOSED else _HINT)
+                    for path, wrong in problems.items()
+                ]
+            )
 
     def claim(self, names: Iterable[str]) -> None:
         """List `names` as ours and make their folders; raises as `check`."""

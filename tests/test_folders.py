@@ -84,6 +84,18 @@ def test_files_and_folders_in_the_way_are_named(tmp_path: Path) -> None:
     assert not (tmp_path / LIST).exists()
 
 
+def test_a_closed_folder_is_not_said_to_be_in_the_way(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The one who runs the tests may be root, whom no folder is closed to."""
+    monkeypatch.setattr("os.access", lambda *_: False)
+    with pytest.raises(StoreError) as caught:
+        OutFolder(tmp_path).check(["a.csv"])
+    (problem,) = caught.value.problems
+    assert problem.message == "cannot be written in: permission denied"
+    assert "choose another folder" in problem.hint
+
+
 @pytest.mark.parametrize("name", ["../mine", "a/../../mine", "/mine"])
 def test_no_name_leads_out_of_the_folder(tmp_path: Path, name: str) -> None:
     with pytest.raises(StoreError, match="leads out of the folder"):
