@@ -121,7 +121,7 @@ const Views = (() => {
       el("p", {}, "Under a value stands its 95 % interval, from leaving out each base scene in turn."),
       state.wanted.includes("date") ? el("p", {}, `Asked on: ${Table.ASKED[0].toLowerCase()}${Table.ASKED.slice(1)}.`) : null,
       track.notes.map((note) => el("p", {}, note)),
-      el("p", {}, "“Scored again” are runs that came as a bundle, whose replies were scored again when this page was made and came out the same. What replies cost, how long they took, and which model gave them no scoring can tell: that is taken from the records."),
+      el("p", {}, "“Scored again” are runs that came as a bundle, whose replies were scored again when this page was made and came out the same. Scoring cannot check what replies cost, how long they took, or which model gave them: these are taken from the records."),
       track.physics ? el("p", {}, `${track.title}: physics is not carried out again, what fell is taken from the records.`) : null);
   }
 
@@ -131,7 +131,7 @@ const Views = (() => {
     const axes = column ? Chart.axes(data, track) : [];
     if (!axes.length) {
       return el("section", { class: "costs" }, el("h2", {}, "Cost against score"),
-        el("p", { class: "muted" }, "Of no two models a price, tokens or a time is known."));
+        el("p", { class: "muted" }, "Nothing to draw: fewer than two models have a known price, token count or time."));
     }
     const axis = axes.some(([name]) => name === state.axis) ? state.axis : axes[0][0];
     const { drawing, without } = Chart.draw(data, track, column, axis);
