@@ -62,6 +62,8 @@ def _track(
         "title": kind_of(track).title,
         "item": kind_of(track).item,
         "measure": what.measure.heading,
+        "unit": what.measure.unit,
+        "better": what.measure.better,
         "rows": [
             {
                 "key": record.item,

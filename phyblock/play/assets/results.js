@@ -26,10 +26,10 @@ const Results = (() => {
     }
     const own = track.rows.map((row) => row.value).filter((value) => value !== null && value !== undefined);
     const lines = [["You", own], ...rivals].filter(([, values]) => values.length)
-      .sort((a, b) => mean(b[1]) - mean(a[1]));
+      .sort((a, b) => (mean(b[1]) - mean(a[1])) * (track.better === "higher" ? 1 : -1));
     return el("section", {},
       el("h2", {}, track.title),
-      el("p", { class: "muted" }, `${track.measure}, mean over ${Words.count(track.rows.length, track.item)} [%]`),
+      el("p", { class: "muted" }, `${track.measure}, mean over ${Words.count(track.rows.length, track.item)}${track.unit && ` [${track.unit}]`}`),
       el("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": `${track.title}: means` },
         el("table", {},
           el("tbody", {}, lines.map(([name, values]) => el("tr", { class: name === "You" ? "own" : null },
@@ -42,7 +42,7 @@ const Results = (() => {
   function one(row, track) {
     const others = row.others.map((other) => `${other.name} ${number(other.value)}`).join(", ");
     return el("li", { class: "card" },
-      el("h3", {}, `${row.key}: `, el("span", { class: "number" }, `${number(row.value)} %`)),
+      el("h3", {}, `${row.key}: `, el("span", { class: "number" }, `${number(row.value)} ${track.unit}`)),
       answer(row),
       el("p", { class: "muted" },
         row.took_s === null ? null : `You took ${Math.round(row.took_s)} s. `,
