@@ -162,7 +162,7 @@ def test_the_table_is_sorted_and_its_columns_are_chosen_by_keyboard(visit: SiteV
     page.locator("summary").press("Enter")
     expect(page.get_by_label("USD a solved question")).to_have_count(1)
     expect(page.get_by_label("Samples done", exact=True)).to_have_count(4)
-    expect(page.locator(".notes")).to_contain_text(["that is taken from the records"])
+    expect(page.locator(".notes")).to_contain_text(["these are taken from the records"])
     box = page.get_by_role("group", name="Full planning, setting B").get_by_label("Overall F1")
     box.focus()
     page.keyboard.press("Space")
