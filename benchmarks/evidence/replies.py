@@ -13,6 +13,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
+from scipy.stats import binomtest
+
 from phyblock.parsing import parse_plan
 from phyblock.words import PlanParser
 from tests.parsing.fresh_replies import KINDS, Fresh, fresh_replies, tally
@@ -23,6 +25,8 @@ Rows = list[tuple[str, tuple[int, ...] | None]]
 N_CANDIDATES = 16
 LATE = 10
 """Rounds from this one on were read at first sight by version 4, or by what became it."""
+MET = 15
+"""Rounds from this one on met the aim."""
 MARKED = 13
 """Rounds from this one on say which replies their authors meant to be hard."""
 PAIRS = ((13, 14), (15, 16), (17, 18))
@@ -75,6 +79,7 @@ def main() -> None:
     for pair in PAIRS:
         name = " and ".join(map(str, pair))
         parts[f"rounds {name}"] = [reply for reply in marked if reply.round in pair]
+    parts[f"rounds {MET} and later"] = [reply for reply in marked if reply.round >= MET]
     for number in sorted({reply.round for reply in marked}):
         parts[f"round {number}"] = [reply for reply in marked if reply.round == number]
     for name, part in parts.items():
@@ -87,9 +92,14 @@ def _then(replies: Sequence[Fresh]) -> str:
     """What came of replies at first sight, as parts of all and of those that hold an answer."""
     counts = Counter(reply.verdict(reply.first) for reply in replies)
     holding = sum(reply.meant is not None for reply in replies)
-    misread = f"{counts['wrong']} of {len(replies)} misread ({counts['wrong'] / len(replies):.1%})"
-    not_read = f"{counts['failed']} of {holding} not read ({counts['failed'] / holding:.1%})"
-    return f"right {counts['right']}, {misread}, {not_read}"
+    misread, not_read = _share(counts["wrong"], len(replies)), _share(counts["failed"], holding)
+    return f"right {counts['right']}, misread {misread}, not read {not_read}"
+
+
+def _share(part: int, whole: int) -> str:
+    """A share with its exact 95 % interval (Clopper and Pearson 1934)."""
+    ends = binomtest(part, whole).proportion_ci(method="exact")
+    return f"{part} of {whole} ({part / whole:.1%}, {ends.low:.2%} to {ends.high:.1%})"
 
 
 def _shown(counts: Mapping[str, int]) -> str:

@@ -111,6 +111,8 @@ def test_replies_from_the_cache_are_worth_the_same(copy: Workspace) -> None:
     done = copy.run()
     assert (done.code, done.err) == (0, "")
     asked = [record for record in copy.records() if record["model"] == "alpha"]
+    said = f"Nobody was asked about {len(asked)} samples of alpha: the replies were in the cache"
+    assert said in done.out
     assert all(r["reply"]["cached"] and r["reply"]["attempts"] == 0 for r in asked)
     assert scores(copy.records()) == first
     assert {name: copy.tables()[name] for name in SCORED} == {
@@ -124,7 +126,9 @@ def test_without_the_cache_it_is_neither_read_nor_written(copy: Workspace) -> No
     copy.out = copy.root / "uncached"
     with Running(OpenAIChat()) as running:
         copy.write_models(running.url, "alpha")
-        assert copy.run("--no-cache").code == 0
+        done = copy.run("--no-cache")
+        assert done.code == 0
+        assert "in the cache" not in done.out
         assert running.server.requests == 15
     assert scores(copy.records()) == first
     assert (copy.cache / "replies.sqlite").read_bytes() == before
