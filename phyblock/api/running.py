@@ -57,7 +57,7 @@ def run_suite(
     known_in = find_models_file(named, loaded.path)
     plan = make_plan(loaded, load_models(known_in), only=models or (), limit=limit)
     check_commands(plan.models, known_in, named)
-    folder = Path(out) if out is not None else Path("results") / plan.folder_name
+    folder = Path(out) if out is not None else plan.folder_in(Path("results"))
     plan = check_ready(plan)
     costly = () if yes else unlimited_spending(plan, folder, use_cache=use_cache)
     if costly:

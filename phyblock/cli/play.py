@@ -33,7 +33,7 @@ from phyblock.run.finding import bundled_suites, find_suite, prompt_dirs
 from phyblock.run.folder import run_folder
 from phyblock.run.plan import RunPlan
 from phyblock.run.session import Session
-from phyblock.run.store import holds_run
+from phyblock.run.store import held_run
 from phyblock.specs import load_suite
 
 __all__ = ["command"]
@@ -113,8 +113,8 @@ def command(
     if export is not None:
         check_folder(export, _RUNS)
         return _export(console, plan, person, export)
-    folder = out or _RUNS / plan.folder_name
-    if holds_run(folder, plan.manifest):
+    folder = out or plan.folder_in(_RUNS)
+    if held_run(folder, plan.manifest, plan.earlier) is not None:
         run_folder(folder).check(names_to_write(folder, page=True))
     if answers is not None:
         return _import(console, plan, person, folder, answers, page=not no_report)

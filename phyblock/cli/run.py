@@ -18,10 +18,9 @@ from phyblock.cli.paths import NAME_OR_PATH, UserPath, models_file_option
 from phyblock.cli.progress import ProgressView
 from phyblock.cli.report import show_made
 from phyblock.plain_text import counted, one_line
-from phyblock.records import read_manifest
 from phyblock.report.made import names_to_write
 from phyblock.resources import bundled
-from phyblock.run.asking import asking_remarks, choice_remarks, moved_remarks
+from phyblock.run.asking import asking_remarks, choice_remarks, moved_remarks, reader_remarks
 from phyblock.run.consent import spending_refused, unlimited_spending
 from phyblock.run.estimate import estimate
 from phyblock.run.execute import Cause, RunResult
@@ -35,7 +34,7 @@ from phyblock.run.finding import (
 from phyblock.run.folder import run_folder
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.session import Session, check_ready
-from phyblock.run.store import holds_run
+from phyblock.run.store import held_run
 from phyblock.specs import load_models, load_suite
 
 __all__ = ["command"]
@@ -103,10 +102,12 @@ def command(
     only, known = split_names(models), load_models(known_in)
     plan = make_plan(loaded, known, only=only, limit=limit, informative=informative)
     check_commands(plan.models, known_in, models_file)
-    folder = out or Path("results") / plan.folder_name
+    folder = out or plan.folder_in(Path("results"))
     moved: list[str] = []
-    if holds_run(folder, plan.manifest):
-        moved = moved_remarks(read_manifest(folder), plan)
+    found = held_run(folder, plan.manifest, plan.earlier)
+    if found is not None:
+        read = reader_remarks(found, plan) if dry_run else []
+        moved = [*read, *moved_remarks(found, plan)]
         names = () if dry_run else names_to_write(folder, page=not no_report)
         run_folder(folder).check(names)
     if dry_run:

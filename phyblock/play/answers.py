@@ -87,15 +87,15 @@ def read_answers(path: Path, plan: RunPlan, person: Person) -> dict[int, Given]:
         raise DataError(problem_of(one, str(path), _IS_NOT, _AS_SAVED) for one in faults) from error
     given: dict[int, Given] = {}
     problems: list[Problem] = []
-    for field, value, wanted in (
-        ("model", found.model, person.model),
-        ("consent", found.consent, person.consent_sha256),
-        ("run", found.run, plan.manifest.identity),
+    for field, value, known in (
+        ("model", found.model, (person.model,)),
+        ("consent", found.consent, (person.consent_sha256,)),
+        ("run", found.run, (plan.manifest.identity, *plan.earlier)),
     ):
-        if value != wanted:
+        if value not in known:
             hint = "give the suite, --set, --limit, --name, --number and --consent of the export"
             message = "is of another sitting than the one that is named"
-            problems.append(Problem(str(path), message, field, value, wanted, hint))
+            problems.append(Problem(str(path), message, field, value, known[0], hint))
             break
     for place, answer in enumerate(found.answers):
         field = f"answers[{place}].number"

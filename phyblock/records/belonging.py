@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,6 +27,9 @@ class Belonging:
 
     Lines of older versions do not say which run they are of. They are known by what they do say:
     track, model, seed, version of the prompt, and that pictures of one item do not change.
+
+    Where the run had other identities under other readers, lines of these are its own, too, but
+    do not count.
     """
 
     identity: str
@@ -36,6 +39,7 @@ class Belonging:
     prompts: Mapping[str, str | None]
     variants: Mapping[str, Mapping[str, Mapping[str, Any]]] = field(default_factory=dict)
     samples: Collection[str] | None = None
+    identities: Sequence[str] = ()
     _pictures: dict[tuple[str, str, int], tuple[str, ...]] = field(default_factory=dict)
 
     @classmethod
@@ -50,7 +54,14 @@ class Belonging:
             {track: _version(about) for track, about in manifest.tracks.items()},
             manifest.variants,
             samples,
+            manifest.identities,
         )
+
+    def counts(self, line: Line) -> bool:
+        """Whether a line is what readers of the run's own version made of a reply."""
+        run = line.run if isinstance(line, Record | Turn) else ""
+        # Lines that name no run were the first in the folder.
+        return self.identity.startswith(run or next(iter(self.identities), ""))
 
     def problem(self, where: str, line: Line) -> Problem | None:
         """What shows that a record or turn is of another run, or None."""
@@ -95,7 +106,8 @@ class Belonging:
 
     def _run(self, run: str) -> tuple[str, object, str, bool]:
         # A run that was scored again has the identity of the first and says how.
-        return "run", run, self.identity[: len(run)], self.identity.startswith(run)
+        known = (self.identity, *self.identities)
+        return "run", run, self.identity[: len(run)], any(one.startswith(run) for one in known)
 
     def _sample(self, sample: str) -> tuple[str, object, str, bool]:
         allowed = "a sample of the suite as it is run"

@@ -38,13 +38,13 @@ LineT = TypeVar("LineT", bound=Line)
 
 
 class Lines(Generic[LineT]):
-    """Every line of a file with where it stands, one at a time, oldest first.
+    """Every line of a file that counts with where it stands, one at a time, oldest first.
 
     A last line without its newline counts all the same when it is whole; else, as a kill
     leaves it behind, it ends the iteration: `is_cut` is then set. `lacks_newline` says that the
-    last one needs one. `whole_bytes` is the size of the lines passed so far. Any other line
-    that is not what the file holds, or is not of the run that it should be of, is an error naming
-    file, line and field.
+    last one needs one. `whole_bytes` is the size of the lines passed so far, `start_bytes` where
+    the last of them begins. Any other line that is not what the file holds, or is not of the run
+    that it should be of, is an error naming file, line and field.
     """
 
     noun: ClassVar[str]
@@ -57,11 +57,18 @@ class Lines(Generic[LineT]):
         self.path = path
         self.is_cut = False
         self.lacks_newline = False
+        self.start_bytes = 0
         self.whole_bytes = 0
         self._adapter = adapter
         self._belonging = belonging
 
     def __iter__(self) -> Iterator[tuple[str, LineT]]:
+        for where, line in self.every():
+            if self._belonging is None or self._belonging.counts(line):
+                yield where, line
+
+    def every(self) -> Iterator[tuple[str, LineT]]:
+        """All lines, also those of readers of other versions, which do not count."""
         self.whole_bytes = 0
         try:
             with open_regular(self.path) as file:
@@ -73,6 +80,7 @@ class Lines(Generic[LineT]):
                         return
                     line = self._read(where, data)
                     self._check(where, line)
+                    self.start_bytes = self.whole_bytes
                     self.whole_bytes += len(data)
                     yield where, line
         except FileNotFoundError:
@@ -153,8 +161,9 @@ class PromptLines(Lines[Prompt]):
         super().__init__(folder / PROMPTS, _PROMPT)
         self.digests: set[str] = set()
 
-    def __iter__(self) -> Iterator[tuple[str, Prompt]]:
-        for where, line in super().__iter__():
+    def every(self) -> Iterator[tuple[str, Prompt]]:
+        """All lines."""
+        for where, line in super().every():
             self.digests.add(line.sha256)
             yield where, line
 

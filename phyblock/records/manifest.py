@@ -120,10 +120,13 @@ class ManifestChoice(Line):
 
 
 class Manifest(Line):
-    """What a run is: written before anything is asked, and never changed."""
+    """What a run is: written before anything is asked, and changed by later readers alone."""
 
     identity: str
     """Digest of what decides the results: only the same run goes on in a folder."""
+    identities: tuple[str, ...] = ()
+    """Where readers of several versions read the replies: its identity under each of them, oldest
+    first. Lines of the one in `identity` count, others stay and are passed over."""
     created: str = ""
     """When it was begun, UTC."""
     format: Annotated[int, Field(ge=1, le=FORMAT)] = FORMAT

@@ -24,6 +24,8 @@ class Turn(Line):
     """The reply, as in a record."""
     run: str = ""
     """Digest of the run that it belongs to; older turns have none."""
+    read_again: bool = False
+    """Whether it repeats a turn of earlier readers, with which its cost was counted."""
 
 
 class PictureMark(Line):

@@ -41,11 +41,9 @@ def newest_starts(lines: RecordLines, tracks: Collection[str] | None = None) -> 
     Only samples of `tracks` are taken, of all where it is None.
     """
     starts: dict[str, int] = {}
-    start = 0
     for _, record in lines:
         if tracks is None or record.track in tracks:
-            starts[record.sample] = start
-        start = lines.whole_bytes
+            starts[record.sample] = lines.start_bytes
     return starts
 
 

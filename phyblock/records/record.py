@@ -150,6 +150,8 @@ class Record(Line):
     """When it was written, UTC."""
     run: str = ""
     """Digest of the run that it belongs to; older records have none."""
+    read_again: bool = False
+    """Whether later readers made it of an earlier record, with which its cost was counted."""
     shown: ShownScene | None = None
     """How the scene was shown; null: as the file has it."""
     asked: AskedAs | None = None
@@ -254,6 +256,8 @@ class Record(Line):
     @property
     def limit_usd(self) -> float:
         """What the run's cost limit counted for this line [US dollars]."""
+        if self.read_again:
+            return 0.0
         if self.reply is not None:
             return self.reply.limit_usd
         return self.failed_usd

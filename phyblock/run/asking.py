@@ -8,6 +8,7 @@ from pathlib import Path
 
 from phyblock.records import Manifest
 from phyblock.run.plan import RunPlan
+from phyblock.run.taking_on import earlier_readers
 from phyblock.specs import LoadedSuite
 from phyblock.tracks import kind_of
 from phyblock.tracks.opening import template_prompt
@@ -30,6 +31,13 @@ def asking_remarks(loaded: LoadedSuite, plan: RunPlan) -> list[str]:
         return own
     unsaid = [_unsaid(track, path) for (track, path), one in used.items() if not _says(track, one)]
     return [*own, *_models(plan), *unsaid]
+
+
+def reader_remarks(begun: Manifest, plan: RunPlan) -> list[str]:
+    """That replies of a run will be read again, where earlier readers read them."""
+    if begun.identity == plan.manifest.identity:
+        return []
+    return [f"{earlier_readers(begun)}: these read them again, before anybody is asked"]
 
 
 def moved_remarks(begun: Manifest, plan: RunPlan) -> list[str]:

@@ -24,13 +24,14 @@ from phyblock.models import (
     waiting_keys,
 )
 from phyblock.models import estimate as estimate_call
-from phyblock.records import BatchLines
+from phyblock.records import BatchLines, Manifest
 from phyblock.records.reading import run_records
 from phyblock.resources import reply_cache_file
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
 from phyblock.run.samples import Sample
-from phyblock.run.store import holds_run
+from phyblock.run.store import held_run
+from phyblock.run.taking_on import begun_anew
 from phyblock.tracks import AnyTrack, Item, shown_item
 from phyblock.variants import Variant
 
@@ -197,9 +198,9 @@ def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
         )
         for m in plan.models
     ]
-    is_begun = holds_run(folder, plan.manifest)
-    settled = _settled(plan, folder, rows) if is_begun else set()
-    lines = tuple(line for _, line in BatchLines(folder)) if is_begun else ()
+    found = held_run(folder, plan.manifest, plan.earlier)
+    settled = set() if found is None else _settled(plan, folder, found, rows)
+    lines = () if found is None else tuple(line for _, line in BatchLines(folder))
     waiting = {
         model.name: waiting_keys(model.config, lines, folder)
         for model in plan.models
@@ -249,16 +250,20 @@ def _outlines(
             yield [seed], list(track.outlines(shown[seed]))
 
 
-def _settled(plan: RunPlan, folder: Path, rows: Sequence[Estimate]) -> set[str]:
-    """Samples whose newest record is final; from their replies the rows learn."""
+def _settled(plan: RunPlan, folder: Path, found: Manifest, rows: Sequence[Estimate]) -> set[str]:
+    """Samples whose newest record is final, and stays so under the readers of today; from their
+    replies the rows learn.
+    """
     by_model = {row.model: row for row in rows}
     newest: dict[str, bool] = {}
-    for _, record in run_records(folder, plan.manifest, plan.sample_ids()):
+    for _, record in run_records(folder, plan.going_on(found), plan.sample_ids()):
         newest[record.sample] = record.is_final
         kind = _kind(record.track, record.way)
         for reply in record.replies:
             by_model[record.model].add_reply(reply.usage.completion_tokens, kind)
-    return {sample for sample, is_final in newest.items() if is_final}
+    settled = {sample for sample, is_final in newest.items() if is_final}
+    is_todays = found.identity == plan.manifest.identity
+    return settled if is_todays else settled - begun_anew(plan, folder, found)
 
 
 def _add(

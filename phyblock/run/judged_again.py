@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,14 @@ from phyblock.run.replayed import counted_again
 from phyblock.tracks import AnyTrack, EpisodeTrack, SingleTrack, kind_of, shown_item
 from phyblock.variants import Variant
 
-__all__ = ["Tell", "is_read_otherwise", "judged_again", "untold"]
+__all__ = [
+    "Tell",
+    "is_read_otherwise",
+    "judged_again",
+    "records_with_items",
+    "reply_judged_again",
+    "untold",
+]
 
 Tell = Callable[[str], object]
 """Takes what a person should know of what was done."""
@@ -51,37 +58,52 @@ async def judged_again(
     or_kept = not anew and is_read_otherwise(manifest)
     kept: Counter[str] = Counter()
     where = str(folder / RECORDS)
-    tracks = variants[""]
-    items = {(name, item.key): item for name, track in tracks.items() for item in track.items}
     records: list[Record] = []
-    for record in read_records(folder, manifest):
-        track = variants[_variant(record, variants, where).shown.key].get(record.track)
+    for record, track, item in records_with_items(folder, manifest, variants):
         if track is None:
             records.append(record)
             continue
-        item = items.get((track.name, record.item))
-        if item is None:
-            message, hint = "names an item that the run has not", "restore the file from a copy"
-            raise StoreError(Problem(where, message, "key", record.item, hint=hint))
-        item = shown_item(track, item, record.seed)
         about = {**about_item(item), **track.about(item)} if anew else None
         if isinstance(track, EpisodeTrack):
             again = await counted_again(track, item, record, where, about, or_kept=or_kept)
             kept[track.name] += again is record
             records.append(again)
         else:
-            records.append(await _of_reply(track, item, record, about or {}))
+            records.append(await reply_judged_again(track, item, record, about or {}))
     for name, count in kept.items():
         if count:
             tell(
                 f"{kind_of(name).title}: {counted(count, 'episode')} of the run would go otherwise "
                 f"under readers {READER_VERSION}, and stay as they were: what was asked next "
-                "followed from what was read. A run in another folder asks on from there."
+                "followed from what was read. The command that made the run asks on from there."
             )
     return records
 
 
-async def _of_reply(
+def records_with_items(
+    folder: Path, manifest: Manifest, variants: Mapping[str, Mapping[str, AnyTrack]]
+) -> Iterator[tuple[Record, AnyTrack | None, Any]]:
+    """The newest record of every sample of the run in `folder`, with its track and its item as it
+    was shown; None for both where `variants` lacks the track.
+
+    Raises StoreError for a record that is not of the run.
+    """
+    where = str(folder / RECORDS)
+    tracks = variants[""]
+    items = {(name, item.key): item for name, track in tracks.items() for item in track.items}
+    for record in read_records(folder, manifest):
+        track = variants[_variant(record, variants, where).shown.key].get(record.track)
+        if track is None:
+            yield record, None, None
+            continue
+        item = items.get((track.name, record.item))
+        if item is None:
+            message, hint = "names an item that the run has not", "restore the file from a copy"
+            raise StoreError(Problem(where, message, "key", record.item, hint=hint))
+        yield record, track, shown_item(track, item, record.seed)
+
+
+async def reply_judged_again(
     track: SingleTrack[Any], item: Any, record: Record, about: Mapping[str, Any]
 ) -> Record:
     """The record of a stored reply, judged again."""

@@ -1,10 +1,8 @@
-"""`run.yaml`: what a run is, written before anything is asked and never changed."""
+"""`run.yaml`: what a run is, written before anything is asked."""
 
 from __future__ import annotations
 
 import contextlib
-import hashlib
-import json
 import platform
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
@@ -12,14 +10,14 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from phyblock.datasets import Dataset
-from phyblock.datasets.version import UNNUMBERED, read_version
-from phyblock.digests import hex_digest
+from phyblock.datasets.version import read_version
 from phyblock.parsing import READER_VERSION
-from phyblock.records import FORMAT, Manifest
+from phyblock.records import Manifest
 from phyblock.records.manifest import ManifestChoice
+from phyblock.run.identity import earlier_identities, identity_of, inputs_of
 from phyblock.run.models import PlannedModel
 from phyblock.sim.registry import told_engine
-from phyblock.specs import LoadedSuite, SuiteSpec
+from phyblock.specs import LoadedSuite
 from phyblock.tracks import AnyTrack, kind_of
 from phyblock.tracks.kind import kinds_with_physics
 from phyblock.variants import Variant
@@ -37,17 +35,19 @@ def make_manifest(
     variants: Mapping[Variant, Sequence[AnyTrack]],
     limit: int | None,
     chosen: ManifestChoice | None = None,
-) -> Manifest:
-    """The manifest; `identity` digests what decides the results, so that only the same run goes
-    on in a folder. Limits, prices, labels, tables, paths, and where and in which order models are
-    named and served are no part of it; nor is how scenes were chosen, only which. `variants` has
-    the tracks of every way of asking.
+) -> tuple[Manifest, tuple[str, ...]]:
+    """The manifest, and its identities under earlier readers.
+
+    `identity` digests what decides the results, so that only the same run goes on in a folder.
+    Limits, prices, labels, tables, paths, and where and in which order models are named and served
+    are no part of it; nor is how scenes were chosen, only which. `variants` has the tracks of every
+    way of asking.
     """
     suite, data_version = loaded.suite, read_version(dataset.root)
-    inputs = _inputs(suite, models, _dataset(dataset, data_version), variants, limit)
+    inputs = inputs_of(suite, models, dataset, data_version, variants, limit)
     scenes = [task.scene for task in dataset.tasks]
     fields = {
-        "identity": _digest(inputs),
+        "identity": identity_of(inputs, READER_VERSION),
         "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         **inputs,
         **({} if chosen is None else {"chosen": chosen.fields()}),
@@ -74,63 +74,13 @@ def make_manifest(
             **_versions(),
         },
     }
-    return Manifest.model_validate(fields)
-
-
-def _inputs(
-    suite: SuiteSpec,
-    models: Sequence[PlannedModel],
-    data: Mapping[str, object],
-    variants: Mapping[Variant, Sequence[AnyTrack]],
-    limit: int | None,
-) -> dict[str, Any]:
-    """What decides the results."""
-    inputs: dict[str, Any] = {
-        "format": FORMAT,
-        "suite": suite.identity(),
-        "models": [{"name": m.name, **_identity(m)} for m in models],
-        "dataset": data,
-        "tracks": {track.name: track.identity() for track in variants[Variant()]},
-        "limit": limit,
-    }
-    if suite.vary.factors:
-        inputs["variants"] = {
-            variant.key: {track.name: track.identity() for track in of_variant}
-            for variant, of_variant in variants.items()
-            if variant == variant.shown
-        }
-    return inputs
-
-
-def _digest(inputs: Mapping[str, Any]) -> str:
-    """Hex digest of the inputs, whatever the order of the models."""
-    by_name = sorted(inputs["models"], key=lambda model: str(model["name"]))
-    decided = {**inputs, "models": by_name, "readers": READER_VERSION}
-    canonical = json.dumps(decided, sort_keys=True, separators=(",", ":"))
-    return hex_digest(canonical)
-
-
-def _dataset(dataset: Dataset, data_version: int) -> dict[str, object]:
-    """What of the data decides the results; runs from before versions were counted say none."""
-    known: dict[str, object] = {"name": dataset.name, "sha256": dataset.sha256}
-    return known if data_version == UNNUMBERED else {**known, "version": data_version}
+    return Manifest.model_validate(fields), earlier_identities(inputs)
 
 
 def _place(model: PlannedModel) -> dict[str, object]:
     """Where a model is served, which decides nothing."""
     addresses = model.config.addresses
     return {"served_at": addresses} if addresses else {}
-
-
-def _identity(model: PlannedModel) -> dict[str, object]:
-    """What decides a model's replies; a recording by what is in it, not by where it is."""
-    folder = model.config.recording
-    if folder is None:
-        return model.config.identity()
-    digest = hashlib.sha256()
-    for path in sorted((*folder.glob("*.json"), *folder.glob("records.jsonl"))):
-        digest.update(f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
-    return {**model.config.identity(), "recording": digest.hexdigest()}
 
 
 def _versions() -> dict[str, str]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from phyblock.datasets import Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.models import ModelConfig
-from phyblock.records import Manifest
+from phyblock.records import MANIFEST, Manifest, read_manifest
 from phyblock.records.manifest import ManifestChoice
 from phyblock.run.data import open_dataset
 from phyblock.run.kept_floors import kept_floors
@@ -33,9 +33,9 @@ __all__ = ["RunPlan", "make_plan"]
 @dataclass(frozen=True)
 class RunPlan:
     """Everything a run needs; `manifest` is what `run.yaml` holds, but for what floors reach;
-    `tracks` are those of the reference, `variants` all ways of asking with the tracks of each;
-    `floors` gives what floors reach; `arranged` says in which order the items of a track are asked
-    about.
+    `earlier` are its identities under earlier readers, the latest first; `tracks` are those of the
+    reference, `variants` all ways of asking with the tracks of each; `floors` gives what floors
+    reach; `arranged` says in which order the items of a track are asked about.
     """
 
     suite: SuiteSpec
@@ -43,6 +43,7 @@ class RunPlan:
     dataset: Dataset
     variants: Mapping[Variant, tuple[AnyTrack, ...]]
     manifest: Manifest
+    earlier: tuple[str, ...]
     floors: Callable[[], FloorValues]
     arranged: Callable[[Sequence[Item]], Sequence[Item]] = tuple
 
@@ -55,6 +56,11 @@ class RunPlan:
         """The manifest of a run that begins, with what floors reach; it may take some seconds."""
         return self.manifest.model_copy(update={"floors": self.floors()})
 
+    def going_on(self, found: Manifest) -> Manifest:
+        """The manifest by which lines of the run in a folder are known, which `found` describes."""
+        changes = {"identity": found.identity, "identities": found.identities}
+        return self.manifest.model_copy(update=changes)
+
     @property
     def samples_per_model(self) -> int:
         """Number of items of all tracks times seeds times ways of asking."""
@@ -66,10 +72,15 @@ class RunPlan:
         """Whether a track plays episodes."""
         return any(isinstance(track, EpisodeTrack) for track in self.tracks)
 
-    @property
-    def folder_name(self) -> str:
-        """Name of the run's folder when none is given: the same command finds it again."""
-        return f"{self.suite.name}-{self.manifest.identity[:8]}"
+    def folder_in(self, root: Path) -> Path:
+        """The run's folder below `root` when none is named: the same command finds it again, also
+        one that was begun under earlier readers.
+        """
+        own = (self.manifest.identity, *self.earlier)
+        folders = [root / f"{self.suite.name}-{identity[:8]}" for identity in own]
+        begun = (folder for folder in folders if (folder / MANIFEST).is_file())
+        known = (folder for folder in begun if read_manifest(folder).identity in own)
+        return next(known, folders[0])
 
     def sample_ids(self) -> frozenset[str]:
         """The ids of all samples of all models."""
@@ -129,14 +140,14 @@ def make_plan(
     if asks:
         for of_variant in variants.values():
             _check_prompts(of_variant)
-    manifest = make_manifest(loaded, models, selected, variants, limit, chosen)
+    manifest, earlier = make_manifest(loaded, models, selected, variants, limit, chosen)
 
     def reopened(name: str, one: SuiteSpec) -> AnyTrack:
         opening = Opening(replace(loaded, suite=one), dataset, limit, False, named)
         return kind_of(name).open(opening)
 
     floors = partial(kept_floors, manifest, suite, reopened, dataset)
-    return RunPlan(suite, models, selected, variants, manifest, floors)
+    return RunPlan(suite, models, selected, variants, manifest, earlier, floors)
 
 
 def _with_plain_names(suite: SuiteSpec, known: Mapping[str, ModelSpec]) -> SuiteSpec:

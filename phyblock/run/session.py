@@ -32,7 +32,8 @@ from phyblock.run.execute import Executor, RunResult
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
 from phyblock.run.soundness import provider_problem
-from phyblock.run.store import RunStore, holds_run
+from phyblock.run.store import RunStore, held_run
+from phyblock.run.taking_on import take_on
 from phyblock.run.writer import RecordWriter
 
 __all__ = ["SERVERS", "Session", "check_ready"]
@@ -109,8 +110,10 @@ class Session:
     async def __aenter__(self) -> Session:
         plan = self._plan
         try:
-            is_there = holds_run(self._folder, plan.manifest)
-            manifest = plan.manifest if is_there else plan.begun()
+            found = held_run(self._folder, plan.manifest, plan.earlier)
+            if found is not None and found.identity != plan.manifest.identity:
+                found = await take_on(plan, self._folder, found, self._tell)
+            manifest = plan.begun() if found is None else plan.going_on(found)
             self._store = RunStore(self._folder, manifest, plan.sample_ids())
             self._check_batches(self._store)
             remove_unfinished(self._folder)

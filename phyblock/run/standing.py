@@ -49,7 +49,7 @@ class Summary:
 
 @dataclass
 class Standing:
-    """The newest record of every sample, summed up, and what the run cost so far.
+    """The newest record of every sample that counts, summed up, and what the run cost so far.
 
     `batches` are all lines about batches, oldest first. `limit_usd` is what the cost limit counted,
     of every line, also of those that later ones replaced.
@@ -59,11 +59,13 @@ class Standing:
     limit_usd: float = 0.0
     batches: list[BatchLine] = field(default_factory=list)
 
-    def add(self, record: Record) -> None:
-        """Take in a record as it was read, oldest first."""
-        self.samples[record.sample] = Summary.of(record)
+    def add(self, record: Record, *, counts: bool) -> None:
+        """Take in a record as it was read, oldest first; of one that does not count, its cost."""
+        if counts:
+            self.samples[record.sample] = Summary.of(record)
         self.limit_usd += record.limit_usd
 
     def add_turn(self, turn: Turn) -> None:
         """Take in an answered turn of an episode."""
-        self.limit_usd += turn.reply.limit_usd
+        if not turn.read_again:
+            self.limit_usd += turn.reply.limit_usd

@@ -1,8 +1,8 @@
-"""Writing a run: `run.yaml`, written first and never changed, and the files that grow.
+"""Writing a run: `run.yaml`, written first, and the files that grow.
 
 A record counts only when it is appended and synced, so a kill at any moment loses nothing that was
 written; a line that a kill cut short is dropped when the run is opened again. A later record of a
-sample replaces an earlier one.
+sample replaces an earlier one. `run.yaml` changes only when later readers take the run on.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from phyblock.records import (
     Lines,
     Manifest,
     PromptLines,
+    Record,
     Stopped,
     StoredReply,
     TurnLines,
@@ -40,7 +41,7 @@ from phyblock.run.standing import Standing
 from phyblock.sim.registry import PHYSICS_VARIABLE, REFERENCE_ENGINE
 from phyblock.tracks.base import CARRYING, ENGINE
 
-__all__ = ["RunStore", "holds_run"]
+__all__ = ["RunStore", "held_run"]
 
 _LABELS = ("published", "served_at", "size_b")
 LineT = TypeVar("LineT", bound=Line)
@@ -84,7 +85,7 @@ class RunStore:
                 self._acquire()
                 self._claim(manifest)
                 records = run_records(folder, manifest, samples)
-                self.records = self._open(records, self.standing.add)
+                self.records = self._open(records, self._add)
                 turns = TurnLines(folder, self._belonging)
                 self.turns = self._open(turns, self.standing.add_turn)
                 batches = BatchLines(folder)
@@ -128,6 +129,14 @@ class RunStore:
         """The replies of episodes that have begun and are not `done`, by sample id."""
         return collect_turns(TurnLines(self._folder, self._belonging), done)
 
+    def take_on(self, manifest: Manifest) -> None:
+        """Replace `run.yaml`, of the run that it is under readers of another version."""
+        with writing(self._folder, _HINT):
+            atomic_write(self._folder / MANIFEST, manifest_text(manifest), sync=True)
+
+    def _add(self, record: Record) -> None:
+        self.standing.add(record, counts=self._belonging.counts(record))
+
     def _open(
         self,
         lines: Lines[LineT],
@@ -138,7 +147,7 @@ class RunStore:
         """Open a file for appending, rid of a line that a kill cut short; `take` sees the rest."""
         file = AppendFile(lines.path, sync=sync)
         self._files.append(file)
-        for _, line in lines:
+        for _, line in lines.every():
             take(line)
         if lines.is_cut:
             os.truncate(lines.path, lines.whole_bytes)
@@ -156,14 +165,13 @@ class RunStore:
             raise StoreError(Problem(str(self._folder), message, hint=hint)) from error
 
     def _claim(self, manifest: Manifest) -> None:
-        if holds_run(self._folder, manifest):
-            return
-        path = self._folder / MANIFEST
-        atomic_write(path, manifest_text(manifest), sync=True)
+        if held_run(self._folder, manifest) is None:
+            self.take_on(manifest)
 
 
-def holds_run(folder: Path, manifest: Manifest) -> bool:
-    """Whether `folder` holds the run that `manifest` describes; reads alone.
+def held_run(folder: Path, manifest: Manifest, earlier: Collection[str] = ()) -> Manifest | None:
+    """The manifest in `folder`, which holds the run that `manifest` describes, or that run under
+    one of its `earlier` identities; None where it holds no run. Reads alone.
 
     Raises StoreError when it holds records or turns of another run, or what is no run. A manifest
     without any is no run yet: one that failed at once leaves it behind, and nothing would be lost
@@ -171,13 +179,15 @@ def holds_run(folder: Path, manifest: Manifest) -> bool:
     """
     check_place(folder)
     if not (folder / MANIFEST).exists():
-        return False
+        return None
     found = read_manifest(folder)
     if found.identity == manifest.identity:
-        return True
+        return found
     paid: tuple[Lines[Any], ...] = (any_records(folder), TurnLines(folder), BatchLines(folder))
     if all(next(iter(lines), None) is None for lines in paid):
-        return False
+        return None
+    if found.identity in earlier:
+        return found
     names = _changed(found, manifest)
     changed = f"different: {', '.join(names) or 'how phyblock asks, draws or reads'}"
     hint = "; ".join((*_reasons(found, manifest), _HINT))
@@ -195,10 +205,11 @@ def _reasons(found: Manifest, wanted: Manifest) -> Iterator[str]:
     if engines[0] != engines[1] and engines[0].keys() == engines[1].keys():
         was, is_now = (one.engine or REFERENCE_ENGINE for one in (found, wanted))
         yield f"its blocks are let go in {was}, here in {is_now} ({PHYSICS_VARIABLE} chooses)"
-    read, reads = (one.versions.get("readers") for one in (found, wanted))
-    if read != reads:
+    read, reads = (one.versions.get("readers", "1") for one in (found, wanted))
+    # Earlier readers are no reason: those of today take their runs on.
+    if read != reads and not (read.isdecimal() and int(read) < int(reads)):
         yield (
-            f"its replies were read by readers {read or 1}, this version has readers {reads}: "
+            f"its replies were read by readers {read}, this version has readers {reads}: "
             "phyblock score FOLDER reads and scores them again and asks nobody, and a run in "
             "another folder takes them from the reply cache"
         )

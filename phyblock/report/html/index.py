@@ -42,10 +42,9 @@ def read_places(folder: Path, design: Design) -> list[Place]:
     """
     lines = run_records(folder)
     found: dict[str, Place] = {}
-    start = 0
     for _, record in lines:
+        start = lines.start_bytes
         found[record.sample] = Place(record.track, record.item, record.model, record.seed, start)
-        start = lines.whole_bytes
     tracks = {name: n for n, name in enumerate(design.suite.tracks)}
     models = {name: n for n, name in enumerate(design.model_names)}
     return sorted(
