@@ -21,6 +21,7 @@ __all__ = [
     "Episode",
     "EpisodeTrack",
     "Item",
+    "ItemT",
     "Judgement",
     "JudgesApart",
     "ShowsBySeed",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Awaitable, Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Generic, TypeVar
@@ -16,7 +16,7 @@ from phyblock.models.base import Image, Message
 from phyblock.specs import LoadedSuite, did_you_mean
 from phyblock.tracks.base import Item
 
-__all__ = ["Examples", "Shots", "WorkedExample", "Working", "examples_of"]
+__all__ = ["Examples", "Shots", "WorkedExample", "examples_of"]
 
 
 AskedT = TypeVar("AskedT", bound=Item)
@@ -40,17 +40,6 @@ class WorkedExample:
             for part in self.question.parts
         )
         return Message("user", parts), Message("assistant", (self.answer,))
-
-
-@dataclass(frozen=True)
-class Working(Generic[AskedT]):
-    """How a track works an example: its pictures as they are sent, or as far as they are at hand
-    and whether all are, and the example that they are part of.
-    """
-
-    pictures: Callable[[AskedT], Awaitable[tuple[Image, ...]]]
-    outline: Callable[[AskedT], tuple[tuple[Image, ...], bool]]
-    example: Callable[[AskedT, tuple[Image, ...]], WorkedExample]
 
 
 @dataclass(frozen=True)
@@ -90,7 +79,6 @@ class Examples(Generic[AskedT]):
     stand_ins: Callable[[AskedT], Iterable[AskedT]] = lambda _: ()
     _alike: dict[Hashable, list[AskedT]] = field(default_factory=dict, init=False)
     _goals: dict[str, bytes] = field(default_factory=dict, init=False)
-    _shown: dict[str, WorkedExample] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         """Put the pool in order."""
@@ -100,25 +88,6 @@ class Examples(Generic[AskedT]):
     def of(self, item: AskedT) -> tuple[AskedT, ...]:
         """The examples of an item, fewer than `n` where there are no more."""
         return tuple(islice(self._others(item), self.n))
-
-    async def shots(self, item: AskedT, work: Working[AskedT]) -> Shots:
-        """The examples of an item, each worked once."""
-        chosen = self.of(item)
-        for one in chosen:
-            if one.key not in self._shown:
-                self._shown[one.key] = work.example(one, await work.pictures(one))
-        return Shots(tuple(self._shown[one.key] for one in chosen))
-
-    def outlined(self, item: AskedT, work: Working[AskedT]) -> tuple[Shots, bool]:
-        """The examples of an item made without rendering, and whether all pictures are the real
-        ones.
-        """
-        examples, are_real = [], True
-        for one in self.of(item):
-            pictures, is_real = work.outline(one)
-            examples.append(work.example(one, pictures))
-            are_real = are_real and is_real
-        return Shots(tuple(examples)), are_real
 
     def used(self, items: Iterable[AskedT]) -> tuple[AskedT, ...]:
         """All that are examples of any of the items, by key."""

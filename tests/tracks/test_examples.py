@@ -187,12 +187,12 @@ def test_no_example_is_kin_of_what_is_shown_instead(tmp_path: Path, track: str) 
     for item in shown.items[::3]:
         for seed in (0, 1):
             if track == "vqa":
-                task = shown._tasks[item.question.id]
-                instead = shown._elsewhere.of(task, seed)
+                asked = item
+                instead = shown._elsewhere.of(item.task, seed)
             else:
-                task = shown.shown(item, seed)
-                instead = task.goal
-            assert all(bases(instead).isdisjoint(bases(one)) for one in shown._examples.of(task))
+                asked = shown.shown(item, seed)
+                instead = asked.goal
+            assert all(bases(instead).isdisjoint(bases(one)) for one in shown._examples.of(asked))
 
 
 def manifest_of(folder: Path, *sets: str) -> Any:

@@ -12,7 +12,7 @@ from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
 from phyblock.models.base import Image
 from phyblock.scoring import AssemblyScorer, Score
-from phyblock.tracks.examples import Examples, Shots, WorkedExample, Working
+from phyblock.tracks.examples import Examples
 from phyblock.tracks.full_planning.baselines import PlanSubject
 from phyblock.tracks.full_planning.worked import worked_plan
 from phyblock.tracks.goal_blind.guessing import BlindGuesses
@@ -102,43 +102,17 @@ class FullPlanning(WholePlanTrack[PlanningRules, Pictures]):
         """`prompt` and `pictures` are None where every model is a recording; from `pool`, else
         `items`, baselines learn. `examples` are in the form in which they are shown.
         """
-        super().__init__(rules, prompt, pictures, items, showing)
-        self._examples = examples or Examples((), 0)
+        super().__init__(rules, prompt, pictures, items, showing, examples)
         self._guesses = BlindGuesses(showing, pool or items, rules.settings[0])
         self._scorers: dict[object, AssemblyScorer] = {}
-
-    def identity(self) -> dict[str, Any]:
-        """Name and version of the prompt, a digest of all that decides the pictures, and the worked
-        examples where there are any.
-        """
-        examples = () if self._pictures is None else self._examples.used(self.items)
-        shots = {"examples": [task.key for task in examples]} if examples else {}
-        return {**super().identity(), **shots}
 
     def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
         """What templates may use; nothing in it gives an answer away."""
         scale = None if self._pictures is None else self._pictures.candidate_scale
         return {**super().facts(item, pictures), "candidate_scale": scale}
 
-    def _pictured(self) -> list[AssemblyTask]:
-        return [*super()._pictured(), *self._examples.used(self.items)]
-
-    async def _shots(self, item: AssemblyTask, prompt: Prompt, pictures: Pictures) -> Shots:
-        return await self._examples.shots(item, self._working(prompt, pictures))
-
-    def _outlined_shots(
-        self, item: AssemblyTask, prompt: Prompt, pictures: Pictures
-    ) -> tuple[Shots, bool]:
-        return self._examples.outlined(item, self._working(prompt, pictures))
-
-    def _working(self, prompt: Prompt, pictures: Pictures) -> Working[AssemblyTask]:
-        return Working(pictures.of, pictures.outline, partial(self._example, prompt))
-
-    def _example(
-        self, prompt: Prompt, task: AssemblyTask, pictures: tuple[Image, ...]
-    ) -> WorkedExample:
-        *_, question = prompt.messages(pictures, self.facts(task, pictures))
-        return WorkedExample(task.key, question, worked_plan(task, self.rules.form(task)))
+    def _right_answer(self, item: AssemblyTask) -> str:
+        return worked_plan(item, self._form(item))
 
     def _subject(self, item: AssemblyTask) -> PlanSubject:
         guess = partial(self._guesses.plan, item)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from phyblock.datasets import (
@@ -27,7 +27,7 @@ from phyblock.tracks.selection import spread, stratified
 from phyblock.tracks.vqa.pictures import QuestionPictures
 from phyblock.tracks.vqa.rules import VqaRules
 from phyblock.tracks.vqa.spec import VqaSpec
-from phyblock.tracks.vqa.track import Vqa, elsewhere_in, subtask_of
+from phyblock.tracks.vqa.track import AskedQuestion, Vqa, elsewhere_in
 
 __all__ = ["open_questions", "open_vqa", "select_questions"]
 
@@ -58,13 +58,20 @@ def open_vqa(opening: Opening) -> Vqa:
     )
     elsewhere = elsewhere_in(questions) if rules.wrong_image else None
 
-    def stand_ins(task: QuestionTask) -> tuple[QuestionTask, ...]:
-        return () if elsewhere is None else elsewhere.each(task, suite.seeds)
+    def stand_ins(item: AskedQuestion) -> Iterator[AskedQuestion]:
+        others = () if elsewhere is None else elsewhere.each(item.task, suite.seeds)
+        return map(AskedQuestion, others)
 
     if elsewhere is not None:
         elsewhere.check(tasks, "question", "vqa.wrong_image")
-    examples = examples_of(loaded, questions.tasks, tasks, "question", subtask_of, stand_ins)
+    pool, items = map(AskedQuestion, questions.tasks), [AskedQuestion(task) for task in tasks]
+    examples = examples_of(loaded, pool, items, "question", _subtask, stand_ins)
     return Vqa(rules, questions, tasks, template_prompt(loaded, Vqa.name), pictures, examples)
+
+
+def _subtask(item: AskedQuestion) -> str:
+    """What a question and its worked examples share."""
+    return item.task.question.subtask
 
 
 def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSet:

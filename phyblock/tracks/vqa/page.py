@@ -18,7 +18,7 @@ from phyblock.tracks.vqa.answers import question_digest, showing
 from phyblock.tracks.vqa.opening import open_questions
 from phyblock.tracks.vqa.pictures import QuestionPictures, ShownQuestion
 from phyblock.tracks.vqa.record import ChoiceRecord
-from phyblock.tracks.vqa.track import asked
+from phyblock.tracks.vqa.track import AskedQuestion
 
 __all__ = ["question_items"]
 
@@ -46,7 +46,7 @@ def question_items(run: Run, dataset: Dataset) -> PageItems:
 def _shown(record: Record, questions: Mapping[str, QuestionTask]) -> ShownQuestion | None:
     if not isinstance(record, ChoiceRecord) or record.question.id not in questions:
         return None
-    return asked(questions[record.question.id], record.question.rotation).shown
+    return AskedQuestion(questions[record.question.id], record.question.rotation).shown
 
 
 def _entry(shown: ShownQuestion) -> dict[str, Any]:
