@@ -17,6 +17,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from phyblock.sums import plain_sum
+
 __all__ = [
     "BLOCK_TYPES",
     "COLORS",
@@ -120,7 +122,7 @@ def _half_disc(radius_m: float, segments: int) -> tuple[float, float]:
     """Area [m2] and centroid height above the diameter [m] of a half disc of `segments` chords."""
     step = math.pi / segments
     area = 0.5 * segments * radius_m**2 * math.sin(step)
-    moment = sum(
+    moment = plain_sum(
         (math.sin(i * step) + math.sin((i + 1) * step)) * radius_m / 3 for i in range(segments)
     ) * (0.5 * radius_m**2 * math.sin(step))
     return area, moment / area

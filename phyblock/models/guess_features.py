@@ -12,6 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from phyblock.domain.question import Question
+from phyblock.sums import plain_sum
 
 __all__ = ["option_features", "text_features"]
 
@@ -53,7 +54,7 @@ def _word_features(words: Sequence[str], asked: set[str]) -> dict[str, float]:
 def _likeness(words: Sequence[Sequence[str]], i: int) -> dict[str, float]:
     """How much an option shares with the others, and whether it is the most or the least alike."""
     shared = [
-        sum(_overlap(one, other) for k, other in enumerate(words) if k != j)
+        plain_sum(_overlap(one, other) for k, other in enumerate(words) if k != j)
         for j, one in enumerate(words)
     ]
     return {

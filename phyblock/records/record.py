@@ -13,6 +13,7 @@ from pydantic import Field
 
 from phyblock.records.line import Amount, Line, Whole
 from phyblock.records.reply import StoredError, StoredReply
+from phyblock.sums import plain_sum
 from phyblock.variants import Variant
 from phyblock.words import AskedAs, Outcome
 
@@ -251,7 +252,7 @@ class Record(Line):
         """
         paid = [reply.cost_usd for reply in self.replies if not reply.cached]
         known = [cost for cost in paid if cost is not None]
-        return sum(known) if len(known) == len(paid) else None
+        return plain_sum(known) if len(known) == len(paid) else None
 
     @property
     def limit_usd(self) -> float:

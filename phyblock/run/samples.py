@@ -17,6 +17,7 @@ from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, begun, judged
 from phyblock.run.shielded import to_its_end
 from phyblock.run.writer import RecordWriter
+from phyblock.sums import plain_sum
 from phyblock.tracks import (
     AnyTrack,
     Episode,
@@ -232,8 +233,8 @@ def _pooled(replies: Sequence[Reply]) -> Reply:
         finish=ends.pop() if len(ends) == 1 else "stop",
         usage=usage,
         cost_usd=_sum(reply.cost_usd for reply in replies),
-        billed_usd=sum(billed) if billed else None,
-        latency_s=sum(reply.latency_s for reply in replies),
+        billed_usd=plain_sum(billed) if billed else None,
+        latency_s=plain_sum(reply.latency_s for reply in replies),
         provider_model=replies[-1].provider_model,
         attempts=sum(reply.attempts for reply in replies),
         cached=all(reply.cached for reply in replies),
@@ -245,4 +246,4 @@ def _sum(values: Iterable[_N | None]) -> _N | None:
     """The sum, or None where one is not known."""
     found = list(values)
     known = [value for value in found if value is not None]
-    return sum(known[1:], known[0]) if known and len(known) == len(found) else None
+    return plain_sum(known) if known and len(known) == len(found) else None

@@ -23,6 +23,7 @@ from phyblock.scoring.pose_match import (
     assigned,
 )
 from phyblock.scoring.ratios import Floats
+from phyblock.sums import plain_sum
 
 __all__ = ["Motion", "Poses", "likely_motions", "nearness"]
 
@@ -121,7 +122,7 @@ def likely_motions(
 
 def _rank(near: Nearness, pairs: list[tuple[int, int]]) -> tuple[float, float]:
     within = sum(int(near.within[pair]) for pair in pairs)
-    far = sum(min(float(near.distance_cm[pair]), FARTHEST_CM) for pair in pairs)
+    far = plain_sum(min(float(near.distance_cm[pair]), FARTHEST_CM) for pair in pairs)
     return float(within), -round(far, _DIGITS)
 
 

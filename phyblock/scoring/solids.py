@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from phyblock.sums import plain_sum
+
 __all__ = ["Piece", "overlap_volume", "placed", "volume"]
 
 Floats = NDArray[np.float64]
@@ -32,12 +34,12 @@ def placed(pieces: Sequence[Piece], rotation: Floats, position: Floats) -> tuple
 
 def overlap_volume(one: Sequence[Piece], other: Sequence[Piece]) -> float:
     """Volume that two solids share, each given by convex pieces that do not overlap."""
-    return sum(_shared(first, second) for first in one for second in other)
+    return plain_sum(_shared(first, second) for first in one for second in other)
 
 
 def volume(pieces: Sequence[Piece]) -> float:
     """Volume of a solid that convex pieces fill."""
-    return sum(_volume(_faces(piece)) for piece in pieces)
+    return plain_sum(_volume(_faces(piece)) for piece in pieces)
 
 
 def _shared(one: Piece, other: Piece) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 from phyblock.domain.question import SUBTASKS, Question, Subtask
 from phyblock.scoring.ratios import ratio_of
 from phyblock.scoring.uncertainty import Clusters, in_range, jackknife
+from phyblock.sums import plain_sum
 from phyblock_making.attacks.cues import CUES, Floats
 from phyblock_making.attacks.observed import RULES, Observed, credit, kind_of
 from phyblock_making.attacks.probes import (
@@ -238,7 +239,7 @@ def _attacked(
         subtask,
         kind,
         len(questions),
-        sum(chances) / len(chances),
+        plain_sum(chances) / len(chances),
         most,
         least,
         _ORDERS if is_order else one.aim,

@@ -12,6 +12,7 @@ from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.plan import Plan
 from phyblock.domain.scene import Scene
 from phyblock.scoring import Goal, match_plan, micro
+from phyblock.sums import plain_sum
 from phyblock.tracks.goal_blind.learning import (
     CONSTANT,
     FREQUENCIES,
@@ -91,7 +92,7 @@ def find_tells(tasks: Iterable[tuple[Scene, CandidateSet]]) -> Tells:
                 firsts.append((poses[0], sum(poses) / len(poses)))
     every = [one for flags in by_place.values() for one in flags]
     chance = sum(every) / max(len(every), 1)
-    chance_first = sum(one for _, one in firsts) / max(len(firsts), 1)
+    chance_first = plain_sum(one for _, one in firsts) / max(len(firsts), 1)
     return Tells(
         {place: Part(sum(flags), len(flags), chance) for place, flags in sorted(by_place.items())},
         {poses: Part(sum(flags), len(flags)) for poses, flags in sorted(by_poses.items())},

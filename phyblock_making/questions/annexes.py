@@ -18,6 +18,7 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.sim.balance import MARGIN_M
 from phyblock.sim.geometry import corners_m
 from phyblock.sim.support import bounds_m, find_gaps, find_overlaps
+from phyblock.sums import plain_sum
 from phyblock_making.questions.choices import pick, shuffled
 
 __all__ = ["with_annex"]
@@ -160,7 +161,8 @@ def _leans_m(plan: _Plan) -> float:
     """How far plank and weights together have their center off the middle of the top [m]."""
     loads = [(plan.off_m, SHAPES[plan.type].mass_kg)]
     loads += [(plan.off_m + at_m, SHAPES[w.type].mass_kg) for at_m, w in plan.weights]
-    return abs(sum(at_m * mass for at_m, mass in loads) / sum(mass for _, mass in loads))
+    moment = plain_sum(at_m * mass for at_m, mass in loads)
+    return abs(moment / plain_sum(mass for _, mass in loads))
 
 
 def _weights(length_m: float, rng: np.random.Generator) -> list[tuple[float, _Weight]]:

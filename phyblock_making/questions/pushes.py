@@ -20,6 +20,7 @@ from phyblock.sim.outcomes import OUTCOME_SETTINGS, Outcome, Push, after
 from phyblock.sim.seeing import block_mark, seen, shown_pixels
 from phyblock.sim.steps import groups
 from phyblock.sim.support import bounds_m, boxes_near
+from phyblock.sums import plain_sum
 from phyblock_making.questions.choices import shuffled
 from phyblock_making.questions.margins import group_of, is_sure
 from phyblock_making.questions.marked_blocks import TAKEN
@@ -112,7 +113,7 @@ def what_happened(
     story = story_of(blocks, picture)
     start = {block.order: block.position_m for block in blocks}
     along = {
-        b.order: sum(
+        b.order: plain_sum(
             (end - begin) * way
             for begin, end, way in zip(start[b.order], b.position_m, push.direction, strict=False)
         )

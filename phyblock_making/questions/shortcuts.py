@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block
 from phyblock.models.guesses import Guesses
+from phyblock.sums import plain_sum
 from phyblock_making.questions.letters import BALANCE
 from phyblock_making.questions.picture_view import shares
 from phyblock_making.questions.question_draft import UnfairError
@@ -134,7 +135,7 @@ def _audit(
         values=len({q.answer if subtask == "OR" else q.options[q.answer[0]] for q in questions}),
         majority=_accuracy("majority", questions, guesses),
         text_only=_accuracy("text-only", questions, guesses) if with_text_probe else None,
-        chance=sum(chances) / len(chances),
+        chance=plain_sum(chances) / len(chances),
         ambiguous=tuple(q.id for q in questions if _reads_alike(q)),
         duplicates=tuple(q.id for q in questions if q.id in repeated),
         least_seen=min(seen, default=None),

@@ -6,6 +6,7 @@ from collections import Counter
 from typing import Any
 
 from phyblock.scoring import POSE_ERRORS, POSE_FRAMES, TOLERANCES_CM
+from phyblock.sums import plain_sum
 from phyblock.tables.measures import SampleCounts
 from phyblock.words import SETTINGS, STEP_ENDS, Setting
 
@@ -21,9 +22,9 @@ def _right(_: Any, judged: Any) -> tuple[int, ...]:
 def _fits(_: Any, judged: Any) -> tuple[float, ...]:
     fits = [fit for fit in judged.fits if fit is not None]
     return (
-        sum(fit.position_cm for fit in fits),
-        sum(fit.turn_deg for fit in fits),
-        sum(fit.iou for fit in fits),
+        plain_sum(fit.position_cm for fit in fits),
+        plain_sum(fit.turn_deg for fit in fits),
+        plain_sum(fit.iou for fit in fits),
         len(fits),
     )
 

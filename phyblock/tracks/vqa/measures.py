@@ -9,6 +9,7 @@ import pandas as pd
 from phyblock.domain import CATEGORIES, SUBTASKS
 from phyblock.scoring import chance
 from phyblock.scoring.ratios import ratio_of
+from phyblock.sums import plain_sum
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Cell, Measure, SampleCounts
 from phyblock.tables.outcomes import has_reply
@@ -88,7 +89,7 @@ def guessing(run: Run, cell: str) -> float:
     if subtask is not None:
         return chance(subtask) ** showing(run).rotations
     (names,) = (other.of for other in subtask_cells(run) if other.name == cell)
-    return sum(guessing(run, name) for name in names) / len(names)
+    return plain_sum(guessing(run, name) for name in names) / len(names)
 
 
 def _single(run: Run) -> pd.DataFrame:
