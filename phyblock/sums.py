@@ -1,7 +1,7 @@
 """Sums of floats that are the same on every Python.
 
 From Python 3.12 on `sum` makes up for what rounding loses, so that its last digits may be others.
-What enters files, or decides anything, is summed up here.
+What enters data, records or tables, or decides what does, is summed up here.
 """
 
 from __future__ import annotations
