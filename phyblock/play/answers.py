@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -74,30 +74,10 @@ def read_answers(path: Path, plan: RunPlan, person: Person) -> dict[int, Given]:
 
     Raises DataError for a file that is none, or is of another person or run.
     """
-    try:
-        text = read_text(path, _LARGEST_BYTES)
-    except OSError as error:
-        raise DataError(Problem(str(path), f"cannot be read: {said(error)}")) from error
-    except ValueError as error:
-        raise DataError(Problem(str(path), f"{_IS_NOT}: {error}")) from error
-    try:
-        found = AnswersFile.model_validate(parse_json(text, path))
-    except ValidationError as error:
-        faults = error.errors(include_url=False)
-        raise DataError(problem_of(one, str(path), _IS_NOT, _AS_SAVED) for one in faults) from error
+    file = _read_file(path)
+    problems = list(_other_sitting(path, file, plan, person))
     given: dict[int, Given] = {}
-    problems: list[Problem] = []
-    for field, value, known in (
-        ("model", found.model, (person.model,)),
-        ("consent", found.consent, (person.consent_sha256,)),
-        ("run", found.run, (plan.manifest.identity, *plan.earlier)),
-    ):
-        if value not in known:
-            hint = "give the suite, --set, --limit, --name, --number and --consent of the export"
-            message = "is of another sitting than the one that is named"
-            problems.append(Problem(str(path), message, field, value, known[0], hint))
-            break
-    for place, answer in enumerate(found.answers):
+    for place, answer in enumerate(file.answers):
         field = f"answers[{place}].number"
         if answer.number > plan.samples_per_model:
             allowed = f"1 to {plan.samples_per_model}"
@@ -116,6 +96,38 @@ def read_answers(path: Path, plan: RunPlan, person: Person) -> dict[int, Given]:
         raise DataError(problems)
     _check_picks(path, given, plan, person)
     return given
+
+
+def _read_file(path: Path) -> AnswersFile:
+    """Raises DataError for a file that is none of answers."""
+    try:
+        text = read_text(path, _LARGEST_BYTES)
+    except OSError as error:
+        raise DataError(Problem(str(path), f"cannot be read: {said(error)}")) from error
+    except ValueError as error:
+        raise DataError(Problem(str(path), f"{_IS_NOT}: {error}")) from error
+    try:
+        return AnswersFile.model_validate(parse_json(text, path))
+    except ValidationError as error:
+        faults = error.errors(include_url=False)
+        problems = [problem_of(fault, str(path), _IS_NOT, _AS_SAVED) for fault in faults]
+        raise DataError(problems) from error
+
+
+def _other_sitting(
+    path: Path, file: AnswersFile, plan: RunPlan, person: Person
+) -> Iterator[Problem]:
+    """What first tells the sitting of a file from the one that is named; nothing where it is it."""
+    for field, value, known in (
+        ("model", file.model, (person.model,)),
+        ("consent", file.consent, (person.consent_sha256,)),
+        ("run", file.run, (plan.manifest.identity, *plan.earlier)),
+    ):
+        if value not in known:
+            hint = "give the suite, --set, --limit, --name, --number and --consent of the export"
+            message = "is of another sitting than the one that is named"
+            yield Problem(str(path), message, field, value, known[0], hint)
+            return
 
 
 def _check_picks(path: Path, given: Mapping[int, Given], plan: RunPlan, person: Person) -> None:
