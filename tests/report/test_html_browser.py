@@ -12,10 +12,12 @@ import pandas as pd
 import pytest
 import yaml
 
+from phyblock import registry, run_suite
 from phyblock.report import write_report, write_tables
 from tests.browser import expect
 from tests.report.browser import ReportVisit
 from tests.report.html_run import HOSTILE, HOSTILE_SAMPLE, many
+from tests.tracks.test_fourth_track import TRACK as COUNTING
 from tests.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -490,3 +492,27 @@ def _large_run(made: Workspace, folder: Path) -> Path:
     lines = (json.dumps(record) + "\n" for record in copied)
     (folder / "records.jsonl").write_text("".join(lines))
     return folder
+
+
+def test_what_a_track_of_ones_own_reads_is_shown_by_its_name(
+    browser: Browser, workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    registry.register_track(COUNTING)
+    try:
+        monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+        suite = workspace.write_suite(tracks=["counting"], models=["random"])
+        run_suite(suite, out=workspace.out)
+        write_report(write_tables(workspace.out), figures=())
+    finally:
+        registry.unregister_track("counting")
+    (record, *_) = workspace.records()
+    visit = ReportVisit(browser.new_page(), workspace.out / "report.html")
+    page = visit.open("samples")
+    expect(page.locator("#detail .parsed")).to_have_text(
+        f"number {record['parse']['number']} read by the rule number"
+    )
+    page.get_by_role("tab", name="The scene").click()
+    expect(page.locator("#detail canvas.goal")).to_be_visible()
+    assert "could be read" not in page.inner_text("#detail")
+    page.close()
+    assert visit.complaints == []

@@ -102,7 +102,7 @@ const Replay = (() => {
     const caption = (i, title) => (several ? `${samples[i].entry.name}${isWide ? `: ${title.toLowerCase()}` : ""}` : title);
     if (scene) panels.forEach((panel, i) => panel && Overlay.over(panel.pictures, scene, runs[i], player));
     const told = panels.map((panel, i) => [several ? el("h2", { class: "model-name" }, samples[i].entry.name) : null,
-      facts(samples[i], records[i], setting), panel ? panel.said : nothing(records[i]),
+      facts(samples[i], records[i], setting), panel ? panel.said : nothing(samples[i], records[i]),
       panel ? Why.note({ record: records[i] }, scene, runs[i].steps, player) : null]);
     return el("section", { class: "card", "aria-label": "Replay" },
       scene ? null : el("p", { class: "notice" }, Store.index.lacking || "The scene is not at hand, so that nothing can be drawn."),
@@ -130,7 +130,8 @@ const Replay = (() => {
     return el("p", { class: "facts" }, known);
   }
 
-  function nothing(record) {
+  function nothing(sample, record) {
+    if (sample.outcome === "ok" && !record.parse?.plan) return null;
     const why = record.error ? record.error.message : record.reply ? "No plan could be read in the reply." : "There is no reply.";
     return el("p", { class: "notice" }, why);
   }
@@ -174,7 +175,7 @@ const Replay = (() => {
     } else if (record.reply) {
       cards.push(el("section", { class: "card" }, el("h2", {}, "Reply"), reply(record.reply)));
     } else {
-      cards.push(el("section", { class: "card" }, el("h2", {}, "Reply"), nothing(record)));
+      cards.push(el("section", { class: "card" }, el("h2", {}, "Reply"), nothing(sample, record)));
     }
     return cards;
   }

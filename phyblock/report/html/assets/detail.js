@@ -48,7 +48,7 @@ const Detail = (() => {
       [several ? heading(sample) : null, Sent.panel(sample)])));
     const said = columns(loaded.map((sample) => [
       several ? heading(sample) : null, question ? Question.answer(sample) : null, ...texts(sample)]));
-    const title = question ? "The question" : "What it built";
+    const title = question ? "The question" : loaded.some(builds) ? "What it built" : "The scene";
     return [tabs([["saw", "What the model saw", saw], ["did", title, did]], loaded), said];
   }
 
@@ -136,8 +136,13 @@ const Detail = (() => {
   const headline = (scores, setting) => scores.find((score) =>
     score.setting === setting && score.matcher === Data.index.matcher && score.placed) || null;
 
+  /** Whether a sample is of blocks that are placed; what another track asks for is in its reply. */
+  const builds = ({ record }) => Boolean(record.turns || record.parse?.plan);
+
+  /** Why there is nothing on the stage; a reply that was read and builds nothing says it all. */
   function nothing(sample) {
     const { record } = sample;
+    if (sample.outcome === "ok" && !builds(sample)) return null;
     const problem = record.parse?.problem ? `: ${Words.named(record.parse.problem)}` : "";
     const why = record.error ? record.error.message
       : record.reply ? `Nothing could be read out of the reply${problem}.` : "There is no reply.";

@@ -2,6 +2,9 @@
 "use strict";
 
 const Reply = (() => {
+  /** Fields that say how a reply was read, not what was read in it. */
+  const HOW_READ = new Set(["rule", "parser", "version", "problem", "dropped", "file_plan", "letters", "move", "plan"]);
+
   function card(reply, parse, title = "Reply") {
     if (!reply) return null;
     return el("section", { class: "card" }, el("h2", {}, title), parsed(parse),
@@ -17,11 +20,18 @@ const Reply = (() => {
     return el("div", { class: "spoken" }, el("div", { class: "markdown" }, made), folded("Raw text", raw()));
   }
 
+  /** What was read: a plan, letters or a move as it is, what other tracks keep by its names. */
+  function readIn(parse) {
+    const plain = [parse.plan, parse.letters, parse.move].find((one) => one !== null && one !== undefined);
+    if (plain !== undefined) return Array.isArray(plain) ? plain.join(" → ") : String(plain);
+    return Object.entries(parse).filter(([name, value]) => !HOW_READ.has(name) && value !== null && value !== undefined)
+      .map(([name, value]) => `${Words.named(name)} ${typeof value === "string" ? value : JSON.stringify(value)}`).join(", ");
+  }
+
   function parsed(parse) {
     if (!parse) return null;
-    const rule = parse.rule ? `read by the rule ${parse.rule}` : "nothing could be read";
-    const read = [parse.plan, parse.letters, parse.move].find((one) => one !== null && one !== undefined);
-    const values = Array.isArray(read) ? read.join(" → ") : String(read ?? "");
+    const values = readIn(parse);
+    const rule = parse.rule ? `read by the rule ${parse.rule}` : values ? "" : "nothing could be read";
     const dropped = parse.dropped && parse.dropped.length ? `; dropped, no such candidate: ${parse.dropped.join(", ")}` : "";
     return el("p", { class: "parsed" }, values ? el("b", { class: "number plan" }, values) : null,
       el("span", { class: "muted" }, ` ${rule}${dropped}${parse.parser ? `, parser ${parse.parser}` : ""}`));
