@@ -13,6 +13,7 @@ from threading import Thread
 
 import click
 from rich.console import Console
+from rich.progress import Progress
 
 from phyblock.bounded import read_text
 from phyblock.cli.console import make_console, shown_path
@@ -144,7 +145,13 @@ def _text(path: Path) -> str:
 
 def _export(console: Console, plan: RunPlan, person: Person, folder: Path) -> int:
     try:
-        page = asyncio.run(export_sitting(plan, person, folder))
+        with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+            drawing = progress.add_task("Drawing tasks", total=plan.samples_per_model)
+
+            def done(number: int) -> None:
+                progress.update(drawing, completed=number)
+
+            page = asyncio.run(export_sitting(plan, person, folder, done))
     finally:
         plan.close()
     tasks = counted(plan.samples_per_model, "task")

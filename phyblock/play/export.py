@@ -7,6 +7,7 @@ answer. Files are numbered in the order of the sitting.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -47,10 +48,13 @@ def check_folder(folder: Path, runs: Path) -> None:
         raise SpecError(Problem("--export", message, found=str(folder), hint=hint))
 
 
-async def export_sitting(plan: RunPlan, person: Person, folder: Path) -> Path:
+async def export_sitting(
+    plan: RunPlan, person: Person, folder: Path, done: Callable[[int], object]
+) -> Path:
     """Write the folder of a plan that passed `check_offline`; the path of its page.
 
-    Raises StoreError where something is in the way or the disk refuses.
+    `done` is called with the number of tasks that are drawn. Raises StoreError where something is
+    in the way or the disk refuses.
     """
     config = person.planned().config
     questions: list[dict[str, Any]] = []
@@ -69,6 +73,7 @@ async def export_sitting(plan: RunPlan, person: Person, folder: Path) -> Path:
                 (new / names[-1]).write_bytes(picture.data)
             place_of = Place(number, plan.samples_per_model)
             questions.append(shown(request, picking_of(request, plan.suite), place_of, names))
+            done(number)
         for name, (_, content) in assets("offline.js", _PAGE).items():
             (new / name).write_bytes(content)
         sitting = {
