@@ -22,7 +22,7 @@ Key = tuple[str, str, int, str]
 """A sample of one model: scene, item, seed, variant."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Facts:
     """What a model's samples of a track took and came to; None where it is not known.
 
@@ -110,17 +110,17 @@ def _facts(
         price = _known(cost["cost_per_100_usd"])
         whole = None if price is None else price / 100 * int(row["replies"])
         found[str(model)] = Facts(
-            int(row["expected"]),
-            int(row["recorded"]),
-            int(row["recorded"] - row["ok"]),
-            solved,
-            _known(cost["prompt_tokens"]),
-            _known(cost["completion_tokens"]),
-            _known(cost["latency_median_s"]),
-            price,
-            whole / solved if whole is not None and solved else None,
-            days.get(str(model)),
-            int(row["cached"]),
+            expected=int(row["expected"]),
+            done=int(row["recorded"]),
+            failed=int(row["recorded"] - row["ok"]),
+            solved=solved,
+            prompt_tokens=_known(cost["prompt_tokens"]),
+            completion_tokens=_known(cost["completion_tokens"]),
+            latency_s=_known(cost["latency_median_s"]),
+            usd_per_100=price,
+            usd_per_solved=whole / solved if whole is not None and solved else None,
+            asked=days.get(str(model)),
+            cached=int(row["cached"]),
         )
     return found
 
