@@ -8,7 +8,7 @@ from typing import Any
 
 from phyblock.records import Record
 from phyblock.records.reading import any_records
-from phyblock.report.html.index import read_places
+from phyblock.report.html.index import Numbers, read_places
 from phyblock.report.html.pack import Pack
 from phyblock.report.html.samples import IN_INDEX
 from phyblock.site.chunks import chunks
@@ -31,28 +31,11 @@ _NOT_OF_TURN = ("reply", "prompt")
 _TENTHS = 10
 
 
-class _Numbers:
-    """Distinct values in the order they came, by number."""
-
-    def __init__(self) -> None:
-        self._numbers: dict[Any, int] = {}
-
-    def of(self, value: Any) -> int:
-        return self._numbers.setdefault(value, len(self._numbers))
-
-    def __contains__(self, value: Any) -> bool:
-        return value in self._numbers
-
-    @property
-    def values(self) -> list[Any]:
-        return list(self._numbers)
-
-
 class _Items:
     """What was asked: columns, a row an item of a track."""
 
     def __init__(self) -> None:
-        self._items = _Numbers()
+        self._items = Numbers()
         self._about: dict[str, list[Any]] = {
             name: [] for name in ("scene", "levels", "part", "question")
         }
@@ -71,7 +54,7 @@ class _Items:
         return self._items.of((record.track, record.item))
 
     def fields(self) -> dict[str, Any]:
-        tracks = _Numbers()
+        tracks = Numbers()
         of_track = [tracks.of(track) for track, _ in self._items.values]
         keys = [key for _, key in self._items.values]
         return {
@@ -84,7 +67,7 @@ class _Samples:
     """What became of it: columns, a row a sample."""
 
     def __init__(self) -> None:
-        self._outcomes, self._ways = _Numbers(), _Numbers()
+        self._outcomes, self._ways = Numbers(), Numbers()
         names = ("entry", "item", "seed", "way", "outcome", "score")
         self._rows: dict[str, list[int | None]] = {name: [] for name in names}
 
@@ -122,7 +105,7 @@ def write_samples(
     Raises OSError where the disk refuses, StoreError for a record that cannot be read.
     """
     packs = {kind: chunks(folder, kind, build) for kind in ("replays", "scenes", "questions")}
-    scenes, items, samples = _Numbers(), _Items(), _Samples()
+    scenes, items, samples = Numbers(), _Items(), _Samples()
     owner = {
         (number, track, entry.model.name): place
         for place, entry in enumerate(entries)

@@ -357,6 +357,6 @@ def test_summaries_and_seeds_stand_beside(run: Run) -> None:
     (_, table1), *terminal = views(table_makers(run)["table1"], run)
     assert table1.rows[0][-1] == terminal[0][1].rows[0][-1] == told
     (headline, *_) = headlines(run)
-    assert headline.rows[0].cells[headline.main].below[-1] == f"seeds {told}"
+    assert headline.rows[0].cells[0].below[-1] == f"seeds {told}"
     silent = [row for row in table1.rows if row[0] == "silent"]
     assert set(silent[0][1:]) == {NO_VALUE}

@@ -93,7 +93,7 @@ def test_the_headline_has_the_floor_and_marks_what_is_not_above_it() -> None:
     run = run_with({"goal-blind": 0.3}, good=(4, 4, 3), bad=(0, 1, 0))
     assert headline_floors(run, "full_planning")["Overall F1"].value == 30.0
     (headline,) = headlines(run)
-    rows = {row.name: row.cells[headline.main] for row in headline.rows}
+    rows = {row.name: row.cells[0] for row in headline.rows}
     assert rows["Floor: goal-blind"].value == 30.0
     assert rows["bad"].below[0].endswith(" †")
     assert "floor" not in rows["good"].below[0]

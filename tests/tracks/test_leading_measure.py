@@ -102,7 +102,7 @@ def test_what_is_not_better_than_the_floor_is_marked(run: Run, measure: Measure)
     floor = 0.3
     show(led_by(floored := replace(measure, chance=lambda *_: floor), floored))
     (table,) = headlines(run)
-    rows = {row.name: row.cells[table.main] for row in table.rows}
+    rows = {row.name: row.cells[0] for row in table.rows}
     assert rows["Floor: chance"].value == floor * measure.scale
     assert "†" not in rows["oracle"].below[0]
     assert rows["random"].below[0].endswith(" †")

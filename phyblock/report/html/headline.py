@@ -64,9 +64,8 @@ class Row:
 class Headline:
     """A headline table: `columns` head the cells, `references` are marked in every strip.
 
-    The column with number `main`, from 0, is what models are ranked by; it is called `strip_name`.
-    Where it `has_strips`, as a share has, they draw it from 0 to 100 %. Models stand in the order
-    of their rank.
+    The first column is what models are ranked by; it is called `strip_name`. Where it `has_strips`,
+    as a share has, they draw it from 0 to 100 %. Models stand in the order of their rank.
     """
 
     track: str
@@ -74,7 +73,6 @@ class Headline:
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
     notes: tuple[str, ...]
-    main: int
     strip_name: str
     has_strips: bool
     references: dict[str, float] = field(default_factory=dict)
@@ -123,7 +121,6 @@ def _headline(run: Run, track: str) -> Headline:
         (*headings, *(["Published"] if report.published(run) else [])),
         tuple(rows),
         (" ".join(_notes(run, track, rows, has_floors=bool(floors))),),
-        0,
         main,
         main_measure(run, track).is_share,
         {

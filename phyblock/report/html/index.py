@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +12,7 @@ from phyblock.tables.design import Design
 from phyblock.tables.listing import Listing
 from phyblock.tracks.kind import kind_of, kinds
 
-__all__ = ["Item", "Place", "SampleIndex", "read_places"]
+__all__ = ["Item", "Numbers", "Place", "SampleIndex", "read_places"]
 
 _COUNTED = ("tp", "fp", "fn", "wrong")
 
@@ -59,22 +58,26 @@ def read_places(folder: Path, design: Design) -> list[Place]:
     )
 
 
-@dataclass
-class _Names:
-    """Distinct values in the order they came, by number."""
+class Numbers:
+    """Numbers distinct values from 0, in the order in which they come."""
 
-    numbers: dict[Any, int] = field(default_factory=dict)
+    def __init__(self, values: Iterable[Any] = ()) -> None:
+        self._numbers: dict[Any, int] = {}
+        for value in values:
+            self.of(value)
 
-    @classmethod
-    def of(cls, values: Iterable[Any]) -> _Names:
-        return cls({value: n for n, value in enumerate(dict.fromkeys(values))})
+    def of(self, value: Any) -> int:
+        """The number of a value, the next one where it is new."""
+        return self._numbers.setdefault(value, len(self._numbers))
 
-    def number(self, value: Any) -> int:
-        return self.numbers.setdefault(value, len(self.numbers))
+    def __contains__(self, value: Any) -> bool:
+        """Whether a value has a number."""
+        return value in self._numbers
 
     @property
     def values(self) -> list[Any]:
-        return list(self.numbers)
+        """All values, by number."""
+        return list(self._numbers)
 
 
 class SampleIndex:
@@ -84,11 +87,11 @@ class SampleIndex:
         self._listings: dict[str, tuple[Listing, ...]] = {
             track: kind_of(track).report().listings(design) for track in design.suite.tracks
         }
-        self._scenes, self._items = _Names(), _Names()
+        self._scenes, self._items = Numbers(), Numbers()
         # A model and a track without any record are in the run as well.
-        self._tracks, self._models = _Names.of(design.suite.tracks), _Names.of(design.model_names)
-        self._outcomes = _Names()
-        self._subtasks, self._variants = _Names(), _Names()
+        self._tracks, self._models = Numbers(design.suite.tracks), Numbers(design.model_names)
+        self._outcomes = Numbers()
+        self._subtasks, self._variants = Numbers(), Numbers()
         self._seeds: set[int] = set()
         self._about: dict[str, list[Any]] = {"scene": [], "levels": [], "subtask": []}
         names = ("track", "model", "item", "seed", "variant", "outcome", "correct")
@@ -113,16 +116,16 @@ class SampleIndex:
     def add(self, record: Record) -> None:
         """Append the sample of a record."""
         item = Item(record.track, record.item)
-        if item not in self._items.numbers:
+        if item not in self._items:
             self._add_item(record)
         self._seeds.add(record.seed)
         row = {
-            "track": self._tracks.number(record.track),
-            "model": self._models.number(record.model),
-            "item": self._items.number(item),
+            "track": self._tracks.of(record.track),
+            "model": self._models.of(record.model),
+            "item": self._items.of(item),
             "seed": record.seed,
-            "variant": self._variants.number(record.way.key),
-            "outcome": self._outcomes.number(record.outcome),
+            "variant": self._variants.of(record.way.key),
+            "outcome": self._outcomes.of(record.outcome),
             "correct": None if record.is_correct is None else int(record.is_correct),
         }
         for name, value in row.items():
@@ -134,9 +137,9 @@ class SampleIndex:
 
     def _add_item(self, record: Record) -> None:
         part = record.part
-        self._about["scene"].append(self._scenes.number(record.scene))
+        self._about["scene"].append(self._scenes.of(record.scene))
         self._about["levels"].append(record.levels)
-        self._about["subtask"].append(None if part is None else self._subtasks.number(part))
+        self._about["subtask"].append(None if part is None else self._subtasks.of(part))
 
     def _of(self, track: str) -> tuple[Listing, ...]:
         return self._listings.get(track, ())
