@@ -11,6 +11,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 from phyblock.domain import Scene
 from phyblock.models.base import Reply, Request
 from phyblock.records import Record
+from phyblock.sim.registry import REFERENCE_ENGINE, physics_engine
 
 __all__ = [
     "CARRYING",
@@ -27,6 +28,7 @@ __all__ = [
     "ShowsBySeed",
     "SingleTrack",
     "Track",
+    "engine_identity",
     "judgement_of",
     "shown_item",
 ]
@@ -44,6 +46,16 @@ keep it.
 """
 FIRST_CARRYING = 1
 """How plans were carried out before runs said so."""
+
+
+def engine_identity() -> dict[str, Any]:
+    """What a track's identity says of the physics engine: runs made before there was a choice say
+    nothing, and are to go on with the engine of reference.
+    """
+    engine = physics_engine()
+    if engine.name == REFERENCE_ENGINE:
+        return {}
+    return {ENGINE: {"engine": engine.name, **engine.versions}}
 
 
 class Item(Protocol):

@@ -23,6 +23,7 @@ from phyblock.words import BACKGROUNDS
 
 __all__ = [
     "assembly_pictures",
+    "check_drawn",
     "open_tracks",
     "picture_folder",
     "picture_policy",
@@ -74,6 +75,16 @@ def assembly_pictures(suite: SuiteSpec, shop: Workshop | None = None) -> Picture
     one.
     """
     return Pictures(picture_folder(), picture_policy(suite.images), shop or render_workers())
+
+
+def check_drawn(loaded: LoadedSuite, reason: str) -> None:
+    """Raise SpecError, with the reason, for a suite that takes pictures from the data set."""
+    if loaded.suite.images.source == "dataset":
+        where, hint = (
+            loaded.where("images", "source"),
+            "render the pictures: --set images.source=render",
+        )
+        raise SpecError(Problem(where, reason, "images.source", "dataset", hint=hint))
 
 
 def task_showing(

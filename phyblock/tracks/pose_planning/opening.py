@@ -6,7 +6,13 @@ from phyblock.errors import Problem, SpecError
 from phyblock.sim.carry import CarryLimits
 from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tracks.kind import Opening
-from phyblock.tracks.opening import picture_folder, picture_style, task_showing, template_prompt
+from phyblock.tracks.opening import (
+    check_drawn,
+    picture_folder,
+    picture_style,
+    task_showing,
+    template_prompt,
+)
 from phyblock.tracks.pose_planning.judging import PoseRules
 from phyblock.tracks.pose_planning.pictures import PosePictures, shows_three_sides
 from phyblock.tracks.pose_planning.spec import PoseSpec
@@ -25,11 +31,7 @@ def open_pose_planning(opening: Opening) -> PosePlanning:
     rules = _rules(suite, poses)
     if not opening.with_prompts:
         return PosePlanning(rules, items=tasks, showing=showing)
-    if suite.images.source == "dataset":
-        where = loaded.where("images", "source")
-        message = "the floor is ruled in pictures that are drawn here"
-        hint = "render the pictures: --set images.source=render"
-        raise SpecError(Problem(where, message, "images.source", "dataset", hint=hint))
+    check_drawn(loaded, "the floor is ruled in pictures that are drawn here")
     _check_sheet(loaded, poses)
     style = picture_style(suite.images)
     pictures = PosePictures(picture_folder(), style, poses.views, opening.shop)

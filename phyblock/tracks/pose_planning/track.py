@@ -19,8 +19,7 @@ from phyblock.parsing import POSE_READER_VERSION
 from phyblock.records import Record
 from phyblock.sim.carry import CarriedStep
 from phyblock.sim.placing import upright
-from phyblock.sim.registry import REFERENCE_ENGINE, physics_engine
-from phyblock.tracks.base import CARRYING, ENGINE, READER
+from phyblock.tracks.base import CARRYING, READER, engine_identity
 from phyblock.tracks.pose_planning.baselines import PoseSubject
 from phyblock.tracks.pose_planning.ended import Ended
 from phyblock.tracks.pose_planning.judging import (
@@ -75,7 +74,7 @@ class PosePlanning(WholePlanTrack[PoseRules, PosePictures]):
             **super().identity(),
             READER: POSE_READER_VERSION,
             CARRYING: CARRY_VERSION,
-            **_other_engine(),
+            **engine_identity(),
         }
 
     def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
@@ -104,14 +103,6 @@ class PosePlanning(WholePlanTrack[PoseRules, PosePictures]):
         if self._pictures is None:
             return await asyncio.to_thread(work)
         return await self._pictures.work_out(work)
-
-
-def _other_engine() -> dict[str, Any]:
-    """The physics engine with its versions, where it is not the engine of reference."""
-    engine = physics_engine()
-    if engine.name == REFERENCE_ENGINE:
-        return {}
-    return {ENGINE: {"engine": engine.name, **engine.versions}}
 
 
 def _earlier(record: Record | None) -> Earlier | None:

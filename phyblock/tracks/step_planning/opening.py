@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from phyblock.errors import Problem, SpecError
 from phyblock.specs import SuiteSpec
 from phyblock.tracks.kind import Opening
-from phyblock.tracks.opening import assembly_pictures, task_showing, template_prompt
+from phyblock.tracks.opening import assembly_pictures, check_drawn, task_showing, template_prompt
 from phyblock.tracks.selection import select_tasks
 from phyblock.tracks.step_planning.prompt import StepPrompt
 from phyblock.tracks.step_planning.rules import StepLimits, StepRules
@@ -24,11 +23,7 @@ def open_step_planning(opening: Opening) -> StepPlanning:
     showing = task_showing(suite, StepsSpec, "steps", tasks, pool)
     if not opening.with_prompts:
         return StepPlanning(rules, items=tasks, showing=showing, pool=pool)
-    if suite.images.source == "dataset":
-        where = loaded.where("images", "source")
-        message = "step planning draws every state, so the goal must be drawn as well"
-        hint = "render the pictures: --set images.source=render"
-        raise SpecError(Problem(where, message, "images.source", "dataset", hint=hint))
+    check_drawn(loaded, "step planning draws every state, so the goal must be drawn as well")
     steps = suite.section(StepsSpec)
     shown = (steps.feedback, steps.history, steps.memory, steps.cot)
     template = template_prompt(loaded, StepPlanning.name)

@@ -21,10 +21,10 @@ from phyblock.models.base import Image, Message, Request
 from phyblock.records import Record
 from phyblock.scoring import Assembly
 from phyblock.sim.question_pictures import question_key, question_png
-from phyblock.sim.registry import REFERENCE_ENGINE, physics_engine, told_engine
+from phyblock.sim.registry import told_engine
 from phyblock.sim.site import ONE_SETTING, Settled, settle, state_picture
 from phyblock.sim.stability import DEFAULT_TRIAL
-from phyblock.tracks.base import ENGINE
+from phyblock.tracks.base import engine_identity
 from phyblock.tracks.goal_blind.guessing import BlindGuesses
 from phyblock.tracks.pictures import Pictures
 from phyblock.tracks.prompts import response_format
@@ -95,7 +95,7 @@ class StepPlanning:
         """Name and version of the prompt, a digest of all that decides the pictures, and the
         physics engine where blocks are let go in another one than PyBullet.
         """
-        engine = self._other_engine()
+        engine = {} if self.rules.physics == "off" else engine_identity()
         if self._sight is None:
             return {"prompt": None, "pictures": None, **engine}
         template = self._sight.prompt.template
@@ -171,13 +171,6 @@ class StepPlanning:
             response_format=response_format(self.rules.form(len(item.candidates))),
         )
         return request, is_real and is_fixed_real and is_current_real
-
-    def _other_engine(self) -> dict[str, Any]:
-        # Runs made before there was a choice name none, and are to go on with PyBullet.
-        engine = None if self.rules.physics == "off" else physics_engine()
-        if engine is None or engine.name == REFERENCE_ENGINE:
-            return {}
-        return {ENGINE: {"engine": engine.name, **engine.versions}}
 
     async def _write(
         self,
