@@ -17,7 +17,7 @@ from phyblock.env.play import DONE, Acted, Play, picture_of
 from phyblock.env.state import MOST_BLOCKS, block_rows, rows_space
 from phyblock.scoring import blocks_reached
 from phyblock.sim import PictureStyle, goal_style
-from phyblock.sim.carry import CarriedStep, Carrying, CarryLimits
+from phyblock.sim.carry import CarriedStep, Carrying
 from phyblock.sim.kit import kit_png
 from phyblock.sim.placing import center_cm, put, upright
 from phyblock.sim.ruled import RuledFloor
@@ -28,14 +28,15 @@ __all__ = ["PosePlay"]
 _CM = 100.0
 _HALF_TURN_DEG = 180.0
 _FALLS = ("falls", "knocks_over")
+_NEAR = (1.0, 10.0)
+"""How far a block may be from its place and still have reached it [cm, degrees]."""
 
 
 class PosePlay(Play):
     """Blocks are put where actions say, let go, and lie where they come to rest.
 
     The tolerances are those of the track with poses: a block may be moved and still stand as
-    `CarryLimits` says, and a goal block is reached by one of its kind within `reached_cm` and
-    `reached_deg`.
+    `CarryLimits` says, and a goal block is reached by one of its kind within `_NEAR`.
     """
 
     def __init__(
@@ -44,18 +45,14 @@ class PosePlay(Play):
         rotation: PoseRotation,
         style: PictureStyle,
         *,
-        is_strict: bool = False,
-        limits: CarryLimits | None = None,
-        reached_cm: float = 1.0,
-        reached_deg: float = 10.0,
+        is_strict: bool,
     ) -> None:
         self._is_free = rotation == "free"
         self._parts = ("center_m", "half_turns") if self._is_free else ("center_m",)
         parts = {name: spaces.Box(-1.0, 1.0, (3,), np.float64) for name in self._parts}
         number = spaces.Discrete(MAX_CANDIDATES + 1)
         self.action_space = spaces.Dict({"block": number, **parts})
-        self._style, self._is_strict, self._limits = style, is_strict, limits
-        self._near = (reached_cm, reached_deg)
+        self._style, self._is_strict = style, is_strict
         self._stack = contextlib.ExitStack()
         self._task = task
         self._floor: RuledFloor | None = None
@@ -66,7 +63,7 @@ class PosePlay(Play):
             self._task, self._floor = task, None
         self._kit = self.candidates(task)
         self._stack.close()
-        self._carrying = self._stack.enter_context(Carrying(self._limits))
+        self._carrying = self._stack.enter_context(Carrying())
         self._last: CarriedStep | None = None
         self._named: list[int] = []
         self._reached = 0
@@ -168,7 +165,7 @@ class PosePlay(Play):
         return self._reached == len(self._task.scene) == len(self.blocks)
 
     def _count(self, goal: tuple[Block, ...]) -> int:
-        return blocks_reached(goal, self.blocks, *self._near)
+        return blocks_reached(goal, self.blocks, *_NEAR)
 
     def _right(self, block: Block) -> dict[str, Any] | None:
         kit = self._kit

@@ -72,14 +72,12 @@ class SharedCache:
         tell: Tell = ignore_text,
         *,
         patience_s: float = _PATIENCE_S,
-        try_again_after_s: float = _TRY_AGAIN_AFTER_S,
         clock: Clock | None = None,
     ) -> None:
         """`patience_s` is how long a locked file is waited for before it is set aside."""
         self.path = path
         self._tell = tell
         self._patience_s = patience_s
-        self._try_again_after_s = try_again_after_s
         self._clock = clock or Clock()
         self._worker = Worker("reply cache")
         self._file: ReplyCache | None = None
@@ -202,7 +200,7 @@ class SharedCache:
         return until_s is not None and self._clock.now() < until_s
 
     def _set_aside(self, error: Exception) -> None:
-        self._aside_until_s = self._clock.now() + self._try_again_after_s
+        self._aside_until_s = self._clock.now() + _TRY_AGAIN_AFTER_S
         if not self._is_told and not self._is_closing:
             self._is_told = True
             said = str(error).partition("\n")[0] or f"reply cache {self.path}: does not answer"
@@ -218,7 +216,7 @@ class SharedCache:
             result = self._wait_and_try(operation, until_s)
         except StoreError as error:
             # Here and not on the loop: the jobs that wait already must not try in their turn.
-            self._aside_until_s = self._clock.now() + self._try_again_after_s
+            self._aside_until_s = self._clock.now() + _TRY_AGAIN_AFTER_S
             if not isinstance(error, CacheBusyError):
                 self._drop_file()
             raise

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Literal, get_args
+from typing import Literal
 
 from phyblock.domain import PoseStep
 
@@ -19,7 +19,6 @@ __all__ = [
     "FARTHEST_PLACE_CM",
     "MOST_TURN_DEG",
     "OTHER_UNIT",
-    "STEP_PROBLEMS",
     "StepProblem",
     "checked_step",
     "read_step",
@@ -39,7 +38,6 @@ StepProblem = Literal[
     "turned",
     "unclear_step",
 ]
-STEP_PROBLEMS: tuple[StepProblem, ...] = get_args(StepProblem)
 """Why a step cannot be read. `turned`: it is given a rotation where candidates keep theirs."""
 
 FARTHEST_PLACE_CM = 1000.0

@@ -14,6 +14,7 @@ from phyblock.scoring.uncertainty import POWER
 from phyblock.tables.csv_text import to_csv
 from phyblock.tables.latex import to_latex
 from phyblock.tables.markdown import to_markdown
+from phyblock.tables.measures import in_unit
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, between, level_name, number
 
 __all__ = ["compare_view", "flipped_lines", "p_text", "ranks_view", "write_comparison"]
@@ -30,7 +31,7 @@ def compare_view(found: Comparison) -> TextTable:
         Column("B", is_text=True),
         *([] if one_part else [Column("Part", is_text=True)]),
         *(
-            Column(name, f"{found.name} ({found.unit})" if found.unit else found.name)
+            Column(name, in_unit(found.name, found.unit))
             for name in ("A", "B", "A - B", "95 % CI", "finds")
         ),
         Column("p (Holm)"),
@@ -94,10 +95,9 @@ def ranks_view(found: Comparison) -> TextTable:
         (row["model"], number(row["value"]), _range(row["best"], row["worst"]))
         for row in found.ranks.to_dict("records")
     ]
-    value = f"{found.name} ({found.unit})" if found.unit else found.name
     return TextTable(
         "Ranks that each model may have",
-        (Column("Model", is_text=True), Column(value), Column("Rank")),
+        (Column("Model", is_text=True), Column(in_unit(found.name, found.unit)), Column("Rank")),
         tuple(rows),
         ("All ranges hold at once with 95 % confidence, by the comparisons above.",),
     )

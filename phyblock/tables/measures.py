@@ -21,6 +21,7 @@ __all__ = [
     "Cell",
     "Measure",
     "SampleCounts",
+    "in_unit",
     "value_key",
 ]
 
@@ -98,7 +99,7 @@ class Measure:
     @property
     def heading_in_unit(self) -> str:
         """The heading with the unit of values in brackets, where they have one."""
-        return f"{self.heading} ({self.unit})" if self.unit else self.heading
+        return in_unit(self.heading, self.unit)
 
     @property
     def is_share(self) -> bool:
@@ -128,6 +129,11 @@ class Measure:
     def most_apart(self) -> float:
         """The most that two values can differ by, as they are shown; infinite without a bound."""
         return self.scale * (2 if self.is_difference else 1) if self.unit == "%" else math.inf
+
+
+def in_unit(heading: str, unit: str) -> str:
+    """A heading with the unit of the values below it in brackets, where they have one."""
+    return f"{heading} ({unit})" if unit else heading
 
 
 def value_key(row: Mapping[Any, Any]) -> str:
