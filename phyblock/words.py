@@ -14,6 +14,7 @@ __all__ = [
     "LEVEL1_CRITERIA",
     "MATCHERS",
     "PLAN_PARSERS",
+    "QUOTE_HINT",
     "REFUSED_ENDS",
     "SETTINGS",
     "STEP_ENDS",
@@ -117,3 +118,6 @@ SendMode = Literal["auto", "always", "never"]
 """Whether a field that not every provider takes is sent."""
 ImageDetail = Literal["auto", "low", "medium", "high", "ultra_high", "original"]
 """How closely a provider looks at pictures; each knows some of these."""
+
+QUOTE_HINT = "quote values with spaces: --set 'seeds=[0, 1]'"
+"""What helps where a shell took a value apart."""

@@ -59,7 +59,11 @@ def run_suite(
     check_commands(plan.models, known_in, named)
     folder = Path(out) if out is not None else plan.folder_in(Path("results"))
     plan = check_ready(plan)
-    costly = () if yes else unlimited_spending(plan, folder, use_cache=use_cache)
+    costly = (
+        ()
+        if yes
+        else unlimited_spending(plan, folder, use_cache=use_cache, retry_failed=retry_failed)
+    )
     if costly:
         hint = "agree with yes=True, or set a limit: load_suite(NAME, 'limits.max_cost_usd=5')"
         raise spending_refused(plan, costly, "would cost money, and nobody agreed", hint)

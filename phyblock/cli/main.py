@@ -13,6 +13,7 @@ import click
 from phyblock.cli.verbs import Verbs
 from phyblock.errors import InputError, PhyblockError, Problem, StoreError, said
 from phyblock.plain_text import counted, plain_lines
+from phyblock.words import QUOTE_HINT
 
 __all__ = ["main", "show_problems"]
 
@@ -59,8 +60,10 @@ def phyblock() -> None:
     """Test vision-language models on PhyBlock: 3D block assembly from pictures."""
 
 
-_LOOSE_END = re.compile(r"unexpected extra arguments? \(.*[]}]\)")
-"""What click says of a list or mapping that the shell took apart."""
+_LOOSE_END = re.compile(r"unexpected extra argument")
+"""What click says of a value that the shell took apart."""
+_VALUES = re.compile(r"=|,$")
+"""What values have that are often written with spaces: `KEY=[A, B]`, `A, B`."""
 
 
 def main() -> None:
@@ -80,8 +83,9 @@ def main() -> None:
         sys.exit(0)
     except click.ClickException as error:
         error.show()
-        if _LOOSE_END.search(error.format_message()):
-            click.echo("Hint: quote values with spaces: --set 'seeds=[0, 1]'", err=True)
+        has_values = any(map(_VALUES.search, sys.argv[1:]))
+        if has_values and _LOOSE_END.search(error.format_message()):
+            click.echo(f"Hint: {QUOTE_HINT}", err=True)
         sys.exit(2)
     except click.Abort:
         sys.exit(130)

@@ -81,6 +81,7 @@ class ProgressView:
             self._take_note(event)
         elif isinstance(event, RunNotice):
             self._say(event.text)
+            self._plain_line()
         elif isinstance(event, ModelStopped):
             tally = self._tallies[event.model]
             tally.is_stopped, tally.notice = True, f"stopped: {event.reason}"

@@ -103,6 +103,7 @@ def command(
     plan = make_plan(loaded, known, only=only, limit=limit, informative=informative)
     check_commands(plan.models, known_in, models_file)
     folder = out or plan.folder_in(Path("results"))
+    asks = {"use_cache": not no_cache, "retry_failed": retry_failed}
     moved: list[str] = []
     found = held_run(folder, plan.manifest, plan.earlier)
     if found is not None:
@@ -111,13 +112,13 @@ def command(
         names = () if dry_run else names_to_write(folder, page=not no_report)
         run_folder(folder).check(names)
     if dry_run:
-        show_estimate(console, plan, estimate(plan, folder, use_cache=not no_cache))
+        show_estimate(console, plan, estimate(plan, folder, **asks))
     for remark in (*moved, *choice_remarks(plan), *asking_remarks(loaded, plan)):
         console.print(remark, style="dim", markup=False, soft_wrap=True)
     if dry_run:
         return 0
     plan = check_ready(plan)
-    if not yes and not _agreed(console, plan, folder, use_cache=not no_cache):
+    if not yes and not _agreed(console, plan, folder, **asks):
         console.print("Nothing was asked.")
         return 1
     view = ProgressView(console, plan.suite.name)
@@ -150,18 +151,18 @@ async def _run(opened: Session, view: ProgressView) -> RunResult:
                     loop.remove_signal_handler(name)
 
 
-def _agreed(console: Console, plan: RunPlan, folder: Path, *, use_cache: bool) -> bool:
+def _agreed(console: Console, plan: RunPlan, folder: Path, **asks: bool) -> bool:
     """Ask before money is spent; nothing is asked when nothing costs anything.
 
     Where nobody can answer, a cost limit is the answer. Raises SpecError where there is none.
     """
     if sys.stdin.isatty():
-        estimated = estimate(plan, folder, use_cache=use_cache)
+        estimated = estimate(plan, folder, **asks)
         if not any(row.may_cost for row in estimated):
             return True
         show_estimate(console, plan, estimated)
         return click.confirm("Go on?", default=True)
-    costly = unlimited_spending(plan, folder, use_cache=use_cache)
+    costly = unlimited_spending(plan, folder, **asks)
     if not costly:
         return True
     show_estimate(console, plan, costly)

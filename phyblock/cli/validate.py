@@ -67,11 +67,7 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[s
         return [_about(read_builtin(path) if is_builtin else read_official(path))]
     if path.name == SCENES_FILE:
         return [_about(read_builtin(path.parent))]
-    if not os.path.isfile(path):
-        path = find_suite(str(path))
-    if path.suffix == ".j2":
-        hint = "name the suite that uses it: its prompts are rendered"
-        raise SpecError(Problem(str(path), "is a prompt, not a suite", hint=hint))
+    path = find_suite(str(path))
     try:
         return _check_written(path, sets, models_file)
     except SpecError as error:

@@ -23,6 +23,8 @@ __all__ = ["Breaker", "Breakers", "Changes", "server_of", "shows_outage"]
 FAILURES_TO_OPEN = 5
 _REQUESTS_TO_OPEN = 2
 _LONGEST_PROBE_WAIT_S = 15.0
+_WORTH_A_WORD_S = 10.0
+"""Waits for a probe that are so long are told, or a log would fall silent."""
 _GATEWAY = (502, 503, 504)
 
 
@@ -167,6 +169,9 @@ class Breaker:
         failures = FAILURES_TO_OPEN + self._probes
         if not self._was_heard and failures >= self._policy.max_connection_failures:
             self._end = f"{self.server} never answered, {failures} times in a row: {error}"
+        elif self._end is None and self._probe_at_s - now_s >= _WORTH_A_WORD_S:
+            tries = f"{failures} times in a row, for {lasted_s:.0f} s"
+            self._tell(f"{self.server} still cannot be reached: tried {tries}")
 
     def _plan_probe(self, error: RetryableError, now_s: float) -> None:
         """Wait longer with every probe, and as long as the server asks for."""

@@ -106,13 +106,13 @@ def require_prices(config: ModelConfig) -> Prices:
 
 
 def is_billed(config: ModelConfig) -> bool:
-    """Whether somebody may be billed for calls: not where the price is 0, nor by a server of one's
-    own to which no price and no key was given.
+    """Whether somebody may be billed for calls: not where the price is 0 from today on, nor by a
+    server of one's own to which no price and no key was given.
     """
     prices = prices_of(config)
     if prices is None:
         return config.provider not in KEYLESS or config.api_key_env is not None
-    return not prices.is_free
+    return not prices.is_free_from(today())
 
 
 def cost_usd(

@@ -17,7 +17,7 @@ from typing import Any
 from phyblock.models.config import ModelConfig
 from phyblock.models.prices import Price, Prices, Rate, Tariff
 
-__all__ = ["map_entry", "mapped_prices"]
+__all__ = ["map_entry", "mapped_prices", "mapped_providers"]
 
 _FILE = "model_prices_and_context_window_backup.json"
 _PER_MILLION = 1_000_000
@@ -40,6 +40,11 @@ def map_entry(config: ModelConfig) -> dict[str, Any]:
     entry = entries.get(config.provider_model, {})
     owner = str(entry.get("litellm_provider", ""))
     return entry if config.provider and owner.startswith(config.provider) else {}
+
+
+def mapped_providers() -> frozenset[str]:
+    """The providers of the map's models."""
+    return frozenset(str(entry.get("litellm_provider", "")) for entry in _entries().values())
 
 
 def mapped_prices(config: ModelConfig) -> Prices | None:

@@ -147,11 +147,13 @@ class Prices:
         )
         return Prices(tuple(tariffs))
 
-    @property
-    def is_free(self) -> bool:
-        """Whether nothing is ever to be paid."""
-        rates = [rate for tariff in self.tariffs for rate in tariff.rates]
-        return all(rate.of(batched=batched).is_free for rate in rates for batched in (False, True))
+    def is_free_from(self, day: date) -> bool:
+        """Whether nothing is to be paid on this day and all that follow."""
+        now = self.on(day)
+        held = [t for t in self.tariffs if t is now or (t.since is not None and t.since > day)]
+        rates = [rate for tariff in held for rate in tariff.rates]
+        are_free = (rate.of(batched=batched).is_free for rate in rates for batched in (False, True))
+        return now is not None and all(are_free)
 
 
 FREE = Prices.flat(0.0, 0.0)

@@ -7,7 +7,7 @@ import importlib.util
 from phyblock.models.config import DIRECT_PROVIDERS, ModelConfig
 from phyblock.models.keys import KEYLESS
 from phyblock.models.litellm_call import litellm_providers
-from phyblock.models.price_map import map_entry
+from phyblock.models.price_map import map_entry, mapped_providers
 
 __all__ = ["known_providers"]
 
@@ -15,10 +15,10 @@ _AT_HAND = frozenset((*DIRECT_PROVIDERS, *KEYLESS))
 
 
 def known_providers(config: ModelConfig) -> frozenset[str]:
-    """The providers of which a model's is one; litellm is imported only where its map does not have
-    the model, which takes seconds.
+    """The providers of which a model's is one; litellm is imported only where its map has neither
+    the model nor another of its provider, which takes seconds.
     """
-    if config.provider in _AT_HAND or map_entry(config):
+    if config.provider in _AT_HAND or map_entry(config) or config.provider in mapped_providers():
         return frozenset((config.provider,))
     if importlib.util.find_spec("litellm") is None:
         return _AT_HAND

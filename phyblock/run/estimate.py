@@ -176,8 +176,8 @@ class Estimate:
 
     @property
     def may_cost(self) -> bool:
-        """Whether money may be spent: calls are left, and not known to be free."""
-        return self.calls > 0 and (self.cost_usd is None or self.cost_usd > 0)
+        """Whether money may be spent: calls are left, and not known to be free for good."""
+        return self.calls > 0 and (self.prices is None or not self.prices.is_free_from(self.day))
 
     @property
     def most_usd(self) -> float | None:
@@ -185,8 +185,14 @@ class Estimate:
         return None if self.tariff is None else self._most_usd
 
 
-def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
-    """Estimates in the order of the plan's models; StoreError for the folder of another run."""
+def estimate(
+    plan: RunPlan, folder: Path, *, use_cache: bool, retry_failed: bool = False
+) -> list[Estimate]:
+    """Estimates in the order of the plan's models; with `retry_failed` samples whose request was
+    rejected are asked again.
+
+    Raises StoreError for the folder of another run.
+    """
     rows = [
         Estimate(
             m.name,
@@ -199,7 +205,7 @@ def estimate(plan: RunPlan, folder: Path, *, use_cache: bool) -> list[Estimate]:
         for m in plan.models
     ]
     found = held_run(folder, plan.manifest, plan.earlier)
-    settled = set() if found is None else _settled(plan, folder, found, rows)
+    settled = set() if found is None else _settled(plan, folder, found, rows, again=retry_failed)
     lines = () if found is None else tuple(line for _, line in BatchLines(folder))
     waiting = {
         model.name: waiting_keys(model.config, lines, folder)
@@ -250,18 +256,20 @@ def _outlines(
             yield [seed], list(track.outlines(shown[seed]))
 
 
-def _settled(plan: RunPlan, folder: Path, found: Manifest, rows: Sequence[Estimate]) -> set[str]:
-    """Samples whose newest record is final, and stays so under the readers of today; from their
-    replies the rows learn.
+def _settled(
+    plan: RunPlan, folder: Path, found: Manifest, rows: Sequence[Estimate], *, again: bool
+) -> set[str]:
+    """Samples that are not asked again, by their newest records and the readers of today; from
+    replies the rows learn. `again` asks for those whose request was rejected.
     """
     by_model = {row.model: row for row in rows}
     newest: dict[str, bool] = {}
     for _, record in run_records(folder, plan.going_on(found), plan.sample_ids()):
-        newest[record.sample] = record.is_final
+        newest[record.sample] = record.is_answered if again else record.is_final
         kind = _kind(record.track, record.way)
         for reply in record.replies:
             by_model[record.model].add_reply(reply.usage.completion_tokens, kind)
-    settled = {sample for sample, is_final in newest.items() if is_final}
+    settled = {sample for sample, is_settled in newest.items() if is_settled}
     is_todays = found.identity == plan.manifest.identity
     return settled if is_todays else settled - begun_anew(plan, folder, found)
 

@@ -30,10 +30,13 @@ def bundled_suites() -> list[str]:
 def find_suite(name: str) -> Path:
     """The suite file that `name` means: a path, or the name of a bundled suite.
 
-    Raises SpecError that lists the bundled suites when there is no such file.
+    Raises SpecError that lists the bundled suites when there is no such file, or for a prompt.
     """
     path = Path(name)
     if os.path.isfile(path):
+        if path.suffix == ".j2":
+            hint = "name the suite that uses it: its prompts are rendered"
+            raise SpecError(Problem(name, "is a prompt, not a suite", hint=hint))
         return path
     if not name.strip():
         allowed = "a suite file, or a bundled suite: " + ", ".join(bundled_suites())

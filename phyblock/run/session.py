@@ -68,10 +68,9 @@ def check_ready(plan: RunPlan) -> RunPlan:
         status = api_key_status(model.config)
         if status.fault:
             problems.append(Problem(f"model {model.name}", status.fault, "", model.config.id))
-        if status.is_needed and not status.is_set:
-            if (unknown := provider_problem(model.config, f"model {model.name}")) is not None:
-                problems.append(unknown)
-                continue
+        if (unknown := provider_problem(model.config, f"model {model.name}")) is not None:
+            problems.append(unknown)
+        elif status.is_needed and not status.is_set:
             message = "needs an API key, and none is set"
             names = " or ".join(status.variables)
             hint = f"set {names} in the environment, or leave the model out with --models"

@@ -28,16 +28,22 @@ def model_problems(
             hint = "the path is taken relative to the models file"
             yield Problem(where, message, f"{name}.replay", spec.replay, "a folder", hint)
         if spec.id is not None:
-            config = ModelConfig(name, "litellm", spec.id)
+            # Whether there is an address matters here, and not which.
+            address = "http://localhost" if spec.has_address else None
+            config = ModelConfig(name, "litellm", spec.id, address, transport=spec.transport)
             if (problem := provider_problem(config, source.where((name, "id")))) is not None:
                 yield problem
 
 
 def provider_problem(config: ModelConfig, where: str) -> Problem | None:
-    """That a model is of a provider which litellm does not know, or None."""
+    """That a model is asked through litellm, which does not know its provider, or None."""
+    if config.kind != "litellm" or config.is_direct:
+        return None
     providers = known_providers(config)
-    if config.kind != "litellm" or config.provider in providers:
+    if config.provider in providers:
         return None
     message, hint = "is of no provider that is known", did_you_mean(config.provider, providers)
+    if config.has_address:
+        hint = f"a server of your own that speaks OpenAI's chat protocol: hosted_vllm/{config.id}"
     allowed = "provider/model, as litellm names them"
     return Problem(where, message, f"{config.name}.id", config.id, allowed, hint)

@@ -59,7 +59,9 @@ def _check_id(model_id: str) -> str:
     if slash and provider and rest and " " not in model_id:
         return model_id
     owner = next((who for start, who in _OWNERS if model_id.lower().startswith(start)), None)
-    hint = f"did you mean {owner}/{model_id}?" if owner else "for example openai/gpt-4o-2024-08-06"
+    own = f", behind a server of your own hosted_vllm/{model_id}" if " " not in model_id else ""
+    hint = f"for example openai/gpt-4o-2024-08-06{own}"
+    hint = f"did you mean {owner}/{model_id}?" if owner else hint
     raise refuse("is not a litellm id", allowed="provider/model", hint=hint)
 
 

@@ -163,7 +163,8 @@ class LimitsSpec(Section):
     max_connection_failures: Count = Field(
         default=20,
         description="Failures to reach a server, one after another, after which its models are "
-        "stopped where it has not answered once in this run.",
+        "stopped where it has not answered once in this run; as many answers with HTTP 2xx that "
+        "hold no reply, where it has not given one.",
     )
     timeout_s: TimeoutS = Field(default=300.0, description="Longest wait for one reply [s].")
     batch_poll_s: Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] = Field(

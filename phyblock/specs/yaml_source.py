@@ -19,6 +19,7 @@ from phyblock.bounded import LONGEST_INTEGER, read_bytes
 from phyblock.bounded_yaml import TAG, TooMuchError, compose
 from phyblock.errors import Problem, SpecError, said
 from phyblock.specs.yaml_loader import BOUNDS, CoreLoader
+from phyblock.words import QUOTE_HINT
 
 __all__ = ["CoreLoader", "FieldPath", "YamlSource", "dotted", "parse_yaml", "read_yaml"]
 
@@ -235,6 +236,8 @@ class _Reader:
             hint = "put text that holds ': ' in quotes, or check the indentation"
         elif "another document" in message:
             hint = "keep one document: remove the line ---"
+        elif self._place:
+            hint = QUOTE_HINT
         return Problem(where, f"is not YAML: {message}", hint=hint)
 
     def _where(self, node: yaml.Node) -> str:

@@ -33,6 +33,7 @@ from tests.cli.breakage import (
     suite_line,
     suite_text,
     template,
+    template_alone,
     user_block,
     without_field,
 )
@@ -41,6 +42,7 @@ from tests.workspace import tower
 
 EPS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 90 90\nshowpage\n"
 LONG = "x" * 5_000
+NOWHERE = "127.0.0.1:9"
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,13 @@ OPTIONS: tuple[Bad, ...] = (
     Bad("set-form", options("--set", "seeds"), ("--set seeds", "key=value")),
     Bad("set-yaml", options("--set", "seeds=[1"), ("--set seeds=[1",)),
     Bad("set-unquoted", options("--set", "seeds=[0,", "1]"), ("1]", "quote values with spaces")),
+    Bad("set-mapping", options("--set", "sampling={top_p:", "1}"), ("quote values with spaces",)),
+    Bad("set-words", options("--set", "name=my", "trial"), ("quote values with spaces",)),
+    Bad("set-spaced", options("--set", "seeds", "=", "0"), ("quote values with spaces",)),
+    Bad("set-half", options("--set", "seeds=[0,"), ("--set seeds=[0,", "quote values with spaces")),
+    Bad("models-spaced", options("--models", "alpha,", "random"), ("quote values with spaces",)),
+    Bad("prompt-run", template_alone("run"), ("mine.j2: is a prompt, not a suite", "hint: name")),
+    Bad("prompt-validate", template_alone("validate"), ("mine.j2: is a prompt, not a suite",)),
     Bad("models", options("--models", "oracel"), ("--models", "found: oracel", "mean oracle?")),
     Bad("no-file", options("--models-file", "gone.yaml"), ("gone.yaml", "no such models file")),
     Bad("limit", options("--limit", "0"), ("--limit", "0 is not in the range")),
@@ -166,6 +175,8 @@ MODELS: tuple[Bad, ...] = (
     Bad("model-twice", models_text("a: openai/x\nb: openai/x\na: openai/y\n"),
         ("models.yaml:3:1", "a")),
     Bad("no-provider", models_text("mine: gpt-4o\n"), ("models.yaml:1:7", "openai/gpt-4o?")),
+    Bad("no-known-provider", models_text(f"alpha: {{id: Qwen/x, api_base: 'http://{NOWHERE}/v1'}}\n"),
+        ("model alpha", "is of no provider that is known", "hosted_vllm/Qwen/x")),
     Bad("builtin", models_text("oracle: openai/x\n"), ("models.yaml:1:1: oracle",)),
     Bad("no-key", models_text("alpha: openai/gpt-4o\n"),
         ("alpha", "OPENAI_API_KEY", "--models")),

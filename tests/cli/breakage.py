@@ -78,6 +78,16 @@ def template(text: str | None) -> Prepare:
     return prepare
 
 
+def template_alone(verb: str) -> Prepare:
+    """A template stands where a suite belongs."""
+
+    def prepare(workspace: Workspace) -> list[str]:
+        (workspace.root / "mine.j2").write_text(user_block("Build it."), encoding="utf-8")
+        return [verb, "mine.j2"]
+
+    return prepare
+
+
 def user_block(text: str) -> str:
     """A template whose second line is `text`, in a user block."""
     return f"{{% block user %}}\n{text}\n{{% endblock %}}"

@@ -139,8 +139,40 @@ def test_nothing_is_spent_unasked_where_nobody_can_be_asked(suite: Workspace) ->
         assert "would cost money, and there is no terminal to ask on" in refused.err
         assert "5 calls, about $" in refused.out
         assert not suite.out.exists()
-        limited = suite.run("--models", "alpha", "--set", "limits.max_cost_usd=1")
-        assert (limited.code, running.server.requests) == (0, 5), limited.err
+        running.server.faults = Faults(mode="400")
+        limit = ["--set", "limits.max_cost_usd=1"]
+        rejected = suite.run("--models", "alpha", *limit)
+        assert (rejected.code, running.server.requests) == (1, 5), rejected.err
+        # What was rejected is asked again only where somebody agrees to that.
+        assert suite.run("--models", "alpha").code == 1
+        again = suite.run("--models", "alpha", "--retry-failed")
+        assert (again.code, running.server.requests) == (2, 5)
+        assert "5 calls, about $" in again.out
+        running.server.faults = Faults()
+        limited = suite.run("--models", "alpha", *limit, "--retry-failed")
+        assert (limited.code, running.server.requests) == (0, 10), limited.err
+
+
+def test_what_costs_nothing_today_alone_is_asked_about(suite: Workspace) -> None:
+    free, dear = ({"input": n, "output": n} for n in (0.0, 1.0))
+    later, before = {**dear, "from": "2999-01-01"}, {**dear, "from": "2020-01-01"}
+    prices = {
+        "soon": [{**free, "from": "2020-01-01"}, later],
+        "once": [before, {**free, "from": "2021-01-01"}],
+        "unknown": None,
+    }
+    with Running(OpenAIChat()) as running:
+        suite.write_yaml(
+            "models.yaml",
+            {
+                name: {"id": f"hosted_vllm/{name}", "api_base": f"{running.url}/v1", "price": price}
+                for name, price in prices.items()
+            },
+        )
+        refused = suite.run("--models", "once,soon,unknown")
+        assert (refused.code, running.server.requests) == (2, 0)
+        assert "found: soon\n" in refused.err
+        assert suite.run("--models", "once,unknown").code == 0
 
 
 def test_yes_asks_no_person(suite: Workspace) -> None:

@@ -17,9 +17,10 @@ def test_missing_recordings_and_unknown_providers_are_found(workspace: Workspace
         "far": {"replay": "./nowhere"},
         "odd": {"id": "opnai/gpt-4o", "groups": ["mine"]},
         "own": {"id": "hosted_vllm/x", "api_base": "http://localhost:1/v1"},
+        "straight": {"id": "My/x", "api_base": "http://localhost:1/v1", "transport": "direct"},
     }
     workspace.write_yaml("models.yaml", models)
-    workspace.write_suite(models=["group:mine", "own"], seeds=[0])
+    workspace.write_suite(models=["group:mine", "own", "straight"], seeds=[0])
     done = workspace.phyblock("validate", "models.yaml", "suite.yaml")
     assert done.code == 2
     assert "models.yaml:2:11: far.replay: recordings not found" in done.err
@@ -28,9 +29,12 @@ def test_missing_recordings_and_unknown_providers_are_found(workspace: Workspace
     assert done.err.count("models.yaml:4:7: odd.id: is of no provider that is known") == 2
     assert "did you mean openai?" in done.err
     assert "own.id" not in done.err
+    assert "straight.id" not in done.err
 
 
-@pytest.mark.parametrize("model", ["hosted_vllm/x", "openai/new", "gemini/gemini-2.5-pro"])
+@pytest.mark.parametrize(
+    "model", ["hosted_vllm/x", "openai/new", "gemini/gemini-2.5-pro", "anthropic/claude-unheard-of"]
+)
 def test_a_model_at_hand_needs_no_litellm(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(providers, "litellm_providers", lambda: pytest.fail("it was imported"))
     assert model.partition("/")[0] in known_providers(ModelConfig("m", "litellm", model))

@@ -292,3 +292,35 @@ def test_a_failure_counts_as_an_attempt_wherever_it_happened() -> None:
     assert isinstance(answer, RetryableError)
     assert sum(server.requests for server in servers) == QUICK.attempts
     assert all(server.requests >= 2 for server in servers)
+
+
+@pytest.mark.parametrize("page", ["html", "cut", "empty"])
+def test_who_never_gives_a_reply_that_can_be_read_is_asked_no_more(page: str) -> None:
+    most = QUICK.max_connection_failures
+    said: list[str] = []
+    breakers = Breakers(QUICK, said.append)
+    wrong, right = OpenAIChat(Faults(mode=page)), OpenAIChat()
+    with Running(wrong) as first, Running(right) as second:
+        alone = ask(make_model(at(first.url, max_concurrency=3)), *map(make_request, names(30)))
+        assert most <= wrong.requests < most + 3
+        beside = at(first.url, second.url, max_concurrency=4)
+        answers = ask(make_model(beside, breakers=breakers), *map(make_request, names(60)))
+        assert wrong.requests < 2 * (most + 4)
+        # One that has given a reply is not given up for what follows.
+        wrong.faults = Faults()
+        model = make_model(at(first.url))
+
+        async def main() -> list[object]:
+            first_of_all = await answers_of(model, "first")
+            wrong.faults = Faults(mode=page)
+            answers = first_of_all + await answers_of(model, *names(4))
+            await model.aclose()
+            return answers
+
+        later = run(main)
+    assert {type(answer) for answer in alone} <= {RetryableError, UnavailableError}
+    assert f"{first.url} never gave a reply that can be read, {most} times: " in str(alone[-1])
+    assert [type(answer) for answer in answers] == [Reply] * 60
+    (text,) = said
+    assert text.startswith(f"{first.url} is left out of m: {first.url} never gave a reply")
+    assert [type(answer) for answer in later] == [Reply, *[RetryableError] * 4]
