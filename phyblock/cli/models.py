@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Iterator, Sequence
 from datetime import date, timedelta
 from importlib.metadata import version
+from pathlib import Path
 
 import click
 from rich.console import Console
@@ -48,32 +49,49 @@ _WIDE = 130
 """Characters from which kinds and prices fit beside names, ids and keys."""
 
 
-@click.group("models", invoke_without_command=True)
-@models_file_option
-@click.option(
+_retiring_option = click.option(
     "--retiring",
     is_flag=True,
     help=f"List only those that their providers end within {_SOON_DAYS} days, or have ended.",
 )
+
+
+@click.group("models", invoke_without_command=True)
+@models_file_option
+@_retiring_option
 @click.pass_context
 def command(ctx: click.Context, models_file: str | None, retiring: bool) -> None:
     """List the models that suites may name, by groups; `check NAME` makes one tiny call."""
     path = find_models_file(models_file, None)
     ctx.obj = load_models(path)
-    if ctx.invoked_subcommand is not None:
-        return
+    if ctx.invoked_subcommand is None:
+        _list(path, ctx.obj, is_retiring=retiring)
+
+
+@command.command("list")
+@_retiring_option
+@click.pass_context
+def list_models(ctx: click.Context, retiring: bool) -> None:
+    """List the models, as without a command."""
+    assert ctx.parent is not None
+    given = ctx.parent.params
+    path = find_models_file(given["models_file"], None)
+    _list(path, ctx.obj, is_retiring=retiring or given["retiring"])
+
+
+def _list(path: Path, known: dict[str, ModelSpec], *, is_retiring: bool) -> None:
     console = make_console()
-    if retiring:
-        _show_retiring(console, [_config(name, ctx.obj) for name in ctx.obj])
+    if is_retiring:
+        _show_retiring(console, [_config(name, known) for name in known])
         return
     groups = {
-        title: [_row(name, _config(name, ctx.obj)) for name in names]
-        for title, names in _by_group(ctx.obj)
+        title: [_row(name, _config(name, known)) for name in names]
+        for title, names in _by_group(known)
     }
     for title, rows in groups.items():
         _show(console, title, rows)
     console.print(
-        f"{counted(len(ctx.obj), 'model')} in {shown_path(path)}", soft_wrap=True, markup=False
+        f"{counted(len(known), 'model')} in {shown_path(path)}", soft_wrap=True, markup=False
     )
     if console.width < _WIDE:
         console.print(f"Kinds and prices need a window of {_WIDE} columns.", soft_wrap=True)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from phyblock.datasets import recorded_models
+from phyblock.errors import DataError
 from phyblock.records import Manifest
 from phyblock.run.plan import RunPlan
 from phyblock.run.taking_on import earlier_readers
-from phyblock.specs import LoadedSuite
+from phyblock.specs import RECORDED, LoadedSuite
 from phyblock.tracks import kind_of
 from phyblock.tracks.opening import template_prompt
 from phyblock.tracks.prompts import FORM_FACTS
@@ -18,14 +21,17 @@ __all__ = ["asking_remarks", "choice_remarks", "moved_remarks"]
 
 
 def asking_remarks(loaded: LoadedSuite, plan: RunPlan) -> list[str]:
-    """Prompts of one's own; and where answers are asked for as JSON, which models are sent the
-    schema, which hear of it in the prompt alone, and which of these prompts do not say it.
+    """Models that are asked although recordings of them are there; prompts of one's own; and where
+    answers are asked for as JSON, which models are sent the schema, which hear of it in the prompt
+    alone, and which of these prompts do not say it.
     """
-    if not any(model.config.kind == "litellm" for model in plan.models):
+    called = [model.name for model in plan.models if model.config.kind == "litellm"]
+    if not called:
         return []
     asked = {variant.shown: loaded.at(variant.shown) for variant in plan.variants}
     used = {(track, path): one for one in asked.values() for track, path in one.templates.items()}
-    own = [_named(track, path, one) for (track, path), one in used.items()]
+    own = [*_recorded(called, loaded)]
+    own += [_named(track, path, one) for (track, path), one in used.items()]
     own += [_unused(track, path, loaded) for track, path in loaded.unused.items()]
     if loaded.suite.answer_format == "text":
         return own
@@ -66,6 +72,18 @@ def choice_remarks(plan: RunPlan) -> list[str]:
         f"Kendall's tau {chosen.tau:.2f} (evenly spread scenes: {chosen.tau_even:.2f}). Values are "
         "of these scenes alone and estimate no others"
     ]
+
+
+def _recorded(called: Sequence[str], loaded: LoadedSuite) -> Iterator[str]:
+    if loaded.suite.dataset.format != "official":
+        return
+    with contextlib.suppress(DataError):
+        known = recorded_models(loaded.dataset_path)
+        if names := ", ".join(name for name in called if name in known):
+            yield (
+                f"{names}: called anew, though {loaded.dataset_path} holds recorded replies "
+                f"(models: {RECORDED} in the suite replays them, of those that --models names)"
+            )
 
 
 def _models(plan: RunPlan) -> Iterator[str]:

@@ -185,7 +185,8 @@ def test_a_limit_keeps_some_of_every_level_and_is_a_run_of_its_own(copy: Workspa
 
 
 def test_what_does_not_change_results_does_not_make_another_run(copy: Workspace) -> None:
-    copy.write_models("http://127.0.0.1:9", "alpha", size_b=7)
+    labels = {"size_b": 7, "published": "GPT-4o", "price": {"input": 1.0, "output": 2.0}}
+    copy.write_models("http://127.0.0.1:9", "alpha", transport="litellm", **labels)
     sets = ("--set", "limits.max_concurrency=1", "--set", "description=x")
     done = copy.run(*sets, "--models", "oracle,random,alpha")
     assert (done.code, done.err) == (0, "")
