@@ -78,6 +78,7 @@ class ChatModel:
         self._parts = parts
         self._sender = Sender(config, parts.budget, parts.prices, parts.halt, self._say_seedless)
         self._told_width = 0
+        self._is_batched_told = False
         self._unavailable: UnavailableError | None = None
 
     async def ask(self, request: Request) -> Reply:
@@ -100,6 +101,8 @@ class ChatModel:
             if known.reply is not None:
                 return replace(known.reply, cost_usd=self._sender.cost_usd(known.reply))
             is_free = not known.is_asked
+            if known.is_batched:
+                self._say_batched()
         outlay = Outlay(estimate(self._config, request))
         return await self._ask_new(_Question(request, key, outlay, is_free=is_free))
 
@@ -166,7 +169,9 @@ class ChatModel:
                 return reply
 
     async def _from_others(self, question: _Question) -> Reply | None:
-        """Wait for others that ask the same, no longer than a request of our own would take."""
+        """Wait for others that ask the same, no longer than a request of our own would take, or
+        than their batch may.
+        """
         cache = self._parts.cache
         is_free, question.is_free = question.is_free, False
         if cache is None or question.by_force or is_free:
@@ -268,6 +273,11 @@ class ChatModel:
 
     def _say_seedless(self) -> None:
         self._tell("seed_unsupported", "takes no seed: seeds are independent repeats")
+
+    def _say_batched(self) -> None:
+        if not self._is_batched_told:
+            self._is_batched_told = True
+            self._tell("batch", "waiting for what another run asks in a batch")
 
     def _stop(self, error: UnavailableError) -> None:
         if self._unavailable is None:

@@ -4,6 +4,8 @@ A lease is held while a request is under way and renewed until it ends, so that 
 asks the same. It ends with its process where that can be told, by those on the same machine, and
 else runs out soon after its holder died or hangs. The clock of the machine may be set: a lease that
 would last longer than any can is none.
+
+Many questions that are asked together stand under one lease, so that one row is renewed for all.
 """
 
 from __future__ import annotations
@@ -11,8 +13,8 @@ from __future__ import annotations
 import sqlite3
 import time
 import uuid
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
 
 from phyblock.models.holder import holder_name, is_holder_gone
 
@@ -28,7 +30,17 @@ CREATE TABLE IF NOT EXISTS leases (
     until REAL NOT NULL
 ) WITHOUT ROWID
 """
-_EXISTS = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'leases'"
+_CREATE_GROUPED = """
+CREATE TABLE IF NOT EXISTS grouped_leases (
+    key TEXT PRIMARY KEY,
+    lease TEXT NOT NULL
+) WITHOUT ROWID
+"""
+_EXISTS = "SELECT count(*) FROM sqlite_master WHERE name IN ('leases', 'grouped_leases')"
+_GROUPED = (
+    "SELECT until, owner, leases.key FROM grouped_leases "
+    "JOIN leases ON leases.key = grouped_leases.lease WHERE grouped_leases.key = ?"
+)
 
 
 class Lease(NamedTuple):
@@ -49,13 +61,22 @@ class Leases:
         self._now = now
         self._held: set[Lease] = set()
         self._holder = holder_name()
-        if db.execute(_EXISTS).fetchone() is None:
+        if db.execute(_EXISTS).fetchone() != (2,):
             db.execute(_CREATE)
+            db.execute(_CREATE_GROUPED)
 
-    def is_taken(self, key: str) -> bool:
-        """Whether the question is being asked."""
-        now = self._now()
+    def is_taken(self, key: str, but: Lease | None = None) -> bool:
+        """Whether the question is being asked, otherwise than under the lease `but`."""
         row = self._db.execute("SELECT until, owner FROM leases WHERE key = ?", (key,)).fetchone()
+        return self._holds(row) or self.is_grouped(key, but)
+
+    def is_grouped(self, key: str, but: Lease | None = None) -> bool:
+        """Whether the question is being asked together with others; see `is_taken`."""
+        row = self._db.execute(_GROUPED, (key,)).fetchone()
+        return self._holds(row) and (but is None or row[2] != but.key)
+
+    def _holds(self, row: tuple[Any, ...] | None) -> bool:
+        now = self._now()
         if row is None or not now < row[0] <= now + LEASE_S:
             return False
         return not is_holder_gone(row[1].partition(" ")[2])
@@ -78,6 +99,31 @@ class Leases:
         self._held.add(lease)
         return lease
 
+    def take_group(self) -> Lease:
+        """A lease that questions can stand under."""
+        lease = self.take(f"group {uuid.uuid4().hex}")
+        assert lease is not None, "nobody else has this name"
+        return lease
+
+    def add(self, group: Lease, keys: Iterable[str], *, by_force: bool = False) -> bool:
+        """Have questions stand under a lease, if nobody else asks any of them, or `by_force`."""
+        rows = [(key, group.key) for key in keys]
+        self._db.execute("BEGIN IMMEDIATE")
+        try:
+            is_free = by_force or not any(self.is_taken(key, group) for key, _ in rows)
+            if is_free:
+                self._db.executemany("INSERT OR REPLACE INTO grouped_leases VALUES (?, ?)", rows)
+            self._db.execute("COMMIT")
+        except BaseException:
+            self._db.execute("ROLLBACK")
+            raise
+        return is_free
+
+    def remove(self, group: Lease, key: str) -> None:
+        """The question is no longer being asked by those who hold the lease."""
+        sql = "DELETE FROM grouped_leases WHERE key = ? AND lease = ?"
+        self._db.execute(sql, (key, group.key))
+
     def renew(self, lease: Lease) -> bool:
         """Let the lease hold for another while; False where it is held no more."""
         sql = "UPDATE leases SET until = ? WHERE key = ? AND owner = ?"
@@ -97,3 +143,6 @@ class Leases:
             for lease in tuple(self._held):
                 self.give_back(lease)
             self._db.execute("DELETE FROM leases WHERE until < ?", (self._now(),))
+            self._db.execute(
+                "DELETE FROM grouped_leases WHERE lease NOT IN (SELECT key FROM leases)"
+            )

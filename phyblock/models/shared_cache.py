@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import itertools
 import queue
 import random
 import time
-from collections.abc import AsyncIterator, Callable, Iterable, Iterator
+from collections.abc import AsyncIterator, Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, TypeVar
@@ -35,16 +36,19 @@ _PATIENCE_S = 5.0
 _TRY_AGAIN_AFTER_S = 60.0
 _FIRST_LOOK_S = 0.05
 _LONGEST_LOOK_S = 1.0
+LONGEST_BATCH_S = 26 * 3600.0
+"""Providers end a batch within a day."""
 
 
 class Known(NamedTuple):
-    """What is known of a question: its reply with the key that it is kept under, and whether it is
-    being asked.
+    """What is known of a question: its reply with the key that it is kept under, whether it is
+    being asked, and whether that is in a batch, which may take a day.
     """
 
     reply: Reply | None = None
     key: str = ""
     is_asked: bool = False
+    is_batched: bool = False
 
 
 @dataclass(frozen=True)
@@ -109,7 +113,7 @@ class SharedCache:
         return await self._do(lambda file: _look(file, iter(keys)), Known())
 
     async def await_others(self, key: str, most_s: float) -> tuple[Reply | None, bool]:
-        """Wait while another asks the same, `most_s` at most.
+        """Wait while another asks the same, `most_s` at most, in a batch somewhat above a day.
 
         The reply if there is one then, and whether the other is still asking.
         """
@@ -117,7 +121,8 @@ class SharedCache:
         while True:
             known = await self.look((key,))
             waited_s = self._clock.now() - began_s
-            if known.reply is not None or not known.is_asked or waited_s >= most_s:
+            is_long = waited_s >= (LONGEST_BATCH_S if known.is_batched else most_s)
+            if known.reply is not None or not known.is_asked or is_long:
                 return known.reply, known.is_asked
             await self._clock.sleep(pause_s * random.uniform(0.5, 1.0))
             pause_s = min(_LONGEST_LOOK_S, 1.5 * pause_s)
@@ -139,6 +144,31 @@ class SharedCache:
             if lease in self._held:
                 self._held.discard(lease)
                 await self._do(lambda file: _give_back(file, lease), None)
+
+    @contextlib.asynccontextmanager
+    async def group(self) -> AsyncIterator[Lease | None]:
+        """A lease for questions that are asked together; None while the cache is set aside."""
+        lease = await self._do(_take_group, None)
+        if lease is None:
+            yield None
+            return
+        renewing = asyncio.create_task(self._renew(lease))
+        try:
+            yield lease
+        finally:
+            renewing.cancel()
+            await self._do(lambda file: _give_back(file, lease), None)
+
+    async def join(self, group: Lease, keys: Collection[str], *, by_force: bool = False) -> bool:
+        """Keep others from asking these questions for as long as the lease holds; False, and
+        nothing is done, where another asks one of them.
+        """
+        add = functools.partial(_add, group=group, keys=keys, by_force=by_force)
+        return await self._do(add, True)
+
+    async def leave(self, group: Lease, key: str) -> None:
+        """A question is no longer asked together with those of the lease."""
+        await self._do(lambda file: _remove(file, group, key), None)
 
     async def keep(self, key: str, model_id: str, reply: Reply, lease: Lease | None = None) -> None:
         """Keep a reply, if it is whole and the file takes it, also when the wait is given up, and
@@ -259,11 +289,11 @@ def _look(file: ReplyCache, keys: Iterator[str]) -> Known:
     """
     first = next(keys)
     with file.leases() as leases:
-        is_asked = leases.is_taken(first)
+        is_asked, is_batched = leases.is_taken(first), leases.is_grouped(first)
     for key in itertools.chain((first,), keys):
         if (reply := file.get(key)) is not None:
-            return Known(reply, key, is_asked)
-    return Known(is_asked=is_asked)
+            return Known(reply, key, is_asked, is_batched)
+    return Known(is_asked=is_asked, is_batched=is_batched)
 
 
 def _keep(
@@ -286,6 +316,21 @@ def _take(file: ReplyCache, key: str, *, by_force: bool) -> Turn:
             return Turn(True, lease=lease)
         leases.give_back(lease)
     return Turn(False, reply)
+
+
+def _take_group(file: ReplyCache) -> Lease | None:
+    with file.leases() as leases:
+        return leases.take_group()
+
+
+def _add(file: ReplyCache, group: Lease, keys: Collection[str], *, by_force: bool) -> bool:
+    with file.leases() as leases:
+        return leases.add(group, keys, by_force=by_force)
+
+
+def _remove(file: ReplyCache, group: Lease, key: str) -> None:
+    with file.leases() as leases:
+        leases.remove(group, key)
 
 
 def _renew(file: ReplyCache, lease: Lease) -> bool:

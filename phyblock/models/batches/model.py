@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models.base import AskLaterError, Reply, Request
+from phyblock.models.batches.claims import Claims
 from phyblock.models.batches.following import Follower
 from phyblock.models.batches.ledger import Batch, BatchFiles, Ledger
 from phyblock.models.batches.protocol import BatchProtocol
@@ -64,6 +65,7 @@ class BatchModel:
         self._follower = Follower(protocol, self._ledger, files, self._sender, policy, self._tell)
         self._wording = Wording(config, protocol, parts.transport, self._say_seedless)
         self._purse = Purse(config, parts.budget, parts.prices)
+        self._claims = Claims(parts.cache, config.timeout_s, parts.halt, self._tell)
         self._earlier = frozenset(self._ledger.batches)
         self._draft: Draft | None = None
         self._drafting = asyncio.Lock()
@@ -74,13 +76,18 @@ class BatchModel:
         self._has_begun = False
 
     async def begin(self) -> None:
-        """See GatheringModel; the first round takes up the batches of earlier commands."""
+        """See GatheringModel; the first round takes up the batches of earlier commands, others
+        begin when nobody else asks what was left to them.
+        """
         if self._refusal is not None:
             raise self._refusal
         if not self._has_begun:
             self._has_begun = True
-            for batch in tuple(self._ledger.batches.values()):
+            batches = tuple(self._ledger.batches.values())
+            await self._claims.begin({k for b in batches if b.event != "ended" for k in b.places})
+            for batch in batches:
                 await self._take_up(batch)
+        await self._claims.wait_for_others()
 
     async def gather(self, request: Request, *, anew: bool = False) -> bool:
         """See GatheringModel."""
@@ -89,6 +96,20 @@ class BatchModel:
             return True
         if self._refusal is not None:
             return False
+        if not await self._claims.take(key):
+            return True
+        is_taken = False
+        try:
+            # With the claim in hand, as its answer may have come to the cache meanwhile.
+            if await self._kept(request) is not None:
+                return True
+            is_taken = await self._take_in(key, request)
+            return is_taken
+        finally:
+            if not is_taken:
+                await self._claims.release(key)
+
+    async def _take_in(self, key: str, request: Request) -> bool:
         written = await self._wording.write(request)
         async with self._drafting:
             newest = self._ledger.newest(key)
@@ -109,6 +130,12 @@ class BatchModel:
         HaltedError when the run ends before the batch does.
         """
         key = reply_key(self._config, request)
+        try:
+            return await self._ask(key, request)
+        finally:
+            await self._claims.release(key)
+
+    async def _ask(self, key: str, request: Request) -> Reply:
         batch = self._ledger.newest(key)
         if batch is None or batch.event == "intended" or key in self._again:
             kept = await self._kept(request)
@@ -142,6 +169,7 @@ class BatchModel:
         await asyncio.gather(*followings, return_exceptions=True)
         if self._draft is not None:
             self._draft.drop()
+        await self._claims.aclose()
         await self._parts.protocol.wire.aclose()
 
     async def _take_up(self, batch: Batch) -> None:
