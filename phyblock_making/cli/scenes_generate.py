@@ -11,7 +11,13 @@ from phyblock.cli.console import shown_path
 from phyblock.cli.paths import UserPath
 from phyblock.plain_text import counted
 from phyblock_making.auditing.given_away import MOST_SCENES, given_away_text
-from phyblock_making.cli.working import jobs_option, ray_option, seed_option, tracked
+from phyblock_making.cli.working import (
+    jobs_option,
+    ray_option,
+    seed_option,
+    tell_simulators,
+    tracked,
+)
 from phyblock_making.scenes.scene_card import card
 from phyblock_making.scenes.scene_draft import PALETTES, Palette
 from phyblock_making.scenes.scene_files import open_writer
@@ -80,8 +86,8 @@ def command(
 ) -> None:
     """Make N scenes with candidate sets, each checked by physics, and their data card.
 
-    The same N, seed, levels and palette give the same files, on any number of
-    processes or a cluster.
+    The same N, seed, levels and palette give the same files with the same
+    physics engine, on any Python, any number of processes or a cluster.
     """
     kind = cast(Palette, palette)
     order = Order(seed, kind, shares(count, levels))
@@ -100,3 +106,4 @@ def command(
         given_away = given_away_text(tasks)
         writer.finish(card(out.name, writer, made_by, _PALETTE_TEXT[kind], given_away))
     click.echo(f"{counted(count, 'scene')}, all checks passed: {shown_path(out)}")
+    tell_simulators()

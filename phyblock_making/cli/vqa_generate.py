@@ -25,7 +25,7 @@ from phyblock_making.cli.question_sets import (
     unseen_option,
 )
 from phyblock_making.cli.subtasks_option import subtasks_option
-from phyblock_making.cli.working import jobs_option, ray_option, seed_option
+from phyblock_making.cli.working import jobs_option, ray_option, seed_option, tell_simulators
 from phyblock_making.questions.question_files import check_place, write_questions
 from phyblock_making.questions.question_production import PER_SUBTASK, make_questions
 from phyblock_making.questions.shortcuts import SubtaskAudit, audit_questions
@@ -64,8 +64,9 @@ def command(
 ) -> None:
     """Make questions, each with an answer that is derived, and their data card.
 
-    The same scenes, subtasks, numbers and seed give the same files, on any number of processes or
-    a cluster. With --unseen, the card also says what is learned from the texts of that set.
+    The same scenes, subtasks, numbers and seed give the same files with the same physics engine,
+    on any Python, any number of processes or a cluster. With --unseen, the card also says what is
+    learned from the texts of that set.
     """
     check_place(out, replace)
     wanted = {subtask: per_subtask or PER_SUBTASK[subtask] for subtask in subtasks}
@@ -107,6 +108,7 @@ def command(
     write_questions(out, questions, originals, read.name, made_by, audits, told)
     outcome = f"{counted(len(questions), 'question')} in {counted(len(subtasks), 'subtask')}"
     click.echo(f"{outcome}: {shown_path(out)}")
+    tell_simulators()
     if not learns:
         click.echo(
             "CARD.md leaves out what is learned from texts and boosted probes, which need "

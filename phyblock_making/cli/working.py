@@ -1,4 +1,4 @@
-"""What the verbs that make sets share: processes, seeds, progress."""
+"""What the verbs that make sets share: processes, seeds, progress, by what a set was made."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from phyblock.cli.console import make_console
+from phyblock.sim.registry import other_simulators
 
-__all__ = ["jobs_option", "ray_option", "seed_option", "tracked"]
+__all__ = ["jobs_option", "ray_option", "seed_option", "tell_simulators", "tracked"]
 
 T = TypeVar("T")
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -51,3 +52,11 @@ def tracked(items: Iterable[T], total: int, doing: str, noun: str = "scenes") ->
             if hidden and count % _LINE_EVERY == 0:
                 console.print(f"{count} of {total} {noun}")
             yield item
+
+
+def tell_simulators() -> None:
+    """Say on standard error where a set is not what the default simulators make of its seed."""
+    for other in other_simulators():
+        click.echo(
+            f"made with {other}: the default one may make another set of the same seed", err=True
+        )

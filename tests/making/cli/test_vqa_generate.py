@@ -16,6 +16,8 @@ from PIL import Image
 from phyblock.cli.main import phyblock
 from phyblock.errors import DataError, StoreError
 from phyblock.resources import bundled
+from phyblock.sim.registry import other_simulators
+from tests.sim.still_engine import STILL_ENGINE
 
 QUESTION_LINES = "questions.jsonl"
 
@@ -29,6 +31,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "scenes.jsonl").write_text(some, encoding="utf-8")
     told = vqa("generate", "--data", folder, "--out", folder / "q", *SMALL)
     assert "8 questions in 2 subtasks" in told.stdout
+    assert ("made with" in told.stderr) == bool(other_simulators())
     return folder
 
 
@@ -62,6 +65,15 @@ def test_questions_are_written_with_card_and_checksums(folder: Path) -> None:
     assert f"phyblock vqa generate --data {folder}" in card
     assert f"scenes of `{folder.name}`" in card
     assert re.search(r"\| text, within the set \| CO \| 4 \| 25 \| \d+ \| .* \| 49 \| 26 \|", card)
+
+
+def test_a_set_by_another_engine_is_said_to_be(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PHYBLOCK_PHYSICS", STILL_ENGINE)
+    few = ("--subtasks", "CO", "--per-subtask", 1, "--jobs", 1)
+    told = vqa("generate", "--data", folder, "--out", tmp_path / "q", *few)
+    assert "made with the physics engine still 1: the default one may make another" in told.stderr
 
 
 def test_the_card_tells_what_was_learned_from_another_set(folder: Path, tmp_path: Path) -> None:
