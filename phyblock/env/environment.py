@@ -240,6 +240,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         }
 
 
+_LEVELS = (1, 2, 3, 4)
 _OPTIONS: Mapping[str, tuple[str, ...]] = {
     "setting": SETTINGS,
     "gating": GATINGS,
@@ -287,6 +288,8 @@ def _tasks_of(
     """The tasks to play, at least one; ValueError where there are none."""
     tasks = read_tasks(data) if isinstance(data, str | Path) else tuple(data)
     if levels is not None:
+        if not isinstance(levels, Collection) or not set(levels) <= set(_LEVELS):
+            raise ValueError(f"levels is {levels!r}; allowed: several of {_LEVELS}, or None")
         tasks = tuple(task for task in tasks if set(task.scene.levels) & set(levels))
     if not tasks:
         of_levels = "" if levels is None else f" of levels {sorted(levels)}"

@@ -108,10 +108,11 @@ def template_prompt(loaded: LoadedSuite, name: str) -> TemplatePrompt:
 
     Raises PromptError for a broken one.
     """
-    path = loaded.templates.get(name)
-    if path is not None:
-        return TemplatePrompt(path, path.stem)
     kind = kind_of(name)
     own = kind.template if loaded.suite.answer_format == "text" else kind.json_template
-    assert own is not None, f"{name} has no prompt of its own"
-    return TemplatePrompt(own, "default")
+    default = None if own is None else TemplatePrompt(own, "default")
+    path = loaded.templates.get(name)
+    if path is not None:
+        return TemplatePrompt(path, path.stem, default)
+    assert default is not None, f"{name} has no prompt of its own"
+    return default

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -35,7 +35,8 @@ FORM_FACTS = ("answer_schema", "answer_example")
 """The names by which templates say the JSON that is asked for."""
 
 _BLOCKS = ("system", "user")
-_ALL_BLOCKS = (*_BLOCKS, "caption", "answer", "turn", "check")
+_COMMON_BLOCKS = (*_BLOCKS, "caption")
+_ALL_BLOCKS = (*_COMMON_BLOCKS, "answer", "turn", "check")
 """Blocks that bundled templates have; another would say its text to nobody."""
 
 
@@ -120,7 +121,8 @@ class TemplatePrompt:
     is not there.
     """
 
-    def __init__(self, path: Path, name: str) -> None:
+    def __init__(self, path: Path, name: str, like: TemplatePrompt | None = None) -> None:
+        """`like` is the template in whose place it stands: it may have the blocks of that one."""
         self.name = name
         self._path = path
         self._sources = read_sources(path, (path.parent, bundled("prompts")))
@@ -133,7 +135,12 @@ class TemplatePrompt:
             # Python compiles what Jinja makes of it, and has bounds of its own.
             raise PromptError(Problem(str(path), f"is not valid Jinja: {said(error)}")) from error
         self.require("user", "and, if wanted, a block system")
-        self._check_blocks()
+        self._check_blocks(_ALL_BLOCKS if like is None else (*_COMMON_BLOCKS, *like.blocks))
+
+    @property
+    def blocks(self) -> tuple[str, ...]:
+        """The names of its blocks."""
+        return tuple(self._template.blocks)
 
     @property
     def included(self) -> tuple[Path, ...]:
@@ -154,12 +161,13 @@ class TemplatePrompt:
             problem = Problem(str(self._path), f"has no {block} block", "", found, allowed)
             raise PromptError(problem)
 
-    def _check_blocks(self) -> None:
+    def _check_blocks(self, used: Iterable[str]) -> None:
         """Raise PromptError for a block that no other is around and that nothing would say."""
+        known = tuple(dict.fromkeys(used))
         for node in self._sources.main.tree.body:
-            if isinstance(node, jinja2.nodes.Block) and node.name not in _ALL_BLOCKS:
-                where, hint = f"{self._path}:{node.lineno}", did_you_mean(node.name, _ALL_BLOCKS)
-                allowed, message = ", ".join(_ALL_BLOCKS), "is a block that nothing uses"
+            if isinstance(node, jinja2.nodes.Block) and node.name not in known:
+                where, hint = f"{self._path}:{node.lineno}", did_you_mean(node.name, known)
+                allowed, message = ", ".join(known), "is a block that nothing uses"
                 raise PromptError(Problem(where, message, "", node.name, allowed, hint))
 
     def messages(

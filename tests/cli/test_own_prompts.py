@@ -52,6 +52,8 @@ def test_a_copy_of_the_bundled_prompt_is_the_bundled_one(asked: Workspace) -> No
         ("{% block user %} {% endblock %}", "says nothing"),
         ("{% block usr %}a{% endblock %}", "has no user block"),
         ("{% block user %}a{% endblock %}{% block sytem %}b{% endblock %}", "mean system?"),
+        # Of another track, which has turns.
+        ("{% block user %}a{% endblock %}{% block turn %}b{% endblock %}", "that nothing uses"),
     ],
 )
 @pytest.mark.parametrize("verb", ["validate", "run"])

@@ -239,7 +239,9 @@ def test_an_invalid_candidate_is_told() -> None:
         ({"rotation": "free"}, "needs action='pose'"),
         ({"action": "pose", "physics": "off"}, "allowed: settle, strict"),
         ({"action": "pose", "setting": "B"}, "leave them out"),
-        ({"levels": (9,)}, r"no tasks of levels \[9\]"),
+        ({"levels": ()}, r"no tasks of levels \[\]"),
+        ({"levels": (2, 9)}, r"levels is \(2, 9\); allowed: several of \(1, 2, 3, 4\)"),
+        ({"levels": 2}, r"levels is 2; allowed"),
     ],
 )
 def test_an_option_that_is_not_allowed_is_said(options: dict[str, Any], message: str) -> None:
