@@ -209,3 +209,16 @@ def test_the_folder_of_a_run_is_found_again_without_naming_it(suite: Workspace) 
     before = suite.files()
     assert suite.phyblock("run", "suite.yaml").out == first.out
     assert suite.files() == before
+
+
+def test_the_name_of_a_model_that_is_stopped_stays_on_the_screen(suite: Workspace) -> None:
+    with Running(OpenAIChat(Faults(mode="401"))) as running:
+        suite.write_models(running.url, "alpha", price={"input": 0.0, "output": 0.0})
+        code, screen = in_terminal(suite, "", "--models", "alpha,oracle")
+    assert code == 1
+    # On a line of its own: colors may stand in it, and nothing that moves the cursor or clears.
+    colors = r"(\x1b\[[0-9;]*m)*"
+    reason = rf"HTTP 401: Incorrect API key provided api_error{colors}\r\n"
+    for words in ("alpha stopped: ", f"alpha was stopped:{colors} {colors}"):
+        assert re.search(rf"(\n|\x1b\[2K){colors}{words}{reason}", screen), words
+    assert "5 of 5 samples" in screen
