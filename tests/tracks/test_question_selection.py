@@ -43,6 +43,19 @@ def test_no_more_than_wanted_of_each_and_in_all(
     assert positions == sorted(set(positions))
 
 
+@given(tasks, some, st.integers(1, 5), st.integers(1, 40))
+def test_a_higher_limit_asks_all_that_a_lower_one_asks(
+    given_tasks: list[QuestionTask], subtasks: list[Subtask], per_subtask: int, limit: int
+) -> None:
+    def keys(most_of_each: int | None, most: int | None) -> set[str]:
+        kept = select_questions(given_tasks, subtasks, LEVELS, most_of_each, most)
+        return {task.key for task in kept}
+
+    assert keys(None, limit) <= keys(None, limit + 1)
+    assert keys(per_subtask, None) <= keys(per_subtask + 1, None)
+    assert keys(per_subtask, limit) <= keys(per_subtask, limit + 1)
+
+
 @given(tasks, st.lists(st.sampled_from(LEVELS), min_size=1, unique=True))
 def test_levels_are_those_of_the_scenes(given_tasks: list[QuestionTask], levels: list[int]) -> None:
     chosen = select_questions(given_tasks, SUBTASKS, levels, None, None)
