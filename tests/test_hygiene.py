@@ -11,17 +11,19 @@ from pathlib import Path
 
 import pytest
 
+from phyblock.sim.registry import ENGINES
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("phyblock", "phyblock_making")
 LOCKS = ("requirements.lock", "requirements-dev.lock")
 MODULES = {
     "PIL": "pillow",
     "inspect_ai": "inspect-ai",
-    "mujoco": "mujoco-core",
     "pydantic_core": "pydantic-core",
     "sklearn": "scikit-learn",
     "typing_extensions": "typing-extensions",
     "yaml": "pyyaml",
+    **{engine.library: engine.distribution for engine in ENGINES.values()},
 }
 """Import names that differ from the package's."""
 

@@ -14,6 +14,7 @@ import pytest
 
 import phyblock
 from phyblock.errors import SpecError
+from phyblock.sim.registry import ENGINES
 from tests.workspace import Workspace
 
 NAMES = ["PhyblockError", "Picture", "PlanScore", "Run", "SceneTask", "Suite", "__version__"]
@@ -40,8 +41,7 @@ def test_importing_phyblock_imports_nothing_heavy() -> None:
         "numpy",
         "pandas",
         "litellm",
-        "pybullet",
-        "mujoco",
+        *(engine.library for engine in ENGINES.values()),
         "aiohttp",
         "pydantic",
         "yaml",

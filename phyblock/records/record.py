@@ -60,6 +60,9 @@ class SentPrompt(Line):
 class Score(Line):
     """Steps counted by one criterion under one setting."""
 
+    FURTHER: ClassVar[tuple[str, ...]] = ("kept",)
+    """Fields that are counts beside tp, fp and fn; older lines lack them."""
+
     criterion: str
     """What is counted."""
     matcher: str | None = None

@@ -16,7 +16,7 @@ from phyblock.records import Manifest
 from phyblock.records.manifest import ManifestChoice
 from phyblock.run.identity import earlier_identities, identity_of, inputs_of
 from phyblock.run.models import PlannedModel
-from phyblock.sim.registry import told_engine
+from phyblock.sim.registry import ENGINES, told_engine
 from phyblock.specs import LoadedSuite
 from phyblock.tracks import AnyTrack, kind_of
 from phyblock.tracks.kind import kinds_with_physics
@@ -24,7 +24,8 @@ from phyblock.variants import Variant
 
 __all__ = ["make_manifest"]
 
-_LIBRARIES = ("phyblock", "litellm", "pybullet", "mujoco-core", "numpy", "pillow", "jinja2")
+_ENGINES = (engine.distribution for engine in ENGINES.values())
+_LIBRARIES = ("phyblock", "litellm", *_ENGINES, "numpy", "pillow", "jinja2")
 """Of the physics engines, one or both may be there."""
 
 

@@ -40,10 +40,13 @@ _DEFAULT_RENDERER = "raster"
 
 
 class KnownEngine(NamedTuple):
-    """Where an engine's factory is, the module of its library, and where that can be had."""
+    """Where an engine's factory is, the module of its library, the distribution that brings it,
+    and where that can be had.
+    """
 
     path: str
     library: str
+    distribution: str
     hint: str
 
 
@@ -51,11 +54,13 @@ ENGINES: Mapping[str, KnownEngine] = {
     REFERENCE_ENGINE: KnownEngine(
         "phyblock.sim.bullet.physics:BulletEngine",
         "pybullet",
+        "pybullet",
         "PyBullet has wheels for Python 3.10 and 3.11 on Linux, x86-64",
     ),
     "mujoco": KnownEngine(
         "phyblock.sim.mujoco.physics:MujocoEngine",
         "mujoco",
+        "mujoco-core",
         "pip install 'phyblock[mujoco]', for Python 3.11 and newer",
     ),
 }

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from phyblock.records import Score
 from phyblock.tables.design import OVERALL
-from phyblock.tables.flat import BLOCK_COLUMNS
+from phyblock.tables.flat import BLOCK_COLUMNS, MATCHED
 from phyblock.tables.load import Run, made_once
 from phyblock.tables.measures import CELL, Cell
 from phyblock.tables.outcomes import has_reply
@@ -33,7 +34,7 @@ SIDE_METRICS = ("Prec", "Rec")
 """Headings that narrow tables do without."""
 _COLUMNS = (
     *("track", "model", "scene", "seed", "variant", "outcome", "criterion", "matcher", "setting"),
-    *("tp", "fp", "fn", *BLOCK_COLUMNS.values(), "kept"),
+    *(*MATCHED, *BLOCK_COLUMNS.values(), *Score.FURTHER),
 )
 """Those of scores that cells need."""
 

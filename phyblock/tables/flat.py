@@ -17,10 +17,12 @@ from phyblock.records import Record, Score
 from phyblock.records.known import record_types
 from phyblock.scoring import BLOCK_OUTCOMES, ERROR_TYPES
 
-__all__ = ["BLOCK_COLUMNS", "TOKENS", "Flattened"]
+__all__ = ["BLOCK_COLUMNS", "MATCHED", "TOKENS", "Flattened"]
 
 BLOCK_COLUMNS = {name: f"blocks_{name}" for name in BLOCK_OUTCOMES}
 """Columns of scores that say what became of the goal's blocks."""
+MATCHED = ("tp", "fp", "fn")
+"""Columns that count steps and blocks by whether they match."""
 
 _TEXTS = ("text", "reasoning")
 """Columns that may be long."""
@@ -73,12 +75,8 @@ _SCORE_TYPES: dict[str, str] = {
     "criterion": "object",
     "matcher": "object",
     "setting": "object",
-    "tp": "int64",
-    "fp": "int64",
-    "fn": "int64",
-    **dict.fromkeys(ERROR_TYPES, "Int64"),
-    **dict.fromkeys(BLOCK_COLUMNS.values(), "Int64"),
-    "kept": "Int64",
+    **dict.fromkeys(MATCHED, "int64"),
+    **dict.fromkeys((*ERROR_TYPES, *BLOCK_COLUMNS.values(), *Score.FURTHER), "Int64"),
 }
 
 _OF_SAMPLE = ("sample", "track", "model", "scene", "seed", "variant", "outcome")
@@ -86,7 +84,7 @@ _OF_SAMPLE = ("sample", "track", "model", "scene", "seed", "variant", "outcome")
 _REPLY = ("finish", "cost_usd", "latency_s", "provider_model", "attempts", "cached", "seed_sent")
 TOKENS = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
 """Columns that count tokens."""
-_COUNTS = ("tp", "fp", "fn", *ERROR_TYPES, *BLOCK_COLUMNS.values(), "kept")
+_COUNTS = (*MATCHED, *ERROR_TYPES, *BLOCK_COLUMNS.values(), *Score.FURTHER)
 _LABELS = ("criterion", "matcher", "setting")
 _UNKNOWN = -(2**62)
 """Stands for a count that there is not."""
@@ -168,13 +166,13 @@ class Flattened:
             self._labels[name].append(self._share(label))
         errors, blocks = score.errors or {}, score.blocks or {}
         counts = (
-            *(score.tp, score.fp, score.fn),
-            *(errors.get(name, _UNKNOWN) for name in ERROR_TYPES),
-            *(blocks.get(name, _UNKNOWN) for name in BLOCK_OUTCOMES),
-            _UNKNOWN if score.kept is None else score.kept,
+            *(getattr(score, name) for name in MATCHED),
+            *(errors.get(name) for name in ERROR_TYPES),
+            *(blocks.get(name) for name in BLOCK_OUTCOMES),
+            *(getattr(score, name) for name in Score.FURTHER),
         )
         for name, count in zip(_COUNTS, counts, strict=True):
-            self._counts[name].append(count)
+            self._counts[name].append(_UNKNOWN if count is None else count)
 
     def _share(self, value: Any) -> Any:
         """The one object that stands for all that equal it."""

@@ -8,9 +8,11 @@ import sys
 import pytest
 
 from phyblock.cli.main import phyblock as group
+from phyblock.sim.registry import ENGINES
 
 VERBS = tuple(group.list_commands(None))  # type: ignore[arg-type]
-HEAVY = ("litellm", "pybullet", "mujoco", "pandas", "aiohttp", "matplotlib", "phyblock_making")
+LIBRARIES = (engine.library for engine in ENGINES.values())
+HEAVY = ("litellm", *LIBRARIES, "pandas", "aiohttp", "matplotlib", "phyblock_making")
 SCRIPT = """
 import atexit, sys
 sys.argv = ["phyblock", *sys.argv[1:]]

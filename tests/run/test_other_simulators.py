@@ -16,7 +16,7 @@ from phyblock.report.compare import compare_runs
 from phyblock.run.rescore import rescore
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
 from phyblock.sim.question_pictures import question_png
-from phyblock.sim.registry import installed_engines, physics_engine, told_engine
+from phyblock.sim.registry import ENGINES, installed_engines, physics_engine, told_engine
 from phyblock.sim.site import state_picture
 from phyblock.tables.load import load_run
 from phyblock.tracks.step_planning.rules import StepRules
@@ -166,7 +166,7 @@ def test_an_unknown_engine_is_refused_before_anything_is_made(workspace: Workspa
     assert done.code == 2
     assert done.errors == [
         "error: PHYBLOCK_PHYSICS: is not known\n    found: bullet\n"
-        "    allowed: pybullet, mujoco, or module:factory"
+        f"    allowed: {', '.join(ENGINES)}, or module:factory"
     ]
     assert not workspace.out.exists()
 

@@ -222,7 +222,7 @@ def test_the_chosen_engine_decides_what_stands(monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.parametrize(
     ("word", "message"),
     [
-        ("bullet", "allowed: pybullet, mujoco, or module:factory"),
+        ("bullet", f"allowed: {', '.join(ENGINES)}, or module:factory"),
         ("", "is not known"),
         (".engine:Engine", "is not known"),
         ("phyblock.nowhere:Engine", "cannot be imported"),

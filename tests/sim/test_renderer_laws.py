@@ -189,7 +189,7 @@ def test_pictures_of_two_renderers_are_never_mixed(monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize(
     ("word", "message"),
     [
-        ("vulkan", "allowed: raster, or module:factory"),
+        ("vulkan", f"allowed: {', '.join(RENDERERS)}, or module:factory"),
         ("phyblock.nowhere:Renderer", "cannot be imported"),
         ("phyblock.sim.bullet.physics:BulletEngine", "names no renderer"),
     ],

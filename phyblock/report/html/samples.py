@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from phyblock.datasets import AssemblyTask
-from phyblock.records import PromptLines, Record, SentPrompt
+from phyblock.records import PromptLines, Record, Score, SentPrompt
 from phyblock.records.reading import any_records
 from phyblock.report.html.index import Item, Place, SampleIndex
 from phyblock.report.html.pack import Pack
@@ -133,7 +133,7 @@ def _prompt(
     return {"template": prompt.template, "n": prompts.get(prompt.messages), "images": images}
 
 
-_COUNTED = ("errors", "blocks", "kept")
+_COUNTED = ("errors", "blocks", *Score.FURTHER)
 """Numbers of a score that stand in tables alone."""
 
 
