@@ -9,12 +9,21 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.tables.drawing import WIDTH_IN, drawn_width_in
+from phyblock.tables.drawing import (
+    WIDTH_IN,
+    bare_axes,
+    drawn_width_in,
+    legend_below,
+    name_across,
+    names_width_in,
+    new_figure,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-__all__ = ["HATCHES", "Part", "stack"]
+__all__ = ["HATCHES", "Part", "share_bars", "stack"]
 
 HATCHES = ("", "", "//", "..", "\\\\", "xx", "----", "++")
 """Hatches of parts by their place: they tell colors apart that look alike to some, or in print."""
@@ -27,6 +36,22 @@ class Part(NamedTuple):
     shares: NDArray[np.float64]
     color: str
     ink: str
+
+
+_LEAST_LABEL = 4.0
+
+
+def share_bars(models: Sequence[str], parts: Iterable[Part], name: str) -> tuple[Figure, Axes]:
+    """A figure with the parts as one line a model, `name` under them and a legend."""
+    names_in = names_width_in(models)
+    figure = new_figure(1.05 + 0.2 * len(models), names_in + 1.0)
+    ax = figure.subplots()
+    stack(ax, models, parts, 0.7, _LEAST_LABEL)
+    ax.set(xlim=(0, 100), ylim=(len(models) - 0.4, -0.6))
+    name_across(ax, name, figure.get_figwidth() - names_in)
+    bare_axes([ax])
+    legend_below(figure, *ax.get_legend_handles_labels())
+    return figure, ax
 
 
 def stack(

@@ -78,7 +78,6 @@ def dataset_levels(run: Run) -> Figure | None:
     left.set_yticks(places, [level_name(level) for level in levels])
     left.set_ylim(len(levels) - 0.4, -0.6)
     bare_axes([left, right])
-    name = f"Suite {run.design.suite.name}, " if run.design.suite.name else ""
-    what = f"{name}{counted(len(scenes), 'scene')}"
+    what = run.design.after_suite(counted(len(scenes), "scene"))
     headed(figure, "Scenes by level", f"{what}; boxes: quartiles, a scene may count in several")
     return figure

@@ -170,7 +170,7 @@ def _marks(figure: Figure, ax: Axes, others: Mapping[str, NDArray[np.float64]]) 
 
 
 def _subtitle(run: Run, track: str, clusters: int) -> str:
-    suite = f"Suite {run.design.suite.name}; " if run.design.suite.name else ""
     notes = kind_of(track).report().notes(run)[:1]
     how = "".join(note.partition(". ")[0].rstrip(".") + "; " for note in notes)
-    return f"{suite}{how}lines: 95 % intervals over {counted(clusters, 'base scene')}"
+    lines = f"{how}lines: 95 % intervals over {counted(clusters, 'base scene')}"
+    return run.design.after_suite(lines, "; ")

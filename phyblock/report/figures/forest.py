@@ -23,6 +23,7 @@ from phyblock.tables.drawing import (
     text_width_in,
 )
 from phyblock.tables.load import Run
+from phyblock.tables.measures import in_unit
 from phyblock.tables.text_table import between, level_name, number
 from phyblock.tracks.headline import main_measure
 from phyblock.tracks.kind import kind_of
@@ -87,19 +88,20 @@ def difference_forest(run: Run, *, track: str) -> Figure | None:
         room_in -= _NUMBERS_IN
     ax.xaxis.set_major_locator(MaxNLocator(max(1, int(room_in / _TICK_IN))))
     unit = "points" if found.unit == "%" else found.unit
-    measured = f"Difference of {found.name}" + (f" ({unit})" if unit else "")
-    name_across(ax, measured, room_in)
+    name_across(ax, in_unit(f"Difference of {found.name}", unit), room_in)
     handles = ax.get_lines()[1:3]
     legend_below(figure, handles, [str(handle.get_label()) for handle in handles])
     most = table.loc[table["n_scenes"].idxmax()]
     samples = counted(int(most["n_samples"]), "sample")
-    suite = f"Suite {run.design.suite.name}; " if run.design.suite.name else ""
+    how = (
+        f"{samples} that both have; lines: 95 % intervals over "
+        f"{counted(int(most['n_clusters']), 'base scene')}; filled: p < {_LEVEL} after Holm's "
+        f"correction for {counted(len(found.table), 'test')}"
+    )
     headed(
         figure,
         f"{kind_of(track).title}: paired differences of {found.name}",
-        f"{suite}{samples} that both have; lines: 95 % intervals over "
-        f"{counted(int(most['n_clusters']), 'base scene')}; filled: p < {_LEVEL} after Holm's "
-        f"correction for {counted(len(found.table), 'test')}",
+        run.design.after_suite(how, "; "),
     )
     return figure
 

@@ -67,11 +67,11 @@ def perturbation_strip(run: Run, dataset: Dataset, scene: str) -> Figure | None:
         _show(axes[2 * row, column], goal_png(one.scene, style))
         _show(axes[2 * row + 1, column], candidates_png(one.candidates, style))
         axes[2 * row, column].set_title(title, fontsize=7, pad=3)
-    name = f"Suite {run.design.suite.name}, " if run.design.suite.name else ""
+    how = f"scene {task.scene.id}; goal above candidates, one factor changed at a time"
     headed(
         figure,
         "One scene in all the ways in which it is shown",
-        f"{name}scene {task.scene.id}; goal above candidates, one factor changed at a time",
+        run.design.after_suite(how),
     )
     return figure
 

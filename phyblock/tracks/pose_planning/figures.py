@@ -6,23 +6,12 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from phyblock.scoring import POSE_ERRORS, POSE_FRAMES, TOLERANCES_CM, PoseError
+from phyblock.scoring import POSE_ERRORS, POSE_FRAMES, TOLERANCES_CM, PoseError, PoseFrame
 from phyblock.tables.design import OVERALL
-from phyblock.tables.drawing import (
-    COLORS,
-    GRID,
-    INK,
-    MARKERS,
-    PALE,
-    bare_axes,
-    headed,
-    legend_below,
-    name_across,
-    names_width_in,
-    new_figure,
-)
+from phyblock.tables.drawing import COLORS, INK, headed
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
+from phyblock.tracks.curves import curves
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.pose_planning.measures import (
     ERROR_NAMES,
@@ -31,15 +20,13 @@ from phyblock.tracks.pose_planning.measures import (
     tolerance_measure,
 )
 from phyblock.tracks.pose_planning.tables import pose_errors_frame, table_c_frame
-from phyblock.tracks.stacked import Part, stack
+from phyblock.tracks.stacked import Part, share_bars
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["f1_by_tolerance", "pose_error_bars", "tolerance_curve"]
 
-_NAMED = 8
-_LEAST_LABEL = 4.0
 _LOOKS: dict[PoseError, tuple[str, str]] = {
     "wrong_kind": (COLORS[1], "white"),
     "wrong_rotation": (COLORS[4], "black"),
@@ -79,32 +66,14 @@ def f1_by_tolerance(run: Run) -> Figure | None:
         return None
     ranks = table_c_frame(run).set_index("model")["f1_c"].dropna()
     models = ranks.sort_values(ascending=False, kind="stable").index
-    figure = new_figure(3.1)
-    ax = figure.subplots()
-    for place, model in reversed(list(enumerate(models))):
-        named = place < _NAMED
-        for frame, style in zip(POSE_FRAMES, ("-", ":"), strict=True):
-            ax.plot(
-                table.index,
-                table[frame, model],
-                linestyle=style,
-                color=COLORS[place] if named else PALE,
-                marker=MARKERS[place] if named and frame == "absolute" else None,
-                markersize=3.4,
-                linewidth=1.3 if named else 0.7,
-                label=model if named and frame == "absolute" else "_other",
-                zorder=3 if named else 1,
-            )
+    styles: dict[str, PoseFrame] = {"-": "absolute", ":": "aligned"}
+    by_style = {style: pd.DataFrame(table[frame]) for style, frame in styles.items()}
+    figure, ax = curves(by_style, list(models), 3.4)
     ax.set(ylim=(0, 102), xlabel="Tolerance (cm)", ylabel="F1 in setting C (%)", xscale="log")
     ax.set_xticks(list(TOLERANCES_CM), [f"{cm:g}" for cm in TOLERANCES_CM])
     ax.minorticks_off()
-    bare_axes([ax], "y")
-    ax.spines["bottom"].set_color(GRID)
-    ax.tick_params(colors=INK)
-    handles, labels = ax.get_legend_handles_labels()
-    legend_below(figure, handles[::-1], labels[::-1])
-    name = f"Suite {run.design.suite.name}, " if run.design.suite.name else ""
-    headed(figure, "F1 by tolerance", f"{name}15 degrees; dotted: the whole plan aligned first")
+    how = run.design.after_suite("15 degrees; dotted: the whole plan aligned first")
+    headed(figure, "F1 by tolerance", how)
     return figure
 
 
@@ -118,22 +87,15 @@ def pose_error_bars(run: Run) -> Figure | None:
     shares = table.pivot(index="model", columns="error", values="value")
     ranks = table_c_frame(run).set_index("model")["f1_c"]
     models = list(ranks.sort_values(ascending=False, kind="stable").index)
-    names_in = names_width_in(models)
-    figure = new_figure(1.05 + 0.2 * len(models), names_in + 1.0)
-    ax = figure.subplots()
     parts = (
         Part(
             ERROR_NAMES[error], shares.loc[models, error].fillna(0).to_numpy(float), *_LOOKS[error]
         )
         for error in POSE_ERRORS
     )
-    stack(ax, models, parts, 0.7, _LEAST_LABEL)
+    figure, ax = share_bars(models, parts, "Share of steps (%)")
     for place, model in enumerate(models):
         if shares.loc[model].isna().all():
             ax.text(1, place, "no steps", va="center", fontsize=7, color=INK)
-    ax.set(xlim=(0, 100), ylim=(len(models) - 0.4, -0.6))
-    name_across(ax, "Share of steps (%)", figure.get_figwidth() - names_in)
-    bare_axes([ax])
-    legend_below(figure, *ax.get_legend_handles_labels())
     headed(figure, "What was wrong with steps", "by the first error that each meets; all levels")
     return figure

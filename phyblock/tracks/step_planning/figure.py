@@ -6,18 +6,9 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from phyblock.tables.drawing import (
-    COLORS,
-    GRID,
-    INK,
-    MARKERS,
-    PALE,
-    bare_axes,
-    headed,
-    legend_below,
-    new_figure,
-)
+from phyblock.tables.drawing import headed
 from phyblock.tables.load import Run
+from phyblock.tracks.curves import curves
 from phyblock.tracks.step_planning.episodes import progress_frame
 from phyblock.tracks.step_planning.measures import is_asked
 
@@ -25,8 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["progress_by_turn", "step_progress"]
-
-_NAMED = 8
 
 
 def step_progress(run: Run) -> pd.DataFrame:
@@ -49,27 +38,9 @@ def progress_by_turn(run: Run) -> Figure | None:
     if not len(table.columns):
         return None
     last = table.iloc[-1].sort_values(ascending=False, kind="stable")
-    figure = new_figure(3.1)
-    ax = figure.subplots()
-    for place, model in reversed(list(enumerate(last.index))):
-        named = place < _NAMED
-        ax.plot(
-            table.index,
-            table[model],
-            color=COLORS[place] if named else PALE,
-            marker=MARKERS[place] if named else None,
-            markersize=3.2,
-            linewidth=1.3 if named else 0.7,
-            label=model if named else "_other",
-            zorder=3 if named else 1,
-        )
+    figure, ax = curves({"-": table}, list(last.index), 3.2)
     ax.set(ylim=(0, 102), xlim=(0, None), xlabel="Step", ylabel="Blocks of the goal placed (%)")
     ax.locator_params(axis="x", integer=True)
-    bare_axes([ax], "y")
-    ax.spines["bottom"].set_color(GRID)
-    ax.tick_params(colors=INK)
-    handles, labels = ax.get_legend_handles_labels()
-    legend_below(figure, handles[::-1], labels[::-1])
-    name = f"Suite {run.design.suite.name}, " if run.design.suite.name else ""
-    headed(figure, "Progress by step", f"{name}mean over episodes; one that ended keeps its blocks")
+    how = run.design.after_suite("mean over episodes; one that ended keeps its blocks")
+    headed(figure, "Progress by step", how)
     return figure

@@ -71,9 +71,8 @@ def vqa_heat_map(run: Run) -> Figure | None:
         bar = figure.colorbar(image, ax=ax, pad=0.015, fraction=0.03)
         bar.set_label("Right answers (%)")
         bar.outline.set_visible(False)
-    name = f"Suite {run.design.suite.name}, " if run.design.suite.name else ""
     chance = (
         f"guessing gives {100 * guessing(run, 'SH'):.2g}, in OR {100 * guessing(run, 'OR'):.1g}"
     )
-    headed(figure, "Questions by subtask", f"{name}right answers (%); {chance}")
+    headed(figure, "Questions by subtask", run.design.after_suite(f"right answers (%); {chance}"))
     return figure

@@ -12,7 +12,6 @@ from phyblock.tables.design import OVERALL, Design
 from phyblock.tables.drawing import (
     COLORS,
     GRID,
-    MARKERS,
     MUTED,
     PALE,
     bare_axes,
@@ -24,6 +23,7 @@ from phyblock.tables.drawing import (
 )
 from phyblock.tables.load import Run
 from phyblock.tables.text_table import level_name
+from phyblock.tracks.curves import NAMED, line_look
 from phyblock.tracks.full_planning.seeds import intervals_table
 from phyblock.tracks.full_planning.settings import settings_frame
 
@@ -36,7 +36,6 @@ __all__ = ["f1_radar", "how_measured", "ranked", "settings_dots"]
 
 _ROW_IN = 0.19
 _LEAST_PANEL_IN, _LEAST_PLOT_IN = 0.7, 1.0
-_RADAR_MODELS = 8
 _RADAR_IN, _LEAST_RADAR_IN = 2.75, 2.2
 _RINGS = (25, 50, 75, 100)
 _CORNER_PT = 9
@@ -91,10 +90,10 @@ def f1_radar(run: Run) -> Figure | None:
     for ax, (title, drawn) in zip(axes.ravel(), shown.items(), strict=True):
         handles = _radar(ax, drawn, levels)
         ax.set_title(title, loc="center", pad=12 + _CORNER_PT)
-    names = list(next(iter(shown.values())))[:_RADAR_MODELS]
+    names = list(next(iter(shown.values())))[:NAMED]
     if len(names) > 1:
         legend_below(figure, handles[: len(names)], names)
-    others = len(models) - _RADAR_MODELS
+    others = len(models) - NAMED
     more = f"; the {others} others in gray" if others > 0 else ""
     headed(figure, "F1 by level (%)", how_measured(run.design, setting=len(panels) == 1) + more)
     return figure
@@ -122,17 +121,12 @@ def _radar(ax: Axes, lines: dict[str, pd.Series[float]], levels: Sequence[str]) 
     handles: list[Artist] = []
     for place, (name, cells) in reversed(list(enumerate(lines.items()))):
         values = cells.loc[list(levels)].to_numpy(float)
-        named = place < _RADAR_MODELS
         handles += ax.plot(
             np.append(angles, angles[0]),
             np.append(values, values[0]),
-            color=COLORS[place] if named else PALE,
-            marker=MARKERS[place] if named else None,
-            linewidth=1.3 if named else 0.7,
             markersize=3.5,
-            label=name if named else "_other",
-            zorder=3 if named else 1,
             clip_on=False,
+            **line_look(place, name),
         )
     ax.set_xticks(angles, [level_name(level) for level in levels])
     ax.tick_params(axis="x", pad=_CORNER_PT)

@@ -6,22 +6,13 @@ from typing import TYPE_CHECKING
 
 from phyblock.scoring import BLOCK_OUTCOMES, BlockOutcome
 from phyblock.tables.design import OVERALL
-from phyblock.tables.drawing import (
-    COLORS,
-    PALE,
-    bare_axes,
-    headed,
-    legend_below,
-    name_across,
-    names_width_in,
-    new_figure,
-)
+from phyblock.tables.drawing import COLORS, PALE, headed
 from phyblock.tables.load import Run
 from phyblock.tracks.full_planning.figures.levels import how_measured, ranked
 from phyblock.tracks.full_planning.losses import losses_frame
 from phyblock.tracks.full_planning.measures import BLOCK_NAMES
 from phyblock.tracks.full_planning.seeds import intervals_table
-from phyblock.tracks.stacked import Part, stack
+from phyblock.tracks.stacked import Part, share_bars
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,7 +30,6 @@ _LOOKS: dict[BlockOutcome, tuple[str, str]] = {
     "order": (COLORS[3], "black"),
 }
 """Color of a part and of the number in it; the three of missing supports are of one hue."""
-_LEAST_LABEL = 4.0
 
 
 def loss_bars(run: Run) -> Figure | None:
@@ -50,17 +40,10 @@ def loss_bars(run: Run) -> Figure | None:
         return None
     shares = table.pivot(index="model", columns="outcome", values="value")
     models = [model for model in ranked(intervals_table(run), "f1") if model in shares.index]
-    names_in = names_width_in(models)
-    figure = new_figure(1.05 + 0.2 * len(models), names_in + 1.0)
-    ax = figure.subplots()
     parts = (
         Part(BLOCK_NAMES[outcome], shares.loc[models, outcome].to_numpy(float), *_LOOKS[outcome])
         for outcome in BLOCK_OUTCOMES
     )
-    stack(ax, models, parts, 0.7, _LEAST_LABEL)
-    ax.set(xlim=(0, 100), ylim=(len(models) - 0.4, -0.6))
-    name_across(ax, "Share of the goals' blocks (%)", figure.get_figwidth() - names_in)
-    bare_axes([ax])
-    legend_below(figure, *ax.get_legend_handles_labels())
+    figure, _ = share_bars(models, parts, "Share of the goals' blocks (%)")
     headed(figure, "What became of the goals' blocks", f"{how_measured(run.design)}; all levels")
     return figure
