@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import re
 import shutil
 import sys
@@ -16,7 +17,9 @@ import pytest
 
 from phyblock import parsing
 from phyblock.cli.main import phyblock
-from phyblock.errors import StoreError
+from phyblock.errors import DataError, StoreError
+from phyblock.play.answers import read_answers
+from phyblock.play.person import Person, plan_sitting
 from phyblock.records import read_manifest
 from phyblock.run import identity, judged_again, manifest, taking_on
 from phyblock.run.appending import AppendFile
@@ -218,3 +221,24 @@ def test_the_same_command_finds_it_and_other_runs_are_refused_as_ever(
     read_earlier(monkeypatch)
     with pytest.raises(StoreError, match="read by readers 6, this version has readers 5"):
         run(folder, "--yes")
+
+
+def test_a_page_of_questions_that_an_earlier_version_wrote_brings_its_answers(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace.write_suite()
+    loaded = load_suite(workspace.root / "suite.yaml", data_dir=workspace.root)
+    person = Person("eve", None, "I agree.")
+    with monkeypatch.context() as earlier:
+        read_earlier(earlier)
+        exported = plan_sitting(loaded, person, None).manifest.identity
+    plan = plan_sitting(loaded, person, None)
+    answer = {"number": 2, "picks": [0, 3], "took_s": 4.5}
+    content = {"format": 1, "run": exported, "model": person.model}
+    content |= {"consent": person.consent_sha256, "agreed": "2026-01-02T03:04Z"}
+    file = workspace.root / "answers.json"
+    file.write_text(json.dumps(content | {"answers": [answer]}), encoding="utf-8")
+    assert read_answers(file, plan, person)[2].took_s == 4.5
+    file.write_text(json.dumps(content | {"run": "0" * 64, "answers": [answer]}))
+    with pytest.raises(DataError, match="is of another sitting"):
+        read_answers(file, plan, person)
