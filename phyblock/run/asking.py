@@ -98,9 +98,11 @@ def _models(plan: RunPlan) -> Iterator[str]:
 
 
 def _named(track: str, path: Path, loaded: LoadedSuite) -> str:
-    included = template_prompt(loaded, track).included
-    more = f" (with {', '.join(file.name for file in included)})" if included else ""
-    return f"prompt of {track}: {path}{more}"
+    prompt = template_prompt(loaded, track)
+    more = f" (with {', '.join(file.name for file in prompt.included)})" if prompt.included else ""
+    line = prompt.unsent_line
+    lost = "" if line is None else f"; the text outside of its blocks (line {line}) is NOT sent"
+    return f"prompt of {track}: {path}{more}{lost}"
 
 
 def _unused(track: str, path: Path, loaded: LoadedSuite) -> str:

@@ -148,6 +148,17 @@ class TemplatePrompt:
         return tuple(source.path for source in self._sources.included.values())
 
     @property
+    def unsent_line(self) -> int | None:
+        """The first line with text that stands outside of blocks, and so is sent to nobody."""
+        for node in self._sources.main.tree.body:
+            parts = node.nodes if isinstance(node, jinja2.nodes.Output) else []
+            for part in parts:
+                if isinstance(part, jinja2.nodes.TemplateData) and part.data.strip():
+                    before = len(part.data) - len(part.data.lstrip())
+                    return part.lineno + part.data[:before].count("\n")
+        return None
+
+    @property
     def says_form(self) -> bool:
         """Whether it uses a name that tells the JSON that is asked for."""
         find = jinja2.meta.find_undeclared_variables
