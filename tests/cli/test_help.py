@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from pathlib import Path
 
+import click
 import pytest
 
 from phyblock.cli.main import phyblock as group
 from phyblock.sim.registry import ENGINES
 
 VERBS = tuple(group.list_commands(None))  # type: ignore[arg-type]
+CALLS = re.compile(rf"\bphyblock ((?:{'|'.join(VERBS)})\b[^\n`;|&>\"#]*)")
 LIBRARIES = (engine.library for engine in ENGINES.values())
 HEAVY = ("litellm", *LIBRARIES, "pandas", "aiohttp", "matplotlib", "phyblock_making")
 SCRIPT = """
@@ -49,3 +53,26 @@ def test_version() -> None:
     told, imported = ask("--version")
     assert told.startswith("phyblock, version ")
     assert not imported & set(HEAVY)
+
+
+def test_every_option_that_messages_and_docs_name_is_there() -> None:
+    root = Path(__file__).parents[2]
+    written = [*root.glob("phyblock*/**/*.py"), root / "README.md", *root.glob("docs/**/*.md")]
+    named: set[tuple[str, ...]] = set()
+    for path in written:
+        for call in CALLS.findall(path.read_text(encoding="utf-8")):
+            before, *options = re.split(r"(?<!\S)(?=--)", call)
+            words = before.split()
+            named |= {(*words[:2], re.split(r"[^a-z0-9-]", option)[0]) for option in options}
+    assert {verb for verb, *_ in named} >= {"run", "score", "scenes", "compare"}
+    assert [each for each in sorted(named) if not is_option(*each)] == []
+
+
+def is_option(verb: str, *words: str) -> bool:
+    """Whether a verb, or its own verb that the next word names, has the option that ends it."""
+    context = click.Context(group)
+    command = group.get_command(context, verb)
+    assert command is not None
+    inner = command.get_command(context, words[0]) if isinstance(command, click.Group) else None
+    known = {name for one in (command, inner) if one for param in one.params for name in param.opts}
+    return words[-1] in known | {"--help"}
