@@ -18,6 +18,7 @@ from phyblock.tables.text_table import (
     number,
     track_column,
     track_text,
+    with_interval,
 )
 from phyblock.tracks.kind import kind_of
 from phyblock.variants import REPEAT
@@ -52,11 +53,8 @@ def components_view(table: pd.DataFrame, run: Run) -> TextTable:
             row["model"],
             *track_text(row["track"], run.design.suite.tracks),
             factor_name(row["factor"]),
-            *(
-                text
-                for name in ("shift", "single")
-                for text in (number(row[name]), between(row[f"{name}_lo"], row[f"{name}_hi"]))
-            ),
+            *with_interval(row, "shift"),
+            *with_interval(row, "single"),
         )
         for row in table.to_dict("records")
     ]

@@ -12,7 +12,7 @@ import pandas as pd
 from phyblock.tables.design import Design
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Measure
-from phyblock.tables.text_table import Column, TextTable, between, number, spread
+from phyblock.tables.text_table import Column, TextTable, between, spread, with_interval
 from phyblock.tables.track_report import HeadlineColumn
 
 __all__ = [
@@ -128,11 +128,8 @@ def interval_view(table: pd.DataFrame, run: Run, cells: Sequence[str], caption: 
     rows = []
     for model, part in table.groupby("model", sort=False):
         of_cell = part.set_index(CELL).to_dict("index")
-        pairs = [
-            (number(of_cell[cell]["value"]), between(of_cell[cell]["lo"], of_cell[cell]["hi"]))
-            for cell in cells
-        ]
-        rows.append((str(model), *(text for pair in pairs for text in pair)))
+        texts = (text for cell in cells for text in with_interval(of_cell[cell]))
+        rows.append((str(model), *texts))
     columns = [
         Column(name, cell.replace("_", " ").capitalize())
         for cell in cells

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from phyblock.tables.load import Run
-from phyblock.tables.text_table import Column, TextTable, number
+from phyblock.tables.text_table import Column, TextTable, level_name, number
 
 __all__ = [
     "HUMAN_NOTE",
@@ -17,6 +17,7 @@ __all__ = [
     "OURS",
     "PUBLISHED",
     "beside",
+    "beside_by_level",
     "beside_view",
     "interleaved",
     "published_table",
@@ -85,6 +86,37 @@ def interleaved(table: pd.DataFrame, cells: Sequence[str]) -> pd.DataFrame:
     names = ["model", "published_name", "cell", "published", "ours"]
     frame = pd.DataFrame(rows, columns=names).astype({"published": "float64", "ours": "float64"})
     return frame.assign(difference=frame["ours"] - frame["published"])
+
+
+def beside_by_level(
+    table: pd.DataFrame,
+    levels: Sequence[str],
+    heading: str,
+    metrics: Mapping[str, str],
+    digits: int,
+) -> tuple[tuple[Column, ...], tuple[tuple[str, ...], ...]]:
+    """Columns, three a level (Paper, Ours, Diff), and rows, one a model and metric, which has a
+    name in `metrics`. Under the name of a model stands the name that it was published by.
+    """
+    cells = {
+        (row["model"], row["metric"], row["level"]): (
+            number(row["published"], digits),
+            number(row["ours"], 2),
+            number(row["difference"], 2, signed=True),
+        )
+        for row in table.to_dict("records")
+    }
+    rows = tuple(
+        (label, name, *(cell for level in levels for cell in cells[model, metric, level]))
+        for model, published in dict(
+            zip(table["model"], table["published_name"], strict=True)
+        ).items()
+        for label, (metric, name) in zip(
+            (model, f"({published})", ""), metrics.items(), strict=False
+        )
+    )
+    parts = (Column(part, level_name(at)) for at in levels for part in ("Paper", "Ours", "Diff"))
+    return (Column("Model", is_text=True), Column(heading, is_text=True), *parts), rows
 
 
 def beside_view(

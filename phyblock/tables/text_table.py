@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from phyblock.plain_text import one_line
 
@@ -19,6 +20,7 @@ __all__ = [
     "spread",
     "track_column",
     "track_text",
+    "with_interval",
 ]
 
 NO_VALUE = "–"  # noqa: RUF001
@@ -93,6 +95,14 @@ def between(lo: float, hi: float, *, signed: bool = False) -> str:
     if math.isnan(lo) or math.isnan(hi):
         return NO_VALUE
     return f"[{number(lo, signed=signed)}, {number(hi, signed=signed)}]"
+
+
+def with_interval(row: Mapping[Hashable, Any], name: str = "") -> tuple[str, str]:
+    """A value and its interval, out of the columns `value`, `lo` and `hi`, or of those of a name:
+    `<name>`, `<name>_lo` and `<name>_hi`.
+    """
+    value, lo, hi = (name, f"{name}_lo", f"{name}_hi") if name else ("value", "lo", "hi")
+    return number(row[value]), between(row[lo], row[hi])
 
 
 def level_name(level: str) -> str:

@@ -39,7 +39,7 @@ const Picker = (() => {
     );
     main.classList.toggle("with-fields", hasFields);
     main.replaceChildren(
-      el("h1", { class: "visually-hidden" }, `Question ${question.number} of ${question.of}`),
+      el("h1", { class: "unseen" }, `Question ${question.number} of ${question.of}`),
       el("div", { class: "asked" }, question.messages.map(message)),
       answer,
     );

@@ -9,7 +9,7 @@ from phyblock.tables.cells import cell_scores
 from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL
-from phyblock.tables.text_table import NO_VALUE, Column, TextTable, between, level_name, number
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, level_name, with_interval
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.full_planning.measures import (
     BLOCK_COUNTS,
@@ -54,10 +54,7 @@ def losses_view(table: pd.DataFrame, run: Run) -> TextTable:
     """A row a model and outcome out of `losses_frame`, a share and its interval a level."""
     design = run.design
     cells = {
-        (row["model"], row["outcome"], row["level"]): (
-            number(row["value"]),
-            between(row["lo"], row["hi"]),
-        )
+        (row["model"], row["outcome"], row["level"]): with_interval(row)
         for row in table.to_dict("records")
     }
     levels = [level for level in design.levels if level in set(table["level"])]

@@ -7,15 +7,15 @@ import pandas as pd
 from phyblock.plain_text import counted
 from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run
-from phyblock.tables.paper_numbers import beside, published_table
+from phyblock.tables.paper_numbers import beside, beside_by_level, published_table
 from phyblock.tables.text_table import (
     NO_VALUE,
     SPREAD,
     Column,
     TextTable,
-    between,
     level_name,
     number,
+    with_interval,
 )
 from phyblock.tracks.full_planning.assembly import assembly_frame, headline_cells
 from phyblock.tracks.full_planning.measures import is_asked
@@ -89,18 +89,12 @@ def intervals_table(run: Run) -> pd.DataFrame:
 def intervals_view(table: pd.DataFrame, run: Run) -> TextTable:
     """F1 with its interval a level out of `intervals_table`."""
     design = run.design
-    cells = {(row["model"], row["level"]): row for row in table.to_dict("records")}
+    named = table.rename(columns={"f1": "value"}).to_dict("records")
+    cells = {(row["model"], row["level"]): row for row in named}
     rows = [
         (
             model,
-            *(
-                text
-                for level in design.levels
-                for text in (
-                    number(cells[model, level]["f1"]),
-                    between(cells[model, level]["lo"], cells[model, level]["hi"]),
-                )
-            ),
+            *(text for level in design.levels for text in with_interval(cells[model, level])),
         )
         for model in design.model_names
     ]
@@ -153,35 +147,10 @@ def paper_table5_frame(run: Run) -> pd.DataFrame:
 
 def paper_table5_view(table: pd.DataFrame, run: Run) -> TextTable:
     """A row a model and statistic out of `paper_table5_frame`."""
-    cells = {
-        (row["model"], row["metric"], row["level"]): (
-            number(row["published"], 2),
-            number(row["ours"], 2),
-            number(row["difference"], 2, signed=True),
-        )
-        for row in table.to_dict("records")
-    }
     kinds = {"f1_mean": "F1 mean", "f1_sd": "F1 sd"}
-    rows = [
-        (
-            label,
-            kinds[metric],
-            *(cell for level in _PAPER_LEVELS for cell in cells[model, metric, level]),
-        )
-        for model, name in dict(zip(table["model"], table["published_name"], strict=True)).items()
-        for label, metric in zip((model, f"({name})"), kinds, strict=True)
-    ]
-    columns = (
-        Column("Model", is_text=True),
-        Column("Statistic", is_text=True),
-        *(
-            Column(name, level_name(level))
-            for level in _PAPER_LEVELS
-            for name in ("Paper", "Ours", "Diff")
-        ),
-    )
+    columns, rows = beside_by_level(table, _PAPER_LEVELS, "Statistic", kinds, 2)
     note = (
         f"Ours: setting {run.design.setting}, matcher {run.design.matcher}. Both: means over "
         "single seeds, sd with ddof = 1; all other tables pool the seeds."
     )
-    return TextTable("Our numbers beside the paper's Table 5 (%)", columns, tuple(rows), (note,))
+    return TextTable("Our numbers beside the paper's Table 5 (%)", columns, rows, (note,))

@@ -11,6 +11,7 @@ from phyblock.tables.cells import METRIC_NAMES, METRICS, SIDE_METRICS
 from phyblock.tables.design import OVERALL, Design
 from phyblock.tables.headline import narrower, seeds_notes, uncertainty_cells, uncertainty_columns
 from phyblock.tables.load import Run
+from phyblock.tables.paper_numbers import beside_by_level
 from phyblock.tables.shares import share_texts
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, level_name, number
 from phyblock.tracks.full_planning.assembly import assembly_frame, headline_cells, level_column
@@ -148,39 +149,13 @@ def published_view(table: pd.DataFrame, run: Run) -> TextTable:
 
     Under the name of a model stands the name that it was published by.
     """
-    columns = (
-        _MODEL,
-        Column("Metric", is_text=True),
-        *(
-            Column(name, level_name(level))
-            for level in PUBLISHED_LEVELS
-            for name in ("Paper", "Ours", "Diff")
-        ),
-        Column("Largest"),
-    )
-    cells = {
-        (row["model"], row["level"], row["metric"]): (
-            number(row["published"]),
-            number(row["ours"], 2),
-            number(row["difference"], 2, signed=True),
-        )
-        for row in table.to_dict("records")
-    }
+    columns, rows = beside_by_level(table, PUBLISHED_LEVELS, "Metric", METRIC_NAMES, 1)
     largest = largest_differences(table)
-    rows = [
-        (
-            label,
-            METRIC_NAMES[metric],
-            *(cell for level in PUBLISHED_LEVELS for cell in cells[model, level, metric]),
-            number(largest[model], 3) if metric == METRICS[0] else "",
-        )
-        for model, name in dict(zip(table["model"], table["published_name"], strict=True)).items()
-        for label, metric in zip((model, f"({name})", ""), METRICS, strict=True)
-    ]
+    last = (text for value in largest for text in (number(value, 3), "", ""))
     return TextTable(
         f"Our numbers beside the paper's Table 1{run.design.of_suite} (%)",
-        columns,
-        tuple(rows),
+        (*columns, Column("Largest")),
+        tuple((*row, end) for row, end in zip(rows, last, strict=True)),
         tuple(_difference_notes(table, run.design)),
     )
 

@@ -11,7 +11,7 @@ from phyblock.scoring import POSE_ERRORS, TOLERANCES_CM
 from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL
-from phyblock.tables.text_table import Column, TextTable, between, level_name, number
+from phyblock.tables.text_table import Column, TextTable, between, level_name, number, with_interval
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.pose_planning.measures import (
     ERROR_NAMES,
@@ -141,12 +141,7 @@ def pose_errors_view(table: pd.DataFrame, run: Run) -> TextTable:
     rows = [
         (
             str(model),
-            *(
-                text
-                for error in POSE_ERRORS
-                for row in (cells[model, error],)
-                for text in (number(row["value"]), between(row["lo"], row["hi"]))
-            ),
+            *(text for error in POSE_ERRORS for text in with_interval(cells[model, error])),
         )
         for model in dict.fromkeys(table["model"] if len(table) else ())
     ]

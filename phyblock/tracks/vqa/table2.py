@@ -29,7 +29,7 @@ from phyblock.tables.paper_numbers import (
     published_table,
     row_name,
 )
-from phyblock.tables.text_table import NO_VALUE, Column, TextTable, between, number
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number, with_interval
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.vqa.accuracy import questions_frame
 from phyblock.tracks.vqa.answers import CELLS, OVERALL_CELL, showing
@@ -131,11 +131,7 @@ def letters_view(table: pd.DataFrame, _: Run) -> TextTable:
             *(
                 text
                 for name in map(str.lower, LETTERS)
-                for text in (
-                    number(row[f"right_{name}"]),
-                    number(row[f"given_{name}"]),
-                    between(row[f"given_{name}_lo"], row[f"given_{name}_hi"]),
-                )
+                for text in (number(row[f"right_{name}"]), *with_interval(row, f"given_{name}"))
             ),
         )
         for row in table.to_dict("records")
