@@ -15,7 +15,7 @@ from phyblock.report.alike import check_alike
 from phyblock.report.comparable import Comparable, Part, comparable, comparable_tracks
 from phyblock.report.verdicts import ranks, with_verdicts
 from phyblock.scoring.ratios import Floats
-from phyblock.scoring.uncertainty import Clusters, jackknife
+from phyblock.scoring.uncertainty import Clusters, bounded, jackknife
 from phyblock.tables.intervals import parents_of
 from phyblock.tables.load import Run
 from phyblock.tables.showing import varied_words
@@ -258,12 +258,11 @@ def _estimated(
     whole = what.whole(part, totals)
     sizes = clusters.behind(seen)
     found = jackknife(counts, clusters, lambda sums: _difference(whole(sums)), n_clusters=sizes)
+    found = bounded(found, what.measure.most_apart / what.measure.scale)
     values = whole(totals)
     numbers = {"value_a": values[:, 0], "value_b": values[:, 1], "difference": found.value}
     numbers |= {"se": found.se, "lo": found.lo, "hi": found.hi}
     table = pd.DataFrame({name: what.measure.scale * value for name, value in numbers.items()})
-    most = what.measure.most_apart
-    table[["lo", "hi"]] = table[["lo", "hi"]].clip(-most, most)
     tallies = pd.DataFrame([_tally(one, what, part) for one in paired])
     more = {"n_scenes": seen.sum(axis=0), "n_clusters": sizes}
     return pd.concat([table.assign(p=found.p), tallies], axis=1).assign(**more)

@@ -19,7 +19,7 @@ from phyblock.scoring.components import (
     within,
 )
 from phyblock.scoring.ratios import Floats, Metric
-from phyblock.scoring.uncertainty import CONFIDENCE, detectable, holm, jackknife
+from phyblock.scoring.uncertainty import CONFIDENCE, bounded, detectable, holm, jackknife
 from phyblock.tables.load import Run, made_once
 from phyblock.variants import REPEAT
 
@@ -154,7 +154,8 @@ def _values(found: Varied, blocks: Blocks) -> dict[str, Floats]:
 
 
 def _level_rows(found: Varied, blocks: Blocks) -> list[dict[str, Any]]:
-    scale, rows = found.what.measure.scale, []
+    measure, rows = found.what.measure, []
+    scale, most = measure.scale, measure.most_apart
     for model, items in found.asked.items():
         metric = found.whole(model)
 
@@ -163,7 +164,7 @@ def _level_rows(found: Varied, blocks: Blocks) -> list[dict[str, Any]]:
             return np.stack([value, value - value[..., :1]], axis=-1)
 
         # (items, levels, counts) gives (levels, 2).
-        told = jackknife(found.sums(model, blocks), items.clusters, values)
+        told = bounded(jackknife(found.sums(model, blocks), items.clusters, values), most / scale)
         for n, level in enumerate(blocks.levels):
             row: dict[str, Any] = {"track": found.track, "model": model}
             row |= {"factor": blocks.factor, "level": level}
@@ -173,9 +174,9 @@ def _level_rows(found: Varied, blocks: Blocks) -> list[dict[str, Any]]:
                 number = np.nan if is_reference else scale * getattr(told, name)[n, 1]
                 row["difference" if name == "value" else name] = number
             row["p"] = np.nan if is_reference else told.p[n, 1]
-            row["detectable"] = float(detectable(row["se"], items.clusters.size, _LEVEL))
+            row["detectable"] = float(detectable(row["se"], items.clusters.size, _LEVEL, most))
             row["n_items"] = len(items.names)
-            rows.append(_within(row, found.what.measure.most_apart))
+            rows.append(row)
     return rows
 
 
@@ -207,11 +208,13 @@ def _pair_rows(found: Varied, blocks: Blocks) -> list[dict[str, Any]]:
     if len(models) < 2:
         return []
     metric, clusters = found.whole(models[0]), found.asked[models[0]].clusters
-    scale, rows = found.what.measure.scale, []
+    measure, rows = found.what.measure, []
+    scale, most = measure.scale, 2 * measure.most_apart
     sums = np.stack([found.sums(model, blocks) for model in models], axis=1)
     for a, b in combinations(range(len(models)), 2):
         # (items, 2, levels, counts) gives (levels - 1).
         told = jackknife(sums[:, [a, b]], clusters, lambda total: _changes(metric(total)))
+        told = bounded(told, most / scale)
         value = metric(sums[:, [a, b]].sum(axis=0))
         apart = value[0] - value[1]
         for n, level in enumerate(blocks.levels[1:]):
@@ -221,18 +224,9 @@ def _pair_rows(found: Varied, blocks: Blocks) -> list[dict[str, Any]]:
             for name in ("value", "lo", "hi", "se"):
                 row["change" if name == "value" else name] = scale * getattr(told, name)[n]
             row["p"] = told.p[n]
-            row["detectable"] = float(detectable(row["se"], clusters.size, _LEVEL))
-            rows.append(_within(row, 2 * found.what.measure.most_apart))
+            row["detectable"] = float(detectable(row["se"], clusters.size, _LEVEL, most))
+            rows.append(row)
     return rows
-
-
-def _within(row: dict[str, Any], most: float) -> dict[str, Any]:
-    """A row whose interval ends where what it bounds does, at `most` to either side; a difference
-    that is detectable beyond it is none (NaN).
-    """
-    ends = {name: float(np.clip(row[name], -most, most)) for name in ("lo", "hi")}
-    found = row["detectable"]
-    return row | ends | {"detectable": found if found <= most else np.nan}
 
 
 def _changes(values: Floats) -> Floats:

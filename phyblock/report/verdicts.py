@@ -26,8 +26,7 @@ def with_verdicts(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
     judged["verdict"] = [_verdict(row, measure, n_tests) for row in judged.to_dict("records")]
     levels = {"detectable": _LEVEL, "detectable_holm": _LEVEL / max(n_tests, 1)}
     for name, level in levels.items():
-        found = detectable(table["se"], table["n_clusters"], level)
-        judged[name] = np.where(found <= measure.most_apart, found, np.nan)
+        judged[name] = detectable(table["se"], table["n_clusters"], level, measure.most_apart)
     columns = [str(name) for name in table]
     after = columns.index("p") + 1
     return judged[[*columns[:after], "p_holm", "verdict", *levels, *columns[after:]]]

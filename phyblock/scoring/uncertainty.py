@@ -14,6 +14,7 @@ Econometrics 38, 2023). docs/statistics.md has the simulation.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -29,6 +30,7 @@ __all__ = [
     "POWER",
     "Clusters",
     "Estimate",
+    "bounded",
     "detectable",
     "holm",
     "in_range",
@@ -172,6 +174,14 @@ def in_range(estimate: Estimate, most: ArrayLike = 1.0) -> Estimate:
     )
 
 
+def bounded(estimate: Estimate, most: float) -> Estimate:
+    """The same estimates of differences, whose intervals end where differences do: at `most` to
+    either side.
+    """
+    lo, hi = (np.clip(end, -most, most) for end in (estimate.lo, estimate.hi))
+    return replace(estimate, lo=lo, hi=hi)
+
+
 def least_p(n_clusters: ArrayLike) -> Floats:
     """The least p value that so many clusters can give: all signs alike, in a sign test.
 
@@ -180,18 +190,21 @@ def least_p(n_clusters: ArrayLike) -> Floats:
     return np.asarray(np.minimum(1.0, 2.0 ** (1.0 - np.asarray(n_clusters, dtype=np.float64))))
 
 
-def detectable(se: ArrayLike, n_clusters: ArrayLike, level: float) -> Floats:
+def detectable(
+    se: ArrayLike, n_clusters: ArrayLike, level: float, most: float = math.inf
+) -> Floats:
     """The difference that a test at `level` finds in `POWER` of cases, in the unit of `se`.
 
     Bloom, *Minimum detectable effects*, Evaluation Review 19, 1995: the sum of the two quantiles
-    of Student's t, times the standard error. NaN with fewer than two clusters, and where no sample
-    differs: a standard error of 0 says nothing about what could be found.
+    of Student's t, times the standard error. NaN with fewer than two clusters, where it is beyond
+    the `most` that values can differ by, and where no sample differs: a standard error of 0 says
+    nothing about what could be found.
     """
     behind = np.asarray(n_clusters, dtype=np.float64)
     df = np.where(behind > 1, behind - 1.0, np.nan)
     error = np.asarray(se, dtype=np.float64)
     difference = (stdtrit(df, 1 - level / 2) + stdtrit(df, POWER)) * error
-    return np.where(error > 0, difference, np.nan)
+    return np.where((error > 0) & (difference <= most), difference, np.nan)
 
 
 def _in_common(

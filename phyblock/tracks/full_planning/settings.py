@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.scoring.ratios import Floats, f1_of
-from phyblock.scoring.uncertainty import Clusters, Estimate, jackknife
+from phyblock.scoring.uncertainty import Clusters, bounded, jackknife
 from phyblock.tables.cells import cell_scores, measured
 from phyblock.tables.intervals import base_scenes, grouped, parents_of, summed
 from phyblock.tables.load import Run, made_once_copied
@@ -62,11 +62,12 @@ def settings_frame(run: Run) -> pd.DataFrame:
             _both_and_difference,
             n_clusters=np.repeat(n_clusters[:, None], 3, axis=1),
         )
+        paired = bounded(paired, 1.0)
         for n, model in enumerate(models):
             f1 = [estimates[model, setting, level, matcher] for setting in "AB"]
             by_cell[model, level] = {
                 **{name: f1["AB".index(of)][end] for name, (of, end) in _F1.items()},
-                **{name: values[n, 2] for name, values in _paired(paired).items()},
+                **{"difference": paired.value[n, 2], "lo": paired.lo[n, 2], "hi": paired.hi[n, 2]},
                 "n_scenes": int(present[:, n].sum()),
                 "n_clusters": int(n_clusters[n]),
             }
@@ -78,12 +79,6 @@ def settings_frame(run: Run) -> pd.DataFrame:
         for level in design.levels
     ]
     return pd.DataFrame(rows, columns=list(_COLUMNS))
-
-
-def _paired(estimate: Estimate) -> dict[str, Floats]:
-    """A difference of two shares ends, with its interval, at 1 to either side."""
-    lo, hi = (np.clip(end, -1.0, 1.0) for end in (estimate.lo, estimate.hi))
-    return {"difference": estimate.value, "lo": lo, "hi": hi}
 
 
 def _estimates(run: Run) -> dict[Hashable, Any]:
