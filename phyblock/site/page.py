@@ -9,7 +9,7 @@ __all__ = ["render_page"]
 _REPORT, _OWN = "phyblock.report.html", "phyblock.site"
 _SCRIPTS = (
     *((_REPORT, name) for name in ("dom.js", "chunks.js", "solid.js", "steps.js", "poses.js")),
-    *((_REPORT, name) for name in ("stage.js", "quotes.js", "overlay.js", "why.js")),
+    *((_REPORT, name) for name in ("runs.js", "stage.js", "quotes.js", "overlay.js", "why.js")),
     *((_OWN, name) for name in ("store.js", "table.js", "chart.js", "views.js", "replay.js")),
     (_OWN, "site.js"),
 )

@@ -16,9 +16,9 @@ __all__ = ["Figure", "render_page"]
 _PACKAGE = "phyblock.report.html"
 _SCRIPTS = (
     *("dom.js", "chunks.js", "data.js", "solid.js", "filters.js", "search.js", "list.js"),
-    *("steps.js", "poses.js", "stage.js", "markdown.js", "quotes.js", "overlay.js", "why.js"),
-    *("reply.js", "sent.js", "detail.js", "tracks.js", "matrix.js", "results.js", "address.js"),
-    "app.js",
+    *("steps.js", "poses.js", "runs.js", "stage.js", "markdown.js", "quotes.js", "overlay.js"),
+    *("why.js", "reply.js", "sent.js", "detail.js", "tracks.js", "matrix.js", "results.js"),
+    *("address.js", "app.js"),
 )
 _STYLES = ("base.css", "results.css", "samples.css", "reply.css", "matrix.css", "print.css")
 

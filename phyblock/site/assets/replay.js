@@ -4,19 +4,9 @@
 const Replay = (() => {
   let player = null;
 
-  /** A canvas that is drawn when it is in the page; see `draw`. */
-  function picture(label, blocks, options, kind = "goal") {
-    const canvas = el("canvas", { class: `picture ${kind}`, role: "img", "aria-label": label });
-    canvas.drawing = [blocks, options];
-    return canvas;
-  }
-
   /** Draw all that is in a place, after a change of size or colors too. */
   function draw(place) {
-    for (const canvas of place.querySelectorAll("canvas.picture")) {
-      const [blocks, options] = canvas.drawing;
-      Solid.draw(canvas, blocks, { view: Stage.HOME, ...options, grid: options.grid ? Stage.style("--grid") : null, accent: Stage.accent() });
-    }
+    Stage.draw(place);
     player?.tell();
   }
 
@@ -83,17 +73,9 @@ const Replay = (() => {
 
   const scoreOf = (record, setting) => (record.scores || []).find((score) => score.setting === setting && score.placed);
 
-  /** What the stage shows of a record. */
-  function runOf(scene, record, setting) {
-    if (record.turns) return Steps.ofTurns(scene, setting, record.turns);
-    if (record.pose) return Poses.of(scene, record);
-    const score = scoreOf(record, setting);
-    return Steps.ofPlan(scene, setting, record.parse && score ? record.parse.plan : [], score);
-  }
-
   function assembly(samples, records, scene, setting) {
     const several = samples.length > 1;
-    const runs = records.map((record) => runOf(scene, record, setting));
+    const runs = records.map((record) => Runs.of(scene, record, setting, scoreOf(record, setting)));
     const longest = Math.max(...runs.map(({ steps }) => steps.length));
     const noun = records[0].turns ? "Turn" : "Step";
     player = new Stage.Player(longest + 1);
@@ -107,7 +89,7 @@ const Replay = (() => {
     return el("section", { class: "card", "aria-label": "Replay" },
       scene ? null : el("p", { class: "notice" }, Store.index.lacking || "The scene is not at hand, so that nothing can be drawn."),
       el("div", { class: ["sides", several && "two", isWide && "wide"].filter(Boolean).join(" ") },
-        scene ? el("figure", {}, el("figcaption", {}, "Goal"), picture("Goal", scene.blocks, { grid: true, marks: Overlay.marks(scene) })) : null,
+        scene ? el("figure", {}, el("figcaption", {}, "Goal"), Stage.picture("Goal", scene.blocks, { grid: true, marks: Overlay.marks(scene) })) : null,
         panels.map((panel, i) => [
           (panel?.pictures || []).map(({ title, canvas }) => el("figure", { class: "built" }, el("figcaption", {}, caption(i, title)), canvas)),
           several ? null : el("div", { class: "about-step" }, told[i])])),
@@ -141,7 +123,7 @@ const Replay = (() => {
 
   /** A question as it was shown, with the answer that is right and the one that was given. */
   function asked(question, sample, record) {
-    const drawn = (one) => picture(`Picture ${one.label}`, one.blocks, { view: one.view, framed: one.framed.length ? one.framed : one.blocks, marks: one.marks, grid: true });
+    const drawn = (one) => Stage.picture(`Picture ${one.label}`, one.blocks, { view: one.view, framed: one.framed.length ? one.framed : one.blocks, marks: one.marks, grid: true });
     const given = record.answer?.given ?? "";
     const shown = question.pictures.filter((one) => !LETTERS.includes(one.label));
     return el("section", { class: "card question", "aria-label": "Question" },
@@ -190,7 +172,7 @@ const Replay = (() => {
       el("pre", { class: "text reply" }, found.text || "(empty)"), cut("text"), took.length ? el("p", { class: "muted number" }, took.join(", ")) : null];
   }
 
-  return { view, picture, draw, stop, get player() {
+  return { view, draw, stop, get player() {
     return player;
   } };
 })();

@@ -281,7 +281,7 @@ const Views = (() => {
       crumbs([["board", {}, "Ranking"], ["scenes", {}, "Scenes"]]),
       el("h1", {}, words.get("s")),
       el("div", { class: "scene-head" },
-        drawn ? el("figure", {}, Replay.picture(`The goal, ${plural(drawn.blocks.length, "block")}`, drawn.blocks, { grid: true })) : el("p", { class: "notice" }, index.lacking || "The scene is not at hand."),
+        drawn ? el("figure", {}, Stage.picture(`The goal, ${plural(drawn.blocks.length, "block")}`, drawn.blocks, { grid: true })) : el("p", { class: "notice" }, index.lacking || "The scene is not at hand."),
         el("dl", { class: "about" }, facts.filter(([, value]) => value).map(([name, value]) => el("div", {}, el("dt", {}, name), el("dd", { class: "number" }, value))))),
       ...data.tracks.map((track) => sceneTrack(data, track, words.get("s"), mine.filter((item) => index.tracks[index.items.track[item]] === track.name))).filter(Boolean),
     ];

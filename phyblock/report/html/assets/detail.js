@@ -91,7 +91,7 @@ const Detail = (() => {
 
   /** Goal and what was built side by side, under one clock; the steps below. */
   function assembly(loaded, scene, several) {
-    const runs = loaded.map((sample) => stepsOf(sample, scene));
+    const runs = loaded.map(({ record, setting }) => Runs.of(scene, record, setting, headline(record.scores, setting)));
     const longest = Math.max(...runs.map(({ steps }) => steps.length));
     const noun = loaded[0].record.turns ? "Turn" : "Step";
     player = new Stage.Player(longest + 1);
@@ -123,15 +123,6 @@ const Detail = (() => {
     (several ? `${model}${wide && `: ${title.toLowerCase()}`}` : title);
 
   const heading = (sample) => el("p", { class: "model-name" }, sample.model);
-
-  function stepsOf(sample, scene) {
-    const { record, setting } = sample;
-    if (record.turns) return Steps.ofTurns(scene, setting, record.turns);
-    if (record.pose) return Poses.of(scene, record);
-    const score = headline(record.scores, setting);
-    const plan = record.parse && score ? record.parse.plan : [];
-    return Steps.ofPlan(scene, setting, plan, score);
-  }
 
   const headline = (scores, setting) => scores.find((score) =>
     score.setting === setting && score.matcher === Data.index.matcher && score.placed) || null;
@@ -175,7 +166,7 @@ const Detail = (() => {
       ? (as.goal ? `; shown was the goal of ${as.goal}` : "; no goal was shown") : "";
     return el("figure", {}, el("figcaption", {}, "Goal ", el("span", { class: "muted" },
       `${Words.count(scene.blocks.length, "block")}, level${levels.length > 1 ? "s" : ""} ${levels.join(" and ")}${other}`)),
-    picture("Goal", scene.blocks, { view: Stage.HOME, grid: true, marks: Overlay.marks(scene) }, "goal"));
+    Stage.picture("Goal", scene.blocks, { grid: true, marks: Overlay.marks(scene) }));
   }
 
   function candidates(scene) {
@@ -186,7 +177,7 @@ const Detail = (() => {
       return el("li", { class: times ? "needed" : "", title: `Turned ${candidate.euler.join(", ")} degrees` },
         el("span", { class: "cell-head number" }, el("span", {}, String(n)),
           times ? el("span", { class: "cell-uses" }, `×${times}`) : null),
-        picture(`Candidate ${n}: ${name}`, [Solid.onTheFloor(candidate)], { view: Stage.HOME, minDistance: 0 }, "cell"),
+        Stage.picture(`Candidate ${n}: ${name}`, [Solid.onTheFloor(candidate)], { minDistance: 0 }, "cell"),
         el("span", { class: "cell-name" }, name));
     });
     return el("section", { class: "card" }, el("h2", {}, "Candidates ",
@@ -194,21 +185,9 @@ const Detail = (() => {
     el("ol", { class: "cells" }, cells));
   }
 
-  /** A canvas that is drawn once it is in the page; see drawn. */
-  function picture(label, blocks, options, kind) {
-    const canvas = el("canvas", { class: `picture ${kind}`, role: "img", "aria-label": label });
-    canvas.drawing = [blocks, options];
-    return canvas;
-  }
-
   /** Draw everything in sight again, after a change of size or colors too. */
   function drawn() {
-    for (const canvas of place?.querySelectorAll("canvas.picture") || []) {
-      if (!canvas.clientWidth) continue;
-      const [blocks, options] = canvas.drawing;
-      const grid = options.grid ? Stage.style("--grid") : null;
-      Solid.draw(canvas, blocks, { ...options, grid, accent: Stage.accent() });
-    }
+    Stage.draw(place);
     player?.tell();
   }
 
@@ -228,7 +207,7 @@ const Detail = (() => {
   }
 
   return {
-    show, picture, drawn, asked,
+    show, drawn, asked,
     /** Show a sentence in the place of a sample. */
     say: (text) => {
       shown++;

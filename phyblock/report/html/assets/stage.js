@@ -199,5 +199,22 @@ const Stage = (() => {
     });
   }
 
-  return { Player, controls, panel, HOME, style, accent };
+  /** A canvas that is drawn once it is in the page; see `draw`. */
+  function picture(label, blocks, options, kind = "goal") {
+    const canvas = el("canvas", { class: `picture ${kind}`, role: "img", "aria-label": label });
+    canvas.drawing = [blocks, options];
+    return canvas;
+  }
+
+  /** Draw every picture in sight of a place, after a change of size or colors too. */
+  function draw(place) {
+    for (const canvas of place?.querySelectorAll("canvas.picture") || []) {
+      if (!canvas.clientWidth) continue;
+      const [blocks, options] = canvas.drawing;
+      const grid = options.grid ? style("--grid") : null;
+      Solid.draw(canvas, blocks, { view: HOME, ...options, grid, accent: accent() });
+    }
+  }
+
+  return { Player, controls, panel, picture, draw, HOME, style, accent };
 })();

@@ -12,7 +12,7 @@ const Question = (() => {
     const drawing = question.pictures.find((candidate) => candidate.label === label);
     if (!drawing) return null;
     const framed = drawing.framed.length ? drawing.framed : drawing.blocks;
-    return el("figure", {}, Detail.picture(`Picture ${label}`, drawing.blocks,
+    return el("figure", {}, Stage.picture(`Picture ${label}`, drawing.blocks,
       { view: drawing.view, framed, marks: drawing.marks, grid: true }, "goal"),
     el("figcaption", { class: "muted" }, `${label}, drawn anew`));
   }
