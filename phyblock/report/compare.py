@@ -257,15 +257,15 @@ def _estimated(
     totals = counts.sum(axis=0)
     whole = what.whole(part, totals)
     sizes = clusters.behind(seen)
-    found = jackknife(counts, clusters, lambda sums: _difference(whole(sums)), n_clusters=sizes)
-    found = bounded(found, what.measure.most_apart / what.measure.scale)
+    estimate = jackknife(counts, clusters, lambda sums: _difference(whole(sums)), n_clusters=sizes)
+    estimate = bounded(estimate, what.measure.most_apart / what.measure.scale)
     values = whole(totals)
-    numbers = {"value_a": values[:, 0], "value_b": values[:, 1], "difference": found.value}
-    numbers |= {"se": found.se, "lo": found.lo, "hi": found.hi}
+    numbers = {"value_a": values[:, 0], "value_b": values[:, 1], "difference": estimate.value}
+    numbers |= {"se": estimate.se, "lo": estimate.lo, "hi": estimate.hi}
     table = pd.DataFrame({name: what.measure.scale * value for name, value in numbers.items()})
     tallies = pd.DataFrame([_tally(one, what, part) for one in paired])
     more = {"n_scenes": seen.sum(axis=0), "n_clusters": sizes}
-    return pd.concat([table.assign(p=found.p), tallies], axis=1).assign(**more)
+    return pd.concat([table.assign(p=estimate.p), tallies], axis=1).assign(**more)
 
 
 def _difference(values: Floats) -> Floats:

@@ -164,16 +164,18 @@ def _level_rows(found: Varied, blocks: Blocks) -> list[dict[str, Any]]:
             return np.stack([value, value - value[..., :1]], axis=-1)
 
         # (items, levels, counts) gives (levels, 2).
-        told = bounded(jackknife(found.sums(model, blocks), items.clusters, values), most / scale)
+        estimate = bounded(
+            jackknife(found.sums(model, blocks), items.clusters, values), most / scale
+        )
         for n, level in enumerate(blocks.levels):
             row: dict[str, Any] = {"track": found.track, "model": model}
             row |= {"factor": blocks.factor, "level": level}
-            row["value"] = scale * told.value[n, 0]
+            row["value"] = scale * estimate.value[n, 0]
             is_reference = n == 0
             for name in ("value", "lo", "hi", "se"):
-                number = np.nan if is_reference else scale * getattr(told, name)[n, 1]
+                number = np.nan if is_reference else scale * getattr(estimate, name)[n, 1]
                 row["difference" if name == "value" else name] = number
-            row["p"] = np.nan if is_reference else told.p[n, 1]
+            row["p"] = np.nan if is_reference else estimate.p[n, 1]
             row["detectable"] = float(detectable(row["se"], items.clusters.size, _LEVEL, most))
             row["n_items"] = len(items.names)
             rows.append(row)
@@ -213,8 +215,8 @@ def _pair_rows(found: Varied, blocks: Blocks) -> list[dict[str, Any]]:
     sums = np.stack([found.sums(model, blocks) for model in models], axis=1)
     for a, b in combinations(range(len(models)), 2):
         # (items, 2, levels, counts) gives (levels - 1).
-        told = jackknife(sums[:, [a, b]], clusters, lambda total: _changes(metric(total)))
-        told = bounded(told, most / scale)
+        estimate = jackknife(sums[:, [a, b]], clusters, lambda total: _changes(metric(total)))
+        estimate = bounded(estimate, most / scale)
         value = metric(sums[:, [a, b]].sum(axis=0))
         apart = value[0] - value[1]
         for n, level in enumerate(blocks.levels[1:]):
@@ -222,8 +224,8 @@ def _pair_rows(found: Varied, blocks: Blocks) -> list[dict[str, Any]]:
             row |= {"a": models[a], "b": models[b]}
             row |= {"reference": scale * apart[0], "here": scale * apart[n + 1]}
             for name in ("value", "lo", "hi", "se"):
-                row["change" if name == "value" else name] = scale * getattr(told, name)[n]
-            row["p"] = told.p[n]
+                row["change" if name == "value" else name] = scale * getattr(estimate, name)[n]
+            row["p"] = estimate.p[n]
             row["detectable"] = float(detectable(row["se"], clusters.size, _LEVEL, most))
             rows.append(row)
     return rows

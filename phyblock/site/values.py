@@ -78,16 +78,16 @@ def values_of(run: Run, track: str) -> TrackValues:
 
 
 def _values(run: Run, track: str) -> Iterator[tuple[str, Mapping[tuple[str, str], Value]]]:
-    found, design = track_estimates(run, track), run.design
+    estimates, design = track_estimates(run, track), run.design
     measures, columns = track_measures(track), headline_columns(run, track)
-    shown = found[found["measure"].isin([column.measure for column in columns])]
+    shown = estimates[estimates["measure"].isin([column.measure for column in columns])]
     if not shown["setting"].astype(bool).any():
-        yield "", headline_values(found, design, measures, columns)
+        yield "", headline_values(estimates, design, measures, columns)
         return
     for setting in design.suite.settings:
         suite = design.suite.model_copy(update={"settings": (setting,)})
         in_setting = design.model_copy(update={"suite": suite})
-        yield setting, headline_values(found, in_setting, measures, columns)
+        yield setting, headline_values(estimates, in_setting, measures, columns)
 
 
 def _samples(run: Run, what: Comparable) -> Iterator[tuple[str, Iterator[tuple[Key, float]]]]:
@@ -103,13 +103,13 @@ def _facts(
     outcomes = coverage_frame(run)
     outcomes = outcomes[outcomes["track"] == track].set_index("model")
     days = _days_asked(run, track)
-    found = {}
+    facts = {}
     for model, row in outcomes.to_dict("index").items():
         cost = of_model[model]
         solved = _solved(samples.get(str(model), {}).values(), measure.best)
         price = _known(cost["cost_per_100_usd"])
         whole = None if price is None else price / 100 * int(row["replies"])
-        found[str(model)] = Facts(
+        facts[str(model)] = Facts(
             expected=int(row["expected"]),
             done=int(row["recorded"]),
             failed=int(row["recorded"] - row["ok"]),
@@ -122,7 +122,7 @@ def _facts(
             asked=days.get(str(model)),
             cached=int(row["cached"]),
         )
-    return found
+    return facts
 
 
 def _solved(values: Iterable[float], best: float) -> int | None:

@@ -40,14 +40,14 @@ def read_places(folder: Path, design: Design) -> list[Place]:
     Raises StoreError for a line that is no record.
     """
     lines = run_records(folder)
-    found: dict[str, Place] = {}
+    newest: dict[str, Place] = {}
     for _, record in lines:
         start = lines.start_bytes
-        found[record.sample] = Place(record.track, record.item, record.model, record.seed, start)
+        newest[record.sample] = Place(record.track, record.item, record.model, record.seed, start)
     tracks = {name: n for n, name in enumerate(design.suite.tracks)}
     models = {name: n for n, name in enumerate(design.model_names)}
     return sorted(
-        found.values(),
+        newest.values(),
         key=lambda place: (
             tracks.get(place.track, len(tracks)),
             place.key,
@@ -176,8 +176,8 @@ class SampleIndex:
 
 def _score(record: Record, listing: Listing | None) -> dict[str, float | None]:
     """What a listing says of a sample, with a bit for each type of wrong step."""
-    found = listing.score(record) if listing else None
-    if listing is None or found is None:
+    listed = listing.score(record) if listing else None
+    if listing is None or listed is None:
         return dict.fromkeys(_COUNTED)
-    wrong = sum(1 << n for n, name in enumerate(listing.errors) if name in found.errors)
-    return dict(zip(_COUNTED, (found.tp, found.fp, found.fn, wrong), strict=True))
+    wrong = sum(1 << n for n, name in enumerate(listing.errors) if name in listed.errors)
+    return dict(zip(_COUNTED, (listed.tp, listed.fp, listed.fn, wrong), strict=True))

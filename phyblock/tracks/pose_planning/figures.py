@@ -41,8 +41,8 @@ _LOOKS: dict[PoseError, tuple[str, str]] = {
 
 def tolerance_curve(run: Run) -> pd.DataFrame:
     """F1 in C [%] over all scenes: a row a tolerance [cm], columns by frame and model."""
-    found = track_estimates(run, NAME)
-    mine = found[found[CELL] == OVERALL].set_index(["measure", "model"])["value"].to_dict()
+    estimates = track_estimates(run, NAME)
+    mine = estimates[estimates[CELL] == OVERALL].set_index(["measure", "model"])["value"].to_dict()
     columns = {
         (frame, model): [
             100 * float(mine.get((tolerance_measure(frame, cm), model), float("nan")))

@@ -46,8 +46,8 @@ _SCALES = {measure.name: measure.scale for measure in POSE_PLANNING_MEASURES}
 
 def _overall(run: Run) -> dict[tuple[str, str], dict[Hashable, Any]]:
     """Estimates over all scenes by model and measure."""
-    found = track_estimates(run, NAME)
-    rows = found[found[CELL] == OVERALL].to_dict("records")
+    estimates = track_estimates(run, NAME)
+    rows = estimates[estimates[CELL] == OVERALL].to_dict("records")
     return {(str(row["model"]), str(row["measure"])): row for row in rows}
 
 
@@ -63,9 +63,9 @@ def table_c_frame(run: Run) -> pd.DataFrame:
     for model in run.design.model_names if is_asked(run) else ():
         row: dict[str, Any] = {"model": model, "n": int(_of(known, model, "final_iou").get("n", 0))}
         for name in _SHOWN:
-            one = _of(known, model, name)
+            estimate = _of(known, model, name)
             for end, suffix in (("value", ""), ("lo", "_lo"), ("hi", "_hi")):
-                row[f"{name}{suffix}"] = _SCALES[name] * float(one.get(end, float("nan")))
+                row[f"{name}{suffix}"] = _SCALES[name] * float(estimate.get(end, float("nan")))
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -127,9 +127,11 @@ def pose_errors_frame(run: Run) -> pd.DataFrame:
     rows = []
     for model in run.design.model_names if is_asked(run) else ():
         for error in POSE_ERRORS:
-            one = _of(known, model, error_measure(error))
-            ends = {end: 100 * float(one.get(end, float("nan"))) for end in ("value", "lo", "hi")}
-            rows.append({"model": model, "error": error, **ends, "n": int(one.get("n", 0))})
+            estimate = _of(known, model, error_measure(error))
+            ends = {
+                end: 100 * float(estimate.get(end, float("nan"))) for end in ("value", "lo", "hi")
+            }
+            rows.append({"model": model, "error": error, **ends, "n": int(estimate.get("n", 0))})
     return pd.DataFrame(rows)
 
 
