@@ -230,8 +230,9 @@ def symmetries(block_type: BlockType) -> NDArray[np.float64]:
         return _cube_rotations()
     turns = [_turn_z(360.0 * i / shape.fold) for i in range(shape.fold)]
     if shape.flips:
-        half_turn_x = np.diag([1.0, -1.0, -1.0])
-        turns += [turn @ half_turn_x for turn in turns]
+        # Every block mirrors in x = 0: where half a turn about z is none, that is one about y.
+        half_turn = [1.0, -1.0, -1.0] if shape.fold % 2 == 0 else [-1.0, 1.0, -1.0]
+        turns += [turn @ np.diag(half_turn) for turn in turns]
     return np.stack(turns)
 
 

@@ -23,7 +23,7 @@ from phyblock.specs import SuiteSpec
 from phyblock.tables.design import read_design
 from phyblock.tables.estimates import estimate_frame
 from phyblock.tables.load import Run, frames_of
-from phyblock.tables.measures import VALUE_KEY, value_key
+from phyblock.tables.measures import VALUE_KEY, Better, value_key
 from phyblock.tracks import AnyTrack, SingleTrack, kind_of, shown_item
 from phyblock.tracks.estimates import counted_samples, track_measures
 
@@ -62,8 +62,9 @@ def floor_values(
                 for order, copies in floor_orders(one)
                 for record in _answered(reopened(name, order), floors, order, copies)
             ]
-            for floor, key, value in _estimates(manifest, name, floors, records):
-                found[name][floor][key] = max(value, found[name][floor].get(key, value))
+            for floor, key, value, better in _estimates(manifest, name, floors, records):
+                best = max if better == "higher" else min
+                found[name][floor][key] = best(value, found[name][floor].get(key, value))
     return found
 
 
@@ -90,15 +91,17 @@ def _answered(
 
 def _estimates(
     manifest: Manifest, track: str, floors: Sequence[str], records: Sequence[Record]
-) -> Iterator[tuple[str, str, float]]:
-    """Floor, `value_key` and value, of measures that name floors."""
+) -> Iterator[tuple[str, str, float, Better]]:
+    """Floor, `value_key`, value and which values are better, of measures that name floors."""
     models = tuple(ManifestModel(name=floor) for floor in floors)
     facts = manifest.model_copy(update={"models": models})
     design = read_design(facts.fields())
     run = Run(Path(MANIFEST), facts, design, *frames_of(records, design, texts=False))
     measures = [measure for measure in track_measures(track) if measure.floors]
+    better = {measure.name: measure.better for measure in measures}
     counts = partial(counted_samples, run, track)
     rows = estimate_frame(run, measures, kind_of(track).report().cells(run), counts)
     for row in rows[["model", *VALUE_KEY, "value"]].to_dict("records"):
         if not math.isnan(row["value"]):
-            yield str(row["model"]), value_key(row), float(row["value"])
+            value = float(row["value"])
+            yield str(row["model"]), value_key(row), value, better[row["measure"]]

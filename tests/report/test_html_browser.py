@@ -14,6 +14,7 @@ import yaml
 
 from phyblock import registry, run_suite
 from phyblock.report import write_report, write_tables
+from phyblock.site import write_site
 from tests.browser import expect
 from tests.report.browser import ReportVisit
 from tests.report.html_run import HOSTILE, HOSTILE_SAMPLE, many
@@ -494,7 +495,7 @@ def _large_run(made: Workspace, folder: Path) -> Path:
     return folder
 
 
-def test_what_a_track_of_ones_own_reads_is_shown_by_its_name(
+def test_a_track_of_ones_own_is_shown_by_what_it_reads_and_by_what_is_better_in_it(
     browser: Browser, workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     registry.register_track(COUNTING)
@@ -503,6 +504,7 @@ def test_what_a_track_of_ones_own_reads_is_shown_by_its_name(
         suite = workspace.write_suite(tracks=["counting"], models=["random"])
         run_suite(suite, out=workspace.out)
         write_report(write_tables(workspace.out), figures=())
+        write_site([workspace.out], workspace.root / "site")
     finally:
         registry.unregister_track("counting")
     (record, *_) = workspace.records()
@@ -514,5 +516,14 @@ def test_what_a_track_of_ones_own_reads_is_shown_by_its_name(
     page.get_by_role("tab", name="The scene").click()
     expect(page.locator("#detail canvas.goal")).to_be_visible()
     assert "could be read" not in page.inner_text("#detail")
+    # The fewer blocks a count is off, the better.
+    for view in ("scenes?t=counting", "model?m=random"):
+        page.goto(f"{(workspace.root / 'site' / 'index.html').as_uri()}#{view}")
+        page.reload()
+        shades = page.locator(".tiles .shade")
+        expect(shades).to_have_count(5)
+        errors = [float(text) for text in shades.all_inner_texts()]
+        assert errors == sorted(errors, reverse=True)
+        assert len(set(errors)) > 1
     page.close()
     assert visit.complaints == []

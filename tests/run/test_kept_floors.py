@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from phyblock import registry
 from phyblock.records import Manifest
 from phyblock.resources import bundled
 from phyblock.run import code, floors
 from phyblock.run.floors import FloorValues
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.specs import load_suite
+from phyblock.tracks.estimates import track_measures
 from tests.workspace import SCENES, Workspace
 
 Plans = Callable[..., RunPlan]
@@ -130,3 +134,19 @@ def test_a_file_that_holds_no_values_costs_only_the_time(
             file.write_bytes(content)
         assert begin() == first
     assert anew == [first] * 4
+
+
+def test_the_best_value_counts_whichever_way_is_better(
+    begin: Begin, request: pytest.FixtureRequest
+) -> None:
+    """The least that is missed of F1 is what is left of the most that is reached."""
+    f1 = next(measure for measure in track_measures("full_planning") if measure.name == "f1")
+    missed = replace(f1, name="missed", value=lambda sums: 1 - f1.value(sums), better="lower")
+    registry.add_measure("full_planning", missed)
+    request.addfinalizer(lambda: registry.remove_measure("full_planning", "missed"))
+    lines = (DATA / "phyblock-400" / "scenes.jsonl").read_text("utf-8").splitlines()[::12]
+    values = begin(*map(json.loads, lines))["full_planning"]["goal-blind"]
+    reached = {key.partition("/")[2]: value for key, value in values.items() if key[:3] == "f1/"}
+    assert reached
+    for key, value in reached.items():
+        assert values[f"missed/{key}"] == pytest.approx(1 - value)

@@ -216,7 +216,13 @@ const Views = (() => {
     }
     const mean = ({ scores }) => (scores.length ? scores.reduce((sum, score) => sum + score, 0) / scores.length : null);
     return [...found.values()].map((one) => ({ ...one, score: mean(one), track }))
-      .sort((a, b) => (a.score ?? -1) - (b.score ?? -1) || a.sample.key.localeCompare(b.sample.key));
+      .sort((a, b) => worse(a.score, b.score, track) || a.sample.key.localeCompare(b.sample.key));
+  }
+
+  /** For sorting by scores, the worst first: none, then what the track's measure calls worse. */
+  function worse(a, b, track) {
+    if (a === null || b === null) return (a !== null) - (b !== null);
+    return track.better === "lower" ? b - a : a - b;
   }
 
   function tiles(list) {
@@ -252,7 +258,7 @@ const Views = (() => {
     const wanted = (words.get("q") || "").toLowerCase();
     const list = [...sums].map(([scene, { n, sum, levels }]) => ({ name: index.scenes[scene], score: sum / n, levels }))
       .filter(({ name }) => name.toLowerCase().includes(wanted))
-      .sort((a, b) => a.score - b.score || a.name.localeCompare(b.name));
+      .sort((a, b) => worse(a.score, b.score, track) || a.name.localeCompare(b.name));
     const choice = data.tracks.length > 1 ? el("label", { class: "choice" }, el("span", {}, "Track"),
       el("select", { id: "track", onchange: (event) => Site.go("scenes", { t: event.target.value, q: words.get("q") }) },
         data.tracks.map((one) => el("option", { value: one.name, selected: one === track }, one.title)))) : null;
@@ -299,8 +305,8 @@ const Views = (() => {
     const samples = Store.index.rowsOfItem[item].map(Store.sample);
     const byEntry = new Map();
     for (const sample of samples) byEntry.set(sample.entry, [...(byEntry.get(sample.entry) || []), sample]);
-    const best = (list) => Math.max(...list.map((sample) => sample.score ?? -1));
-    const rows = [...byEntry].sort((a, b) => best(b[1]) - best(a[1]) || a[0].name.localeCompare(b[0].name));
+    const best = (list) => list.map((sample) => sample.score).sort((a, b) => worse(b, a, track))[0];
+    const rows = [...byEntry].sort((a, b) => worse(best(b[1]), best(a[1]), track) || a[0].name.localeCompare(b[0].name));
     return el("ul", { class: "answers" }, rows.map(([entry, list]) => el("li", {},
       el("span", { class: "answer-name" }, link("model", { m: entry.name }, entry.name)),
       el("span", { class: "answer-scores" }, list.map((sample) => link("replay", Site.wordsOf(sample),
