@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from phyblock.domain.blocks import BLOCK_TYPES
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.sim.support import GROUND, support_graph
@@ -25,7 +26,7 @@ from phyblock_making.questions.picture_view import (
     shown_picture,
 )
 from phyblock_making.questions.question_draft import Draft, UnfairError
-from phyblock_making.questions.referring import names, resolve_one, shape_word
+from phyblock_making.questions.referring import SHAPE_WORDS, names, resolve_one, shape_word
 from phyblock_making.questions.static_drafts import (
     StaticMaker,
     draft,
@@ -199,11 +200,13 @@ TALLIES: Mapping[str, Tally] = {
     "lc-above": Tally(
         _layer_numbers, lambda p, s: _in_layers(p, lambda n: n > int(s["layer"])), range(1, 12)
     ),
-    "tc-all": Tally(_no_slots, lambda p, _: len(_types(_all_shapes_seen(p))), range(1, 9)),
+    "tc-all": Tally(
+        _no_slots, lambda p, _: len(_types(_all_shapes_seen(p))), range(1, len(BLOCK_TYPES) + 1)
+    ),
     "tc-shapes": Tally(
         _no_slots,
         lambda p, _: len({shape_word(block.type) for block in _all_shapes_seen(p)}),
-        range(1, 7),
+        range(1, len(SHAPE_WORDS) + 1),
     ),
     "tc-once": Tally(
         _no_slots,
