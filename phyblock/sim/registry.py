@@ -24,7 +24,8 @@ __all__ = [
     "PHYSICS_VARIABLE",
     "REFERENCE_ENGINE",
     "RENDERERS",
-    "KnownEngine",
+    "KnownSimulator",
+    "installed",
     "installed_engines",
     "other_simulators",
     "physics_engine",
@@ -39,9 +40,9 @@ _RENDERER_VARIABLE = "PHYBLOCK_RENDERER"
 _DEFAULT_RENDERER = "raster"
 
 
-class KnownEngine(NamedTuple):
-    """Where an engine's factory is, the module of its library, the distribution that brings it,
-    and where that can be had.
+class KnownSimulator(NamedTuple):
+    """Where the factory of an engine or renderer is, the module of its library, the
+    distribution that brings it, and where that can be had.
     """
 
     path: str
@@ -50,14 +51,14 @@ class KnownEngine(NamedTuple):
     hint: str
 
 
-ENGINES: Mapping[str, KnownEngine] = {
-    REFERENCE_ENGINE: KnownEngine(
+ENGINES: Mapping[str, KnownSimulator] = {
+    REFERENCE_ENGINE: KnownSimulator(
         "phyblock.sim.bullet.physics:BulletEngine",
         "pybullet",
         "pybullet",
         "PyBullet has wheels for Python 3.10 and 3.11 on Linux, x86-64",
     ),
-    "mujoco": KnownEngine(
+    "mujoco": KnownSimulator(
         "phyblock.sim.mujoco.physics:MujocoEngine",
         "mujoco",
         "mujoco-core",
@@ -65,15 +66,21 @@ ENGINES: Mapping[str, KnownEngine] = {
     ),
 }
 """The physics engines, the one that is taken first where several are installed before others."""
-RENDERERS: Mapping[str, str] = {
-    "raster": "phyblock.sim.raster.renderer:NumpyRenderer",
+RENDERERS: Mapping[str, KnownSimulator] = {
+    _DEFAULT_RENDERER: KnownSimulator(
+        "phyblock.sim.raster.renderer:NumpyRenderer", "numpy", "numpy", "pip install numpy"
+    ),
 }
-"""Where the factory of each renderer is."""
 
 
 def installed_engines() -> tuple[str, ...]:
-    """Names of the engines whose libraries are installed, which are not imported."""
-    return tuple(name for name, engine in ENGINES.items() if find_spec(engine.library) is not None)
+    """Names of the engines that are installed, as `installed` tells."""
+    return installed(ENGINES)
+
+
+def installed(known: Mapping[str, KnownSimulator]) -> tuple[str, ...]:
+    """Names of those whose libraries are installed, which are not imported."""
+    return tuple(name for name, one in known.items() if find_spec(one.library) is not None)
 
 
 def physics_engine() -> PhysicsEngine:
@@ -82,16 +89,11 @@ def physics_engine() -> PhysicsEngine:
 
     Raises InputError for a name that is not known, and where the engine is not installed.
     """
-    variable = PHYSICS_VARIABLE
     usual = next(iter(installed_engines()), REFERENCE_ENGINE)
-    word = os.environ.get(variable, usual)
-    known = ENGINES.get(word)
-    if known is not None and find_spec(known.library) is None:
-        raise InputError(Problem(variable, "is not installed", found=word, hint=known.hint))
-    path = word if known is None else known.path
-    made = _make(variable, word, path, ", ".join(ENGINES))
+    word = os.environ.get(PHYSICS_VARIABLE, usual)
+    made = _made(PHYSICS_VARIABLE, word, ENGINES)
     if not isinstance(made, PhysicsEngine):
-        raise InputError(Problem(variable, "names no physics engine", found=word))
+        raise InputError(Problem(PHYSICS_VARIABLE, "names no physics engine", found=word))
     return made
 
 
@@ -115,11 +117,18 @@ def renderer() -> Renderer:
 @functools.cache
 def _renderer(word: str) -> Renderer:
     """Looked at once: every key of a picture asks for its renderer."""
-    path = RENDERERS.get(word, word)
-    made = _make(_RENDERER_VARIABLE, word, path, ", ".join(RENDERERS))
+    made = _made(_RENDERER_VARIABLE, word, RENDERERS)
     if not isinstance(made, Renderer):
         raise InputError(Problem(_RENDERER_VARIABLE, "names no renderer", found=word))
     return made
+
+
+def _made(variable: str, word: str, known: Mapping[str, KnownSimulator]) -> object:
+    """What a word means: one of those that are known, or `module:factory`."""
+    named = known.get(word)
+    if named is not None and find_spec(named.library) is None:
+        raise InputError(Problem(variable, "is not installed", found=word, hint=named.hint))
+    return _make(variable, word, word if named is None else named.path, ", ".join(known))
 
 
 def other_simulators() -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from phyblock.sim import PictureStyle, candidates_key, candidates_png
 from phyblock.sim.camera import FULL_WINDOW, Camera, frame, view_axes
 from phyblock.sim.geometry import solid_mesh
 from phyblock.sim.pose import Pose
-from phyblock.sim.registry import RENDERERS, renderer
+from phyblock.sim.registry import RENDERERS, installed, renderer
 from phyblock.sim.renderer import Light, Prop, Raster, Renderer
 from tests.sim.box_renderer import BOX_RENDERER
 
@@ -35,7 +35,7 @@ def chosen(word: str) -> Renderer:
         return renderer()
 
 
-@pytest.fixture(params=[*RENDERERS, BOX_RENDERER], scope="module")
+@pytest.fixture(params=[*installed(RENDERERS), BOX_RENDERER], scope="module")
 def drawn_by(request: pytest.FixtureRequest) -> Renderer:
     """Any renderer."""
     return chosen(request.param)
