@@ -2,8 +2,10 @@
 it can again, and all others go elsewhere or wait.
 
 What a server says itself, an error 500 or a 429 too, shows that it is there. No connection, a lost
-one, or a gateway that finds nothing behind it (502, 503, 504) shows that it is not. An answer that
-does not come in time shows neither: some requests are slow.
+one, or a gateway that finds nothing behind it (502, 503, 504) shows that it is not. So does a
+success that holds no reply, as long as no reply ever came: a web server's page, or that of a proxy
+while the model is loaded. An answer that does not come in time shows neither: some requests are
+slow.
 """
 
 from __future__ import annotations
@@ -16,9 +18,9 @@ from collections.abc import Awaitable, Callable, Hashable, Iterator
 from phyblock.errors import ModelError, RetryableError
 from phyblock.models.config import ModelConfig
 from phyblock.models.events import Tell, ignore_text
-from phyblock.models.retry import RetryPolicy, backoff_s
+from phyblock.models.retry import RetryPolicy, backoff_s, is_success
 
-__all__ = ["Breaker", "Breakers", "Changes", "server_of", "shows_outage"]
+__all__ = ["Breaker", "Breakers", "Changes", "server_of"]
 
 FAILURES_TO_OPEN = 5
 _REQUESTS_TO_OPEN = 2
@@ -62,7 +64,7 @@ class Breaker:
     that one request which a server cannot survive is not taken for an outage. A probe that still
     fails when the outage has lasted `policy.retry_for_s` gives the server up: it is probed only as
     long as others of the model answer. So does the `policy.max_connection_failures`-th failure in a
-    row where the server has never answered. `changes` wakes those that wait.
+    row where the server has never answered, or never with a reply. `changes` wakes those that wait.
     """
 
     def __init__(
@@ -84,6 +86,7 @@ class Breaker:
         self._is_probed = False
         self._is_open = False
         self._was_heard = False
+        self._has_replied = False
         self._end: str | None = None
 
     @property
@@ -124,19 +127,36 @@ class Breaker:
         self._requests.clear()
         self._changes.tell()
 
+    def replied(self) -> None:
+        """The server gave a reply."""
+        self._has_replied = True
+        self.heard()
+
+    def is_outage(self, error: ModelError) -> bool:
+        """Whether a failure shows that the server cannot be reached."""
+        is_unreached = error.sent in ("no", "lost") or error.status in _GATEWAY
+        return isinstance(error, RetryableError) and (is_unreached or self._is_page(error))
+
+    def _is_page(self, error: ModelError) -> bool:
+        """Whether it promised a reply and gave none, as the page of a web server does."""
+        return (
+            not self._has_replied and is_success(error.status) and isinstance(error, RetryableError)
+        )
+
     def failed(self, error: ModelError, request: Hashable, *, is_probe: bool) -> None:
         """An attempt for `request` failed; counts it where the server was not reached.
 
         What becomes of attempts that were sent before the breaker opened says nothing new.
         """
-        is_answer = error.sent == "answered" and error.status not in _GATEWAY
+        is_answer = error.sent == "answered" and not self.is_outage(error)
         # The server took the probe, so it can be reached, however long it thinks.
         is_slow_probe = is_probe and error.sent == "maybe" and isinstance(error, RetryableError)
         if is_answer or is_slow_probe:
             self.heard()
         # A gateway that finds nothing behind it is there: its address is right.
-        self._was_heard = self._was_heard or error.status is not None
-        if not shows_outage(error):
+        is_there = error.status is not None and not self._is_page(error)
+        self._was_heard = self._was_heard or is_there
+        if not self.is_outage(error):
             return
         assert isinstance(error, RetryableError)
         now_s = self._policy.clock.now()
@@ -150,7 +170,7 @@ class Breaker:
             self._end = None
             self._probes = 0
             self._plan_probe(error, now_s)
-            self._tell(f"{self.server} cannot be reached, trying now and then: {error}")
+            self._tell(f"{self.server} {self._fault(error)}, trying now and then: {error}")
 
     def _is_new_outage(self) -> bool:
         return (
@@ -163,27 +183,27 @@ class Breaker:
         self._probes += 1
         self._plan_probe(error, now_s)
         lasted_s = now_s - self._began_s
-        if self._policy.gives_up(error, self._probes, lasted_s):
+        is_page = self._is_page(error)
+        if not is_page and self._policy.gives_up(error, self._probes, lasted_s):
             self._end = f"{self.server} could not be reached for {lasted_s:.0f} s: {error}"
         # Failures of requests that were sent together before it opened say no more than one.
         failures = FAILURES_TO_OPEN + self._probes
-        if not self._was_heard and failures >= self._policy.max_connection_failures:
-            self._end = f"{self.server} never answered, {failures} times in a row: {error}"
+        is_new = is_page or not self._was_heard
+        if is_new and failures >= self._policy.max_connection_failures:
+            never = "never gave a reply that can be read" if is_page else "never answered"
+            self._end = f"{self.server} {never}, {failures} times in a row: {error}"
         elif self._end is None and self._probe_at_s - now_s >= _WORTH_A_WORD_S:
             tries = f"{failures} times in a row, for {lasted_s:.0f} s"
-            self._tell(f"{self.server} still cannot be reached: tried {tries}")
+            self._tell(f"{self.server} still {self._fault(error)}: tried {tries}")
+
+    def _fault(self, error: RetryableError) -> str:
+        return "gives no reply that can be read" if self._is_page(error) else "cannot be reached"
 
     def _plan_probe(self, error: RetryableError, now_s: float) -> None:
         """Wait longer with every probe, and as long as the server asks for."""
         most_s = min(_LONGEST_PROBE_WAIT_S, self._policy.max_wait_s)
         wait_s = backoff_s(self._policy.base_s, most_s, self._probes + 1)
         self._probe_at_s = now_s + max(wait_s, self._policy.followed_s(error))
-
-
-def shows_outage(error: ModelError) -> bool:
-    """Whether a failure shows that the server cannot be reached."""
-    is_unreached = error.sent in ("no", "lost") or error.status in _GATEWAY
-    return is_unreached and isinstance(error, RetryableError)
 
 
 class Breakers:

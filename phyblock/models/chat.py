@@ -17,7 +17,6 @@ from phyblock.errors import (
     UnavailableError,
 )
 from phyblock.models.base import Reply, Request
-from phyblock.models.breaker import shows_outage
 from phyblock.models.cache import known_keys
 from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, estimate
@@ -205,23 +204,19 @@ class ChatModel:
         except ModelError as error:
             sender = (self.name, question.request.key, question.request.seed)
             breaker.failed(error, sender, is_probe=is_probe)
-            if isinstance(error, RetryableError):
+            if isinstance(error, UnavailableError):
+                if replicas.leave_out(replica, error):
+                    return None
+                self._stop(error)
+            elif isinstance(error, RetryableError):
                 question.failure = error
                 question.failed_at = replica
-            refusal = replica.no_use(error, sender, self._parts.policy.max_connection_failures)
-            if refusal is not None:
-                if replicas.leave_out(replica, refusal):
-                    return None
-                self._stop(refusal)
-                raise refusal from None
-            if isinstance(error, RetryableError):
                 self._slow_down(error, replica, mark)
                 replicas.raise_if_none_left()
-                if breaker.is_open and shows_outage(error):
+                if breaker.is_open and breaker.is_outage(error):
                     return None
             raise
-        breaker.heard()
-        replica.has_replied = True
+        breaker.replied()
         replica.pace.answered(mark, reply.latency_s)
         self._fit_width()
         return self._finished(reply, question)

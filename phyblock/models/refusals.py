@@ -31,7 +31,7 @@ __all__ = [
 
 _RETRYABLE = (408, 409, 425, 429)
 _UNAVAILABLE = (401, 402, 403, 404)
-_SLOW_DOWN = 429
+_PASSING = re.compile(r"429|5\d\d")
 _POLICY = re.compile(
     r"content_policy_violation|ResponsibleAIPolicyViolation|content management policy"
     r"|data_?inspection_?failed|\bcontent_filter\b|requires moderation",
@@ -157,8 +157,9 @@ def _error_in_success(answer: Answer, text: str, wish_s: float | None) -> ModelE
         return RefusedError(text, status=answer.status)
     if _NEVER.search(text) or any(str(code) in codes for code in _UNAVAILABLE):
         return UnavailableError(text, status=answer.status)
-    # A limit that is reached is no reply that was paid for: fewer are to be sent at once.
-    status = _SLOW_DOWN if str(_SLOW_DOWN) in codes else answer.status
+    # A limit that is reached and a fault behind a gateway are no replies that were paid for.
+    passing = (int(code) for code in codes if _PASSING.fullmatch(code))
+    status = next(passing, answer.status)
     return RetryableError(text, status=status, retry_after_s=wish_s)
 
 

@@ -5,30 +5,25 @@ tried now and then.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import AsyncIterator, Callable, Hashable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass
 
-from phyblock.errors import ModelError, RefusedError, UnavailableError
+from phyblock.errors import UnavailableError
 from phyblock.models.adaptive_pace import AdaptivePace
 from phyblock.models.address_list import AddressList, changing_list
 from phyblock.models.breaker import Breaker, Breakers
 from phyblock.models.config import ModelConfig
 from phyblock.models.pace import FixedPace, Mark, Pace
-from phyblock.models.retry import is_success
 from phyblock.models.transport import Transport
 from phyblock.plain_text import counted
 
 __all__ = ["Replica", "Replicas"]
 
-_REQUESTS_TO_TELL = 2
-"""One request alone may be what a server cannot answer."""
-
 
 @dataclass(eq=False)
 class Replica:
     """A server of the model, how many requests it may have, has now and was ever sent, and why it
-    is no use: what it said that it would say to every request. `unread` are the requests to which
-    it promised a reply and gave none, as long as it has given none to any.
+    is no use: what it said that it would say to every request.
     """
 
     transport: Transport
@@ -37,22 +32,6 @@ class Replica:
     under_way: int = 0
     sent: int = 0
     refusal: UnavailableError | None = None
-    has_replied: bool = False
-    unread: list[Hashable] = field(default_factory=list)
-
-    def no_use(self, error: ModelError, request: Hashable, most: int) -> UnavailableError | None:
-        """Why it is not to be asked any more, if this failure of a request shows it: it says so, or
-        is the `most`-th that promised a reply and gave none, as the pages of a web server do.
-        """
-        if isinstance(error, UnavailableError):
-            return error
-        if self.has_replied or not is_success(error.status) or isinstance(error, RefusedError):
-            return None
-        self.unread.append(request)
-        if len(self.unread) < most or len(set(self.unread)) < _REQUESTS_TO_TELL:
-            return None
-        message = f"never gave a reply that can be read, {len(self.unread)} times: {error}"
-        return UnavailableError(f"{self.breaker.server} {message}", status=error.status)
 
     @contextlib.contextmanager
     def asked(self) -> Iterator[Mark]:
@@ -195,7 +174,6 @@ class Replicas:
             replica = self._known[address]
             if replica not in before:
                 replica.refusal = None
-                replica.unread.clear()
             self._listed.append(replica)
 
 

@@ -31,13 +31,23 @@ from tests.servers.chassis import Faults, Running, Seen, start
 from tests.servers.openai_chat import OpenAIChat
 
 REFUSED = UnreachableError("connection refused")
+LOST = RetryableError("connection refused", sent="lost")
+PAGE = RetryableError("HTTP 200: malformed reply", status=200)
 
 
 class Outage:
     """A transport whose server is away from `begins_s` until `ends_s`; calls take `takes_s`."""
 
-    def __init__(self, time: FakeTime, begins_s: float, ends_s: float, takes_s: float) -> None:
+    def __init__(
+        self,
+        time: FakeTime,
+        begins_s: float,
+        ends_s: float,
+        takes_s: float,
+        error: RetryableError = LOST,
+    ) -> None:
         self.time = time
+        self.error = error
         self.begins_s, self.ends_s, self.takes_s = begins_s, ends_s, takes_s
         self.failed = self.answered = 0
 
@@ -50,7 +60,7 @@ class Outage:
             await self.time.sleep(self.takes_s)
         if was_away or self.is_away():
             self.failed += 1
-            raise RetryableError("connection refused", sent="lost")
+            raise RetryableError(str(self.error), status=self.error.status, sent=self.error.sent)
         self.answered += 1
         return Reply("Step1: Move block with index 1")
 
@@ -134,22 +144,42 @@ def test_an_outage_loses_nothing_and_costs_few_attempts(
     assert transport.failed <= 2 * width + FAILURES_TO_OPEN + 30
 
 
-@pytest.mark.parametrize("width", [2, 8, 32])
-def test_a_dead_name_stops_the_model_after_few_attempts_and_leaves_its_samples(width: int) -> None:
+@settings(max_examples=20, deadline=None)
+@given(st.floats(1, 100, allow_nan=False), st.floats(0.1, 20, allow_nan=False), st.integers(2, 64))
+def test_pages_that_a_proxy_shows_while_the_model_is_loaded_lose_nothing(
+    lasts_s: float, takes_s: float, width: int
+) -> None:
     time = FakeTime()
-    transport = Outage(time, 0.0, float("inf"), 1.0)
+    transport = Outage(time, 0.0, lasts_s, takes_s, PAGE)
+    answers, _ = ask_through(transport, time, samples=80, width=width)
+    assert [type(answer) for answer in answers] == [Reply] * 80
+    assert transport.failed <= 2 * width + FAILURES_TO_OPEN + 30
+
+
+@pytest.mark.parametrize("width", [2, 8, 32])
+@pytest.mark.parametrize(
+    ("error", "fault", "never"),
+    [
+        (LOST, "cannot be reached", "never answered"),
+        (PAGE, "gives no reply that can be read", "never gave a reply that can be read"),
+    ],
+)
+def test_a_wrong_address_stops_the_model_after_few_attempts_and_leaves_its_samples(
+    width: int, error: RetryableError, fault: str, never: str
+) -> None:
+    time = FakeTime()
+    transport = Outage(time, 0.0, float("inf"), 1.0, error)
     answers, said = ask_through(transport, time, samples=500, width=width)
     assert {type(answer) for answer in answers} == {UnavailableError}
     assert len(answers) == width
-    assert "http://gone:1 never answered, 20 times in a row" in str(answers[0])
-    assert "connection refused" in str(answers[0])
+    assert f"http://gone:1 {never}, 20 times in a row: {error}" in str(answers[0])
     assert transport.failed <= width + FAILURES_TO_OPEN + 30
     first, *later = said
-    assert first.startswith("http://gone:1 cannot be reached")
+    assert first.startswith(f"http://gone:1 {fault}, trying now and then: {error}")
     assert 100 <= time.now_s < 200
     # A log is never silent for long, and says that it gets worse.
     assert time.now_s / 20 <= len(later) <= time.now_s / 10
-    assert all("still cannot be reached: tried " in text for text in later)
+    assert all(f"still {fault}: tried " in text for text in later)
 
 
 @settings(max_examples=20, deadline=None)
