@@ -119,5 +119,5 @@ SendMode = Literal["auto", "always", "never"]
 ImageDetail = Literal["auto", "low", "medium", "high", "ultra_high", "original"]
 """How closely a provider looks at pictures; each knows some of these."""
 
-QUOTE_HINT = "quote values with spaces: --set 'seeds=[0, 1]'"
+QUOTE_HINT = "quote values with spaces, or write none: --set 'seeds=[0, 1]', --models a,b"
 """What helps where a shell took a value apart."""

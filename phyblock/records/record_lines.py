@@ -57,7 +57,8 @@ class RecordLines(Lines[Record]):
         context = first.get("ctx") or {}
         found, allowed = str(context.get("tag")), str(context.get("expected_tags"))
         message = f"is not a {self.noun}: of a track that is not known"
-        return Problem(where, message, "track", found, allowed, self.hint)
+        hint = "a track of a program of its own: open it from there, by registry.register_track"
+        return Problem(where, message, "track", found, allowed, hint)
 
 
 class RecordedLines(Lines[Recorded]):

@@ -43,7 +43,7 @@ def reader_remarks(begun: Manifest, plan: RunPlan) -> list[str]:
     """That replies of a run will be read again, where earlier readers read them."""
     if begun.identity == plan.manifest.identity:
         return []
-    return [f"{earlier_readers(begun)}: these read them again, before anybody is asked"]
+    return [f"{earlier_readers(begun)}: they are read again before anybody is asked"]
 
 
 def moved_remarks(begun: Manifest, plan: RunPlan) -> list[str]:

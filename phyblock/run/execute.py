@@ -262,9 +262,10 @@ class Executor:
     def _stop(self, stop: Stop) -> None:
         if self.result.stop is None:
             self.result.stop = stop
-            waiting = self._halt.waiting
+            # Some wait for others, and have no call under way.
+            under_way = max(0, self._in_flight - self._halt.waiting)
             self._halt.set()
-            self._watch(Stopping(stop.reason, self._in_flight - waiting))
+            self._watch(Stopping(stop.reason, under_way))
 
     async def _one(self, planned: PlannedModel, sample: Sample) -> None:
         model = self._models[planned.name]

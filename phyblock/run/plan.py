@@ -230,7 +230,8 @@ def _check_models(
                 hint = "each turn waits for the one before: take batch: true out, or the track"
                 problems.append(Problem(where, message, "batch", track.name, hint=hint))
             if model.config.kind == "human" and kind_of(track.name).by_hand is None:
-                message, hint = f"is a person, who cannot answer in {track.name}", "leave it out"
+                message = f"is a person, who cannot answer in {track.name}"
+                hint = f"leave {track.name} out of tracks"
                 problems.append(Problem(where, message, "tracks", track.name, hint=hint))
             able = kind_of(track.name).baselines
             if model.config.kind != "baseline" or model.config.id in able:

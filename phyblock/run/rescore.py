@@ -56,9 +56,10 @@ def rescore(
     target = out or folder / name
     by = f"{suite.parser} {reader_version(suite.parser)}, {suite.scoring.matchers[0]}"
     identity = f"{manifest.identity} scored by {by}"
+    earlier = [f"{one} scored by {by}" for one in manifest.identities]
     if out is None:
         run_folder(folder).check([f"{name}/"])
-    _check_target(target, identity)
+    _check_target(target, (identity, *earlier))
     dataset = recorded_dataset(folder, manifest, suite.levels, data)
     stayed: list[str] = []
     names = [name for name in suite.tracks if kind_of(name).rescored or counts_samples(name)]
@@ -166,10 +167,12 @@ def _read_anew(
     return names
 
 
-def _check_target(target: Path, identity: str) -> None:
-    """Raise StoreError unless `target` is new, empty or holds these scores."""
+def _check_target(target: Path, identities: Collection[str]) -> None:
+    """Raise StoreError unless `target` is new, empty or holds these scores, maybe as they were
+    under earlier readers.
+    """
     check_place(target)
-    if (target / MANIFEST).exists() and read_manifest(target).identity != identity:
+    if (target / MANIFEST).exists() and read_manifest(target).identity not in identities:
         hint = "choose another folder with --out: what a run stored is never changed"
         raise StoreError(Problem(str(target), "holds another run", hint=hint))
 

@@ -41,9 +41,12 @@ _AT_ONCE = 500
 def earlier_readers(found: Manifest) -> str:
     """Which readers read the replies of a run that earlier readers began, and which are here."""
     if not is_read_otherwise(found):
-        return "its replies were read by an earlier reader of one of its tracks"
+        return "An earlier version of phyblock read the replies of this run, in one of its tracks"
     read = found.versions.get("readers", 1)
-    return f"its replies were read by readers {read}, this version has readers {READER_VERSION}"
+    return (
+        "An earlier version of phyblock read the replies of this run "
+        f"(readers {read}, now {READER_VERSION})"
+    )
 
 
 def begun_anew(plan: RunPlan, folder: Path, found: Manifest) -> set[str]:
@@ -73,6 +76,8 @@ async def take_on(plan: RunPlan, folder: Path, found: Manifest, tell: Tell) -> M
         done = await _read_again(plan, folder, begun, store)
         changes = {
             "identity": today,
+            # What floors reach is read by the readers too.
+            "floors": plan.floors(),
             "tracks": plan.manifest.tracks,
             "versions": {**found.versions, "readers": str(READER_VERSION)},
         }
@@ -106,8 +111,8 @@ class _Done:
         told = f"{counted(self.replies, 'record')} read again, {self.otherwise:,} of them otherwise"
         if not self.episodes:
             return f"{told}; nobody was asked"
-        episodes = f"{counted(self.episodes, 'episode')} will be asked on"
-        return f"{told}; nobody was asked. {episodes} from the first turn that changes"
+        episodes = f"{counted(self.episodes, 'episode')} will go on"
+        return f"{told}; nobody was asked. {episodes} from the first turn that may change"
 
 
 @dataclass

@@ -131,11 +131,12 @@ def test_it_goes_on_as_if_todays_readers_had_begun_it_and_pays_nothing_twice(
     before, usd = newest(workspace, "out"), spent(workspace)
     anew = begun_anew(plan, workspace.out, earlier)
     assert {before[sample]["model"] for sample in anew} == {"random", "alpha"}
+    assert call("score", "out") == 0
     files = workspace.files()
     capsys.readouterr()
     assert run("out", "--dry-run") == 0
     said = capsys.readouterr().out
-    assert "read by readers 5, this version has readers 6" in said
+    assert "read the replies of this run (readers 5, now 6): they are read again before" in said
     done = len([s for s in before if s not in anew and "/alpha/" in s])
     assert re.search(rf"^ alpha +litellm +10 +{done} ", said, re.MULTILINE)
     assert workspace.files() == files
@@ -151,6 +152,7 @@ def test_it_goes_on_as_if_todays_readers_had_begun_it_and_pays_nothing_twice(
     assert now.versions == {**earlier.versions, "readers": "6"}
     assert (now.identities[0], now.created) == (earlier.identity, earlier.created)
     assert now.identity == now.identities[1] == plan.manifest.identity
+    assert call("score", "out") == 0
     paid = 1.04 * (len(begun.answered) - 22)
     assert spent(workspace) == pytest.approx(usd + paid)
 

@@ -64,7 +64,7 @@ const Matrix = (() => {
     box.style.setProperty("--models", models.length);
     box.setAttribute("aria-rowcount", items.length + 1);
     box.setAttribute("aria-colcount", models.length + 1);
-    const why = Data.lacking(state.track), none = document.getElementById("matrix-none");
+    const why = Data.lacking(state.track) || unscored([...seen.values()]), none = document.getElementById("matrix-none");
     none.textContent = why;
     none.hidden = !why;
     box.hidden = Boolean(why);
@@ -81,6 +81,14 @@ const Matrix = (() => {
       if (select) select.value = String(state[name]);
     }
     paint();
+  }
+
+  /** Why there is nothing to show of a track whose samples are read and have no score of their own. */
+  function unscored(sums) {
+    const { rows, outcomes, track_titles: titles } = Data.index;
+    const isRead = rows.track.some((track, row) => track === state.track && outcomes[rows.outcome[row]] === "ok");
+    if (!isRead || sums.some(({ n }) => n)) return "";
+    return `${titles[state.track]} gives single samples no score: its values are under Results, its replies under Samples.`;
   }
 
   function ordered(found) {
