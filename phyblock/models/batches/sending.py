@@ -29,6 +29,8 @@ __all__ = ["Draft", "Sender", "UnsureError"]
 
 T = TypeVar("T")
 
+_WORTH_A_WORD_S = 2.0
+"""Waits that are so long are told, or a log would fall silent."""
 _CLOCKS_APART_S = 3600.0
 _HINT = "free some space and give the same command again: nothing of this batch was sent"
 
@@ -270,11 +272,15 @@ class Sender:
     async def patiently(self, call: Callable[[], Awaitable[T]]) -> T:
         """Call until it succeeds or cannot; UnavailableError where it never does."""
         try:
-            return await with_retries(call, self._policy, lambda *_: None)
+            return await with_retries(call, self._policy, self._say_retry)
         except UnavailableError:
             raise
         except ModelError as error:
             raise UnavailableError(str(error), status=error.status, sent=error.sent) from None
+
+    def _say_retry(self, error: RetryableError, wait_s: float) -> None:
+        if wait_s >= _WORTH_A_WORD_S:
+            self._tell(f"trying again in {wait_s:.0f} s: {error}")
 
 
 def _named(status: BatchStatus) -> BatchStatus:
