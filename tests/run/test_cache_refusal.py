@@ -6,10 +6,12 @@ Replies stand in the records too, so that nothing depends on the cache but what 
 from __future__ import annotations
 
 import contextlib
+import re
 import signal
 import sqlite3
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -26,6 +28,13 @@ def prepare(workspace: Workspace, url: str, at_once: int = 1) -> None:
     workspace.write_models(url, "alpha")
     limits = {"max_concurrency": at_once}
     workspace.write_suite(models=["alpha"], seeds=[0, 1, 2, 3], limits=limits)
+
+
+def catches(pid: int, number: signal.Signals) -> bool:
+    """Whether a process has its own handler of a signal, as one that asks models has of SIGTERM."""
+    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+    (mask,) = re.findall(r"^SigCgt:\s*(\w+)", status, re.MULTILINE)
+    return bool(int(mask, 16) >> (number - 1) & 1)
 
 
 @contextlib.contextmanager
@@ -110,7 +119,7 @@ def test_ctrl_c_ends_a_run_whose_cache_is_locked(workspace: Workspace) -> None:
     with Running(OpenAIChat()) as running, locked(workspace):
         prepare(workspace, running.url, AT_ONCE)
         with workspace.start() as process:
-            while not (workspace.out / "run.yaml").exists():
+            while not catches(process.pid, signal.SIGTERM):
                 time.sleep(0.01)
             time.sleep(1.0)
             process.send_signal(signal.SIGINT)
