@@ -227,6 +227,10 @@ class _Handler(BaseHTTPRequestHandler):
         except ValueError:
             self._refuse(400)
             return None, ""
+        if split.netloc:
+            # A whole address is for proxies, and Pythons differ in which hosts they take.
+            self._refuse(404)
+            return None, ""
         hosts, origin = self.headers.get_all("Host", []), self.headers.get("Origin")
         origins = [f"http://{host}" for host in self.sitting.hosts]
         name = self.sitting.below(split.path)

@@ -76,7 +76,7 @@ def _notes(found: Comparison) -> tuple[str, ...]:
             f"{counted(most['n_clusters'], 'base scene')}; scenes that share one are not taken as "
             "independent."
         )
-        single = table["detectable"].median()
+        single = table["detectable"].dropna().median()
         median = "" if math.isnan(single) else f"; a single test, in the median, {number(single)}"
         notes.append(
             f"“finds”: the difference that this comparison would find in {POWER:.0%} of cases"

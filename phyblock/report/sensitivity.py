@@ -259,7 +259,7 @@ def ranks_frame(run: Run) -> pd.DataFrame:
                 row |= {"models": len(values), "tau": _tau(values[:, 0], values[:, place])}
                 row |= {"pairs": len(part), "flips": int(part["flips"].sum())}
                 row |= {"sure": int(part["is_sure"].sum())}
-                row["detectable"] = float(part["detectable"].median())
+                row["detectable"] = float(part["detectable"].dropna().median())
                 row["n_items"] = len(next(iter(ranked.asked.values())).names)
                 rows.append(row)
     return pd.DataFrame(rows, columns=list(_RANKS))

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pandas as pd
 
-from phyblock.tables.flat import TOKENS
+from phyblock.tables.flat import TOKENS, joined_counts
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.outcomes import HEADINGS, NOT_RUN, OUTCOMES
 from phyblock.tables.text_table import (
@@ -80,7 +80,7 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     table = pd.DataFrame(rows, columns=[*_ROW, "expected"])
     table = table.join(sums, on=_ROW).join(known, on=_ROW)
     table = table.join(groups["latency_s"].mean(), on=_ROW)
-    table[list(_COUNTS)] = table[list(_COUNTS)].fillna(0).astype("int64")
+    table[list(_COUNTS)] = joined_counts(table[list(_COUNTS)])
     table.loc[(table["replies"] > 0) & (table["replies"] == table["cached"]), "cost_usd"] = 0.0
     table["not_run"] = table["expected"] - table["recorded"]
     return table[list(_COLUMNS)]

@@ -17,7 +17,7 @@ from phyblock.records import Record, Score
 from phyblock.records.known import record_types
 from phyblock.scoring import BLOCK_OUTCOMES, ERROR_TYPES
 
-__all__ = ["BLOCK_COLUMNS", "MATCHED", "TOKENS", "Flattened"]
+__all__ = ["BLOCK_COLUMNS", "MATCHED", "TOKENS", "Flattened", "joined_counts"]
 
 BLOCK_COLUMNS = {name: f"blocks_{name}" for name in BLOCK_OUTCOMES}
 """Columns of scores that say what became of the goal's blocks."""
@@ -228,3 +228,9 @@ def _rule(parse: Any) -> str | None:
     """The rule that matched, of whatever a track says of its parsing."""
     rule = parse.get("rule") if isinstance(parse, dict) else getattr(parse, "rule", None)
     return None if rule is None else str(rule)
+
+
+def joined_counts(columns: pd.DataFrame) -> pd.DataFrame:
+    """Counts that a join brought, 0 where it found none."""
+    # Out of an empty frame columns of any type come, and pandas fills these with a warning.
+    return columns.astype("float64").fillna(0).astype("int64")

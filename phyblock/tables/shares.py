@@ -11,6 +11,7 @@ import pandas as pd
 
 from phyblock.scoring.ratios import Floats, ratio_of
 from phyblock.tables.estimates import estimate_frame
+from phyblock.tables.flat import joined_counts
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Cell, Measure, SampleCounts
 from phyblock.tables.text_table import between, number
@@ -60,7 +61,7 @@ def joined_shares(table: pd.DataFrame, shares: pd.DataFrame, on: Sequence[str]) 
     """A table with the columns of `shares_of` at the rows that `on` names; without them, sums 0."""
     wide = table.join(shares.rename_axis(list(on)), on=list(on))
     sums = [name for name in shares if f"{name}_share" in shares or name == _WHOLE]
-    return wide.assign(**wide[sums].fillna(0).astype("int64"))
+    return wide.assign(**joined_counts(wide[sums]))
 
 
 def _share(place: int, sums: Floats) -> Floats:

@@ -7,6 +7,7 @@ import pandas as pd
 from phyblock.plain_text import counted
 from phyblock.tables.cells import METRICS, cell_scores, with_levels
 from phyblock.tables.design import OVERALL, Design
+from phyblock.tables.flat import joined_counts
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL
 from phyblock.tables.outcomes import FAILURES
@@ -60,7 +61,7 @@ def assembly_frame(run: Run) -> pd.DataFrame:
         .join(_estimates(run), on=keys)
         .join(_outcomes(run), on=list(_GROUP))
     )
-    frame[list(_COUNTS)] = frame[list(_COUNTS)].fillna(0).astype("int64")
+    frame[list(_COUNTS)] = joined_counts(frame[list(_COUNTS)])
     notes = _seed_notes(run)
     frame["seed_note"] = [notes.get(model, "") for model in frame["model"]]
     return frame[list(ASSEMBLY_COLUMNS)]

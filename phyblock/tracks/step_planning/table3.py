@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.tables.cells import METRIC_NAMES, METRICS
+from phyblock.tables.flat import joined_counts
 from phyblock.tables.headline import (
     headline_rows,
     interval_frame,
@@ -95,7 +96,7 @@ def step_scores_frame(run: Run) -> pd.DataFrame:
     ]
     frame = pd.DataFrame(cells, columns=keys)
     frame = frame.join(groups.size().rename("n"), on=keys).join(groups[counts[1:]].sum(), on=keys)
-    frame[counts] = frame[counts].fillna(0).astype("int64")
+    frame[counts] = joined_counts(frame[counts])
     estimates = track_estimates(run, NAME)
     for ends in (("value",), ("lo", "hi"), ("mean", "sd")):
         for metric in METRICS:
