@@ -129,7 +129,8 @@ class Model(Protocol):
         """Answer, or None when a recording holds no reply for the request.
 
         Raises RetryableError when all attempts failed, SampleError or RefusedError when this
-        request cannot succeed, UnavailableError when the model cannot answer at all.
+        request cannot succeed, UnavailableError when the model cannot answer at all, AskLaterError
+        where others should be asked before.
         """
 
     async def aclose(self) -> None:
@@ -137,7 +138,9 @@ class Model(Protocol):
 
 
 class AskLaterError(PhyblockError):
-    """The request has to be gathered once more: its answer failed, or it was not sent yet."""
+    """The request has to be gathered once more: its answer failed, or it was not sent yet. Or, from
+    a model that gathers none, it is better asked after the others, as its answer takes long.
+    """
 
 
 @runtime_checkable

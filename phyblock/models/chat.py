@@ -16,7 +16,7 @@ from phyblock.errors import (
     RetryableError,
     UnavailableError,
 )
-from phyblock.models.base import Reply, Request
+from phyblock.models.base import AskLaterError, Reply, Request
 from phyblock.models.cache import known_keys
 from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, estimate
@@ -77,6 +77,7 @@ class ChatModel:
         self._parts = parts
         self._sender = Sender(config, parts.budget, parts.prices, parts.halt, self._say_seedless)
         self._told_width = 0
+        self._put_off: set[tuple[str, int]] = set()
         self._is_batched_told = False
         self._unavailable: UnavailableError | None = None
 
@@ -84,8 +85,9 @@ class ChatModel:
         """The cached reply, or a new one, which is then cached if it is whole.
 
         `cost_usd` of a cached reply is what it would cost today. Raises what the model seam
-        says, BudgetReachedError when the call does not fit, HaltedError when the run ends before it
-        is sent.
+        says, AskLaterError where another run asks the same in a batch, which is waited for the
+        second time, BudgetReachedError when the call does not fit, HaltedError when the run ends
+        before it is sent.
         """
         cache = self._parts.cache
         key, is_free = "", False
@@ -101,9 +103,18 @@ class ChatModel:
                 return replace(known.reply, cost_usd=self._sender.cost_usd(known.reply))
             is_free = not known.is_asked
             if known.is_batched:
+                self._put_off_once(key, request)
                 self._say_batched()
         outlay = Outlay(estimate(self._config, request))
         return await self._ask_new(_Question(request, key, outlay, is_free=is_free))
+
+    def _put_off_once(self, key: str, request: Request) -> None:
+        """A batch may take a day, in which other requests could be asked."""
+        # Requests of several seeds have one key where seeds are not sent.
+        which = key, request.seed
+        if which not in self._put_off:
+            self._put_off.add(which)
+            raise AskLaterError
 
     async def aclose(self) -> None:
         """Release connections."""
@@ -272,7 +283,11 @@ class ChatModel:
     def _say_batched(self) -> None:
         if not self._is_batched_told:
             self._is_batched_told = True
-            self._tell("batch", "waiting for what another run asks in a batch")
+            self._tell(
+                "batch",
+                "waiting for what another run asks in a batch; --no-cache asks at once, "
+                "and pays again",
+            )
 
     def _stop(self, error: UnavailableError) -> None:
         if self._unavailable is None:

@@ -6,19 +6,22 @@ else runs out soon after its holder died or hangs. The clock of the machine may 
 would last longer than any can is none.
 
 Many questions that are asked together stand under one lease, so that one row is renewed for all.
+Where its holder was silent for so long that others cleared it away, it brings back what it has.
 """
 
 from __future__ import annotations
 
+import contextlib
 import sqlite3
 import time
 import uuid
-from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from phyblock.models.holder import holder_name, is_holder_gone
 
-__all__ = ["LEASE_S", "Lease", "Leases"]
+__all__ = ["LEASE_S", "Asking", "Lease", "LeaseGroup", "Leases"]
 
 LEASE_S = 30.0
 """How long a lease holds that is not renewed."""
@@ -37,9 +40,10 @@ CREATE TABLE IF NOT EXISTS grouped_leases (
 ) WITHOUT ROWID
 """
 _EXISTS = "SELECT count(*) FROM sqlite_master WHERE name IN ('leases', 'grouped_leases')"
-_GROUPED = (
+_ASKING = (
+    "SELECT until, owner, NULL FROM leases WHERE key = ?1 UNION ALL "
     "SELECT until, owner, leases.key FROM grouped_leases "
-    "JOIN leases ON leases.key = grouped_leases.lease WHERE grouped_leases.key = ?"
+    "JOIN leases ON leases.key = grouped_leases.lease WHERE grouped_leases.key = ?1"
 )
 
 
@@ -50,6 +54,24 @@ class Lease(NamedTuple):
 
     key: str
     owner: str
+
+
+@dataclass(eq=False)
+class LeaseGroup:
+    """A lease with the questions that stand under it, as its holder knows them; `is_whole` is
+    whether the file knows the same.
+    """
+
+    lease: Lease
+    keys: set[str] = field(default_factory=set)
+    is_whole: bool = True
+
+
+class Asking(NamedTuple):
+    """Whether a question is being asked: by itself, and together with others."""
+
+    alone: bool
+    together: bool
 
 
 class Leases:
@@ -65,64 +87,99 @@ class Leases:
             db.execute(_CREATE)
             db.execute(_CREATE_GROUPED)
 
-    def is_taken(self, key: str, but: Lease | None = None) -> bool:
-        """Whether the question is being asked, otherwise than under the lease `but`."""
-        row = self._db.execute("SELECT until, owner FROM leases WHERE key = ?", (key,)).fetchone()
-        return self._holds(row) or self.is_grouped(key, but)
+    def asking(self, key: str, but: LeaseGroup | None = None) -> Asking:
+        """How the question is being asked, otherwise than under the lease of `but`."""
+        rows = self._db.execute(_ASKING, (key,)).fetchall()
+        held = {lease for until, owner, lease in rows if self._holds(until, owner)}
+        alone = None in held
+        return Asking(alone, bool(held - {None, but and but.lease.key}))
 
-    def is_grouped(self, key: str, but: Lease | None = None) -> bool:
-        """Whether the question is being asked together with others; see `is_taken`."""
-        row = self._db.execute(_GROUPED, (key,)).fetchone()
-        return self._holds(row) and (but is None or row[2] != but.key)
+    def is_taken(self, key: str, but: LeaseGroup | None = None) -> bool:
+        """Whether the question is being asked; see `asking`."""
+        return any(self.asking(key, but))
 
-    def _holds(self, row: tuple[Any, ...] | None) -> bool:
+    def _holds(self, until: float, owner: str) -> bool:
         now = self._now()
-        if row is None or not now < row[0] <= now + LEASE_S:
-            return False
-        return not is_holder_gone(row[1].partition(" ")[2])
+        return now < until <= now + LEASE_S and not is_holder_gone(owner.partition(" ")[2])
 
-    def take(self, key: str, *, by_force: bool = False) -> Lease | None:
-        """Take the lease, or None where another holds it. `by_force` takes it from the other."""
-        lease = Lease(key, f"{uuid.uuid4().hex} {self._holder}".rstrip())
+    @contextlib.contextmanager
+    def _alone(self) -> Iterator[None]:
+        """While nobody else changes the table; what fails is undone."""
         self._db.execute("BEGIN IMMEDIATE")
         try:
-            is_free = by_force or not self.is_taken(key)
-            if is_free:
-                row = (*lease, self._now() + LEASE_S)
-                self._db.execute("INSERT OR REPLACE INTO leases VALUES (?, ?, ?)", row)
+            yield
             self._db.execute("COMMIT")
         except BaseException:
             self._db.execute("ROLLBACK")
             raise
+
+    def take(self, key: str, *, by_force: bool = False) -> Lease | None:
+        """Take the lease, or None where another holds it. `by_force` takes it from the other."""
+        lease = Lease(key, f"{uuid.uuid4().hex} {self._holder}".rstrip())
+        with self._alone():
+            is_free = by_force or not self.is_taken(key)
+            if is_free:
+                self._write(lease)
         if not is_free:
             return None
         self._held.add(lease)
         return lease
 
-    def take_group(self) -> Lease:
+    def _write(self, lease: Lease) -> None:
+        row = (*lease, self._now() + LEASE_S)
+        self._db.execute("INSERT OR REPLACE INTO leases VALUES (?, ?, ?)", row)
+
+    def take_group(self) -> LeaseGroup:
         """A lease that questions can stand under."""
         lease = self.take(f"group {uuid.uuid4().hex}")
         assert lease is not None, "nobody else has this name"
-        return lease
+        return LeaseGroup(lease)
 
-    def add(self, group: Lease, keys: Iterable[str], *, by_force: bool = False) -> bool:
+    def add(self, group: LeaseGroup, keys: Collection[str], *, by_force: bool = False) -> bool:
         """Have questions stand under a lease, if nobody else asks any of them, or `by_force`."""
-        rows = [(key, group.key) for key in keys]
-        self._db.execute("BEGIN IMMEDIATE")
-        try:
-            is_free = by_force or not any(self.is_taken(key, group) for key, _ in rows)
+        with self._alone():
+            # Or they would stand under a lease that is not there.
+            self._hold(group)
+            is_free = by_force or not any(self.is_taken(key, group) for key in keys)
             if is_free:
-                self._db.executemany("INSERT OR REPLACE INTO grouped_leases VALUES (?, ?)", rows)
-            self._db.execute("COMMIT")
-        except BaseException:
-            self._db.execute("ROLLBACK")
-            raise
+                self._place(group, keys)
+        if is_free:
+            group.keys.update(keys)
         return is_free
 
-    def remove(self, group: Lease, key: str) -> None:
+    def _place(self, group: LeaseGroup, keys: Collection[str]) -> None:
+        rows = [(key, group.lease.key) for key in keys]
+        self._db.executemany("INSERT OR REPLACE INTO grouped_leases VALUES (?, ?)", rows)
+
+    def remove(self, group: LeaseGroup, key: str) -> None:
         """The question is no longer being asked by those who hold the lease."""
+        group.keys.discard(key)
         sql = "DELETE FROM grouped_leases WHERE key = ? AND lease = ?"
-        self._db.execute(sql, (key, group.key))
+        self._db.execute(sql, (key, group.lease.key))
+
+    def hold(self, group: LeaseGroup) -> None:
+        """Let the lease hold for another while; what the file has lost of it is brought back,
+        whoever else asks it by now.
+        """
+        with self._alone():
+            self._hold(group)
+
+    def _hold(self, group: LeaseGroup) -> None:
+        if self.renew(group.lease) and group.is_whole:
+            return
+        self._write(group.lease)
+        self._held.add(group.lease)
+        self._clear(group)
+        self._place(group, tuple(group.keys))
+        group.is_whole = True
+
+    def _clear(self, group: LeaseGroup) -> None:
+        self._db.execute("DELETE FROM grouped_leases WHERE lease = ?", (group.lease.key,))
+
+    def give_group_back(self, group: LeaseGroup) -> None:
+        """Nothing that stood under the lease is being asked any more."""
+        self.give_back(group.lease)
+        self._clear(group)
 
     def renew(self, lease: Lease) -> bool:
         """Let the lease hold for another while; False where it is held no more."""

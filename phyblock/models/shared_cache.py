@@ -23,7 +23,7 @@ from phyblock.errors import StoreError
 from phyblock.models.base import Reply
 from phyblock.models.cache import CacheBusyError, ReplyCache
 from phyblock.models.events import Tell, ignore_text
-from phyblock.models.leases import LEASE_S, Lease
+from phyblock.models.leases import LEASE_S, Lease, LeaseGroup
 from phyblock.models.limits import Clock
 from phyblock.models.worker import Worker
 
@@ -117,13 +117,24 @@ class SharedCache:
 
         The reply if there is one then, and whether the other is still asking.
         """
+        known = await self._await(key, most_s, self._clock.now() + LONGEST_BATCH_S)
+        return known.reply, known.is_asked
+
+    async def await_all_others(self, keys: Iterable[str], most_s: float) -> set[str]:
+        """Wait as `await_others` does for every one of the questions, but for all together no
+        longer than for a batch; those that others are still asking.
+        """
+        until_s = self._clock.now() + LONGEST_BATCH_S
+        return {key for key in keys if (await self._await(key, most_s, until_s)).is_asked}
+
+    async def _await(self, key: str, most_s: float, until_s: float) -> Known:
         began_s, pause_s = self._clock.now(), _FIRST_LOOK_S
         while True:
             known = await self.look((key,))
-            waited_s = self._clock.now() - began_s
-            is_long = waited_s >= (LONGEST_BATCH_S if known.is_batched else most_s)
+            now_s = self._clock.now()
+            is_long = now_s >= until_s or (not known.is_batched and now_s >= began_s + most_s)
             if known.reply is not None or not known.is_asked or is_long:
-                return known.reply, known.is_asked
+                return known
             await self._clock.sleep(pause_s * random.uniform(0.5, 1.0))
             pause_s = min(_LONGEST_LOOK_S, 1.5 * pause_s)
 
@@ -135,7 +146,7 @@ class SharedCache:
         if lease is None:
             yield turn
             return
-        renewing = asyncio.create_task(self._renew(lease))
+        renewing = asyncio.create_task(self._renew(lambda file: _renew(file, lease)))
         self._held.add(lease)
         try:
             yield turn
@@ -146,29 +157,41 @@ class SharedCache:
                 await self._do(lambda file: _give_back(file, lease), None)
 
     @contextlib.asynccontextmanager
-    async def group(self) -> AsyncIterator[Lease | None]:
-        """A lease for questions that are asked together; None while the cache is set aside."""
-        lease = await self._do(_take_group, None)
-        if lease is None:
+    async def group(self) -> AsyncIterator[LeaseGroup | None]:
+        """A lease for questions that are asked together; None while the cache is set aside.
+
+        It holds until the end, also where the cache is set aside meanwhile or others cleared it
+        away while this process stood still.
+        """
+        group = await self._do(_take_group, None)
+        if group is None:
             yield None
             return
-        renewing = asyncio.create_task(self._renew(lease))
+        renewing = asyncio.create_task(self._renew(lambda file: _hold(file, group)))
         try:
-            yield lease
+            yield group
         finally:
             renewing.cancel()
-            await self._do(lambda file: _give_back(file, lease), None)
+            await self._do(lambda file: _give_group_back(file, group), None)
 
-    async def join(self, group: Lease, keys: Collection[str], *, by_force: bool = False) -> bool:
+    async def join(
+        self, group: LeaseGroup, keys: Collection[str], *, by_force: bool = False
+    ) -> bool:
         """Keep others from asking these questions for as long as the lease holds; False, and
         nothing is done, where another asks one of them.
         """
         add = functools.partial(_add, group=group, keys=keys, by_force=by_force)
-        return await self._do(add, True)
+        is_free = await self._do(add, None)
+        if is_free is None:
+            group.keys.update(keys)
+            group.is_whole = False
+        return is_free is not False
 
-    async def leave(self, group: Lease, key: str) -> None:
-        """A question is no longer asked together with those of the lease."""
-        await self._do(lambda file: _remove(file, group, key), None)
+    async def leave(self, group: LeaseGroup, keys: Collection[str]) -> None:
+        """Questions are no longer asked together with those of the lease."""
+        if not await self._do(lambda file: _remove(file, group, keys), False):
+            group.keys.difference_update(keys)
+            group.is_whole = False
 
     async def keep(self, key: str, model_id: str, reply: Reply, lease: Lease | None = None) -> None:
         """Keep a reply, if it is whole and the file takes it, also when the wait is given up, and
@@ -196,11 +219,11 @@ class SharedCache:
             await asyncio.wait_for(self._worker.run(self._close_file), 2 * _BUSY_TIMEOUT_S)
         self._worker.stop()
 
-    async def _renew(self, lease: Lease) -> None:
+    async def _renew(self, renew: Callable[[ReplyCache], bool]) -> None:
         is_held = True
         while is_held:
             await asyncio.sleep(LEASE_S / 3)
-            is_held = await self._do(lambda file: _renew(file, lease), True)
+            is_held = await self._do(renew, True)
 
     async def _do(self, operation: Callable[[ReplyCache], T], otherwise: T) -> T:
         """What the operation returns; `otherwise` while the cache is set aside."""
@@ -289,7 +312,8 @@ def _look(file: ReplyCache, keys: Iterator[str]) -> Known:
     """
     first = next(keys)
     with file.leases() as leases:
-        is_asked, is_batched = leases.is_taken(first), leases.is_grouped(first)
+        asking = leases.asking(first)
+    is_asked, is_batched = any(asking), asking.together
     for key in itertools.chain((first,), keys):
         if (reply := file.get(key)) is not None:
             return Known(reply, key, is_asked, is_batched)
@@ -318,19 +342,32 @@ def _take(file: ReplyCache, key: str, *, by_force: bool) -> Turn:
     return Turn(False, reply)
 
 
-def _take_group(file: ReplyCache) -> Lease | None:
+def _take_group(file: ReplyCache) -> LeaseGroup:
     with file.leases() as leases:
         return leases.take_group()
 
 
-def _add(file: ReplyCache, group: Lease, keys: Collection[str], *, by_force: bool) -> bool:
+def _add(file: ReplyCache, group: LeaseGroup, keys: Collection[str], *, by_force: bool) -> bool:
     with file.leases() as leases:
         return leases.add(group, keys, by_force=by_force)
 
 
-def _remove(file: ReplyCache, group: Lease, key: str) -> None:
+def _remove(file: ReplyCache, group: LeaseGroup, keys: Collection[str]) -> bool:
     with file.leases() as leases:
-        leases.remove(group, key)
+        for key in keys:
+            leases.remove(group, key)
+    return True
+
+
+def _hold(file: ReplyCache, group: LeaseGroup) -> bool:
+    with file.leases() as leases:
+        leases.hold(group)
+    return True
+
+
+def _give_group_back(file: ReplyCache, group: LeaseGroup) -> None:
+    with file.leases() as leases:
+        leases.give_group_back(group)
 
 
 def _renew(file: ReplyCache, lease: Lease) -> bool:

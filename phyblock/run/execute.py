@@ -177,14 +177,15 @@ class Executor:
     async def _work(
         self, planned: PlannedModel, queue: deque[Sample], later: deque[Sample] | None = None
     ) -> None:
-        """Ask until the queue is empty; `later` takes what its model wants to be asked again."""
+        """Ask until the queue is empty; what its model wants to be asked later goes to `later`, or
+        without one behind the others.
+        """
         while queue and self._goes_on(planned):
             sample = queue.popleft()
             try:
                 await self._guarded(planned, self._one(planned, sample))
             except AskLaterError:
-                assert later is not None, "only gathering models ask for it"
-                later.append(sample)
+                (queue if later is None else later).append(sample)
 
     async def _in_rounds(
         self, planned: PlannedModel, model: GatheringModel, queue: deque[Sample]

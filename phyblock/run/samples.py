@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from phyblock.digests import drawn_bytes
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
-from phyblock.models import Halt, Model, ModelConfig, Reply, Request, Usage
+from phyblock.models import AskLaterError, Halt, Model, ModelConfig, Reply, Request, Usage
 from phyblock.models.stored import reply_of, stored
 from phyblock.records import Record, SentPrompt, StoredReply, Turn
 from phyblock.run.judging import judged_apart
@@ -89,8 +89,8 @@ class SampleRunner:
     async def record(self, sample: Sample, model: Model, config: ModelConfig) -> Record:
         """Ask, and say what came of it.
 
-        Raises UnavailableError, BudgetReachedError and HaltedError as models do, and what making
-        a prompt or writing a turn raises.
+        Raises UnavailableError, BudgetReachedError, HaltedError and AskLaterError as models do, and
+        what making a prompt or writing a turn raises.
         """
         sample = sample.shown()
         if isinstance(sample.track, EpisodeTrack):
@@ -155,7 +155,7 @@ class SampleRunner:
             if len(replies) < len(earlier):
                 answer = earlier[len(replies)]
             else:
-                answer = await _answer(model.ask(request))
+                answer = await _answer(_ask_now(model, request))
                 if isinstance(answer, Reply):
                     number, reply = len(replies), stored(answer)
                     await self._turns.put(
@@ -207,6 +207,14 @@ def _asked(config: ModelConfig, request: Request) -> dict[str, AskedAs]:
     if request.response_format is None or config.kind != "litellm":
         return {}
     return {"asked": "response_format" if config.sends_format else "prompt"}
+
+
+async def _ask_now(model: Model, request: Request) -> Reply | None:
+    """What a model answers that may put a request off: an episode that has begun goes on."""
+    try:
+        return await model.ask(request)
+    except AskLaterError:
+        return await model.ask(request)
 
 
 async def _answer(asked: Awaitable[Reply | None]) -> Reply | ModelError | None:

@@ -1,8 +1,8 @@
 """Which requests are being asked in batches here, and which another run asks, on the same cache.
 
-A request is claimed from when it is gathered until somebody here has its answer or its failure. So
-nobody holds a claim while waiting for another's: two runs that share requests never wait for each
-other.
+A request is claimed from when it is gathered until somebody here has its answer or its failure, or
+nobody here will ask for it. Whoever waits for another's claims has given up all its own before: two
+runs that share requests never wait for each other.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from contextlib import AsyncExitStack
 
 from phyblock.models.events import Tell
 from phyblock.models.halt import Halt
-from phyblock.models.leases import Lease
+from phyblock.models.leases import LeaseGroup
 from phyblock.models.shared_cache import SharedCache
 from phyblock.plain_text import counted
 
@@ -33,8 +33,7 @@ class Claims:
         self._halt = halt
         self._tell = tell
         self._stack = AsyncExitStack()
-        self._group: Lease | None = None
-        self._held: set[str] = set()
+        self._group: LeaseGroup | None = None
         self._others: set[str] = set()
         self._overdue: set[str] = set()
 
@@ -44,7 +43,6 @@ class Claims:
             return
         self._group = await self._stack.enter_async_context(self._cache.group())
         if self._group is not None and under_way:
-            self._held.update(under_way)
             await self._cache.join(self._group, under_way, by_force=True)
 
     async def take(self, key: str) -> bool:
@@ -52,31 +50,43 @@ class Claims:
         if self._cache is None or self._group is None:
             return True
         by_force = key in self._overdue
-        if not await self._cache.join(self._group, [key], by_force=by_force):
+        is_free = await self._cache.join(self._group, [key], by_force=by_force)
+        if not is_free:
             self._others.add(key)
-            return False
-        self._held.add(key)
-        return True
+        return is_free
 
     async def release(self, key: str) -> None:
         """The request is asked here no more."""
-        if key in self._held:
-            self._held.discard(key)
-            assert self._cache is not None
-            assert self._group is not None
-            await self._cache.leave(self._group, key)
+        await self._leave({key})
+
+    async def release_all(self, but: Collection[str] = ()) -> None:
+        """Nothing is asked here any more, except `but`."""
+        if self._group is not None:
+            await self._leave(self._group.keys.difference(but))
+
+    async def _leave(self, keys: set[str]) -> None:
+        if self._group is None or self._cache is None:
+            return
+        if held := keys & self._group.keys:
+            await self._cache.leave(self._group, held)
+
+    @property
+    def must_wait(self) -> bool:
+        """Whether another run asks what was wanted here."""
+        return bool(self._others)
 
     async def wait_for_others(self) -> None:
-        """Wait until nobody else asks what could not be claimed. HaltedError where the run ends."""
+        """Give up all claims and wait until nobody else asks what could not be claimed.
+
+        HaltedError where the run ends.
+        """
         others, self._others = self._others, set()
         if not others or self._cache is None:
             return
+        await self.release_all()
         self._tell(f"waiting for {counted(len(others), 'request')} that another run is asking")
         with self._halt.giving_up():
-            for key in others:
-                _, is_asked = await self._cache.await_others(key, self._patience_s)
-                if is_asked:
-                    self._overdue.add(key)
+            self._overdue |= await self._cache.await_all_others(others, self._patience_s)
 
     async def aclose(self) -> None:
         """Claim nothing any more."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+import contextlib
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, replace
 
 from phyblock.errors import ModelError, RetryableError, UnavailableError
@@ -50,7 +51,8 @@ class BatchModel:
     """A GatheringModel over a provider's batches.
 
     A request is in a draft, or in the newest batch that the ledger has it in. `_again` are those
-    whose answer there failed; `_given` those whose answer a sample of this command has.
+    whose answer there failed; `_given` those whose answer a sample of this command has; `_asking`
+    those whose answer one waits for.
     """
 
     needs_messages = True
@@ -72,26 +74,47 @@ class BatchModel:
         self._failures: dict[str, int] = {}
         self._again: set[str] = set()
         self._given: set[str] = set()
+        self._asking: set[str] = set()
         self._refusal: UnavailableError | None = None
         self._has_begun = False
+        self._has_stopped = False
 
     async def begin(self) -> None:
         """See GatheringModel; the first round takes up the batches of earlier commands, others
         begin when nobody else asks what was left to them.
         """
-        if self._refusal is not None:
-            raise self._refusal
-        if not self._has_begun:
-            self._has_begun = True
-            batches = tuple(self._ledger.batches.values())
-            await self._claims.begin({k for b in batches if b.event != "ended" for k in b.places})
-            for batch in batches:
-                await self._take_up(batch)
-        await self._claims.wait_for_others()
+        async with self._releasing():
+            if self._refusal is not None:
+                raise self._refusal
+            if not self._has_begun:
+                self._has_begun = True
+                batches = tuple(self._ledger.batches.values())
+                await self._claims.begin(
+                    {k for b in batches if b.event != "ended" for k in b.places}
+                )
+                for batch in batches:
+                    await self._take_up(batch)
+            if self._claims.must_wait:
+                # With these under way, two runs could wait for each other.
+                await self._end_of_batches()
+                await self._claims.wait_for_others()
+
+    @contextlib.asynccontextmanager
+    async def _releasing(self) -> AsyncIterator[None]:
+        """What stops the model has it ask no more: others may, but for what is waited for here."""
+        try:
+            yield
+        except UnavailableError:
+            self._has_stopped = True
+            await self._claims.release_all(but=self._asking)
+            raise
 
     async def gather(self, request: Request, *, anew: bool = False) -> bool:
         """See GatheringModel."""
-        key = reply_key(self._config, request)
+        async with self._releasing():
+            return await self._gather(reply_key(self._config, request), request, anew=anew)
+
+    async def _gather(self, key: str, request: Request, *, anew: bool) -> bool:
         if self._is_drafted(key) or await self._is_answered(key, request, anew=anew):
             return True
         if self._refusal is not None:
@@ -106,7 +129,7 @@ class BatchModel:
             is_taken = await self._take_in(key, request)
             return is_taken
         finally:
-            if not is_taken:
+            if not is_taken or self._has_stopped:
                 await self._claims.release(key)
 
     async def _take_in(self, key: str, request: Request) -> bool:
@@ -130,9 +153,12 @@ class BatchModel:
         HaltedError when the run ends before the batch does.
         """
         key = reply_key(self._config, request)
+        self._asking.add(key)
         try:
-            return await self._ask(key, request)
+            async with self._releasing():
+                return await self._ask(key, request)
         finally:
+            self._asking.discard(key)
             await self._claims.release(key)
 
     async def _ask(self, key: str, request: Request) -> Reply:
@@ -181,6 +207,13 @@ class BatchModel:
                     return
         if batch.event == "created":
             self._following(batch)
+
+    async def _end_of_batches(self) -> None:
+        """Wait until none is under way."""
+        with self._parts.halt.giving_up():
+            for batch in tuple(self._ledger.batches.values()):
+                if batch.event == "created":
+                    await asyncio.shield(self._following(batch))
 
     def _following(self, batch: Batch) -> asyncio.Future[None]:
         if batch.following is None:
