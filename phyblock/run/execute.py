@@ -90,8 +90,8 @@ class Executor:
         keeps_replies: bool = False,
     ) -> None:
         """`halt` is the switch that `models` were built with; `retry_failed` asks again also where
-        a request was rejected for good; `keeps_replies` says that models keep each whole reply
-        before they send the next request in its place.
+        a request was rejected for good; `keeps_replies` says that a model keeps each reply before
+        it sends the next request in its place.
         """
         self.settled: Mapping[str, Summary] = {
             sample: summary
@@ -169,7 +169,7 @@ class Executor:
         """How many samples of a model are worked on at once.
 
         Half as many again as are asked about: while one is looked up, judged or written, another
-        takes its place at the server. Not where a kill would then lose more whole replies.
+        takes its place at the server. Not where a kill would then lose more replies.
         """
         is_kept = self._keeps_replies and config.kind == "litellm"
         return config.max_concurrency + (config.max_concurrency // 2 if is_kept else 0)
