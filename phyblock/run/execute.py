@@ -15,14 +15,7 @@ from enum import Enum, auto
 from typing import Any
 
 from phyblock.errors import BudgetReachedError, UnavailableError
-from phyblock.models import (
-    AskLaterError,
-    GatheringModel,
-    Halt,
-    HaltedError,
-    Model,
-    ModelConfig,
-)
+from phyblock.models import AskLaterError, GatheringModel, Halt, HaltedError, Model
 from phyblock.run.events import ModelStopped, SampleDone, Stopping, Watcher
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
@@ -87,11 +80,9 @@ class Executor:
         halt: Halt,
         *,
         retry_failed: bool = False,
-        keeps_replies: bool = False,
     ) -> None:
         """`halt` is the switch that `models` were built with; `retry_failed` asks again also where
-        a request was rejected for good; `keeps_replies` says that a model keeps each reply before
-        it sends the next request in its place.
+        a request was rejected for good.
         """
         self.settled: Mapping[str, Summary] = {
             sample: summary
@@ -108,7 +99,6 @@ class Executor:
         self._models = models
         self._watch = watch
         self._halt = halt
-        self._keeps_replies = keeps_replies
         self.result = RunResult(plan.samples_per_model * len(plan.models))
         settled = self.settled.values()
         self.result.failed = sum(not summary.is_answered for summary in settled)
@@ -143,7 +133,7 @@ class Executor:
             if isinstance(model, GatheringModel):
                 workers.append(asyncio.create_task(self._in_rounds(planned, model, queue)))
             else:
-                count = min(self._at_work(planned.config), len(queue))
+                count = min(planned.config.max_concurrency, len(queue))
                 workers += [asyncio.create_task(self._work(planned, queue)) for _ in range(count)]
         try:
             # One worker's error must not end the others: they wait for what is paid for.
@@ -164,15 +154,6 @@ class Executor:
         await asyncio.gather(*workers, return_exceptions=True)
         await self._writer.drain()
         await self._turns.drain()
-
-    def _at_work(self, config: ModelConfig) -> int:
-        """How many samples of a model are worked on at once.
-
-        Half as many again as are asked about: while one is looked up, judged or written, another
-        takes its place at the server. Not where a kill would then lose more replies.
-        """
-        is_kept = self._keeps_replies and config.kind == "litellm"
-        return config.max_concurrency + (config.max_concurrency // 2 if is_kept else 0)
 
     async def _work(
         self, planned: PlannedModel, queue: deque[Sample], later: deque[Sample] | None = None

@@ -151,7 +151,6 @@ class Session:
                 self._watch,
                 halt,
                 retry_failed=self._retry_failed,
-                keeps_replies=self._cache is not None,
             )
         except BaseException:
             await self._close()
