@@ -30,12 +30,11 @@ $(TESTS): $(RUNS) requirements-dev.lock
 run: $(RUNS)
 	$(BIN)/phyblock run benchmarks/quick.yaml
 
-# Three workers on two cores: tests wait a fifth of their time, for servers, disks and other processes.
 test: $(TESTS)
-	$(BIN)/python -m pytest -n 3 --dist worksteal
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 test-all: $(TESTS)
-	$(BIN)/python -m pytest -n 3 --dist worksteal -m ''
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m ''
 
 test-pythons: $(RUNS)
 	.ci/pythons

@@ -9,7 +9,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 from types import NoneType
 
@@ -27,6 +27,9 @@ from phyblock.run.session import Session, check_ready
 from phyblock.specs import load_models
 
 __all__ = ["run_suite"]
+
+_NAP_S = 0.2
+"""How long an interrupt may wait to be noticed."""
 
 
 def run_suite(
@@ -116,7 +119,11 @@ class _RunApart:
         try:
             with self._interruptible(), ThreadPoolExecutor(1) as pool:
                 try:
-                    return pool.submit(asyncio.run, self._run()).result()
+                    running = pool.submit(asyncio.run, self._run())
+                    # A signal that the system gives to another thread wakes nobody here.
+                    while not wait((running,), _NAP_S).done:
+                        continue
+                    return running.result()
                 except BaseException:
                     # A program's handlers of other signals may raise what they like.
                     self._stop()

@@ -143,6 +143,7 @@ def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace: 
         assert counted_once(server, 10)
 
 
+@pytest.mark.slow
 def test_a_run_asked_singly_asks_all_that_is_free_before_it_waits_for_a_batch(
     workspace: Workspace,
 ) -> None:

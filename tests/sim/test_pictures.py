@@ -48,8 +48,12 @@ def opened(png: bytes) -> np.ndarray:
         return np.asarray(image.convert("RGB"))
 
 
+SIZED = list(zip(itertools.cycle([128, 130]), BACKGROUNDS))
+
+
 @pytest.mark.parametrize(
-    ("size_px", "background"), list(zip(itertools.cycle([128, 130]), BACKGROUNDS))
+    ("size_px", "background"),
+    [*SIZED[:2], *(pytest.param(*one, marks=pytest.mark.slow) for one in SIZED[2:])],
 )
 def test_pictures_are_squares_of_the_size_asked_for(size_px: int, background: str) -> None:
     scene = designed("l1-gate")
