@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from phyblock.models.batches.fields import joined
@@ -100,6 +100,7 @@ def test_the_first_whole_line_of_a_request_answers_it(
     assert len(results) + sum(results.faults.values()) == len(lines)
 
 
+@example({"0": None, "": 0}, "0", None)
 @given(st.dictionaries(st.text(), values, max_size=3), st.text(min_size=1), values)
 def test_bodies_stand_in_lines_as_they_are(fields: dict[str, Any], name: str, body: Any) -> None:
     data = json.dumps(body).encode()

@@ -52,5 +52,7 @@ def joined(fields: Mapping[str, Any], name: str, body: Any) -> bytes:
     inner = body if isinstance(body, bytes) else json.dumps(body).encode()
     if not name:
         return inner
-    head = json.dumps({**fields, name: None}).encode()
+    # Last, also where there was one of this name.
+    others = {key: value for key, value in fields.items() if key != name}
+    head = json.dumps({**others, name: None}).encode()
     return head.removesuffix(b"null}") + inner + b"}"
