@@ -44,7 +44,9 @@ def map_entry(config: ModelConfig) -> dict[str, Any]:
 
 def mapped_providers() -> frozenset[str]:
     """The providers of the map's models."""
-    return frozenset(str(entry.get("litellm_provider", "")) for entry in _entries().values())
+    named = (str(entry.get("litellm_provider", "")) for entry in _entries().values())
+    # Some entries name none.
+    return frozenset(name for name in named if name)
 
 
 def mapped_prices(config: ModelConfig) -> Prices | None:

@@ -69,3 +69,9 @@ def test_validate_uses_the_models_file_that_a_run_would(workspace: Workspace) ->
     assert named.code == 0, named.err
     workspace.write_yaml("models.yaml", {"delta": "openai/gpt-4o"})
     assert workspace.phyblock("validate", "suite.yaml").code == 0
+
+
+@pytest.mark.parametrize("model", ["x", "/x"])
+def test_no_name_is_no_provider(model: str) -> None:
+    """Some entries of litellm's map name none."""
+    assert "" not in known_providers(ModelConfig("m", "litellm", model))
