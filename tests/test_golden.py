@@ -1,0 +1,33 @@
+"""Golden runs are what they were; see tests/golden.py."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests import golden
+from tests.conftest import OFFICIAL_MISSING, official_root
+
+GOLDEN = json.loads(golden.GOLDEN.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", golden.RUNS)
+def test_numbers_are_what_they_were(name: str, tmp_path: Path, pictures_dir: Path) -> None:
+    if name == "paper-table1" and official_root() is None:
+        pytest.skip(OFFICIAL_MISSING)
+    now = golden.run_numbers(name, tmp_path, pictures_dir)
+    assert golden.compare(GOLDEN[name], now, name) == []
+
+
+@pytest.mark.parametrize("name", golden.SUITES)
+def test_requests_are_what_they_were(name: str, tmp_path: Path, pictures_dir: Path) -> None:
+    now = golden.request_digests(name, tmp_path, pictures_dir)
+    assert golden.compare(GOLDEN["requests"][name], now, name) == []
+
+
+def test_a_difference_is_named() -> None:
+    moved = {"estimates.csv": {"random": "1", "oracle": "2"}}
+    found = golden.compare({"estimates.csv": {"random": "1", "oracle": "3", "x": "4"}}, moved, "r")
+    assert found == ["r: estimates.csv: oracle: differs", "r: estimates.csv: x: is missing"]
