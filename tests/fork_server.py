@@ -215,10 +215,10 @@ def end_fork_server() -> None:
 
 def serve(orders: socket.socket) -> None:
     import phyblock.cli
-    import phyblock_making.cli
+    import phyblock.making.cli
     from phyblock.models.litellm_call import _litellm
 
-    for package in (phyblock.cli, phyblock_making.cli):
+    for package in (phyblock.cli, phyblock.making.cli):
         for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
             importlib.import_module(module.name)
     for name in _PRELOADED:

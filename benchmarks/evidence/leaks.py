@@ -19,10 +19,10 @@ import numpy as np
 from phyblock.datasets import SCENES_FILE, AssemblyTask, read_builtin, read_official
 from phyblock.domain import Plan
 from phyblock.domain.scene import Kind
+from phyblock.making.auditing.tells import Part, Tells, find_tells
 from phyblock.resources import bundled
 from phyblock.scoring import Goal, match_plan, micro
 from phyblock.words import SETTINGS
-from phyblock_making.auditing.tells import Part, Tells, find_tells
 
 Pick = Callable[[Sequence[int]], int]
 """One of the places at which a kind is listed."""

@@ -20,10 +20,10 @@ from scipy import ndimage
 from sklearn.ensemble import RandomForestClassifier
 
 from phyblock.domain.question import LETTERS, Question
+from phyblock.making.cli.question_sets import read_question_set
+from phyblock.making.questions.wording import slots_of
 from phyblock.models.guesses import FOLDS, Folds
 from phyblock.sim.seeing import SEEN_PX, mark_pixel, seen
-from phyblock_making.cli.question_sets import read_question_set
-from phyblock_making.questions.wording import slots_of
 
 Floats = NDArray[np.float64]
 Features = Callable[[Question], Floats]

@@ -18,12 +18,12 @@ from typing import Any
 from phyblock.datasets import read_builtin
 from phyblock.domain import SUBTASKS, Question, Scene
 from phyblock.errors import DataError
+from phyblock.making.questions.question_production import make_questions
+from phyblock.making.questions.rederiving import problem_of
+from phyblock.making.workers import open_workers
 from phyblock.resources import bundled
 from phyblock.sim import PictureStyle, goal_png
 from phyblock.sim.question_pictures import question_png
-from phyblock_making.questions.question_production import make_questions
-from phyblock_making.questions.rederiving import problem_of
-from phyblock_making.workers import open_workers
 
 STYLE = PictureStyle()
 MOST_SCENES = 64

@@ -22,15 +22,15 @@ import psutil
 
 from phyblock.datasets import read_builtin
 from phyblock.domain import Scene
+from phyblock.making.auditing.scene_audit import audit_scene
+from phyblock.making.auditing.set_verification import verify_scene
+from phyblock.making.scenes.candidate_sets import make_candidates
+from phyblock.making.scenes.compositions import beside
+from phyblock.making.scenes.scene_production import Order, produce, shares
+from phyblock.making.scenes.sketch import make_scene
+from phyblock.making.workers import Workers, open_workers
 from phyblock.resources import bundled
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
-from phyblock_making.auditing.scene_audit import audit_scene
-from phyblock_making.auditing.set_verification import verify_scene
-from phyblock_making.scenes.candidate_sets import make_candidates
-from phyblock_making.scenes.compositions import beside
-from phyblock_making.scenes.scene_production import Order, produce, shares
-from phyblock_making.scenes.sketch import make_scene
-from phyblock_making.workers import Workers, open_workers
 
 SIZES = (4, 12, 22)
 STYLE = PictureStyle()

@@ -41,8 +41,8 @@ _VERBS = {
 
 
 _MADE_ELSEWHERE = {
-    "scenes": "phyblock_making.cli.scenes_verbs",
-    "vqa": "phyblock_making.cli.vqa_verbs",
+    "scenes": "phyblock.making.cli.scenes_verbs",
+    "vqa": "phyblock.making.cli.vqa_verbs",
 }
 """Verbs of the package beside this one, which the runner never imports but by these names."""
 

@@ -16,7 +16,7 @@ from phyblock.sim.registry import ENGINES
 VERBS = tuple(group.list_commands(None))  # type: ignore[arg-type]
 CALLS = re.compile(rf"\bphyblock ((?:{'|'.join(VERBS)})\b[^\n`;|&>\"#]*)")
 LIBRARIES = (engine.library for engine in ENGINES.values())
-HEAVY = ("litellm", *LIBRARIES, "pandas", "aiohttp", "matplotlib", "phyblock_making")
+HEAVY = ("litellm", *LIBRARIES, "pandas", "aiohttp", "matplotlib", "phyblock.making")
 SCRIPT = """
 import atexit, sys
 sys.argv = ["phyblock", *sys.argv[1:]]

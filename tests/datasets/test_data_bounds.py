@@ -16,7 +16,7 @@ from phyblock.datasets import read_builtin, read_official, read_official_questio
 from phyblock.datasets.official import read_candidates
 from phyblock.domain import MAX_CANDIDATES
 from phyblock.errors import DataError, Problem
-from phyblock_making.auditing.salvage import salvage
+from phyblock.making.auditing.salvage import salvage
 from tests.datasets.broken import sound_scene, with_value, write_checkout
 from tests.fuzz.strategies import CANDIDATES, QUESTIONS, SCENES, sound_question
 from tests.workspace import tower

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from phyblock.domain import BlockType, Color
-from phyblock_making.scenes.sketch import Sketch
+from phyblock.making.scenes.sketch import Sketch
 
 __all__ = ["Design", "Pad"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 
 from phyblock.domain import Scene
-from phyblock_making.scenes.sketch import make_scene
+from phyblock.making.scenes.sketch import make_scene
 from tests.designs.large import LEVEL_4
 from tests.designs.medium import LEVEL_3
 from tests.designs.pad import Design, Pad

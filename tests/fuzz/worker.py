@@ -121,10 +121,10 @@ class Worker:
 def serve(sabotage: str) -> None:
     """Answer orders until there are no more."""
     import phyblock.cli
-    import phyblock_making.cli
+    import phyblock.making.cli
     from phyblock.cli.main import main
 
-    for package in (phyblock.cli, phyblock_making.cli):
+    for package in (phyblock.cli, phyblock.making.cli):
         for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
             importlib.import_module(module.name)
     resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY_BYTES, _MOST_MEMORY_BYTES))

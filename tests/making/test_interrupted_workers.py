@@ -21,7 +21,7 @@ def stay(n):
 """
 WORK = """
 import sys
-from phyblock_making.workers import open_workers
+from phyblock.making.workers import open_workers
 from tasks import stay
 
 try:

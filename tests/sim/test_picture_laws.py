@@ -16,6 +16,7 @@ from phyblock.datasets import read_builtin
 from phyblock.datasets.questions import read_questions
 from phyblock.domain import BLOCK_TYPES, Color
 from phyblock.domain.question import QuestionPicture
+from phyblock.making.poses import POSES
 from phyblock.sim.backgrounds import TONES
 from phyblock.sim.camera import Camera, view_axes
 from phyblock.sim.exploded import exploded_blocks
@@ -34,7 +35,6 @@ from phyblock.sim.render import COLOR_RGB, DrawnBlock, picture, segments, shoot
 from phyblock.sim.surfaces import SURFACES
 from phyblock.sim.textures import floor
 from phyblock.words import BACKGROUNDS, Background
-from phyblock_making.poses import POSES
 from tests.sim.structures import block, clouds, scene_of
 
 DATA = Path(__file__).parents[2] / "benchmarks" / "data"

@@ -14,6 +14,8 @@ from PIL import Image
 
 from phyblock.domain import KIT_PALETTE, Candidate, CandidateSet, Scene
 from phyblock.errors import DataError
+from phyblock.making.poses import POSES
+from phyblock.making.scenes.candidate_sets import make_candidates
 from phyblock.sim import (
     PictureStyle,
     candidates_key,
@@ -26,8 +28,6 @@ from phyblock.sim.compose import LABEL_STRIP, numbered_grid
 from phyblock.sim.pictures import candidate_camera, on_the_floor
 from phyblock.sim.render import picture, shoot
 from phyblock.words import BACKGROUNDS
-from phyblock_making.poses import POSES
-from phyblock_making.scenes.candidate_sets import make_candidates
 from tests.designs.scenes import designed_scene
 from tests.sim.structures import block, scene_of
 

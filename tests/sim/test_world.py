@@ -10,11 +10,11 @@ from numpy.testing import assert_allclose
 
 from phyblock.domain import BLOCK_TYPES, SHAPES, BlockType
 from phyblock.errors import SimulationError
+from phyblock.making.poses import POSES
 from phyblock.sim import Physics, Pose, World
 from phyblock.sim.registry import ENGINES
 from phyblock.sim.steps import wait
 from phyblock.sim.support import drop_height_m
-from phyblock_making.poses import POSES
 from tests.sim.structures import block, counterweighted_beam, tower
 
 LINE_BALANCED = {"bowl", "bowl-turned"}
@@ -115,7 +115,7 @@ def test_the_same_scene_gives_the_same_bits_in_another_process() -> None:
 def test_importing_the_package_loads_no_engine() -> None:
     libraries = {engine.library for engine in ENGINES.values()}
     code = (
-        "import sys, phyblock.sim, phyblock_making.scenes\n"
+        "import sys, phyblock.sim, phyblock.making.scenes\n"
         f"print(not {libraries}.isdisjoint(sys.modules))"
     )
     answer = subprocess.run(

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from phyblock.datasets import AssemblyTask
 from phyblock.domain.symmetry import Symmetry, canonical_form
 from phyblock.errors import SpecError
+from phyblock.making.symmetry import transformed
 from phyblock.models.base import Image
 from phyblock.resources import bundled
 from phyblock.run.data import open_dataset
@@ -28,7 +29,6 @@ from phyblock.tracks.full_planning.worked import worked_plan
 from phyblock.tracks.vqa import opening
 from phyblock.tracks.vqa.spec import VqaSpec
 from phyblock.variants import Variant
-from phyblock_making.symmetry import transformed
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain import Question, Scene
-from phyblock_making.attacks.attacks import ATTACKS, Attack, all_attacks, attack, by_cue, by_rule
-from phyblock_making.attacks.observed import Observed, credit
-from phyblock_making.attacks.probes import boosted_cues, linear_cues
+from phyblock.making.attacks.attacks import ATTACKS, Attack, all_attacks, attack, by_cue, by_rule
+from phyblock.making.attacks.observed import Observed, credit
+from phyblock.making.attacks.probes import boosted_cues, linear_cues
 
 LIKINGS = st.lists(st.integers(-2, 2), min_size=4, max_size=4)
 BY_NAME = {one.name: one for one in all_attacks()}

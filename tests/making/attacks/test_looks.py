@@ -13,14 +13,14 @@ from phyblock.domain import Question, QuestionPicture
 from phyblock.domain.blocks import Color
 from phyblock.domain.rotation import rotated
 from phyblock.domain.scene import Block
+from phyblock.making.attacks import cut
+from phyblock.making.attacks.cues import cues_of
+from phyblock.making.attacks.looks import look_at
+from phyblock.making.attacks.naive_support import naive_likings, resting_on, resting_only_on
+from phyblock.making.attacks.observed import observe
+from phyblock.making.questions.counterfactual import OUTCOME_TEXTS
 from phyblock.sim import question_pictures
 from phyblock.sim.camera import Camera
-from phyblock_making.attacks import cut
-from phyblock_making.attacks.cues import cues_of
-from phyblock_making.attacks.looks import look_at
-from phyblock_making.attacks.naive_support import naive_likings, resting_on, resting_only_on
-from phyblock_making.attacks.observed import observe
-from phyblock_making.questions.counterfactual import OUTCOME_TEXTS
 from tests.vqa_set import questions, write_questions
 from tests.workspace import Workspace
 

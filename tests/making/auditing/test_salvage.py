@@ -6,7 +6,7 @@ import pytest
 
 from phyblock.datasets import read_builtin
 from phyblock.errors import DataError
-from phyblock_making.auditing.salvage import salvage
+from phyblock.making.auditing.salvage import salvage
 from tests.datasets.broken import sound_scene, with_value, without, write_checkout, write_scenes
 
 TOLERATED = {

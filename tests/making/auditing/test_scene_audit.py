@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from phyblock.datasets import read_builtin
 from phyblock.domain import CandidateSet, Scene
 from phyblock.errors import StoreError
+from phyblock.making.auditing.corrected_copy import write_fixed
+from phyblock.making.auditing.salvage import salvage
+from phyblock.making.auditing.scene_audit import AUDITED, SceneAudit, audit_scene
+from phyblock.making.auditing.set_audit import Audit, audit_scenes, findings_csv
+from phyblock.making.checks.set_checks import find_duplicates
+from phyblock.making.checks.tolerances import FOREIGN
+from phyblock.making.scenes.candidate_sets import make_candidates
 from phyblock.sim import Physics, Trial
-from phyblock_making.auditing.corrected_copy import write_fixed
-from phyblock_making.auditing.salvage import salvage
-from phyblock_making.auditing.scene_audit import AUDITED, SceneAudit, audit_scene
-from phyblock_making.auditing.set_audit import Audit, audit_scenes, findings_csv
-from phyblock_making.checks.set_checks import find_duplicates
-from phyblock_making.checks.tolerances import FOREIGN
-from phyblock_making.scenes.candidate_sets import make_candidates
 from tests.designs.scenes import designed_scenes
 from tests.sim.structures import counterweighted_beam, scene_of, tower
 from tests.sim.test_support import FLOATING, OVERLAPPING

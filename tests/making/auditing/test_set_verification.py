@@ -10,18 +10,18 @@ import pytest
 from phyblock.datasets import read_builtin
 from phyblock.domain import CandidateSet, Scene
 from phyblock.domain.symmetry import Symmetry
-from phyblock_making.auditing.set_verification import (
+from phyblock.making.auditing.set_verification import (
     LAWS,
     check_looks,
     check_sums,
     verify_scenes,
 )
-from phyblock_making.checks.set_checks import find_duplicates, find_orphans
-from phyblock_making.scenes.candidate_sets import make_candidates
-from phyblock_making.scenes.scene_files import SUMS_FILE, sums_text
-from phyblock_making.scenes.sketch import make_scene
-from phyblock_making.symmetry import transformed
-from phyblock_making.workers import open_workers
+from phyblock.making.checks.set_checks import find_duplicates, find_orphans
+from phyblock.making.scenes.candidate_sets import make_candidates
+from phyblock.making.scenes.scene_files import SUMS_FILE, sums_text
+from phyblock.making.scenes.sketch import make_scene
+from phyblock.making.symmetry import transformed
+from phyblock.making.workers import open_workers
 from tests.designs.pad import Pad
 from tests.designs.scenes import designed_scene, designed_scenes
 

@@ -6,7 +6,7 @@ import pytest
 
 from phyblock.domain import Block, Scene
 from phyblock.errors import DataError
-from phyblock_making.scenes.sketch import make_scene
+from phyblock.making.scenes.sketch import make_scene
 from tests.designs.acceptance import accept, form_problems, physics_problems
 from tests.designs.pad import Pad
 from tests.designs.scenes import designed_scene

@@ -6,16 +6,16 @@ import pytest
 
 from phyblock.domain import CandidateSet, Scene
 from phyblock.errors import Problem
+from phyblock.making.auditing.scene_audit import AUDITED, audit_scene
+from phyblock.making.auditing.set_verification import LAWS, verify_scene
+from phyblock.making.checks.finding import Finding, unreadable
+from phyblock.making.checks.scene_checks import CHECKS, findings_of
+from phyblock.making.checks.scene_facts import SceneFacts
+from phyblock.making.checks.tolerances import FOREIGN, OURS
+from phyblock.making.scenes.candidate_sets import make_candidates
+from phyblock.making.scenes.sketch import make_scene
 from phyblock.sim import Physics, Trial
 from phyblock.sim.support import GROUND
-from phyblock_making.auditing.scene_audit import AUDITED, audit_scene
-from phyblock_making.auditing.set_verification import LAWS, verify_scene
-from phyblock_making.checks.finding import Finding, unreadable
-from phyblock_making.checks.scene_checks import CHECKS, findings_of
-from phyblock_making.checks.scene_facts import SceneFacts
-from phyblock_making.checks.tolerances import FOREIGN, OURS
-from phyblock_making.scenes.candidate_sets import make_candidates
-from phyblock_making.scenes.sketch import make_scene
 from tests.designs.acceptance import form_problems, physics_problems
 from tests.designs.pad import Pad
 from tests.designs.scenes import designed_scene

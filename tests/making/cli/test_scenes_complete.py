@@ -16,10 +16,10 @@ from benchmarks.evidence.completing import stripped
 from phyblock.datasets import read_builtin
 from phyblock.domain import Scene
 from phyblock.errors import DataError
+from phyblock.making.auditing.set_verification import check_sums, verify_scene
+from phyblock.making.scenes.completing import complete, derived
+from phyblock.making.scenes.given_scenes import GivenScene, ReadScene, read_given
 from phyblock.resources import bundled
-from phyblock_making.auditing.set_verification import check_sums, verify_scene
-from phyblock_making.scenes.completing import complete, derived
-from phyblock_making.scenes.given_scenes import GivenScene, ReadScene, read_given
 from tests.workspace import SCENES, Workspace
 
 DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))

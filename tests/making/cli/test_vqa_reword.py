@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from phyblock.cli.main import phyblock
 from phyblock.datasets import read_builtin, read_questions
 from phyblock.errors import DataError
-from phyblock_making.questions.rewording import read_wordings, reword
+from phyblock.making.questions.rewording import read_wordings, reword
 from tests.making.cli.test_vqa_write import GOOD, QUESTION, SCENE, Writer, sees_negations
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock_making.questions.alike import ranked_as_drawn
-from phyblock_making.questions.four_alike import four_alike
+from phyblock.making.questions.alike import ranked_as_drawn
+from phyblock.making.questions.four_alike import four_alike
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from phyblock.datasets import read_builtin
 from phyblock.domain import Block, Scene
+from phyblock.making.questions.annexes import with_annex
+from phyblock.making.questions.margins import is_sure, resting_on
 from phyblock.resources import bundled
 from phyblock.sim.support import find_gaps, find_overlaps
-from phyblock_making.questions.annexes import with_annex
-from phyblock_making.questions.margins import is_sure, resting_on
 
 TASKS = read_builtin(bundled("benchmarks", "data", "phyblock-400")).tasks
 SCENES = [task.scene for task in TASKS if len(task.scene) < 9][::30]

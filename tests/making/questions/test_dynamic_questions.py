@@ -11,15 +11,15 @@ from phyblock.datasets import read_builtin
 from phyblock.domain import LETTERS, Question, Subtask
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.scene import Scene
+from phyblock.making.questions.counterfactual import OUTCOME_TEXTS
+from phyblock.making.questions.pictured_drafts import LEAST_PIXELS
+from phyblock.making.questions.question_production import make_questions
+from phyblock.making.questions.rederiving import problem_of
+from phyblock.making.workers import open_workers
 from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled
 from phyblock.sim.seeing import is_inside, least_difference, seen
 from phyblock.sim.support import find_gaps
-from phyblock_making.questions.counterfactual import OUTCOME_TEXTS
-from phyblock_making.questions.pictured_drafts import LEAST_PIXELS
-from phyblock_making.questions.question_production import make_questions
-from phyblock_making.questions.rederiving import problem_of
-from phyblock_making.workers import open_workers
 
 DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
 SCENES: dict[str, Scene] = {task.scene.id: task.scene for task in DATA.tasks}

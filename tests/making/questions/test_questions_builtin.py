@@ -12,23 +12,23 @@ import pytest
 
 from phyblock.datasets import QuestionSet, read_builtin, read_questions
 from phyblock.domain import LETTERS, SUBTASKS, Subtask
-from phyblock.records.question import StoredQuestion
-from phyblock.resources import bundled
-from phyblock.sim.registry import other_simulators
-from phyblock.sim.seeing import mark_pixel
-from phyblock_making.attacks.attack_card import attack_card
-from phyblock_making.attacks.attacks import UNSEEN_TEXT, all_attacks, attack
-from phyblock_making.attacks.observed import observe_all
-from phyblock_making.questions.question_card import question_card
-from phyblock_making.questions.question_production import (
+from phyblock.making.attacks.attack_card import attack_card
+from phyblock.making.attacks.attacks import UNSEEN_TEXT, all_attacks, attack
+from phyblock.making.attacks.observed import observe_all
+from phyblock.making.questions.question_card import question_card
+from phyblock.making.questions.question_production import (
     PER_SUBTASK,
     as_question,
     make_questions,
     scene_drafts,
 )
-from phyblock_making.questions.rederiving import problem_of
-from phyblock_making.questions.shortcuts import audit_questions, duplicates_of
-from phyblock_making.workers import open_workers
+from phyblock.making.questions.rederiving import problem_of
+from phyblock.making.questions.shortcuts import audit_questions, duplicates_of
+from phyblock.making.workers import open_workers
+from phyblock.records.question import StoredQuestion
+from phyblock.resources import bundled
+from phyblock.sim.registry import other_simulators
+from phyblock.sim.seeing import mark_pixel
 
 FOLDER = bundled("benchmarks", "data", "phyblock-vqa")
 DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))

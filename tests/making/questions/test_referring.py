@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 
 from phyblock.datasets import read_builtin
 from phyblock.domain import BLOCK_TYPES, Block, BlockType, Color, QuestionPicture, Scene
-from phyblock.resources import bundled
-from phyblock_making.questions.question_draft import UnfairError
-from phyblock_making.questions.referring import (
+from phyblock.making.questions.question_draft import UnfairError
+from phyblock.making.questions.referring import (
     SHAPE_WORDS,
     Feature,
     names,
@@ -18,6 +17,7 @@ from phyblock_making.questions.referring import (
     resolve_one,
     shape_word,
 )
+from phyblock.resources import bundled
 
 FEATURES: tuple[Feature, ...] = ("color", "type", "size", "layer", "side", "support")
 SCENES = [t.scene for t in read_builtin(bundled("benchmarks", "data", "phyblock-400")).tasks][::10]

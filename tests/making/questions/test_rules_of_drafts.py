@@ -14,19 +14,19 @@ from phyblock.datasets import read_builtin
 from phyblock.domain import Block, BlockType, Color, QuestionPicture, Scene
 from phyblock.domain.blocks import SHAPES, Euler
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
+from phyblock.making.poses import POSES
+from phyblock.making.questions.axis_turns import AXIS_TURNS, axis_turns, tipped_over
+from phyblock.making.questions.hidden import sure_blocks
+from phyblock.making.questions.layers import layers_of
+from phyblock.making.questions.lengths import LENGTHS, along_and_across_m, grid_cm
+from phyblock.making.questions.loose_blocks import put_beside
+from phyblock.making.questions.question_draft import Draft, UnfairError
+from phyblock.making.questions.shifts import shifted
+from phyblock.making.questions.viewpoint import ViewpointMaker
+from phyblock.making.symmetry import transformed
 from phyblock.resources import bundled
 from phyblock.sim.seeing import least_difference, seen
 from phyblock.sim.support import find_overlaps, support_graph
-from phyblock_making.poses import POSES
-from phyblock_making.questions.axis_turns import AXIS_TURNS, axis_turns, tipped_over
-from phyblock_making.questions.hidden import sure_blocks
-from phyblock_making.questions.layers import layers_of
-from phyblock_making.questions.lengths import LENGTHS, along_and_across_m, grid_cm
-from phyblock_making.questions.loose_blocks import put_beside
-from phyblock_making.questions.question_draft import Draft, UnfairError
-from phyblock_making.questions.shifts import shifted
-from phyblock_making.questions.viewpoint import ViewpointMaker
-from phyblock_making.symmetry import transformed
 
 SCENES = [t.scene for t in read_builtin(bundled("benchmarks", "data", "phyblock-400")).tasks]
 scenes = st.sampled_from(SCENES[::9])

@@ -11,8 +11,8 @@ import pytest
 from phyblock.datasets import read_builtin, read_questions
 from phyblock.domain import LETTERS, Question
 from phyblock.domain.rotation import rotated
-from phyblock_making.questions.sheet import sheet_html
-from phyblock_making.questions.shortcuts import audit_questions, duplicates_of, referents
+from phyblock.making.questions.sheet import sheet_html
+from phyblock.making.questions.shortcuts import audit_questions, duplicates_of, referents
 from tests.vqa_set import questions, write_questions
 from tests.workspace import Workspace
 

@@ -14,15 +14,15 @@ from hypothesis import strategies as st
 from phyblock.datasets import read_builtin
 from phyblock.domain import KIT_PALETTE, MAX_CANDIDATES, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.errors import DataError
+from phyblock.making.auditing.boosting import boosted
+from phyblock.making.auditing.tells import Part, find_tells
+from phyblock.making.poses import POSES
+from phyblock.making.scenes.candidate_sets import NEEDED, make_candidates
+from phyblock.making.scenes.grammar import Group, Request, draw
+from phyblock.making.scenes.scene_production import shares
 from phyblock.scoring import Goal, match_plan, micro
 from phyblock.tracks.goal_blind.learning import CONSTANT, FREQUENCIES, goal_blind_plans
 from phyblock.words import SETTINGS, Setting
-from phyblock_making.auditing.boosting import boosted
-from phyblock_making.auditing.tells import Part, find_tells
-from phyblock_making.poses import POSES
-from phyblock_making.scenes.candidate_sets import NEEDED, make_candidates
-from phyblock_making.scenes.grammar import Group, Request, draw
-from phyblock_making.scenes.scene_production import shares
 from tests.designs.scenes import designed_scene
 
 BUILT_IN = Path(__file__).parents[3] / "benchmarks" / "data" / "phyblock-400"

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from phyblock.domain import KIT_PALETTE, Scene
 from phyblock.domain.symmetry import canonical_form
+from phyblock.making.scenes.buildings import BUILDINGS
+from phyblock.making.scenes.compositions import COMPOSITIONS, beside
+from phyblock.making.scenes.creatures import CREATURES
+from phyblock.making.scenes.grammar import GROUP_LEVELS, Request, draw
+from phyblock.making.scenes.scene_draft import PALETTES, Draft
 from phyblock.sim import find_gaps, find_overlaps
 from phyblock.sim.support import bounds_m
-from phyblock_making.scenes.buildings import BUILDINGS
-from phyblock_making.scenes.compositions import COMPOSITIONS, beside
-from phyblock_making.scenes.creatures import CREATURES
-from phyblock_making.scenes.grammar import GROUP_LEVELS, Request, draw
-from phyblock_making.scenes.scene_draft import PALETTES, Draft
 from tests.designs.acceptance import form_problems
 
 GROUPS = tuple(GROUP_LEVELS)

@@ -1,0 +1,217 @@
+"""What a static question's picture shows: shares of blocks, where they are, along which axes."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.domain.blocks import BlockType, euler_deg_to_matrix
+from phyblock.domain.question import Question, QuestionPicture
+from phyblock.domain.scene import Block, Scene
+from phyblock.making.questions.question_draft import UnfairError
+from phyblock.sim.camera import view_axes
+from phyblock.sim.pictures import PictureStyle, drawn, goal_camera
+from phyblock.sim.render import DrawnBlock, shoot
+from phyblock.sim.support import bounds_m
+from phyblock.sim.visibility import visible_shares
+
+__all__ = [
+    "COUNTED",
+    "ELEVATIONS_DEG",
+    "NAMED",
+    "SHAPED",
+    "SHAPED_AREA",
+    "STUDIED",
+    "View",
+    "are_seen",
+    "center_m",
+    "drawn_view",
+    "goal_picture",
+    "outermost",
+    "picture_axes",
+    "require_seen",
+    "require_shapes_seen",
+    "shares",
+    "shown_picture",
+    "shows_profile",
+    "shows_solid",
+]
+
+View = tuple[float, float]
+"""Azimuth and elevation of a camera [degrees]."""
+ELEVATIONS_DEG = (18, 38)
+"""The views of static questions look down by this much: tops show, and so do sides."""
+COUNTED = 0.25
+"""The least visible share of a block that is to be counted."""
+NAMED = 0.4
+"""The least visible share of a block that is named in a question or an option."""
+STUDIED = 0.55
+"""The least visible share of a block whose shape, size or orientation is asked about."""
+SHAPED = 0.28
+"""The least visible share of every block where shapes are counted,"""
+SHAPED_AREA = 0.004
+"""and the least share of the picture that it covers."""
+_PROFILE_AXES: Mapping[BlockType, int] = {
+    "arch": 0,
+    "triangle": 0,
+    "semi_cylinder": 0,
+    "cylinder": 2,
+}
+"""Body axes along which these types look like what they are, and from elsewhere like boxes."""
+_MOST_OF_A_FACE = 0.8
+"""The most that one face of a block by itself may be of all that shows of it."""
+_LEAST_PROFILE = 0.26
+"""The sine of 15 degrees: so far the face across that axis is turned to the viewer."""
+_SIZE_PX = 256
+_MIDDLE_GAP = 0.1
+"""So much further out, of half the picture's width, is the middle of a block called leftmost,"""
+_EDGE_GAP = 0.05
+"""and so much its outer edge."""
+
+
+def drawn_view(rng: np.random.Generator) -> View:
+    """A view drawn evenly: from all round, looking down by `ELEVATIONS_DEG`, in whole degrees."""
+    low, high = ELEVATIONS_DEG
+    return (float(rng.integers(360)), float(rng.integers(low, high + 1)))
+
+
+def goal_picture(scene: Scene, view: View) -> QuestionPicture:
+    """The whole scene from a view."""
+    return QuestionPicture("scene", scene.blocks, view)
+
+
+def shown_picture(question: Question) -> QuestionPicture:
+    """The one picture of a static question; UnfairError for others, or one from too high or low."""
+    labels = [picture.label for picture in question.pictures]
+    if labels != ["scene"]:
+        raise UnfairError(f"has pictures {labels}, not one of the scene alone")
+    low, high = ELEVATIONS_DEG
+    if not low <= question.pictures[0].view_deg[1] <= high:
+        raise UnfairError(f"is not seen from {low} to {high} degrees above the floor")
+    return question.pictures[0]
+
+
+def shares(picture: QuestionPicture) -> Mapping[int, float]:
+    """Visible share of each block, by order, of a picture framed on the blocks that it draws."""
+    return _shares(tuple(map(_plain, picture.blocks)), picture.view_deg)
+
+
+@functools.lru_cache(maxsize=512)
+def _shares(blocks: tuple[Block, ...], view: View) -> Mapping[int, float]:
+    return visible_shares(Scene("", (1,), blocks, ()), _style(view))
+
+
+def are_seen(picture: QuestionPicture, orders: Collection[int], least: float) -> bool:
+    """Whether each of the named blocks shows at least this share of itself."""
+    seen = shares(picture)
+    return all(seen[order] >= least for order in orders)
+
+
+def require_seen(picture: QuestionPicture, orders: Collection[int], least: float) -> None:
+    """Raise UnfairError that names the blocks that show less than `least`."""
+    seen = shares(picture)
+    hidden = [order for order in sorted(orders) if seen[order] < least]
+    if hidden:
+        raise UnfairError(f"blocks {hidden} show less than {least:.0%} of themselves")
+
+
+@functools.lru_cache(maxsize=4096)
+def center_m(block: Block) -> NDArray[np.float64]:
+    """Middle of the box round a block, shape (3,) [m], world frame."""
+    middle: NDArray[np.float64] = bounds_m(block).mean(axis=0)
+    return middle
+
+
+def picture_axes(view: View) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """To the right of the picture and away from the viewer along the floor, unit (3,) vectors."""
+    right, _, forward = view_axes(*view)
+    away = np.array([forward[0], forward[1], 0.0])
+    return right, away / np.linalg.norm(away)
+
+
+def outermost(orders: Sequence[int], picture: QuestionPicture, to_left: bool) -> int | None:
+    """Which of the named blocks is farthest to a side of a picture; None when that is close.
+
+    Both its middle and its outer edge have to be clearly farther out than those of the others.
+    """
+    spans = _spans(tuple(map(_plain, picture.blocks)), picture.view_deg)
+    sign = -1.0 if to_left else 1.0
+    reach = {
+        order: (sign * sum(spans[order]) / 2, max(sign * end for end in spans[order]))
+        for order in orders
+    }
+    ranked = sorted(orders, key=lambda order: -reach[order][0])
+    first = reach[ranked[0]]
+    for other in ranked[1:]:
+        if first[0] - reach[other][0] < _MIDDLE_GAP or first[1] - reach[other][1] < _EDGE_GAP:
+            return None
+    return ranked[0]
+
+
+@functools.lru_cache(maxsize=512)
+def _spans(blocks: tuple[Block, ...], view: View) -> Mapping[int, tuple[float, float]]:
+    """Left and right end of each block across the picture, -1 to 1, by order."""
+    scene = Scene("", (1,), blocks, ())
+    camera = goal_camera(scene, _style(view))
+    spans = {}
+    for block, one in zip(blocks, drawn(scene), strict=True):
+        across = camera.project(one.vertices_m)[:, 0]
+        spans[block.order] = (float(across.min()), float(across.max()))
+    return spans
+
+
+@functools.lru_cache(maxsize=512)
+def _areas(blocks: tuple[Block, ...], view: View) -> Mapping[int, float]:
+    """Share of the picture that each block covers, by order."""
+    scene = Scene("", (1,), blocks, ())
+    camera = goal_camera(scene, _style(view))
+    seen = shoot(drawn(scene), camera, _SIZE_PX).block
+    counts = np.bincount(seen[seen >= 0], minlength=len(blocks))
+    return {
+        block.order: float(count) / _SIZE_PX**2 for block, count in zip(blocks, counts, strict=True)
+    }
+
+
+def shows_profile(block: Block, view: View) -> bool:
+    """Whether a view shows the face that tells an arch, a prism or a half cylinder from a box."""
+    axis = _PROFILE_AXES.get(block.type)
+    if axis is None:
+        return True
+    along = euler_deg_to_matrix(block.euler_deg)[:, axis]
+    return bool(abs(along @ view_axes(*view)[2]) >= _LEAST_PROFILE)
+
+
+def shows_solid(block: Block, view: View) -> bool:
+    """Whether a view shows its profile, and no one face is nearly all that shows of the block."""
+    along = view_axes(*view)[2]
+    corners = DrawnBlock(block.type, block.color, block.position_m, block.euler_deg).triangles_m
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    shown = np.maximum(-normals @ along, 0.0)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    _, faces = np.unique(np.round(normals / lengths, 2), axis=0, return_inverse=True)
+    largest = np.bincount(faces.ravel(), shown).max() / shown.sum()
+    return shows_profile(block, view) and bool(largest <= _MOST_OF_A_FACE)
+
+
+def require_shapes_seen(picture: QuestionPicture) -> None:
+    """Raise UnfairError unless every block shows enough of itself to tell its shape."""
+    require_seen(picture, [block.order for block in picture.blocks], SHAPED)
+    if not all(shows_profile(block, picture.view_deg) for block in picture.blocks):
+        raise UnfairError("some block is seen from a side that does not tell its shape")
+    areas = _areas(tuple(map(_plain, picture.blocks)), picture.view_deg)
+    small = [order for order, area in sorted(areas.items()) if area < SHAPED_AREA]
+    if small:
+        raise UnfairError(f"blocks {small} cover less than {SHAPED_AREA:.1%} of the picture")
+
+
+def _style(view: View) -> PictureStyle:
+    return PictureStyle(_SIZE_PX, "checkerboard", *view)
+
+
+def _plain(block: Block) -> Block:
+    """The block as far as it decides what is hidden."""
+    return replace(block, color="red", depend=())

@@ -1,0 +1,246 @@
+"""VP: which picture shows the same structure from elsewhere, or how it looks from a given side.
+
+The structures of four options come from two changes, each made or not: mirroring, two blocks that
+exchange their colors, a block that is put a little elsewhere. All have the same blocks in the same
+colors, none is the odd one out, and any of the four may be the one that is shown: it is drawn. So
+options alone tell nothing. Comparing how much of each color shows does not either: a set of options
+is used where that is right for one of the four that may be shown, which is what chance gives.
+Scenes are recolored, as many are their own mirror image.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.domain.blocks import COLORS
+from phyblock.domain.question import Question, QuestionPicture, Subtask
+from phyblock.domain.scene import Block, Scene
+from phyblock.domain.symmetry import Symmetry, turned_form
+from phyblock.making.questions.choices import pick, shuffled
+from phyblock.making.questions.coloring import recolored
+from phyblock.making.questions.picture_view import View, drawn_view
+from phyblock.making.questions.pictured_drafts import (
+    are_told_apart,
+    draft,
+    of_kind,
+    only_index,
+    option_pictures,
+    picture_of,
+    same_blocks,
+)
+from phyblock.making.questions.question_draft import Draft, UnfairError
+from phyblock.making.questions.shifts import shifted
+from phyblock.making.questions.wording import slots_of
+from phyblock.making.symmetry import transformed
+from phyblock.sim.seeing import least_difference, seen, shown_pixels
+
+__all__ = ["ViewpointMaker"]
+
+_FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
+"""Straight on: a mirror image of a slanted view can be a true view of the same side."""
+_FRONT_ELEVATION_DEG = 22.0
+_SIDES: dict[str, float] = {"its right side": 90.0, "its left side": -90.0, "behind": 180.0}
+_LEAST_TURN_DEG = 60
+_FAMILIES_TRIED = 8
+_LEAST_SHOWN = 100
+"""Pixels of 256 x 256 that both views show of blocks that exchange their colors."""
+_SHOWN_IN_FRONT = 0.8
+"""The least share of all blocks of which the front view shows something."""
+_LEAST_SHARE = 0.1
+"""In so much of what shows of the blocks any two options differ: less is easily overlooked."""
+_SIDE_PIXELS = 500
+"""Whole pictures are compared by side, not structures that are nearly alike."""
+
+
+@dataclass(frozen=True)
+class _Structure:
+    """Blocks as they stand; `is_mirrored` where views go round them the other way."""
+
+    blocks: tuple[Block, ...]
+    is_mirrored: bool = False
+
+    def mirrored(self) -> _Structure:
+        """Its mirror image, which shows the mirrored picture from the mirrored view."""
+        return _Structure(transformed(self.blocks, Symmetry(0, True)), not self.is_mirrored)
+
+    def seen_from(self, view: View) -> QuestionPicture:
+        """The picture from a view; of a mirrored structure from the mirrored view."""
+        azimuth = (180.0 - view[0]) % 360 if self.is_mirrored else view[0] % 360
+        return QuestionPicture("scene", self.blocks, (azimuth, view[1]))
+
+
+class ViewpointMaker:
+    """Kinds: `vp-match`, a structure from anywhere; `vp-side`, what is seen from a side named."""
+
+    subtask: Subtask = "VP"
+    scenes_tried = 300
+    drafts_a_scene = 2
+
+    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """One draft of each kind at most."""
+        scene, view = recolored(scene, rng), drawn_view(rng)
+        turn = float(rng.integers(_LEAST_TURN_DEG, 361 - _LEAST_TURN_DEG))
+        yield from _match(scene, rng, "vp-match", view, (view[0] + turn, drawn_view(rng)[1]), "")
+        side = pick(rng, tuple(_SIDES))
+        front = (pick(rng, _FRONTS_DEG), _FRONT_ELEVATION_DEG)
+        if side == "behind":
+            yield from _match(scene, rng, "vp-side", front, _from_side(front, side), side)
+        else:
+            yield from _side(scene, rng, front, side)
+
+    def rederive(self, question: Question) -> tuple[int, ...]:
+        """By the blocks in the pictures, whichever side they are seen from."""
+        slots = slots_of(question)
+        shown, options = picture_of(question, "scene"), option_pictures(question)
+        if of_kind(question) == "vp-side":
+            if shown.view_deg[0] not in _FRONTS_DEG:
+                raise UnfairError("the first picture is not straight from the front")
+            azimuth = _from_side(shown.view_deg, slots["side_words"])[0]
+            right = [(option.view_deg[0] - azimuth) % 360 == 0 for option in options]
+            alike = [same_blocks(shown.blocks, option.blocks) for option in options]
+            return only_index([a and b for a, b in zip(right, alike, strict=True)])
+        form = turned_form(shown.blocks)
+        return only_index([turned_form(option.blocks) == form for option in options])
+
+
+def _from_side(front: View, side: str) -> View:
+    return (front[0] + _SIDES[side], front[1])
+
+
+def _match(
+    scene: Scene, rng: np.random.Generator, stem: str, first: View, second: View, side: str
+) -> Iterator[Draft]:
+    """Four structures from the second view, one of which the first picture shows."""
+    for _ in range(_FAMILIES_TRIED):
+        family, changes = _family(scene, rng, (first, second))
+        if not family or _hits(family, first, second) != 1.0:
+            continue
+        shown, options = ([one.seen_from(view) for one in family] for view in (first, second))
+        if are_told_apart(shown) and are_told_apart(options) and _differ_at_a_glance(options):
+            right = int(rng.integers(len(family)))
+            order = [right, *(i for i in range(len(family)) if i != right)]
+            slots = {"side_words": side} if side else {}
+            facts = {"changes": changes}
+            dealt = [options[i] for i in order]
+            value = side or changes
+            yield draft(scene, rng, stem, dealt, [shown[right]], value, slots, facts)
+            return
+
+
+def _family(
+    scene: Scene, rng: np.random.Generator, views: Sequence[View]
+) -> tuple[tuple[_Structure, ...], str]:
+    """A structure with each of two changes made or not; none where two of them are the same."""
+    base = _Structure(scene.blocks)
+    names = shuffled(rng, ("mirror", "swap", "swap", "shift"))[:2]
+    changed = [base]
+    touched: list[int] = []
+    for name in names:
+        made = _changed(base, name, rng, views)
+        if made is None:
+            return (), ""
+        touched += [] if made.is_mirrored else _differing(base, made)
+        changed += [_like(base, made, one) for one in changed]
+    forms = {turned_form(one.blocks) for one in changed}
+    if len(forms) < len(changed) or len(set(touched)) < len(touched):
+        return (), ""
+    return tuple(changed), "+".join(sorted(names))
+
+
+def _differing(base: _Structure, changed: _Structure) -> list[int]:
+    """Orders of the blocks that a change alters."""
+    pairs = zip(base.blocks, changed.blocks, strict=True)
+    return [before.order for before, after in pairs if before != after]
+
+
+def _changed(
+    base: _Structure, name: str, rng: np.random.Generator, views: Sequence[View]
+) -> _Structure | None:
+    if name == "mirror":
+        return base.mirrored()
+    if name == "shift":
+        blocks = shifted(base.blocks, rng)
+        return None if blocks is None else _Structure(blocks)
+    counts = [_pixels(base, view) for view in views]
+    shown = [b for b in base.blocks if min(one[b.order] for one in counts) >= _LEAST_SHOWN]
+    pairs = [(a, b) for a, b in itertools.combinations(shown, 2) if a.color != b.color]
+    if not pairs:
+        return None
+    one, other = pick(rng, pairs)
+    colors = {one.order: other.color, other.order: one.color}
+    return _Structure(tuple(replace(b, color=colors.get(b.order, b.color)) for b in base.blocks))
+
+
+def _like(base: _Structure, changed: _Structure, other: _Structure) -> _Structure:
+    """What was changed from `base` changed in another structure as well."""
+    if changed.is_mirrored:
+        return other.mirrored()
+    if other.is_mirrored:
+        return _like(base, changed, other.mirrored()).mirrored()
+    altered = _differing(base, changed)
+    new = {block.order: block for block in changed.blocks if block.order in altered}
+    return _Structure(tuple(new.get(block.order, block) for block in other.blocks))
+
+
+def _side(scene: Scene, rng: np.random.Generator, front: View, side: str) -> Iterator[Draft]:
+    """Left and right of a structure and of its mirror image; either may be the one shown."""
+    base = _Structure(scene.blocks)
+    views = [_from_side(front, name) for name in (side, _opposite(side))]
+    options = [one.seen_from(view) for one in (base, base.mirrored()) for view in views]
+    shown = base.seen_from(front)
+    pixels = _pixels(base, front).values()
+    if sum(n > 0 for n in pixels) < _SHOWN_IN_FRONT * len(pixels):
+        return
+    if are_told_apart([shown, *options], least=_SIDE_PIXELS) and _differ_at_a_glance(options):
+        if rng.random() < 0.5:
+            # The mirror image is shown: what it looks like from a side is the other side mirrored.
+            shown, options = base.mirrored().seen_from(front), options[::-1]
+        facts = {"changes": "mirror"}
+        yield draft(scene, rng, "vp-side", options, [shown], side, {"side_words": side}, facts)
+
+
+def _differ_at_a_glance(options: Sequence[QuestionPicture]) -> bool:
+    """Whether any two of the options differ in at least `_LEAST_SHARE` of what shows of blocks."""
+    shots = [seen(option) for option in options]
+    area = max(int((shot.block >= 0).sum()) for shot in shots)
+    return least_difference(shots) >= _LEAST_SHARE * area
+
+
+def _opposite(side: str) -> str:
+    return next(name for name in _SIDES if name not in (side, "behind"))
+
+
+def _hits(family: Sequence[_Structure], first: View, second: View) -> float:
+    """How many of the structures the nearest histogram of colors finds again; ties count in part.
+
+    By two ways to measure, the sum of differences and of their squares; 0 where they disagree.
+    """
+    shown, options = (np.array([_histogram(s, view) for s in family]) for view in (first, second))
+    apart = shown[:, None, :] - options[None, :, :]
+    found = []
+    for far in (np.abs(apart).sum(axis=2), (apart**2).sum(axis=2)):
+        nearest = far <= far.min(axis=1, keepdims=True) + 1e-9
+        found.append(float((np.diag(nearest) / nearest.sum(axis=1)).sum()))
+    return found[0] if found[0] == found[1] else 0.0
+
+
+def _histogram(structure: _Structure, view: View) -> NDArray[np.float64]:
+    """Share of each color in what shows of the blocks, rounded to a thousandth."""
+    pixels = _pixels(structure, view)
+    counts = np.zeros(len(COLORS))
+    for block in structure.blocks:
+        counts[COLORS.index(block.color)] += pixels[block.order]
+    shares: NDArray[np.float64] = np.round(counts / counts.sum(), 3)
+    return shares
+
+
+def _pixels(structure: _Structure, view: View) -> dict[int, int]:
+    """How many pixels show each block, by order: those of its mirror image, whatever the colors."""
+    plain = (structure.mirrored() if structure.is_mirrored else structure).seen_from(view)
+    plain = replace(plain, blocks=tuple(replace(b, color="red") for b in plain.blocks))
+    return shown_pixels(plain, seen(plain))

@@ -1,0 +1,120 @@
+"""Candidate sets: the needed blocks among distractors that other goals need as often.
+
+Whether a candidate is needed shall not show in what it is, in which pose, in how many poses its
+kind is offered, or in where it stands. So a distractor is drawn as often as makes every look
+needed in the same share of the sets that offer it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+from phyblock.digests import drawn_bytes
+from phyblock.domain.blocks import KIT_PALETTE, BlockType
+from phyblock.domain.candidates import MAX_CANDIDATES, Candidate, CandidateSet
+from phyblock.domain.scene import Kind, Look, Scene
+from phyblock.errors import DataError, Problem
+from phyblock.making.poses import POSES
+
+__all__ = ["NEEDED", "make_candidates"]
+
+NEEDED: dict[BlockType, dict[str, float]] = {
+    "arch": {"gate": 0.196, "gate-turned": 0.081, "cradle": 0.05, "cradle-turned": 0.032},
+    "cube": {"flat": 1.246},
+    "cuboid1": {"flat": 0.5, "edge-x": 0.059, "edge-y": 0.052},
+    "cuboid2": {
+        **{"flat-x": 0.191, "flat-y": 0.348, "edge-x": 0.032, "edge-y": 0.01},
+        **{"upright-x": 0.018, "upright-y": 0.012},
+    },
+    "cuboid3": {"flat-x": 0.138, "flat-y": 0.267, "edge-x": 0.01, "edge-y": 0.004},
+    "cylinder": {"upright": 0.335, "lying-x": 0.058, "lying-y": 0.045},
+    "semi_cylinder": {
+        **{"dome": 0.408, "dome-turned": 0.276, "round+x": 0.014, "round+y": 0.029},
+        **{"round-x": 0.013, "round-y": 0.024},
+    },
+    "triangle": {
+        **{"roof": 0.261, "roof-turned": 0.215, "ramp+y": 0.273, "ramp-x": 0.128},
+        **{"ramp-y": 0.258, "ramp+x": 0.125},
+    },
+}
+"""How many looks of a type and pose a goal of the grammar needs on average, over its colors:
+counted in 1,200 goals. Poses that no goal needs give themselves away and are not offered.
+"""
+_EVEN_SHARE = 0.36
+"""A look is to be needed in this share of the sets that offer it: 5.76 of 16 on average."""
+_RISING: tuple[tuple[BlockType, ...], ...] = (
+    *(("arch",), ("cylinder",), ("cuboid2",), ("cuboid3",), ("cube",), ("cuboid1",)),
+    ("triangle", "semi_cylinder"),
+)
+"""From the types that goals have low to those that they have high: whoever names all candidates as
+they are listed names them in a good order to build in, and wins nothing by finding a better one.
+"""
+_TIERS = {block_type: tier for tier, types in enumerate(_RISING) for block_type in types}
+_RARER: dict[BlockType, float] = {"triangle": 0.7}
+"""Factors on how often a type is drawn as a distractor. Triangles are of one color in six poses: to
+setting B, where a pose does not count, all of them are one block offered again and again, and
+leaving some out would pay.
+"""
+_MOST_DRAWN = 0.98
+"""What more than `_EVEN_SHARE` of all goals need is offered nearly always."""
+
+
+def make_candidates(
+    scene: Scene, seed: int = 0, *, palette: tuple[Kind, ...] = KIT_PALETTE
+) -> CandidateSet:
+    """Up to `MAX_CANDIDATES` candidates that look different, all that the scene needs among them.
+
+    Distractors come from `palette`. Types that goals have low stand first, candidates of one type
+    in an order that is drawn. The same scene id and seed give the same set everywhere. Raises
+    DataError when the scene needs more looks than that.
+    """
+    needed = _by_look([Candidate(b.type, b.color, b.euler_deg) for b in scene.blocks])
+    if len(needed) > MAX_CANDIDATES:
+        allowed = f"at most {MAX_CANDIDATES}"
+        message = "needs more different blocks than a candidate set holds"
+        raise DataError(Problem(scene.id, message, "blocks", str(len(needed)), allowed))
+    salt = f"{seed}/{scene.id}"
+    rates = _rates(palette)
+    others = [one for one in rates if one.look not in needed]
+    first = sorted(others, key=lambda one: _waiting(one, rates[one], salt))
+    chosen = [*needed.values(), *first[: MAX_CANDIDATES - len(needed)]]
+    return CandidateSet(tuple(sorted(chosen, key=lambda one: _place(one, salt))))
+
+
+def _rates(palette: tuple[Kind, ...]) -> dict[Candidate, float]:
+    """How often each look that some goal needs is drawn as a distractor, a rate over one unit of
+    time: one is drawn within it where it is not needed as often as its even share asks.
+    """
+    colors = Counter(block_type for block_type, _ in palette)
+    rates = {}
+    for block_type, color in palette:
+        for pose, needed in NEEDED[block_type].items():
+            share = needed / colors[block_type]
+            drawn = min(share * (1 / _EVEN_SHARE - 1) / (1 - share), _MOST_DRAWN)
+            one = Candidate(block_type, color, POSES[block_type][pose])
+            rates[one] = -math.log1p(-drawn) * _RARER.get(block_type, 1.0)
+    return rates
+
+
+def _waiting(candidate: Candidate, rate: float, salt: str) -> float:
+    """When a candidate comes up: an exponential waiting time (Efraimidis and Spirakis 2006)."""
+    return -math.log(_drawn(candidate, f"{salt}/drawn")) / rate
+
+
+def _place(candidate: Candidate, salt: str) -> tuple[int, float]:
+    return _TIERS[candidate.type], _drawn(candidate, f"{salt}/place")
+
+
+def _drawn(candidate: Candidate, salt: str) -> float:
+    """A number in (0, 1) by a hash: the same on every platform and Python."""
+    digest = drawn_bytes(f"{salt}/{candidate}")
+    return (int.from_bytes(digest[:6], "big") + 0.5) / 2**48
+
+
+def _by_look(candidates: list[Candidate]) -> dict[Look, Candidate]:
+    """The first of each look, in the order given."""
+    first: dict[Look, Candidate] = {}
+    for candidate in candidates:
+        first.setdefault(candidate.look, candidate)
+    return first

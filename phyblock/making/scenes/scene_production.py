@@ -1,0 +1,199 @@
+"""Many scenes from one seed: which are asked for, which are taken, and what they are called."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from phyblock.domain.scene import Scene
+from phyblock.domain.symmetry import fingerprint
+from phyblock.errors import DataError, Problem
+from phyblock.making.checks.acceptance import is_acceptable
+from phyblock.making.scenes.grammar import GROUP_LEVELS, Group, Request, draw
+from phyblock.making.scenes.scene_draft import PALETTES, Palette
+from phyblock.making.workers import Workers
+
+__all__ = ["Order", "Share", "produce", "shares"]
+
+_SHARES: dict[Group, tuple[int, int]] = {
+    "1": (16, 6),
+    "1+2": (10, 4),
+    "2": (36, 71),
+    "3": (68, 70),
+    "4": (20, 99),
+}
+"""Base scenes and variations in each group, of 400."""
+_SOURCES: dict[Group, tuple[tuple[int, tuple[Group, ...]], ...]] = {
+    "1": ((1, ("1",)),),
+    "1+2": ((1, ("1+2", "1")),),
+    "2": ((1, ("2",)), (1, ("1", "1+2", "2")), (2, ("1", "1+2"))),
+    "3": ((1, ("3",)), (2, ("1", "1+2", "2")), (2, ("1", "1+2", "2", "3"))),
+    "4": ((2, ("3",)), (2, ("3",)), (2, ("3",)), (2, ("3",)), (1, ("4",))),
+}
+"""What variations are made from: how many parents, out of which groups."""
+_PATIENCE = 150
+"""So many candidates running that are refused or known end the search."""
+_LARGEST_ROUND = 256
+
+
+@dataclass(frozen=True)
+class Share:
+    """How many scenes of a group are wanted: drawn by the grammar, and made from those."""
+
+    group: Group
+    base: int
+    varied: int
+
+
+@dataclass(frozen=True)
+class Order:
+    """What is wanted: the seed, the palette and the shares."""
+
+    seed: int
+    palette: Palette
+    shares: tuple[Share, ...]
+
+
+def shares(count: int, levels: Sequence[int] = (1, 2, 3, 4)) -> tuple[Share, ...]:
+    """The shares of `count` scenes, in the proportions of the built-in 400, in these levels.
+
+    Scenes of levels 1 and 2 are asked for when both levels are. Largest remainders decide.
+    """
+    wanted = {
+        (group, part): number
+        for group, numbers in _SHARES.items()
+        if set(GROUP_LEVELS[group]) <= set(levels)
+        for part, number in enumerate(numbers)
+    }
+    total = sum(wanted.values())
+    exact = {key: count * number / total for key, number in wanted.items()}
+    given = {key: math.floor(number) for key, number in exact.items()}
+    by_rest = sorted(exact, key=lambda key: (given[key] - exact[key], key[1], key[0]))
+    for key in by_rest[: count - sum(given.values())]:
+        given[key] += 1
+    groups = dict.fromkeys(group for group, _ in wanted)
+    return tuple(Share(group, given[group, 0], given[group, 1]) for group in groups)
+
+
+def produce(order: Order, workers: Workers) -> Iterator[Scene]:
+    """Accepted scenes: first all base scenes, group by group, then the variations.
+
+    The same order gives the same scenes with any workers: a candidate depends on its number
+    alone, and of two that are alike the lower number is kept. Raises DataError when the rules
+    give no more different scenes.
+    """
+    maker = _Maker(order, workers)
+    for share in order.shares:
+        yield from maker.bases(share.group, share.base)
+    for share in order.shares:
+        yield from maker.variations(share.group, share.varied)
+
+
+class _Maker:
+    """Remembers what was taken: 16 bytes a candidate, and a request a base scene."""
+
+    def __init__(self, order: Order, workers: Workers) -> None:
+        self._order, self._workers = order, workers
+        self._seen: set[bytes] = set()
+        self._bases: dict[Group, list[tuple[str, Request]]] = {g: [] for g in GROUP_LEVELS}
+        self._next: dict[Group, int] = dict.fromkeys(GROUP_LEVELS, 0)
+        self._named: dict[int, int] = {}
+        self._width = max(3, len(str(sum(s.base + s.varied for s in order.shares))))
+
+    def bases(self, group: Group, wanted: int) -> Iterator[Scene]:
+        def request(number: int) -> Request:
+            return Request(self._order.seed, self._order.palette, group, number)
+
+        taken = 0
+        for made, scene in self._accepted(wanted, request, self._next[group]):
+            taken, self._next[group] = taken + 1, made.number + 1
+            name = self._name(scene)
+            self._bases[group].append((name, made))
+            yield replace(scene, id=name, parents=(name,))
+        if taken < wanted:
+            raise DataError(_no_more(group, f"gave no more than {taken} new scenes of {wanted}"))
+
+    def variations(self, group: Group, wanted: int) -> Iterator[Scene]:
+        """Variations, and base scenes for what is missing where there are too few to vary."""
+        parents: dict[int, tuple[str, ...]] = {}
+
+        def request(number: int) -> Request:
+            chosen = self._parents(group, number)
+            parents[number] = tuple(name for name, _ in chosen)
+            made = Request(self._order.seed, self._order.palette, group, number)
+            return replace(made, parents=tuple(parent for _, parent in chosen))
+
+        taken = 0
+        if self._sources(group):
+            for made, scene in self._accepted(wanted, request, 0):
+                taken += 1
+                names = tuple(dict.fromkeys(parents[made.number]))
+                yield replace(scene, id=self._name(scene), parents=names)
+        yield from self.bases(group, wanted - taken)
+
+    def _parents(self, group: Group, number: int) -> list[tuple[str, Request]]:
+        text = f"{self._order.seed}/{group}/parents/{number}".encode()
+        rng = np.random.default_rng(list(text))
+        sources = self._sources(group)
+        count, bases = sources[int(rng.integers(len(sources)))]
+        return [bases[int(i)] for i in rng.choice(len(bases), size=count, replace=False)]
+
+    def _sources(self, group: Group) -> list[tuple[int, list[tuple[str, Request]]]]:
+        """How many parents out of which base scenes, in the ways that there are enough for."""
+        sources = [
+            (count, [base for name in groups for base in self._bases[name]])
+            for count, groups in _SOURCES[group]
+        ]
+        return [(count, bases) for count, bases in sources if len(bases) >= count]
+
+    def _accepted(
+        self, wanted: int, request: Callable[[int], Request], first: int
+    ) -> Iterator[tuple[Request, Scene]]:
+        """The first `wanted` candidates that are sound and new, in the order of their numbers.
+
+        Fewer when candidate after candidate brings nothing new.
+        """
+        number, taken, last = first, 0, first
+        while taken < wanted and number - last <= _PATIENCE:
+            size = min(_LARGEST_ROUND, max(8, math.ceil((wanted - taken) * 1.3)))
+            requests = [request(number + i) for i in range(size)]
+            number += size
+            for made, scene in self._sound(requests):
+                taken, last = taken + 1, made.number
+                yield made, scene
+                if taken == wanted:
+                    return
+
+    def _sound(self, requests: list[Request]) -> Iterator[tuple[Request, Scene]]:
+        fresh: list[tuple[Request, Scene]] = []
+        for made, drawn in zip(requests, self._workers.map(_drawn, requests), strict=True):
+            if drawn is not None and drawn[1] not in self._seen:
+                self._seen.add(drawn[1])
+                fresh.append((made, drawn[0]))
+        tasks = [(scene, self._order.palette) for _, scene in fresh]
+        for one, sound in zip(fresh, self._workers.map(_is_sound, tasks), strict=True):
+            if sound:
+                yield one
+
+    def _name(self, scene: Scene) -> str:
+        level = scene.levels[0]
+        self._named[level] = self._named.get(level, 0) + 1
+        return f"l{level}-{self._named[level]:0{self._width}d}-{scene.id}"
+
+
+def _drawn(request: Request) -> tuple[Scene, bytes] | None:
+    scene = draw(request)
+    return None if scene is None else (scene, fingerprint(scene.blocks))
+
+
+def _is_sound(task: tuple[Scene, Palette]) -> bool:
+    scene, palette = task
+    return is_acceptable(scene, PALETTES[palette])
+
+
+def _no_more(group: str, message: str) -> Problem:
+    hint = "ask for fewer scenes, for other levels, or for --palette full"
+    return Problem(f"level {group}", message, hint=hint)
