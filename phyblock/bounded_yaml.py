@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from phyblock.bounded import LONGEST_INTEGER
+from phyblock.files import LONGEST_INTEGER
 
 __all__ = ["TAG", "BoundedLoader", "TooMuchError", "YamlBounds", "compose", "load_yaml"]
 

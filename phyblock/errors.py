@@ -23,33 +23,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = [
-    "BudgetReachedError",
-    "DataError",
-    "InputError",
-    "ModelError",
-    "PhyblockError",
-    "Problem",
-    "PromptError",
-    "RefusedError",
-    "RetryableError",
-    "SampleError",
-    "Sent",
-    "SimulationError",
-    "SpecError",
-    "StoreError",
-    "UnavailableError",
-    "UnreachableError",
-    "said",
-]
-
 _LONGEST_PART = 2000
 """Characters of a problem's part that are shown; what is longer holds garbage."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong with an input, said so that it can be mended.
+    """One thing that is wrong with an input, worded so that it can be fixed.
 
     `where` names the file and, where known, line and column (`suite.yaml:3:5`); `field` the
     dotted field; `found` and `allowed` are shown as given.
@@ -73,8 +53,8 @@ class Problem:
         return (("found", self.found), ("allowed", self.allowed), ("hint", self.hint))
 
 
-def said(error: BaseException) -> str:
-    """What an exception says, or its class in plain words where it says nothing."""
+def reason_of(error: BaseException) -> str:
+    """Return an exception's message, or its class in plain words where it has none."""
     text = (error.strerror if isinstance(error, OSError) else None) or str(error).strip()
     if isinstance(error, RecursionError):
         return "nested too deeply"
@@ -104,6 +84,10 @@ class InputError(PhyblockError):
     def __init__(self, problems: Problem | Iterable[Problem]) -> None:
         self.problems = (problems,) if isinstance(problems, Problem) else tuple(problems)
         super().__init__("\n".join(str(problem) for problem in self.problems))
+
+    def __reduce__(self) -> tuple[type[InputError], tuple[tuple[Problem, ...]]]:
+        # The message, which pickling would pass on, is no list of problems.
+        return type(self), (self.problems,)
 
 
 class SpecError(InputError):

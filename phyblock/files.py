@@ -1,29 +1,212 @@
-"""Write files so that nobody ever sees half of one, and say clearly when the disk refuses."""
+"""Read files within bounds; write them whole, and never over what the user made.
+
+No input may hang, exhaust memory or end the process: the limits are far above what an honest file
+needs. Readers raise OSError for what the disk refuses and ValueError, with a text that can be shown
+as it is, for contents that are refused. A file is written whole or not at all; `OutFolder` writes
+into folders that hold files of the user.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
+import hashlib
+import io
+import json
+import math
 import os
+import re
+import shutil
 import stat
-from collections.abc import Iterable, Iterator
-from pathlib import Path
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any, BinaryIO
 from uuid import uuid4
 
-from phyblock.errors import Problem, StoreError
+from phyblock.errors import DataError, Problem, StoreError, reason_of
 
-__all__ = [
-    "append_whole",
-    "atomic_write",
-    "check_free",
-    "make_folder",
-    "sync_folder",
-    "write_named",
-    "writing",
-]
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
-_CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)
-"""What file systems say that know no sync of a folder."""
+LARGEST_FILE_BYTES = 64 * 1024 * 1024
+"""Default limit of a file that is read whole [bytes]."""
+LARGEST_PICTURE_BYTES = 32 * 1024 * 1024
+"""Limit of a picture file [bytes]."""
+LONGEST_INTEGER = 300
+"""Digits of an integer; what is longer fits no float."""
+_DEEPEST_JSON = 64
+
+_PICTURE_FORMATS = ("PNG", "JPEG", "GIF", "WEBP")
+_PICTURES_ALLOWED = "PNG, JPEG, GIF or WebP"
+_LEAST_SIDE_PX, _MOST_SIDE_PX, _MOST_PIXELS = 8, 10_000, 40_000_000
+_SIZES_ALLOWED = (
+    f"{_LEAST_SIDE_PX} to {_MOST_SIDE_PX:,} pixels a side, {_MOST_PIXELS // 10**6} million in all"
+)
+_DECODED: set[bytes] = set()
+"""Digests of picture files that were decoded: each is read several times in a run."""
+
+
+class NotRegularError(ValueError):
+    """A pipe, a device, a socket: what an ordinary open would wait for, or read without end."""
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a regular file for reading; NotRegularError for another, OSError as `open`."""
+    # A pipe without a writer would block an ordinary open.
+    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    mode = os.fstat(number).st_mode
+    if stat.S_ISREG(mode):
+        return os.fdopen(number, "rb")
+    os.close(number)
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, "Is a directory", str(path))
+    raise NotRegularError("is not a regular file")
+
+
+def read_bytes(path: Path, most_bytes: int = LARGEST_FILE_BYTES) -> bytes:
+    """Return the content of a regular file; ValueError where it is larger than `most_bytes`."""
+    with open_regular(path) as file:
+        data = file.read(most_bytes + 1)
+    if len(data) > most_bytes:
+        raise ValueError(f"is larger than {most_bytes / 1024**2:g} MB")
+    return data
+
+
+def read_text(path: Path, most_bytes: int = LARGEST_FILE_BYTES) -> str:
+    """Return the content of a regular UTF-8 file without its byte order mark; see `read_bytes`."""
+    data = read_bytes(path, most_bytes)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"is not UTF-8: {error.reason} at byte {error.start}") from None
+
+
+class RepeatedFieldError(ValueError):
+    """A JSON object holds a field twice; `field` names it."""
+
+    def __init__(self, field: str) -> None:
+        self.field = field
+        super().__init__(f"holds the field {field[:80]!r} twice in one object")
+
+
+def load_json(data: bytes | str, *, finite: bool = True, unique: bool = False) -> Any:
+    """Decode JSON whose nesting, integers and floats are bounded.
+
+    Raises ValueError (a JSONDecodeError for broken syntax) for NaN, Infinity, a float outside the
+    range of doubles, an integer of more than 300 digits, or nesting of more than 64 levels. With
+    `finite=False` numbers outside that range pass, up to 4,300 digits, for a reader that says which
+    field they stand in. With `unique` a field that stands twice in one object is refused too
+    (RepeatedFieldError).
+    """
+
+    def integer(digits: str) -> int:
+        if len(digits) > (LONGEST_INTEGER if finite else 4300):
+            raise ValueError(f"holds a number of {len(digits):,} digits")
+        return int(digits)
+
+    def number(digits: str) -> float:
+        value = float(digits)
+        if not math.isfinite(value):
+            raise ValueError(f"holds {digits[:20]}, which is outside the range of numbers")
+        return value
+
+    def constant(name: str) -> float:
+        raise ValueError(f"holds {name}, which is no JSON")
+
+    def mapping(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        fields: dict[str, Any] = {}
+        for field, value in pairs:
+            if field in fields:
+                raise RepeatedFieldError(field)
+            fields[field] = value
+        return fields
+
+    too_deep = ValueError(f"is nested more than {_DEEPEST_JSON} levels deep")
+    try:
+        value = json.loads(
+            data,
+            parse_int=integer,
+            parse_float=number if finite else None,
+            parse_constant=constant if finite else None,
+            object_pairs_hook=mapping if unique else None,
+        )
+    except RecursionError:
+        raise too_deep from None
+    level = [value]
+    for _ in range(_DEEPEST_JSON + 1):
+        level = [part for part in level if isinstance(part, (dict, list))]
+        if not level:
+            return value
+        level = [
+            inner for part in level for inner in (part.values() if isinstance(part, dict) else part)
+        ]
+    raise too_deep
+
+
+def read_picture(path: Path) -> bytes:
+    """Return the bytes of a picture file that can be decoded; DataError for any other."""
+    try:
+        data = read_bytes(path, LARGEST_PICTURE_BYTES)
+    except OSError as error:
+        raise DataError(_damaged(str(path), reason_of(error))) from error
+    except ValueError as error:
+        raise DataError(_damaged(str(path), f"it {error}")) from error
+    digest = hashlib.sha256(data).digest()
+    if digest not in _DECODED:
+        decode_picture(data, str(path)).close()
+        _DECODED.add(digest)
+    return data
+
+
+def decode_picture(data: bytes, where: str) -> Image:
+    """Decode the first frame of an encoded picture; DataError, at `where`, for a bad one."""
+    picture = _open_picture(data, where)
+    try:
+        picture.load()
+    except Exception as error:
+        # The bytes steer the decoder, which can fail in any way.
+        picture.close()
+        raise DataError(_damaged(where, reason_of(error))) from error
+    return picture
+
+
+def picture_size(data: bytes, where: str) -> tuple[int, int]:
+    """Return width and height [pixels] by a picture's header; DataError for a bad header."""
+    with _open_picture(data, where) as picture:
+        return picture.width, picture.height
+
+
+def _open_picture(data: bytes, where: str) -> Image:
+    # Decoders of other formats start programs (EPS starts Ghostscript) or are seldom maintained.
+    from PIL import Image, UnidentifiedImageError
+
+    too_large = "is a picture of a size that is not allowed"
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            picture = Image.open(io.BytesIO(data), formats=_PICTURE_FORMATS)
+    except UnidentifiedImageError as error:
+        found = f"a file that begins with {data[:12]!r}" if data else "an empty file"
+        raise DataError(Problem(where, "is no picture", "", found, _PICTURES_ALLOWED)) from error
+    except (Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
+        pixels = re.search(r"\d+", str(error))
+        found = f"{int(pixels[0]):,} pixels" if pixels else reason_of(error)
+        raise DataError(Problem(where, too_large, "", found, _SIZES_ALLOWED)) from error
+    except Exception as error:
+        raise DataError(_damaged(where, reason_of(error))) from error
+    width, height = picture.size
+    small, large = min(width, height), max(width, height)
+    if small < _LEAST_SIDE_PX or large > _MOST_SIDE_PX or small * large > _MOST_PIXELS:
+        picture.close()
+        found = f"{width:,} x {height:,} pixels"
+        raise DataError(Problem(where, too_large, "", found, _SIZES_ALLOWED))
+    return picture
+
+
+def _damaged(where: str, why: str) -> Problem:
+    return Problem(where, f"is not a readable picture: {why}", allowed=_PICTURES_ALLOWED)
 
 
 @contextlib.contextmanager
@@ -36,8 +219,8 @@ def writing(path: Path, hint: str = "") -> Iterator[None]:
         yield
     except (OSError, UnicodeEncodeError) as error:
         # A name that the file system cannot spell is an encoding error, no OSError.
-        said = getattr(error, "strerror", None) or str(error) or type(error).__name__
-        raise StoreError(Problem(str(path), f"cannot be written: {said}", hint=hint)) from error
+        message = f"cannot be written: {reason_of(error)}"
+        raise StoreError(Problem(str(path), message, hint=hint)) from error
 
 
 def check_free(paths: Iterable[Path], hint: str) -> None:
@@ -56,10 +239,9 @@ def make_folder(path: Path, hint: str = "") -> None:
 def atomic_write(path: Path, data: bytes | str, *, sync: bool = False) -> None:
     """Write a whole file, or leave what was there and nothing beside it.
 
-    Text is written as UTF-8, with question marks for halves of characters. The permissions are
-    those of any new file. Where `path` is a link, the link is replaced and its target stays as it
-    is. With `sync` it survives the death of the machine. Raises OSError where the disk refuses: see
-    `writing`.
+    Text is written as UTF-8, with question marks for halves of characters. Where `path` is a link,
+    the link is replaced and its target stays as it is. With `sync` the file survives the death of
+    the machine. Raises OSError where the disk refuses: see `writing`.
     """
     # A name of its own: two processes may write the same file at the same time.
     partial = path.with_name(f".{uuid4().hex}.part")
@@ -83,7 +265,8 @@ def sync_folder(path: Path) -> None:
     try:
         os.fsync(number)
     except OSError as error:
-        if error.errno not in _CANNOT_SYNC:
+        # Some file systems have no sync of a folder.
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):
             raise
     finally:
         os.close(number)
@@ -94,7 +277,7 @@ def append_whole(number: int, data: bytes, *, sync: bool = False) -> None:
 
     With `sync` it is on disk at the end. Raises OSError where the disk refuses: see `writing`.
     """
-    # Asked before anything is written: a size that is not known must never be cut back to.
+    # Read before anything is written: a size that is not known must never be cut back to.
     size = os.fstat(number).st_size
     try:
         left = memoryview(data)
@@ -122,3 +305,170 @@ def write_named(path: Path, data: bytes | str) -> None:
             raise StoreError(Problem(str(path), f"cannot be written: it is {what}"))
         target.parent.mkdir(parents=True, exist_ok=True)
         atomic_write(target, data)
+
+
+LIST = ".generated"
+"""The file that names what phyblock wrote into a folder."""
+_HEAD = "# What phyblock wrote here and may write again; all else is never touched."
+_LINK = "cannot be written: it is a link, and links are never followed or replaced"
+_CLOSED = "cannot be written in: permission denied"
+_MOVE = "move it away; phyblock writes over nothing that it did not make"
+
+
+class OutFolder:
+    """A folder that phyblock writes into beside files of the user.
+
+    The names that phyblock wrote stand in `.generated`, a line each, written before the file is.
+    Whatever else is there is the user's: it is never written over or removed, and a link is never
+    followed. Names are of files, relative, with slashes; one that ends in a slash is of a folder.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def check(self, names: Iterable[str]) -> None:
+        """Raise StoreError naming all that is in the way of writing `names`; nothing is written.
+
+        In the way are files that phyblock never wrote, links, and folders that cannot be written
+        in.
+        """
+        names = list(names)
+        # What is there is looked at first: another process lists a name before it writes the file.
+        there = [n for n in names if not n.endswith("/") and os.path.lexists(self.path / n)]
+        known = self._known()
+        problems: dict[Path, str] = {}
+        for name in names:
+            if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
+                problems[self.path / name] = "cannot be written: its name leads out of the folder"
+        # The folder itself may be a link: a person named it.
+        for folder in (self.path, *(self.path / below for below in _folders(names))):
+            if folder.is_symlink() and folder != self.path:
+                problems[folder] = _LINK
+            elif folder.exists() and not folder.is_dir() and folder != self.path:
+                problems[folder] = "cannot be written in: it is no folder"
+            elif folder.is_dir() and not os.access(folder, os.W_OK | os.X_OK):
+                problems[folder] = _CLOSED
+        for name in there:
+            path = self.path / name
+            if any(above in problems for above in path.parents):
+                continue
+            if path.is_symlink():
+                problems[path] = _LINK
+            elif not path.is_file():
+                problems[path] = "cannot be written: it is no file"
+            elif name not in known:
+                problems[path] = "cannot be written: phyblock did not make what is there"
+        if problems:
+            let_in = "let yourself write there, or choose another folder"
+            raise StoreError(
+                Problem(str(path), message, hint=let_in if message == _CLOSED else _MOVE)
+                for path, message in problems.items()
+            )
+
+    def claim(self, names: Iterable[str]) -> None:
+        """List `names` as phyblock's and make their folders; raises as `check`."""
+        names = list(names)
+        self.check(names)
+        make_folder(self.path, "choose another folder with --out")
+        path = self.path / LIST
+        with writing(path):
+            listed = self._listed()
+            known = set(listed.split("\n"))
+            lines = [n for n in dict.fromkeys(names) if not n.endswith("/") and n not in known]
+            # The death of the machine may have cut the last line short.
+            start = "\n" if listed and not listed.endswith("\n") else ""
+            text = start + "".join(f"{line}\n" for line in ([] if listed else [_HEAD]) + lines)
+            with path.open("ab", buffering=0) as file:
+                # In one piece, so that lines of two processes never mix.
+                append_whole(file.fileno(), text.encode("utf-8", "surrogateescape"))
+        for folder in _folders(names):
+            make_folder(self.path / folder, _MOVE)
+
+    def write(self, files: Mapping[str, bytes | str]) -> tuple[Path, ...]:
+        """Write files by name, each whole or not at all; raises as `check`, or as the disk does."""
+        self.claim(files)
+        for name, data in files.items():
+            with writing(self.path / name):
+                atomic_write(self.path / name, data)
+        return tuple(self.path / name for name in files)
+
+    def names(self, below: str) -> list[str]:
+        """Return phyblock's names that begin with `below`, whether the files are there or not."""
+        return sorted(name for name in self._known() if name.startswith(below))
+
+    def remove(self, names: Iterable[str]) -> None:
+        """Remove those of `names` that are phyblock's, and folders that are empty then.
+
+        Nothing else in an output folder is ever removed. Raises StoreError where the disk refuses.
+        """
+        known = self._known()
+        folders: set[str] = set()
+        for name in names:
+            path, above = self.path / name, _folders([name])
+            if name not in known or any((self.path / folder).is_symlink() for folder in above):
+                continue
+            if path.is_file() and not path.is_symlink():
+                with writing(path):
+                    path.unlink(missing_ok=True)
+                folders |= set(above)
+        for folder in sorted(folders, reverse=True):
+            with writing(self.path / folder):
+                if next((self.path / folder).iterdir(), None) is None:
+                    (self.path / folder).rmdir()
+
+    @contextlib.contextmanager
+    def making(self, below: str = "") -> Iterator[Path]:
+        """Give a new folder to write any files into; at the end they are moved to `below` in here.
+
+        `below` is empty or a folder's name with its slash. Where the work fails, nothing is left of
+        it. Raises as `write`.
+        """
+        self.claim([below] if below else [])
+        part = self.path / f".{uuid4().hex}.part"
+        with writing(self.path / below):
+            part.mkdir()
+        try:
+            yield part
+            files = sorted(path for path in part.rglob("*") if path.is_file())
+            names = [path.relative_to(part).as_posix() for path in files]
+            self.claim(below + name for name in names)
+            with writing(self.path / below):
+                for file, name in zip(files, names, strict=True):
+                    file.replace(self.path / below / name)
+        finally:
+            shutil.rmtree(part)
+
+    @contextlib.contextmanager
+    def alone(self) -> Iterator[None]:
+        """Wait until no other process is in here, and keep others out."""
+        self.claim([])
+        with contextlib.ExitStack() as stack:
+            with writing(self.path / LIST):
+                file = stack.enter_context((self.path / LIST).open("ab"))
+                fcntl.flock(file, fcntl.LOCK_EX)
+            yield
+
+    def _known(self) -> set[str]:
+        return set(self._listed().split("\n"))
+
+    def _listed(self) -> str:
+        """Return the text of the list, empty where there is none."""
+        path = self.path / LIST
+        with writing(path):
+            if path.is_symlink():
+                raise StoreError(Problem(str(path), _LINK, hint=_MOVE))
+            try:
+                return read_bytes(path).decode("utf-8", "surrogateescape")
+            except FileNotFoundError:
+                return ""
+            except ValueError as error:
+                raise StoreError(Problem(str(path), str(error), hint=_MOVE)) from error
+
+
+def _folders(names: Iterable[str]) -> list[str]:
+    """Return the folders that are named or hold what is named, those above first."""
+    folders: set[str] = set()
+    for name in names:
+        path = PurePosixPath(f"{name}_" if name.endswith("/") else name)
+        folders |= {str(above) for above in path.parents}
+    return sorted(folders - {".", "/"})

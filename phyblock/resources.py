@@ -1,17 +1,18 @@
-"""Where the suites, prompts, data sets and models file that come with the project are."""
+"""The suites, prompts, data sets and models file that come with the project; caches; extras."""
 
 from __future__ import annotations
 
+import importlib
 import os
 from pathlib import Path
 
-__all__ = ["bundled", "bundled_sets", "cache_dir", "learned_dir", "reply_cache_file"]
+from phyblock.errors import Problem, SpecError
 
 _PACKAGE = Path(__file__).parent
 
 
 def bundled(*parts: str) -> Path:
-    """A path inside what comes with the project: `benchmarks/`, `prompts/` or `models.yaml`.
+    """Return a path inside what comes with the project: `benchmarks/`, `prompts/` or `models.yaml`.
 
     In an installed wheel they lie in the package, in a checkout beside it.
     """
@@ -20,12 +21,12 @@ def bundled(*parts: str) -> Path:
 
 
 def bundled_sets(file: str) -> list[str]:
-    """Names of the bundled data sets that hold a file of this name, sorted."""
+    """Return the names of the bundled data sets that hold a file of this name, sorted."""
     return sorted(path.parent.name for path in bundled("benchmarks", "data").glob(f"*/{file}"))
 
 
 def cache_dir() -> Path:
-    """The user's cache folder: `$PHYBLOCK_CACHE`, else the platform's place for caches."""
+    """Return the user's cache folder: `$PHYBLOCK_CACHE`, else the platform's place for caches."""
     named = os.environ.get("PHYBLOCK_CACHE")
     if named:
         return Path(named).expanduser()
@@ -33,12 +34,19 @@ def cache_dir() -> Path:
 
 
 def learned_dir() -> Path:
-    """Where plans that floors learned and what floors reach are kept, `DIGEST.json` each: they cost
-    time alone.
-    """
+    """Return the folder of what floors learned and reach, which costs time alone."""
     return cache_dir() / "goal-blind"
 
 
 def reply_cache_file() -> Path:
-    """The reply cache that all runs of this user share."""
+    """Return the reply cache that all runs of this user share."""
     return cache_dir() / "replies.sqlite"
+
+
+def needs(package: str, extra: str, form: str) -> None:
+    """Raise SpecError that names the extra to install where a format's package is not there."""
+    try:
+        importlib.import_module(package)
+    except ImportError as error:
+        name, hint = package.partition(".")[0], f"pip install 'phyblock[{extra}]'"
+        raise SpecError(Problem(f"--to {form}", f"needs the package {name}", hint=hint)) from error

@@ -1,18 +1,39 @@
+"""Files are read within bounds, written whole, and never over what the user made."""
+
 from __future__ import annotations
 
+import contextlib
+import io
+import json
 import os
 import resource
 import signal
+import struct
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image, PngImagePlugin
 
-from phyblock.errors import StoreError
-from phyblock.files import atomic_write, write_named, writing
+from phyblock.errors import DataError, StoreError
+from phyblock.files import (
+    LIST,
+    OutFolder,
+    atomic_write,
+    decode_picture,
+    load_json,
+    picture_size,
+    read_bytes,
+    read_picture,
+    read_text,
+    write_named,
+    writing,
+)
+from tests.fuzz.strategies import PICTURES, png_header
 
 
 @given(st.binary() | st.text())
@@ -93,3 +114,314 @@ def test_a_device_is_never_replaced(tmp_path: Path) -> None:
             write_named(path, "text")
     assert list(tmp_path.iterdir()) == [tmp_path / "pipe"]
     assert (tmp_path / "pipe").is_fifo()
+
+
+_VALUES = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(st.characters(exclude_categories=("Cs",))),
+    lambda below: st.lists(below) | st.dictionaries(st.text(), below),
+)
+
+
+@given(_VALUES)
+def test_json_of_ordinary_size_is_read_as_json_reads_it(value: object) -> None:
+    text = json.dumps(value)
+    assert load_json(text) == json.loads(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[" * 66 + "]" * 66, "nested"),
+        ("[" * 100_000, "nested"),
+        ('{"a":' * 100_000, "nested"),
+        ("NaN", "NaN"),
+        ("[-Infinity]", "-Infinity"),
+        ("[1e999]", "outside the range"),
+        ("1" * 400, "400 digits"),
+        ("1" * 100_000, "digits"),
+        ("{", "Expecting"),
+    ],
+)
+def test_json_beyond_the_bounds_is_a_value_error(text: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        load_json(text)
+
+
+def test_nesting_is_allowed_down_to_the_limit() -> None:
+    assert load_json("[" * 64 + "]" * 64)
+
+
+def test_a_file_is_read_up_to_the_limit(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(b"x" * 100)
+    assert read_bytes(path, 100) == b"x" * 100
+    with pytest.raises(ValueError, match="larger than"):
+        read_bytes(path, 99)
+
+
+def test_pipes_and_devices_are_refused_at_once(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for path in (pipe, Path("/dev/zero")):
+        with pytest.raises(ValueError, match="regular file"):
+            read_bytes(path)
+    with pytest.raises(IsADirectoryError):
+        read_bytes(tmp_path)
+
+
+def test_text_is_utf_8(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes("\ufeffä".encode())
+    assert read_text(path) == "ä"
+    path.write_bytes(b"ab\xff")
+    with pytest.raises(ValueError, match="at byte 2"):
+        read_text(path)
+
+
+EPS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 90 90\nshowpage\n"
+
+
+def encoded(format_name: str, size: tuple[int, int] = (64, 32), mode: str = "RGB") -> bytes:
+    buffer = io.BytesIO()
+    Image.linear_gradient("L").resize(size).convert(mode).save(buffer, format_name)
+    return buffer.getvalue()
+
+
+def chunk(name: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+
+
+def with_chunk(png: bytes, name: bytes, body: bytes) -> bytes:
+    """The PNG with another chunk behind its header."""
+    return png[:33] + chunk(name, body) + png[33:]
+
+
+BOMB = zlib.compress(b"x" * (PngImagePlugin.MAX_TEXT_CHUNK + 1))
+GOOD = {name: encoded(name) for name in ("PNG", "JPEG", "GIF", "WEBP")}
+BAD = {
+    "eps": (EPS, "is no picture"),
+    "bmp": (encoded("BMP"), "is no picture"),
+    "tiff": (encoded("TIFF"), "is no picture"),
+    "text": (b"no picture", "is no picture"),
+    "nothing": (b"", "an empty file"),
+    "dot": (encoded("PNG", (1, 1)), "1 x 1 pixels"),
+    "thin": (encoded("PNG", (64, 1)), "64 x 1 pixels"),
+    "wide": (png_header(10_001, 8), "10,001 x 8 pixels"),
+    "large": (png_header(8_000, 8_000), "8,000 x 8,000 pixels"),
+    "bomb": (png_header(30_000, 30_000), "900,000,000 pixels"),
+    "warned": (png_header(10_000, 10_000), "100,000,000 pixels"),
+    "no-size": (png_header(0, 0), "pic.png"),
+    "cut-png": (GOOD["PNG"][:-40], "is not a readable picture: "),
+    "cut-jpeg": (GOOD["JPEG"][: len(GOOD["JPEG"]) // 2], "is not a readable picture: "),
+    "cut-webp": (GOOD["WEBP"][: len(GOOD["WEBP"]) // 2], "pic.png"),
+    "empty-data": (png_header(64, 64), "is not a readable picture: "),
+    "text-bomb": (with_chunk(GOOD["PNG"], b"zTXt", b"a\0\0" + BOMB), "is not a readable picture: "),
+    "unicode": (with_chunk(GOOD["PNG"], b"iTXt", b"a\0\1\0\0\0" + BOMB), "pic.png"),
+    "crc": (GOOD["PNG"][:30] + b"\0" + GOOD["PNG"][31:], "pic.png"),
+}
+
+
+@pytest.mark.parametrize("format_name", GOOD)
+def test_four_formats_are_read(format_name: str, tmp_path: Path) -> None:
+    path = tmp_path / "any.name"
+    path.write_bytes(GOOD[format_name])
+    assert read_picture(path) == GOOD[format_name]
+    assert picture_size(GOOD[format_name], "x") == (64, 32)
+    assert decode_picture(GOOD[format_name], "x").size == (64, 32)
+
+
+@pytest.mark.parametrize(("data", "told"), BAD.values(), ids=BAD)
+def test_a_bad_picture_is_refused(data: bytes, told: str, tmp_path: Path) -> None:
+    path = tmp_path / "pic.png"
+    path.write_bytes(data)
+    with pytest.raises(DataError) as caught:
+        read_picture(path)
+    (problem,) = caught.value.problems
+    assert problem.where == str(path)
+    assert told in str(problem)
+    assert problem.allowed
+
+
+def test_no_program_is_started_for_a_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = tmp_path / "started"
+    script = tmp_path / "gs"
+    script.write_text(f"#!/bin/sh\ntouch {told}\n")
+    script.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    path = tmp_path / "000.png"
+    path.write_bytes(EPS)
+    with pytest.raises(DataError, match="is no picture"):
+        read_picture(path)
+    assert not told.exists()
+
+
+def test_what_is_no_file_or_too_large(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(DataError, match="is not a regular file"):
+        read_picture(tmp_path / "pipe")
+    with pytest.raises(DataError, match="Is a directory"):
+        read_picture(tmp_path)
+    with pytest.raises(DataError, match="No such file"):
+        read_picture(tmp_path / "none.png")
+    with (tmp_path / "big.png").open("wb") as file:
+        file.truncate(40 * 2**20)
+    with pytest.raises(DataError, match="is larger than 32 MB"):
+        read_picture(tmp_path / "big.png")
+
+
+@settings(deadline=None)
+@given(PICTURES)
+def test_any_bytes_are_a_picture_or_a_data_error(data: bytes) -> None:
+    with contextlib.suppress(DataError):
+        picture = decode_picture(data, "pic")
+        assert 8 <= min(picture.size) <= max(picture.size) <= 10_000
+        assert picture_size(data, "pic") == picture.size
+
+
+NAMES = ("a.csv", "b.md", "tables/c.csv", "tables/deep/d.csv", "figures/e.svg")
+some = st.sets(st.sampled_from(NAMES))
+
+
+def contents(folder: Path) -> dict[str, str]:
+    files = (path for path in folder.rglob("*") if path.is_file() and path.name != LIST)
+    return {str(path.relative_to(folder)): path.read_text() for path in files}
+
+
+def put(folder: Path, names: set[str]) -> None:
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text("theirs")
+
+
+@given(theirs=some, first=some, later=some)
+def test_what_we_never_wrote_is_never_written_over(
+    tmp_path_factory: pytest.TempPathFactory, theirs: set[str], first: set[str], later: set[str]
+) -> None:
+    folder = tmp_path_factory.mktemp("out")
+    put(folder, theirs)
+    for round_, names in enumerate((first, later, first)):
+        before = contents(folder)
+        texts = dict.fromkeys(sorted(names), f"ours {round_}")
+        if names & theirs:
+            with pytest.raises(StoreError) as caught:
+                OutFolder(folder).write(texts)
+            assert len(caught.value.problems) == len(names & theirs)
+            assert contents(folder) == before
+        else:
+            OutFolder(folder).write(texts)
+            assert contents(folder) == before | texts
+
+
+def test_links_are_neither_followed_nor_replaced(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "file").write_text("theirs")
+    out = tmp_path / "out"
+    OutFolder(out).write({"c.csv": "ours"})
+    (out / "c.csv").unlink()
+    (out / "c.csv").symlink_to(tmp_path / "elsewhere" / "file")
+    (out / "tables").symlink_to(tmp_path / "elsewhere", target_is_directory=True)
+    with pytest.raises(StoreError) as caught:
+        OutFolder(out).write({"tables/file": "ours", "tables/deep/x": "ours", "c.csv": "ours"})
+    assert [problem.where for problem in caught.value.problems] == [
+        str(out / "tables"),
+        str(out / "c.csv"),
+    ]
+    assert contents(tmp_path / "elsewhere") == {"file": "theirs"}
+
+
+def test_a_list_that_is_a_link_is_not_written_through(tmp_path: Path) -> None:
+    theirs = tmp_path / "theirs"
+    theirs.write_text("theirs")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / LIST).symlink_to(theirs)
+    with pytest.raises(StoreError, match="it is a link"):
+        OutFolder(tmp_path / "out").write({"a": "ours"})
+    assert theirs.read_text() == "theirs"
+
+
+def test_files_and_folders_in_the_way_are_named(tmp_path: Path) -> None:
+    (tmp_path / "tables").write_text("theirs")
+    (tmp_path / "a.csv").mkdir()
+    with pytest.raises(StoreError) as caught:
+        OutFolder(tmp_path).check(["tables/b.csv", "a.csv"])
+    told = {problem.where: problem.message for problem in caught.value.problems}
+    assert told == {
+        str(tmp_path / "tables"): "cannot be written in: it is no folder",
+        str(tmp_path / "a.csv"): "cannot be written: it is no file",
+    }
+    assert not (tmp_path / LIST).exists()
+
+
+def test_a_closed_folder_is_not_said_to_be_in_the_way(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The one who runs the tests may be root, whom no folder is closed to."""
+    monkeypatch.setattr("os.access", lambda *_: False)
+    with pytest.raises(StoreError) as caught:
+        OutFolder(tmp_path).check(["a.csv"])
+    (problem,) = caught.value.problems
+    assert problem.message == "cannot be written in: permission denied"
+    assert "choose another folder" in problem.hint
+
+
+@pytest.mark.parametrize("name", ["../mine", "a/../../mine", "/mine"])
+def test_no_name_leads_out_of_the_folder(tmp_path: Path, name: str) -> None:
+    with pytest.raises(StoreError, match="leads out of the folder"):
+        OutFolder(tmp_path / "out").write({name: "ours"})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_list_that_was_cut_short_is_no_failure(tmp_path: Path) -> None:
+    OutFolder(tmp_path).write({"a.csv": "1", "b.md": "1"})
+    listed = (tmp_path / LIST).read_bytes()
+    os.truncate(tmp_path / LIST, len(listed) - 3)
+    with pytest.raises(StoreError, match=r"b\.md"):
+        OutFolder(tmp_path).write({"b.md": "2", "c": "2"})
+    OutFolder(tmp_path).write({"a.csv": "2", "c": "2"})
+    OutFolder(tmp_path).write({"c": "3"})
+    assert contents(tmp_path) == {"a.csv": "2", "b.md": "1", "c": "3"}
+
+
+def test_only_what_is_ours_is_removed_and_folders_that_are_empty_then(tmp_path: Path) -> None:
+    out = OutFolder(tmp_path / "out")
+    out.write({"a/b/one": "ours", "a/two": "ours", "c/three": "ours", "d/four": "ours"})
+    (out.path / "c" / "theirs").write_text("mine")
+    (out.path / "d" / "four").unlink()
+    (out.path / "d").rmdir()
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "four").write_text("mine")
+    (out.path / "d").symlink_to(tmp_path / "elsewhere")
+    assert out.names("a/") == ["a/b/one", "a/two"]
+    out.remove(["a/b/one", "a/two", "c/three", "c/theirs", "d/four", "gone"])
+    left = {path.relative_to(out.path).as_posix() for path in out.path.rglob("*")}
+    assert left == {LIST, "c", "c/theirs", "d"}
+    assert (tmp_path / "elsewhere" / "four").read_text() == "mine"
+
+
+def make(out: OutFolder, name: str, failure: Exception | None = None) -> None:
+    with out.making() as folder:
+        (folder / "b").write_text("ours")
+        (folder / name).write_text("ours")
+        if failure is not None:
+            raise failure
+
+
+def test_files_that_are_made_together_come_together_or_not_at_all(tmp_path: Path) -> None:
+    out = OutFolder(tmp_path / "out")
+    with out.making("deep/") as folder:
+        (folder / "x").mkdir()
+        (folder / "x" / "y").write_text("ours")
+    assert contents(out.path) == {"deep/x/y": "ours"}
+    put(out.path, {"mine"})
+    with pytest.raises(ValueError, match="stop"):
+        make(out, "a", ValueError("stop"))
+    with pytest.raises(StoreError, match="mine"):
+        make(out, "mine")
+    assert contents(out.path) == {"deep/x/y": "ours", "mine": "theirs"}
+    assert sorted(path.name for path in out.path.iterdir()) == [LIST, "deep", "mine"]

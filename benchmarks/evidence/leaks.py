@@ -22,7 +22,7 @@ from phyblock.domain.scene import Kind
 from phyblock.making.auditing.tells import Part, Tells, find_tells
 from phyblock.resources import bundled
 from phyblock.scoring import Goal, match_plan, micro
-from phyblock.words import SETTINGS
+from phyblock.types import SETTINGS
 
 Pick = Callable[[Sequence[int]], int]
 """One of the places at which a kind is listed."""

@@ -22,7 +22,7 @@ from phyblock.domain import Plan
 from phyblock.models.raw_replies import read_raw_reply
 from phyblock.parsing import parse_plan
 from phyblock.scoring import AssemblyScorer, BlockOutcome, Score
-from phyblock.words import SETTINGS
+from phyblock.types import SETTINGS
 
 GROUPS: dict[str, tuple[tuple[BlockOutcome, ...], float]] = {
     "placed": (("placed",), 29.4),

@@ -19,7 +19,7 @@ from phyblock.domain import Plan
 from phyblock.models.raw_replies import read_raw_reply
 from phyblock.parsing import parse_plan
 from phyblock.scoring import Goal, match_plan, micro
-from phyblock.words import MATCHERS, SETTINGS
+from phyblock.types import MATCHERS, SETTINGS
 
 
 def valid_plans(task: AssemblyTask, orders: int, rng: np.random.Generator) -> Iterator[Plan]:

@@ -22,7 +22,7 @@ from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
 from phyblock.sim.assembly import filmstrip_png
 from phyblock.sim.camera import VIEWS
 from phyblock.sim.exploded import exploded_png
-from phyblock.words import BACKGROUNDS
+from phyblock.types import BACKGROUNDS
 
 OUT = Path(__file__).parents[2] / "docs" / "images" / "pictures"
 CELL_PX, CAPTION_PX, GAP_PX = 240, 24, 4

@@ -25,7 +25,7 @@ from phyblock.tracks.pose_planning.judging import (
     judge_poses,
 )
 from phyblock.tracks.pose_planning.track import PosePlanning
-from phyblock.words import PoseRotation
+from phyblock.types import PoseRotation
 
 ROTATIONS: tuple[PoseRotation, ...] = ("candidate", "free")
 LEAST_IOU = 0.98

@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from scipy.stats import binomtest
 
 from phyblock.parsing import parse_plan
-from phyblock.words import PlanParser
+from phyblock.types import PlanParser
 from tests.parsing.fresh_replies import KINDS, Fresh, fresh_replies, tally
 from tests.parsing.test_plan_hostile import ALIKE, LAST, LATER, NONE, PLANS
 from tests.parsing.test_plan_manners import FAILURES, READ

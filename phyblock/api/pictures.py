@@ -11,7 +11,7 @@ from phyblock.datasets import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.files import write_named
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png, goal_style
-from phyblock.words import Background, View
+from phyblock.types import Background, View
 
 __all__ = ["Picture", "Shown", "render"]
 

@@ -10,7 +10,7 @@ from phyblock.datasets import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.parsing import parse_plan
 from phyblock.scoring import AssemblyScorer, ErrorType
-from phyblock.words import MATCHERS, PLAN_PARSERS, SETTINGS, Matcher, PlanParser, Setting
+from phyblock.types import MATCHERS, PLAN_PARSERS, SETTINGS, Matcher, PlanParser, Setting
 
 __all__ = ["PlanScore", "score"]
 

@@ -8,14 +8,14 @@ from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from phyblock.bounded import read_bytes
 from phyblock.bundle.archive import ABOUT, MEMBERS
-from phyblock.digests import hex_digest
 from phyblock.errors import Problem, StoreError
+from phyblock.files import read_bytes
 from phyblock.parsing import READER_VERSION
 from phyblock.records import MANIFEST, RECORDS, Line, Manifest
 from phyblock.records.decode import decode, problem_of
 from phyblock.report.inputs import digest_of_file
+from phyblock.stable import hex_digest
 
 __all__ = [
     "FORMAT",

@@ -17,8 +17,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import BinaryIO
 
-from phyblock.bounded import open_regular
-from phyblock.errors import Problem, StoreError, said
+from phyblock.errors import Problem, StoreError, reason_of
+from phyblock.files import open_regular
 from phyblock.records import MANIFEST, RECORDS
 
 __all__ = ["ABOUT", "MEMBERS", "pack", "unpack"]
@@ -84,9 +84,9 @@ def unpack(path: Path, folder: Path) -> None:
     except FileNotFoundError as error:
         raise StoreError(Problem(str(path), "is not there")) from error
     except (zipfile.BadZipFile, zlib.error, struct.error, EOFError) as error:
-        raise _refused(path, f"{_NOT}, or it is damaged: {said(error)}") from error
+        raise _refused(path, f"{_NOT}, or it is damaged: {reason_of(error)}") from error
     except (OSError, ValueError, NotImplementedError, RuntimeError) as error:
-        raise _refused(path, f"cannot be read: {said(error)}") from error
+        raise _refused(path, f"cannot be read: {reason_of(error)}") from error
 
 
 def _check_end(path: Path, file: BinaryIO) -> None:

@@ -9,7 +9,7 @@ import click
 from phyblock.bundle import BUNDLE_FILE, Verified, bundle_run
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
-from phyblock.plain_text import counted
+from phyblock.text import counted
 
 __all__ = ["command", "how_whole"]
 

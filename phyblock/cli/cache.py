@@ -10,10 +10,10 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import make_console, plain_table
-from phyblock.errors import InputError, Problem, said
+from phyblock.errors import InputError, Problem, reason_of
 from phyblock.models import ReplyCache
-from phyblock.plain_text import counted
 from phyblock.resources import learned_dir, reply_cache_file
+from phyblock.text import counted
 
 __all__ = ["command"]
 
@@ -69,7 +69,9 @@ def _clear_learned() -> None:
         try:
             path.unlink(missing_ok=True)
         except OSError as error:
-            raise InputError(Problem(str(path), f"cannot be removed: {said(error)}")) from error
+            raise InputError(
+                Problem(str(path), f"cannot be removed: {reason_of(error)}")
+            ) from error
         removed.append(size)
     make_console().print(f"Deleted {_sizes_text(removed)}.")
 

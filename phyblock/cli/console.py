@@ -13,8 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from phyblock.cli.layout import lay_out
-from phyblock.plain_text import one_line, plain_lines
 from phyblock.report import TextTable
+from phyblock.text import one_line, plain_lines
 
 __all__ = ["make_console", "plain_table", "print_view", "shown_path"]
 

@@ -12,7 +12,6 @@ from phyblock.cli.paths import UserPath
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.files import write_named
-from phyblock.plain_text import counted
 from phyblock.records import MANIFEST, RECORDS, Record, read_manifest
 from phyblock.records.reading import newest_starts, run_records
 from phyblock.run.data import recorded_dataset
@@ -20,6 +19,7 @@ from phyblock.sim import PictureStyle
 from phyblock.sim.film import episode_gif, episode_images, episode_sheet
 from phyblock.tables.design import read_design
 from phyblock.tables.track_report import EpisodeView
+from phyblock.text import counted
 from phyblock.tracks import kind_of, kinds
 from phyblock.tracks.showing import as_recorded
 

@@ -8,10 +8,10 @@ from rich.console import Console
 
 from phyblock.cli.console import print_view
 from phyblock.models import Price
-from phyblock.plain_text import counted
 from phyblock.report import NO_VALUE, Column, TextTable
 from phyblock.run.estimate import Estimate
 from phyblock.run.plan import RunPlan
+from phyblock.text import counted
 from phyblock.tracks import kind_of
 
 __all__ = ["show_estimate"]

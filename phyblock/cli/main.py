@@ -11,9 +11,9 @@ from collections import Counter
 import click
 
 from phyblock.cli.verbs import Verbs
-from phyblock.errors import InputError, PhyblockError, Problem, StoreError, said
-from phyblock.plain_text import counted, plain_lines
-from phyblock.words import QUOTE_HINT
+from phyblock.errors import InputError, PhyblockError, Problem, StoreError, reason_of
+from phyblock.text import counted, plain_lines
+from phyblock.types import QUOTE_HINT
 
 __all__ = ["main", "show_problems"]
 
@@ -102,7 +102,7 @@ def main() -> None:
     except OSError as error:
         _drop_output()
         where = "output" if error.filename is None else os.fsdecode(error.filename)
-        show_problems(StoreError(Problem(where, f"cannot be used: {said(error)}")))
+        show_problems(StoreError(Problem(where, f"cannot be used: {reason_of(error)}")))
         sys.exit(2)
     sys.exit(code if isinstance(code, int) else 0)
 

@@ -25,7 +25,6 @@ from phyblock.models import (
     prices_of,
     today,
 )
-from phyblock.plain_text import counted
 from phyblock.registry import baseline_names
 from phyblock.report import NO_VALUE
 from phyblock.run.check import check_model
@@ -40,6 +39,7 @@ from phyblock.specs import (
     load_models,
     with_members,
 )
+from phyblock.text import counted
 
 __all__ = ["command"]
 

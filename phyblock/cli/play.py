@@ -15,12 +15,11 @@ import click
 from rich.console import Console
 from rich.progress import Progress
 
-from phyblock.bounded import read_text
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.cli.report import show_made
-from phyblock.errors import Problem, SpecError, said
-from phyblock.plain_text import counted
+from phyblock.errors import Problem, SpecError, reason_of
+from phyblock.files import read_text
 from phyblock.play.answers import FileAnswers, default_text, read_answers
 from phyblock.play.export import check_folder, check_offline, export_sitting
 from phyblock.play.page import default_consent
@@ -36,6 +35,7 @@ from phyblock.run.plan import RunPlan
 from phyblock.run.session import Session
 from phyblock.run.store import held_run
 from phyblock.specs import load_suite
+from phyblock.text import counted
 
 __all__ = ["command"]
 
@@ -134,7 +134,7 @@ def _text(path: Path) -> str:
         text = read_text(path, _LARGEST_CONSENT_BYTES).strip()
     except OSError as error:
         raise SpecError(
-            Problem(str(path), f"cannot be read: {said(error)}", "--consent")
+            Problem(str(path), f"cannot be read: {reason_of(error)}", "--consent")
         ) from error
     except ValueError as error:
         raise SpecError(Problem(str(path), str(error), "--consent")) from error

@@ -18,7 +18,6 @@ from rich.text import Text
 
 from phyblock.cli.remarks import Remarks
 from phyblock.cli.tally import Tally, failure_text
-from phyblock.plain_text import counted, one_line
 from phyblock.run.events import (
     ModelNotice,
     ModelStopped,
@@ -29,6 +28,7 @@ from phyblock.run.events import (
     Stopping,
 )
 from phyblock.run.standing import Summary
+from phyblock.text import counted, one_line
 
 __all__ = ["ProgressView"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
-from phyblock.plain_text import counted
 from phyblock.run.events import ModelNotice
+from phyblock.text import counted
 
 __all__ = ["Remarks"]
 

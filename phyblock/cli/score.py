@@ -9,9 +9,9 @@ import click
 
 from phyblock.cli.paths import UserPath, moved_data_option
 from phyblock.cli.report import show_tables
-from phyblock.plain_text import plain_lines
 from phyblock.run.rescore import rescore
-from phyblock.words import MATCHERS, PLAN_PARSERS, Matcher, PlanParser
+from phyblock.text import plain_lines
+from phyblock.types import MATCHERS, PLAN_PARSERS, Matcher, PlanParser
 
 __all__ = ["command"]
 

@@ -8,8 +8,8 @@ import click
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
-from phyblock.plain_text import counted
 from phyblock.site import write_site
+from phyblock.text import counted
 
 __all__ = ["command"]
 

@@ -9,9 +9,9 @@ from rich.console import Console
 
 from phyblock.cli.console import print_view, shown_path
 from phyblock.cli.layout import width_of
-from phyblock.plain_text import one_line
 from phyblock.report import TextTable
 from phyblock.report.terminal import Failure, Terminal
+from phyblock.text import one_line
 
 __all__ = ["print_summary"]
 

@@ -9,18 +9,18 @@ from pathlib import Path
 
 import click
 
-from phyblock.bounded import read_bytes
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath, models_file_option
 from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
-from phyblock.plain_text import counted
+from phyblock.files import read_bytes
 from phyblock.resources import bundled
 from phyblock.run.asking import asking_remarks
 from phyblock.run.finding import check_commands, find_models_file, find_suite, prompt_dirs
 from phyblock.run.plan import make_plan
 from phyblock.run.soundness import model_problems
 from phyblock.specs import RECORDED, ModelSpec, load_models, load_suite, suite_model
+from phyblock.text import counted
 
 __all__ = ["command"]
 

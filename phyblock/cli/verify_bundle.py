@@ -11,7 +11,7 @@ from phyblock.bundle.verify import FELL
 from phyblock.cli.bundle import how_whole
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
-from phyblock.plain_text import counted
+from phyblock.text import counted
 
 __all__ = ["command"]
 

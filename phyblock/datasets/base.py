@@ -9,11 +9,10 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from phyblock.bounded import read_bytes
-from phyblock.digests import hex_digest
 from phyblock.domain import CandidateSet, Question, Scene
-from phyblock.errors import DataError, Problem, said
-from phyblock.picture_files import LARGEST_PICTURE_BYTES
+from phyblock.errors import DataError, Problem, reason_of
+from phyblock.files import LARGEST_PICTURE_BYTES, read_bytes
+from phyblock.stable import hex_digest
 
 __all__ = ["AssemblyTask", "Dataset", "QuestionSet", "QuestionTask"]
 
@@ -88,7 +87,7 @@ def _picture_bytes(path: Path) -> bytes:
     try:
         return read_bytes(path, LARGEST_PICTURE_BYTES)
     except (OSError, ValueError) as error:
-        raise DataError(Problem(str(path), f"cannot be read: {said(error)}")) from error
+        raise DataError(Problem(str(path), f"cannot be read: {reason_of(error)}")) from error
 
 
 def _digest(content: object) -> str:

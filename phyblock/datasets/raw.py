@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from phyblock.bounded import RepeatedFieldError, load_json, read_bytes
-from phyblock.errors import DataError, Problem, said
+from phyblock.errors import DataError, Problem, reason_of
+from phyblock.files import RepeatedFieldError, load_json, read_bytes
 
 __all__ = [
     "gather",
@@ -34,7 +34,7 @@ def read_text(path: Path, allowed: str = "") -> str:
     try:
         return read_bytes(path, _LARGEST_BYTES).decode("utf-8")
     except OSError as error:
-        problem = Problem(str(path), f"cannot be read: {said(error)}", allowed=allowed)
+        problem = Problem(str(path), f"cannot be read: {reason_of(error)}", allowed=allowed)
         raise DataError(problem) from error
     except UnicodeDecodeError as error:
         raise DataError(Problem(str(path), f"is not UTF-8 text: {error.reason}")) from error

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from phyblock.bounded import read_text
-from phyblock.errors import DataError, Problem, said
+from phyblock.errors import DataError, Problem, reason_of
+from phyblock.files import read_text
 
 __all__ = ["UNNUMBERED", "VERSION_FILE", "read_version"]
 
@@ -23,7 +23,7 @@ def read_version(folder: Path) -> int:
     except FileNotFoundError:
         return UNNUMBERED
     except (OSError, ValueError) as error:
-        raise DataError(Problem(str(path), f"cannot be read: {said(error)}")) from error
+        raise DataError(Problem(str(path), f"cannot be read: {reason_of(error)}")) from error
     if not (text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS and int(text)):
         allowed = "a whole number from 1"
         raise DataError(Problem(str(path), "holds no version", "", repr(text[:20]), allowed))

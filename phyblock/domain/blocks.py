@@ -17,7 +17,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.sums import plain_sum
+from phyblock.stable import plain_sum
 
 __all__ = [
     "BLOCK_TYPES",

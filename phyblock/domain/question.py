@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
 from phyblock.domain.scene import Block, Scene
-from phyblock.words import Background
+from phyblock.types import Background
 
 __all__ = [
     "CATEGORIES",

@@ -14,7 +14,7 @@ from phyblock.scoring import Assembly
 from phyblock.sim import PictureStyle, candidates_png
 from phyblock.sim.site import ONE_SETTING, Lookout, Settled, Site
 from phyblock.sim.stability import DEFAULT_TRIAL
-from phyblock.words import Gating, Physics, Setting
+from phyblock.types import Gating, Physics, Setting
 
 __all__ = ["BlockPlay"]
 

@@ -26,10 +26,10 @@ from phyblock.env.pose_play import PosePlay
 from phyblock.env.scenes import read_tasks
 from phyblock.env.state import MOST_BLOCKS, candidate_rows, goal_rows, rows_space
 from phyblock.errors import DataError, Problem
-from phyblock.plain_text import some_of
 from phyblock.sim import PictureStyle
 from phyblock.sim.pictures import LARGEST_PX, SMALLEST_PX
-from phyblock.words import GATINGS, SETTINGS, Background, Gating, Physics, PoseRotation, Setting
+from phyblock.text import some_of
+from phyblock.types import GATINGS, SETTINGS, Background, Gating, Physics, PoseRotation, Setting
 
 __all__ = ["Observation", "PhyBlockEnv"]
 

@@ -21,7 +21,7 @@ from phyblock.sim.carry import CarriedStep, Carrying
 from phyblock.sim.kit import kit_png
 from phyblock.sim.placing import center_cm, put, upright
 from phyblock.sim.ruled import RuledFloor
-from phyblock.words import PoseRotation
+from phyblock.types import PoseRotation
 
 __all__ = ["PosePlay"]
 

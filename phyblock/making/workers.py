@@ -6,13 +6,12 @@ import contextlib
 import importlib
 import socket
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import Future
 from itertools import islice
 from typing import Any, Protocol, TypeVar
 
 from phyblock.errors import InputError, PhyblockError, Problem
-from phyblock.worker_processes import end_workers, starting_workers, worker_pool
+from phyblock.workers import WorkerDiedError, WorkerPool
 
 __all__ = ["Workers", "open_workers"]
 
@@ -46,12 +45,12 @@ def open_workers(jobs: int = 1, ray_address: str | None = None) -> Iterator[Work
     elif jobs == 1:
         yield _Here()
     else:
-        with worker_pool(jobs) as pool:
+        with WorkerPool(jobs) as pool:
             try:
                 yield _Processes(pool, jobs * _AHEAD)
             except KeyboardInterrupt:
                 # Of what is under way nothing is wanted, and a worker hears no Ctrl-C of its own.
-                end_workers(pool)
+                pool.kill()
                 raise
 
 
@@ -61,7 +60,7 @@ class _Here:
 
 
 class _Processes:
-    def __init__(self, pool: ProcessPoolExecutor, ahead: int) -> None:
+    def __init__(self, pool: WorkerPool, ahead: int) -> None:
         self._pool, self._ahead = pool, ahead
 
     def map(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
@@ -71,12 +70,11 @@ class _Processes:
             while running:
                 yield running.pop(0).result()
                 running += [self._submit(function, task) for task in islice(waiting, 1)]
-        except BrokenProcessPool as error:
+        except WorkerDiedError as error:
             raise PhyblockError("a worker process was killed; nothing was written") from error
 
     def _submit(self, function: Callable[[T], R], task: T) -> Future[R]:
-        with starting_workers():
-            return self._pool.submit(function, task)
+        return self._pool.submit(function, task)
 
 
 class _Ray:

@@ -12,12 +12,12 @@ import time
 from collections.abc import Sequence
 from typing import IO
 
-from phyblock.errors import Problem, SpecError, said
+from phyblock.errors import Problem, SpecError, reason_of
 from phyblock.models.address_file import LARGEST_BYTES, addresses_in
 from phyblock.models.events import Tell
 from phyblock.models.keys import environment_secrets, hidden
 from phyblock.models.limits import Clock
-from phyblock.plain_text import one_line
+from phyblock.text import one_line
 
 __all__ = ["AddressCommand", "addresses_by"]
 
@@ -41,7 +41,7 @@ class _Runs:
         except ValueError as error:
             raise self.fault(str(error)) from None
         except OSError as error:
-            raise self.fault(f"cannot be run: {said(error)}") from None
+            raise self.fault(f"cannot be run: {reason_of(error)}") from None
         return addresses_in(text, self.name, _FIELD)
 
     def end(self) -> None:
@@ -188,7 +188,7 @@ class AddressCommand:
             return await asyncio.to_thread(self._runs.addresses)
         except RuntimeError as error:
             # No thread is left to run it in.
-            raise self._runs.fault(f"cannot be run: {said(error)}") from None
+            raise self._runs.fault(f"cannot be run: {reason_of(error)}") from None
 
     async def aclose(self) -> None:
         """End what still runs."""

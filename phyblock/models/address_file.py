@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from phyblock.addresses import AddressFault, address_fault
-from phyblock.bounded import read_text
 from phyblock.errors import Problem, SpecError
+from phyblock.files import read_text
 from phyblock.models.events import Tell
 from phyblock.models.limits import Clock
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
-from phyblock.digests import hex_digest
 from phyblock.errors import PhyblockError
-from phyblock.words import Finish, Role
+from phyblock.stable import hex_digest
+from phyblock.types import Finish, Role
 
 __all__ = [
     "AskLaterError",

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from phyblock.digests import drawn_bytes
 from phyblock.errors import Problem, SpecError
 from phyblock.models.base import Reply, Request, Usage
 from phyblock.models.config import ModelConfig
 from phyblock.registry import baseline_names, baseline_rules
+from phyblock.stable import drawn_bytes
 
 __all__ = ["BaselineModel"]
 

@@ -18,7 +18,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
 
-from phyblock.digests import hex_digest
 from phyblock.errors import Problem, StoreError
 from phyblock.models.base import Image, Message, Reply, Request, Usage
 from phyblock.models.config import ModelConfig
@@ -26,7 +25,8 @@ from phyblock.models.events import Tell, ignore_text
 from phyblock.models.leases import Leases
 from phyblock.models.payload import wire_params
 from phyblock.models.raw_replies import token_count
-from phyblock.words import Finish
+from phyblock.stable import hex_digest
+from phyblock.types import Finish
 
 __all__ = ["CacheBusyError", "CacheStats", "ReplyCache", "former_key", "known_keys", "reply_key"]
 

@@ -11,7 +11,7 @@ from typing import Literal
 from phyblock.addresses import address_fault
 from phyblock.errors import Problem, SpecError
 from phyblock.models.prices import Prices
-from phyblock.words import ImageDetail, SendMode, TransportName
+from phyblock.types import ImageDetail, SendMode, TransportName
 
 __all__ = [
     "DIRECT_PROVIDERS",

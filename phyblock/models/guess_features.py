@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from phyblock.domain.question import Question
-from phyblock.sums import plain_sum
+from phyblock.stable import plain_sum
 
 __all__ = ["option_features", "text_features"]
 

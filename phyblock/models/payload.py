@@ -16,7 +16,7 @@ from typing import Any
 from phyblock.errors import DataError, Problem
 from phyblock.models.base import Image, Message, Request
 from phyblock.models.config import ModelConfig
-from phyblock.words import ImageDetail
+from phyblock.types import ImageDetail
 
 __all__ = ["data_uri", "json_body", "mime_type", "wire_messages", "wire_params"]
 

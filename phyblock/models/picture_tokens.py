@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from phyblock.models.base import Image
-from phyblock.words import ImageDetail
+from phyblock.types import ImageDetail
 
 __all__ = ["picture_tokens"]
 

@@ -12,8 +12,8 @@ from typing import Any
 
 from phyblock.errors import DataError, Problem
 from phyblock.models.base import Usage
-from phyblock.plain_text import well_formed
-from phyblock.words import Finish
+from phyblock.text import well_formed
+from phyblock.types import Finish
 
 __all__ = [
     "RawReply",

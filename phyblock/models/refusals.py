@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from datetime import datetime, timezone
 from typing import Any
 
-from phyblock.bounded import load_json
 from phyblock.errors import (
     ModelError,
     RefusedError,
@@ -17,6 +16,7 @@ from phyblock.errors import (
     SampleError,
     UnavailableError,
 )
+from phyblock.files import load_json
 from phyblock.models.http_client import Answer
 
 __all__ = [

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from phyblock.bounded import load_json, read_text
-from phyblock.errors import DataError, Problem, RefusedError, SampleError, said
+from phyblock.errors import DataError, Problem, RefusedError, SampleError, reason_of
+from phyblock.files import load_json, read_text
 from phyblock.models.base import Reply, Request
 from phyblock.models.config import ModelConfig
 from phyblock.models.raw_replies import RawReply, read_raw_reply
@@ -117,7 +117,7 @@ def _read_json(path: Path) -> object:
     try:
         return load_json(read_text(path), finite=False)
     except OSError as error:
-        raise DataError(Problem(str(path), f"cannot be read: {said(error)}")) from error
+        raise DataError(Problem(str(path), f"cannot be read: {reason_of(error)}")) from error
     except ValueError as error:
         where = f"{path}:{getattr(error, 'lineno', 1)}:{getattr(error, 'colno', 1)}"
         raise DataError(Problem(where, f"is not JSON: {error}")) from error

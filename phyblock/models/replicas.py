@@ -15,7 +15,7 @@ from phyblock.models.breaker import Breaker, Breakers
 from phyblock.models.config import ModelConfig
 from phyblock.models.pace import FixedPace, Mark, Pace
 from phyblock.models.transport import Transport
-from phyblock.plain_text import counted
+from phyblock.text import counted
 
 __all__ = ["Replica", "Replicas"]
 

@@ -12,7 +12,7 @@ from phyblock.models.base import Message, Reply
 from phyblock.models.config import ModelConfig
 from phyblock.models.http_client import Client, HttpClient
 from phyblock.models.keys import hidden
-from phyblock.plain_text import well_formed
+from phyblock.text import well_formed
 
 __all__ = ["Call", "GuardedTransport", "SeedRefusedError", "Transport"]
 

@@ -35,7 +35,7 @@ from phyblock.parsing.plan_rank import LAST, MOVES, rank_of
 from phyblock.parsing.reply_lists import reply_lists
 from phyblock.parsing.speech import BACKWARD, REFUSAL
 from phyblock.parsing.text_forms import BOX, TAG, answer_of, plain_line
-from phyblock.words import PlanParser
+from phyblock.types import PlanParser
 
 __all__ = ["PLAN_PROBLEMS", "ParsedPlan", "PlanProblem", "kept_plan", "parse_plan"]
 

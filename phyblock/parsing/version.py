@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from phyblock.words import PlanParser
+from phyblock.types import PlanParser
 
 __all__ = ["POSE_READER_VERSION", "READER_VERSION", "reader_version"]
 

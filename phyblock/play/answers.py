@@ -8,16 +8,16 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from phyblock.bounded import load_json, read_bytes, read_text
 from phyblock.datasets.raw import parse_json
-from phyblock.digests import hex_digest
-from phyblock.errors import DataError, Problem, said
+from phyblock.errors import DataError, Problem, reason_of
+from phyblock.files import load_json, read_bytes, read_text
 from phyblock.models import HaltedError, Request
 from phyblock.play.page import default_consent
 from phyblock.play.person import Given, Person, picking_of
 from phyblock.records.decode import problem_of
 from phyblock.records.line import Amount
 from phyblock.run.plan import RunPlan
+from phyblock.stable import hex_digest
 from phyblock.tracks.base import shown_item
 from phyblock.tracks.by_hand import Picking, picks_of
 
@@ -103,7 +103,7 @@ def _read_file(path: Path) -> AnswersFile:
     try:
         text = read_text(path, _LARGEST_BYTES)
     except OSError as error:
-        raise DataError(Problem(str(path), f"cannot be read: {said(error)}")) from error
+        raise DataError(Problem(str(path), f"cannot be read: {reason_of(error)}")) from error
     except ValueError as error:
         raise DataError(Problem(str(path), f"{_IS_NOT}: {error}")) from error
     try:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from phyblock.errors import Problem, SpecError
-from phyblock.folders import OutFolder
+from phyblock.files import OutFolder
 from phyblock.play.answers import ANSWERS_FORMAT
 from phyblock.play.page import assets
 from phyblock.play.person import Person, picking_of

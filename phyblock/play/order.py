@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypeVar
 
-from phyblock.digests import drawn_bytes
+from phyblock.stable import drawn_bytes
 from phyblock.tracks import Item
 
 __all__ = ["arranged", "row_of_name", "williams_row", "williams_rows"]

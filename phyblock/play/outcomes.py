@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from phyblock.errors import SpecError
-from phyblock.plain_text import one_line
 from phyblock.records import Record
 from phyblock.records.reading import read_records
 from phyblock.report.alike import check_alike
 from phyblock.report.comparable import Comparable, Part, comparable
 from phyblock.tables.design import Design
 from phyblock.tables.load import Run, load_run
+from phyblock.text import one_line
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["outcomes"]

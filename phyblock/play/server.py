@@ -22,8 +22,8 @@ from socketserver import TCPServer
 from typing import Any
 from urllib.parse import urlsplit
 
-from phyblock.bounded import load_json
-from phyblock.errors import Problem, SpecError, said
+from phyblock.errors import Problem, SpecError, reason_of
+from phyblock.files import load_json
 from phyblock.play.desk import Desk, NotNowError
 from phyblock.play.page import assets
 from phyblock.tracks.by_hand import Pick, picks_of
@@ -69,7 +69,7 @@ class Server:
         try:
             self._http = _Listener((HOST, port), handler)
         except OSError as error:
-            problem = Problem("--port", f"cannot be used: {said(error)}", found=str(port))
+            problem = Problem("--port", f"cannot be used: {reason_of(error)}", found=str(port))
             raise SpecError(problem) from error
         self._thread = threading.Thread(target=self._http.serve_forever, daemon=True)
 

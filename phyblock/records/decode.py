@@ -8,8 +8,8 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from phyblock.bounded import load_json
 from phyblock.errors import Problem
+from phyblock.files import load_json
 from phyblock.records.line import encodable
 
 __all__ = ["decode", "dotted", "is_cut", "problem_of", "shown"]

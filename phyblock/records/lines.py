@@ -9,8 +9,8 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from phyblock.bounded import NotRegularError, open_regular
 from phyblock.errors import InputError, Problem, StoreError
+from phyblock.files import NotRegularError, open_regular
 from phyblock.records.belonging import Belonging
 from phyblock.records.decode import decode, is_cut, problem_of
 from phyblock.records.line import Line

@@ -6,7 +6,7 @@ from typing import Literal
 
 from phyblock.records.line import Line, Usd, Whole
 from phyblock.records.reply import StoredReply
-from phyblock.words import Role
+from phyblock.types import Role
 
 __all__ = ["BatchEvent", "BatchLine", "PictureMark", "Prompt", "PromptMessage", "Turn"]
 

@@ -24,7 +24,7 @@ from phyblock.records.decode import shown
 from phyblock.records.faults import Fault, fits, free_of
 from phyblock.records.line import Line
 from phyblock.records.picture import OF_BLOCKS, About, Picture, StoredPicture
-from phyblock.words import Background
+from phyblock.types import Background
 
 __all__ = ["Options", "SceneId", "StoredQuestion"]
 

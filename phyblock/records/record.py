@@ -13,9 +13,9 @@ from pydantic import Field
 
 from phyblock.records.line import Amount, Line, Whole
 from phyblock.records.reply import StoredError, StoredReply
-from phyblock.sums import plain_sum
+from phyblock.stable import plain_sum
+from phyblock.types import AskedAs, Outcome
 from phyblock.variants import Variant
-from phyblock.words import AskedAs, Outcome
 
 __all__ = [
     "AskedTurn",

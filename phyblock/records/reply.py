@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeVar
 from typing_extensions import Self
 
 from phyblock.records.line import LARGEST_WHOLE, Amount, Line, Usd, Whole, encodable
-from phyblock.words import Finish
+from phyblock.types import Finish
 
 __all__ = ["ErrorKind", "StoredError", "StoredReply", "StoredUsage"]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from phyblock.bounded import read_bytes
+from phyblock.files import read_bytes
 from phyblock.records.line import Line
 
 __all__ = ["STOPPED", "Stopped", "read_stopped"]

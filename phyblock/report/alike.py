@@ -8,10 +8,10 @@ from pathlib import Path
 import pandas as pd
 
 from phyblock.errors import Problem, SpecError
-from phyblock.plain_text import counted
 from phyblock.records.manifest import ManifestDataset, ManifestQuestions
 from phyblock.tables.load import Run
 from phyblock.tables.measures import Measure
+from phyblock.text import counted
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["check_alike"]

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from phyblock.folders import OutFolder
-from phyblock.plain_text import counted
+from phyblock.files import OutFolder
 from phyblock.report.compare import Comparison
 from phyblock.scoring.uncertainty import POWER
 from phyblock.tables.csv_text import to_csv
@@ -16,6 +15,7 @@ from phyblock.tables.latex import to_latex
 from phyblock.tables.markdown import to_markdown
 from phyblock.tables.measures import in_unit
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, between, level_name, number
+from phyblock.text import counted
 
 __all__ = ["compare_view", "flipped_lines", "p_text", "ranks_view", "write_comparison"]
 

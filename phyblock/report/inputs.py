@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from phyblock.bounded import NotRegularError, open_regular
+from phyblock.files import NotRegularError, open_regular
 from phyblock.records import MANIFEST, PROMPTS, RECORDS, STOPPED, read_manifest
 from phyblock.resources import cache_dir
 from phyblock.run.code import code_digest, digest_of, state_of

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import BaseModel, ConfigDict
 
-from phyblock.bounded import NotRegularError, read_bytes
+from phyblock.files import NotRegularError, read_bytes
 from phyblock.report.inputs import digest_of_file
 from phyblock.report.terminal import Terminal
 from phyblock.run.code import code_digest

@@ -7,7 +7,6 @@ from dataclasses import asdict, fields
 
 import pandas as pd
 
-from phyblock.plain_text import counted
 from phyblock.tables.headline import Value, headline_rows, headline_values
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL
@@ -19,6 +18,7 @@ from phyblock.tables.text_table import (
     track_column,
     track_text,
 )
+from phyblock.text import counted
 from phyblock.tracks.estimates import samples_lacking, track_estimates, track_measures
 from phyblock.tracks.headline import headline_columns, main_column
 from phyblock.tracks.kind import kind_of

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from phyblock.plain_text import counted
 from phyblock.report.compare import Comparison, compare_models, compare_runs
 from phyblock.report.measure_table import headline_of, main_heading
 from phyblock.report.write import make_tables, table_names
 from phyblock.tables.load import Run
 from phyblock.tables.load import load_run as load_frames
 from phyblock.tables.text_table import TextTable, between, number
+from phyblock.text import counted
 from phyblock.tracks.estimates import all_estimates
 from phyblock.tracks.kind import kind_of
 

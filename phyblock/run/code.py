@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from phyblock.digests import hex_digest
 from phyblock.registry import has_additions
+from phyblock.stable import hex_digest
 
 __all__ = ["code_digest", "digest_of", "state_of"]
 

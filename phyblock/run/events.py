@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from phyblock.plain_text import counted
 from phyblock.records import Record
 from phyblock.run.standing import Summary
+from phyblock.text import counted
 
 __all__ = [
     "ModelNotice",

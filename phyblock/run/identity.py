@@ -10,11 +10,11 @@ from typing import Any
 
 from phyblock.datasets import Dataset
 from phyblock.datasets.version import UNNUMBERED
-from phyblock.digests import hex_digest
 from phyblock.parsing import READER_VERSION
 from phyblock.records import FORMAT
 from phyblock.run.models import PlannedModel
 from phyblock.specs import SuiteSpec
+from phyblock.stable import hex_digest
 from phyblock.tracks import AnyTrack
 from phyblock.tracks.base import READER
 from phyblock.variants import Variant

@@ -9,12 +9,12 @@ from typing import Any
 
 from phyblock.errors import Problem, StoreError
 from phyblock.parsing import READER_VERSION
-from phyblock.plain_text import counted
 from phyblock.records import RECORDS, Manifest, Record
 from phyblock.records.reading import read_records
 from phyblock.run.judging import judged_apart
 from phyblock.run.records import about_item
 from phyblock.run.replayed import counted_again
+from phyblock.text import counted
 from phyblock.tracks import AnyTrack, EpisodeTrack, SingleTrack, kind_of, shown_item
 from phyblock.variants import Variant
 

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter
 
-from phyblock.bounded import read_bytes
 from phyblock.datasets import Dataset
-from phyblock.files import atomic_write
+from phyblock.files import atomic_write, read_bytes
 from phyblock.records import Manifest
 from phyblock.resources import learned_dir
 from phyblock.run.code import code_digest, digest_of

@@ -34,7 +34,7 @@ from phyblock.specs import (
     unknown_model,
     with_members,
 )
-from phyblock.words import AnswerFormat, CandidateOrder
+from phyblock.types import AnswerFormat, CandidateOrder
 
 __all__ = ["PlannedModel", "plan_models", "recorded_format", "recorded_order", "to_config"]
 

@@ -10,11 +10,11 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from phyblock.digests import hex_digest
 from phyblock.models.base import Image, Message
 from phyblock.records import PictureMark, Prompt, PromptLines, PromptMessage
 from phyblock.records.line import encodable
 from phyblock.run.appending import AppendFile
+from phyblock.stable import hex_digest
 
 __all__ = ["PromptFile", "read_prompts"]
 

@@ -19,7 +19,7 @@ from phyblock.records import (
 from phyblock.records.known import known_records
 from phyblock.tracks import Episode, Item, Judgement
 from phyblock.tracks.counting import count_sample
-from phyblock.words import Outcome
+from phyblock.types import Outcome
 
 __all__ = ["about_item", "about_prompt", "begun", "judged"]
 

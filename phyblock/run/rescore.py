@@ -23,7 +23,7 @@ from phyblock.run.rewritten import write_run
 from phyblock.specs import SuiteSpec, suite_model
 from phyblock.tracks import AnyTrack, kind_of
 from phyblock.tracks.counting import counts_samples
-from phyblock.words import Matcher, PlanParser
+from phyblock.types import Matcher, PlanParser
 
 if TYPE_CHECKING:
     from phyblock.run.floors import FloorValues

@@ -18,7 +18,7 @@ __all__ = ["manifest_text", "record_lines", "write_run"]
 def write_run(folder: Path, manifest: Manifest, records: Iterable[Record]) -> None:
     """Write manifest and records of a run; raises StoreError where the disk refuses."""
     texts = {MANIFEST: manifest_text(manifest), RECORDS: "".join(record_lines(records))}
-    run_folder(folder).begin()
+    run_folder(folder).claim([])
     with writing(folder):
         for name, text in texts.items():
             atomic_write(folder / name, text)

@@ -7,7 +7,6 @@ from collections.abc import Awaitable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
-from phyblock.digests import drawn_bytes
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
 from phyblock.models import AskLaterError, Halt, Model, ModelConfig, Reply, Request, Usage
 from phyblock.models.stored import reply_of, stored
@@ -17,7 +16,7 @@ from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, begun, judged
 from phyblock.run.shielded import to_its_end
 from phyblock.run.writer import RecordWriter
-from phyblock.sums import plain_sum
+from phyblock.stable import drawn_bytes, plain_sum
 from phyblock.tracks import (
     AnyTrack,
     Episode,
@@ -26,8 +25,8 @@ from phyblock.tracks import (
     SingleTrack,
     shown_item,
 )
+from phyblock.types import AskedAs
 from phyblock.variants import Variant
-from phyblock.words import AskedAs
 
 __all__ = ["Sample", "SampleRunner"]
 

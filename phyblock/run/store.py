@@ -80,7 +80,7 @@ class RunStore:
         try:
             with writing(folder, _HINT):
                 check_place(folder)
-                run_folder(folder).begin()
+                run_folder(folder).claim([])
                 self._lock = (folder / LOCK).open("w")
                 self._acquire()
                 self._claim(manifest)

@@ -18,7 +18,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from phyblock.parsing import READER_VERSION
-from phyblock.plain_text import counted
 from phyblock.records import Line, Manifest, Record, StoredReply, Turn
 from phyblock.run.appending import AppendFile
 from phyblock.run.judged_again import (
@@ -30,6 +29,7 @@ from phyblock.run.judged_again import (
 from phyblock.run.plan import RunPlan
 from phyblock.run.replayed import read_again
 from phyblock.run.store import RunStore
+from phyblock.text import counted
 from phyblock.tracks import AnyTrack, EpisodeTrack
 
 __all__ = ["begun_anew", "earlier_readers", "take_on"]

@@ -13,7 +13,7 @@ from phyblock.scoring.losses import BlockOutcome, block_outcomes
 from phyblock.scoring.match import match_plan, step_errors
 from phyblock.scoring.metrics import Counts
 from phyblock.scoring.nearest import steps_kept
-from phyblock.words import Criterion, Level1Criterion, Matcher, Setting
+from phyblock.types import Criterion, Level1Criterion, Matcher, Setting
 
 __all__ = ["AssemblyScorer", "Score"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable, Sequence
 
 from phyblock.domain import AOVGraph, CandidateSet, Scene
-from phyblock.words import Setting
+from phyblock.types import Setting
 
 __all__ = ["Goal"]
 

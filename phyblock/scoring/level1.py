@@ -12,7 +12,7 @@ from collections import Counter
 from phyblock.domain import Plan
 from phyblock.scoring.goal import Goal
 from phyblock.scoring.metrics import Counts
-from phyblock.words import Level1Criterion
+from phyblock.types import Level1Criterion
 
 __all__ = ["level1_counts"]
 

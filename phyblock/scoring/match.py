@@ -12,7 +12,7 @@ from phyblock.domain import Plan
 from phyblock.scoring.error_types import ErrorType, error_type
 from phyblock.scoring.goal import Goal
 from phyblock.scoring.metrics import Counts
-from phyblock.words import Matcher
+from phyblock.types import Matcher
 
 __all__ = ["Match", "match_plan", "most_placed", "step_errors"]
 

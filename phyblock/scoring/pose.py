@@ -25,7 +25,7 @@ from phyblock.scoring.pose_align import Motion, Poses, likely_motions, nearness
 from phyblock.scoring.pose_match import TOLERANCES_CM, Nearness, matched
 from phyblock.scoring.ratios import Floats
 from phyblock.scoring.solids import Piece, overlap_volume, placed
-from phyblock.words import Setting
+from phyblock.types import Setting
 
 __all__ = ["POSE_FRAMES", "Laid", "PoseFit", "PoseFrame", "PoseScore", "PoseScorer"]
 

@@ -23,7 +23,7 @@ from phyblock.scoring.pose_match import (
     assigned,
 )
 from phyblock.scoring.ratios import Floats
-from phyblock.sums import plain_sum
+from phyblock.stable import plain_sum
 
 __all__ = ["Motion", "Poses", "likely_motions", "nearness"]
 

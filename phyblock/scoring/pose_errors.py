@@ -9,7 +9,7 @@ from phyblock.scoring.error_types import error_type
 from phyblock.scoring.goal import Goal
 from phyblock.scoring.pose import PoseFit
 from phyblock.scoring.pose_match import TURN_TOLERANCE_DEG
-from phyblock.words import StepEnd
+from phyblock.types import StepEnd
 
 __all__ = ["ERROR_TOLERANCE_CM", "POSE_ERRORS", "PoseError", "pose_errors"]
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.sums import plain_sum
+from phyblock.stable import plain_sum
 
 __all__ = ["Piece", "overlap_volume", "placed", "volume"]
 

@@ -18,7 +18,7 @@ from phyblock.domain import CandidateSet, Scene
 from phyblock.scoring.error_types import ERROR_TYPES, ErrorType, error_type
 from phyblock.scoring.goal import Goal
 from phyblock.scoring.metrics import Counts
-from phyblock.words import Gating, Setting
+from phyblock.types import Gating, Setting
 
 __all__ = [
     "MOVE_OUTCOMES",

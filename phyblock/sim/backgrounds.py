@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from phyblock.sim.renderer import Rgb
-from phyblock.words import Background
+from phyblock.types import Background
 
 __all__ = ["DARK_INK", "INK_RGB", "LIGHT_INK", "TONES", "Tones"]
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.sim.exact import dot, rounded, turned
-from phyblock.words import View
+from phyblock.types import View
 
 __all__ = ["FIELD_OF_VIEW_DEG", "FULL_WINDOW", "VIEWS", "Camera", "Window", "frame", "view_axes"]
 

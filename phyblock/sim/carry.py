@@ -34,7 +34,7 @@ from phyblock.sim.support import (
     pieces_of,
 )
 from phyblock.sim.world import World
-from phyblock.words import StepEnd
+from phyblock.types import StepEnd
 
 __all__ = [
     "LONGEST_S",

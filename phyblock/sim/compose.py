@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from phyblock.sim.backgrounds import DARK_INK, LIGHT_INK, TONES
 from phyblock.sim.surfaces import SURFACES
-from phyblock.words import Background
+from phyblock.types import Background
 
 __all__ = [
     "GRID_COLUMNS",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from PIL import Image, ImageDraw, ImageFont
 
-from phyblock.picture_files import decoded
+from phyblock.files import decode_picture
 from phyblock.sim.compose import to_png
 
 __all__ = ["LETTERED_VERSION", "lettered_sheet_png", "sheet_size_px"]
@@ -30,7 +30,7 @@ def lettered_sheet_png(pictures: Sequence[bytes], letters: str, side_px: int) ->
     step = side_px + _gap_px(side_px)
     for number, (data, letter) in enumerate(zip(pictures, letters, strict=True)):
         row, column = divmod(number, _COLUMNS)
-        with decoded(data, f"picture {letter}") as picture:
+        with decode_picture(data, f"picture {letter}") as picture:
             cell = picture.convert("RGB").resize((side_px, side_px), Image.Resampling.LANCZOS)
         _draw_badge(cell, letter)
         sheet.paste(cell, (column * step, row * step))

@@ -11,7 +11,7 @@ import io
 
 from PIL import Image, ImageDraw, ImageFont
 
-from phyblock.digests import hex_digest
+from phyblock.stable import hex_digest
 
 __all__ = ["library_pixels"]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from phyblock.sim.backgrounds import INK_RGB, TONES
 from phyblock.sim.renderer import Raster
-from phyblock.words import Background
+from phyblock.types import Background
 
 __all__ = ["draw_outlines"]
 

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from phyblock.digests import hex_digest
 from phyblock.domain.blocks import SHAPES, BlockType, Color, Euler
 from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
@@ -30,7 +29,8 @@ from phyblock.sim.library_pixels import library_pixels
 from phyblock.sim.registry import renderer
 from phyblock.sim.render import DrawnBlock, picture
 from phyblock.sim.renderer import Renderer
-from phyblock.words import BACKGROUNDS, Background, CandidateScale, View
+from phyblock.stable import hex_digest
+from phyblock.types import BACKGROUNDS, Background, CandidateScale, View
 
 __all__ = [
     "LARGEST_PX",

@@ -11,7 +11,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import fields, replace
 
-from phyblock.digests import hex_digest
 from phyblock.domain.blocks import SHAPES
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block
@@ -26,6 +25,7 @@ from phyblock.sim.pictures import (
     pixel_versions,
 )
 from phyblock.sim.render import DrawnBlock, picture
+from phyblock.stable import hex_digest
 
 __all__ = [
     "BLOCK_LABEL",

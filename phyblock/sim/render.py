@@ -31,7 +31,7 @@ from phyblock.sim.pose import Pose
 from phyblock.sim.registry import renderer
 from phyblock.sim.renderer import Light, Prop, Raster, Renderer, Rgb
 from phyblock.sim.textures import floor, shadow
-from phyblock.words import Background
+from phyblock.types import Background
 
 __all__ = [
     "COLOR_RGB",

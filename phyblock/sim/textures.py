@@ -13,7 +13,7 @@ from PIL import Image, ImageFilter
 from phyblock.sim.backgrounds import TONES
 from phyblock.sim.camera import Camera
 from phyblock.sim.surfaces import PERIOD_M, SURFACES, Surface, sample
-from phyblock.words import Background
+from phyblock.types import Background
 
 __all__ = ["floor", "shadow"]
 

@@ -12,10 +12,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from phyblock.digests import hex_digest
 from phyblock.errors import Problem, SpecError, StoreError
-from phyblock.files import writing
-from phyblock.folders import LIST, OutFolder
+from phyblock.files import LIST, OutFolder, writing
 from phyblock.records import MANIFEST, RECORDS
 from phyblock.report.inputs import digest_of_file
 from phyblock.site.alike import check_runs_alike
@@ -25,6 +23,7 @@ from phyblock.site.entries import entries_of
 from phyblock.site.page import render_page
 from phyblock.site.runs import SiteRun, open_runs
 from phyblock.site.samples import write_samples
+from phyblock.stable import hex_digest
 from phyblock.tracks.drawable import kit
 
 __all__ = ["INDEX", "SiteWritten", "write_site"]

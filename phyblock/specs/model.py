@@ -31,7 +31,7 @@ from phyblock.specs.fields import (
 )
 from phyblock.specs.prices import PriceSpec, PriceSpecs
 from phyblock.specs.sections import SamplingSpec
-from phyblock.words import BATCH_PROVIDERS, ImageDetail, SendMode, TransportName
+from phyblock.types import BATCH_PROVIDERS, ImageDetail, SendMode, TransportName
 
 __all__ = ["ModelSpec"]
 

@@ -19,7 +19,7 @@ from phyblock.specs.fields import (
     UniqueSome,
     check_unique,
 )
-from phyblock.words import (
+from phyblock.types import (
     Background,
     CandidateOrder,
     CandidateScale,

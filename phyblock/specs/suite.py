@@ -40,12 +40,12 @@ from phyblock.specs.sections import (
     ScoringSpec,
 )
 from phyblock.specs.vary import FACTORS, ExampleCount, VarySpec, with_values
-from phyblock.variants import Variant
-from phyblock.words import (
+from phyblock.types import (
     AnswerFormat,
     PlanParser,
     Setting,
 )
+from phyblock.variants import Variant
 
 __all__ = [
     "BUILTIN_DATASET",

@@ -16,8 +16,8 @@ from typing_extensions import Self
 
 from phyblock.specs.fields import Section, check_unique, refuse
 from phyblock.specs.prompt import Prompt
+from phyblock.types import Background, CandidateOrder, PictureLayout, View
 from phyblock.variants import REPEAT, Variant
-from phyblock.words import Background, CandidateOrder, PictureLayout, View
 
 __all__ = ["FACTORS", "ExampleCount", "VarySpec", "with_values"]
 

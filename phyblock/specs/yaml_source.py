@@ -15,11 +15,11 @@ from typing import Any
 
 import yaml
 
-from phyblock.bounded import LONGEST_INTEGER, read_bytes
 from phyblock.bounded_yaml import TAG, TooMuchError, compose
-from phyblock.errors import Problem, SpecError, said
+from phyblock.errors import Problem, SpecError, reason_of
+from phyblock.files import LONGEST_INTEGER, read_bytes
 from phyblock.specs.yaml_loader import BOUNDS, CoreLoader
-from phyblock.words import QUOTE_HINT
+from phyblock.types import QUOTE_HINT
 
 __all__ = ["CoreLoader", "FieldPath", "YamlSource", "dotted", "parse_yaml", "read_yaml"]
 
@@ -76,7 +76,7 @@ def read_yaml(path: Path) -> YamlSource:
     try:
         raw = read_bytes(path, LARGEST_YAML_BYTES)
     except OSError as error:
-        raise SpecError(Problem(str(path), f"cannot be read: {said(error)}")) from error
+        raise SpecError(Problem(str(path), f"cannot be read: {reason_of(error)}")) from error
     except ValueError as error:
         raise SpecError(Problem(str(path), str(error), allowed=_ALLOWED)) from error
     try:

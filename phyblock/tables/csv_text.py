@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from phyblock.plain_text import csv_cell
+from phyblock.text import csv_cell
 
 __all__ = ["to_csv"]
 

@@ -13,7 +13,7 @@ from phyblock.errors import Problem, StoreError
 from phyblock.registry import known_tracks, table_names
 from phyblock.specs.vary import VarySpec
 from phyblock.tables.outcomes import WITHOUT_REPLY
-from phyblock.words import AnswerFormat, CandidateOrder, Criterion, MissingPolicy
+from phyblock.types import AnswerFormat, CandidateOrder, Criterion, MissingPolicy
 
 __all__ = ["OVERALL", "Design", "SectionT", "read_design", "read_section"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, get_args
 
-from phyblock.words import Outcome
+from phyblock.types import Outcome
 
 if TYPE_CHECKING:
     import pandas as pd

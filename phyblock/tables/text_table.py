@@ -7,7 +7,7 @@ from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from phyblock.plain_text import one_line
+from phyblock.text import one_line
 
 __all__ = [
     "NO_VALUE",

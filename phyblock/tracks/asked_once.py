@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
 from phyblock import parsing
-from phyblock.digests import hex_digest
 from phyblock.models.base import Image, Request
+from phyblock.stable import hex_digest
 from phyblock.tracks.base import ItemT
 from phyblock.tracks.examples import Examples, Shots, WorkedExample
 from phyblock.tracks.prompts import Prompt, response_format

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import Generic, TypeVar
 
-from phyblock.digests import drawn_bytes
 from phyblock.errors import Problem, SpecError
+from phyblock.stable import drawn_bytes
 from phyblock.tracks.base import Item
 
 __all__ = ["Elsewhere"]

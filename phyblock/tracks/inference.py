@@ -11,7 +11,6 @@ from PIL import Image
 
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
-from phyblock.plain_text import one_line, some_of
 from phyblock.records import Record
 from phyblock.records.reading import read_records
 from phyblock.sim import PictureStyle, candidates_png
@@ -21,6 +20,7 @@ from phyblock.specs.sections import ImagesSpec
 from phyblock.tables.drawing import INK, MUTED, headed, new_figure, text_width_in, wrapped
 from phyblock.tables.load import Run
 from phyblock.tables.track_report import EpisodeView
+from phyblock.text import one_line, some_of
 from phyblock.tracks.kind import kind_of
 from phyblock.tracks.opening import picture_style
 from phyblock.tracks.showing import as_recorded

@@ -19,7 +19,7 @@ from phyblock.tracks.pictures import PicturePolicy, Pictures
 from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.tracks.showing import Showing, TaskShowing
 from phyblock.tracks.studio import Workshop, render_workers
-from phyblock.words import BACKGROUNDS
+from phyblock.types import BACKGROUNDS
 
 __all__ = [
     "assembly_pictures",

@@ -8,10 +8,9 @@ from functools import partial
 from pathlib import Path
 
 from phyblock.datasets import AssemblyTask
-from phyblock.digests import hex_digest
 from phyblock.errors import DataError, Problem
+from phyblock.files import decode_picture, read_picture
 from phyblock.models.base import Image
-from phyblock.picture_files import decoded, read_picture
 from phyblock.sim import (
     PictureStyle,
     candidates_key,
@@ -22,9 +21,10 @@ from phyblock.sim import (
     goal_style,
 )
 from phyblock.sim.compose import joined_size_px, to_png
+from phyblock.stable import hex_digest
 from phyblock.tracks.showing import ShownTask
 from phyblock.tracks.studio import Drawing, Studio, Workshop, to_image
-from phyblock.words import CandidateScale, PictureLayout, PictureName, PictureSource
+from phyblock.types import CandidateScale, PictureLayout, PictureName, PictureSource
 
 __all__ = ["PicturePolicy", "Pictures"]
 
@@ -154,7 +154,7 @@ def _composite(make_goal: Callable[[], bytes], make_grid: Callable[[], bytes]) -
 
 def _halves(composite: bytes, path: Path | None) -> tuple[bytes, bytes]:
     """Goal and candidates cut out of a 2:1 composite: two squares but for the gap between."""
-    with decoded(composite, str(path)) as picture:
+    with decode_picture(composite, str(path)) as picture:
         # PNG knows no CMYK, in which JPEG files may come.
         picture = picture.convert("RGB") if picture.mode == "CMYK" else picture
         width, height = picture.size

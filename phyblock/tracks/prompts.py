@@ -14,11 +14,11 @@ import jinja2.meta
 import jinja2.nodes
 
 from phyblock import parsing
-from phyblock.digests import hex_digest
-from phyblock.errors import Problem, PromptError, said
+from phyblock.errors import Problem, PromptError, reason_of
 from phyblock.models.base import Image, Message
 from phyblock.resources import bundled
 from phyblock.specs import did_you_mean
+from phyblock.stable import hex_digest
 from phyblock.tracks.template_bounds import BoundedEnvironment, render_block
 from phyblock.tracks.template_sources import Sources, read_sources
 
@@ -133,7 +133,9 @@ class TemplatePrompt:
             self._head = self._environment.head(self._sources.main.text)
         except Exception as error:
             # Python compiles what Jinja makes of it, and has bounds of its own.
-            raise PromptError(Problem(str(path), f"is not valid Jinja: {said(error)}")) from error
+            raise PromptError(
+                Problem(str(path), f"is not valid Jinja: {reason_of(error)}")
+            ) from error
         self.require("user", "and, if wanted, a block system")
         self._check_blocks(_ALL_BLOCKS if like is None else (*_COMMON_BLOCKS, *like.blocks))
 
@@ -211,7 +213,11 @@ class TemplatePrompt:
             is_name = isinstance(error, jinja2.UndefinedError)
             known = "names that are there: " + ", ".join(sorted(facts)) if is_name else ""
             circle = self._sources.circle if isinstance(error, RecursionError) else ""
-            why = f"files include one another without an end, {circle}" if circle else said(error)
+            why = (
+                f"files include one another without an end, {circle}"
+                if circle
+                else reason_of(error)
+            )
             message, hint = f"cannot be rendered: {why}", ""
             if is_name and any(f"'{fact}' is undefined" in why for fact in facts):
                 hint = "macros of another file see it by {% import ... with context %}"

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from phyblock.datasets import AssemblyTask
-from phyblock.digests import drawn_bytes
 from phyblock.domain import CandidateSet
 from phyblock.errors import DataError, Problem
 from phyblock.records import Record
+from phyblock.stable import drawn_bytes
 from phyblock.tracks.elsewhere import Elsewhere
-from phyblock.words import CandidateOrder
+from phyblock.types import CandidateOrder
 
 __all__ = [
     "Showing",

@@ -7,18 +7,14 @@ import contextlib
 import os
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from phyblock.bounded import read_bytes
 from phyblock.errors import DataError, SimulationError
-from phyblock.files import atomic_write, writing
+from phyblock.files import LARGEST_PICTURE_BYTES, atomic_write, picture_size, read_bytes, writing
 from phyblock.models.base import Image
-from phyblock.picture_files import LARGEST_PICTURE_BYTES, picture_size
-from phyblock.worker_processes import starting_workers, worker_pool
+from phyblock.workers import WorkerDiedError, WorkerPool
 
 __all__ = ["Drawing", "Studio", "Workshop", "render_workers", "to_image"]
 
@@ -49,7 +45,7 @@ class Workshop:
         self.making: dict[Path, asyncio.Task[bytes]] = {}
         self.recent: OrderedDict[tuple[Studio, str], tuple[Image, ...]] = OrderedDict()
         self._workers = workers
-        self._pool: ProcessPoolExecutor | None = None
+        self._pool: WorkerPool | None = None
         self._alone = asyncio.Lock()
 
     async def work_out(self, work: Callable[[], _Result]) -> _Result:
@@ -57,20 +53,17 @@ class Workshop:
 
         Where one was killed it is done once more, alone; SimulationError where it is killed again.
         """
-        pool = self._pool = self._pool or worker_pool(self._workers)
-        with contextlib.suppress(BrokenProcessPool):
-            return await _done_in(pool, work)
-        # All that was under way ends with the one that was killed: each is done again alone.
-        if self._pool is pool:
-            self._pool = None
-            pool.shutdown(wait=False)
+        self._pool = self._pool or WorkerPool(self._workers)
+        loop = asyncio.get_running_loop()
+        with contextlib.suppress(WorkerDiedError):
+            return await loop.run_in_executor(self._pool, work)
+        # Alone, so that what is killed for memory finds as much as there is.
         async with self._alone:
-            with worker_pool(1) as lone:
-                try:
-                    return await _done_in(lone, work)
-                except BrokenProcessPool as error:
-                    message = "a process that draws and simulates was killed twice"
-                    raise SimulationError(message) from error
+            try:
+                return await loop.run_in_executor(self._pool, work)
+            except WorkerDiedError as error:
+                message = "a process that draws and simulates was killed twice"
+                raise SimulationError(message) from error
 
     def close(self) -> None:
         """Stop the worker processes."""
@@ -194,9 +187,3 @@ def _whole_png(path: Path) -> bytes | None:
         return None
     is_whole = data.startswith(b"\x89PNG\r\n\x1a\n") and data.endswith(b"IEND\xaeB`\x82")
     return data if is_whole else None
-
-
-async def _done_in(pool: ProcessPoolExecutor, work: Callable[[], _Result]) -> _Result:
-    with starting_workers():
-        done = asyncio.get_running_loop().run_in_executor(pool, work)
-    return await done

@@ -16,9 +16,9 @@ from pathlib import Path, PurePath, PurePosixPath
 import jinja2
 from jinja2 import nodes
 
-from phyblock.bounded import read_text
-from phyblock.digests import hex_digest
-from phyblock.errors import Problem, PromptError, said
+from phyblock.errors import Problem, PromptError, reason_of
+from phyblock.files import read_text
+from phyblock.stable import hex_digest
 
 __all__ = ["Source", "Sources", "read_sources"]
 
@@ -99,7 +99,7 @@ def _read(path: Path) -> Source:
     try:
         text = read_text(path, _LARGEST_BYTES)
     except OSError as error:
-        raise PromptError(Problem(str(path), f"cannot be read: {said(error)}")) from error
+        raise PromptError(Problem(str(path), f"cannot be read: {reason_of(error)}")) from error
     except ValueError as error:
         raise PromptError(Problem(str(path), f"cannot be read: it {error}")) from error
     try:
@@ -110,7 +110,7 @@ def _read(path: Path) -> Source:
         raise PromptError(Problem(where, f"is not valid Jinja: {error.message}")) from error
     except Exception as error:
         # Python has bounds of its own on how deep a text may be nested.
-        raise PromptError(Problem(str(path), f"is not valid Jinja: {said(error)}")) from error
+        raise PromptError(Problem(str(path), f"is not valid Jinja: {reason_of(error)}")) from error
 
 
 def _named_in(source: Source, folders: Sequence[Path]) -> Iterator[tuple[str, Path]]:

@@ -15,7 +15,7 @@ from click.testing import CliRunner, Result
 
 from phyblock import registry
 from phyblock.cli.main import phyblock
-from phyblock.folders import LIST
+from phyblock.files import LIST
 from phyblock.report import inputs
 from phyblock.report.html import PageWritten
 from phyblock.report.made import MADE, names_to_write, note_made, still_made

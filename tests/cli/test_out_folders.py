@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from phyblock.cli.main import phyblock
 from phyblock.errors import StoreError
-from phyblock.folders import LIST
+from phyblock.files import LIST
 from phyblock.report import write_report, write_tables
 from tests.report.factory import LEVELS, manifest, record, score, write_run
 from tests.workspace import COMMAND, Workspace

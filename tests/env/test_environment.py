@@ -20,7 +20,7 @@ from phyblock.errors import DataError
 from phyblock.scoring import blocks_reached
 from phyblock.sim.carry import carry_out
 from phyblock.sim.placing import put
-from phyblock.words import SETTINGS, Setting
+from phyblock.types import SETTINGS, Setting
 
 ROOT = Path(__file__).parents[2]
 SOME = read_tasks("phyblock-400")[::20]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from phyblock.errors import DataError
 from phyblock.models import RawReply, Usage, read_raw_reply
 from phyblock.models.raw_replies import token_count
-from phyblock.plain_text import well_formed
+from phyblock.text import well_formed
 
 STEPS = "Step1: Move block with index 3"
 

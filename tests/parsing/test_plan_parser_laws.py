@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from phyblock.parsing import PLAN_PROBLEMS, parse_plan
 from phyblock.parsing.text_forms import number_of_word, plain_forms
-from phyblock.words import PLAN_PARSERS, PlanParser
+from phyblock.types import PLAN_PARSERS, PlanParser
 
 # Fragments that the rules look for, so that random texts reach deep into them.
 FRAGMENTS = st.sampled_from(

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from phyblock.digests import hex_digest
 from phyblock.errors import DataError
 from phyblock.models import Message, Request
 from phyblock.play.answers import default_text, read_answers
@@ -26,6 +25,7 @@ from phyblock.play.desk import Desk
 from phyblock.play.page import default_consent
 from phyblock.play.server import Server
 from phyblock.play.shown import Place, shown
+from phyblock.stable import hex_digest
 from phyblock.tracks.by_hand import Choice, NumberField, Picking
 from tests.browser import Visit
 from tests.fork_server import Forked, fork_server

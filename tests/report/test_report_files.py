@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import StoreError
-from phyblock.folders import LIST
+from phyblock.files import LIST
 from phyblock.report import Column, TextTable, load_run, to_latex, to_markdown, write_tables
 from phyblock.report.compare import compare_models
 from phyblock.report.compare_view import write_comparison

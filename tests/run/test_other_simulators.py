@@ -21,7 +21,7 @@ from phyblock.sim.site import state_picture
 from phyblock.tables.load import load_run
 from phyblock.tracks.step_planning.rules import StepRules
 from phyblock.tracks.step_planning.track import StepPlanning
-from phyblock.words import Physics
+from phyblock.types import Physics
 from tests.fork_server import Done
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat

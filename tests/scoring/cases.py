@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from hypothesis import strategies as st
 
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.words import Setting
+from phyblock.types import Setting
 from tests.domain.graphs import acyclic
 
 # Both types look the same after a half turn about z, so 0 and 180 are one orientation.

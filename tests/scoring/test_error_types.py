@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring import ERROR_TYPES, ErrorType, Goal, count_errors, match_plan, step_errors
-from phyblock.words import MATCHERS, SETTINGS, Matcher, Setting
+from phyblock.types import MATCHERS, SETTINGS, Matcher, Setting
 from tests.scoring.cases import Case, cases, equal
 
 FLAT, TURNED = (0.0, 0.0, 0.0), (0.0, 0.0, 90.0)

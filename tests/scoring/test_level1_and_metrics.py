@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring import AssemblyScorer, Counts, Goal, level1_counts, match_plan, micro
-from phyblock.words import LEVEL1_CRITERIA, MATCHERS, SETTINGS, Level1Criterion, Setting
+from phyblock.types import LEVEL1_CRITERIA, MATCHERS, SETTINGS, Level1Criterion, Setting
 from tests.scoring.cases import Case, cases, equal
 
 each_setting = pytest.mark.parametrize("setting", SETTINGS)

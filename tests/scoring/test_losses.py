@@ -22,7 +22,7 @@ from phyblock.scoring import (
     match_plan,
     steps_kept,
 )
-from phyblock.words import SETTINGS, Setting
+from phyblock.types import SETTINGS, Setting
 from tests.domain.graphs import acyclic
 from tests.scoring.cases import Case, cases, equal, renumbered
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring import Counts, Goal, Match, match_plan, most_placed
-from phyblock.words import MATCHERS, SETTINGS, Matcher, Setting
+from phyblock.types import MATCHERS, SETTINGS, Matcher, Setting
 from tests.scoring.cases import Case, cases, choices, greatest_tp, greedy_tp, renumbered
 
 each_setting = pytest.mark.parametrize("setting", SETTINGS)

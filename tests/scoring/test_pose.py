@@ -33,7 +33,7 @@ from phyblock.scoring.pose_match import Nearness, matched
 from phyblock.scoring.solids import Piece, overlap_volume, placed, volume
 from phyblock.sim.geometry import collision_pieces
 from phyblock.sim.pose import quat_xyzw_to_euler_deg
-from phyblock.words import SETTINGS, Setting
+from phyblock.types import SETTINGS, Setting
 
 KINDS: tuple[BlockType, ...] = ("cube", "cuboid2", "triangle", "arch")
 

@@ -13,7 +13,7 @@ from phyblock.datasets import AssemblyTask, read_official
 from phyblock.domain import Plan
 from phyblock.parsing import parse_plan
 from phyblock.scoring import AssemblyScorer, Goal, match_plan
-from phyblock.words import MATCHERS, PLAN_PARSERS, SETTINGS, PlanParser
+from phyblock.types import MATCHERS, PLAN_PARSERS, SETTINGS, PlanParser
 from tests.official_replies import reply_texts
 
 Row = tuple[str, str, str, str]

@@ -10,7 +10,7 @@ import pytest
 from phyblock.datasets import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Plan
 from phyblock.scoring import Goal, match_plan
-from phyblock.words import SETTINGS
+from phyblock.types import SETTINGS
 
 ORDERS = 200
 BUNDLED = sorted((Path(__file__).parents[2] / "benchmarks" / "data").glob("*/scenes.jsonl"))

@@ -34,7 +34,7 @@ from phyblock.sim.question_pictures import drawn_blocks, question_camera
 from phyblock.sim.render import COLOR_RGB, DrawnBlock, picture, segments, shoot
 from phyblock.sim.surfaces import SURFACES
 from phyblock.sim.textures import floor
-from phyblock.words import BACKGROUNDS, Background
+from phyblock.types import BACKGROUNDS, Background
 from tests.sim.structures import block, clouds, scene_of
 
 DATA = Path(__file__).parents[2] / "benchmarks" / "data"

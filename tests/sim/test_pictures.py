@@ -27,7 +27,7 @@ from phyblock.sim import (
 from phyblock.sim.compose import LABEL_STRIP, numbered_grid
 from phyblock.sim.pictures import candidate_camera, on_the_floor
 from phyblock.sim.render import picture, shoot
-from phyblock.words import BACKGROUNDS
+from phyblock.types import BACKGROUNDS
 from tests.designs.scenes import designed_scene
 from tests.sim.structures import block, scene_of
 

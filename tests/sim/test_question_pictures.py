@@ -20,7 +20,7 @@ from phyblock.sim.pose import quat_xyzw_to_euler_deg
 from phyblock.sim.question_pictures import question_camera, question_key, question_png
 from phyblock.sim.seeing import block_mark, differing_pixels, is_inside, seen, seen_order
 from phyblock.sim.world import Pose
-from phyblock.words import BACKGROUNDS
+from phyblock.types import BACKGROUNDS
 
 STYLE = PictureStyle(256)
 VIEW = (45.0, 22.0)

@@ -6,7 +6,7 @@ import pytest
 from phyblock.sim.camera import frame, view_axes
 from phyblock.sim.surfaces import PERIOD_M, SURFACES, Surface, sample, surface_map
 from phyblock.sim.textures import floor
-from phyblock.words import BACKGROUNDS
+from phyblock.types import BACKGROUNDS
 
 FINE_M = 0.0001
 

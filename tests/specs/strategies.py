@@ -6,7 +6,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from phyblock.words import BACKGROUNDS
+from phyblock.types import BACKGROUNDS
 
 NAMES = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._:+-]{0,20}", fullmatch=True)
 LINES = st.text(st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\ufeff"))

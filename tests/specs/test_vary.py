@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from phyblock.errors import SpecError
 from phyblock.specs import load_suite
 from phyblock.specs.vary import FACTORS, VarySpec
+from phyblock.types import BACKGROUNDS
 from phyblock.variants import REPEAT, Variant
-from phyblock.words import BACKGROUNDS
 
 HEAD = "name: s\nmodels: [oracle]\n"
 OFFICIAL = HEAD + "dataset: {format: official, path: .}\n"

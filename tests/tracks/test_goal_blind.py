@@ -12,7 +12,7 @@ from phyblock.scoring import Goal, match_plan, micro
 from phyblock.tracks.goal_blind.learning import CONSTANT, FREQUENCIES, goal_blind_plans
 from phyblock.tracks.goal_blind.lessons import lessons, related
 from phyblock.tracks.goal_blind.offered import units
-from phyblock.words import Setting
+from phyblock.types import Setting
 
 KIT = tuple(Candidate(*kind, (0.0, 0.0, 0.0)) for kind in KIT_PALETTE)
 

@@ -41,7 +41,7 @@ from phyblock.tracks.pose_planning.spec import PoseSpec
 from phyblock.tracks.pose_planning.track import PosePlanning
 from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.tracks.showing import ShownTask
-from phyblock.words import REFUSED_ENDS, STEP_ENDS, StepEnd
+from phyblock.types import REFUSED_ENDS, STEP_ENDS, StepEnd
 from tests.datasets.broken import write_scenes
 from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.openai_chat import OpenAIChat

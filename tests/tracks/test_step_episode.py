@@ -24,7 +24,7 @@ from phyblock.tracks.step_planning.baselines import STEP_RULES, StepSubject
 from phyblock.tracks.step_planning.episode import StepEpisode
 from phyblock.tracks.step_planning.rules import ENDINGS, StepLimits, StepRules, Tally, majority
 from phyblock.tracks.step_planning.track import StepPlanning
-from phyblock.words import SETTINGS, Setting
+from phyblock.types import SETTINGS, Setting
 from tests.parsing.test_move_parser import REPLIES
 
 BUILT_IN = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400"

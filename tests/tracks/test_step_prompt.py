@@ -20,7 +20,7 @@ from phyblock.tracks import PicturePolicy, Pictures, TemplatePrompt
 from phyblock.tracks.step_planning.prompt import Feedback, PastStep, StepPrompt
 from phyblock.tracks.step_planning.rules import StepRules
 from phyblock.tracks.step_planning.track import StepPlanning
-from phyblock.words import Setting
+from phyblock.types import Setting
 
 TEMPLATE = TemplatePrompt(bundled("prompts", "step_planning.j2"), "default")
 GOAL, CANDIDATES = Image(b"g", "goal", 1, 1), Image(b"c", "candidates", 1, 1)

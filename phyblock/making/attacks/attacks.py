@@ -25,7 +25,7 @@ from phyblock.making.attacks.probes import (
 )
 from phyblock.scoring.ratios import ratio_of
 from phyblock.scoring.uncertainty import Clusters, in_range, jackknife
-from phyblock.sums import plain_sum
+from phyblock.stable import plain_sum
 
 __all__ = [
     "ATTACKS",

@@ -14,7 +14,7 @@ from phyblock.making.auditing.scene_audit import SceneAudit, audit_scene
 from phyblock.making.checks.finding import CheckName, Declared, Finding
 from phyblock.making.checks.tolerances import FOREIGN, Tolerances
 from phyblock.making.workers import open_workers
-from phyblock.plain_text import csv_cell
+from phyblock.text import csv_cell
 
 __all__ = ["Audit", "audit_scenes", "csv_text", "findings_csv", "shown_orders"]
 

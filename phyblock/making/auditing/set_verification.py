@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from phyblock.bounded import read_text
-from phyblock.digests import hex_digest
 from phyblock.domain.candidates import Candidate, CandidateSet
 from phyblock.domain.scene import Scene
-from phyblock.errors import Problem, said
+from phyblock.errors import Problem, reason_of
+from phyblock.files import read_text
 from phyblock.making.checks.finding import CheckName, Finding
 from phyblock.making.checks.scene_checks import CHECKS, findings_of
 from phyblock.making.checks.scene_facts import SceneFacts
@@ -20,6 +19,7 @@ from phyblock.making.scenes.scene_files import SUMS_FILE
 from phyblock.making.workers import Workers
 from phyblock.sim.pictures import PictureStyle, candidate_camera, on_the_floor
 from phyblock.sim.render import picture
+from phyblock.stable import hex_digest
 
 __all__ = [
     "LAWS",
@@ -90,7 +90,7 @@ def check_sums(folder: Path) -> tuple[int, tuple[Problem, ...]]:
     try:
         lines = read_text(path).splitlines()
     except (OSError, ValueError) as error:
-        return 1, (Problem(str(path), f"cannot be read: {said(error)}"),)
+        return 1, (Problem(str(path), f"cannot be read: {reason_of(error)}"),)
     wrong = []
     for line in lines:
         digest, _, name = line.partition("  ")

@@ -13,14 +13,14 @@ from phyblock.domain.plan import Plan
 from phyblock.domain.scene import Scene
 from phyblock.making.auditing.boosting import boosted, can_boost
 from phyblock.scoring import Goal, match_plan, micro
-from phyblock.sums import plain_sum
+from phyblock.stable import plain_sum
 from phyblock.tracks.goal_blind.learning import (
     CONSTANT,
     FREQUENCIES,
     Learner,
     goal_blind_plans,
 )
-from phyblock.words import SETTINGS, Setting
+from phyblock.types import SETTINGS, Setting
 
 __all__ = ["Blind", "Part", "Tells", "blind_scores", "find_tells", "learners"]
 

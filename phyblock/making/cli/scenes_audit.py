@@ -13,8 +13,7 @@ from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.datasets import SCENES_FILE
 from phyblock.datasets.named import find_data_set
-from phyblock.files import check_free, make_folder, write_named
-from phyblock.folders import OutFolder
+from phyblock.files import OutFolder, check_free, make_folder, write_named
 from phyblock.making.auditing.boosting import can_boost
 from phyblock.making.auditing.corrected_copy import CHANGES_FILE, write_fixed
 from phyblock.making.auditing.salvage import Salvage, salvage
@@ -27,9 +26,9 @@ from phyblock.making.checks.tolerances import FOREIGN, Tolerances
 from phyblock.making.cli.scenes_audit_view import print_audit, print_changes, worst_scenes
 from phyblock.making.cli.scenes_tells_view import print_blind, print_tells
 from phyblock.making.cli.working import jobs_option, tracked
-from phyblock.plain_text import counted
 from phyblock.sim import PictureStyle
 from phyblock.sim.marked import marked_png
+from phyblock.text import counted
 
 __all__ = ["command"]
 

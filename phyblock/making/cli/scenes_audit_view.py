@@ -13,7 +13,7 @@ from phyblock.making.auditing.corrected_copy import Copied
 from phyblock.making.auditing.scene_audit import AUDITED, SceneAudit
 from phyblock.making.auditing.set_audit import Audit, shown_orders
 from phyblock.making.checks.finding import CheckName, Finding
-from phyblock.plain_text import counted
+from phyblock.text import counted
 
 __all__ = ["print_audit", "print_changes", "worst_scenes"]
 

@@ -17,7 +17,7 @@ from phyblock.making.scenes.given_scenes import ReadScene, read_given
 from phyblock.making.scenes.scene_card import completed_card
 from phyblock.making.scenes.scene_files import check_folder, open_writer
 from phyblock.making.workers import open_workers
-from phyblock.plain_text import counted
+from phyblock.text import counted
 
 __all__ = ["command"]
 

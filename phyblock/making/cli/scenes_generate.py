@@ -22,7 +22,7 @@ from phyblock.making.scenes.scene_draft import PALETTES, Palette
 from phyblock.making.scenes.scene_files import open_writer
 from phyblock.making.scenes.scene_production import Order, produce, shares
 from phyblock.making.workers import open_workers
-from phyblock.plain_text import counted
+from phyblock.text import counted
 
 __all__ = ["command"]
 

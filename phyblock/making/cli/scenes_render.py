@@ -12,14 +12,14 @@ from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.datasets import AssemblyTask
 from phyblock.datasets.named import read_data_set
-from phyblock.folders import OutFolder
+from phyblock.files import OutFolder
 from phyblock.making.cli.scene_sets import find_scenes
-from phyblock.plain_text import counted
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
 from phyblock.sim.assembly import animation, filmstrip_png
 from phyblock.sim.camera import VIEWS
 from phyblock.sim.exploded import exploded_png
-from phyblock.words import BACKGROUNDS, Background
+from phyblock.text import counted
+from phyblock.types import BACKGROUNDS, Background
 
 __all__ = ["command"]
 

@@ -10,9 +10,9 @@ from phyblock.datasets import AssemblyTask
 from phyblock.datasets.named import read_data_set
 from phyblock.domain import Block
 from phyblock.making.cli.scene_sets import find_scenes
-from phyblock.plain_text import counted
 from phyblock.sim import PictureStyle
 from phyblock.sim.visibility import visible_shares
+from phyblock.text import counted
 
 __all__ = ["command"]
 

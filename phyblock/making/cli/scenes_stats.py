@@ -12,7 +12,7 @@ from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.datasets.named import read_data_set
 from phyblock.domain import BLOCK_TYPES, COLORS, Scene
-from phyblock.plain_text import counted
+from phyblock.text import counted
 
 __all__ = ["command"]
 

@@ -21,7 +21,7 @@ from phyblock.making.auditing.set_verification import (
 from phyblock.making.checks.set_checks import find_duplicates, find_orphans
 from phyblock.making.cli.working import jobs_option, ray_option, tracked
 from phyblock.making.workers import open_workers
-from phyblock.plain_text import counted
+from phyblock.text import counted
 
 __all__ = ["command"]
 

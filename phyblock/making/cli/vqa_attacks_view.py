@@ -14,7 +14,7 @@ from phyblock.cli.console import plain_table
 from phyblock.making.attacks.attacks import Attacked, Rate
 from phyblock.making.attacks.observed import Observed
 from phyblock.making.questions.shortcuts import SubtaskAudit
-from phyblock.plain_text import counted
+from phyblock.text import counted
 
 __all__ = ["attack_findings", "audit_json", "cut_findings", "print_attacks"]
 

@@ -11,8 +11,7 @@ import click
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
 from phyblock.domain import SUBTASKS, Question
-from phyblock.files import make_folder, write_named
-from phyblock.folders import OutFolder
+from phyblock.files import OutFolder, make_folder, write_named
 from phyblock.making.attacks.attacks import all_attacks, attack
 from phyblock.making.attacks.observed import Observed, observe_all
 from phyblock.making.cli.question_sets import (
@@ -35,9 +34,9 @@ from phyblock.making.cli.working import jobs_option, tracked
 from phyblock.making.questions.blind_picture import blind_png
 from phyblock.making.questions.sheet import Draw, sheet_html
 from phyblock.making.questions.shortcuts import SubtaskAudit, audit_questions
-from phyblock.plain_text import counted
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
+from phyblock.text import counted
 from phyblock.tracks.vqa.opening import select_questions
 
 __all__ = ["command"]

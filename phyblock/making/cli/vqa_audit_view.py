@@ -10,7 +10,7 @@ from phyblock.cli.console import plain_table
 from phyblock.domain import LETTERS, SUBTASK_NAMES, Question
 from phyblock.making.questions.letters import BALANCE
 from phyblock.making.questions.shortcuts import GUESSABLE, SubtaskAudit, duplicates_of
-from phyblock.plain_text import counted
+from phyblock.text import counted
 
 __all__ = ["print_contents", "print_findings", "print_guessing"]
 

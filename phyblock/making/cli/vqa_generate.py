@@ -29,7 +29,7 @@ from phyblock.making.questions.question_files import check_place, write_question
 from phyblock.making.questions.question_production import PER_SUBTASK, make_questions
 from phyblock.making.questions.shortcuts import SubtaskAudit, audit_questions
 from phyblock.making.workers import open_workers
-from phyblock.plain_text import counted
+from phyblock.text import counted
 
 __all__ = ["command"]
 

@@ -19,7 +19,7 @@ from phyblock.making.questions.question_files import check_place, write_question
 from phyblock.making.questions.rederiving import verify_questions
 from phyblock.making.questions.rewording import read_wordings, reword
 from phyblock.making.workers import open_workers
-from phyblock.plain_text import counted
+from phyblock.text import counted
 
 __all__ = ["command"]
 

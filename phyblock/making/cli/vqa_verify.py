@@ -13,7 +13,7 @@ from phyblock.making.cli.question_sets import data_option, questions_argument, r
 from phyblock.making.cli.working import jobs_option, ray_option, tracked
 from phyblock.making.questions.rederiving import verify_questions
 from phyblock.making.workers import open_workers
-from phyblock.plain_text import counted
+from phyblock.text import counted
 
 __all__ = ["command"]
 

@@ -19,11 +19,11 @@ from phyblock.making.cli.subtasks_option import subtasks_option
 from phyblock.making.cli.working import seed_option
 from phyblock.making.questions.paraphrases import Paraphrase, stems_of, write_wordings
 from phyblock.models import Breakers, Gate, ModelConfig, RetryPolicy, SharedCache, build_model
-from phyblock.plain_text import counted
 from phyblock.resources import bundled, reply_cache_file
 from phyblock.run.finding import find_models_file
 from phyblock.run.models import to_config
 from phyblock.specs import SuiteSpec, did_you_mean, load_models
+from phyblock.text import counted
 from phyblock.tracks import TemplatePrompt
 
 __all__ = ["command"]

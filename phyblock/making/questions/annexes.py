@@ -19,7 +19,7 @@ from phyblock.making.questions.choices import pick, shuffled
 from phyblock.sim.balance import MARGIN_M
 from phyblock.sim.geometry import corners_m
 from phyblock.sim.support import bounds_m, find_gaps, find_overlaps
-from phyblock.sums import plain_sum
+from phyblock.stable import plain_sum
 
 __all__ = ["with_annex"]
 

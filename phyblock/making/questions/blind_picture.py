@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from PIL import Image, ImageDraw, ImageFont
 
 from phyblock.domain.question import LETTERS, Question, is_picture_option
+from phyblock.files import decode_picture
 from phyblock.making.questions.sheet import Draw
-from phyblock.picture_files import decoded
 from phyblock.sim.compose import to_png
 
 __all__ = ["blind_png"]
@@ -58,7 +58,7 @@ def _text(question: Question, width_px: int) -> Image.Image:
 
 
 def _captioned(data: bytes, caption: str) -> Image.Image:
-    with decoded(data, caption) as picture:
+    with decode_picture(data, caption) as picture:
         image = Image.new("RGB", (picture.width + _GAP_PX, picture.height + _LINE_PX), "white")
         image.paste(picture.convert("RGB"), (0, _LINE_PX))
     ImageDraw.Draw(image).text(

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from phyblock.bounded import load_json
 from phyblock.domain import LETTERS, Question, Subtask, is_picture_option
+from phyblock.files import load_json
 from phyblock.making.questions.rederiving import problem_of
 from phyblock.making.questions.wording import WORDINGS, fill_template, stem_of, wording_ids
 from phyblock.models import Message, Model, Request

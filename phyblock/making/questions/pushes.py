@@ -31,7 +31,7 @@ from phyblock.sim.outcomes import OUTCOME_SETTINGS, Outcome, Push, after
 from phyblock.sim.seeing import block_mark, seen, shown_pixels
 from phyblock.sim.steps import groups
 from phyblock.sim.support import bounds_m, boxes_near
-from phyblock.sums import plain_sum
+from phyblock.stable import plain_sum
 
 __all__ = ["meant_push", "push_drafts", "sure_push", "what_happened"]
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from phyblock.datasets.version import VERSION_FILE
-from phyblock.digests import hex_digest
 from phyblock.domain.question import Question
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
@@ -14,6 +13,7 @@ from phyblock.files import atomic_write, check_free, writing
 from phyblock.making.questions.question_card import question_card
 from phyblock.making.questions.shortcuts import SubtaskAudit
 from phyblock.records.question import StoredQuestion
+from phyblock.stable import hex_digest
 
 __all__ = ["QUESTIONS_FILE", "check_place", "write_questions"]
 

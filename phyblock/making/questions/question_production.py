@@ -24,7 +24,7 @@ from phyblock.making.questions.makers import MAKERS
 from phyblock.making.questions.question_draft import Draft, Option
 from phyblock.making.questions.selection import Pooled, select
 from phyblock.making.workers import Workers
-from phyblock.words import BACKGROUNDS, Background
+from phyblock.types import BACKGROUNDS, Background
 
 __all__ = ["PER_SUBTASK", "as_question", "make_questions", "scene_drafts", "tidy_picture"]
 

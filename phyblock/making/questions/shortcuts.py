@@ -15,7 +15,7 @@ from phyblock.making.questions.picture_view import shares
 from phyblock.making.questions.question_draft import UnfairError
 from phyblock.making.questions.referring import resolve
 from phyblock.models.guesses import Guesses
-from phyblock.sums import plain_sum
+from phyblock.stable import plain_sum
 
 __all__ = ["GUESSABLE", "SubtaskAudit", "audit_questions", "duplicates_of", "referents"]
 

@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from collections import Counter
 
-from phyblock.digests import drawn_bytes
 from phyblock.domain.blocks import KIT_PALETTE, BlockType
 from phyblock.domain.candidates import MAX_CANDIDATES, Candidate, CandidateSet
 from phyblock.domain.scene import Kind, Look, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.making.poses import POSES
+from phyblock.stable import drawn_bytes
 
 __all__ = ["NEEDED", "make_candidates"]
 

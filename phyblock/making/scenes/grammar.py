@@ -11,7 +11,6 @@ from typing import Literal
 
 import numpy as np
 
-from phyblock.digests import drawn_bytes
 from phyblock.domain.aov import CycleError
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.scene import Block, Kind, Scene
@@ -24,6 +23,7 @@ from phyblock.making.scenes.scene_draft import PALETTES, Draft, Palette, Theme
 from phyblock.making.scenes.sketch import make_scene
 from phyblock.making.symmetry import transformed
 from phyblock.sim.support import find_gaps
+from phyblock.stable import drawn_bytes
 
 __all__ = ["GROUP_LEVELS", "Group", "Request", "draw"]
 

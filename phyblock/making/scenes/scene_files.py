@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from phyblock.datasets.version import VERSION_FILE
-from phyblock.digests import hex_digest
 from phyblock.domain.candidates import CandidateSet
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
@@ -18,6 +17,7 @@ from phyblock.files import atomic_write, check_free, writing
 from phyblock.making.scenes.candidate_sets import make_candidates
 from phyblock.making.scenes.scene_draft import PALETTES, Palette
 from phyblock.records.scene import StoredScene
+from phyblock.stable import hex_digest
 
 __all__ = [
     "CARD_FILE",

@@ -14,7 +14,7 @@ from phyblock.models.events import Tell
 from phyblock.models.halt import Halt
 from phyblock.models.leases import LeaseGroup
 from phyblock.models.shared_cache import SharedCache
-from phyblock.plain_text import counted
+from phyblock.text import counted
 
 __all__ = ["Claims"]
 

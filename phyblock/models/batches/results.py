@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-from phyblock.bounded import load_json, open_regular
+from phyblock.files import load_json, open_regular
 from phyblock.models.batches.protocol import BatchProtocol, ResultLine
 
 __all__ = ["Results", "custom_id"]

@@ -22,8 +22,8 @@ from phyblock.models.batches.results import Results, custom_id
 from phyblock.models.batches.wording import Written
 from phyblock.models.events import Tell
 from phyblock.models.retry import RetryPolicy, with_retries
-from phyblock.plain_text import counted
 from phyblock.records import BATCHES
+from phyblock.text import counted
 
 __all__ = ["Draft", "Sender", "UnsureError"]
 

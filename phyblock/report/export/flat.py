@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from phyblock.extras import needs
 from phyblock.report.export.rows import as_json, export_rows, track_columns
+from phyblock.resources import needs
 from phyblock.tables.csv_text import to_csv as csv_text
 from phyblock.tables.load import Run
 

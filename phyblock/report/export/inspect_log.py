@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from phyblock.digests import hex_digest
-from phyblock.extras import needs
 from phyblock.records import PromptMessage, Record, StoredReply
 from phyblock.records import Score as StoredScore
 from phyblock.report.export.rows import newest_records, prompt_text
+from phyblock.resources import needs
 from phyblock.run.prompts import read_prompts
 from phyblock.scoring import Counts
+from phyblock.stable import hex_digest
 from phyblock.tables.load import Run
 from phyblock.tables.measures import SCORED_BY
 from phyblock.tracks.estimates import numbers_of, stored_counts, track_estimates, track_measures

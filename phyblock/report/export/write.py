@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from phyblock.files import writing
-from phyblock.folders import OutFolder
+from phyblock.files import OutFolder, writing
 from phyblock.report.export.flat import EXPORTS
 from phyblock.report.export.inspect_log import to_inspect
 from phyblock.run.folder import run_folder

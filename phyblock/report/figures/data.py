@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from phyblock.plain_text import counted
 from phyblock.tables.design import OVERALL
 from phyblock.tables.drawing import (
     ACCENT,
@@ -20,6 +19,7 @@ from phyblock.tables.drawing import (
 )
 from phyblock.tables.load import Run
 from phyblock.tables.text_table import level_name
+from phyblock.text import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from phyblock.plain_text import counted
 from phyblock.tables.drawing import (
     ACCENT,
     COLORS,
@@ -25,6 +24,7 @@ from phyblock.tables.drawing import (
 from phyblock.tables.headline import headline_rows, rows_of
 from phyblock.tables.load import Run
 from phyblock.tables.measures import Measure
+from phyblock.text import counted
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.headline import headline_columns, main_column, main_measure
 from phyblock.tracks.kind import kind_of

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from phyblock.plain_text import counted
 from phyblock.report.compare import compare_models
 from phyblock.tables.drawing import (
     ACCENT,
@@ -25,6 +24,7 @@ from phyblock.tables.drawing import (
 from phyblock.tables.load import Run
 from phyblock.tables.measures import in_unit
 from phyblock.tables.text_table import between, level_name, number
+from phyblock.text import counted
 from phyblock.tracks.headline import main_measure
 from phyblock.tracks.kind import kind_of
 

@@ -12,7 +12,6 @@ from PIL import Image
 
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
-from phyblock.plain_text import some_of
 from phyblock.report.sensitivity_view import factor_name
 from phyblock.sim import candidates_key, candidates_png, goal_key, goal_png
 from phyblock.sim.pictures import PictureStyle
@@ -20,6 +19,7 @@ from phyblock.specs.sections import ImagesSpec
 from phyblock.specs.vary import FACTORS, with_values
 from phyblock.tables.drawing import drawn_width_in, headed, new_figure
 from phyblock.tables.load import Run
+from phyblock.text import some_of
 from phyblock.tracks.opening import picture_style
 from phyblock.tracks.showing import in_order, shown_order
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from phyblock.errors import Problem, SpecError
-from phyblock.folders import OutFolder
+from phyblock.files import OutFolder
 from phyblock.report.figures.captions import caption_files
 from phyblock.report.figures.data import dataset_levels
 from phyblock.report.figures.dots import measure_dots

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from itertools import takewhile
 from urllib.parse import urlencode
 
-from phyblock.plain_text import one_line
 from phyblock.report.sensitivity import ITEMS
 from phyblock.report.sensitivity_view import FACTOR, LEVEL, factor_name
 from phyblock.report.varied import blocks_of
 from phyblock.tables.load import Run
 from phyblock.tables.outcomes import HEADINGS, NOT_RUN
 from phyblock.tables.text_table import Column, TextTable, level_name, track_text
+from phyblock.text import one_line
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["TableLeads", "mean_parts", "part_names", "samples_query", "table_leads"]

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from phyblock.datasets import AssemblyTask
-from phyblock.files import writing
-from phyblock.folders import OutFolder
+from phyblock.files import OutFolder, writing
 from phyblock.records import MANIFEST, PROMPTS, RECORDS, STOPPED
 from phyblock.report.figures import figure_titles, write_figures
 from phyblock.report.html.headline import headlines

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pandas as pd
 
-from phyblock.plain_text import counted
 from phyblock.tables.cells import METRICS, cell_scores, with_levels
 from phyblock.tables.design import OVERALL, Design
 from phyblock.tables.flat import joined_counts
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL
 from phyblock.tables.outcomes import FAILURES
+from phyblock.text import counted
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.full_planning.measures import NAME, is_asked
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pandas as pd
 
-from phyblock.plain_text import counted
 from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run
 from phyblock.tables.paper_numbers import beside, beside_by_level, published_table
@@ -17,6 +16,7 @@ from phyblock.tables.text_table import (
     number,
     with_interval,
 )
+from phyblock.text import counted
 from phyblock.tracks.full_planning.assembly import assembly_frame, headline_cells
 from phyblock.tracks.full_planning.measures import is_asked
 

@@ -21,7 +21,7 @@ from phyblock.tracks.plans import score_fields
 from phyblock.tracks.prompts import Prompt
 from phyblock.tracks.showing import TaskShowing, file_plan
 from phyblock.tracks.whole_plans import AS_IN_FILE, WholePlanTrack
-from phyblock.words import AnswerFormat, Level1Criterion, Matcher, PlanParser, Setting
+from phyblock.types import AnswerFormat, Level1Criterion, Matcher, PlanParser, Setting
 
 __all__ = ["FullPlanning", "PlanJudgement", "PlanningRules"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from phyblock import parsing
 from phyblock.datasets import AssemblyTask
-from phyblock.digests import drawn_bytes
 from phyblock.domain import Scene
+from phyblock.stable import drawn_bytes
 from phyblock.tracks.full_planning.baselines import plan_text
 
 __all__ = ["can_be_worked", "worked_plan"]

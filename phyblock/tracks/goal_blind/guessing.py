@@ -9,7 +9,7 @@ from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
 from phyblock.tracks.goal_blind.kept_plans import kept_plans
 from phyblock.tracks.showing import Showing, ShownTask, TaskShowing
-from phyblock.words import CandidateOrder, Setting
+from phyblock.types import CandidateOrder, Setting
 
 __all__ = ["BlindGuesses"]
 

@@ -14,12 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from phyblock.bounded import load_json, read_bytes
 from phyblock.domain import CandidateSet, Plan, Scene
-from phyblock.files import atomic_write
+from phyblock.files import atomic_write, load_json, read_bytes
 from phyblock.resources import learned_dir
 from phyblock.tracks.goal_blind.learning import goal_blind_plans
-from phyblock.words import Setting
+from phyblock.types import Setting
 
 __all__ = ["kept_plans"]
 

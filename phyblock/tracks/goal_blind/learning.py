@@ -21,7 +21,7 @@ from phyblock.domain import CandidateSet, Plan, Scene
 from phyblock.scoring import most_placed
 from phyblock.tracks.goal_blind.lessons import Lesson, left_out, lessons, related
 from phyblock.tracks.goal_blind.offered import Unit
-from phyblock.words import Setting
+from phyblock.types import Setting
 
 __all__ = ["CONSTANT", "FREQUENCIES", "MOST_COPIES", "Learner", "goal_blind_plans"]
 

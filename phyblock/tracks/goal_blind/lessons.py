@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from phyblock.domain import CandidateSet, Scene
 from phyblock.scoring import Goal
 from phyblock.tracks.goal_blind.offered import Unit, units
-from phyblock.words import Setting
+from phyblock.types import Setting
 
 __all__ = ["Lesson", "left_out", "lessons", "related"]
 

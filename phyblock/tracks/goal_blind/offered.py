@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from phyblock.domain import BLOCK_TYPES, COLORS, Candidate, CandidateSet, Kind
-from phyblock.words import Setting
+from phyblock.types import Setting
 
 __all__ = ["Unit", "units"]
 

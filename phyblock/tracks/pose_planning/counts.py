@@ -6,9 +6,9 @@ from collections import Counter
 from typing import Any
 
 from phyblock.scoring import POSE_ERRORS, POSE_FRAMES, TOLERANCES_CM
-from phyblock.sums import plain_sum
+from phyblock.stable import plain_sum
 from phyblock.tables.measures import SampleCounts
-from phyblock.words import SETTINGS, STEP_ENDS, Setting
+from phyblock.types import SETTINGS, STEP_ENDS, Setting
 
 __all__ = ["CARRIED", "COUNTED", "ERRORS", "FITS", "PLANS", "RIGHT"]
 

@@ -16,7 +16,7 @@ from phyblock.sim.pose import Pose
 from phyblock.sim.stability import DEFAULT_TRIAL
 from phyblock.sim.voxels import voxel_iou
 from phyblock.tracks.pose_planning.resting import Rest, worlds_of
-from phyblock.words import REFUSED_ENDS, StepEnd
+from phyblock.types import REFUSED_ENDS, StepEnd
 
 __all__ = ["Ended", "borne_out"]
 

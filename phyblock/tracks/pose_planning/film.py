@@ -6,17 +6,17 @@ from collections.abc import Iterator, Sequence
 
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block, PoseStep
-from phyblock.plain_text import counted
 from phyblock.scoring import PoseError
 from phyblock.sim.carry import CarryLimits, carry_out
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.placing import put, upright
 from phyblock.sim.registry import told_engine
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
+from phyblock.text import counted
 from phyblock.tracks.pose_planning.measures import ERROR_NAMES
 from phyblock.tracks.pose_planning.record import PoseOutcome, PoseRecord, StepOutcome, kept_rests
 from phyblock.tracks.pose_planning.resting import worlds_of
-from phyblock.words import REFUSED_ENDS, StepEnd
+from phyblock.types import REFUSED_ENDS, StepEnd
 
 __all__ = ["pose_film", "pose_table"]
 

@@ -44,7 +44,7 @@ from phyblock.tracks.pose_planning.bodies import laid, pieces_of
 from phyblock.tracks.pose_planning.ended import Ended, borne_out
 from phyblock.tracks.pose_planning.resting import Rest, rests_of
 from phyblock.tracks.showing import file_plan
-from phyblock.words import AnswerFormat, Matcher, PoseRotation, Setting
+from phyblock.types import AnswerFormat, Matcher, PoseRotation, Setting
 
 __all__ = ["CARRY_VERSION", "Earlier", "PoseJudgement", "PoseRules", "judge_poses"]
 

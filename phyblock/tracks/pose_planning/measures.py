@@ -15,7 +15,7 @@ from phyblock.tables.load import Run
 from phyblock.tables.measures import Measure, SampleCounts
 from phyblock.tracks.pose_planning.baselines import POSE_FLOORS
 from phyblock.tracks.pose_planning.counts import CARRIED, ERRORS, FITS, PLANS, RIGHT
-from phyblock.words import Setting
+from phyblock.types import Setting
 
 __all__ = [
     "ERROR_NAMES",

@@ -15,7 +15,7 @@ from phyblock.sim.ruled import ruled_key, ruled_png
 from phyblock.tracks.pose_planning.spec import ViewSpec
 from phyblock.tracks.showing import ShownTask
 from phyblock.tracks.studio import Drawing, Studio, Workshop
-from phyblock.words import View
+from phyblock.types import View
 
 __all__ = ["KIT_LABEL", "PosePictures", "shows_three_sides"]
 

@@ -10,7 +10,7 @@ from phyblock.records.line import Amount, Whole
 from phyblock.scoring import PoseError
 from phyblock.tracks.plans import PLAN_COLUMNS, PlanParse, plan_row
 from phyblock.tracks.pose_planning.resting import Rest
-from phyblock.words import PoseRotation, StepEnd
+from phyblock.types import PoseRotation, StepEnd
 
 __all__ = [
     "CarryTolerances",

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag
 
 from phyblock.sim.carry import CarryLimits
 from phyblock.specs.fields import PictureControls, Section, TemplateName, UniqueSome, refuse
-from phyblock.words import PoseRotation, View
+from phyblock.types import PoseRotation, View
 
 __all__ = ["MOST_VIEWS", "PoseSpec", "ViewSpec"]
 

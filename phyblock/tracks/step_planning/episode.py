@@ -24,7 +24,7 @@ from phyblock.tracks.showing import file_plan
 from phyblock.tracks.step_planning.baselines import StepSubject
 from phyblock.tracks.step_planning.prompt import PastStep, StepOutcome
 from phyblock.tracks.step_planning.rules import Ending, StepRules, Tally, majority
-from phyblock.words import Setting
+from phyblock.types import Setting
 
 __all__ = ["Desk", "StepEpisode"]
 

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block
-from phyblock.plain_text import counted
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.registry import REFERENCE_ENGINE, told_engine
 from phyblock.sim.site import settle
 from phyblock.tables.text_table import Column, TextTable
+from phyblock.text import counted
 from phyblock.tracks.step_planning.episode_views import ENDING_NAMES, OUTCOME_NAMES
 from phyblock.tracks.step_planning.record import EpisodeRecord, EpisodeTurn
 

@@ -14,7 +14,7 @@ from phyblock import parsing
 from phyblock.models.base import Image, Message
 from phyblock.scoring import MoveOutcome
 from phyblock.tracks.prompts import TemplatePrompt, form_facts
-from phyblock.words import CandidateScale, Gating, Setting
+from phyblock.types import CandidateScale, Gating, Setting
 
 __all__ = ["Feedback", "History", "PastStep", "StepOutcome", "StepPrompt"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from phyblock import parsing
-from phyblock.words import AnswerFormat, Gating, Physics, Setting
+from phyblock.types import AnswerFormat, Gating, Physics, Setting
 
 __all__ = ["ENDINGS", "Ending", "StepLimits", "StepRules", "Tally", "majority"]
 

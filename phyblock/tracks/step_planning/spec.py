@@ -8,7 +8,7 @@ from pydantic import Field
 
 from phyblock.specs.fields import Count, Flag, PictureControls, TemplateName
 from phyblock.tracks.step_planning.prompt import Feedback, History
-from phyblock.words import Gating, Physics, Setting
+from phyblock.types import Gating, Physics, Setting
 
 __all__ = ["StepsSpec"]
 

@@ -15,7 +15,6 @@ from functools import partial
 from typing import Any
 
 from phyblock.datasets import AssemblyTask
-from phyblock.digests import hex_digest
 from phyblock.domain import Block
 from phyblock.models.base import Image, Message, Request
 from phyblock.records import Record
@@ -24,6 +23,7 @@ from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.sim.registry import told_engine
 from phyblock.sim.site import ONE_SETTING, Settled, settle, state_picture
 from phyblock.sim.stability import DEFAULT_TRIAL
+from phyblock.stable import hex_digest
 from phyblock.tracks.base import engine_identity
 from phyblock.tracks.goal_blind.guessing import BlindGuesses
 from phyblock.tracks.pictures import Pictures

@@ -14,10 +14,9 @@ from typing import Any
 from phyblock.datasets import Dataset, QuestionTask
 from phyblock.datasets.named import find_questions
 from phyblock.domain import LETTERS, SUBTASKS, is_picture_option
-from phyblock.extras import needs
-from phyblock.files import writing
-from phyblock.folders import OutFolder
+from phyblock.files import OutFolder, writing
 from phyblock.models.base import Image
+from phyblock.resources import needs
 from phyblock.sim import PictureStyle
 from phyblock.tables.track_report import ItemExport
 from phyblock.tracks.opening import picture_folder

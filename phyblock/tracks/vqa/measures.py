@@ -9,7 +9,7 @@ import pandas as pd
 from phyblock.domain import CATEGORIES, SUBTASKS
 from phyblock.scoring import chance
 from phyblock.scoring.ratios import ratio_of
-from phyblock.sums import plain_sum
+from phyblock.stable import plain_sum
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Cell, Measure, SampleCounts
 from phyblock.tables.outcomes import has_reply

@@ -8,16 +8,16 @@ from functools import partial
 from pathlib import Path
 from typing import Literal
 
-from phyblock.digests import hex_digest
 from phyblock.domain import LETTERS, Question, QuestionPicture
 from phyblock.errors import DataError, Problem
+from phyblock.files import read_picture
 from phyblock.models.base import Image
-from phyblock.picture_files import read_picture
 from phyblock.sim import PictureStyle
 from phyblock.sim.lettered import LETTERED_VERSION, lettered_sheet_png, sheet_size_px
 from phyblock.sim.question_pictures import question_key, question_png
+from phyblock.stable import hex_digest
 from phyblock.tracks.studio import Drawing, Studio, Workshop, to_image
-from phyblock.words import Background
+from phyblock.types import Background
 
 __all__ = ["OptionsAs", "QuestionPictures", "ShownQuestion"]
 

@@ -8,7 +8,7 @@ from phyblock import parsing
 from phyblock.domain import Question
 from phyblock.tracks.vqa.baselines import choice_text
 from phyblock.tracks.vqa.pictures import OptionsAs
-from phyblock.words import AnswerFormat
+from phyblock.types import AnswerFormat
 
 __all__ = ["VqaRules"]
 

@@ -7,7 +7,7 @@ from pydantic import Field
 from phyblock.domain import LETTERS, SUBTASKS, Subtask
 from phyblock.specs.fields import Count, Flag, PictureControls, TemplateName, UniqueSome
 from phyblock.tracks.vqa.pictures import OptionsAs
-from phyblock.words import DataFormat
+from phyblock.types import DataFormat
 
 __all__ = ["BUILTIN_QUESTIONS", "VqaSpec"]
 

@@ -11,11 +11,11 @@ from typing import Any
 
 from phyblock import parsing
 from phyblock.datasets import QuestionSet, QuestionTask
-from phyblock.digests import hex_digest
 from phyblock.domain import LETTERS, Question, Scene, is_picture_option
 from phyblock.domain.rotation import rotated, rotated_label
 from phyblock.models.base import Image
 from phyblock.models.guesses import Guesses
+from phyblock.stable import hex_digest
 from phyblock.tracks.asked_once import AskedOnce
 from phyblock.tracks.elsewhere import Elsewhere
 from phyblock.tracks.examples import Examples

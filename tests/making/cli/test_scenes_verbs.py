@@ -15,7 +15,7 @@ from PIL import Image
 from phyblock.cli.main import phyblock
 from phyblock.datasets import read_builtin
 from phyblock.errors import DataError, StoreError
-from phyblock.folders import LIST
+from phyblock.files import LIST
 from tests.workspace import SCENES, tower
 
 

@@ -26,7 +26,7 @@ from phyblock.making.questions.wording import WORDINGS
 from phyblock.making.workers import open_workers
 from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled
-from phyblock.words import BACKGROUNDS
+from phyblock.types import BACKGROUNDS
 
 DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
 SCENES = tuple(task.scene for task in DATA.tasks)[3::20]

@@ -22,7 +22,7 @@ from phyblock.making.scenes.grammar import Group, Request, draw
 from phyblock.making.scenes.scene_production import shares
 from phyblock.scoring import Goal, match_plan, micro
 from phyblock.tracks.goal_blind.learning import CONSTANT, FREQUENCIES, goal_blind_plans
-from phyblock.words import SETTINGS, Setting
+from phyblock.types import SETTINGS, Setting
 from tests.designs.scenes import designed_scene
 
 BUILT_IN = Path(__file__).parents[3] / "benchmarks" / "data" / "phyblock-400"

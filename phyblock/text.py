@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import re
-from collections.abc import Sequence
-
-__all__ = ["counted", "csv_cell", "one_line", "plain_lines", "some_of", "well_formed"]
+from collections.abc import Iterable, Sequence
 
 _SOME = 5
 _HALF = re.compile("[\ud800-\udfff]")
@@ -14,12 +13,12 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def well_formed(text: str) -> str:
-    """The text with U+FFFD in the place of lone surrogates, which cannot be written as UTF-8."""
+    """Return the text with U+FFFD for lone surrogates, which cannot be written as UTF-8."""
     return _HALF.sub("\ufffd", text)
 
 
 def one_line(text: str) -> str:
-    """Text on one line: a space for each newline and control character.
+    """Return the text on one line: a space for each newline and control character.
 
     Half a character, as it stands for a byte of a file name that is not UTF-8, becomes U+FFFD.
     Marks that turn the direction of writing go, too: they would change what stands beside them.
@@ -31,22 +30,29 @@ def one_line(text: str) -> str:
 
 
 def plain_lines(text: str) -> str:
-    """Text whose lines are each as `one_line` makes them."""
+    """Return the text with each line as `one_line` makes it."""
     return "\n".join(map(one_line, text.split("\n")))
 
 
 def counted(number: int, noun: str, several: str = "") -> str:
-    """A number with its noun: `1 call`, `2 calls`; `several` is a plural that takes no plain s."""
+    """Return a number with its noun, `1 call`, `2 calls`; `several` is an irregular plural."""
     return f"{number:,} {noun if number == 1 else several or noun + 's'}"
 
 
 def some_of(names: Sequence[str]) -> str:
-    """The first names of a list that may be long: what errors tell of what is allowed."""
+    """Return the first names of a list that may be long, for the `allowed` of an error."""
     return ", ".join([*names[:_SOME], *["..."] * (len(names) > _SOME)]) or "none"
 
 
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return a hint at the known word that is most like `word`, case aside; "" if none is close."""
+    folded = {name.casefold(): name for name in known}
+    matches = difflib.get_close_matches(word.casefold(), folded, n=1)
+    return f"did you mean {folded[matches[0]]}?" if matches else ""
+
+
 def csv_cell(value: object) -> object:
-    """A value as a cell of a CSV file that a spreadsheet never takes for a formula.
+    """Return a value as a cell of a CSV file that a spreadsheet never takes for a formula.
 
     Text that begins with `=`, `+`, `-`, `@`, a tab or a line break gets an apostrophe before it;
     so does text that begins with apostrophes and then one of these, so that one apostrophe taken

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.plain_text import counted, csv_cell, one_line
+from phyblock.text import counted, csv_cell, one_line
 
 STARTS = tuple("=+-@\t\r\n")
 risky = st.text(alphabet="'=+-@\t\r\n1.a") | st.text()

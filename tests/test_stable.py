@@ -22,7 +22,7 @@ from phyblock.resources import bundled
 from phyblock.scoring.pose import PoseFit
 from phyblock.scoring.solids import Piece, overlap_volume, placed
 from phyblock.sim.geometry import collision_pieces
-from phyblock.sums import plain_sum
+from phyblock.stable import plain_sum
 from phyblock.tracks.pose_planning.counts import FITS
 
 DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
