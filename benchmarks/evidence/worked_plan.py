@@ -19,6 +19,7 @@ from typing import Any
 
 import pandas as pd
 
+from phyblock.config.suite import load_suite
 from phyblock.datasets import AssemblyTask, Dataset, read_builtin
 from phyblock.domain import Scene
 from phyblock.domain.scene import Oriented
@@ -29,7 +30,6 @@ from phyblock.resources import bundled
 from phyblock.run.records import begun, judged
 from phyblock.scoring import BLOCK_OUTCOMES, ERROR_TYPES
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
-from phyblock.specs import load_suite
 from phyblock.tables.cells import METRICS
 from phyblock.tables.design import OVERALL, read_design
 from phyblock.tables.load import Run, frames_of

@@ -22,10 +22,11 @@ from pathlib import Path
 import yaml
 from measure import Cost, run_measured
 
+from phyblock.config.models import load_models
+from phyblock.config.suite import load_suite
 from phyblock.datasets import read_builtin
 from phyblock.resources import bundled
 from phyblock.run.plan import make_plan
-from phyblock.specs import load_models, load_suite
 
 PHYBLOCK = (sys.executable, "-m", "phyblock")
 FLOOR = "import json, sys\nfor line in open(sys.argv[1], 'rb'):\n    json.loads(line)\n"
@@ -35,7 +36,6 @@ from pathlib import Path
 from phyblock.resources import bundled
 from phyblock.run.plan import make_plan
 from phyblock.run.session import Session
-from phyblock.specs import load_models, load_suite
 
 folder = Path(sys.argv[1])
 suite = load_suite(folder / "soak.yaml", (), data_dir=bundled("benchmarks", "data"))

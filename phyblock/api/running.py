@@ -15,6 +15,7 @@ from types import NoneType
 
 from phyblock.api.given import expect
 from phyblock.api.suites import Suite, load_suite
+from phyblock.config.models import load_models
 from phyblock.errors import Problem, SpecError
 from phyblock.report.notebook import LoadedRun, load_run
 from phyblock.run.consent import spending_refused, unlimited_spending
@@ -23,7 +24,6 @@ from phyblock.run.execute import RunResult
 from phyblock.run.finding import check_commands, find_models_file
 from phyblock.run.plan import make_plan
 from phyblock.run.session import Session, check_ready
-from phyblock.specs import load_models
 from phyblock.text import counted
 
 __all__ = ["run_suite"]

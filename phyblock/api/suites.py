@@ -10,15 +10,14 @@ from pathlib import Path
 
 from phyblock.api.given import expect
 from phyblock.api.pictures import render
+from phyblock.config.suite import LoadedSuite
+from phyblock.config.suite import load_suite as read_suite
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.resources import bundled
 from phyblock.run.data import open_dataset
 from phyblock.run.finding import find_suite, prompt_dirs
-from phyblock.specs import LoadedSuite
-from phyblock.specs import load_suite as read_suite
-from phyblock.specs.words import did_you_mean
-from phyblock.text import counted
+from phyblock.text import counted, did_you_mean
 from phyblock.tracks.selection import select_tasks
 
 __all__ = ["SceneTask", "Scenes", "Suite", "load_suite"]

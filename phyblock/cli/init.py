@@ -9,10 +9,10 @@ import click
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
+from phyblock.config.suite import suite_tracks
 from phyblock.files import check_free, writing
 from phyblock.resources import bundled
 from phyblock.run.finding import bundled_suites, find_suite
-from phyblock.specs import suite_tracks
 from phyblock.tracks import kind_of
 
 __all__ = ["command"]

@@ -11,9 +11,10 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from phyblock.addresses import host_of
 from phyblock.cli.console import make_console, plain_table, shown_path
 from phyblock.cli.paths import models_file_option
+from phyblock.config.models import GROUP, ModelSpec, group_names, host_of, load_models, with_members
+from phyblock.config.suite import SuiteSpec
 from phyblock.errors import ModelError, Problem, SpecError
 from phyblock.models import (
     ModelConfig,
@@ -30,16 +31,7 @@ from phyblock.report import NO_VALUE
 from phyblock.run.check import check_model
 from phyblock.run.finding import find_models_file
 from phyblock.run.models import to_config
-from phyblock.specs import (
-    GROUP,
-    ModelSpec,
-    SuiteSpec,
-    did_you_mean,
-    group_names,
-    load_models,
-    with_members,
-)
-from phyblock.text import counted
+from phyblock.text import counted, did_you_mean
 
 __all__ = ["command"]
 

@@ -18,6 +18,7 @@ from rich.progress import Progress
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.cli.report import show_made
+from phyblock.config.suite import load_suite
 from phyblock.errors import Problem, SpecError, reason_of
 from phyblock.files import read_text
 from phyblock.play.answers import FileAnswers, default_text, read_answers
@@ -34,7 +35,6 @@ from phyblock.run.folder import run_folder
 from phyblock.run.plan import RunPlan
 from phyblock.run.session import Session
 from phyblock.run.store import held_run
-from phyblock.specs import load_suite
 from phyblock.text import counted
 
 __all__ = ["command"]

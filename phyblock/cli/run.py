@@ -17,6 +17,8 @@ from phyblock.cli.names import split_names
 from phyblock.cli.paths import NAME_OR_PATH, UserPath, models_file_option
 from phyblock.cli.progress import ProgressView
 from phyblock.cli.report import show_made
+from phyblock.config.models import load_models
+from phyblock.config.suite import load_suite
 from phyblock.report.made import names_to_write
 from phyblock.resources import bundled
 from phyblock.run.asking import asking_remarks, choice_remarks, moved_remarks, reader_remarks
@@ -34,7 +36,6 @@ from phyblock.run.folder import run_folder
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.session import Session, check_ready
 from phyblock.run.store import held_run
-from phyblock.specs import load_models, load_suite
 from phyblock.text import counted, one_line
 
 __all__ = ["command"]

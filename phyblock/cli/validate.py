@@ -11,6 +11,8 @@ import click
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath, models_file_option
+from phyblock.config.models import RECORDED, ModelSpec, load_models
+from phyblock.config.suite import load_suite, suite_model
 from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
 from phyblock.files import read_bytes
@@ -19,7 +21,6 @@ from phyblock.run.asking import asking_remarks
 from phyblock.run.finding import check_commands, find_models_file, find_suite, prompt_dirs
 from phyblock.run.plan import make_plan
 from phyblock.run.soundness import model_problems
-from phyblock.specs import RECORDED, ModelSpec, load_models, load_suite, suite_model
 from phyblock.text import counted
 
 __all__ = ["command"]

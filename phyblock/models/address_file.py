@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from phyblock.addresses import AddressFault, address_fault
+from phyblock.config.models import AddressFault, address_fault
 from phyblock.errors import Problem, SpecError
 from phyblock.files import read_text
 from phyblock.models.events import Tell

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-from phyblock.addresses import address_fault
+from phyblock.config.models import address_fault
 from phyblock.errors import Problem, SpecError
 from phyblock.models.prices import Prices
 from phyblock.types import ImageDetail, SendMode, TransportName

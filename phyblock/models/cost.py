@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import date, timedelta
 
-from phyblock.addresses import host_of
+from phyblock.config.models import host_of
 from phyblock.errors import BudgetReachedError, ModelError, Problem, SpecError
 from phyblock.models.base import Image, Reply, Request, Usage
 from phyblock.models.config import ModelConfig

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, BinaryIO, Protocol
 
-from phyblock.addresses import host_of
+from phyblock.config.models import host_of
 from phyblock.errors import RetryableError, UnreachableError
 from phyblock.models.config import ModelConfig
 from phyblock.models.unpacking import ACCEPTED_ENCODINGS, BodyReader

@@ -7,12 +7,13 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
+from phyblock.config.models import HUMAN
+from phyblock.config.suite import LoadedSuite, SuiteSpec
 from phyblock.errors import Problem, SpecError
 from phyblock.models import ModelConfig, Reply, Request, Usage
 from phyblock.play.order import arranged, row_of_name
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan, make_plan
-from phyblock.specs import HUMAN, LoadedSuite, SuiteSpec
 from phyblock.stable import hex_digest
 from phyblock.tracks.by_hand import Pick, Picking
 from phyblock.tracks.kind import kinds

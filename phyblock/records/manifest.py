@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import yaml
 from pydantic import AfterValidator, Field, ValidationError
 
-from phyblock.bounded_yaml import TooMuchError, YamlBounds, load_yaml
+from phyblock.config.yaml import TooMuchError, YamlBounds, load_yaml
 from phyblock.errors import Problem, StoreError
 from phyblock.files import read_text
 from phyblock.records.decode import problem_of

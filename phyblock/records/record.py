@@ -11,11 +11,11 @@ from typing import Any, ClassVar, NamedTuple
 
 from pydantic import Field
 
+from phyblock.config.suite import Variant
 from phyblock.records.line import Amount, Line, Whole
 from phyblock.records.reply import StoredError, StoredReply
 from phyblock.stable import plain_sum
 from phyblock.types import AskedAs, Outcome
-from phyblock.variants import Variant
 
 __all__ = [
     "AskedTurn",

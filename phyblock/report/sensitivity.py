@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from phyblock.config.suite import REPEAT
 from phyblock.report.varied import Blocks, Varied, varied
 from phyblock.scoring.components import (
     NO_COMPONENT,
@@ -21,7 +22,6 @@ from phyblock.scoring.components import (
 from phyblock.scoring.ratios import Floats, Metric
 from phyblock.scoring.uncertainty import CONFIDENCE, bounded, detectable, holm, jackknife
 from phyblock.tables.load import Run, made_once
-from phyblock.variants import REPEAT
 
 __all__ = [
     "ITEMS",

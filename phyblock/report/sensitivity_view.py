@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from phyblock.config.suite import REPEAT
 from phyblock.report.comparable import comparable
 from phyblock.report.compare_view import p_text
 from phyblock.report.sensitivity import ITEMS, levels_frame
@@ -21,7 +22,6 @@ from phyblock.tables.text_table import (
     with_interval,
 )
 from phyblock.tracks.kind import kind_of
-from phyblock.variants import REPEAT
 
 __all__ = [
     "FACTOR",

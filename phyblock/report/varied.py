@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from phyblock.config.suite import REPEAT, Variant, VarySpec
 from phyblock.report.comparable import Comparable, Part, comparable
 from phyblock.scoring.ratios import Floats, Metric
 from phyblock.scoring.uncertainty import Clusters
-from phyblock.specs.vary import VarySpec
 from phyblock.tables.intervals import parents_of
 from phyblock.tables.load import Run
-from phyblock.variants import REPEAT, Variant
 
 __all__ = ["Blocks", "ItemsAsked", "Varied", "blocks_of", "varied"]
 

@@ -7,12 +7,13 @@ import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from phyblock.config.models import RECORDED
+from phyblock.config.suite import LoadedSuite
 from phyblock.datasets import recorded_models
 from phyblock.errors import DataError
 from phyblock.records import Manifest
 from phyblock.run.plan import RunPlan
 from phyblock.run.taking_on import earlier_readers
-from phyblock.specs import RECORDED, LoadedSuite
 from phyblock.tracks import kind_of
 from phyblock.tracks.opening import template_prompt
 from phyblock.tracks.prompts import FORM_FACTS

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from datetime import date, timedelta
 from pathlib import Path
 
+from phyblock.config.suite import Variant
 from phyblock.models import Estimate as CallEstimate
 from phyblock.models import (
     ModelConfig,
@@ -33,7 +34,6 @@ from phyblock.run.samples import Sample
 from phyblock.run.store import held_run
 from phyblock.run.taking_on import begun_anew
 from phyblock.tracks import AnyTrack, Item, shown_item
-from phyblock.variants import Variant
 
 __all__ = ["Estimate", "estimate"]
 

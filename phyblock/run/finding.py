@@ -10,7 +10,7 @@ from pathlib import Path
 from phyblock.errors import Problem, SpecError
 from phyblock.resources import bundled
 from phyblock.run.models import PlannedModel
-from phyblock.specs import did_you_mean
+from phyblock.text import did_you_mean
 
 __all__ = [
     "bundled_suites",

@@ -6,8 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
-from phyblock.specs import SuiteSpec
-from phyblock.variants import Variant
+from phyblock.config.suite import SuiteSpec, Variant
 
 __all__ = ["floor_orders", "floor_seeds", "shows_seeds"]
 

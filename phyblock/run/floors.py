@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from phyblock.config.suite import SuiteSpec
 from phyblock.models.base import Reply
 from phyblock.records import MANIFEST, Manifest, Record
 from phyblock.records.manifest import ManifestModel
 from phyblock.run.floor_orders import floor_orders, floor_seeds
 from phyblock.run.records import begun, judged
-from phyblock.specs import SuiteSpec
 from phyblock.tables.design import read_design
 from phyblock.tables.estimates import estimate_frame
 from phyblock.tables.load import Run, frames_of

@@ -8,16 +8,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any
 
+from phyblock.config.suite import SuiteSpec, Variant
 from phyblock.datasets import Dataset
 from phyblock.datasets.version import UNNUMBERED
 from phyblock.parsing import READER_VERSION
 from phyblock.records import FORMAT
 from phyblock.run.models import PlannedModel
-from phyblock.specs import SuiteSpec
 from phyblock.stable import hex_digest
 from phyblock.tracks import AnyTrack
 from phyblock.tracks.base import READER
-from phyblock.variants import Variant
 
 __all__ = ["Inputs", "earlier_identities", "identity_of", "inputs_of"]
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from phyblock.config.suite import Variant
 from phyblock.errors import Problem, StoreError
 from phyblock.parsing import READER_VERSION
 from phyblock.records import RECORDS, Manifest, Record
@@ -16,7 +17,6 @@ from phyblock.run.records import about_item
 from phyblock.run.replayed import counted_again
 from phyblock.text import counted
 from phyblock.tracks import AnyTrack, EpisodeTrack, SingleTrack, kind_of, shown_item
-from phyblock.variants import Variant
 
 __all__ = [
     "Tell",

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter
 
+from phyblock.config.suite import SuiteSpec
 from phyblock.datasets import Dataset
 from phyblock.files import atomic_write, read_bytes
 from phyblock.records import Manifest
 from phyblock.resources import learned_dir
 from phyblock.run.code import code_digest, digest_of
 from phyblock.run.floor_orders import floor_orders, shows_seeds
-from phyblock.specs import SuiteSpec
 from phyblock.tracks import AnyTrack
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from phyblock.config.suite import LoadedSuite, Variant
 from phyblock.datasets import Dataset
 from phyblock.datasets.version import read_version
 from phyblock.parsing import READER_VERSION
@@ -17,10 +18,8 @@ from phyblock.records.manifest import ManifestChoice
 from phyblock.run.identity import earlier_identities, identity_of, inputs_of
 from phyblock.run.models import PlannedModel
 from phyblock.sim.registry import ENGINES, told_engine
-from phyblock.specs import LoadedSuite
 from phyblock.tracks import AnyTrack, kind_of
 from phyblock.tracks.kind import kinds_with_physics
-from phyblock.variants import Variant
 
 __all__ = ["make_manifest"]
 

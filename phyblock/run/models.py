@@ -6,6 +6,17 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from phyblock.config.models import (
+    GROUP,
+    RECORDED,
+    BatchRateSpec,
+    ModelSpec,
+    RateSpec,
+    group_names,
+    unknown_model,
+    with_members,
+)
+from phyblock.config.suite import LoadedSuite, SuiteSpec, resolve_models
 from phyblock.datasets import recorded_models
 from phyblock.datasets.published_names import match_published
 from phyblock.errors import Problem, SpecError
@@ -20,20 +31,7 @@ from phyblock.models import (
 )
 from phyblock.records import RECORDS, Recorded, RecordedLines
 from phyblock.registry import baseline_names
-from phyblock.specs import (
-    GROUP,
-    RECORDED,
-    BatchRateSpec,
-    LoadedSuite,
-    ModelSpec,
-    RateSpec,
-    SuiteSpec,
-    did_you_mean,
-    group_names,
-    resolve_models,
-    unknown_model,
-    with_members,
-)
+from phyblock.text import did_you_mean
 from phyblock.types import AnswerFormat, CandidateOrder
 
 __all__ = ["PlannedModel", "plan_models", "recorded_format", "recorded_order", "to_config"]

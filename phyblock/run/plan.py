@@ -9,6 +9,8 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from phyblock.config.models import RECORDED, ModelSpec, with_members
+from phyblock.config.suite import LoadedSuite, SuiteSpec, Variant
 from phyblock.datasets import Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.models import ModelConfig
@@ -19,10 +21,8 @@ from phyblock.run.kept_floors import kept_floors
 from phyblock.run.manifest import make_manifest
 from phyblock.run.models import PlannedModel, plan_models, recorded_format, recorded_order
 from phyblock.run.samples import Sample
-from phyblock.specs import RECORDED, LoadedSuite, ModelSpec, SuiteSpec, with_members
 from phyblock.tracks import AnyTrack, EpisodeTrack, Item, Opening, kind_of, open_tracks
 from phyblock.tracks.selection import select_tasks
-from phyblock.variants import Variant
 
 if TYPE_CHECKING:
     from phyblock.run.floors import FloorValues

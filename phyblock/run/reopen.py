@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
+from phyblock.config.suite import LoadedSuite, SuiteSpec
+from phyblock.config.yaml import YamlSource
 from phyblock.datasets import Dataset
 from phyblock.errors import DataError, Problem
 from phyblock.records import MANIFEST, Manifest
 from phyblock.run.data import CHANGED
-from phyblock.specs import LoadedSuite, SuiteSpec
-from phyblock.specs.yaml_source import YamlSource
 from phyblock.tracks import AnyTrack, kind_of
 from phyblock.tracks.base import CARRYING, ENGINE, READER
 from phyblock.tracks.kind import Opening

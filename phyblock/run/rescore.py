@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
+from phyblock.config.suite import SuiteSpec, suite_model
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.parsing import READER_VERSION, reader_version
@@ -20,7 +21,6 @@ from phyblock.run.judged_again import Tell, is_read_otherwise, judged_again, unt
 from phyblock.run.kept_floors import kept_floors
 from phyblock.run.reopen import reopen_tracks
 from phyblock.run.rewritten import write_run
-from phyblock.specs import SuiteSpec, suite_model
 from phyblock.tracks import AnyTrack, kind_of
 from phyblock.tracks.counting import counts_samples
 from phyblock.types import Matcher, PlanParser

@@ -7,6 +7,7 @@ from collections.abc import Awaitable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
+from phyblock.config.suite import Variant
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
 from phyblock.models import AskLaterError, Halt, Model, ModelConfig, Reply, Request, Usage
 from phyblock.models.stored import reply_of, stored
@@ -26,7 +27,6 @@ from phyblock.tracks import (
     shown_item,
 )
 from phyblock.types import AskedAs
-from phyblock.variants import Variant
 
 __all__ = ["Sample", "SampleRunner"]
 

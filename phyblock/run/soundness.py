@@ -6,10 +6,11 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+from phyblock.config.models import ModelSpec, with_members
+from phyblock.config.yaml import read_yaml
 from phyblock.errors import Problem
 from phyblock.models import ModelConfig, known_providers
-from phyblock.specs import ModelSpec, did_you_mean, with_members
-from phyblock.specs.yaml_source import read_yaml
+from phyblock.text import did_you_mean
 
 __all__ = ["model_problems", "provider_problem"]
 

@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from phyblock.config.suite import ImagesSpec
 from phyblock.errors import Problem, SpecError
 from phyblock.site.runs import SiteRun
-from phyblock.specs.sections import ImagesSpec
 from phyblock.tables.load import Run
 from phyblock.tracks.base import CARRYING, ENGINE, FIRST_CARRYING, READER
 from phyblock.tracks.kind import kind_of

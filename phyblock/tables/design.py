@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 from pydantic_core import PydanticCustomError
 
+from phyblock.config.suite import VarySpec
 from phyblock.errors import Problem, StoreError
 from phyblock.registry import known_tracks, table_names
-from phyblock.specs.vary import VarySpec
 from phyblock.tables.outcomes import WITHOUT_REPLY
 from phyblock.types import AnswerFormat, CandidateOrder, Criterion, MissingPolicy
 

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Generic, TypeVar
 
+from phyblock.config.suite import LoadedSuite
 from phyblock.domain import Scene
 from phyblock.domain.symmetry import fingerprint
 from phyblock.errors import Problem, SpecError
 from phyblock.models.base import Image, Message
-from phyblock.specs import LoadedSuite, did_you_mean
 from phyblock.stable import drawn_bytes
+from phyblock.text import did_you_mean
 from phyblock.tracks.base import Item
 
 __all__ = ["Examples", "Shots", "WorkedExample", "examples_of"]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from PIL import Image
 
+from phyblock.config.suite import ImagesSpec
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.records import Record
@@ -16,7 +17,6 @@ from phyblock.records.reading import read_records
 from phyblock.sim import PictureStyle, candidates_png
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.site import Lookout
-from phyblock.specs.sections import ImagesSpec
 from phyblock.tables.drawing import INK, MUTED, headed, new_figure, text_width_in, wrapped
 from phyblock.tables.load import Run
 from phyblock.tables.track_report import EpisodeView

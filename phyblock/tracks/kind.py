@@ -9,10 +9,10 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from phyblock.config.suite import LoadedSuite, SuiteSpec
 from phyblock.datasets import Dataset
 from phyblock.records import Manifest, Record
 from phyblock.registry import known_tracks
-from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tables.measures import SampleCounts
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.base import AnyTrack

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from phyblock.config.suite import ImagesSpec, LoadedSuite, SuiteSpec
+from phyblock.config.validation import PictureControls
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.resources import cache_dir
 from phyblock.sim import PictureStyle
-from phyblock.specs import LoadedSuite, SuiteSpec
-from phyblock.specs.fields import PictureControls
-from phyblock.specs.sections import ImagesSpec
 from phyblock.tracks.base import AnyTrack
 from phyblock.tracks.kind import Opening, kind_of
 from phyblock.tracks.pictures import PicturePolicy, Pictures

@@ -17,8 +17,8 @@ from phyblock import parsing
 from phyblock.errors import Problem, PromptError, reason_of
 from phyblock.models.base import Image, Message
 from phyblock.resources import bundled
-from phyblock.specs import did_you_mean
 from phyblock.stable import hex_digest
+from phyblock.text import did_you_mean
 from phyblock.tracks.template_bounds import BoundedEnvironment, render_block
 from phyblock.tracks.template_sources import Sources, read_sources
 

@@ -19,7 +19,7 @@ from typing import Any
 from hypothesis import strategies as st
 from PIL import Image
 
-from tests.specs.strategies import SUITES as SOUND_SUITES
+from tests.config.strategies import SUITES as SOUND_SUITES
 from tests.workspace import tower
 
 __all__ = [

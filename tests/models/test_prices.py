@@ -11,6 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from phyblock.config.models import load_models
+from phyblock.config.suite import SuiteSpec
 from phyblock.errors import SpecError
 from phyblock.models import (
     Budget,
@@ -30,7 +32,6 @@ from phyblock.models.price_map import map_entry
 from phyblock.models.stored import reply_of as reply_of_line
 from phyblock.models.stored import stored
 from phyblock.run.models import to_config
-from phyblock.specs import SuiteSpec, load_models
 from tests.models.factory import make_model, make_request, reply_of
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.anthropic_messages import AnthropicMessages

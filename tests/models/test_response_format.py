@@ -9,12 +9,13 @@ from typing import Any
 import pytest
 from aiohttp import web
 
+from phyblock.config.models import ModelSpec, load_models
+from phyblock.config.suite import SuiteSpec
 from phyblock.errors import ModelError, RefusedError, SampleError, UnavailableError
 from phyblock.models import ModelConfig, Reply, Request, reply_key, takes_format
 from phyblock.parsing import choice_form, move_form, parse_asked_plan, plan_form
 from phyblock.resources import bundled
 from phyblock.run.models import to_config
-from phyblock.specs import ModelSpec, SuiteSpec, load_models
 from tests.models.factory import ask, make_model, make_request, reply_of
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Running, Seen

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from phyblock.config.models import ModelSpec, group_names, load_models
+from phyblock.config.suite import SuiteSpec
 from phyblock.models import ModelConfig, ends_on
 from phyblock.models.keys import KEYLESS
 from phyblock.models.price_map import map_entry
 from phyblock.run.models import to_config
-from phyblock.specs import ModelSpec, SuiteSpec, group_names, load_models
 from tests.models.factory import make_model, make_request, reply_of
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Running

@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
+from phyblock.config.suite import load_suite
 from phyblock.play.person import Person, plan_sitting
 from phyblock.play.sitting import Sitting
 from phyblock.run.execute import RunResult
-from phyblock.specs import load_suite
 from phyblock.tracks.by_hand import picks_of
 from tests.workspace import SCENES, Workspace
 

@@ -10,7 +10,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.bounded_yaml import YamlBounds, load_yaml
+from phyblock.config.yaml import YamlBounds, load_yaml
 from phyblock.errors import StoreError
 from phyblock.records import MANIFEST, read_manifest
 from phyblock.records.decode import problem_of

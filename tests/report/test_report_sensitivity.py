@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from phyblock.config.suite import VarySpec
 from phyblock.report import Run
 from phyblock.report.compare import compare_models
 from phyblock.report.compare_view import flipped_lines
@@ -22,7 +23,6 @@ from phyblock.report.sensitivity import (
     ranks_frame,
 )
 from phyblock.report.sensitivity_view import components_view, levels_view, ranks_view
-from phyblock.specs.vary import VarySpec
 from phyblock.tables.text_table import NO_VALUE, number
 from phyblock.tracks.estimates import all_estimates
 from tests.report.factory import manifest, record, run_of, score

@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from phyblock.cli.estimate_view import show_estimate
+from phyblock.config.models import load_models
+from phyblock.config.suite import load_suite
 from phyblock.models import Estimate as CallEstimate
 from phyblock.models import Prices, today
 from phyblock.models.text_tokens import text_tokens
@@ -22,7 +24,6 @@ from phyblock.resources import bundled
 from phyblock.run.estimate import Estimate, estimate
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.session import Session
-from phyblock.specs import load_models, load_suite
 from tests.models.routes import ROUTES
 from tests.servers.billing import (
     COMPLETION,

@@ -12,12 +12,12 @@ from typing import Any
 import pytest
 
 from phyblock import registry
+from phyblock.config.suite import load_suite
 from phyblock.records import Manifest
 from phyblock.resources import bundled
 from phyblock.run import code, floors
 from phyblock.run.floors import FloorValues
 from phyblock.run.plan import RunPlan, make_plan
-from phyblock.specs import load_suite
 from phyblock.tracks.estimates import track_measures
 from tests.workspace import SCENES, Workspace
 

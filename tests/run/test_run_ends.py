@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 from aiohttp import web
 
+from phyblock.config.models import load_models
+from phyblock.config.suite import load_suite
 from phyblock.records import STOPPED, Line, Record
 from phyblock.run.appending import AppendFile
 from phyblock.run.events import RunEvent, SampleDone, Stopping
@@ -17,7 +19,6 @@ from phyblock.run.execute import Cause
 from phyblock.run.plan import make_plan
 from phyblock.run.session import Session
 from phyblock.run.writer import RecordWriter
-from phyblock.specs import load_models, load_suite
 from phyblock.tracks.full_planning.track import FullPlanning
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat

@@ -13,6 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from phyblock.config.models import ModelSpec
+from phyblock.config.suite import load_suite
 from phyblock.errors import StoreError
 from phyblock.models import Image, Message
 from phyblock.records import Manifest, PromptLines, TurnLines
@@ -21,7 +23,6 @@ from phyblock.run.appending import AppendFile
 from phyblock.run.plan import make_plan
 from phyblock.run.prompts import PromptFile, read_prompts
 from phyblock.run.store import RunStore
-from phyblock.specs import ModelSpec, load_suite
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace

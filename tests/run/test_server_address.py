@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import pytest
 
+from phyblock.config.models import ModelSpec
+from phyblock.config.suite import SuiteSpec
 from phyblock.errors import ModelError
 from phyblock.models import ModelConfig, Reply, ReplyCache, former_key, reply_key
 from phyblock.run.models import to_config
-from phyblock.specs import ModelSpec, SuiteSpec
 from tests.models.factory import ask, make_model, make_request
 from tests.servers.anthropic_messages import AnthropicMessages
 from tests.servers.chassis import LocalServer, Running

@@ -17,6 +17,8 @@ import pytest
 
 from phyblock import parsing
 from phyblock.cli.main import phyblock
+from phyblock.config.models import load_models
+from phyblock.config.suite import load_suite
 from phyblock.errors import DataError, StoreError
 from phyblock.play.answers import read_answers
 from phyblock.play.person import Person, plan_sitting
@@ -26,7 +28,6 @@ from phyblock.run.appending import AppendFile
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.store import RunStore, held_run
 from phyblock.run.taking_on import begun_anew
-from phyblock.specs import load_models, load_suite
 from phyblock.tables.load import load_run
 from tests.run.test_step_runs import by_sample
 from tests.servers.chassis import Faults, Running, Seen

@@ -14,6 +14,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from phyblock.config.suite import Variant, load_suite
 from phyblock.datasets import AssemblyTask
 from phyblock.domain.symmetry import Symmetry, canonical_form
 from phyblock.errors import SpecError
@@ -22,13 +23,11 @@ from phyblock.models.base import Image
 from phyblock.resources import bundled
 from phyblock.run.data import open_dataset
 from phyblock.run.manifest import make_manifest
-from phyblock.specs import load_suite
 from phyblock.tracks import Opening, open_tracks
 from phyblock.tracks.examples import Examples
 from phyblock.tracks.full_planning.worked import worked_plan
 from phyblock.tracks.vqa import opening
 from phyblock.tracks.vqa.spec import VqaSpec
-from phyblock.variants import Variant
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace

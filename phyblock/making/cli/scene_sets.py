@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.errors import DataError, Problem
-from phyblock.specs import did_you_mean
+from phyblock.text import did_you_mean
 
 __all__ = ["find_scenes"]
 

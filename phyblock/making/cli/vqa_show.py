@@ -23,7 +23,7 @@ from phyblock.making.cli.question_sets import (
 )
 from phyblock.sim import PictureStyle
 from phyblock.sim.question_pictures import question_png
-from phyblock.specs import did_you_mean
+from phyblock.text import did_you_mean
 
 __all__ = ["command"]
 

@@ -11,6 +11,8 @@ import click
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath, models_file_option
+from phyblock.config.models import load_models
+from phyblock.config.suite import SuiteSpec
 from phyblock.domain import Question, Subtask
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import check_free, make_folder, write_named
@@ -22,8 +24,7 @@ from phyblock.models import Breakers, Gate, ModelConfig, RetryPolicy, SharedCach
 from phyblock.resources import bundled, reply_cache_file
 from phyblock.run.finding import find_models_file
 from phyblock.run.models import to_config
-from phyblock.specs import SuiteSpec, did_you_mean, load_models
-from phyblock.text import counted
+from phyblock.text import counted, did_you_mean
 from phyblock.tracks import TemplatePrompt
 
 __all__ = ["command"]

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from phyblock.config.yaml import YamlSource, read_yaml
 from phyblock.datasets.raw import lines_of, parse_json, read_json
 from phyblock.domain.blocks import BlockType, Color
 from phyblock.domain.scene import Block
@@ -32,7 +33,6 @@ from phyblock.records.data_values import (
 )
 from phyblock.records.faults import validated
 from phyblock.records.scene import EITHER_NAME, MAX_BLOCKS, CandidateList, Levels
-from phyblock.specs.yaml_source import YamlSource, read_yaml
 
 __all__ = ["GivenBlock", "GivenScene", "ReadScene", "read_given"]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 from urllib.parse import urlsplit
 
-from phyblock.addresses import host_of
+from phyblock.config.models import host_of
 from phyblock.errors import ModelError, UnavailableError
 from phyblock.files import writing
 from phyblock.models.config import ModelConfig

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from phyblock.specs.sections import ImagesSpec
-from phyblock.specs.vary import FACTORS, with_values
+from phyblock.config.suite import FACTORS, ImagesSpec, with_values
 from phyblock.tables.load import Run
 
 __all__ = ["images_of"]

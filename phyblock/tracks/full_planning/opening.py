@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from phyblock.config.suite import LoadedSuite, SuiteSpec
 from phyblock.datasets import AssemblyTask, Dataset, official_prompt
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tracks.examples import examples_of
 from phyblock.tracks.full_planning.spec import PlanningSpec
 from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from phyblock.specs.fields import PictureControls
+from phyblock.config.validation import PictureControls
 
 __all__ = ["PlanningSpec"]
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from phyblock.config.suite import LoadedSuite, SuiteSpec
 from phyblock.errors import Problem, SpecError
 from phyblock.sim.carry import CarryLimits
-from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tracks.kind import Opening
 from phyblock.tracks.opening import (
     check_drawn,

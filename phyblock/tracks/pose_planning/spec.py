@@ -7,8 +7,8 @@ from typing import Annotated, get_args
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
+from phyblock.config.validation import PictureControls, Section, TemplateName, UniqueSome, refuse
 from phyblock.sim.carry import CarryLimits
-from phyblock.specs.fields import PictureControls, Section, TemplateName, UniqueSome, refuse
 from phyblock.types import PoseRotation, View
 
 __all__ = ["MOST_VIEWS", "PoseSpec", "ViewSpec"]

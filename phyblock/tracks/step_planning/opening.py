@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from phyblock.specs import SuiteSpec
+from phyblock.config.suite import SuiteSpec
 from phyblock.tracks.kind import Opening
 from phyblock.tracks.opening import assembly_pictures, check_drawn, task_showing, template_prompt
 from phyblock.tracks.selection import select_tasks

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from phyblock.specs.fields import Count, Flag, PictureControls, TemplateName
+from phyblock.config.validation import Count, Flag, PictureControls, TemplateName
 from phyblock.tracks.step_planning.prompt import Feedback, History
 from phyblock.types import Gating, Physics, Setting
 

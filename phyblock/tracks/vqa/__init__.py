@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
+from phyblock.config.suite import LoadedSuite, SuiteSpec
 from phyblock.datasets.version import read_version
 from phyblock.records import Manifest
 from phyblock.resources import bundled
-from phyblock.specs import LoadedSuite, SuiteSpec
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.kind import TrackKind
 from phyblock.tracks.vqa.baselines import CHOICE_RULES, ChoiceSubject

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from PIL import Image
 
+from phyblock.config.suite import ImagesSpec
 from phyblock.datasets import Dataset
 from phyblock.domain import (
     CATEGORIES,
@@ -23,7 +24,6 @@ from phyblock.domain import (
 )
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_png
-from phyblock.specs.sections import ImagesSpec
 from phyblock.tables.drawing import COLORS, INK, MUTED, headed, new_figure, wrapped
 from phyblock.tables.load import Run
 from phyblock.tracks.opening import picture_style

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from phyblock.config.validation import Count, Flag, PictureControls, TemplateName, UniqueSome
 from phyblock.domain import LETTERS, SUBTASKS, Subtask
-from phyblock.specs.fields import Count, Flag, PictureControls, TemplateName, UniqueSome
 from phyblock.tracks.vqa.pictures import OptionsAs
 from phyblock.types import DataFormat
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from phyblock.config.suite import LoadedSuite, load_suite
 from phyblock.errors import Problem, SpecError
-from phyblock.specs import LoadedSuite, load_suite
 
 SUITE = "name: s\nmodels: [oracle]\nimages: {size_px: 256}\n"
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from phyblock.config.suite import load_suite
 from phyblock.errors import Problem, SpecError
-from phyblock.specs import load_suite
 
 HEAD = "name: s\nmodels: [oracle]\n"
 

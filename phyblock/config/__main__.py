@@ -1,9 +1,11 @@
-"""`python -m phyblock.specs [FOLDER]`: rewrite the JSON Schemas from the models."""
+"""`python -m phyblock.config [FOLDER]`: rewrite the JSON Schemas from the models."""
+
+from __future__ import annotations
 
 import sys
 from pathlib import Path
 
-from phyblock.specs.schema import write_schemas
+from phyblock.config.schema import write_schemas
 
 if __name__ == "__main__":
     beside = Path(__file__).parents[2] / "benchmarks" / "schemas"

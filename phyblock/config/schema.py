@@ -6,11 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
+from phyblock.config.models import RECORDED, ModelSpec
+from phyblock.config.suite import suite_model
 from phyblock.registry import baseline_names, known_tracks, table_names
-from phyblock.specs.model import ModelSpec
-from phyblock.specs.suite import RECORDED, suite_model
-
-__all__ = ["models_schema", "render", "suite_schema", "write_schemas"]
 
 _DRAFT = "https://json-schema.org/draft/2020-12/schema"
 _NAME = r"^[A-Za-z0-9][A-Za-z0-9._:+-]{0,79}$"

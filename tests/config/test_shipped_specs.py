@@ -13,9 +13,10 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft202012Validator
 
+from phyblock.config.models import SamplingSpec, load_models
+from phyblock.config.suite import load_suite, resolve_models
+from phyblock.config.yaml import read_yaml
 from phyblock.errors import SpecError
-from phyblock.specs import SamplingSpec, load_models, load_suite, resolve_models
-from phyblock.specs.yaml_source import read_yaml
 
 ROOT = Path(__file__).parents[2]
 SUITES = sorted((ROOT / "benchmarks").glob("*.yaml"))

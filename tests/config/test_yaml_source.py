@@ -12,8 +12,8 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from phyblock.config.yaml import dotted, parse_yaml, read_yaml
 from phyblock.errors import SpecError
-from phyblock.specs.yaml_source import dotted, parse_yaml, read_yaml
 
 SCALARS = {
     "on": "on",

@@ -14,10 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from pydantic import ValidationError
+from tests.config.strategies import SUITES
 
-from phyblock.specs import ModelSpec, models_schema, suite_model, suite_schema
-from phyblock.specs.schema import render
-from tests.specs.strategies import SUITES
+from phyblock.config.models import ModelSpec
+from phyblock.config.schema import models_schema, render, suite_schema
+from phyblock.config.suite import suite_model
 
 SUITE_MODEL = suite_model()
 
@@ -34,11 +35,11 @@ def test_a_schema_is_a_schema(schema: dict[str, Any]) -> None:
 @pytest.mark.parametrize(("name", "make"), [("suite", suite_schema), ("models", models_schema)])
 def test_the_committed_schema_is_the_generated_one(name: str, make: Any) -> None:
     committed = (SCHEMAS / f"{name}.schema.json").read_text(encoding="utf-8")
-    assert committed == render(make()), "rewrite it: python -m phyblock.specs"
+    assert committed == render(make()), "rewrite it: python -m phyblock.config"
 
 
 def test_the_module_writes_both(tmp_path: Path) -> None:
-    subprocess.run([sys.executable, "-m", "phyblock.specs", str(tmp_path)], check=True)
+    subprocess.run([sys.executable, "-m", "phyblock.config", str(tmp_path)], check=True)
     for name in ("suite.schema.json", "models.schema.json"):
         assert (tmp_path / name).read_bytes() == (SCHEMAS / name).read_bytes()
 

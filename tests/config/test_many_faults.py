@@ -11,9 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from phyblock.config.models import load_models
+from phyblock.config.suite import load_suite, resolve_models
+from phyblock.config.yaml import looks_secret
 from phyblock.errors import SpecError
-from phyblock.specs import load_models, load_suite, resolve_models
-from phyblock.specs.words import looks_secret
 from tests.fuzz.strategies import MODELS_FILES, SUITES
 from tests.fuzz.strategies import OVERRIDES as OVERRIDE_TEXTS
 

@@ -1,9 +1,17 @@
-"""What a person may write about one model in a models file."""
+"""Models files: the models that suites may name, with addresses, prices and groups."""
 
 from __future__ import annotations
 
+import contextlib
+import ipaddress
 import math
-from collections.abc import Mapping
+import re
+import urllib.parse
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+from itertools import pairwise
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -12,28 +20,200 @@ from pydantic import (
     Discriminator,
     Field,
     JsonValue,
+    PrivateAttr,
     Tag,
+    TypeAdapter,
+    ValidationError,
     model_validator,
 )
 
-from phyblock.addresses import address_fault
-from phyblock.specs.fields import (
+from phyblock.config.validation import (
+    MOST_HINTS,
     Count,
     Flag,
     MaxTokens,
+    ModelName,
     Section,
     Temperature,
     TimeoutS,
     TopP,
     Unique,
     UniqueSome,
+    check,
+    find_secrets,
+    merge_problems,
     refuse,
 )
-from phyblock.specs.prices import PriceSpec, PriceSpecs
-from phyblock.specs.sections import SamplingSpec
+from phyblock.config.yaml import YamlSource, expand, read_yaml, show, sort_problems
+from phyblock.errors import Problem, SpecError
+from phyblock.registry import baseline_names
 from phyblock.types import BATCH_PROVIDERS, ImageDetail, SendMode, TransportName
 
-__all__ = ["ModelSpec"]
+_LONGEST = 1_000
+_EXAMPLE = "for example http://localhost:8000/v1"
+_BY_VARIABLE = "put the key alone into an environment variable and name that in api_key_env"
+
+
+@dataclass(frozen=True)
+class AddressFault:
+    """Why an address is refused, what to do about it, and whether a secret may stand in it."""
+
+    message: str
+    hint: str
+    may_hold_secret: bool
+
+
+def address_fault(url: str) -> AddressFault | None:
+    """Why this is no address that a model can be called at; None when it is one."""
+    scheme, mark, rest = url.partition("://")
+    host = re.split(r"[/?#\\]", rest if mark else url, maxsplit=1)[0]
+    if "@" in host:
+        return AddressFault("holds a user name or a password", _BY_VARIABLE, may_hold_secret=True)
+    if "?" in url or "#" in url:
+        message = "holds a query or a fragment, where keys are often written"
+        return AddressFault(message, _BY_VARIABLE, may_hold_secret=True)
+    if not mark or scheme.lower() not in ("http", "https"):
+        message = "is not the address of a server"
+    elif len(url) > _LONGEST or "\\" in url or any(not "!" <= c <= "~" for c in rest[len(host) :]):
+        message = "is too long, or holds characters that must be escaped in an address"
+    elif not _is_host(host):
+        message = "names no host, or one that cannot be read"
+    else:
+        return None
+    return AddressFault(message, _EXAMPLE, may_hold_secret="@" in url)
+
+
+def host_of(url: str) -> str:
+    """Host and port alone; "an unreadable address" where there are none."""
+    try:
+        parts = urllib.parse.urlsplit(url)
+        host, port = parts.hostname or "", parts.port
+    except ValueError:
+        return "an unreadable address"
+    if not host:
+        return "an unreadable address"
+    shown = f"[{host}]" if ":" in host else host
+    return shown if port is None else f"{shown}:{port}"
+
+
+def _is_host(host: str) -> bool:
+    """Whether `host` is a name or an IP address, with or without a port."""
+    if any(character.isspace() or not character.isprintable() for character in host):
+        return False
+    try:
+        parts = urllib.parse.urlsplit(f"//{host}")
+        name = parts.hostname or ""
+        if parts.port == 0:
+            return False
+        if host.startswith("[") or ":" in name:
+            return ipaddress.ip_address(name.partition("%")[0]).version == 6
+        return len(name.encode("idna")) > 0
+    except ValueError:  # UnicodeError, of a label that is empty or too long, is one
+        return False
+
+
+UsdPerMillion = Annotated[float, Field(strict=True, ge=0, le=1e9, allow_inf_nan=False)]
+
+
+def _read_day(value: object) -> date:
+    if isinstance(value, str) and re.fullmatch(r"\d{4}-\d\d-\d\d", value):
+        with contextlib.suppress(ValueError):
+            return date.fromisoformat(value)
+    raise refuse("is no day", allowed="a day such as 2026-12-01")
+
+
+class BatchRateSpec(Section):
+    """What tokens cost in the provider's batches."""
+
+    input: UsdPerMillion = Field(description="Prompt tokens [USD per million].")
+    output: UsdPerMillion = Field(description="Reply tokens [USD per million].")
+    cached: UsdPerMillion | None = Field(
+        default=None,
+        description="Prompt tokens that the provider has in its cache [USD per million]; null: as "
+        "the others.",
+    )
+    cache_write: UsdPerMillion | None = Field(
+        default=None,
+        description="Prompt tokens that it puts into its cache [USD per million]; null: as the "
+        "others.",
+    )
+
+
+class RateSpec(BatchRateSpec):
+    """What tokens cost."""
+
+    batch: BatchRateSpec | None = Field(
+        default=None,
+        description="What they cost in batches; null: half at OpenAI's, Anthropic's and Google's "
+        "own addresses, and at others as outside of batches.",
+    )
+
+
+class TierSpec(RateSpec):
+    """What tokens cost in calls with long prompts."""
+
+    above: Count = Field(description="Prompts of more tokens than this.")
+
+
+def _check_rising(tiers: tuple[TierSpec, ...]) -> tuple[TierSpec, ...]:
+    for index, (tier, following) in enumerate(pairwise(tiers), start=1):
+        if following.above <= tier.above:
+            message, allowed = "is not above the one before it", f"more than {tier.above}"
+            raise refuse(message, at=(index, "above"), allowed=allowed)
+    return tiers
+
+
+class PriceSpec(RateSpec):
+    """What a model costs, where litellm's price map does not know it or is wrong."""
+
+    since: Annotated[date, BeforeValidator(_read_day)] | None = Field(
+        default=None,
+        alias="from",
+        description="Day from which this holds (UTC). Before the first one that is named, "
+        "litellm's price map does.",
+    )
+    tiers: Annotated[tuple[TierSpec, ...], AfterValidator(_check_rising)] = Field(
+        default=(), description="Other prices of calls with long prompts, by rising `above`."
+    )
+    _place: str = PrivateAttr(default="")
+
+    def __eq__(self, other: object) -> bool:
+        # Where a price is written is no part of it.
+        return isinstance(other, PriceSpec) and self.__dict__ == other.__dict__
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.__dict__.values()))
+
+    @property
+    def place(self) -> str:
+        """The file and line that say so, "" where none is known."""
+        return self._place
+
+    def stands_at(self, place: str) -> None:
+        """Note the file and line that say so."""
+        self._place = place
+
+
+def _check_days(prices: tuple[PriceSpec, ...]) -> tuple[PriceSpec, ...]:
+    for index, (price, following) in enumerate(pairwise(prices), start=1):
+        if following.since is None:
+            message = "does not say from which day on it holds"
+            raise refuse(message, at=(index,), hint="add from, for example from: 2026-12-01")
+        if price.since is not None and following.since <= price.since:
+            message, allowed = "is not later than the one before it", f"a day after {price.since}"
+            raise refuse(message, at=(index, "from"), allowed=allowed)
+    return prices
+
+
+PriceSpecs = Annotated[
+    Annotated[PriceSpec, Tag("one")]
+    | Annotated[
+        tuple[PriceSpec, ...], Field(min_length=1), AfterValidator(_check_days), Tag("list")
+    ],
+    Discriminator(lambda value: "list" if isinstance(value, list | tuple) else "one"),
+]
+"""One price, or several that follow on one another."""
+
 
 Effort = Literal["none", "minimal", "low", "medium", "high", "xhigh", "max"]
 GroupName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,39}$")]
@@ -117,6 +297,20 @@ def _check_finite(body: dict[str, JsonValue]) -> dict[str, JsonValue]:
         elif isinstance(value, list):
             stack.extend(((*path, index), item) for index, item in enumerate(value))
     return body
+
+
+RECORDED = "recorded"
+"""The word that stands for every folder of recorded replies."""
+
+
+class SamplingSpec(Section):
+    """Sampling parameters for models that say nothing of their own."""
+
+    temperature: Temperature | None = Field(default=0.0, description="0 to 2; null: not sent.")
+    top_p: TopP | None = Field(default=None, description="Above 0, at most 1; null: not sent.")
+    max_tokens: MaxTokens | None = Field(
+        default=4096, description="Limit of a reply, thinking included [tokens]; null: not sent."
+    )
 
 
 class ModelSpec(Section):
@@ -319,3 +513,122 @@ class ModelSpec(Section):
         }
         chosen["reasoning_effort"] = self.reasoning_effort
         return {key: value for key, value in chosen.items() if value is not None}
+
+
+GROUP = "group:"
+"""What stands before the name of a group where models are named."""
+HUMAN = "human:"
+"""What stands before the name of a person where models are named."""
+
+
+def group_names(known: Mapping[str, ModelSpec]) -> tuple[str, ...]:
+    """The groups that models belong to, in the order in which the file names them."""
+    return tuple(dict.fromkeys(group for spec in known.values() for group in spec.groups))
+
+
+def with_members(names: Sequence[str], known: Mapping[str, ModelSpec]) -> tuple[str, ...]:
+    """The names with the members of a group in its place, each once; an unknown group stays."""
+    groups = group_names(known)
+    members: dict[str, None] = {}
+    for name in names:
+        group = name.removeprefix(GROUP)
+        if name.startswith(GROUP) and group in groups:
+            members |= {n: None for n, spec in known.items() if group in spec.groups}
+        else:
+            members[name] = None
+    return tuple(members)
+
+
+def unknown_model(name: str) -> str:
+    """What is wrong with a name that is neither a model nor a group."""
+    if name.startswith(GROUP):
+        return "is no group of the models file"
+    if name.startswith(HUMAN):
+        return "is a person, who answers in `phyblock play`"
+    return "is neither in the models file nor a built-in baseline"
+
+
+_NAME = TypeAdapter(ModelName)
+
+
+def load_models(path: Path) -> dict[str, ModelSpec]:
+    """Read a models file: each name maps to a litellm id or to a mapping.
+
+    Paths of replay folders, of lists of servers and of programs that list them come out absolute.
+    Raises SpecError with all that is wrong.
+    """
+    source = read_yaml(path)
+    data = {} if source.data is None else source.data
+    if not isinstance(data, dict):
+        wrong = Problem(source.where(()), "has the wrong type", "", show(data),
+                        "a mapping: name: provider/model")  # fmt: skip
+        raise SpecError([*source.problems, wrong])
+    models: dict[str, ModelSpec] = {}
+    problems: list[Problem] = []
+    for name, entry in data.items():
+        hints = max(0, MOST_HINTS - len(problems))
+        spec, of_entry = _read_entry(name, entry, source, hints)
+        problems += of_entry
+        if spec is not None:
+            models[name] = spec
+    secrets = list(find_secrets(data, source))
+    merged = merge_problems(source.problems, secrets, problems)
+    if merged:
+        raise SpecError(sort_problems(merged))
+    return models
+
+
+def _read_entry(
+    name: str, entry: Any, source: YamlSource, hints: int
+) -> tuple[ModelSpec | None, list[Problem]]:
+    problems = _check_name(name, source)
+    if not isinstance(entry, str | dict):
+        wrong = Problem(source.where((name,)), "has the wrong type", name, show(entry),
+                        "a litellm id (provider/model), or a mapping")  # fmt: skip
+        return None, [*problems, wrong]
+    spec, of_entry = check(ModelSpec, {"id": entry} if isinstance(entry, str) else entry, source,
+                        (name,), hints)  # fmt: skip
+    problems += of_entry
+    if spec is None:
+        return None, problems
+    for index, price in enumerate(spec.prices):
+        line = source.where((name, "price", index)).split(":")[-2]
+        price.stands_at(f"{Path(source.label).name} line {line}")
+    for field, path in _paths(spec).items():
+        try:
+            absolute = str(expand(path, Path(source.label).parent))
+        except ValueError as error:
+            where = source.where((name, field))
+            return None, [*problems, Problem(where, str(error), f"{name}.{field}", path)]
+        words = spec.api_base_command if field == "api_base_command" else None
+        value = absolute if words is None else (absolute, *words[1:])
+        spec = spec.model_copy(update={field: value})
+    return spec, problems
+
+
+def _paths(spec: ModelSpec) -> dict[str, str]:
+    """The paths in an entry by field; a program's name alone is looked for as a shell does."""
+    program = (spec.api_base_command or ("",))[0]
+    paths = {
+        "replay": spec.replay,
+        "api_base_file": spec.api_base_file,
+        "api_base_command": program if "/" in program else None,
+    }
+    return {field: path for field, path in paths.items() if path is not None}
+
+
+def _check_name(name: str, source: YamlSource) -> list[Problem]:
+    where = source.where((name,), key=True)
+    if name in (*baseline_names(), RECORDED):
+        taken = ", ".join((*baseline_names(), RECORDED))
+        return [Problem(where, "is a name of phyblock's own", name, allowed=f"not {taken}",
+                        hint="choose another name")]  # fmt: skip
+    if name.startswith(GROUP):
+        message, hint = f"begins with {GROUP}, which names groups", "choose another name"
+        return [Problem(where, message, name, show(name), hint=hint)]
+    try:
+        _NAME.validate_python(name)
+    except ValidationError:
+        allowed = "up to 80 letters, digits and . _ : + -, starting with a letter or digit"
+        return [Problem(where, "is not a usable name", name, show(name), allowed)]
+    return []

@@ -10,11 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from phyblock.config.suite import FACTORS, REPEAT, Variant, VarySpec, load_suite
 from phyblock.errors import SpecError
-from phyblock.specs import load_suite
-from phyblock.specs.vary import FACTORS, VarySpec
 from phyblock.types import BACKGROUNDS
-from phyblock.variants import REPEAT, Variant
 
 HEAD = "name: s\nmodels: [oracle]\n"
 OFFICIAL = HEAD + "dataset: {format: official, path: .}\n"

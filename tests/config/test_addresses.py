@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.addresses import address_fault, host_of
+from phyblock.config.models import address_fault, host_of, load_models
 from phyblock.errors import SpecError
 from phyblock.models import ModelConfig, server_address
-from phyblock.specs import load_models
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace

@@ -9,16 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from phyblock.config.models import ModelSpec, SamplingSpec, load_models
+from phyblock.config.suite import LoadedSuite, load_suite, resolve_models
 from phyblock.errors import Problem, SpecError
 from phyblock.registry import baseline_names
-from phyblock.specs import (
-    LoadedSuite,
-    ModelSpec,
-    SamplingSpec,
-    load_models,
-    load_suite,
-    resolve_models,
-)
 
 
 def load(folder: Path, text: str) -> dict[str, ModelSpec]:
