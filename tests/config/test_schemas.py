@@ -14,11 +14,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from pydantic import ValidationError
-from tests.config.strategies import SUITES
 
 from phyblock.config.models import ModelSpec
 from phyblock.config.schema import models_schema, render, suite_schema
 from phyblock.config.suite import suite_model
+from tests.config.strategies import SUITES
 
 SUITE_MODEL = suite_model()
 

@@ -12,11 +12,11 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
-from tests.config.strategies import FIELDS, REQUIRED, SECTIONS, SUITES
 
 from phyblock.config.suite import LoadedSuite, load_suite, suite_model
 from phyblock.config.yaml import CoreLoader
 from phyblock.errors import SpecError
+from tests.config.strategies import FIELDS, REQUIRED, SECTIONS, SUITES
 
 SUITE_MODEL = suite_model()
 
