@@ -22,8 +22,8 @@ import psutil
 
 from phyblock.datasets import read_builtin
 from phyblock.domain import Scene
-from phyblock.making.auditing.scene_audit import audit_scene
-from phyblock.making.auditing.set_verification import verify_scene
+from phyblock.making.checks.scene_audit import audit_scene
+from phyblock.making.checks.set_verification import verify_scene
 from phyblock.making.scenes.candidate_sets import make_candidates
 from phyblock.making.scenes.compositions import beside
 from phyblock.making.scenes.scene_production import Order, produce, shares

@@ -7,10 +7,7 @@ from typing import Literal
 
 from phyblock.errors import Problem
 
-__all__ = ["CheckName", "Declared", "Finding", "unreadable"]
-
 CheckName = Literal[
-    "unreadable",
     "size",
     "palette",
     "overlap",
@@ -60,13 +57,6 @@ class Finding:
 
     def __str__(self) -> str:
         return str(self.problem)
-
-
-def unreadable(scene: str, problem: Problem) -> Finding:
-    """What a reader of the data format complains about in a scene."""
-    field = f"{problem.field} " if problem.field else ""
-    message = f"{problem.where}: {field}{problem.message}"
-    return Finding(scene, "unreadable", message, declared=problem.found, derived=problem.allowed)
 
 
 def _shown(value: Declared) -> str:

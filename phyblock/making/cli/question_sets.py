@@ -2,25 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.datasets import QuestionSet, read_questions
 from phyblock.datasets.named import find_questions, read_data_set
-from phyblock.domain import Question
-
-__all__ = [
-    "data_option",
-    "questions_argument",
-    "questions_option",
-    "read_question_set",
-    "read_unseen",
-    "size_option",
-    "unseen_data_option",
-    "unseen_option",
-]
 
 _QUESTIONS = "phyblock-vqa"
 _SCENES = "phyblock-400"
@@ -52,28 +38,6 @@ size_option = click.option(
     metavar="PX",
     help="Side of each picture.",
 )
-unseen_option = click.option(
-    "--unseen",
-    type=NAME_OR_PATH,
-    metavar="PATH",
-    help="Another set of questions, of another seed: a text probe learns from it alone.",
-)
-unseen_data_option = click.option(
-    "--unseen-data",
-    type=NAME_OR_PATH,
-    metavar="PATH",
-    help="The scenes that those are about, unless they are those of --data.",
-)
-
-
-def read_unseen(unseen: str | None, scenes: str, mine: Path) -> list[Question]:
-    """The questions of another set than `mine`, or none; BadParameter where it is that set."""
-    if unseen is None:
-        return []
-    other = read_question_set(unseen, scenes)
-    if other.root.resolve() == mine.resolve():
-        raise click.BadParameter(f"{unseen} is the set itself", param_hint="--unseen")
-    return [task.question for task in other.tasks]
 
 
 def read_question_set(name: str, scenes: str = _SCENES) -> QuestionSet:

@@ -9,7 +9,6 @@ import click
 
 from phyblock.cli.console import shown_path
 from phyblock.cli.paths import UserPath
-from phyblock.making.auditing.given_away import MOST_SCENES, given_away_text
 from phyblock.making.cli.working import (
     jobs_option,
     ray_option,
@@ -95,15 +94,11 @@ def command(
         open_workers(jobs, ray_address) as workers,
         open_writer(out, kind, replace, "give another --out, or --replace") as writer,
     ):
-        tasks = []
         for scene in tracked(produce(order, workers), count, "Making"):
-            candidates = writer.add(scene)
-            if count <= MOST_SCENES:
-                tasks.append((scene, candidates))
+            writer.add(scene)
         chosen = ",".join(map(str, levels))
         made_by = f"phyblock scenes generate --count {count} --seed {seed} --levels {chosen}"
         made_by += f" --palette {palette} --out {out.name}"
-        given_away = given_away_text(tasks)
-        writer.finish(card(out.name, writer, made_by, _PALETTE_TEXT[kind], given_away))
+        writer.finish(card(out.name, writer, made_by, _PALETTE_TEXT[kind]))
     click.echo(f"{counted(count, 'scene')}, all checks passed: {shown_path(out)}")
     tell_simulators()

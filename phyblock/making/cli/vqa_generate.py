@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -11,23 +10,12 @@ from rich.progress import Progress, TaskID
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
 from phyblock.datasets.named import read_data_set
-from phyblock.domain import SUBTASKS, Question, Subtask
-from phyblock.errors import Problem, SpecError
-from phyblock.making.attacks.attack_card import attack_card
-from phyblock.making.attacks.attacks import Attacked, all_attacks, attack
-from phyblock.making.attacks.observed import Observed, observe
-from phyblock.making.auditing.boosting import can_boost
-from phyblock.making.cli.question_sets import (
-    data_option,
-    read_unseen,
-    unseen_data_option,
-    unseen_option,
-)
+from phyblock.domain import SUBTASKS, Subtask
+from phyblock.making.cli.question_sets import data_option
 from phyblock.making.cli.subtasks_option import subtasks_option
 from phyblock.making.cli.working import jobs_option, ray_option, seed_option, tell_simulators
 from phyblock.making.questions.question_files import check_place, write_questions
 from phyblock.making.questions.question_production import PER_SUBTASK, make_questions
-from phyblock.making.questions.shortcuts import SubtaskAudit, audit_questions
 from phyblock.making.workers import open_workers
 from phyblock.text import counted
 
@@ -48,8 +36,6 @@ __all__ = ["command"]
 @ray_option
 @click.option("--out", type=UserPath(), required=True, metavar="DIR", help="Folder to write.")
 @click.option("--replace", is_flag=True, help="Replace questions that are in the folder.")
-@unseen_option
-@unseen_data_option
 def command(
     data: str,
     subtasks: tuple[Subtask, ...],
@@ -59,25 +45,15 @@ def command(
     ray_address: str | None,
     out: Path,
     replace: bool,
-    unseen: str | None,
-    unseen_data: str | None,
 ) -> None:
     """Make questions, each with an answer that is derived, and their data card.
 
     The same scenes, subtasks, numbers and seed give the same files with the same physics engine,
-    on any Python, any number of processes or a cluster. With --unseen, the card also says what is
-    learned from the texts of that set.
+    on any Python, any number of processes or a cluster.
     """
     check_place(out, replace)
     wanted = {subtask: per_subtask or PER_SUBTASK[subtask] for subtask in subtasks}
     read = read_data_set(data)
-    other = read_unseen(unseen, unseen_data or data, out)
-    learns = can_boost()
-    if other and not learns:
-        message = (
-            "learning from the texts of another set needs scikit-learn, which is not installed"
-        )
-        raise SpecError(Problem("--unseen", message, hint="pip install 'phyblock[audit]'"))
     scenes = [task.scene for task in read.tasks]
     console = make_console(stderr=True)
     with (
@@ -94,35 +70,13 @@ def command(
             progress.advance(bars[subtask])
 
         questions = list(make_questions(scenes, wanted, seed, workers, report))
-        observed = list(workers.map(observe, questions))
     made_by = f"phyblock vqa generate --data {data} --seed {seed} --out {out.name}"
     if len(subtasks) < len(SUBTASKS):
         made_by += f" --subtasks {','.join(subtasks)}"
     if per_subtask is not None:
         made_by += f" --per-subtask {per_subtask}"
-    if unseen is not None:
-        made_by += f" --unseen {Path(unseen).name}"
     originals = {scene.id: scene for scene in scenes}
-    audits, attacked = _figures(questions, observed, other, with_texts=learns)
-    told = attack_card(attacked, observed)
-    write_questions(out, questions, originals, read.name, made_by, audits, told)
+    write_questions(out, questions, originals, read.name, made_by)
     outcome = f"{counted(len(questions), 'question')} in {counted(len(subtasks), 'subtask')}"
     click.echo(f"{outcome}: {shown_path(out)}")
     tell_simulators()
-    if not learns:
-        click.echo(
-            "CARD.md leaves out what is learned from texts and boosted probes, which need "
-            "scikit-learn: pip install 'phyblock[audit]'",
-            err=True,
-        )
-
-
-def _figures(
-    questions: Sequence[Question],
-    observed: Sequence[Observed],
-    other: Sequence[Question],
-    with_texts: bool,
-) -> tuple[list[SubtaskAudit], list[Attacked]]:
-    audits = list(audit_questions(questions, with_text_probe=with_texts))
-    attacks = all_attacks(other, with_texts=with_texts)
-    return audits, [row for one in attacks for row in attack(one, observed)]

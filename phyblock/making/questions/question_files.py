@@ -11,11 +11,8 @@ from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, check_free, writing
 from phyblock.making.questions.question_card import question_card
-from phyblock.making.questions.shortcuts import SubtaskAudit
 from phyblock.records.question import StoredQuestion
 from phyblock.stable import hex_digest
-
-__all__ = ["QUESTIONS_FILE", "check_place", "write_questions"]
 
 QUESTIONS_FILE = "questions.jsonl"
 _CARD_FILE = "CARD.md"
@@ -42,20 +39,15 @@ def write_questions(
     originals: Mapping[str, Scene],
     scenes_name: str,
     made_by: str,
-    audits: Sequence[SubtaskAudit] = (),
-    attacks: str = "",
 ) -> None:
     """Write the questions, sorted as they are, with card and checksums; StoreError if it cannot.
 
     `originals` are the scenes as stored, by id, of the set `scenes_name`; `made_by` is the command
-    that makes the same files; `audits` are told of in the card, and `attacks` is its section about
-    those.
+    that makes the same files.
     """
     lines = "".join(f"{StoredQuestion.of(q, originals[q.scene.id]).as_json()}\n" for q in questions)
     files = {
-        _CARD_FILE: question_card(
-            folder.name, scenes_name, questions, made_by, audits, attacks
-        ).encode(),
+        _CARD_FILE: question_card(folder.name, scenes_name, questions, made_by).encode(),
         QUESTIONS_FILE: lines.encode(),
         VERSION_FILE: f"{SET_VERSION}\n".encode(),
     }

@@ -10,8 +10,6 @@ from phyblock.sim.steps import DEFAULT_REST
 from phyblock.sim.support import FIT_TOLERANCE_M
 from phyblock.sim.visibility import LEAST_SHARE, LEAST_SHOWN
 
-__all__ = ["card", "completed_card"]
-
 _TEXT = """# {name}
 
 {count} block structures for assembly planning, with their candidate blocks:
@@ -77,7 +75,7 @@ Mean and most, over the scenes of a level:
 
 The candidate sets hold {candidates}.
 
-{given_away}"""
+"""
 _FILE_TEXT = """## The file
 
 `scenes.jsonl` holds one scene a line, sorted by `id`:
@@ -94,13 +92,8 @@ _FILE_TEXT = """## The file
 """
 
 
-def card(
-    name: str, written: SetWriter, command: str, palette_text: str, given_away: str = ""
-) -> str:
-    """Markdown text of the card, after all scenes were added; `command` is what made them.
-
-    `given_away` is a section on the candidate sets.
-    """
+def card(name: str, written: SetWriter, command: str, palette_text: str) -> str:
+    """Return the Markdown card, after all scenes were added; `command` is what made them."""
     levels = dict(sorted(written.levels.items()))
     settings = " and at ".join(
         f"1/{round(1 / physics.time_step_s)} s ({physics.iterations} solver iterations)"
@@ -127,7 +120,6 @@ def card(
         pixels=LEAST_SHARE * 512**2,
         shown=LEAST_SHOWN,
         version=SET_VERSION,
-        given_away=given_away,
         limits="\n".join(_limit(level) for level in levels),
         heads=" | ".join(f"{quantity}, mean | most" for quantity in QUANTITIES),
         rules="|".join("---|---" for _ in QUANTITIES),

@@ -6,11 +6,11 @@ import pytest
 
 from phyblock.domain import CandidateSet, Scene
 from phyblock.errors import Problem
-from phyblock.making.auditing.scene_audit import AUDITED, audit_scene
-from phyblock.making.auditing.set_verification import LAWS, verify_scene
-from phyblock.making.checks.finding import Finding, unreadable
+from phyblock.making.checks.finding import Finding
+from phyblock.making.checks.scene_audit import AUDITED, audit_scene
 from phyblock.making.checks.scene_checks import CHECKS, findings_of
 from phyblock.making.checks.scene_facts import SceneFacts
+from phyblock.making.checks.set_verification import LAWS, verify_scene
 from phyblock.making.checks.tolerances import FOREIGN, OURS
 from phyblock.making.scenes.candidate_sets import make_candidates
 from phyblock.making.scenes.sketch import make_scene
@@ -72,7 +72,7 @@ SPOILED = {
 def test_every_check_has_an_example_here_and_is_chosen_somewhere() -> None:
     assert set(SPOILED) == set(CHECKS)
     assert {check.law for name, check in CHECKS.items() if name != "palette"} == set(LAWS)
-    assert set(AUDITED) - {"unreadable", "duplicate"} <= set(CHECKS)
+    assert set(AUDITED) - {"duplicate"} <= set(CHECKS)
 
 
 @pytest.mark.parametrize("name", SPOILED)
@@ -96,7 +96,7 @@ def test_a_check_finds_its_own_fault_measured_in_units(name: str) -> None:
     ids=["floating", "overlap", "dependency", "layer"],
 )
 def test_accepting_verifying_and_auditing_say_the_same_words(scene: Scene) -> None:
-    audited = {finding.message for finding in audit_scene(scene, OFFERED, FOREIGN).findings}
+    audited = {finding.message for finding in audit_scene((scene, OFFERED), FOREIGN).findings}
     verified = {f.message for found in verify_scene((scene, OFFERED)).values() for f in found}
     refused = {p.message for p in (*form_problems(scene), *physics_problems(scene))}
     assert audited
@@ -119,5 +119,3 @@ def test_dependencies_that_name_no_block_leave_layers_and_order_unjudged() -> No
 def test_a_finding_reads_as_a_problem_with_orders_as_a_list() -> None:
     finding = Finding("s1", "order", "said", (2,), field="f", declared=(1, 3), derived=())
     assert finding.problem == Problem("s1", "said", "f", "[1, 3]", "")
-    problem = Problem("file:3", "is wrong", "field", "found", "allowed")
-    assert unreadable("s1", problem).message == "file:3: field is wrong"

@@ -16,7 +16,7 @@ from benchmarks.evidence.completing import stripped
 from phyblock.datasets import read_builtin
 from phyblock.domain import Scene
 from phyblock.errors import DataError
-from phyblock.making.auditing.set_verification import check_sums, verify_scene
+from phyblock.making.checks.set_verification import check_sums, verify_scene
 from phyblock.making.scenes.completing import complete, derived
 from phyblock.making.scenes.given_scenes import GivenScene, ReadScene, read_given
 from phyblock.resources import bundled

@@ -10,13 +10,13 @@ import pytest
 from phyblock.datasets import read_builtin
 from phyblock.domain import CandidateSet, Scene
 from phyblock.domain.symmetry import Symmetry
-from phyblock.making.auditing.set_verification import (
+from phyblock.making.checks.set_checks import find_duplicates, find_orphans
+from phyblock.making.checks.set_verification import (
     LAWS,
     check_looks,
     check_sums,
     verify_scenes,
 )
-from phyblock.making.checks.set_checks import find_duplicates, find_orphans
 from phyblock.making.scenes.candidate_sets import make_candidates
 from phyblock.making.scenes.scene_files import SUMS_FILE, sums_text
 from phyblock.making.scenes.sketch import make_scene

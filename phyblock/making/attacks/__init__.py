@@ -1,1 +1,0 @@
-"""Ways to answer questions without understanding them, tried on whole sets."""

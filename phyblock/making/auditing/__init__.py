@@ -1,1 +1,0 @@
-"""Whole data sets held against geometry and physics: those made here and those made elsewhere."""

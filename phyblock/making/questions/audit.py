@@ -1,0 +1,301 @@
+"""Audit of a question set: balance of answers, repeats, and probes that answer blindly.
+
+Two probes learn from questions about other base scenes and answer the rest: one reads only the
+texts (logistic regression over words, numbers and likeness), one looks only at simple features of
+the pictures that are options (ridge regression). Where either is right much more often than
+chance, the set gives its answers away.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
+from phyblock.domain.scene import Block
+from phyblock.making.questions.letters import BALANCE
+from phyblock.making.questions.picture_view import shares
+from phyblock.making.questions.question_draft import UnfairError
+from phyblock.making.questions.referring import resolve
+from phyblock.models.guesses import FOLDS, Folds, Guesses
+from phyblock.sim.render import COLOR_RGB, Shot
+from phyblock.sim.seeing import changed_pixels, seen
+
+Floats = NDArray[np.float64]
+
+GUESSABLE = 0.35
+"""Accuracy that no probe of a sound set exceeds beyond its interval."""
+LEAST_SEEN = 0.25
+"""Share of itself that a block named in words has to show."""
+_DARKEST_FACE = 60
+_EDGE_STEP = 40
+_FEWEST = 12
+_RIDGE = 4.0
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Accuracy of a probe on `n` questions, with a Wilson interval of 95 %."""
+
+    right: float
+    n: int
+
+    @property
+    def accuracy(self) -> float:
+        """Share of questions answered rightly."""
+        return self.right / self.n
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson score interval of 95 %."""
+        z, n, p = 1.96, self.n, self.accuracy
+        middle = (p + z * z / (2 * n)) / (1 + z * z / n)
+        half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+        return middle - half, middle + half
+
+
+@dataclass(frozen=True)
+class SubtaskAudit:
+    """Facts about the questions of one subtask.
+
+    `letters` counts right answers by letter (ordering: by permutation). `ambiguous` questions have
+    options that read alike, `repeats` ask the same as an earlier one, `hidden` name a block that
+    shows less than `LEAST_SEEN` of itself. Probes are None where they have nothing to go by.
+    """
+
+    subtask: Subtask
+    n: int
+    base_scenes: int
+    letters: dict[str, int]
+    chance: float
+    majority: Probe
+    text: Probe | None
+    pictures: Probe | None
+    ambiguous: tuple[str, ...]
+    repeats: tuple[str, ...]
+    hidden: tuple[str, ...]
+
+    @property
+    def letter_shares(self) -> tuple[float, float]:
+        """Smallest and largest share of a letter (ordering: of a first picture)."""
+        counts = Counter(dict.fromkeys(LETTERS, 0))
+        for answer, count in self.letters.items():
+            counts[answer[0]] += count
+        return min(counts.values()) / self.n, max(counts.values()) / self.n
+
+    @property
+    def is_balanced(self) -> bool:
+        """True if every letter is right about as often as the others; orders are not judged."""
+        low, high = self.letter_shares
+        return self.subtask == "OR" or (BALANCE[0] <= low and high <= BALANCE[1])
+
+    def findings(self) -> Iterator[str]:
+        """Yield what is wrong, a sentence each."""
+        if not self.is_balanced:
+            low, high = (round(100 * bound) for bound in BALANCE)
+            yield f"{self.subtask}: a letter is right outside {low} to {high} %"
+        probes = {"majority": self.majority, "text": self.text, "pictures": self.pictures}
+        for name, probe in probes.items():
+            if probe is not None and probe.interval[0] > max(GUESSABLE, self.chance):
+                yield f"{self.subtask}: the {name} probe reaches {100 * probe.accuracy:.0f} %"
+        yield from (f"{name}: options read alike" for name in self.ambiguous)
+        yield from (f"{name}: asks what an earlier question asks" for name in self.repeats)
+        yield from (f"{name}: names a block that can hardly be seen" for name in self.hidden)
+
+
+def audit_questions(
+    questions: Sequence[Question], *, with_texts: bool = True, with_pictures: bool = True
+) -> Iterator[SubtaskAudit]:
+    """Yield an audit of each subtask that has questions, in the paper's order.
+
+    Raises SpecError where the text probe is wanted and scikit-learn is not installed.
+    """
+    guesses, folds = Guesses(questions), Folds(questions)
+    repeated = duplicates_of(questions)
+    for subtask in SUBTASKS:
+        mine = [question for question in questions if question.subtask == subtask]
+        if not mine:
+            continue
+        chances = [1 / math.factorial(4) if subtask == "OR" else 1 / len(q.options) for q in mine]
+        yield SubtaskAudit(
+            subtask=subtask,
+            n=len(mine),
+            base_scenes=len({base for q in mine for base in q.scene.parents or (q.scene.id,)}),
+            letters=dict(sorted(Counter(q.answer_letters for q in mine).items())),
+            chance=math.fsum(chances) / len(chances),
+            majority=_guessed("majority", mine, guesses),
+            text=_guessed("text-only", mine, guesses) if with_texts else None,
+            pictures=picture_probe(mine, folds) if with_pictures else None,
+            ambiguous=tuple(q.id for q in mine if _reads_alike(q)),
+            repeats=tuple(q.id for q in mine if q.id in repeated),
+            hidden=tuple(
+                q.id for q in mine if any(share < LEAST_SEEN for share in referents(q).values())
+            ),
+        )
+
+
+def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
+    """Return questions that ask what an earlier one asks, whatever the order of options, with the
+    id of that one.
+    """
+    first: dict[str, str] = {}
+    repeats = {}
+    for question in questions:
+        earlier = first.setdefault(_content(question), question.id)
+        if earlier != question.id:
+            repeats[question.id] = earlier
+    return repeats
+
+
+def referents(question: Question) -> dict[int, float]:
+    """Return the visible share of each block that question or options name in words, by order.
+
+    Only static questions name blocks: where marks or pictures say which block is meant, none is
+    named. An option that names a block begins with "the".
+    """
+    picture = question.pictures[0] if question.pictures else None
+    if picture is None or picture.label != "scene":
+        return {}
+    slots = map(str, question.evidence.get("slots", {}).values())
+    named: set[int] = set()
+    for text in (*slots, *(option for option in question.options if option.startswith("the "))):
+        try:
+            orders = resolve(text.lower(), picture)
+        except UnfairError:  # Not every slot is an expression that names a block.
+            continue
+        named.update(orders if len(orders) == 1 else ())
+    seen_shares = shares(picture) if named else {}
+    return {order: seen_shares[order] for order in sorted(named)}
+
+
+def picture_probe(questions: Sequence[Question], folds: Folds) -> Probe | None:
+    """Answer questions whose options are pictures by features of these pictures alone.
+
+    Ridge regression of being right (ordering: of the place in the order), learned from questions
+    of the same kind that share no base scene. None where no option is a picture.
+    """
+    features = {q.id: _picture_features(q) for q in questions}
+    kinds: dict[object, list[Question]] = {}
+    for question in questions:
+        if features[question.id] is not None:
+            kinds.setdefault(question.evidence.get("kind", ""), []).append(question)
+    right, n = 0.0, 0
+    for members in kinds.values():
+        for fold in range(FOLDS):
+            held_out = [q for q in members if folds.of(q) == fold]
+            known = [q for q in members if folds.is_known(fold, q)]
+            if not held_out or len(known) < _FEWEST:
+                continue
+            rows = np.vstack([features[q.id] for q in known])  # type: ignore[misc]
+            worth = np.concatenate([_worth(q) for q in known])
+            centered = rows - rows.mean(axis=0)
+            gram = centered.T @ centered + _RIDGE * np.eye(rows.shape[1])
+            weights = np.linalg.solve(gram, centered.T @ (worth - worth.mean()))
+            for question in held_out:
+                order = np.argsort(-(features[question.id] @ weights), kind="stable")
+                right += tuple(order[: len(question.answer)]) == question.answer
+                n += 1
+    return Probe(right, n) if n else None
+
+
+def _guessed(probe: str, questions: Sequence[Question], guesses: Guesses) -> Probe:
+    right = sum(guesses.guess(probe, question) == question.answer for question in questions)
+    return Probe(right, len(questions))
+
+
+def _worth(question: Question) -> Floats:
+    """1 for the right option and 0 for others; in an order, the first is worth most."""
+    worth = np.zeros(len(question.options))
+    worth[list(question.answer)] = np.arange(len(question.answer), 0, -1)
+    return worth
+
+
+def _picture_features(question: Question) -> Floats | None:
+    """Features of each option's picture beside the other options', shape (options, 2 * features):
+    deviations from their mean in standard deviations, and the absolute values of these.
+    """
+    pictures = {picture.label: picture for picture in question.pictures}
+    shots = [seen(pictures[letter]) for letter in LETTERS if letter in pictures]
+    if not shots:
+        return None
+    columns = [_measures(shot) for shot in shots]
+    colors = [_color_shares(shot) for shot in shots]
+    for i, (shot, column) in enumerate(zip(shots, columns, strict=True)):
+        column.append(sum(float(changed_pixels(shot, other).sum()) for other in shots))
+        column.append(sum(float(np.abs(colors[i] - other).sum()) for other in colors))
+    if "scene" in pictures:
+        scene = seen(replace(pictures["scene"], marks=()))
+        shown = _color_shares(scene)
+        for shot, column, color in zip(shots, columns, colors, strict=True):
+            changed = changed_pixels(scene, shot)
+            column += [float(changed.sum()), *_center(changed), float(np.abs(shown - color).sum())]
+    values = np.array(columns)
+    spread = values.std(axis=0)
+    steps = (values - values.mean(axis=0)) / np.where(spread > 0, spread, 1.0)
+    return np.hstack([steps, np.abs(steps)])
+
+
+def _measures(shot: Shot) -> list[float]:
+    """Colored area, its center, its extent, brightness and edges of a picture [pixels]."""
+    mask = shot.block >= 0
+    lines = [np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0)]
+    gray = np.where(mask, shot.rgb.mean(axis=2), 255.0)
+    edges = sum(int((np.abs(np.diff(gray, axis=axis)) > _EDGE_STEP).sum()) for axis in (0, 1))
+    return [
+        float(mask.sum()),
+        *_center(mask),
+        *(float(np.ptp(line)) if len(line) else 0.0 for line in lines),
+        float(shot.rgb[mask].mean()) if mask.any() else 0.0,
+        float(edges),
+    ]
+
+
+def _center(mask: NDArray[np.bool_]) -> tuple[float, float]:
+    """Mean row and column of a mask, the picture's middle where it is empty."""
+    rows, columns = np.nonzero(mask)
+    if not len(rows):
+        return mask.shape[0] / 2, mask.shape[1] / 2
+    return float(rows.mean()), float(columns.mean())
+
+
+def _color_shares(shot: Shot) -> Floats:
+    """Shares of the pixels of faces by the block color nearest in hue, shape (colors,)."""
+    pixels = shot.rgb[shot.block >= 0].astype(np.float64)
+    faces = pixels[pixels.max(axis=1) > _DARKEST_FACE]
+    hues = np.array(list(COLOR_RGB.values()), dtype=np.float64)
+    hues /= np.linalg.norm(hues, axis=1, keepdims=True)
+    counts = np.bincount((faces @ hues.T).argmax(axis=1), minlength=len(hues)).astype(np.float64)
+    return np.asarray(counts / max(counts.sum(), 1.0))
+
+
+def _reads_alike(question: Question) -> bool:
+    plain = {" ".join(option.lower().split()) for option in question.options}
+    return len(plain) < len(question.options)
+
+
+def _content(question: Question) -> str:
+    """Everything that a reader of the question sees, its options in no order, as JSON."""
+    pictures = {picture.label: _recipe(picture) for picture in question.pictures}
+    shown = [json.dumps(part) for label, part in pictures.items() if label not in LETTERS]
+    options = [
+        json.dumps(pictures[letter]) if letter in pictures else option
+        for letter, option in zip(LETTERS, question.options, strict=False)
+    ]
+    return json.dumps([question.subtask, question.text, shown, sorted(options)])
+
+
+def _recipe(picture: QuestionPicture) -> list[object]:
+    def rounded(numbers: Sequence[float]) -> tuple[float, ...]:
+        return tuple(round(number, 6) + 0.0 for number in numbers)
+
+    def drawn(block: Block) -> tuple[object, ...]:
+        return block.type, block.color, rounded(block.position_m), rounded(block.euler_deg)
+
+    marks = sorted((rounded(mark.position_m), mark.letter) for mark in picture.marks)
+    return [picture.view_deg, sorted(map(drawn, picture.blocks)), marks]
