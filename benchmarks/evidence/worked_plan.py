@@ -54,17 +54,17 @@ def run_of(setting: str, matcher: str) -> tuple[AssemblyTask, Record, Run]:
     """The scene, the record of the plan, and a run that holds it alone, scored in one way."""
     sets = [f"settings=[{setting}]", f"scoring.matchers=[{matcher}]", "levels=[3]", "seeds=[0]"]
     data = bundled("benchmarks", "data")
-    loaded = load_suite(bundled("benchmarks", "quick.yaml"), sets, data_dir=data)
-    dataset = _scene_alone(loaded.dataset_path)
-    (track,) = open_tracks(Opening(loaded, dataset, None, with_prompts=False), [TRACK])
+    suite = load_suite(bundled("benchmarks", "quick.yaml"), sets, data_dir=data)
+    dataset = _scene_alone(suite.files.dataset)
+    (track,) = open_tracks(Opening(suite, dataset, None, with_prompts=False), [TRACK])
     assert isinstance(track, SingleTrack)
     (task,) = track.items
     fields = begun(f"{TRACK}/{MODEL}/{SCENE}/s0", TRACK, MODEL, task, 0, Reply(REPLY))
     record = judged({**fields, **track.about(task)}, task, track.judge(task, REPLY))
-    suite = {**loaded.suite.model_dump(mode="json"), "name": ""}
+    written = {**suite.model_dump(mode="json"), "name": ""}
     facts = {
         "identity": "the worked plan",
-        "suite": suite,
+        "suite": written,
         "models": [{"name": MODEL}],
         "items": {TRACK: 1},
         "scenes": 1,

@@ -57,7 +57,7 @@ def run_suite(
     _check(suite, models, limit, out, models_file)
     loaded = (suite if isinstance(suite, Suite) else load_suite(suite)).loaded
     named = None if models_file is None else str(models_file)
-    known_in = find_models_file(named, loaded.path)
+    known_in = find_models_file(named, loaded.files.path)
     plan = make_plan(loaded, load_models(known_in), only=models or (), limit=limit)
     check_commands(plan.models, known_in, named)
     folder = Path(out) if out is not None else plan.folder_in(Path("results"))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from phyblock.api.given import expect
 from phyblock.api.pictures import render
-from phyblock.config.suite import LoadedSuite
+from phyblock.config.suite import Suite as ConfigSuite
 from phyblock.config.suite import load_suite as read_suite
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import Problem, SpecError
@@ -68,17 +68,17 @@ class Scenes(Mapping[str, SceneTask]):
 class Suite:
     """A suite as it was read: what `run_suite` takes."""
 
-    loaded: LoadedSuite = field(compare=False)
+    loaded: ConfigSuite = field(compare=False)
 
     @property
     def name(self) -> str:
         """Its name."""
-        return self.loaded.suite.name
+        return self.loaded.name
 
     @property
     def models(self) -> tuple[str, ...]:
         """The models that it names; groups, and the word `recorded`, stand for themselves."""
-        named = self.loaded.suite.models
+        named = self.loaded.models
         return (named,) if isinstance(named, str) else tuple(named)
 
     @functools.cached_property
@@ -87,15 +87,15 @@ class Suite:
 
         Raises DataError where the data set cannot be read.
         """
-        suite = self.loaded.suite
-        dataset = open_dataset(suite.dataset.format, self.loaded.dataset_path)
+        suite = self.loaded
+        dataset = open_dataset(suite.dataset.format, self.loaded.files.dataset)
         return Scenes(select_tasks(dataset.tasks, suite.levels, suite.limit))
 
     def __repr__(self) -> str:
         return f"<suite {self.name}: {self._about()}>"
 
     def _about(self) -> str:
-        suite = self.loaded.suite
+        suite = self.loaded
         levels = ", ".join(map(str, suite.levels))
         return (
             f"{', '.join(suite.tracks)}; levels {levels}; {counted(len(suite.seeds), 'seed')}; "
@@ -104,7 +104,7 @@ class Suite:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: name, description, what it asks of whom."""
-        described = self.loaded.suite.description
+        described = self.loaded.description
         return (
             f"<p><b>{escape(self.name)}</b> {escape(described)}</p><p>{escape(self._about())}</p>"
         )

@@ -14,7 +14,7 @@ from rich.console import Console
 from phyblock.cli.console import make_console, plain_table, shown_path
 from phyblock.cli.paths import models_file_option
 from phyblock.config.models import GROUP, ModelSpec, group_names, host_of, load_models, with_members
-from phyblock.config.suite import SuiteSpec
+from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, Problem, SpecError
 from phyblock.models import (
     ModelConfig,
@@ -176,7 +176,7 @@ def _show_retiring(console: Console, configs: Sequence[ModelConfig]) -> None:
 
 
 def _config(name: str, known: dict[str, ModelSpec]) -> ModelConfig:
-    return to_config(name, known.get(name), SuiteSpec(name="models", models=(name,)))
+    return to_config(name, known.get(name), Suite(name="models", models=(name,)))
 
 
 def _row(name: str, config: ModelConfig) -> tuple[str, ...]:

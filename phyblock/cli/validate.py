@@ -89,17 +89,17 @@ def _check_written(path: Path, sets: tuple[str, ...], models_file: str | None) -
             raise SpecError(Problem(str(path), "names nothing", allowed=allowed))
         return [f"models file, {counted(len(known), 'model')}"]
     data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
-    loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
+    suite = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
     named = find_models_file(models_file, path)
     known = load_models(named)
-    if loaded.suite.models != RECORDED:
-        _check_models(named, known, loaded.suite.models)
-    plan = make_plan(loaded, known)
+    if suite.models != RECORDED:
+        _check_models(named, known, suite.models)
+    plan = make_plan(suite, known)
     check_commands(plan.models, named, models_file)
     calls = plan.samples_per_model
     models = counted(len(plan.models), "model")
     summary = f"suite {plan.suite.name}, {models}, {counted(calls, 'sample')} a model"
-    return [summary, *asking_remarks(loaded, plan)]
+    return [summary, *asking_remarks(suite, plan)]
 
 
 def _check_models(path: Path, known: Mapping[str, ModelSpec], names: Collection[str]) -> None:

@@ -18,6 +18,7 @@ from pydantic import (
     BeforeValidator,
     Discriminator,
     Field,
+    PrivateAttr,
     Tag,
     create_model,
     model_validator,
@@ -592,7 +593,27 @@ Examples = Annotated[
 ]
 
 
-class SuiteSpec(Section):
+@dataclass(frozen=True)
+class SuiteFiles:
+    """The files that a suite was read from and names.
+
+    `path` is the suite's own; `dataset` the absolute folder of the data set; by track, `folders`
+    are those of data of its own, and `templates` the absolute paths of prompts that are files.
+    Where prompts vary, `templates` are those of the reference, and `prompts` has the paths of all
+    by their texts. `unused` are custom templates that stand in for the bundled one of the other
+    form of answers.
+    """
+
+    path: Path
+    dataset: Path
+    source: YamlSource = field(repr=False, compare=False)
+    folders: Mapping[str, Path] = field(default_factory=dict)
+    templates: Mapping[str, Path] = field(default_factory=dict)
+    prompts: Mapping[str, Path] = field(default_factory=dict)
+    unused: Mapping[str, Path] = field(default_factory=dict)
+
+
+class Suite(Section):
     """A suite: which models are asked about which scenes, how, and what is made of the replies.
 
     Cross-field rules (`RULES`) hold on every instance; pydantic's
@@ -671,9 +692,27 @@ class SuiteSpec(Section):
     )
 
     later: ClassVar[tuple[str, ...]] = ("limit", "vary", "examples")
+    _files: SuiteFiles | None = PrivateAttr(default=None)
+
+    @property
+    def files(self) -> SuiteFiles:
+        """The files that it was read from and names; LookupError for one without any."""
+        if self._files is None:
+            raise LookupError(f"the suite {self.name} was not read from a file")
+        return self._files
+
+    def with_files(self, files: SuiteFiles) -> Self:
+        """Return the suite as one that was read from these files."""
+        suite = self.model_copy()
+        suite._files = files
+        return suite
+
+    def where(self, *path: str | int) -> str:
+        """Return the place ("file:line:col" or "--set ...") of a field, for errors found later."""
+        return self.files.source.where(path)
 
     @model_validator(mode="after")
-    def _check_rules(self) -> SuiteSpec:
+    def _check_rules(self) -> Suite:
         broken = broken_rules(lambda dotted: read_dotted(self, dotted))
         if broken:
             raise refuse("; ".join(f"{rule.field}: {rule.message}" for rule in broken), rules=True)
@@ -687,14 +726,20 @@ class SuiteSpec(Section):
             raise LookupError(f"the suite has no section of {model.__name__}")
         return section
 
-    def at(self, variant: Variant) -> SuiteSpec:
+    def at(self, variant: Variant) -> Self:
         """The suite as a variant asks, its other factors at their reference."""
         levels = {name: self.vary.names(name)[0] for name in self.vary.factors}
         values: dict[tuple[str, ...], Any] = {}
         for factor, level in {**levels, **dict(variant.levels)}.items():
             value = self.vary.value(factor, level)
             values |= dict.fromkeys(self.fields_of(factor), value)
-        return with_values(self, values)
+        suite = with_values(self, values)
+        if self._files is None or "prompt" not in self.vary.factors:
+            return suite
+        texts = {name: _prompt(suite, name) for name in suite.tracks}
+        prompts = self._files.prompts
+        templates = {name: prompts[text] for name, text in texts.items() if text in prompts}
+        return suite.with_files(replace(self._files, templates=templates))
 
     def fields_of(self, factor: str) -> tuple[tuple[str, ...], ...]:
         """The paths of the fields that a factor gives values to; none for repeats."""
@@ -728,25 +773,25 @@ class SuiteSpec(Section):
         return spec
 
 
-def suite_model() -> type[SuiteSpec]:
-    """What a suite may hold: `SuiteSpec` with the sections of all tracks."""
+def suite_model() -> type[Suite]:
+    """What a suite may hold: `Suite` with the sections of all tracks."""
     return _composed(tuple(kind.section for kind in known_tracks().values() if kind.section))
 
 
 @functools.cache
-def _composed(sections: tuple[tuple[str, type[BaseModel], str], ...]) -> type[SuiteSpec]:
+def _composed(sections: tuple[tuple[str, type[BaseModel], str], ...]) -> type[Suite]:
     fields: dict[str, Any] = {
         key: (model, Field(default_factory=model, description=description))
         for key, model, description in sections
     }
-    return create_model("SuiteSpec", __base__=SuiteSpec, __doc__=SuiteSpec.__doc__, **fields)
+    return create_model("Suite", __base__=Suite, __doc__=Suite.__doc__, **fields)
 
 
 _DRAWN = ("background", "view")
 """Factors of pictures that are drawn."""
 
 
-def vary_problems(suite: SuiteSpec, source: YamlSource) -> Iterator[Problem]:
+def vary_problems(suite: Suite, source: YamlSource) -> Iterator[Problem]:
     """What is wrong with the section `vary` of a suite, each fault at its place in the file."""
     for factor in suite.vary.factors:
         at = ("vary", factor)
@@ -768,7 +813,7 @@ def vary_problems(suite: SuiteSpec, source: YamlSource) -> Iterator[Problem]:
             yield from _levels(suite, source, factor)
 
 
-def _conflicts(suite: SuiteSpec, source: YamlSource, factor: str) -> Iterator[Problem]:
+def _conflicts(suite: Suite, source: YamlSource, factor: str) -> Iterator[Problem]:
     """A field that says something else than the reference of the factor that varies it."""
     for path in suite.fields_of(factor):
         value, first = read_dotted(suite, dotted(path)), suite.vary.values(factor)[0]
@@ -778,7 +823,7 @@ def _conflicts(suite: SuiteSpec, source: YamlSource, factor: str) -> Iterator[Pr
             yield Problem(source.where(path), message, dotted(path), show(value), str(first), hint)
 
 
-def _levels(suite: SuiteSpec, source: YamlSource, factor: str) -> Iterator[Problem]:
+def _levels(suite: Suite, source: YamlSource, factor: str) -> Iterator[Problem]:
     """Levels that break a rule of suites."""
     for place, level in enumerate(suite.vary.names(factor)):
         at = ("vary", factor, place)
@@ -796,46 +841,13 @@ def _levels(suite: SuiteSpec, source: YamlSource, factor: str) -> Iterator[Probl
 _BARE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9_-]*$")
 
 
-@dataclass(frozen=True)
-class LoadedSuite:
-    """A suite and the file it was read from.
-
-    `dataset_path` is the absolute folder of the data set; by track, `folders` are those of data of
-    its own, and `templates` the absolute paths of prompts that are files. Where prompts
-    vary, `suite` and `templates` are those of the reference, and `prompts` has the paths of all by
-    their texts. `unused` are templates of one's own that stand in for the bundled one of the other
-    form of answers.
-    """
-
-    suite: SuiteSpec
-    path: Path
-    dataset_path: Path
-    source: YamlSource = field(repr=False, compare=False)
-    folders: Mapping[str, Path] = field(default_factory=dict)
-    templates: Mapping[str, Path] = field(default_factory=dict)
-    prompts: Mapping[str, Path] = field(default_factory=dict)
-    unused: Mapping[str, Path] = field(default_factory=dict)
-
-    def at(self, variant: Variant) -> LoadedSuite:
-        """The suite as a variant asks."""
-        suite = self.suite.at(variant)
-        texts = {name: _prompt(suite, name) for name in suite.tracks}
-        known = {name: self.prompts[text] for name, text in texts.items() if text in self.prompts}
-        templates = known if "prompt" in suite.vary.factors else self.templates
-        return replace(self, suite=suite, templates=templates)
-
-    def where(self, *path: str | int) -> str:
-        """Place ("file:line:col" or "--set ...") of a field, for errors found later."""
-        return self.source.where(path)
-
-
 def load_suite(
     path: Path,
     overrides: Sequence[str] = (),
     *,
     data_dir: Path,
     prompt_dirs: Sequence[Path] = (),
-) -> LoadedSuite:
+) -> Suite:
     """Read, override and validate a suite.
 
     `overrides` are "key=value" texts; `data_dir` is the folder of the bundled data sets, where
@@ -866,23 +878,21 @@ def suite_tracks(path: Path) -> tuple[str, ...]:
     return tuple(read_yaml(path).data.get("tracks", default))
 
 
-def resolve_models(
-    loaded: LoadedSuite, known: Mapping[str, ModelSpec]
-) -> dict[str, ModelSpec | None]:
+def resolve_models(suite: Suite, known: Mapping[str, ModelSpec]) -> dict[str, ModelSpec | None]:
     """The suite's models in its order, those of a group in its place; None stands for a built-in
     baseline.
 
     Raises SpecError for each unknown name, at its place in the suite, and ValueError when the
     suite asks for recorded replies (those are listed by the data set).
     """
-    names = loaded.suite.models
+    names = suite.models
     if names == RECORDED:
         raise ValueError("the models of a suite of recorded replies are listed by its data set")
     allowed = [*baseline_names(), *known, *(GROUP + name for name in group_names(known))]
     unknown = [(index, name) for index, name in enumerate(names) if name not in allowed]
     problems = [
         Problem(
-            loaded.where("models", index),
+            suite.where("models", index),
             unknown_model(name),
             f"models[{index}]",
             show(name),
@@ -937,12 +947,12 @@ def _rule_place(source: YamlSource, reads: tuple[str, ...]) -> str:
 
 
 def _locate(
-    suite: SuiteSpec,
+    suite: Suite,
     path: Path,
     source: YamlSource,
     data_dir: Path,
     prompt_dirs: Sequence[Path],
-) -> LoadedSuite:
+) -> Suite:
     finder = _Finder(path, source, data_dir)
     scenes = suite.dataset
     is_bundled = scenes.format == "builtin"
@@ -974,10 +984,10 @@ def _locate(
     if dataset is None or finder.problems:
         raise SpecError(sort_problems(finder.problems))
     located = map(_there, (folders, templates, prompts, unused))
-    return LoadedSuite(suite, path, dataset, source, *located).at(Variant())
+    return suite.with_files(SuiteFiles(path, dataset, source, *located)).at(Variant())
 
 
-def _prompt(suite: SuiteSpec, track: str) -> str:
+def _prompt(suite: Suite, track: str) -> str:
     """What a suite names as the prompt of a track."""
     return str(read_dotted(suite, ".".join(known_track(track).prompt_field)))
 

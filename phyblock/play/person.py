@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from phyblock.config.models import HUMAN
-from phyblock.config.suite import LoadedSuite, SuiteSpec
+from phyblock.config.suite import Suite
 from phyblock.errors import Problem, SpecError
 from phyblock.models import ModelConfig, Reply, Request, Usage
 from phyblock.play.order import arranged, row_of_name
@@ -61,18 +61,17 @@ class Person:
         return PlannedModel(self.model, config)
 
 
-def plan_sitting(loaded: LoadedSuite, person: Person, limit: int | None) -> RunPlan:
+def plan_sitting(suite: Suite, person: Person, limit: int | None) -> RunPlan:
     """The run of one person: a suite asked once, with the first of its seeds, in a row's order.
 
     Raises SpecError for a suite that asks in several ways or what nobody can answer by hand, and
     what `make_plan` raises.
     """
-    suite = loaded.suite
     if suite.vary.factors:
         message, hint = "asks in several ways, and a person is asked once", "take `vary` out"
         found = ", ".join(suite.vary.factors)
-        raise SpecError(Problem(loaded.where("vary"), message, "vary", found, hint=hint))
-    once = replace(loaded, suite=suite.model_copy(update={"seeds": suite.seeds[:1]}))
+        raise SpecError(Problem(suite.where("vary"), message, "vary", found, hint=hint))
+    once = suite.model_copy(update={"seeds": suite.seeds[:1]})
     plan = make_plan(once, {}, limit=limit, people=[person.planned()])
     return replace(plan, arranged=partial(arranged, row=person.row))
 
@@ -85,7 +84,7 @@ class Given:
     took_s: float
 
 
-def picking_of(request: Request, suite: SuiteSpec) -> Picking:
+def picking_of(request: Request, suite: Suite) -> Picking:
     """How a person answers a request of a suite.
 
     How grids are cut in pictures that a data set brings is not known: they are not clicked in.
@@ -103,7 +102,7 @@ class PersonModel:
     needs_messages = True
 
     def __init__(
-        self, name: str, suite: SuiteSpec, answer: Callable[[Request, Picking], Awaitable[Given]]
+        self, name: str, suite: Suite, answer: Callable[[Request, Picking], Awaitable[Given]]
     ) -> None:
         self.name = name
         self._suite = suite

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from phyblock.config.models import RECORDED
-from phyblock.config.suite import LoadedSuite
+from phyblock.config.suite import Suite
 from phyblock.datasets import recorded_models
 from phyblock.errors import DataError
 from phyblock.records import Manifest
@@ -21,7 +21,7 @@ from phyblock.tracks.prompts import FORM_FACTS
 __all__ = ["asking_remarks", "choice_remarks", "moved_remarks"]
 
 
-def asking_remarks(loaded: LoadedSuite, plan: RunPlan) -> list[str]:
+def asking_remarks(suite: Suite, plan: RunPlan) -> list[str]:
     """Models that are asked although recordings of them are there; prompts of one's own; and where
     answers are asked for as JSON, which models are sent the schema, which hear of it in the prompt
     alone, and which of these prompts do not say it.
@@ -29,12 +29,14 @@ def asking_remarks(loaded: LoadedSuite, plan: RunPlan) -> list[str]:
     called = [model.name for model in plan.models if model.config.kind == "litellm"]
     if not called:
         return []
-    asked = {variant.shown: loaded.at(variant.shown) for variant in plan.variants}
-    used = {(track, path): one for one in asked.values() for track, path in one.templates.items()}
-    own = [*_recorded(called, loaded)]
+    asked = {variant.shown: suite.at(variant.shown) for variant in plan.variants}
+    used = {
+        (track, path): one for one in asked.values() for track, path in one.files.templates.items()
+    }
+    own = [*_recorded(called, suite)]
     own += [_named(track, path, one) for (track, path), one in used.items()]
-    own += [_unused(track, path, loaded) for track, path in loaded.unused.items()]
-    if loaded.suite.answer_format == "text":
+    own += [_unused(track, path, suite) for track, path in suite.files.unused.items()]
+    if suite.answer_format == "text":
         return own
     unsaid = [_unsaid(track, path) for (track, path), one in used.items() if not _says(track, one)]
     return [*own, *_models(plan), *unsaid]
@@ -75,14 +77,14 @@ def choice_remarks(plan: RunPlan) -> list[str]:
     ]
 
 
-def _recorded(called: Sequence[str], loaded: LoadedSuite) -> Iterator[str]:
-    if loaded.suite.dataset.format != "official":
+def _recorded(called: Sequence[str], suite: Suite) -> Iterator[str]:
+    if suite.dataset.format != "official":
         return
     with contextlib.suppress(DataError):
-        known = recorded_models(loaded.dataset_path)
+        known = recorded_models(suite.files.dataset)
         if names := ", ".join(name for name in called if name in known):
             yield (
-                f"{names}: called anew, though {loaded.dataset_path} holds recorded replies "
+                f"{names}: called anew, though {suite.files.dataset} holds recorded replies "
                 f"(models: {RECORDED} in the suite replays them, of those that --models names)"
             )
 
@@ -98,17 +100,17 @@ def _models(plan: RunPlan) -> Iterator[str]:
         )
 
 
-def _named(track: str, path: Path, loaded: LoadedSuite) -> str:
-    prompt = template_prompt(loaded, track)
+def _named(track: str, path: Path, suite: Suite) -> str:
+    prompt = template_prompt(suite, track)
     more = f" (with {', '.join(file.name for file in prompt.included)})" if prompt.included else ""
     line = prompt.unsent_line
     lost = "" if line is None else f"; the text outside of its blocks (line {line}) is NOT sent"
     return f"prompt of {track}: {path}{more}{lost}"
 
 
-def _unused(track: str, path: Path, loaded: LoadedSuite) -> str:
-    form = loaded.suite.answer_format
-    used = loaded.templates.get(track)
+def _unused(track: str, path: Path, suite: Suite) -> str:
+    form = suite.answer_format
+    used = suite.files.templates.get(track)
     kind = kind_of(track)
     bundled = kind.template if form == "text" else kind.json_template
     name = f"{bundled.name}, which is the bundled one" if bundled else "another one"
@@ -118,8 +120,8 @@ def _unused(track: str, path: Path, loaded: LoadedSuite) -> str:
     )
 
 
-def _says(track: str, loaded: LoadedSuite) -> bool:
-    return template_prompt(loaded, track).says_form
+def _says(track: str, suite: Suite) -> bool:
+    return template_prompt(suite, track).says_form
 
 
 def _unsaid(track: str, path: Path) -> str:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from phyblock.config.suite import SuiteSpec
+from phyblock.config.suite import Suite
 from phyblock.models.base import Reply
 from phyblock.records import MANIFEST, Manifest, Record
 from phyblock.records.manifest import ManifestModel
@@ -37,8 +37,8 @@ FloorValues = dict[str, dict[str, dict[str, float]]]
 
 def floor_values(
     manifest: Manifest,
-    suite: SuiteSpec,
-    reopened: Callable[[str, SuiteSpec], AnyTrack],
+    suite: Suite,
+    reopened: Callable[[str, Suite], AnyTrack],
 ) -> FloorValues:
     """What the floors of `COMPUTED_FLOORS` reach on a run, for every measure that names them.
 
@@ -69,7 +69,7 @@ def floor_values(
 
 
 def _answered(
-    track: AnyTrack, floors: Sequence[str], suite: SuiteSpec, copies: int
+    track: AnyTrack, floors: Sequence[str], suite: Suite, copies: int
 ) -> Iterator[Record]:
     """The judged answers of floors, each so many times."""
     assert isinstance(track, SingleTrack)

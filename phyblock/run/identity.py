@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any
 
-from phyblock.config.suite import SuiteSpec, Variant
+from phyblock.config.suite import Suite, Variant
 from phyblock.datasets import Dataset
 from phyblock.datasets.version import UNNUMBERED
 from phyblock.parsing import READER_VERSION
@@ -25,7 +25,7 @@ Inputs = Mapping[str, Any]
 
 
 def inputs_of(
-    suite: SuiteSpec,
+    suite: Suite,
     models: Sequence[PlannedModel],
     dataset: Dataset,
     data_version: int,

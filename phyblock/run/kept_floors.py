@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter
 
-from phyblock.config.suite import SuiteSpec
+from phyblock.config.suite import Suite
 from phyblock.datasets import Dataset
 from phyblock.files import atomic_write, read_bytes
 from phyblock.records import Manifest
@@ -43,8 +43,8 @@ _VALUES = TypeAdapter(dict[str, dict[str, dict[str, float]]])
 
 def kept_floors(
     manifest: Manifest,
-    suite: SuiteSpec,
-    reopened: Callable[[str, SuiteSpec], AnyTrack],
+    suite: Suite,
+    reopened: Callable[[str, Suite], AnyTrack],
     dataset: Dataset,
 ) -> FloorValues:
     """What `floor_values` gives, from the cache folder where the same was worked out before.
@@ -67,7 +67,7 @@ def kept_floors(
     return values
 
 
-def _key(manifest: Manifest, suite: SuiteSpec, dataset: Dataset) -> str | None:
+def _key(manifest: Manifest, suite: Suite, dataset: Dataset) -> str | None:
     """Digest of all that decides the values; None where that cannot be told."""
     code = code_digest()
     if code is None:

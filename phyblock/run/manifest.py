@@ -9,7 +9,7 @@ from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from phyblock.config.suite import LoadedSuite, Variant
+from phyblock.config.suite import Suite, Variant
 from phyblock.datasets import Dataset
 from phyblock.datasets.version import read_version
 from phyblock.parsing import READER_VERSION
@@ -29,7 +29,7 @@ _LIBRARIES = ("phyblock", "litellm", *_ENGINES, "numpy", "pillow", "jinja2")
 
 
 def make_manifest(
-    loaded: LoadedSuite,
+    suite: Suite,
     models: Sequence[PlannedModel],
     dataset: Dataset,
     variants: Mapping[Variant, Sequence[AnyTrack]],
@@ -43,7 +43,7 @@ def make_manifest(
     are no part of it; nor is how scenes were chosen, only which. `variants` has the tracks of every
     way of asking.
     """
-    suite, data_version = loaded.suite, read_version(dataset.root)
+    data_version = read_version(dataset.root)
     inputs = inputs_of(suite, models, dataset, data_version, variants, limit)
     scenes = [task.scene for task in dataset.tasks]
     fields = {
@@ -62,7 +62,7 @@ def make_manifest(
             "format": suite.dataset.format,
             "root": str(dataset.root),
         },
-        **_of_tracks(loaded),
+        **_of_tracks(suite),
         "items": {track.name: len(track.items) for track in variants[Variant()]},
         "scenes": len(scenes),
         "scenes_by_level": {
@@ -91,13 +91,13 @@ def _versions() -> dict[str, str]:
     return found
 
 
-def _of_tracks(loaded: LoadedSuite) -> dict[str, Any]:
+def _of_tracks(suite: Suite) -> dict[str, Any]:
     """What single tracks say beyond what all of them have."""
-    kinds = [kind_of(name) for name in loaded.suite.tracks]
-    told = {"engine": told_engine()} if kinds_with_physics(loaded.suite.model_dump()) else {}
+    kinds = [kind_of(name) for name in suite.tracks]
+    told = {"engine": told_engine()} if kinds_with_physics(suite.model_dump()) else {}
     return told | {
         key: value
         for kind in kinds
         if kind.manifest is not None
-        for key, value in kind.manifest(loaded).items()
+        for key, value in kind.manifest(suite).items()
     }

@@ -16,7 +16,7 @@ from phyblock.config.models import (
     unknown_model,
     with_members,
 )
-from phyblock.config.suite import LoadedSuite, SuiteSpec, resolve_models
+from phyblock.config.suite import Suite, resolve_models
 from phyblock.datasets import recorded_models
 from phyblock.datasets.published_names import match_published
 from phyblock.errors import Problem, SpecError
@@ -48,15 +48,15 @@ class PlannedModel:
 
 
 def plan_models(
-    loaded: LoadedSuite, known: Mapping[str, ModelSpec], only: Sequence[str]
+    suite: Suite, known: Mapping[str, ModelSpec], only: Sequence[str]
 ) -> tuple[PlannedModel, ...]:
     """The suite's models in its order, or those that `only` names, in its order.
 
     `only` may name any known model or group, in the suite or not; of recordings, any that is there.
     Raises SpecError for a name that is not known, DataError where no recordings are found.
     """
-    if loaded.suite.models == RECORDED:
-        folders = recorded_models(loaded.dataset_path)
+    if suite.models == RECORDED:
+        folders = recorded_models(suite.files.dataset)
         missing = f"is not among the recordings: {', '.join(folders)}"
         _check_known(only, list(folders), lambda _: missing)
         return tuple(
@@ -68,8 +68,8 @@ def plan_models(
         _check_known(only, names, unknown_model)
         specs = {name: known.get(name) for name in with_members(only, known)}
     else:
-        specs = resolve_models(loaded, known)
-    return tuple(_planned(name, spec, loaded.suite) for name, spec in specs.items())
+        specs = resolve_models(suite, known)
+    return tuple(_planned(name, spec, suite) for name, spec in specs.items())
 
 
 def recorded_order(folder: Path) -> CandidateOrder:
@@ -104,13 +104,13 @@ def _check_known(names: Sequence[str], known: Sequence[str], message: Callable[[
         raise SpecError(problems)
 
 
-def _planned(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> PlannedModel:
+def _planned(name: str, spec: ModelSpec | None, suite: Suite) -> PlannedModel:
     published = match_published(name) if spec is None else spec.published or match_published(name)
     size_b = None if spec is None else spec.size_b
     return PlannedModel(name, to_config(name, spec, suite), published, size_b)
 
 
-def to_config(name: str, spec: ModelSpec | None, suite: SuiteSpec) -> ModelConfig:
+def to_config(name: str, spec: ModelSpec | None, suite: Suite) -> ModelConfig:
     """How to call one model; None as spec is a built-in baseline."""
     if spec is None:
         assert name in baseline_names(), name
@@ -171,7 +171,7 @@ def _price(spec: BatchRateSpec) -> Price:
     return Price(spec.input, spec.output, spec.cached, spec.cache_write)
 
 
-def _sends_format(config: ModelConfig, spec: ModelSpec, suite: SuiteSpec) -> bool:
+def _sends_format(config: ModelConfig, spec: ModelSpec, suite: Suite) -> bool:
     """Whether the JSON schema of answers is sent; SpecError for a model that says its own."""
     mode = spec.response_format
     if suite.answer_format == "text" or mode == "never":

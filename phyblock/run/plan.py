@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from phyblock.config.models import RECORDED, ModelSpec, with_members
-from phyblock.config.suite import LoadedSuite, SuiteSpec, Variant
+from phyblock.config.suite import Suite, Variant
 from phyblock.datasets import Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.models import ModelConfig
@@ -38,7 +38,7 @@ class RunPlan:
     reach; `arranged` says in which order the items of a track are asked about.
     """
 
-    suite: SuiteSpec
+    suite: Suite
     models: tuple[PlannedModel, ...]
     dataset: Dataset
     variants: Mapping[Variant, tuple[AnyTrack, ...]]
@@ -104,7 +104,7 @@ class RunPlan:
 
 
 def make_plan(
-    loaded: LoadedSuite,
+    suite: Suite,
     known: Mapping[str, ModelSpec],
     *,
     only: Sequence[str] = (),
@@ -120,15 +120,14 @@ def make_plan(
     apart best. Raises
     SpecError, DataError, StoreError or PromptError with all that is wrong.
     """
-    dataset = open_dataset(loaded.suite.dataset.format, loaded.dataset_path)
-    models = tuple(people) or plan_models(loaded, known, only)
-    loaded = replace(loaded, suite=_with_plain_names(loaded.suite, known))
-    suite = loaded.suite
+    dataset = open_dataset(suite.dataset.format, suite.files.dataset)
+    models = tuple(people) or plan_models(suite, known, only)
+    suite = _with_plain_names(suite, known)
     limit = suite.limit if limit is None else limit
     asks = any(model.config.kind != "replay" for model in models)
-    chosen = None if informative is None else _informative(informative, loaded, dataset, limit)
+    chosen = None if informative is None else _informative(informative, suite, dataset, limit)
     named = None if chosen is None else frozenset(chosen.scenes)
-    variants = _variants(Opening(loaded, dataset, limit, asks, named))
+    variants = _variants(Opening(suite, dataset, limit, asks, named))
     tracks = variants[Variant()]
     _check_models(models, tracks, suite)
     if named is not None:
@@ -136,21 +135,21 @@ def make_plan(
     tasks = select_tasks(dataset.tasks, suite.levels, limit, named)
     selected = replace(dataset, tasks=tasks)
     if not any(track.items for track in tracks):
-        raise SpecError(_nothing(loaded, dataset, limit))
+        raise SpecError(_nothing(suite, dataset, limit))
     if asks:
         for of_variant in variants.values():
             _check_prompts(of_variant)
-    manifest, earlier = make_manifest(loaded, models, selected, variants, limit, chosen)
+    manifest, earlier = make_manifest(suite, models, selected, variants, limit, chosen)
 
-    def reopened(name: str, one: SuiteSpec) -> AnyTrack:
-        opening = Opening(replace(loaded, suite=one), dataset, limit, False, named)
+    def reopened(name: str, one: Suite) -> AnyTrack:
+        opening = Opening(one, dataset, limit, False, named)
         return kind_of(name).open(opening)
 
     floors = partial(kept_floors, manifest, suite, reopened, dataset)
     return RunPlan(suite, models, selected, variants, manifest, earlier, floors)
 
 
-def _with_plain_names(suite: SuiteSpec, known: Mapping[str, ModelSpec]) -> SuiteSpec:
+def _with_plain_names(suite: Suite, known: Mapping[str, ModelSpec]) -> Suite:
     """The suite with the members of groups in their place, which a run stays the same by."""
     if suite.models == RECORDED:
         return suite
@@ -159,12 +158,12 @@ def _with_plain_names(suite: SuiteSpec, known: Mapping[str, ModelSpec]) -> Suite
 
 def _variants(opening: Opening) -> dict[Variant, tuple[AnyTrack, ...]]:
     """All ways of asking, each with its tracks; repeats share them."""
-    names = opening.loaded.suite.tracks
+    names = opening.suite.tracks
     opened: dict[Variant, tuple[AnyTrack, ...]] = {}
-    for variant in opening.loaded.suite.vary.variants:
+    for variant in opening.suite.vary.variants:
         if variant.shown not in opened:
-            loaded = opening.loaded.at(variant)
-            opened[variant.shown] = open_tracks(replace(opening, loaded=loaded), names)
+            suite = opening.suite.at(variant)
+            opened[variant.shown] = open_tracks(replace(opening, suite=suite), names)
         opened[variant] = opened[variant.shown]
     return opened
 
@@ -176,13 +175,11 @@ def _check_prompts(tracks: Sequence[AnyTrack]) -> None:
             next(iter(track.outlines(item)), None)
 
 
-def _informative(
-    folder: Path, loaded: LoadedSuite, dataset: Dataset, limit: int | None
-) -> ManifestChoice:
+def _informative(folder: Path, suite: Suite, dataset: Dataset, limit: int | None) -> ManifestChoice:
     # Tables are made of pandas, which other runs do without until something was asked.
     from phyblock.run.informative import choose_informative
 
-    return choose_informative(folder, dataset, loaded.suite.levels, limit)
+    return choose_informative(folder, dataset, suite.levels, limit)
 
 
 def _check_named(tracks: Sequence[AnyTrack], named: Collection[str]) -> None:
@@ -193,16 +190,14 @@ def _check_named(tracks: Sequence[AnyTrack], named: Collection[str]) -> None:
         raise SpecError(Problem("--informative", message, "tracks", ", ".join(others), hint=hint))
 
 
-def _nothing(loaded: LoadedSuite, dataset: Dataset, limit: int | None) -> Problem:
-    found = f"levels {', '.join(map(str, loaded.suite.levels))}; limit {limit or 'none'}"
+def _nothing(suite: Suite, dataset: Dataset, limit: int | None) -> Problem:
+    found = f"levels {', '.join(map(str, suite.levels))}; limit {limit or 'none'}"
     have = sorted({level for task in dataset.tasks for level in task.scene.levels})
     allowed = f"the levels of {dataset.name}: {', '.join(map(str, have))}"
-    return Problem(str(loaded.path), "the suite has no samples", "", found, allowed)
+    return Problem(str(suite.files.path), "the suite has no samples", "", found, allowed)
 
 
-def _check_models(
-    models: Sequence[PlannedModel], tracks: Sequence[AnyTrack], suite: SuiteSpec
-) -> None:
+def _check_models(models: Sequence[PlannedModel], tracks: Sequence[AnyTrack], suite: Suite) -> None:
     """Every model can answer what every track asks, means the numbers that are shown, and is not
     taken for another; a recording was asked in the form in which it is read.
     """

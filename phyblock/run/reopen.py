@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
-from phyblock.config.suite import LoadedSuite, SuiteSpec
+from phyblock.config.suite import Suite, SuiteFiles
 from phyblock.config.yaml import YamlSource
 from phyblock.datasets import Dataset
 from phyblock.errors import DataError, Problem
@@ -22,7 +22,7 @@ __all__ = ["reopen_tracks"]
 def reopen_tracks(
     folder: Path,
     manifest: Manifest,
-    suite: SuiteSpec,
+    suite: Suite,
     names: Collection[str],
     dataset: Dataset,
 ) -> dict[str, AnyTrack]:
@@ -36,9 +36,9 @@ def reopen_tracks(
         name: Path(root) for name in names if (root := kind_of(name).own_root(manifest)) is not None
     }
     source = YamlSource(str(path))
-    loaded = LoadedSuite(suite, path, dataset.root, source, folders)
+    suite = suite.with_files(SuiteFiles(path, dataset.root, source, folders))
     named = manifest.scenes_chosen
-    opening = Opening(loaded, dataset, manifest.limit, with_prompts=False, named=named)
+    opening = Opening(suite, dataset, manifest.limit, with_prompts=False, named=named)
     tracks = {track.name: track for track in open_tracks(opening, tuple(names))}
     for name, track in tracks.items():
         _check_alike(name, track, manifest, folders.get(name, dataset.root))

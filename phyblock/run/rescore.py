@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
-from phyblock.config.suite import SuiteSpec, suite_model
+from phyblock.config.suite import Suite, suite_model
 from phyblock.datasets import AssemblyTask, Dataset
 from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.parsing import READER_VERSION, reader_version
@@ -119,7 +119,7 @@ class _Scored:
 def _scored(
     folder: Path,
     manifest: Manifest,
-    suite: SuiteSpec,
+    suite: Suite,
     names: Collection[str],
     dataset: Dataset,
     tell: Tell,
@@ -128,7 +128,7 @@ def _scored(
 ) -> _Scored:
     """The records of a run, those of the tracks in `names` judged again; see `judged_again`."""
 
-    def reopened(name: str, one: SuiteSpec) -> AnyTrack:
+    def reopened(name: str, one: Suite) -> AnyTrack:
         return reopen_tracks(folder, manifest, one, [name], dataset)[name]
 
     tracks = {
@@ -146,7 +146,7 @@ def _scored(
 def _read_anew(
     folder: Path,
     manifest: Manifest,
-    suite: SuiteSpec,
+    suite: Suite,
     known: Collection[str],
     dataset: Dataset,
     tell: Tell,
@@ -182,7 +182,7 @@ def recorded_suite(
     manifest: Manifest,
     parser: PlanParser | None = None,
     matcher: Matcher | None = None,
-) -> SuiteSpec:
+) -> Suite:
     """The suite of the run in `folder`, with parser and headline matcher replaced where named.
 
     Raises StoreError for a suite that is none, SpecError for a parser that cannot read what was

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Generic, TypeVar
 
-from phyblock.config.suite import LoadedSuite
+from phyblock.config.suite import Suite
 from phyblock.domain import Scene
 from phyblock.domain.symmetry import fingerprint
 from phyblock.errors import Problem, SpecError
@@ -127,7 +127,7 @@ class Examples(Generic[AskedT]):
 
 
 def examples_of(
-    loaded: LoadedSuite,
+    suite: Suite,
     pool: Iterable[AskedT],
     items: Sequence[AskedT],
     noun: str,
@@ -140,7 +140,7 @@ def examples_of(
 
     Raises SpecError for a scene that the pool has not, and where an item has too few others.
     """
-    suite, where = loaded.suite, loaded.where("examples")
+    where = suite.where("examples")
     wanted = suite.examples
     n, named = (wanted, ()) if isinstance(wanted, int) else (len(wanted), wanted)
     kept = list(pool) if n else []
@@ -150,7 +150,7 @@ def examples_of(
         allowed = f"names of scenes, such as {min(known)}" if known else "no scene of these data"
         raise SpecError(
             Problem(
-                loaded.where("examples", at),
+                suite.where("examples", at),
                 message,
                 f"examples[{at}]",
                 name,

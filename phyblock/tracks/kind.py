@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from phyblock.config.suite import LoadedSuite, SuiteSpec
+from phyblock.config.suite import Suite
 from phyblock.datasets import Dataset
 from phyblock.records import Manifest, Record
 from phyblock.registry import known_tracks
@@ -30,7 +30,7 @@ class Opening:
     keeps, where they are not evenly spread. `shop` is where pictures of all tracks are drawn.
     """
 
-    loaded: LoadedSuite
+    suite: Suite
     dataset: Dataset
     limit: int | None
     with_prompts: bool
@@ -75,8 +75,8 @@ class TrackKind:
     section: tuple[str, type[BaseModel], str] | None = None
     baselines: Mapping[str, Callable[..., str]] = field(default_factory=dict)
     tables: tuple[str, ...] = ()
-    own_data: Callable[[SuiteSpec], tuple[str, tuple[str, ...], bool] | None] | None = None
-    manifest: Callable[[LoadedSuite], Mapping[str, Any]] | None = None
+    own_data: Callable[[Suite], tuple[str, tuple[str, ...], bool] | None] | None = None
+    manifest: Callable[[Suite], Mapping[str, Any]] | None = None
     plays: bool = False
     own_root: Callable[[Manifest], str | None] = lambda _: None
     rescored: bool = False

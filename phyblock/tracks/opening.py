@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from phyblock.config.suite import ImagesSpec, LoadedSuite, SuiteSpec
+from phyblock.config.suite import ImagesSpec, Suite
 from phyblock.config.validation import PictureControls
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import Problem, SpecError
@@ -37,17 +37,17 @@ def open_tracks(opening: Opening, names: Sequence[str]) -> tuple[AnyTrack, ...]:
 
     Raises SpecError, DataError or PromptError with what is wrong.
     """
-    loaded = opening.loaded
-    if loaded.suite.answer_format == "json_schema":
+    suite = opening.suite
+    if suite.answer_format == "json_schema":
         lacking = [name for name in names if kind_of(name).json_template is None]
         if lacking:
-            where, message = loaded.where("answer_format"), "cannot be asked for as JSON"
+            where, message = suite.where("answer_format"), "cannot be asked for as JSON"
             found, hint = f"track {', '.join(lacking)}", "use answer_format: text"
             raise SpecError(Problem(where, message, "answer_format", found, hint=hint))
-    if loaded.suite.examples:
+    if suite.examples:
         for name in names:
             if reason := kind_of(name).no_examples:
-                where, message = loaded.where("examples"), f"cannot be shown in {name}: {reason}"
+                where, message = suite.where("examples"), f"cannot be shown in {name}: {reason}"
                 raise SpecError(Problem(where, message, "examples", hint="leave them out"))
     return tuple(kind_of(name).open(opening) for name in names)
 
@@ -69,25 +69,25 @@ def picture_policy(images: ImagesSpec) -> PicturePolicy:
     return PicturePolicy(images.source, images.layout, images.order, picture_style(images))
 
 
-def assembly_pictures(suite: SuiteSpec, shop: Workshop | None = None) -> Pictures:
+def assembly_pictures(suite: Suite, shop: Workshop | None = None) -> Pictures:
     """Pictures of goals and candidates as a suite wants them, drawn in a shop of their own or this
     one.
     """
     return Pictures(picture_folder(), picture_policy(suite.images), shop or render_workers())
 
 
-def check_drawn(loaded: LoadedSuite, reason: str) -> None:
+def check_drawn(suite: Suite, reason: str) -> None:
     """Raise SpecError, with the reason, for a suite that takes pictures from the data set."""
-    if loaded.suite.images.source == "dataset":
+    if suite.images.source == "dataset":
         where, hint = (
-            loaded.where("images", "source"),
+            suite.where("images", "source"),
             "render the pictures: --set images.source=render",
         )
         raise SpecError(Problem(where, reason, "images.source", "dataset", hint=hint))
 
 
 def task_showing(
-    suite: SuiteSpec,
+    suite: Suite,
     section: type[PictureControls],
     name: str,
     tasks: Sequence[AssemblyTask],
@@ -102,15 +102,15 @@ def task_showing(
     return TaskShowing(how, tasks, pool, f"{name}.wrong_image")
 
 
-def template_prompt(loaded: LoadedSuite, name: str) -> TemplatePrompt:
+def template_prompt(suite: Suite, name: str) -> TemplatePrompt:
     """The prompt of a track: the suite's own template, else the bundled one for its format.
 
     Raises PromptError for a broken one.
     """
     kind = kind_of(name)
-    own = kind.template if loaded.suite.answer_format == "text" else kind.json_template
+    own = kind.template if suite.answer_format == "text" else kind.json_template
     default = None if own is None else TemplatePrompt(own, "default")
-    path = loaded.templates.get(name)
+    path = suite.files.templates.get(name)
     if path is not None:
         return TemplatePrompt(path, path.stem, default)
     assert default is not None, f"{name} has no prompt of its own"

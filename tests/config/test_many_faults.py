@@ -164,7 +164,7 @@ def test_any_suite_is_read_or_refused(
     with contextlib.suppress(SpecError):
         overrides = () if override is None else (override,)
         loaded = load_suite(folder / "law.yaml", overrides, data_dir=folder / "data")
-        assert json.dumps(loaded.suite.identity(), allow_nan=False)
+        assert json.dumps(loaded.identity(), allow_nan=False)
 
 
 @settings(deadline=None, max_examples=40)

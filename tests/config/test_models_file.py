@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.config.models import ModelSpec, SamplingSpec, load_models
-from phyblock.config.suite import LoadedSuite, load_suite, resolve_models
+from phyblock.config.suite import Suite, load_suite, resolve_models
 from phyblock.errors import Problem, SpecError
 from phyblock.registry import baseline_names
 
@@ -259,7 +259,7 @@ def test_a_dumped_file_loads_equal(
     ]
 
 
-def load_naming(folder: Path, models: str, *overrides: str) -> LoadedSuite:
+def load_naming(folder: Path, models: str, *overrides: str) -> Suite:
     (folder / "data" / "phyblock-400").mkdir(parents=True)
     path = folder / "s.yaml"
     path.write_text(f"name: s\nmodels:\n{models}", encoding="utf-8")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.config.suite import LoadedSuite, load_suite
+from phyblock.config.suite import Suite, load_suite
 from phyblock.errors import Problem, SpecError
 
 SUITE = "name: s\nmodels: [oracle]\nimages: {size_px: 256}\n"
@@ -22,7 +22,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def load(folder: Path, *overrides: str) -> LoadedSuite:
+def load(folder: Path, *overrides: str) -> Suite:
     return load_suite(folder / "suites" / "s.yaml", overrides, data_dir=folder / "data")
 
 
@@ -41,7 +41,7 @@ def test_values_are_yaml(folder: Path) -> None:
         "sampling.temperature=null",
         "scoring={level1: aov}",
         "description='say: no'",
-    ).suite
+    )
     assert suite.levels == (1, 2)
     assert suite.seeds == (3,)
     assert suite.limits.max_cost_usd == 1e-3
@@ -51,13 +51,13 @@ def test_values_are_yaml(folder: Path) -> None:
 
 
 def test_the_rest_of_a_section_stays(folder: Path) -> None:
-    images = load(folder, "images.background=white").suite.images
+    images = load(folder, "images.background=white").images
     assert (images.size_px, images.background) == (256, "white")
 
 
 def test_the_last_of_two_wins(folder: Path) -> None:
-    assert load(folder, "seeds=[1]", "seeds=[2]").suite.seeds == (2,)
-    changed = load(folder, "images.size_px=128", "images={layout: separate}").suite.images
+    assert load(folder, "seeds=[1]", "seeds=[2]").seeds == (2,)
+    changed = load(folder, "images.size_px=128", "images={layout: separate}").images
     assert (changed.size_px, changed.layout) == (512, "separate")
 
 
@@ -129,7 +129,7 @@ def test_all_overrides_are_judged(folder: Path) -> None:
 def test_an_override_mends_the_file(folder: Path) -> None:
     path = folder / "suites" / "s.yaml"
     path.write_text(SUITE + "levels: [9]\n", encoding="utf-8")
-    assert load(folder, "levels=[1]").suite.levels == (1,)
+    assert load(folder, "levels=[1]").levels == (1,)
 
 
 def test_a_secret_is_not_repeated(folder: Path) -> None:
@@ -139,9 +139,9 @@ def test_a_secret_is_not_repeated(folder: Path) -> None:
 
 def test_paths_on_the_command_line_start_at_the_working_directory(folder: Path) -> None:
     loaded = load(folder, "dataset={format: official}", "dataset.path=official")
-    assert loaded.dataset_path == folder / "official"
+    assert loaded.files.dataset == folder / "official"
     whole = load(folder, "dataset={format: official, path: ./official}")
-    assert whole.dataset_path == folder / "official"
+    assert whole.files.dataset == folder / "official"
 
 
 def test_paths_in_a_file_start_at_the_file(folder: Path) -> None:
@@ -150,8 +150,8 @@ def test_paths_in_a_file_start_at_the_file(folder: Path) -> None:
     text = "dataset: {format: official, path: ../official}\nprompt: p.j2\n"
     path.write_text(SUITE + text, encoding="utf-8")
     loaded = load(folder)
-    assert loaded.dataset_path == folder / "official"
-    assert loaded.templates["full_planning"] == folder / "suites" / "p.j2"
+    assert loaded.files.dataset == folder / "official"
+    assert loaded.files.templates["full_planning"] == folder / "suites" / "p.j2"
     assert loaded.where("dataset", "path") == f"{path}:4:35"
 
 
@@ -160,20 +160,20 @@ def test_variables_and_home_are_expanded(folder: Path, monkeypatch: pytest.Monke
     monkeypatch.setenv("HOME", str(folder))
     for text in ("$PHYBLOCK_TEST_ROOT/official", "${PHYBLOCK_TEST_ROOT}/official", "~/official"):
         loaded = load(folder, "dataset.format=official", f"dataset.path={text}")
-        assert loaded.dataset_path == folder / "official"
+        assert loaded.files.dataset == folder / "official"
 
 
 def test_a_bare_name_is_a_bundled_data_set(folder: Path) -> None:
-    assert load(folder).dataset_path == folder / "data" / "phyblock-400"
+    assert load(folder).files.dataset == folder / "data" / "phyblock-400"
     named = load(folder, "dataset.path=phyblock-400")
-    assert named.dataset_path == folder / "data" / "phyblock-400"
+    assert named.files.dataset == folder / "data" / "phyblock-400"
 
 
 def test_a_prompt_that_is_a_word_has_no_path(folder: Path) -> None:
-    assert load(folder).templates == {}
+    assert load(folder).files.templates == {}
 
 
 def test_a_section_left_empty_in_the_file_can_be_filled(folder: Path) -> None:
     path = folder / "suites" / "s.yaml"
     path.write_text(SUITE + "limits:\n", encoding="utf-8")
-    assert load(folder, "limits.max_attempts=2").suite.limits.max_attempts == 2
+    assert load(folder, "limits.max_attempts=2").limits.max_attempts == 2

@@ -49,9 +49,9 @@ def test_a_shipped_suite_loads_and_its_models_are_known(path: Path, tmp_path: Pa
         (tmp_path / name).mkdir()
     overrides = [f"dataset.path={tmp_path}"] if path.stem in OFFICIAL_ONLY else []
     loaded = load_suite(path, overrides, data_dir=tmp_path)
-    assert loaded.suite.name == path.stem
-    assert loaded.suite.description
-    if loaded.suite.models != "recorded":
+    assert loaded.name == path.stem
+    assert loaded.description
+    if loaded.models != "recorded":
         assert resolve_models(loaded, load_models(ROOT / "models.yaml"))
 
 
@@ -70,7 +70,7 @@ def test_the_suites_are_those_that_are_promised() -> None:
 
 def test_the_paper_suite_scores_as_the_paper_did(tmp_path: Path) -> None:
     path = ROOT / "benchmarks" / "paper-table1.yaml"
-    suite = load_suite(path, [f"dataset.path={tmp_path}"], data_dir=tmp_path).suite
+    suite = load_suite(path, [f"dataset.path={tmp_path}"], data_dir=tmp_path)
     assert suite.dataset.format == "official"
     assert suite.models == "recorded"
     assert suite.parser == "official"
@@ -98,7 +98,7 @@ def test_full_holds_the_models_of_table_1(tmp_path: Path) -> None:
     for name in ("phyblock-400", "phyblock-vqa"):
         (tmp_path / name).mkdir()
     models = load_models(ROOT / "models.yaml")
-    suite = load_suite(ROOT / "benchmarks" / "full.yaml", data_dir=tmp_path).suite
+    suite = load_suite(ROOT / "benchmarks" / "full.yaml", data_dir=tmp_path)
     rows = [models[name].published for name in suite.models if name in models]
     assert rows == [name.strip() for name in PUBLISHED.split(",")][:20]
     assert suite.seeds == (0, 1, 2, 3, 4)

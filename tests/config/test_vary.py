@@ -71,25 +71,25 @@ def test_a_variant_is_the_suite_with_other_values_in_its_fields(tmp_path: Path) 
         "  prompt: [brief.j2, default]\n  repeats: 2\n"
     )
     loaded = load_suite(write(tmp_path, text), data_dir=tmp_path / "data")
-    assert loaded.templates == {"full_planning": tmp_path / "brief.j2"}
-    for variant in loaded.suite.vary.variants:
+    assert loaded.files.templates == {"full_planning": tmp_path / "brief.j2"}
+    for variant in loaded.vary.variants:
         one = loaded.at(variant)
         told = dict(variant.levels)
-        assert one.suite.images.background == told.get("background", "lawn")
-        assert one.suite.candidates.order == told.get("candidate_order", "file")
-        assert bool(one.templates) == ("prompt" not in told)
-        assert (told.get("prompt", "brief")) in loaded.suite.vary.names("prompt")
+        assert one.images.background == told.get("background", "lawn")
+        assert one.candidates.order == told.get("candidate_order", "file")
+        assert bool(one.files.templates) == ("prompt" not in told)
+        assert (told.get("prompt", "brief")) in loaded.vary.names("prompt")
 
 
 def test_a_suite_that_varies_nothing_is_written_as_before(tmp_path: Path) -> None:
-    suite = load_suite(write(tmp_path, HEAD), data_dir=tmp_path / "data").suite
+    suite = load_suite(write(tmp_path, HEAD), data_dir=tmp_path / "data")
     dumped = suite.model_dump(mode="json")
     assert {"vary", "limit"}.isdisjoint(dumped)
     assert "view" not in dumped["images"]
     assert {"vary", "limit"}.isdisjoint(suite.identity())
     changed = load_suite(
         tmp_path / "s.yaml", ["images.view=top", "limit=3"], data_dir=tmp_path / "data"
-    ).suite.identity()
+    ).identity()
     # The limit itself decides nothing: what is asked about under it does.
     assert (changed["images"]["view"], "limit" in changed) == ("top", False)
     assert suite.at(Variant()) == suite

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.config.models import load_models
-from phyblock.config.suite import SuiteSpec
+from phyblock.config.suite import Suite
 from phyblock.errors import SpecError
 from phyblock.models import (
     Budget,
@@ -40,7 +40,7 @@ from tests.servers.gemini_generate import GeminiGenerate
 from tests.servers.openai_chat import OpenAIChat
 
 DAY = date(2026, 11, 22)
-SUITE = SuiteSpec(name="s", models=("m",))
+SUITE = Suite(name="s", models=("m",))
 
 usd = st.floats(0, 100)
 prices = st.builds(Price, usd, usd, st.none() | usd, st.none() | usd)

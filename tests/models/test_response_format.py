@@ -10,7 +10,7 @@ import pytest
 from aiohttp import web
 
 from phyblock.config.models import ModelSpec, load_models
-from phyblock.config.suite import SuiteSpec
+from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, RefusedError, SampleError, UnavailableError
 from phyblock.models import ModelConfig, Reply, Request, reply_key, takes_format
 from phyblock.parsing import choice_form, move_form, parse_asked_plan, plan_form
@@ -131,7 +131,7 @@ def _answers(server: OpenAIChat) -> list[Reply | ModelError | None]:
         return ask(make_model(config), asking("001"), asking("002"), asking("003"))
 
 
-JSON_SUITE = SuiteSpec(name="s", models=("m",), answer_format="json_schema")
+JSON_SUITE = Suite(name="s", models=("m",), answer_format="json_schema")
 
 
 @pytest.mark.parametrize(
@@ -150,7 +150,7 @@ JSON_SUITE = SuiteSpec(name="s", models=("m",), answer_format="json_schema")
 def test_who_is_sent_a_schema(fields: dict[str, str], sends: bool) -> None:
     spec = ModelSpec.model_validate(fields)
     assert to_config("m", spec, JSON_SUITE).sends_format is sends
-    assert not to_config("m", spec, SuiteSpec(name="s", models=("m",))).sends_format
+    assert not to_config("m", spec, Suite(name="s", models=("m",))).sends_format
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from phyblock.config.models import ModelSpec, group_names, load_models
-from phyblock.config.suite import SuiteSpec
+from phyblock.config.suite import Suite
 from phyblock.models import ModelConfig, ends_on
 from phyblock.models.keys import KEYLESS
 from phyblock.models.price_map import map_entry
@@ -22,7 +22,7 @@ from tests.servers.chassis import Running
 AS_OF = date(2026, 11, 22)
 """The day of which models.yaml speaks."""
 MODELS = load_models(Path(__file__).parents[2] / "models.yaml")
-SUITE = SuiteSpec(name="s", models=("m",))
+SUITE = Suite(name="s", models=("m",))
 
 MAKERS = {
     "frontier": {

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from phyblock.config.models import ModelSpec
-from phyblock.config.suite import SuiteSpec
+from phyblock.config.suite import Suite
 from phyblock.errors import ModelError
 from phyblock.models import ModelConfig, Reply, ReplyCache, former_key, reply_key
 from phyblock.run.models import to_config
@@ -42,7 +42,7 @@ WAYS: list[tuple[str, str, str, type[LocalServer]]] = [
 
 def config_of(model_id: str, transport: str = "auto") -> ModelConfig:
     spec = ModelSpec(id=model_id, api_key_env="PHYBLOCK_TEST_KEY", transport=transport)  # type: ignore[arg-type]
-    return to_config("m", spec, SuiteSpec(name="s", models=("m",)))
+    return to_config("m", spec, Suite(name="s", models=("m",)))
 
 
 @pytest.fixture(autouse=True)
@@ -75,7 +75,7 @@ def test_calls_go_to_the_address_and_keys_say_that_there_is_one(
 def test_what_the_models_file_says_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_BASE_URL", "http://127.0.0.1:9/v1")
     spec = ModelSpec(id="openai/m", api_base="http://127.0.0.1:10/v1")
-    config = to_config("m", spec, SuiteSpec(name="s", models=("m",)))
+    config = to_config("m", spec, Suite(name="s", models=("m",)))
     assert config.api_base == "http://127.0.0.1:10/v1"
 
 

@@ -61,7 +61,7 @@ def _questions_are_read_once() -> Iterator[None]:
 def opened(folder: Path, *sets: str, limit: int | None = None) -> Any:
     data = bundled("benchmarks", "data")
     loaded = load_suite(suite_file(folder), sets, data_dir=data)
-    (track,) = open_tracks(Opening(loaded, DATA, limit, True), loaded.suite.tracks)
+    (track,) = open_tracks(Opening(loaded, DATA, limit, True), loaded.tracks)
     return track, loaded
 
 
@@ -139,7 +139,7 @@ def test_examples_are_turns_before_the_question(
             asked.examples, asked.messages[1::2], asked.messages[2::2], strict=False
         ):
             n = len(bare.messages[-1].parts)
-            if track == "full_planning" or loaded.suite.section(VqaSpec).blind:
+            if track == "full_planning" or loaded.section(VqaSpec).blind:
                 assert len(question.parts) == n
             pictures = [part for part in question.parts if isinstance(part, Image)]
             assert all(part.label.startswith(f"example {key}: ") for part in pictures)

@@ -52,7 +52,7 @@ class Counting:
     template = "counting"
 
     def __init__(self, opening: Opening) -> None:
-        suite = opening.loaded.suite
+        suite = opening.suite
         self.items = select_tasks(opening.dataset.tasks, suite.levels, opening.limit)
         self._pictures = assembly_pictures(suite)
 

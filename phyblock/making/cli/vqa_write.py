@@ -12,7 +12,7 @@ import click
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath, models_file_option
 from phyblock.config.models import load_models
-from phyblock.config.suite import SuiteSpec
+from phyblock.config.suite import Suite
 from phyblock.domain import Question, Subtask
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import check_free, make_folder, write_named
@@ -105,7 +105,7 @@ def _config(name: str, models_file: str | None) -> ModelConfig:
     if name not in known:
         hint = did_you_mean(name, list(known)) or "list them: phyblock models"
         raise SpecError(Problem("--model", "is not in the models file", "", name, hint=hint))
-    return to_config(name, known[name], SuiteSpec(name="write", models=(name,)))
+    return to_config(name, known[name], Suite(name="write", models=(name,)))
 
 
 async def _ask(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from phyblock.config.suite import LoadedSuite, SuiteSpec
+from phyblock.config.suite import Suite
 from phyblock.datasets import AssemblyTask, Dataset, official_prompt
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.tracks.examples import examples_of
@@ -23,7 +23,7 @@ __all__ = ["open_full_planning"]
 
 def open_full_planning(opening: Opening) -> FullPlanning:
     """The track; SpecError, DataError or PromptError with what is wrong."""
-    suite = opening.loaded.suite
+    suite = opening.suite
     tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit, opening.named)
     pool = opening.dataset.tasks
     showing = task_showing(suite, PlanningSpec, FullPlanning.name, tasks, pool)
@@ -31,18 +31,18 @@ def open_full_planning(opening: Opening) -> FullPlanning:
         return FullPlanning(_rules(suite), items=tasks, showing=showing, pool=pool)
     if suite.images.source == "dataset":
         _check_composites(opening.dataset, tasks)
-    prompt, pictures = _prompt(opening.loaded), assembly_pictures(suite, opening.shop)
+    prompt, pictures = _prompt(opening.suite), assembly_pictures(suite, opening.shop)
     as_shown = TaskShowing(replace(showing.how, wrong_image=False))
     able = [
         as_shown.of(task, suite.seeds[0])
         for task in pool
         if can_be_worked(task) and (task.composite or suite.images.source == "render")
     ]
-    examples = examples_of(opening.loaded, able, tasks, "scene", stand_ins=showing.stand_ins)
+    examples = examples_of(opening.suite, able, tasks, "scene", stand_ins=showing.stand_ins)
     return FullPlanning(_rules(suite), prompt, pictures, tasks, showing, pool, examples)
 
 
-def _rules(suite: SuiteSpec) -> PlanningRules:
+def _rules(suite: Suite) -> PlanningRules:
     """How a suite reads and scores plans."""
     level1 = suite.scoring.level1
     criterion = None if level1 == "aov" else level1
@@ -50,14 +50,14 @@ def _rules(suite: SuiteSpec) -> PlanningRules:
     return PlanningRules(suite.parser, suite.settings, matchers, criterion, asked)
 
 
-def _prompt(loaded: LoadedSuite) -> Prompt:
-    if loaded.suite.prompt != "official":
-        return template_prompt(loaded, FullPlanning.name)
-    if loaded.suite.dataset.format != "official":
+def _prompt(suite: Suite) -> Prompt:
+    if suite.prompt != "official":
+        return template_prompt(suite, FullPlanning.name)
+    if suite.dataset.format != "official":
         message = "the official prompt is read from the official data set"
         hint = "set dataset.format to official and dataset.path to its checkout"
-        raise SpecError(Problem(str(loaded.path), message, "prompt", "official", hint=hint))
-    return OfficialPrompt(official_prompt(loaded.dataset_path))
+        raise SpecError(Problem(str(suite.files.path), message, "prompt", "official", hint=hint))
+    return OfficialPrompt(official_prompt(suite.files.dataset))
 
 
 def _check_composites(dataset: Dataset, tasks: Sequence[AssemblyTask]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from phyblock.config.suite import LoadedSuite, SuiteSpec
+from phyblock.config.suite import Suite
 from phyblock.errors import Problem, SpecError
 from phyblock.sim.carry import CarryLimits
 from phyblock.tracks.kind import Opening
@@ -24,29 +24,29 @@ __all__ = ["open_pose_planning"]
 
 def open_pose_planning(opening: Opening) -> PosePlanning:
     """The track; SpecError, DataError or PromptError with what is wrong."""
-    loaded, suite = opening.loaded, opening.loaded.suite
+    suite = opening.suite
     poses = suite.section(PoseSpec)
     tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit, opening.named)
     showing = task_showing(suite, PoseSpec, "pose", tasks, opening.dataset.tasks)
     rules = _rules(suite, poses)
     if not opening.with_prompts:
         return PosePlanning(rules, items=tasks, showing=showing)
-    check_drawn(loaded, "the floor is ruled in pictures that are drawn here")
-    _check_sheet(loaded, poses)
+    check_drawn(suite, "the floor is ruled in pictures that are drawn here")
+    _check_sheet(suite, poses)
     style = picture_style(suite.images)
     pictures = PosePictures(picture_folder(), style, poses.views, opening.shop)
-    prompt = template_prompt(loaded, PosePlanning.name)
+    prompt = template_prompt(suite, PosePlanning.name)
     return PosePlanning(rules, prompt, pictures, tasks, showing)
 
 
-def _check_sheet(loaded: LoadedSuite, poses: PoseSpec) -> None:
+def _check_sheet(suite: Suite, poses: PoseSpec) -> None:
     """Raise SpecError for a first view from which blocks of the sheet cannot be told apart."""
     first = poses.views[0]
     if shows_three_sides(first):
         return
     name = first if isinstance(first, str) else "a view along an axis, or too steep or too flat"
     problem = Problem(
-        loaded.where("pose", "views"),
+        suite.where("pose", "views"),
         "the sheet of blocks is seen from the first view, and blocks look alike from there",
         "pose.views[0]",
         name,
@@ -57,7 +57,7 @@ def _check_sheet(loaded: LoadedSuite, poses: PoseSpec) -> None:
     raise SpecError(problem)
 
 
-def _rules(suite: SuiteSpec, poses: PoseSpec) -> PoseRules:
+def _rules(suite: Suite, poses: PoseSpec) -> PoseRules:
     """How a suite reads, scores and carries out plans with poses."""
     return PoseRules(
         poses.rotation,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from phyblock.config.suite import SuiteSpec
+from phyblock.config.suite import Suite
 from phyblock.tracks.kind import Opening
 from phyblock.tracks.opening import assembly_pictures, check_drawn, task_showing, template_prompt
 from phyblock.tracks.selection import select_tasks
@@ -16,23 +16,23 @@ __all__ = ["open_step_planning"]
 
 def open_step_planning(opening: Opening) -> StepPlanning:
     """The track; SpecError, DataError or PromptError with what is wrong."""
-    loaded, suite = opening.loaded, opening.loaded.suite
+    suite = opening.suite
     tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit, opening.named)
     rules = _rules(suite)
     pool = opening.dataset.tasks
     showing = task_showing(suite, StepsSpec, "steps", tasks, pool)
     if not opening.with_prompts:
         return StepPlanning(rules, items=tasks, showing=showing, pool=pool)
-    check_drawn(loaded, "step planning draws every state, so the goal must be drawn as well")
+    check_drawn(suite, "step planning draws every state, so the goal must be drawn as well")
     steps = suite.section(StepsSpec)
     shown = (steps.feedback, steps.history, steps.memory, steps.cot)
-    template = template_prompt(loaded, StepPlanning.name)
+    template = template_prompt(suite, StepPlanning.name)
     rules_shown = (rules.gating, rules.accepts, steps.blind, rules.form)
     prompt = StepPrompt(template, *shown, *rules_shown)
     return StepPlanning(rules, prompt, assembly_pictures(suite, opening.shop), tasks, showing, pool)
 
 
-def _rules(suite: SuiteSpec) -> StepRules:
+def _rules(suite: Suite) -> StepRules:
     """How a suite plays episodes."""
     steps = suite.section(StepsSpec)
     limits = StepLimits(

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from phyblock.config.suite import LoadedSuite, SuiteSpec
+from phyblock.config.suite import Suite
 from phyblock.datasets.version import read_version
 from phyblock.records import Manifest
 from phyblock.resources import bundled
@@ -19,14 +19,14 @@ from phyblock.tracks.vqa.track import Vqa
 __all__ = ["TRACK"]
 
 
-def _questions(suite: SuiteSpec) -> tuple[str, tuple[str, ...], bool]:
+def _questions(suite: Suite) -> tuple[str, tuple[str, ...], bool]:
     spec = suite.section(VqaSpec)
     return spec.path, ("vqa", "path"), spec.format == "builtin"
 
 
-def _manifest(loaded: LoadedSuite) -> Mapping[str, Any]:
-    spec = loaded.suite.section(VqaSpec)
-    root = loaded.folders[Vqa.name]
+def _manifest(suite: Suite) -> Mapping[str, Any]:
+    spec = suite.section(VqaSpec)
+    root = suite.files.folders[Vqa.name]
     questions = {"format": spec.format, "root": str(root), "version": read_version(root)}
     return {"questions": questions}
 

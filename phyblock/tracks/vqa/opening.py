@@ -34,14 +34,14 @@ __all__ = ["open_questions", "open_vqa", "select_questions"]
 
 def open_vqa(opening: Opening) -> Vqa:
     """The track; SpecError, DataError or PromptError with what is wrong."""
-    loaded, suite = opening.loaded, opening.loaded.suite
+    suite = opening.suite
     spec = suite.section(VqaSpec)
-    questions = open_questions(spec.format, loaded.folders[Vqa.name], opening.dataset)
+    questions = open_questions(spec.format, suite.files.folders[Vqa.name], opening.dataset)
     tasks = select_questions(
         questions.tasks, spec.subtasks, suite.levels, spec.per_subtask, opening.limit
     )
     if not tasks:
-        where = loaded.where("vqa", "subtasks")
+        where = suite.where("vqa", "subtasks")
         found = ", ".join(sorted({task.question.subtask for task in questions.tasks}))
         message = "no question is of these subtasks and levels"
         raise SpecError(Problem(where, message, "vqa.subtasks", found=f"questions of {found}"))
@@ -65,8 +65,8 @@ def open_vqa(opening: Opening) -> Vqa:
     if elsewhere is not None:
         elsewhere.check(tasks, "question", "vqa.wrong_image")
     pool, items = map(AskedQuestion, questions.tasks), [AskedQuestion(task) for task in tasks]
-    examples = examples_of(loaded, pool, items, "question", _subtask, stand_ins)
-    return Vqa(rules, questions, tasks, template_prompt(loaded, Vqa.name), pictures, examples)
+    examples = examples_of(suite, pool, items, "question", _subtask, stand_ins)
+    return Vqa(rules, questions, tasks, template_prompt(suite, Vqa.name), pictures, examples)
 
 
 def _subtask(item: AskedQuestion) -> str:
