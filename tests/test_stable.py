@@ -19,8 +19,7 @@ from phyblock.datasets import read_builtin, read_questions
 from phyblock.domain import euler_deg_to_matrix
 from phyblock.models.guess_features import option_features
 from phyblock.resources import bundled
-from phyblock.scoring.pose import PoseFit
-from phyblock.scoring.solids import Piece, overlap_volume, placed
+from phyblock.scoring.pose import Piece, PoseFit, overlap_volume, placed
 from phyblock.sim.geometry import collision_pieces
 from phyblock.stable import plain_sum
 from phyblock.tracks.pose_planning.counts import FITS

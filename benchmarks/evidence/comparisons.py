@@ -21,8 +21,8 @@ from benchmarks.evidence.coverage import difference_of, p_of_draws, weights
 from benchmarks.evidence.estimates import clusters_of
 from benchmarks.evidence.subsets import recorded_counts
 from phyblock.datasets import read_official
-from phyblock.scoring.ratios import Floats, f1_of
-from phyblock.scoring.uncertainty import Clusters, detectable, holm, jackknife, least_p
+from phyblock.scoring.counts import Floats, f1_of
+from phyblock.scoring.statistics import Clusters, detectable, holm, jackknife, least_p
 
 MODELS, LEVEL = 26, 0.05
 GAPS = (0, 5, 10, 25)

@@ -12,8 +12,7 @@ import argparse
 
 import numpy as np
 
-from phyblock.scoring.components import interaction, shift, within
-from phyblock.scoring.uncertainty import Clusters
+from phyblock.scoring.statistics import Clusters, interaction, shift, within
 
 ITEMS, BASES, REPEATS = 40, 25, 2
 DESIGNS = {

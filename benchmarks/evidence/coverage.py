@@ -4,7 +4,7 @@
 
 Run from the root of a checkout. Worlds of scenes are made up in which the true F1 is known
 (tests/scoring/worlds.py): 150 base scenes and 250 scenes made of two of them, as in the official
-data. `jackknife` is what phyblock does (phyblock/scoring/uncertainty.py); `pigeonhole` is the
+data. `jackknife` is what phyblock does (phyblock/scoring/statistics.py); `pigeonhole` is the
 bootstrap that it did before (Owen, Annals of Applied Statistics 1, 2007), `naive` takes scenes as
 independent.
 """
@@ -17,8 +17,8 @@ from collections import defaultdict
 import numpy as np
 from scipy.special import ndtr, ndtri, stdtr, stdtrit  # type: ignore[import-untyped]
 
-from phyblock.scoring.ratios import Floats, Metric, f1_of
-from phyblock.scoring.uncertainty import Clusters, in_range, jackknife
+from phyblock.scoring.counts import Floats, Metric, f1_of
+from phyblock.scoring.statistics import Clusters, in_range, jackknife
 from tests.scoring.worlds import World
 
 WORLDS = {

@@ -22,9 +22,9 @@ from benchmarks.evidence.coverage import pigeonhole
 from benchmarks.evidence.losses import recorded_plans, scores
 from phyblock.datasets import AssemblyTask, read_official, recorded_models
 from phyblock.domain import Plan
-from phyblock.scoring import ERROR_TYPES, Goal, level1_counts
-from phyblock.scoring.ratios import Floats, f1_of, ratio_of, recall_of
-from phyblock.scoring.uncertainty import Clusters, in_range, jackknife
+from phyblock.scoring.counts import Floats, f1_of, ratio_of, recall_of
+from phyblock.scoring.plan import ERROR_TYPES, Goal, level1_counts
+from phyblock.scoring.statistics import Clusters, in_range, jackknife
 
 Tasks = tuple[AssemblyTask, ...]
 LEVEL1 = 2

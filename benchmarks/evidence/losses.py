@@ -21,7 +21,7 @@ from phyblock.datasets import AssemblyTask, read_official, recorded_models
 from phyblock.domain import Plan
 from phyblock.models.raw_replies import read_raw_reply
 from phyblock.parsing import parse_plan
-from phyblock.scoring import AssemblyScorer, BlockOutcome, Score
+from phyblock.scoring.plan import AssemblyScorer, BlockOutcome, Score
 from phyblock.types import SETTINGS
 
 GROUPS: dict[str, tuple[tuple[BlockOutcome, ...], float]] = {

@@ -18,7 +18,8 @@ from phyblock.datasets import AssemblyTask, read_official, recorded_models
 from phyblock.domain import Plan
 from phyblock.models.raw_replies import read_raw_reply
 from phyblock.parsing import parse_plan
-from phyblock.scoring import Goal, match_plan, micro
+from phyblock.scoring.counts import micro
+from phyblock.scoring.plan import Goal, match_plan
 from phyblock.types import MATCHERS, SETTINGS
 
 

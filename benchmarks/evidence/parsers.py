@@ -22,7 +22,8 @@ from phyblock.datasets import AssemblyTask, read_official, recorded_models
 from phyblock.domain import Plan
 from phyblock.models.raw_replies import read_raw_reply
 from phyblock.parsing import ParsedPlan, parse_plan
-from phyblock.scoring import Counts, Goal, match_plan, micro
+from phyblock.scoring.counts import Counts, micro
+from phyblock.scoring.plan import Goal, match_plan
 
 FORMER_F1 = {
     "claude-3-5-haiku": 27.56,

@@ -8,7 +8,7 @@ method of moments for a crossed design without repeats (Searle, Casella and McCu
 "Variance components", chapter 4). The half width of a 95 % interval of the mean is Student's t
 times sqrt(s^2 / S + p^2 / P + e^2 / (S P)); for one person, p is left out: the interval is for that
 person. Detectable: the median over pairs of models of the difference that a paired test over S
-scenes finds in four of five cases (phyblock.scoring.uncertainty.detectable), its standard error
+scenes finds in four of five cases (phyblock.scoring.statistics.detectable), its standard error
 taken from all scenes by base scenes left out in turn, times sqrt(400 / S).
 """
 
@@ -24,8 +24,8 @@ from scipy.special import stdtrit  # type: ignore[import-untyped]
 
 from benchmarks.evidence.subsets import recorded_counts
 from phyblock.datasets import read_official
-from phyblock.scoring.ratios import Floats, f1_of
-from phyblock.scoring.uncertainty import Clusters, detectable, jackknife
+from phyblock.scoring.counts import Floats, f1_of
+from phyblock.scoring.statistics import Clusters, detectable, jackknife
 
 SCENES = (8, 12, 24, 48, 96)
 PEOPLE = (1, 4, 8, 16, 32)

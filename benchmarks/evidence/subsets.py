@@ -21,14 +21,14 @@ from benchmarks.evidence.losses import recorded_plans, scores
 from phyblock.datasets import read_official, recorded_models
 from phyblock.domain import Plan
 from phyblock.run.informative import most_informative
-from phyblock.scoring.item_analysis import (
+from phyblock.scoring.counts import Floats, f1_of
+from phyblock.scoring.statistics import (
     discrimination,
     explained,
     least_correlation,
     pairs_kept,
     pairs_kept_by_choice,
 )
-from phyblock.scoring.ratios import Floats, f1_of
 from phyblock.tracks.selection import evenly, stratified
 
 SIZES = (20, 40, 60, 100)

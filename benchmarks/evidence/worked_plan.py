@@ -28,7 +28,7 @@ from phyblock.records import Manifest, Record
 from phyblock.report.measure_table import measures_frame
 from phyblock.resources import bundled
 from phyblock.run.records import begun, judged
-from phyblock.scoring import BLOCK_OUTCOMES, ERROR_TYPES
+from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
 from phyblock.tables.cells import METRICS
 from phyblock.tables.design import OVERALL, read_design

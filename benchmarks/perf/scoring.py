@@ -18,7 +18,7 @@ from pathlib import Path
 from phyblock.datasets import AssemblyTask, read_official, recorded_models
 from phyblock.models import read_raw_reply
 from phyblock.parsing import parse_plan
-from phyblock.scoring import AssemblyScorer
+from phyblock.scoring.plan import AssemblyScorer
 
 _INDEX = re.compile(r"block with index (\d+)")
 

@@ -9,7 +9,7 @@ from phyblock.api.given import expect
 from phyblock.datasets import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.parsing import parse_plan
-from phyblock.scoring import AssemblyScorer, ErrorType
+from phyblock.scoring.plan import AssemblyScorer, ErrorType
 from phyblock.types import MATCHERS, PLAN_PARSERS, SETTINGS, Matcher, PlanParser, Setting
 
 __all__ = ["PlanScore", "score"]

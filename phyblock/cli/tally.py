@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from phyblock.report import NO_VALUE
 from phyblock.run.standing import Summary
-from phyblock.scoring import Counts
+from phyblock.scoring.counts import Counts
 from phyblock.tables.outcomes import FAILURES
 
 __all__ = ["Tally", "failure_text"]

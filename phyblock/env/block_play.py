@@ -10,7 +10,7 @@ from PIL import Image
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import MAX_CANDIDATES, Block
 from phyblock.env.play import DONE, Acted, Play, picture_of
-from phyblock.scoring import Assembly
+from phyblock.scoring.steps import Assembly
 from phyblock.sim import PictureStyle, candidates_png
 from phyblock.sim.site import ONE_SETTING, Lookout, Settled, Site
 from phyblock.sim.stability import DEFAULT_TRIAL

@@ -15,7 +15,7 @@ from phyblock.datasets import AssemblyTask
 from phyblock.domain import MAX_CANDIDATES, Block, CandidateSet, PoseStep
 from phyblock.env.play import DONE, Acted, Play, picture_of
 from phyblock.env.state import MOST_BLOCKS, block_rows, rows_space
-from phyblock.scoring import blocks_reached
+from phyblock.scoring.pose import blocks_reached
 from phyblock.sim import PictureStyle, goal_style
 from phyblock.sim.carry import CarriedStep, Carrying
 from phyblock.sim.kit import kit_png

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.errors import Problem, SpecError
-from phyblock.scoring.ratios import Floats, Metric
+from phyblock.scoring.counts import Floats, Metric
 from phyblock.tables.design import Design
 from phyblock.tables.estimates import pooled_in, value_of_cells
 from phyblock.tables.headline import headline_rows

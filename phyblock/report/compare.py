@@ -14,8 +14,8 @@ from phyblock.errors import Problem, SpecError
 from phyblock.report.alike import check_alike
 from phyblock.report.comparable import Comparable, Part, comparable, comparable_tracks
 from phyblock.report.verdicts import ranks, with_verdicts
-from phyblock.scoring.ratios import Floats
-from phyblock.scoring.uncertainty import Clusters, bounded, jackknife
+from phyblock.scoring.counts import Floats
+from phyblock.scoring.statistics import Clusters, bounded, jackknife
 from phyblock.tables.intervals import parents_of
 from phyblock.tables.load import Run
 from phyblock.tables.showing import varied_words

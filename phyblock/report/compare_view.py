@@ -9,7 +9,7 @@ import pandas as pd
 
 from phyblock.files import OutFolder
 from phyblock.report.compare import Comparison
-from phyblock.scoring.uncertainty import POWER
+from phyblock.scoring.statistics import POWER
 from phyblock.tables.csv_text import to_csv
 from phyblock.tables.latex import to_latex
 from phyblock.tables.markdown import to_markdown

@@ -11,16 +11,20 @@ import pandas as pd
 
 from phyblock.config.suite import REPEAT
 from phyblock.report.varied import Blocks, Varied, varied
-from phyblock.scoring.components import (
+from phyblock.scoring.counts import Floats, Metric
+from phyblock.scoring.statistics import (
+    CONFIDENCE,
     NO_COMPONENT,
     Component,
+    bounded,
+    detectable,
+    holm,
     interaction,
+    jackknife,
     shift,
     spread_of_items,
     within,
 )
-from phyblock.scoring.ratios import Floats, Metric
-from phyblock.scoring.uncertainty import CONFIDENCE, bounded, detectable, holm, jackknife
 from phyblock.tables.load import Run, made_once
 
 __all__ = [
@@ -61,7 +65,7 @@ def components_frame(run: Run) -> pd.DataFrame:
     scores of single items over levels beyond the shift; of repeats, that of one question asked
     again; in the row `items`, that between items. `*_lo` and `*_hi` bound 95 % intervals over the
     `n_clusters` base scenes of the `n_items` items that the model has in every way of asking.
-    See `phyblock.scoring.components`. Empty where the run varies nothing.
+    See `phyblock.scoring.statistics`. Empty where the run varies nothing.
     """
     rows = []
     for found in _of_tracks(run):

@@ -10,7 +10,7 @@ from phyblock.config.suite import REPEAT
 from phyblock.report.comparable import comparable
 from phyblock.report.compare_view import p_text
 from phyblock.report.sensitivity import ITEMS, levels_frame
-from phyblock.scoring.uncertainty import CONFIDENCE
+from phyblock.scoring.statistics import CONFIDENCE
 from phyblock.tables.load import Run
 from phyblock.tables.text_table import (
     Column,

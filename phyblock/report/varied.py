@@ -11,8 +11,8 @@ import pandas as pd
 
 from phyblock.config.suite import REPEAT, Variant, VarySpec
 from phyblock.report.comparable import Comparable, Part, comparable
-from phyblock.scoring.ratios import Floats, Metric
-from phyblock.scoring.uncertainty import Clusters
+from phyblock.scoring.counts import Floats, Metric
+from phyblock.scoring.statistics import Clusters
 from phyblock.tables.intervals import parents_of
 from phyblock.tables.load import Run
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.scoring.uncertainty import CONFIDENCE, detectable, holm, least_p, rank_ranges
+from phyblock.scoring.statistics import CONFIDENCE, detectable, holm, least_p, rank_ranges
 from phyblock.tables.measures import Measure
 
 __all__ = ["ranks", "with_verdicts"]

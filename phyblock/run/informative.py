@@ -12,13 +12,13 @@ from phyblock.datasets.version import read_version
 from phyblock.errors import Problem, SpecError
 from phyblock.records.manifest import Manifest, ManifestChoice
 from phyblock.run.data import CHANGED, asked_about
-from phyblock.scoring.item_analysis import (
+from phyblock.scoring.counts import Floats, Metric
+from phyblock.scoring.statistics import (
     LEAST_MODELS,
     discrimination,
     pairs_kept,
     pairs_kept_by_choice,
 )
-from phyblock.scoring.ratios import Floats, Metric
 from phyblock.tables.load import Run, load_run
 from phyblock.tracks.scenes import SceneCounts, scene_counts
 from phyblock.tracks.selection import evenly, highest, select_tasks

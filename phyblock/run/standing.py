@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from phyblock.records import BatchLine, Record, Turn
-from phyblock.scoring import Counts
+from phyblock.scoring.counts import Counts
 
 __all__ = ["Standing", "Summary"]
 

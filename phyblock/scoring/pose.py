@@ -1,38 +1,48 @@
-"""Setting C: what a plan with poses is worth by geometry alone, as it stands and once it was moved
-as a whole.
+"""Setting C: the score of a plan with poses by geometry, as it stands and after the best motion.
+
+With it the error type of each step, the blocks of a finished structure that lie where they should,
+and exact volumes of intersections of convex pieces.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from phyblock.domain import (
+    Block,
     BlockType,
     CandidateSet,
     Euler,
     Scene,
     euler_deg_to_matrix,
     symmetries,
+    turn_deg,
 )
 from phyblock.domain.blocks import SHAPES
-from phyblock.scoring.goal import Goal
-from phyblock.scoring.pose_align import Motion, Poses, likely_motions, nearness
-from phyblock.scoring.pose_match import TOLERANCES_CM, Nearness, matched
-from phyblock.scoring.ratios import Floats
-from phyblock.scoring.solids import Piece, overlap_volume, placed
-from phyblock.types import Setting
-
-__all__ = ["POSE_FRAMES", "Laid", "PoseFit", "PoseFrame", "PoseScore", "PoseScorer"]
+from phyblock.scoring.counts import Floats
+from phyblock.scoring.plan import Goal
+from phyblock.scoring.pose_matching import (
+    TOLERANCES_CM,
+    TURN_TOLERANCE_DEG,
+    Alignment,
+    Motion,
+    Nearness,
+    Poses,
+    cheapest,
+    matched,
+)
+from phyblock.stable import plain_sum
+from phyblock.types import Setting, StepEnd
 
 PoseFrame = Literal["absolute", "aligned"]
 POSE_FRAMES: tuple[PoseFrame, ...] = get_args(PoseFrame)
-"""`absolute`: where the plan says. `aligned`: after the best shift over the floor and turn about
-the vertical of the whole plan, which is none where none counts more.
+"""`absolute`: as the plan stands. `aligned`: after the best shift over the floor and turn about the
+vertical of the whole plan, which is none where none counts more.
 """
 _CM = 100.0
 _DIGITS = 4
@@ -42,9 +52,7 @@ _SAME_CM, _SAME_DEG = 1e-7, 1e-5
 
 @dataclass(frozen=True)
 class Laid:
-    """A step as a rigid body: the candidate's number, the origin of its body frame [m], its
-    angles.
-    """
+    """A step as a rigid body: candidate number, origin of its body frame [m], Euler angles."""
 
     candidate: int
     position_m: tuple[float, float, float]
@@ -53,8 +61,9 @@ class Laid:
 
 @dataclass(frozen=True)
 class PoseFit:
-    """How a step lies to the goal block that it stands for: in all, sideways and up [cm], turned
-    [degrees], and what share of both volumes they have in common.
+    """Distance of a step from its goal block: in all, sideways and up [cm], turned [degrees].
+
+    `iou` is the intersection over union of the two volumes, None where it was not computed.
     """
 
     vertex: int
@@ -67,8 +76,10 @@ class PoseFit:
 
 @dataclass(frozen=True)
 class PoseScore:
-    """One plan in one frame: the fit of each step that stands for a block, None for the others, and
-    how many are right at each of `TOLERANCES_CM`.
+    """One plan in one frame.
+
+    `fits` has the fit of each step, None for one that is matched to no block; `right` the number of
+    right steps at each of `TOLERANCES_CM`.
     """
 
     frame: PoseFrame
@@ -112,16 +123,15 @@ class PoseScorer:
         for place, step in enumerate(steps):
             equal[place, list(self.goal.equal_to[step.candidate])] = True
         alike = tuple(symmetries(block_type) for block_type in types)
+        alignment = Alignment(poses, self._poses, equal, alike, self._turns)
         numbers = [step.candidate for step in steps]
-        absolute = self._scored("absolute", numbers, types, poses, equal, alike, Motion())
+        absolute = self._scored("absolute", numbers, types, alignment, Motion())
         aligned: PoseScore | None = None
-        motions = likely_motions(poses, self._poses, equal, alike, turns=self._turns)
-        for most, motion in motions[:_MOST_COUNTED]:
+        for most, motion in alignment.likely_motions()[:_MOST_COUNTED]:
             # In a valid order no more is within a tolerance than in any.
             if aligned is not None and sum(aligned.right) >= most:
                 break
-            moved = poses.moved(motion, turns=self._turns)
-            score = self._scored("aligned", numbers, types, moved, equal, alike, motion)
+            score = self._scored("aligned", numbers, types, alignment, motion)
             if aligned is None or sum(score.right) > sum(aligned.right):
                 aligned = score
         if aligned is None or sum(absolute.right) > sum(aligned.right):
@@ -134,12 +144,10 @@ class PoseScorer:
         frame: PoseFrame,
         numbers: Sequence[int],
         types: Sequence[BlockType],
-        poses: Poses,
-        equal: NDArray[np.bool_],
-        alike: tuple[Floats, ...],
+        alignment: Alignment,
         motion: Motion,
     ) -> PoseScore:
-        near = nearness(poses, self._poses, equal, alike)
+        poses, near = alignment.moved(motion)
         vertices = matched(self.goal, numbers, near)
         fits = tuple(
             None
@@ -156,7 +164,7 @@ class PoseScorer:
     def _fit(
         self, near: Nearness, poses: Poses, step: int, vertex: int, block_type: BlockType | None
     ) -> PoseFit:
-        """The fit of a step; of a type, its volume too."""
+        """The fit of a step, with its volume where the type is given."""
         off = poses.centers_cm[step] - self._poses.centers_cm[vertex]
         distance, turn = float(near.distance_cm[step, vertex]), float(near.turn_deg[step, vertex])
         iou = None if block_type is None else 1.0
@@ -185,3 +193,226 @@ def _poses(bodies: Sequence[tuple[BlockType, tuple[float, float, float], Euler]]
         for (block_type, position, _), rotation in zip(bodies, rotations, strict=True)
     ]
     return Poses(np.array(centers) * _CM, rotations)
+
+
+PoseError = Literal[
+    "wrong_kind",
+    "wrong_rotation",
+    "too_early",
+    "off_sideways",
+    "off_height",
+    "interpenetrating",
+    "floating",
+    "toppling",
+]
+POSE_ERRORS: tuple[PoseError, ...] = get_args(PoseError)
+"""In the order in which a step meets them, of which the first counts: a block is chosen, of a kind
+that the goal does not need, or not so often (`wrong_kind`); it is turned as no such block of the
+goal is (`wrong_rotation`); what it rests on is not there (`too_early`); its place is farther than
+`ERROR_TOLERANCE_CM` from that of its goal block, more to a side or more up or down (`off_sideways`,
+`off_height`); put there, it shares space with others or the floor (`interpenetrating`); let go, it
+does not stay (`floating`), or others do not (`toppling`).
+"""
+ERROR_TOLERANCE_CM = 1.0
+
+
+_PHYSICAL: dict[StepEnd, PoseError] = {
+    "no_block": "wrong_kind",
+    "under_floor": "interpenetrating",
+    "overlaps": "interpenetrating",
+    "falls": "floating",
+    "knocks_over": "toppling",
+}
+
+
+def pose_errors(
+    goal: Goal,
+    numbers: Sequence[int],
+    fits: Sequence[PoseFit | None],
+    ends: Sequence[StepEnd],
+) -> tuple[PoseError | None, ...]:
+    """The error of each step, None for one that is right and stands.
+
+    `numbers` are those of all steps, including numbers that no candidate has; `fits` are those of
+    the plan as it stands, `ends` those of its execution.
+    """
+    placed = 0
+    found: list[PoseError | None] = []
+    for number, fit, end in zip(numbers, fits, ends, strict=True):
+        if fit is None:
+            found.append(_unmatched(goal, number, placed))
+            continue
+        placed |= 1 << fit.vertex
+        if fit.turn_deg > TURN_TOLERANCE_DEG:
+            found.append("wrong_rotation")
+        elif fit.position_cm > ERROR_TOLERANCE_CM:
+            found.append("off_sideways" if fit.sideways_cm >= abs(fit.up_cm) else "off_height")
+        else:
+            found.append(_PHYSICAL.get(end))
+    return tuple(found)
+
+
+def _unmatched(goal: Goal, number: int, placed: int) -> PoseError:
+    """The error of a step that is matched to no goal block."""
+    if number not in goal.equal:
+        return "wrong_kind"
+    error = goal.error(number, placed)
+    if error == "incorrect_orientation":
+        return "wrong_rotation"
+    # One of several steps for a block, of which another lies nearer, is one too many.
+    is_ready = bool(goal.choices(number, placed))
+    return "too_early" if error == "dependency_not_met" and not is_ready else "wrong_kind"
+
+
+def blocks_reached(
+    goal: Sequence[Block], blocks: Sequence[Block], within_cm: float, within_deg: float
+) -> int:
+    """The most goal blocks that can each be given a block of its kind that lies near enough."""
+
+    def is_near(one: Block, other: Block) -> bool:
+        if one.kind != other.kind:
+            return False
+        rotations = [euler_deg_to_matrix(block.euler_deg) for block in (one, other)]
+        middle = np.array(SHAPES[one.type].center_of_mass_m)
+        places = [
+            np.array(block.position_m) + rotation @ middle
+            for block, rotation in zip((one, other), rotations, strict=True)
+        ]
+        if math.dist(*places) * _CM > within_cm:
+            return False
+        return turn_deg(one.type, *rotations) <= within_deg
+
+    near = np.array([[is_near(one, other) for other in blocks] for one in goal])
+    if not near.size:
+        return 0
+    return sum(bool(near[pair]) for pair in cheapest((~near).astype(np.float64)))
+
+
+_AXES = np.eye(3)
+_FLAT = 1e-9
+"""Points closer to a plane than this share of a block's size lie on it [m]."""
+
+
+class Piece(NamedTuple):
+    """A convex polytope: corners (n, 3), and a unit normal (k, 3) for each pair of faces."""
+
+    corners: Floats
+    normals: Floats
+
+
+def placed(pieces: Sequence[Piece], rotation: Floats, position: Floats) -> tuple[Piece, ...]:
+    """Pieces turned by `rotation` (3, 3), then shifted to `position` (3,)."""
+    return tuple(Piece(p.corners @ rotation.T + position, p.normals @ rotation.T) for p in pieces)
+
+
+def overlap_volume(one: Sequence[Piece], other: Sequence[Piece]) -> float:
+    """Volume that two solids share, each given by convex pieces that do not overlap."""
+    return plain_sum(_shared(first, second) for first in one for second in other)
+
+
+def volume(pieces: Sequence[Piece]) -> float:
+    """Volume of a solid that convex pieces fill."""
+    return plain_sum(_volume(_faces(piece)) for piece in pieces)
+
+
+def _shared(one: Piece, other: Piece) -> float:
+    apart = np.maximum(
+        one.corners.min(axis=0) - other.corners.max(axis=0),
+        other.corners.min(axis=0) - one.corners.max(axis=0),
+    )
+    if apart.max() >= 0:
+        return 0.0
+    faces = _faces(one)
+    for normal in (*other.normals, *-other.normals):
+        faces = _cut(faces, normal, float((other.corners @ normal).max()))
+        if len(faces) < 4:
+            return 0.0
+    return _volume(faces)
+
+
+def _faces(piece: Piece) -> list[Floats]:
+    """The faces of a polytope, each a polygon (n, 3) in order round it."""
+    faces = []
+    for normal in (*piece.normals, *-piece.normals):
+        heights = piece.corners @ normal
+        face = piece.corners[heights > heights.max() - _FLAT]
+        # A semi-cylinder has a face on one side of a pair alone.
+        if len(face) > 2:
+            faces.append(_round(face, normal))
+    return faces
+
+
+def _round(points: Floats, normal: Floats) -> Floats:
+    """Corners of a convex polygon in order round its middle."""
+    if len(points) == 3:
+        return points
+    helper = _AXES[int(np.argmin(np.abs(normal)))]
+    right = _cross(normal, helper)
+    spread = points - points.sum(axis=0) / len(points)
+    angles = np.arctan2(spread @ _cross(normal, right), spread @ right)
+    return points[np.argsort(angles, kind="stable")]
+
+
+def _cross(one: Floats, other: Floats) -> Floats:
+    """Vector products along the last axis; `np.cross` takes several times as long on few."""
+    a, b, c = one[..., 0], one[..., 1], one[..., 2]
+    x, y, z = other[..., 0], other[..., 1], other[..., 2]
+    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=-1)
+
+
+def _cut(faces: list[Floats], normal: Floats, limit: float) -> list[Floats]:
+    """Return the part of a polytope at or below the plane `normal` · x = `limit`."""
+    kept: list[Floats] = []
+    rim: list[Floats] = []
+    has_lid = False
+    for face in faces:
+        heights = face @ normal - limit
+        highest = heights.max()
+        if highest < -_FLAT:
+            kept.append(face)
+            continue
+        if highest <= _FLAT:
+            on_plane = heights >= -_FLAT
+            has_lid = has_lid or bool(on_plane.all())
+            kept.append(face)
+            rim += list(face[on_plane])
+            continue
+        polygon = _below(face, heights)
+        if len(polygon) > 2:
+            kept.append(polygon)
+        if len(polygon):
+            rim += list(polygon[polygon @ normal >= limit - _FLAT])
+    if len(rim) > 2 and not has_lid:
+        corners: Floats = np.unique(np.round(np.array(rim), 10), axis=0)
+        if len(corners) > 2:
+            kept.append(_round(corners, normal))
+    return kept
+
+
+def _below(face: Floats, heights: Floats) -> Floats:
+    """The part of a polygon whose `heights` are not above zero."""
+    points = []
+    for i, height in enumerate(heights):
+        after = (i + 1) % len(face)
+        if height <= _FLAT:
+            points.append(face[i])
+        if (height < -_FLAT and heights[after] > _FLAT) or (
+            height > _FLAT and heights[after] < -_FLAT
+        ):
+            share = height / (height - heights[after])
+            points.append(face[i] + share * (face[after] - face[i]))
+    return np.array(points).reshape(-1, 3)
+
+
+def _volume(faces: list[Floats]) -> float:
+    """Volume of a convex polytope: cones from a point inside to each of its faces."""
+    if len(faces) < 4:
+        return 0.0
+    corners = np.concatenate(faces)
+    middle = corners.sum(axis=0) / len(corners)
+    total = 0.0
+    for face in faces:
+        legs = face - middle
+        fans = _cross(legs[1:-1] - legs[0], legs[2:] - legs[0])
+        total += abs(float((fans @ legs[0]).sum())) / 6
+    return total

@@ -1,4 +1,4 @@
-"""Building one block at a time: what a move does, under a setting and a gating.
+"""Building one block at a time: the effect of a move, under a setting and a gating.
 
 A move names a candidate, not a block, so several goal blocks can be what it placed. An assembly
 keeps every set of placed blocks that explains the moves that succeeded (as the `optimal` matcher
@@ -15,20 +15,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from phyblock.domain import CandidateSet, Scene
-from phyblock.scoring.error_types import ERROR_TYPES, ErrorType, error_type
-from phyblock.scoring.goal import Goal
-from phyblock.scoring.metrics import Counts
+from phyblock.scoring.counts import Counts
+from phyblock.scoring.plan import ERROR_TYPES, ErrorType, Goal
 from phyblock.types import Gating, Setting
-
-__all__ = [
-    "MOVE_OUTCOMES",
-    "Assembly",
-    "Move",
-    "MoveOutcome",
-    "attempted_counts",
-    "gated",
-    "placed_counts",
-]
 
 MoveOutcome = Literal["placed", "invalid"] | ErrorType
 MOVE_OUTCOMES: tuple[MoveOutcome, ...] = ("placed", *ERROR_TYPES, "invalid")
@@ -36,7 +25,7 @@ MOVE_OUTCOMES: tuple[MoveOutcome, ...] = ("placed", *ERROR_TYPES, "invalid")
 
 @dataclass(frozen=True)
 class Move:
-    """What one move did: `vertex` is the goal block that it put into the world, or None.
+    """The effect of one move: `vertex` is the goal block that it put into the world, or None.
 
     `swapped` are the pairs (from, to) of vertices by which earlier blocks changed places, so that
     this move could succeed.
@@ -48,7 +37,7 @@ class Move:
 
 
 def gated(scene: Scene, gating: Gating) -> Scene:
-    """The scene whose graph says what may be placed when.
+    """Return the scene with the dependencies that the gating asks for.
 
     `aov` is the scene itself: a block waits for those it depends on. Under `layer` it waits for
     all blocks of the layers below, as in the official code; layers are longest paths of
@@ -57,17 +46,11 @@ def gated(scene: Scene, gating: Gating) -> Scene:
     if gating == "aov":
         return scene
     layers = scene.graph.layers
+    at = list(zip(scene.blocks, layers, strict=True))
     below = {
-        layer: tuple(
-            block.order for block, at in zip(scene.blocks, layers, strict=True) if at < layer
-        )
-        for layer in set(layers)
+        layer: tuple(block.order for block, lower in at if lower < layer) for layer in set(layers)
     }
-    blocks = tuple(
-        replace(block, depend=below[layer])
-        for block, layer in zip(scene.blocks, layers, strict=True)
-    )
-    return replace(scene, blocks=blocks)
+    return replace(scene, blocks=tuple(replace(block, depend=below[layer]) for block, layer in at))
 
 
 class Assembly:
@@ -87,12 +70,11 @@ class Assembly:
         self._goal = Goal(gated(scene, gating), candidates, setting)
         self._frontier = {0}
         self._above = tuple(mask.bit_count() - 1 for mask in self._goal.above)
-        carried = _carried(self._goal)
-        self._roles = [(b.look, carried[v]) for v, b in enumerate(scene.blocks)]
+        self._roles = [(b.look, self._goal.unlocks[v]) for v, b in enumerate(scene.blocks)]
 
     @property
     def is_complete(self) -> bool:
-        """Whether every block of the goal is placed."""
+        """True if every block of the goal is placed."""
         return len(self.chosen) == len(self.scene)
 
     @property
@@ -112,7 +94,7 @@ class Assembly:
         return tuple(n for n in self.right_moves() if self.candidates[n].look in looks)
 
     def move(self, index: int) -> Move:
-        """Try to place a candidate; a wrong move changes nothing and says what is wrong.
+        """Try to place a candidate; a wrong move changes nothing but names the error.
 
         `index` may be any number: one that no candidate has is `invalid`.
         """
@@ -122,17 +104,14 @@ class Assembly:
             mask | 1 << vertex for mask in self._frontier for vertex in self._choices(index, mask)
         }
         if not reached:
-            goal = self._goal
-            return Move(error_type(goal.of_kind[index], goal.equal[index], self.placed))
+            return Move(self._goal.error(index, self.placed))
         before = self.placed
         self._frontier = reached
         self.chosen.append(index)
         return self._show(index, before)
 
     def _choices(self, index: int, mask: int) -> list[int]:
-        """What a candidate can be placed as: of blocks that look alike and carry the same ones,
-        the first, for they are interchangeable.
-        """
+        """Vertices a candidate can be placed as, one of each group that is interchangeable."""
         choices = self._goal.choices(index, mask)
         if len(choices) < 2:
             return choices
@@ -146,19 +125,15 @@ class Assembly:
             self.placed = before | 1 << vertex
             return Move("placed", vertex)
         self.placed = min(self._frontier, key=lambda mask: ((before & ~mask).bit_count(), mask))
+        attribute, blocks = ("look" if self.setting == "A" else "kind"), self.scene.blocks
         entered = list(_bits(self.placed & ~before))
         pairs: list[tuple[int, int]] = []
         for left in _bits(before & ~self.placed):
-            twin = next(v for v in entered if self._alike(left, v))
+            mine = getattr(blocks[left], attribute)
+            twin = next(v for v in entered if getattr(blocks[v], attribute) == mine)
             entered.remove(twin)
             pairs.append((left, twin))
         return Move("placed", entered[0], tuple(pairs))
-
-    def _alike(self, one: int, other: int) -> bool:
-        blocks = self.scene.blocks
-        if self.setting == "A":
-            return blocks[one].look == blocks[other].look
-        return blocks[one].kind == blocks[other].kind
 
 
 def placed_counts(
@@ -188,12 +163,6 @@ def placed_counts(
 def attempted_counts(placed: Counts, attempts: int) -> Counts:
     """Counts over every attempted move, those that placed nothing being false positives too."""
     return Counts(placed.tp, attempts - placed.tp, placed.fn)
-
-
-def _carried(goal: Goal) -> tuple[int, ...]:
-    """For each vertex, the bit mask of those that directly wait for it."""
-    needed, n = goal.graph.needed_masks, len(goal.graph)
-    return tuple(sum((needed[w] >> v & 1) << w for w in range(n)) for v in range(n))
 
 
 def _bits(mask: int) -> Iterator[int]:

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from phyblock.scoring.ratios import Floats
-from phyblock.scoring.uncertainty import Clusters, in_range, jackknife
+from phyblock.scoring.counts import Floats
+from phyblock.scoring.statistics import Clusters, in_range, jackknife
 from phyblock.tables.intervals import Grouping, base_scenes, grouped, parents_of, summed
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Cell, Measure, SampleCounts

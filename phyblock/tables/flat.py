@@ -15,7 +15,7 @@ import pandas as pd
 
 from phyblock.records import Record, Score
 from phyblock.records.known import record_types
-from phyblock.scoring import BLOCK_OUTCOMES, ERROR_TYPES
+from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES
 
 __all__ = ["BLOCK_COLUMNS", "MATCHED", "TOKENS", "Flattened", "joined_counts"]
 

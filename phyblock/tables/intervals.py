@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from phyblock.scoring.ratios import Floats
+from phyblock.scoring.counts import Floats
 from phyblock.tables.load import Run
 
 __all__ = ["Grouping", "base_scenes", "grouped", "parents_of", "summed"]

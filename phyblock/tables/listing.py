@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from phyblock.scoring import ERROR_TYPES
+from phyblock.scoring.plan import ERROR_TYPES
 
 if TYPE_CHECKING:
     from phyblock.records import Record

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     import pandas as pd
 
-    from phyblock.scoring.ratios import Metric
+    from phyblock.scoring.counts import Metric
     from phyblock.tables.load import Run
 
 __all__ = [

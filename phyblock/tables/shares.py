@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.scoring.ratios import Floats, ratio_of
+from phyblock.scoring.counts import Floats, ratio_of
 from phyblock.tables.estimates import estimate_frame
 from phyblock.tables.flat import joined_counts
 from phyblock.tables.load import Run

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from phyblock.records import Line, ShownScene
-from phyblock.scoring import Score
+from phyblock.scoring.plan import Score
 
 __all__ = ["PLAN_COLUMNS", "PlanParse", "plan_row", "score_fields"]
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from phyblock.domain import CandidateSet, Scene
-from phyblock.scoring.ratios import Floats, ratio_of
+from phyblock.scoring.counts import Floats, ratio_of
 from phyblock.tables.measures import Measure, SampleCounts
 
 __all__ = ["POSE_COUNTS", "POSE_MEASURES", "pose_choices", "pose_counts"]

@@ -9,13 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.scoring.item_analysis import (
-    LEAST_MODELS,
-    discrimination,
-    explained,
-    least_correlation,
-)
-from phyblock.scoring.ratios import Floats
+from phyblock.scoring.counts import Floats
+from phyblock.scoring.statistics import LEAST_MODELS, discrimination, explained, least_correlation
 from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Measure

@@ -17,7 +17,7 @@ from phyblock.datasets import AssemblyTask, read_builtin
 from phyblock.domain import BLOCK_TYPES, COLORS, Block, Candidate, CandidateSet, PoseStep, Scene
 from phyblock.env import DONE, PhyBlockEnv, read_tasks
 from phyblock.errors import DataError
-from phyblock.scoring import blocks_reached
+from phyblock.scoring.pose import blocks_reached
 from phyblock.sim.carry import carry_out
 from phyblock.sim.placing import put
 from phyblock.types import SETTINGS, Setting

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from phyblock.records import Manifest
 from phyblock.records.known import known_records
 from phyblock.report import Run, read_design
-from phyblock.scoring import BLOCK_OUTCOMES, ERROR_TYPES
+from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES
 from phyblock.tables.load import Frames, frames_of
 from phyblock.tables.outcomes import OUTCOMES
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from phyblock.report import write_report, write_tables
-from phyblock.scoring import ERROR_TYPES
+from phyblock.scoring.plan import ERROR_TYPES
 from tests.browser import expect
 from tests.report.browser import ReportVisit
 from tests.report.factory import manifest, write_run

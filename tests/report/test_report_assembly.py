@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.scoring import ERROR_TYPES, Counts, micro
+from phyblock.scoring.counts import Counts, micro
+from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.tracks.full_planning.assembly import ASSEMBLY_COLUMNS, assembly_frame, table1_frame
 from phyblock.tracks.full_planning.errors import errors_frame
 from phyblock.tracks.full_planning.settings import settings_frame

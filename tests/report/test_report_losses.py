@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from phyblock.scoring import BLOCK_OUTCOMES
+from phyblock.scoring.plan import BLOCK_OUTCOMES
 from phyblock.tables.load import Run
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.full_planning.losses import losses_frame, losses_view

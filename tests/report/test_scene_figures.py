@@ -18,7 +18,7 @@ from phyblock.domain import Plan
 from phyblock.errors import SpecError
 from phyblock.report.figures import Wanted, write_paper_figures
 from phyblock.report.figures.perturbations import perturbation_strip
-from phyblock.scoring import AssemblyScorer
+from phyblock.scoring.plan import AssemblyScorer
 from phyblock.tables.drawing import COLUMN_IN, Look
 from phyblock.tables.load import Run
 from phyblock.tracks.full_planning.film import PLAN_VIEW

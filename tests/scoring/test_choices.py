@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain import CATEGORIES, LETTERS
 from phyblock.report import published_table
-from phyblock.scoring import chance, letter_rates
+from phyblock.scoring.counts import chance, letter_rates
 
 ROUNDING = 0.05 + 1e-9
 OTHERWISE_AVERAGED = {

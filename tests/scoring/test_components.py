@@ -10,14 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import gammaincinv  # type: ignore[import-untyped]
 
-from phyblock.scoring.components import (
+from phyblock.scoring.statistics import (
+    Clusters,
     Component,
     interaction,
     shift,
     spread_of_items,
     within,
 )
-from phyblock.scoring.uncertainty import Clusters
 
 ITEMS, LEVELS, BLOCKS, REPEATS = 40, 2, 8, 2
 TRUTH = {"shift": 0.04, "interaction": 0.08, "within": 0.1, "spread": 0.3}

@@ -9,7 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring import ERROR_TYPES, ErrorType, Goal, count_errors, match_plan, step_errors
+from phyblock.scoring.plan import (
+    ERROR_TYPES,
+    ErrorType,
+    Goal,
+    count_errors,
+    match_plan,
+    step_errors,
+)
 from phyblock.types import MATCHERS, SETTINGS, Matcher, Setting
 from tests.scoring.cases import Case, cases, equal
 

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
-from phyblock.scoring.item_analysis import (
+from phyblock.scoring.counts import Floats, ratio_of
+from phyblock.scoring.statistics import (
     discrimination,
     explained,
     least_correlation,
     pairs_kept,
     pairs_kept_by_choice,
 )
-from phyblock.scoring.ratios import Floats, ratio_of
 
 SCORES = arrays(
     np.float64, st.tuples(st.integers(3, 7), st.integers(2, 6)), elements=st.integers(0, 4)

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring import AssemblyScorer, Counts, Goal, level1_counts, match_plan, micro
+from phyblock.scoring.counts import Counts, micro
+from phyblock.scoring.plan import AssemblyScorer, Goal, level1_counts, match_plan
 from phyblock.types import LEVEL1_CRITERIA, MATCHERS, SETTINGS, Level1Criterion, Setting
 from tests.scoring.cases import Case, cases, equal
 

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring import (
+from phyblock.scoring.plan import (
     BLOCK_OUTCOMES,
     BlockOutcome,
     Goal,

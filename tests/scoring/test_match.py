@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring import Counts, Goal, Match, match_plan, most_placed
+from phyblock.scoring.counts import Counts
+from phyblock.scoring.plan import Goal, Match, match_plan, most_placed
 from phyblock.types import MATCHERS, SETTINGS, Matcher, Setting
 from tests.scoring.cases import Case, cases, choices, greatest_tp, greedy_tp, renumbered
 

@@ -26,11 +26,9 @@ from phyblock.domain import (
     turn_deg,
 )
 from phyblock.domain.blocks import SHAPES, BlockType
-from phyblock.scoring import Goal, Laid, PoseScore, PoseScorer, most_placed
-from phyblock.scoring.assignment import cheapest
-from phyblock.scoring.pose_align import Motion
-from phyblock.scoring.pose_match import Nearness, matched
-from phyblock.scoring.solids import Piece, overlap_volume, placed, volume
+from phyblock.scoring.plan import Goal, most_placed
+from phyblock.scoring.pose import Laid, Piece, PoseScore, PoseScorer, overlap_volume, placed, volume
+from phyblock.scoring.pose_matching import Motion, Nearness, cheapest, matched
 from phyblock.sim.geometry import collision_pieces
 from phyblock.sim.pose import quat_xyzw_to_euler_deg
 from phyblock.types import SETTINGS, Setting

@@ -12,7 +12,7 @@ import pytest
 from phyblock.datasets import AssemblyTask, read_official
 from phyblock.domain import Plan
 from phyblock.parsing import parse_plan
-from phyblock.scoring import AssemblyScorer, Goal, match_plan
+from phyblock.scoring.plan import AssemblyScorer, Goal, match_plan
 from phyblock.types import MATCHERS, PLAN_PARSERS, SETTINGS, PlanParser
 from tests.official_replies import reply_texts
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from phyblock.datasets import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring import ERROR_TYPES, Goal, match_plan
+from phyblock.scoring.plan import ERROR_TYPES, Goal, match_plan
 from phyblock.scoring.steps import MOVE_OUTCOMES, Assembly, attempted_counts, gated, placed_counts
 from phyblock.types import GATINGS, SETTINGS, Gating, Setting
 from tests.scoring.cases import Case, cases

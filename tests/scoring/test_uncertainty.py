@@ -12,8 +12,8 @@ from hypothesis.extra import numpy as hnp
 from scipy import stats
 
 from phyblock.datasets import read_official
-from phyblock.scoring.ratios import Floats, f1_of, precision_of, ratio_of, recall_of
-from phyblock.scoring.uncertainty import (
+from phyblock.scoring.counts import Floats, f1_of, precision_of, ratio_of, recall_of
+from phyblock.scoring.statistics import (
     POWER,
     Clusters,
     detectable,

@@ -9,7 +9,7 @@ import pytest
 
 from phyblock.datasets import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Plan
-from phyblock.scoring import Goal, match_plan
+from phyblock.scoring.plan import Goal, match_plan
 from phyblock.types import SETTINGS
 
 ORDERS = 200

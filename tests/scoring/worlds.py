@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from phyblock.scoring.ratios import Floats
-from phyblock.scoring.uncertainty import Clusters
+from phyblock.scoring.counts import Floats
+from phyblock.scoring.statistics import Clusters
 
 
 @dataclass(frozen=True)

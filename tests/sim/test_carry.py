@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain import Block, BlockType, euler_deg_to_matrix
 from phyblock.domain.blocks import SHAPES
-from phyblock.scoring.pose_end import blocks_reached
-from phyblock.scoring.solids import overlap_volume, placed
+from phyblock.scoring.pose import blocks_reached, overlap_volume, placed
 from phyblock.sim.carry import CarryLimits, carry_out
 from phyblock.sim.engine import Physics, PhysicsEngine, Velocity
 from phyblock.sim.pose import Pose

@@ -17,7 +17,7 @@ from phyblock.cli.main import phyblock
 from phyblock.errors import StoreError
 from phyblock.report import write_report, write_tables
 from phyblock.run.rescore import rescore
-from phyblock.scoring.ratios import ratio_of
+from phyblock.scoring.counts import ratio_of
 from phyblock.tables.measures import Measure, SampleCounts
 from tests.vqa_set import write_questions
 from tests.workspace import Workspace

@@ -17,7 +17,7 @@ from phyblock import registry
 from phyblock.cli.main import phyblock
 from phyblock.datasets import AssemblyTask
 from phyblock.models.base import Message, Request
-from phyblock.scoring.ratios import mean_of, ratio_of
+from phyblock.scoring.counts import mean_of, ratio_of
 from phyblock.tables.measures import Measure, SampleCounts
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks import Opening, TrackKind

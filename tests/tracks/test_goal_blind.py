@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain import COLORS, KIT_PALETTE, Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring import Goal, match_plan, micro
+from phyblock.scoring.counts import micro
+from phyblock.scoring.plan import Goal, match_plan
 from phyblock.tracks.goal_blind.learning import CONSTANT, FREQUENCIES, goal_blind_plans
 from phyblock.tracks.goal_blind.lessons import lessons, related
 from phyblock.tracks.goal_blind.offered import units

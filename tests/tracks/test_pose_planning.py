@@ -24,8 +24,8 @@ from phyblock.records.known import known_records
 from phyblock.resources import bundled
 from phyblock.run.records import begun, judged
 from phyblock.run.rescore import rescore
-from phyblock.scoring import Goal, PoseFit
-from phyblock.scoring.pose_errors import POSE_ERRORS, pose_errors
+from phyblock.scoring.plan import Goal
+from phyblock.scoring.pose import POSE_ERRORS, PoseFit, pose_errors
 from phyblock.sim.carry import CarryLimits, carry_out
 from phyblock.sim.placing import center_cm, put
 from phyblock.sim.pose import Pose

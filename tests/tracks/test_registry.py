@@ -15,7 +15,7 @@ import pytest
 from phyblock import registry
 from phyblock.errors import StoreError
 from phyblock.report import load_run, to_markdown, write_tables
-from phyblock.scoring.ratios import ratio_of
+from phyblock.scoring.counts import ratio_of
 from phyblock.tables.measures import Measure, SampleCounts
 from phyblock.tracks.estimates import track_estimates, track_measures
 from phyblock.tracks.kind import kind_of

@@ -19,7 +19,7 @@ from phyblock.datasets import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Block, Candidate, CandidateSet, Scene
 from phyblock.models.base import Reply, Request, Usage
 from phyblock.parsing import MOVE_PROBLEMS, parse_move
-from phyblock.scoring import MOVE_OUTCOMES
+from phyblock.scoring.steps import MOVE_OUTCOMES
 from phyblock.tracks.step_planning.baselines import STEP_RULES, StepSubject
 from phyblock.tracks.step_planning.episode import StepEpisode
 from phyblock.tracks.step_planning.rules import ENDINGS, StepLimits, StepRules, Tally, majority

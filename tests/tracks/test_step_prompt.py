@@ -14,7 +14,7 @@ from phyblock.datasets import read_builtin
 from phyblock.errors import PromptError
 from phyblock.models.base import Image, Message, Reply
 from phyblock.resources import bundled
-from phyblock.scoring import MOVE_OUTCOMES
+from phyblock.scoring.steps import MOVE_OUTCOMES
 from phyblock.sim import PictureStyle
 from phyblock.tracks import PicturePolicy, Pictures, TemplatePrompt
 from phyblock.tracks.step_planning.prompt import Feedback, PastStep, StepPrompt

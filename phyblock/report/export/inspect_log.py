@@ -12,7 +12,7 @@ from phyblock.records import Score as StoredScore
 from phyblock.report.export.rows import newest_records, prompt_text
 from phyblock.resources import needs
 from phyblock.run.prompts import read_prompts
-from phyblock.scoring import Counts
+from phyblock.scoring.counts import Counts
 from phyblock.stable import hex_digest
 from phyblock.tables.load import Run
 from phyblock.tables.measures import SCORED_BY

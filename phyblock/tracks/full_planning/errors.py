@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from phyblock.scoring import ERROR_TYPES
+from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.tables.cells import level_cells, with_levels
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block
 from phyblock.records import Score
-from phyblock.scoring import ERROR_TYPES, ErrorType
+from phyblock.scoring.plan import ERROR_TYPES, ErrorType
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.tables.text_table import Column, TextTable
 from phyblock.tables.track_report import EpisodeView

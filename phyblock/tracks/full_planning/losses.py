@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from phyblock.scoring import BLOCK_OUTCOMES
+from phyblock.scoring.plan import BLOCK_OUTCOMES
 from phyblock.tables.cells import cell_scores
 from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run, made_once_copied

@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from phyblock.scoring import BLOCK_OUTCOMES, BlockOutcome
-from phyblock.scoring.ratios import Floats, f1_of, precision_of, ratio_of, recall_of
+from phyblock.scoring.counts import Floats, f1_of, precision_of, ratio_of, recall_of
+from phyblock.scoring.plan import BLOCK_OUTCOMES, BlockOutcome
 from phyblock.tables.cells import cell_scores
 from phyblock.tables.flat import BLOCK_COLUMNS
 from phyblock.tables.load import Run

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.scoring.ratios import Floats, f1_of
-from phyblock.scoring.uncertainty import Clusters, bounded, jackknife
+from phyblock.scoring.counts import Floats, f1_of
+from phyblock.scoring.statistics import Clusters, bounded, jackknife
 from phyblock.tables.cells import cell_scores, measured
 from phyblock.tables.intervals import base_scenes, grouped, parents_of, summed
 from phyblock.tables.load import Run, made_once_copied

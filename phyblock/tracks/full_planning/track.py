@@ -11,7 +11,7 @@ from phyblock import parsing
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Plan
 from phyblock.models.base import Image
-from phyblock.scoring import AssemblyScorer, Score
+from phyblock.scoring.plan import AssemblyScorer, Score
 from phyblock.tracks.examples import Examples
 from phyblock.tracks.full_planning.baselines import PlanSubject
 from phyblock.tracks.full_planning.worked import worked_plan

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pandas as pd
 
-from phyblock.scoring import ERROR_TYPES, ErrorType
+from phyblock.scoring.plan import ERROR_TYPES, ErrorType
 from phyblock.tables.cells import METRIC_NAMES, METRICS, SIDE_METRICS
 from phyblock.tables.design import OVERALL, Design
 from phyblock.tables.headline import narrower, seeds_notes, uncertainty_cells, uncertainty_columns

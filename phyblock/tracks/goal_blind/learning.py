@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain import CandidateSet, Plan, Scene
-from phyblock.scoring import most_placed
+from phyblock.scoring.plan import most_placed
 from phyblock.tracks.goal_blind.lessons import Lesson, left_out, lessons, related
 from phyblock.tracks.goal_blind.offered import Unit
 from phyblock.types import Setting

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain import CandidateSet, Scene
-from phyblock.scoring import Goal
+from phyblock.scoring.plan import Goal
 from phyblock.tracks.goal_blind.offered import Unit, units
 from phyblock.types import Setting
 

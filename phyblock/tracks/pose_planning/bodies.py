@@ -5,8 +5,7 @@ from __future__ import annotations
 import functools
 
 from phyblock.domain import BlockType, Candidate, PoseStep
-from phyblock.scoring import Laid
-from phyblock.scoring.solids import Piece
+from phyblock.scoring.pose import Laid, Piece
 from phyblock.sim.geometry import collision_pieces
 from phyblock.sim.placing import origin_m
 

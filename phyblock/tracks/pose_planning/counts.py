@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
-from phyblock.scoring import POSE_ERRORS, POSE_FRAMES, TOLERANCES_CM
+from phyblock.scoring.pose import POSE_ERRORS, POSE_FRAMES
+from phyblock.scoring.pose_matching import TOLERANCES_CM
 from phyblock.stable import plain_sum
 from phyblock.tables.measures import SampleCounts
 from phyblock.types import SETTINGS, STEP_ENDS, Setting

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from phyblock.domain import Block
-from phyblock.scoring import blocks_reached
+from phyblock.scoring.pose import blocks_reached
 from phyblock.sim.carry import CarriedStep, CarryLimits, depth_cm, end_of, moved_between
 from phyblock.sim.pose import Pose
 from phyblock.sim.stability import DEFAULT_TRIAL

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from phyblock.scoring import POSE_ERRORS, POSE_FRAMES, TOLERANCES_CM, PoseError, PoseFrame
+from phyblock.scoring.pose import POSE_ERRORS, POSE_FRAMES, PoseError, PoseFrame
+from phyblock.scoring.pose_matching import TOLERANCES_CM
 from phyblock.tables.design import OVERALL
 from phyblock.tables.drawing import COLORS, INK, headed
 from phyblock.tables.load import Run

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block, PoseStep
-from phyblock.scoring import PoseError
+from phyblock.scoring.pose import PoseError
 from phyblock.sim.carry import CarryLimits, carry_out
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.placing import put, upright

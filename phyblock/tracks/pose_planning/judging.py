@@ -24,17 +24,16 @@ from phyblock.domain import (
     euler_deg_to_matrix,
     turn_deg,
 )
-from phyblock.scoring import (
-    TURN_TOLERANCE_DEG,
-    AssemblyScorer,
+from phyblock.scoring.plan import AssemblyScorer, Score
+from phyblock.scoring.pose import (
     PoseError,
     PoseFit,
     PoseScore,
     PoseScorer,
-    Score,
     blocks_reached,
     pose_errors,
 )
+from phyblock.scoring.pose_matching import TURN_TOLERANCE_DEG
 from phyblock.sim.carry import Carried, CarriedStep, CarryLimits, carry_out
 from phyblock.sim.placing import put
 from phyblock.sim.registry import told_engine

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from phyblock.records import Record
-from phyblock.scoring import POSE_ERRORS, TOLERANCES_CM
+from phyblock.scoring.pose import POSE_ERRORS
+from phyblock.scoring.pose_matching import TOLERANCES_CM
 from phyblock.tables.listing import ListedScore, Listing
 from phyblock.tracks.pose_planning.counts import RIGHT
 from phyblock.tracks.pose_planning.record import PoseRecord

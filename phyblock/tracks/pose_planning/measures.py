@@ -9,8 +9,9 @@ from functools import partial
 
 import numpy as np
 
-from phyblock.scoring import POSE_ERRORS, POSE_FRAMES, TOLERANCES_CM, PoseError, PoseFrame
-from phyblock.scoring.ratios import Floats, f1_of, mean_of, ratio_of
+from phyblock.scoring.counts import Floats, f1_of, mean_of, ratio_of
+from phyblock.scoring.pose import POSE_ERRORS, POSE_FRAMES, PoseError, PoseFrame
+from phyblock.scoring.pose_matching import TOLERANCES_CM
 from phyblock.tables.load import Run
 from phyblock.tables.measures import Measure, SampleCounts
 from phyblock.tracks.pose_planning.baselines import POSE_FLOORS

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from phyblock.records import Course, Line, Record
 from phyblock.records.line import Amount, Whole
-from phyblock.scoring import PoseError
+from phyblock.scoring.pose import PoseError
 from phyblock.tracks.plans import PLAN_COLUMNS, PlanParse, plan_row
 from phyblock.tracks.pose_planning.resting import Rest
 from phyblock.types import PoseRotation, StepEnd

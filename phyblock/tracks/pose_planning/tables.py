@@ -7,7 +7,8 @@ from typing import Any
 
 import pandas as pd
 
-from phyblock.scoring import POSE_ERRORS, TOLERANCES_CM
+from phyblock.scoring.pose import POSE_ERRORS
+from phyblock.scoring.pose_matching import TOLERANCES_CM
 from phyblock.tables.design import OVERALL
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL

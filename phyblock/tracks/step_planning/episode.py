@@ -10,14 +10,9 @@ from phyblock import parsing
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block, Plan
 from phyblock.models.base import Image, Message, Reply, Request
-from phyblock.scoring import (
-    ERROR_TYPES,
-    Assembly,
-    Counts,
-    ErrorType,
-    attempted_counts,
-    placed_counts,
-)
+from phyblock.scoring.counts import Counts
+from phyblock.scoring.plan import ERROR_TYPES, ErrorType
+from phyblock.scoring.steps import Assembly, attempted_counts, placed_counts
 from phyblock.sim.site import Settled
 from phyblock.tracks.prompts import response_format
 from phyblock.tracks.showing import file_plan

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.scoring import ERROR_TYPES
+from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL
 from phyblock.tables.outcomes import has_reply

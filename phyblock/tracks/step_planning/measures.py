@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from phyblock.scoring.ratios import f1_of, precision_of, ratio_of, recall_of
+from phyblock.scoring.counts import f1_of, precision_of, ratio_of, recall_of
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Measure, SampleCounts
 from phyblock.tables.outcomes import has_reply

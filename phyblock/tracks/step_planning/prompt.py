@@ -12,7 +12,7 @@ from typing import Literal
 
 from phyblock import parsing
 from phyblock.models.base import Image, Message
-from phyblock.scoring import MoveOutcome
+from phyblock.scoring.steps import MoveOutcome
 from phyblock.tracks.prompts import TemplatePrompt, form_facts
 from phyblock.types import CandidateScale, Gating, Setting
 

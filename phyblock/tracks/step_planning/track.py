@@ -18,7 +18,7 @@ from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block
 from phyblock.models.base import Image, Message, Request
 from phyblock.records import Record
-from phyblock.scoring import Assembly
+from phyblock.scoring.steps import Assembly
 from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.sim.registry import told_engine
 from phyblock.sim.site import ONE_SETTING, Settled, settle, state_picture

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
-from phyblock.scoring import letter_rates
+from phyblock.scoring.counts import letter_rates
 from phyblock.tables.load import Run, made_once_copied
 from phyblock.tables.measures import CELL
 from phyblock.tables.outcomes import has_reply

@@ -7,8 +7,7 @@ from collections.abc import Container
 import pandas as pd
 
 from phyblock.domain import CATEGORIES, SUBTASKS
-from phyblock.scoring import chance
-from phyblock.scoring.ratios import ratio_of
+from phyblock.scoring.counts import chance, ratio_of
 from phyblock.stable import plain_sum
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, SCORED_BY, Cell, Measure, SampleCounts

@@ -18,7 +18,8 @@ from phyblock.making.poses import POSES
 from phyblock.making.scenes.candidate_sets import NEEDED, make_candidates
 from phyblock.making.scenes.grammar import Group, Request, draw
 from phyblock.making.scenes.scene_production import shares
-from phyblock.scoring import Goal, match_plan, micro
+from phyblock.scoring.counts import micro
+from phyblock.scoring.plan import Goal, match_plan
 from phyblock.tracks.goal_blind.learning import CONSTANT, FREQUENCIES, goal_blind_plans
 from phyblock.types import SETTINGS, Setting
 from tests.designs.scenes import designed_scene

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from phyblock.scoring import ERROR_TYPES
+from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.tables.design import OVERALL
 from phyblock.tables.drawing import (
     COLORS,

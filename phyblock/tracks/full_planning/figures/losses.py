@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from phyblock.scoring import BLOCK_OUTCOMES, BlockOutcome
+from phyblock.scoring.plan import BLOCK_OUTCOMES, BlockOutcome
 from phyblock.tables.design import OVERALL
 from phyblock.tables.drawing import COLORS, PALE, headed
 from phyblock.tables.load import Run

@@ -1,4 +1,4 @@
-"""How sure a number is: a cluster jackknife over base scenes, tests of differences, ranks.
+"""Uncertainty: a cluster jackknife over base scenes, tests of differences, ranks, components.
 
 Scenes made from the same base scene succeed and fail together, and a scene that combines two base
 scenes shares something with every scene made from either of them. The variance of a statistic then
@@ -10,45 +10,50 @@ its terms is taken by leaving units out and measuring again, which needs no deri
 statistic and is less optimistic than one with few clusters (MacKinnon, Nielsen and Webb, *Fast and
 reliable jackknife and bootstrap methods for cluster-robust inference*, Journal of Applied
 Econometrics 38, 2023). docs/statistics.md has the simulation.
+
+Variance components tell how much a varied factor (seed, prompt, background) moves scores. Items are
+crossed with the levels of the factor, and both with *blocks*: the combinations of everything else
+that was varied. The *shift* is the effect of a level on all items alike: the standard deviation of
+the levels' means. The *interaction* is its effect on single items beyond that: the standard
+deviation of an item's scores over levels, without the shift and without what differs from block to
+block. Both are method-of-moments estimates of a crossed design with items as a random facet
+(Cornfield and Tukey, *Average values of mean squares in factorials*, Annals of Mathematical
+Statistics 27, 1956; Brennan, *Generalizability Theory*, 2001). Items of common origin are no
+independent sample, so the error of the levels' means is taken from the jackknife.
+
+Item analysis is that of classical test theory (Lord and Novick, *Statistical Theories of Mental
+Test Scores*, 1968).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import stdtr, stdtrit  # type: ignore[import-untyped]
+from scipy.special import (  # type: ignore[import-untyped]
+    chdtri,
+    ncfdtr,
+    ncfdtrinc,
+    stdtr,
+    stdtrit,
+)
 
-from phyblock.scoring.ratios import Floats, Metric
-
-__all__ = [
-    "CONFIDENCE",
-    "POWER",
-    "Clusters",
-    "Estimate",
-    "bounded",
-    "detectable",
-    "holm",
-    "in_range",
-    "jackknife",
-    "least_p",
-    "rank_ranges",
-]
+from phyblock.scoring.counts import Floats, Metric
 
 CONFIDENCE = 0.95
 POWER = 0.8
-"""How often a difference is found that `detectable` names."""
+"""Share of cases in which the difference that `detectable` names is found."""
 _NOTHING = 1e-9
 """Share of a value that its standard error has by rounding alone."""
 
 
 @dataclass(frozen=True, eq=False)
 class Clusters:
-    """Which base scenes each unit (scene, question) comes from.
+    """The base scenes that each unit (scene, question) comes from.
 
     `members` has shape (units, most base scenes of a unit) and holds numbers of base scenes from 0
     to `size` - 1, with `size` where a unit has no further one.
@@ -74,7 +79,7 @@ class Clusters:
         return cls(members, len(numbers))
 
     def behind(self, present: NDArray[np.bool_]) -> NDArray[np.intp]:
-        """How many base scenes are behind each column of `present` (units, columns)."""
+        """Number of base scenes behind each column of `present` (units, columns)."""
         seen = np.zeros((self.size + 1, present.shape[1]), dtype=bool)
         for members in self.members.T:
             np.logical_or.at(seen, members, present)
@@ -175,9 +180,7 @@ def in_range(estimate: Estimate, most: ArrayLike = 1.0) -> Estimate:
 
 
 def bounded(estimate: Estimate, most: float) -> Estimate:
-    """The same estimates of differences, whose intervals end where differences do: at `most` to
-    either side.
-    """
+    """The same estimates of differences, with intervals cut at -`most` and `most`."""
     lo, hi = (np.clip(end, -most, most) for end in (estimate.lo, estimate.hi))
     return replace(estimate, lo=lo, hi=hi)
 
@@ -264,3 +267,229 @@ def rank_ranges(is_better: ArrayLike) -> NDArray[np.intp]:
     """
     known = np.asarray(is_better, dtype=bool)
     return np.stack([1 + known.sum(axis=0), len(known) - known.sum(axis=1)], axis=1)
+
+
+_TAIL = (1 - CONFIDENCE) / 2
+
+
+@dataclass(frozen=True)
+class Component:
+    """A standard deviation with its 95 % interval; NaN where it cannot be told."""
+
+    sd: float
+    lo: float
+    hi: float
+
+
+NO_COMPONENT = Component(np.nan, np.nan, np.nan)
+
+
+def shift(scores: Floats, clusters: Clusters) -> Component:
+    """Standard deviation by which levels move the mean over items; (items, levels, blocks).
+
+    The interval is that of the noncentrality of an F test of equal levels (Steiger, *Beyond the F
+    test*, Psychological Methods 9, 2004), with the jackknife's error and one degree of freedom less
+    than base scenes; it begins at 0 where the test finds nothing.
+    """
+    items, levels, _ = scores.shape
+    if items < 2 or levels < 2 or clusters.size < 2:
+        return NO_COMPONENT
+    moved = (scores - scores.mean(axis=1, keepdims=True)).mean(axis=2)
+    estimate = jackknife(
+        np.concatenate([moved, np.ones((items, 1))], axis=1),
+        clusters,
+        lambda sums: sums[..., :-1] / sums[..., -1:],
+    )
+    df, df_error = levels - 1, clusters.size - 1
+    total, error = float((estimate.value**2).sum()), float((estimate.se**2).sum())
+    if error <= np.finfo(float).tiny:
+        exact = np.sqrt(total / df)
+        return Component(exact, exact, exact)
+    f = total / error
+
+    def end(p: float) -> float:
+        """From the noncentrality at which F is at most `f` with probability `p`."""
+        is_none = ncfdtr(df, df_error, 0.0, f) <= p
+        noncentrality = 0.0 if is_none else float(ncfdtrinc(df, df_error, p, f))
+        return float(np.sqrt(noncentrality * error) / df)
+
+    return Component(float(np.sqrt(max(total - error, 0.0) / df)), end(1 - _TAIL), end(_TAIL))
+
+
+def interaction(scores: Floats, clusters: Clusters) -> Component:
+    """Standard deviation by which levels move items beyond the shift; (items, levels, blocks).
+
+    With one block it cannot be told from noise.
+    """
+    items, levels, blocks = scores.shape
+    if items < 2 or levels < 2 or blocks < 2 or clusters.size < 2:
+        return NO_COMPONENT
+    moved = scores - scores.mean(axis=1, keepdims=True)
+    mean = moved.mean(axis=2, keepdims=True)
+    counts = np.concatenate(
+        [
+            np.ones((items, 1)),
+            (mean**2).sum(axis=(1, 2))[:, None],
+            ((moved - mean) ** 2).sum(axis=(1, 2))[:, None],
+            moved.reshape(items, -1),
+        ],
+        axis=1,
+    )
+
+    def variance(sums: Floats) -> Floats:
+        n = sums[..., 0]
+        cells = (sums[..., 3:] / n[..., None]).reshape(*n.shape, levels, blocks)
+        level = cells.mean(axis=-1)
+        df = (n - 1) * (levels - 1)
+        of_levels = (sums[..., 1] - n * (level**2).sum(axis=-1)) / df
+        apart = ((cells - level[..., None]) ** 2).sum(axis=(-2, -1))
+        of_blocks = (sums[..., 2] - n * apart) / (df * (blocks - 1))
+        return np.stack([of_levels - of_blocks / blocks, of_blocks / blocks], axis=-1)
+
+    estimate = jackknife(counts, clusters, variance)
+    most = (clusters.size - 1) * (levels - 1)
+    above, noise = (float(value) for value in estimate.value)
+    return _of_variance(above, float(estimate.se[0]), noise, most=most)
+
+
+def within(scores: Floats, clusters: Clusters) -> Component:
+    """Standard deviation of an item's score over repeats of one condition.
+
+    `scores` has shape (items, conditions, repeats).
+    """
+    items, ways, repeats = scores.shape
+    if items < 2 or repeats < 2 or clusters.size < 2:
+        return NO_COMPONENT
+    variances = scores.var(axis=2, ddof=1).mean(axis=1)
+    counts = np.stack([np.ones(items), variances], axis=1)
+    estimate = jackknife(counts, clusters, lambda sums: sums[..., 1] / sums[..., 0])
+    most = clusters.size * ways * (repeats - 1)
+    return _of_variance(float(estimate.value), float(estimate.se), most=most)
+
+
+def spread_of_items(scores: Floats, clusters: Clusters) -> Component:
+    """Standard deviation of items, each by its mean over all conditions; `scores` (items, ...)."""
+    items = len(scores)
+    if items < 3 or clusters.size < 3:
+        return NO_COMPONENT
+    means = scores.reshape(items, -1).mean(axis=1)
+    # Centered first: what is left of large squares would be noise.
+    means = means - means.mean()
+    counts = np.stack([np.ones(items), means, means**2], axis=1)
+    estimate = jackknife(
+        counts,
+        clusters,
+        lambda sums: (sums[..., 2] - sums[..., 1] ** 2 / sums[..., 0]) / (sums[..., 0] - 1),
+    )
+    return _of_variance(float(estimate.value), float(estimate.se), most=clusters.size - 1)
+
+
+def _of_variance(variance: float, se: float, noise: float = 0.0, *, most: float) -> Component:
+    """The component of `variance`, which is a mean square less `noise`.
+
+    The mean square has the interval of chi-square with the degrees of freedom that its error stands
+    for (Satterthwaite, *An approximate distribution of estimates of variance components*,
+    Biometrics Bulletin 2, 1946), less `noise` too, and not below zero. An error that was estimated
+    is at times far too small, even 0: there are at `most` as many degrees of freedom as independent
+    base scenes have.
+    """
+    square = variance + noise
+    ends = (square, square)
+    if square > 0:
+        ratio = square / se if se > 0 else math.inf
+        df = min(2 * ratio * ratio, most)
+        ends = (square * df / chdtri(df, _TAIL), square * df / chdtri(df, 1 - _TAIL))
+    parts = (variance, *(end - noise for end in ends))
+    return Component(*(float(np.sqrt(max(part, 0.0))) for part in parts))
+
+
+LEAST_MODELS = 4
+"""Fewer models leave a correlation over them without meaning."""
+_LEVEL = 0.05
+
+
+def discrimination(scores: Floats) -> Floats:
+    """Correlation of each item's score with the mean of all other items, over models.
+
+    `scores` has shape (models, items), NaN where a model has none; the result (items,), NaN where
+    fewer than two models have a score, or all of them the same.
+    """
+    known = ~np.isnan(scores)
+    filled = np.where(known, scores, 0.0)
+    others = known.sum(axis=1, keepdims=True) - known
+    rest = (filled.sum(axis=1, keepdims=True) - filled) / np.maximum(others, 1)
+    return _correlation(filled, rest, known & (others > 0))
+
+
+def _correlation(one: Floats, other: Floats, known: NDArray[np.bool_]) -> Floats:
+    """Pearson's correlation of each column, over the rows that are known."""
+    n = np.maximum(known.sum(axis=0), 1)
+    apart = [
+        np.where(known, values - np.where(known, values, 0).sum(axis=0) / n, 0)
+        for values in (one, other)
+    ]
+    spread = np.sqrt((apart[0] ** 2).sum(axis=0) * (apart[1] ** 2).sum(axis=0))
+    # Equal scores differ from their mean by what rounding leaves.
+    is_defined = (known.sum(axis=0) > 1) & (spread > 1e-12)
+    together = (apart[0] * apart[1]).sum(axis=0)
+    out = np.full(spread.shape, np.nan)
+    np.divide(together, spread, out=out, where=is_defined)
+    return np.clip(out, -1.0, 1.0)
+
+
+def least_correlation(models: int) -> float:
+    """The least distance from 0 by which a correlation over so many models differs from none.
+
+    Two-sided at 5 %, one item alone, by the t distribution; NaN for fewer than three models.
+    """
+    freedom = models - 2
+    if freedom < 1:
+        return float("nan")
+    t = float(stdtrit(freedom, 1 - _LEVEL / 2))
+    return float(t / np.sqrt(freedom + t**2))
+
+
+def explained(values: ArrayLike, groups: Sequence[object]) -> float:
+    """Share of the variance of `values` that lies between groups (eta squared); NaN without any."""
+    numbers = np.asarray(values, dtype=np.float64)
+    names = {group: place for place, group in enumerate(dict.fromkeys(groups))}
+    places = np.array([names[group] for group in groups], dtype=np.intp)
+    sizes = np.bincount(places, minlength=len(names))
+    apart = numbers - numbers.mean() if len(numbers) else numbers
+    total = float((apart**2).sum())
+    if total <= 1e-12:
+        return float("nan")
+    means = np.bincount(places, weights=apart, minlength=len(names)) / sizes
+    return float((sizes * means**2).sum() / total)
+
+
+def pairs_kept(counts: Floats, value: Metric, chosen: Sequence[int], rest: bool = False) -> Floats:
+    """Agreement of the order of each pair of models on the chosen items with that on all items.
+
+    `counts` has shape (models, items, columns), `value` makes a value of their sums. 1: in the same
+    order, -1: in the other, 0: even in one of them; their mean is Kendall's tau-a. With `rest` the
+    items that were not chosen stand in the place of all. In the order of `combinations`.
+    """
+    pairs = np.array(list(combinations(range(len(counts)), 2)), dtype=np.intp).reshape(-1, 2)
+    subset = value(counts[:, list(chosen)].sum(axis=1))
+    held = np.delete(counts, list(chosen), axis=1) if rest else counts
+    whole = value(held.sum(axis=1))
+    signs = [np.sign(values[pairs[:, 0]] - values[pairs[:, 1]]) for values in (subset, whole)]
+    return np.asarray(signs[0] * signs[1], dtype=np.float64)
+
+
+def pairs_kept_by_choice(
+    counts: Floats,
+    value: Metric,
+    choose: Callable[[Floats], Sequence[int]],
+    rest: bool = False,
+) -> Floats:
+    """`pairs_kept`, each pair on items that were chosen without its two models.
+
+    `choose` gives the items for the counts of some models.
+    """
+    kept = []
+    for pair in combinations(range(len(counts)), 2):
+        chosen = choose(np.delete(counts, pair, axis=0))
+        kept.append(pairs_kept(counts[list(pair)], value, chosen, rest)[0])
+    return np.array(kept)

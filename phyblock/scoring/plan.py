@@ -1,0 +1,454 @@
+"""The score of a plan against a scene's AOV graph: matchers, criteria, error types, losses.
+
+Settings A and B say which blocks are equal; the `paper` and `optimal` matchers say which goal block
+a step places. Sets of goal vertices are bit masks throughout.
+"""
+
+from __future__ import annotations
+
+import functools
+import operator
+from collections import Counter
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import Literal, get_args
+
+from phyblock.domain import CandidateSet, Plan, Scene
+from phyblock.scoring.counts import Counts
+from phyblock.types import Criterion, Level1Criterion, Matcher, Setting
+
+ErrorType = Literal["shape_not_in_gt", "overflow", "incorrect_orientation", "dependency_not_met"]
+ERROR_TYPES: tuple[ErrorType, ...] = get_args(ErrorType)
+"""The four types of wrong step (paper appendix B.3), exhaustive and exclusive: the first that holds
+when the step comes. No goal block has this type and color; every such block is already placed; an
+unplaced one exists, but none that equals the candidate under the setting (A only); an unplaced
+equal one exists but is not ready.
+"""
+
+BlockOutcome = Literal[
+    "placed",
+    "left_out",
+    "wrong_kind",
+    "wrong_orientation",
+    "support_not_named",
+    "support_turned",
+    "support_both",
+    "order",
+]
+BLOCK_OUTCOMES: tuple[BlockOutcome, ...] = get_args(BlockOutcome)
+"""Outcomes of a goal block. `left_out`: the plan has no step left for it. `wrong_kind`: it has, and
+the step names a kind that is not needed, or not so often. `wrong_orientation`: its kind is named,
+in another pose (setting A only). Named as it is, but in no order of the plan's steps ready, as what
+it rests on, directly or not, was never named (`support_not_named`), named in another pose
+(`support_turned`), or partly the one and partly the other (`support_both`). `order`: another order
+would place it.
+"""
+
+
+class Goal:
+    """A scene and its candidate set prepared for matching under one setting.
+
+    `equal_to[i]` holds the goal vertices, in file order, that equal candidate i (1-based). All else
+    are bit masks of vertices: `equal[i]` the same, `of_kind[i]` those of its type and color,
+    `kinds` all blocks by type and color, `kind_of_look` the kind of each group that the setting
+    takes for equal; `above[v]` v and all that depends on it, directly or not, `below[v]` v and all
+    that it depends on. `unlocks[v]` are the vertices that directly depend on v: equal blocks that
+    unlock the same ones are interchangeable when both are ready.
+    """
+
+    def __init__(self, scene: Scene, candidates: CandidateSet, setting: Setting) -> None:
+        attribute = "look" if setting == "A" else "kind"
+        self.graph = graph = scene.graph
+        n = len(graph)
+        looks = [getattr(block, attribute) for block in scene.blocks]
+        kinds = [block.kind for block in scene.blocks]
+        self.equal_to: dict[int, tuple[int, ...]] = {}
+        self.equal: dict[int, int] = {}
+        self.of_kind: dict[int, int] = {}
+        for index, candidate in enumerate(candidates.candidates, 1):
+            look, kind = getattr(candidate, attribute), candidate.kind
+            self.equal_to[index] = tuple(v for v in range(n) if looks[v] == look)
+            self.equal[index] = sum(1 << v for v in self.equal_to[index])
+            self.of_kind[index] = sum(1 << v for v in range(n) if kinds[v] == kind)
+        self.kinds = _groups(kinds)
+        self.kind_of_look = {
+            look: kind for look in _groups(looks) for kind in self.kinds if look & kind
+        }
+        below = [1 << v for v in range(n)]
+        for vertex in sorted(range(n), key=graph.layers.__getitem__):
+            for other in graph.depends_on[vertex]:
+                below[vertex] |= below[other]
+        self.below = tuple(below)
+        self.above = tuple(sum((below[w] >> v & 1) << w for w in range(n)) for v in range(n))
+        self.unlocks = [tuple(w for w in range(n) if v in graph.depends_on[w]) for v in range(n)]
+
+    def choices(self, index: int, placed: int) -> list[int]:
+        """Ready goal vertices, in file order, that candidate `index` could be placed as."""
+        return [v for v in self.equal_to[index] if self.graph.is_ready(v, placed)]
+
+    def distinct(self, vertices: Sequence[int]) -> list[int]:
+        """The first of each group of vertices that unlock the same blocks."""
+        if len(vertices) < 2:
+            return list(vertices)
+        return list({self.unlocks[v]: v for v in reversed(vertices)}.values())
+
+    def error(self, index: int, placed: int) -> ErrorType:
+        """The type of a wrong step that names candidate `index` when `placed` are placed."""
+        if not self.of_kind[index]:
+            return "shape_not_in_gt"
+        if not self.of_kind[index] & ~placed:
+            return "overflow"
+        if not self.equal[index] & ~placed:
+            return "incorrect_orientation"
+        return "dependency_not_met"
+
+
+def _groups(values: Iterable[Hashable]) -> tuple[int, ...]:
+    """Bit masks of the places that have the same value."""
+    groups: dict[Hashable, int] = {}
+    for place, value in enumerate(values):
+        groups[value] = groups.get(value, 0) | 1 << place
+    return tuple(groups.values())
+
+
+@dataclass(frozen=True)
+class Match:
+    """The effect of each step of a plan.
+
+    `vertices[i]` is the goal vertex that step i placed, or None; `placed[i]` the bit mask of the
+    vertices placed before step i; `n_blocks` the size of the goal.
+    """
+
+    vertices: tuple[int | None, ...]
+    placed: tuple[int, ...]
+    n_blocks: int
+
+    @property
+    def counts(self) -> Counts:
+        """TP: steps that placed a block; FP: the other steps; FN: blocks that were left."""
+        tp = sum(vertex is not None for vertex in self.vertices)
+        return Counts(tp, len(self.vertices) - tp, self.n_blocks - tp)
+
+
+def match_plan(goal: Goal, plan: Plan, matcher: Matcher) -> Match:
+    """Match `plan` step by step; raises KeyError for a step that is no candidate.
+
+    `paper` is Algorithm 1 of the paper: each step takes the first ready equal block in file
+    order. `optimal` takes the same steps but chooses among interchangeable ready blocks so that
+    the number of true positives over the whole plan is greatest, so every valid order scores 1.
+    Of the choices with as many, it takes those under which the fewest steps are `overflow`, and of
+    these the fewest `incorrect_orientation`: the file order of blocks changes no count.
+    """
+    vertices: list[int | None] = []
+    if matcher == "optimal":
+        vertices = _best_choices(goal, plan)
+    placed, masks = 0, []
+    for step, index in enumerate(plan.steps):
+        masks.append(placed)
+        if matcher == "paper":
+            vertices.append(next(iter(goal.choices(index, placed)), None))
+        vertex = vertices[step]
+        placed |= 0 if vertex is None else 1 << vertex
+    return Match(tuple(vertices), tuple(masks), len(goal.graph))
+
+
+def _best_choices(goal: Goal, plan: Plan) -> list[int | None]:
+    """Search over the frontier of sets of placed vertices that some choice can reach.
+
+    A step with a ready match never gains by being skipped, and a set's size is its number of true
+    positives, so the way into each distinct set that costs least is enough.
+    """
+    cost_of: dict[ErrorType, int] = {
+        "shape_not_in_gt": 0,
+        "overflow": len(plan) + 1,
+        "incorrect_orientation": 1,
+        "dependency_not_met": 0,
+    }
+    frontier = {0: 0}
+    history: list[dict[int, int | None]] = []
+    for index in plan.steps:
+        costs: dict[int, int] = {}
+        taken: dict[int, int | None] = {}
+        for placed, cost in frontier.items():
+            choices = goal.distinct(goal.choices(index, placed))
+            if not choices:
+                more = cost + cost_of[goal.error(index, placed)]
+                if more < costs.get(placed, more + 1):
+                    costs[placed], taken[placed] = more, None
+            for vertex in choices:
+                reached = placed | 1 << vertex
+                if cost < costs.get(reached, cost + 1):
+                    costs[reached], taken[reached] = cost, vertex
+        frontier = costs
+        history.append(taken)
+    best = min(frontier, key=lambda mask: (-mask.bit_count(), frontier[mask]))
+    return steps_back(history, best)
+
+
+def steps_back(history: Sequence[Mapping[int, int | None]], reached: int) -> list[int | None]:
+    """The vertex of each step of a search by which it came to the set `reached`, read backwards."""
+    vertices: list[int | None] = []
+    for taken in reversed(history):
+        chosen = taken[reached]
+        vertices.append(chosen)
+        reached &= ~(1 << chosen) if chosen is not None else ~0
+    return vertices[::-1]
+
+
+def most_placed(goal: Goal, plan: Plan) -> int:
+    """The number of true positives under the `optimal` matcher, without which steps they are.
+
+    Quicker than `match_plan`; raises KeyError for a step that is no candidate.
+    """
+    frontier = {0}
+    for index in plan.steps:
+        if goal.equal[index]:
+            reached: set[int] = set()
+            for placed in frontier:
+                choices = goal.distinct(goal.choices(index, placed))
+                reached.update([placed | 1 << vertex for vertex in choices] or [placed])
+            frontier = reached
+    return max(mask.bit_count() for mask in frontier)
+
+
+def step_errors(goal: Goal, plan: Plan, match: Match) -> tuple[ErrorType | None, ...]:
+    """For each step its error type, or None for a true positive."""
+    return tuple(
+        goal.error(index, placed) if vertex is None else None
+        for index, vertex, placed in zip(plan.steps, match.vertices, match.placed, strict=True)
+    )
+
+
+def count_errors(errors: Iterable[ErrorType | None]) -> dict[ErrorType, int]:
+    """Number of wrong steps of each type, all four types present."""
+    counted = Counter(error for error in errors if error is not None)
+    return {name: counted[name] for name in ERROR_TYPES}
+
+
+def level1_counts(goal: Goal, plan: Plan, criterion: Level1Criterion) -> Counts:
+    """Counts of `plan` without order, under the goal's setting.
+
+    `membership` is the paper's: a step counts when any goal block equals it, however often it is
+    repeated. `selection` is one to one. Raises KeyError for a step that is no candidate.
+    """
+    if criterion == "membership":
+        tp = sum(bool(goal.equal_to[index]) for index in plan.steps)
+    else:
+        chosen = Counter(goal.equal_to[index] for index in plan.steps)
+        tp = sum(min(times, len(vertices)) for vertices, times in chosen.items())
+    return Counts(tp, len(plan) - tp, len(goal.graph) - tp)
+
+
+def block_outcomes(
+    goal: Goal, plan: Plan, placed: Sequence[int]
+) -> tuple[dict[BlockOutcome, int], ...]:
+    """Number of goal blocks of each outcome, for each number of blocks that the plan `placed`.
+
+    Matchers find different numbers. Raises KeyError for a step that is no candidate.
+    """
+    n = len(goal.graph)
+    kinds = Counter(mask for index in plan.steps if (mask := goal.of_kind[index]))
+    looks = Counter(mask for index in plan.steps if (mask := goal.equal[index]))
+    exact = {look: min(times, look.bit_count()) for look, times in looks.items()}
+    of_kind = {kind: min(times, kind.bit_count()) for kind, times in kinds.items()}
+    right_kind, right_pose = sum(of_kind.values()), sum(exact.values())
+    stand = _most_standing(goal, exact, {}, max(placed))
+    both = right_pose - stand
+    by_turned = by_absent = 0
+    if both:
+        turned = {
+            kind: named - sum(times for look, times in exact.items() if look & kind)
+            for kind, named in of_kind.items()
+        }
+        absent = {kind: kind.bit_count() - of_kind.get(kind, 0) for kind in goal.kinds}
+        by_turned = _most_standing(goal, exact, turned, stand) - stand
+        by_absent = _most_standing(goal, exact, absent, stand) - stand
+        # Where either alone would do, one of several equal blocks being meant, it is the pose.
+        by_absent = min(by_absent, both - by_turned)
+    shared: dict[BlockOutcome, int] = {
+        "left_out": max(0, n - len(plan)),
+        "wrong_kind": min(n, len(plan)) - right_kind,
+        "wrong_orientation": right_kind - right_pose,
+        "support_not_named": by_absent,
+        "support_turned": by_turned,
+        "support_both": both - by_turned - by_absent,
+    }
+    return tuple({"placed": tp, **shared, "order": stand - tp} for tp in placed)
+
+
+def _most_standing(
+    goal: Goal, exact: Mapping[int, int], spare: Mapping[int, int], at_least: int
+) -> int:
+    """The most blocks named as they are that can stand together, each on what it depends on.
+
+    `exact` says how many blocks of a look (a bit mask of vertices) are named as they are, `spare`
+    how many others of a kind may support them, uncounted; `at_least` so many are known to stand.
+    Where there are too many blocks of a kind, some are taken away with all that rests on them, in
+    every way that may be best: of the topmost, as what a lower one takes along includes those.
+    """
+    best = at_least
+    seen: set[int] = set()
+
+    def search(standing: int) -> None:
+        nonlocal best
+        if standing in seen:
+            return
+        seen.add(standing)
+        value = sum(min((look & standing).bit_count(), n) for look, n in exact.items())
+        if value <= best:
+            return
+        some, surplus = _too_many(goal, standing, exact, spare)
+        if not some:
+            best = value
+            return
+        above = [goal.above[v] & standing for v in range(len(goal.graph)) if some >> v & 1]
+        if surplus == len(above):
+            search(standing & ~functools.reduce(operator.or_, above))
+            return
+        for gone in sorted(above, key=int.bit_count):
+            if (gone & some).bit_count() == 1:
+                search(standing & ~gone)
+
+    search((1 << len(goal.graph)) - 1)
+    return best
+
+
+def _too_many(
+    goal: Goal, standing: int, exact: Mapping[int, int], spare: Mapping[int, int]
+) -> tuple[int, int]:
+    """Blocks of a kind of which too few are named for all to stand, and how many must go.
+
+    (0, 0) where all can stand. A kind of which all must go comes first.
+    """
+    surplus: dict[int, int] = {}
+    blocks: dict[int, int] = {}
+    for look, kind in goal.kind_of_look.items():
+        excess = (look & standing).bit_count() - exact.get(look, 0)
+        if excess > 0:
+            surplus[kind] = surplus.get(kind, -spare.get(kind, 0)) + excess
+            blocks[kind] = blocks.get(kind, 0) | look & standing
+    needed = (0, 0)
+    for kind, some in blocks.items():
+        if surplus[kind] == some.bit_count():
+            return some, surplus[kind]
+        if surplus[kind] > 0:
+            needed = some, surplus[kind]
+    return needed
+
+
+def steps_kept(goal: Goal, plan: Plan, at_least: int = 0) -> int:
+    """The most steps of a plan that occur, in its order, in one valid order of the goal.
+
+    That order is the plan with the other steps left out and the other blocks put in, and no valid
+    order needs fewer such edits. Steps may stand for any equal blocks as long as none comes after
+    one that rests on it. At least `at_least` steps are known to be kept. Raises KeyError for a
+    step that is no candidate.
+    """
+    steps = [goal.equal[index] for index in plan.steps]
+    # For each place in the plan, how many steps from there on equal each set of blocks, at most as
+    # many as there are such blocks.
+    ahead: list[dict[int, int]] = [{}]
+    for equal in reversed(steps):
+        known = ahead[-1].get(equal, 0)
+        is_more = known < equal.bit_count()
+        ahead.append({**ahead[-1], equal: known + 1} if is_more else ahead[-1])
+    ahead.reverse()
+
+    def bound(at: int, kept: int, closed: int) -> int:
+        """At least the number of steps that can be kept in all."""
+        most = kept.bit_count()
+        for equal, times in ahead[at].items():
+            most += min(times, (equal & ~closed).bit_count())
+        return most
+
+    # The way that may still keep most comes first, so the first way that comes to the end is a
+    # best one. A kept block and those that it rests on are closed.
+    open_ways = [(-bound(0, 0, 0), 0, 0, 0)]
+    seen = {(0, 0)}
+    while True:
+        least, before, kept, closed = heappop(open_ways)
+        at, most = -before, -least
+        if at == len(steps) or most == kept.bit_count() or most <= at_least:
+            return max(most, at_least)
+        for now, closed_now in _kept_after(goal, steps[at], kept, closed):
+            if (at + 1, now) not in seen:
+                seen.add((at + 1, now))
+                heappush(open_ways, (-bound(at + 1, now, closed_now), -at - 1, now, closed_now))
+
+
+def _kept_after(goal: Goal, equal: int, kept: int, closed: int) -> Iterator[tuple[int, int]]:
+    """Sets of kept and closed blocks after a step that is left out or is one of `equal`."""
+    yield kept, closed
+    roles = set()
+    free = equal & ~closed
+    while free:
+        bit = free & -free
+        free ^= bit
+        vertex = bit.bit_length() - 1
+        role = (goal.above[vertex] ^ bit, goal.below[vertex] ^ bit)
+        if role not in roles:
+            roles.add(role)
+            yield kept | bit, closed | goal.below[vertex]
+
+
+@dataclass(frozen=True)
+class Score:
+    """Counts of one plan under one criterion and setting.
+
+    `matcher`, `errors` (wrong steps by type), `vertices` (the goal vertex each step placed),
+    `step_errors`, `blocks` (goal blocks by outcome) and `kept` (steps that the nearest valid order
+    keeps) belong to criterion `aov` and are None for the Level-1 criteria.
+    """
+
+    criterion: Criterion
+    setting: Setting
+    counts: Counts
+    matcher: Matcher | None = None
+    errors: dict[ErrorType, int] | None = None
+    vertices: tuple[int | None, ...] | None = None
+    step_errors: tuple[ErrorType | None, ...] | None = None
+    blocks: dict[BlockOutcome, int] | None = None
+    kept: int | None = None
+
+
+class AssemblyScorer:
+    """Scores plans for one scene; build once, use for every model and seed."""
+
+    def __init__(self, scene: Scene, candidates: CandidateSet, settings: Sequence[Setting]) -> None:
+        self._scene = scene
+        self._goals = {setting: Goal(scene, candidates, setting) for setting in settings}
+
+    def score(
+        self, plan: Plan, matchers: Sequence[Matcher], level1: Level1Criterion | None
+    ) -> tuple[Score, ...]:
+        """Scores by setting, then matcher; the Level-1 criterion only for scenes of level 1.
+
+        Raises KeyError for a step that is no candidate.
+        """
+        scores: list[Score] = []
+        for setting, goal in self._goals.items():
+            matches = [match_plan(goal, plan, matcher) for matcher in matchers]
+            if matches:
+                placed = [match.counts.tp for match in matches]
+                kept = steps_kept(goal, plan, max(placed))
+                outcomes = block_outcomes(goal, plan, placed)
+                for matcher, match, blocks in zip(matchers, matches, outcomes, strict=True):
+                    why = step_errors(goal, plan, match)
+                    errors = count_errors(why)
+                    scores.append(
+                        Score(
+                            "aov",
+                            setting,
+                            match.counts,
+                            matcher,
+                            errors,
+                            match.vertices,
+                            why,
+                            blocks,
+                            kept,
+                        )
+                    )
+            if level1 is not None and 1 in self._scene.levels:
+                scores.append(Score(level1, setting, level1_counts(goal, plan, level1)))
+        return tuple(scores)

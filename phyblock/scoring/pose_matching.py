@@ -1,0 +1,368 @@
+"""Matching the steps of a plan with poses to goal blocks, and moving the whole plan to fit best.
+
+A step is matched to an unplaced, ready block that equals its candidate: as many steps as setting A
+(or B) lets place a block. Of all such matchings it is one under which steps are within the most
+tolerances together, and of those one under which they lie nearest.
+
+For the motion, every pair of steps laid upon a pair of equal goal blocks is a hypothesis, and where
+steps bring a rotation, so is every step laid upon one; the best are drawn nearer by weighted least
+squares over the blocks that they match. The result does not depend on where the plan was or how it
+was turned.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.domain import Plan
+from phyblock.scoring.counts import Floats
+from phyblock.scoring.plan import Goal, most_placed, steps_back
+from phyblock.stable import plain_sum
+
+
+def cheapest(cost: Floats) -> list[tuple[int, int]]:
+    """Pairs of row and column of the least total cost, as many as the shorter side has, by row.
+
+    Shortest augmenting paths with potentials (Jonker and Volgenant, *A shortest augmenting path
+    algorithm*, Computing 38, 1987). Of equal totals it takes the same one on every machine.
+    """
+    rows, columns = cost.shape
+    if rows > columns:
+        return sorted((row, column) for column, row in cheapest(cost.T))
+    # Column 0 stands for none, so that all others are numbered from 1.
+    owner = np.zeros(columns + 1, dtype=np.intp)
+    of_row, of_column = np.zeros(rows + 1), np.zeros(columns + 1)
+    for row in range(1, rows + 1):
+        owner[0] = row
+        least = np.full(columns + 1, np.inf)
+        before = np.zeros(columns + 1, dtype=np.intp)
+        is_used = np.zeros(columns + 1, dtype=bool)
+        at = 0
+        while owner[at]:
+            is_used[at] = True
+            reduced = cost[owner[at] - 1] - of_row[owner[at]] - of_column[1:]
+            is_nearer = ~is_used[1:] & (reduced < least[1:])
+            least[1:][is_nearer] = reduced[is_nearer]
+            before[1:][is_nearer] = at
+            after = int(np.where(is_used, np.inf, least)[1:].argmin()) + 1
+            step = least[after]
+            of_row[owner[is_used]] += step
+            of_column[is_used] -= step
+            least[~is_used] -= step
+            at = after
+        while at:
+            owner[at] = owner[before[at]]
+            at = int(before[at])
+    return sorted((int(row) - 1, column) for column, row in enumerate(owner[1:]) if row)
+
+
+TOLERANCES_CM = (0.5, 1.0, 2.0, 4.0)
+"""How far from its place a right step may be [cm]; the headline is the mean over them."""
+TURN_TOLERANCE_DEG = 15.0
+"""How far a right step may be turned, up to the symmetry of the block [degrees]."""
+FARTHEST_CM = 20.0
+"""Steps that are farther off cost no more, so that one far away moves no other [cm]."""
+_SLACK = 1e-6
+_DISTANCE_COST = 1e-3
+_IMPOSSIBLE = 1e3
+_MOST_SETS = 4000
+"""Sets of placed blocks that are kept after a step, those that cost least; plans that follow the
+order need no search at all.
+"""
+
+
+@dataclass(frozen=True)
+class Nearness:
+    """Steps against goal blocks, arrays of shape (steps, blocks): distance [cm], turn [degrees].
+
+    `equal` is true where the step's candidate equals the block.
+    """
+
+    distance_cm: Floats
+    turn_deg: Floats
+    equal: NDArray[np.bool_]
+
+    @property
+    def within(self) -> NDArray[np.int64]:
+        """The number of tolerances each pair is within."""
+        limits = np.array(TOLERANCES_CM) + _SLACK
+        near = (self.distance_cm[..., None] <= limits).sum(axis=-1)
+        turned = self.turn_deg <= TURN_TOLERANCE_DEG + _SLACK
+        within: NDArray[np.int64] = np.where(turned & self.equal, near, 0)
+        return within
+
+    @property
+    def cost(self) -> Floats:
+        """Cost of each pair: the share of tolerances that it misses, and a little by distance."""
+        missed = 1 - self.within / len(TOLERANCES_CM)
+        far = np.round(np.minimum(self.distance_cm / FARTHEST_CM, 1.0), 9)
+        return np.where(self.equal, missed + _DISTANCE_COST * far, _IMPOSSIBLE)
+
+
+def assigned(near: Nearness) -> list[int | None]:
+    """The goal block of each step at the least total cost, in whatever order they are placed."""
+    vertices: list[int | None] = [None] * len(near.equal)
+    for step, vertex in cheapest(near.cost):
+        if near.equal[step, vertex]:
+            vertices[step] = vertex
+    return vertices
+
+
+def matched(goal: Goal, numbers: Sequence[int], near: Nearness) -> tuple[int | None, ...]:
+    """The goal block of each step; KeyError for a number that is no candidate."""
+    most = most_placed(goal, Plan(tuple(numbers)))
+    vertices = assigned(near)
+    placed = 0
+    for vertex in vertices:
+        if vertex is not None and goal.graph.is_ready(vertex, placed):
+            placed |= 1 << vertex
+    is_valid = placed.bit_count() == sum(vertex is not None for vertex in vertices)
+    if is_valid and placed.bit_count() == most:
+        return tuple(vertices)
+    return tuple(_searched(goal, numbers, near.cost, most))
+
+
+def _searched(goal: Goal, numbers: Sequence[int], cost: Floats, most: int) -> list[int | None]:
+    """Step by step over the sets of placed blocks, each with the way into it that costs least.
+
+    So many steps as cannot be matched at all may be passed over, where a later one fits better.
+    """
+    spare = len(numbers) - most
+    frontier: dict[int, float] = {0: 0.0}
+    history: list[dict[int, int | None]] = []
+    for step, number in enumerate(numbers):
+        costs: dict[int, float] = {}
+        taken: dict[int, int | None] = {}
+        for placed, paid in frontier.items():
+            if step - placed.bit_count() < spare and paid < costs.get(placed, np.inf):
+                costs[placed], taken[placed] = paid, None
+            for vertex in goal.choices(number, placed):
+                reached, more = placed | 1 << vertex, paid + float(cost[step, vertex])
+                if more < costs.get(reached, np.inf):
+                    costs[reached], taken[reached] = more, vertex
+        if len(costs) > _MOST_SETS:
+            # Passing a step over counts as if it had missed every tolerance.
+            ranked = sorted(costs, key=lambda mask: (costs[mask] - mask.bit_count(), mask))
+            costs = {mask: costs[mask] for mask in ranked[:_MOST_SETS]}
+        frontier = costs
+        history.append(taken)
+    best = min(frontier, key=lambda mask: (-mask.bit_count(), frontier[mask], mask))
+    return steps_back(history, best)
+
+
+_WIDEST_CM = TOLERANCES_CM[-1]
+_APART_CM = 1.0
+"""Two steps that are nearer to one another give no direction."""
+_MOST_PAIRS = 6000
+_MOST_TURNED = 240
+_MOST_TRIED = 12
+_ROUNDS = 5
+_DIGITS = 6
+_TRACE_SLACK = 1e-4
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A turn about the vertical through the origin, then a shift over the floor [cm]."""
+
+    turn_rad: float = 0.0
+    shift_cm: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Steps or goal blocks: centers of mass (n, 3) [cm] and rotations (n, 3, 3)."""
+
+    centers_cm: Floats
+    rotations: Floats
+
+    def moved(self, motion: Motion, *, turns: bool) -> Poses:
+        """All of them turned and then shifted together; with `turns` each turns along."""
+        cosine, sine = np.cos(motion.turn_rad), np.sin(motion.turn_rad)
+        matrix = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+        centers = self.centers_cm @ matrix.T
+        centers[:, :2] += motion.shift_cm
+        return Poses(centers, matrix @ self.rotations if turns else self.rotations)
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """The steps of a plan against a goal, and the motions of the whole plan between them.
+
+    `equal` (steps, blocks) is true where a step's candidate equals a block; `symmetries` are those
+    (k, 3, 3) of each step's block. With `turns` the rotation of each step turns along with the
+    plan; without, candidates keep the orientation in which they were shown.
+    """
+
+    steps: Poses
+    goal: Poses
+    equal: NDArray[np.bool_]
+    symmetries: tuple[Floats, ...]
+    turns: bool
+
+    def moved(self, motion: Motion) -> tuple[Poses, Nearness]:
+        """The steps after `motion`, and their nearness to the goal blocks."""
+        steps = self.steps if motion == Motion() else self.steps.moved(motion, turns=self.turns)
+        apart = steps.centers_cm[:, None] - self.goal.centers_cm[None]
+        distance = np.sqrt((apart**2).sum(axis=-1))
+        turn = np.zeros(self.equal.shape)
+        for step, rotations in enumerate(self.symmetries):
+            same = steps.rotations[step] @ rotations
+            traces = np.einsum("kij,gij->gk", same, self.goal.rotations)
+            turn[step] = _angle_deg(traces.max(axis=1))
+        return steps, Nearness(distance, turn, self.equal)
+
+    def likely_motions(self) -> list[tuple[int, Motion]]:
+        """Motions, each with the number of tolerances its steps are within in any order.
+
+        Those with most come first, then those that bring steps nearest.
+        """
+        if not self.equal.any():
+            return [(0, Motion())]
+        ranked: dict[tuple[float, float], Motion] = {}
+        for turn, shift in zip(*self._likeliest(*self._hypotheses()), strict=True):
+            motion = Motion(float(turn), (float(shift[0]), float(shift[1])))
+            for _ in range(_ROUNDS):
+                _, near = self.moved(motion)
+                pairs = [(s, v) for s, v in enumerate(assigned(near)) if v is not None]
+                within = sum(int(near.within[pair]) for pair in pairs)
+                far = plain_sum(min(float(near.distance_cm[pair]), FARTHEST_CM) for pair in pairs)
+                rank = (float(within), -round(far, _DIGITS))
+                if rank in ranked:
+                    break
+                ranked[rank] = motion
+                close = [pair for pair in pairs if near.within[pair]]
+                if len(close) < 2:
+                    break
+                motion = self._fitted(close, near, motion)
+        best = sorted(ranked.items(), key=lambda item: item[0], reverse=True)
+        return [(int(within), motion) for (within, _), motion in best]
+
+    def _fitted(self, pairs: list[tuple[int, int]], near: Nearness, before: Motion) -> Motion:
+        """The motion of weighted least squares over pairs, in the plane of the floor (Kabsch).
+
+        Weights are those under which its fixed points are the peaks of a smooth count of
+        tolerances, a bell for each: pairs that are far off give way to those that can be brought
+        within one more.
+        """
+        one = self.steps.centers_cm[[s for s, _ in pairs], :2]
+        other = self.goal.centers_cm[[v for _, v in pairs], :2]
+        distance = np.array([near.distance_cm[pair] for pair in pairs])
+        limits = np.array(TOLERANCES_CM)
+        weight = (np.exp(-((distance[:, None] / limits) ** 2)) / limits**2).sum(axis=1)[:, None]
+        weight /= weight.sum()
+        middle, target = (weight * one).sum(axis=0), (weight * other).sum(axis=0)
+        a, b = one - middle, other - target
+        along = float((weight * a * b).sum())
+        across = float((weight[:, 0] * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])).sum())
+        is_one_place = float(np.abs(a).max()) < _APART_CM or float(np.abs(b).max()) < _APART_CM
+        turn = before.turn_rad if is_one_place else math.atan2(across, along)
+        cosine, sine = math.cos(turn), math.sin(turn)
+        x, y = (float(part) for part in middle)
+        return Motion(
+            turn,
+            (float(target[0]) - cosine * x + sine * y, float(target[1]) - sine * x - cosine * y),
+        )
+
+    def _hypotheses(self) -> tuple[Floats, Floats]:
+        """Turns (h,) [rad] and shifts (h, 2) [cm] that lay steps upon equal blocks."""
+        p, q = self.steps.centers_cm[:, :2], self.goal.centers_cm[:, :2]
+        step, vertex = np.nonzero(self.equal)
+        # Pairs of pairs, each once.
+        first, second = np.triu_indices(len(step), 1)
+        apart = (step[first] != step[second]) & (vertex[first] != vertex[second])
+        first, second = first[apart], second[apart]
+        way, aim = p[step[second]] - p[step[first]], q[vertex[second]] - q[vertex[first]]
+        length, wanted = np.hypot(*way.T), np.hypot(*aim.T)
+        off = np.round(np.abs(length - wanted), _DIGITS)
+        kept = np.flatnonzero(
+            (length > _APART_CM) & (wanted > _APART_CM) & (off <= 2 * _WIDEST_CM + 10**-_DIGITS)
+        )
+        kept = kept[np.argsort(off[kept], kind="stable")][:_MOST_PAIRS]
+        first, second, way, aim = first[kept], second[kept], way[kept], aim[kept]
+        turn = np.arctan2(aim[:, 1], aim[:, 0]) - np.arctan2(way[:, 1], way[:, 0])
+        middle = (p[step[first]] + p[step[second]]) / 2
+        target = (q[vertex[first]] + q[vertex[second]]) / 2
+        shift = target - _turned(middle, turn)
+        if not self.turns:
+            if len(turn):
+                # One step alone tells no turn.
+                return turn, shift
+            alone, turn_alone = np.arange(len(step)), np.zeros(len(step))
+        else:
+            alone, turn_alone = self._single_turns(step, vertex)
+        shift_alone = q[vertex[alone]] - _turned(p[step[alone]], turn_alone)
+        return np.concatenate([turn, turn_alone]), np.concatenate([shift, shift_alone])
+
+    def _single_turns(
+        self, step: NDArray[np.int64], vertex: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], Floats]:
+        """Turns that bring the rotation of a step nearest to that of its block, and their pairs.
+
+        A pair has as many turns as the symmetry of its block lets be best.
+        """
+        places, found = [], []
+        for place, (s, v) in enumerate(zip(step, vertex, strict=True)):
+            a, b, c = self._trace_parts(s, v)
+            reached = np.hypot(a, b) + c
+            best = reached > reached.max() - _TRACE_SLACK
+            for turn in sorted(set(np.round(np.arctan2(b[best], a[best]), _DIGITS).tolist())):
+                places.append(place)
+                found.append(turn)
+        return np.array(places), np.array(found)
+
+    def _trace_parts(self, step: int, vertex: int) -> tuple[Floats, Floats, Floats]:
+        """Numbers a, b, c for each symmetry of the step's block.
+
+        After a turn by t the trace of goal⁻¹ · step is a cos t + b sin t + c.
+        """
+        both = self.steps.rotations[step] @ self.symmetries[step] @ self.goal.rotations[vertex].T
+        return (
+            both[..., 0, 0] + both[..., 1, 1],
+            both[..., 0, 1] - both[..., 1, 0],
+            both[..., 2, 2],
+        )
+
+    def _likeliest(self, turns_rad: Floats, shifts_cm: Floats) -> tuple[Floats, Floats]:
+        """The hypotheses under which most steps have an equal block near, each by itself."""
+        limits = np.array(TOLERANCES_CM)
+
+        def ranked(distance: Floats) -> NDArray[np.int64]:
+            """Places of hypotheses, the best first."""
+            nearest = distance.min(axis=2)
+            within = (nearest[..., None] <= limits + 10**-_DIGITS).sum(axis=(1, 2))
+            far = np.round(np.minimum(nearest, FARTHEST_CM).sum(axis=1), _DIGITS)
+            return np.lexsort((far, -within))
+
+        p, q = self.steps.centers_cm, self.goal.centers_cm
+        rise = (p[:, None, 2] - q[None, :, 2]) ** 2
+        xy = _turned(p[:, :2], turns_rad[:, None]) + shifts_cm[:, None]
+        apart = ((xy[:, :, None] - q[None, None, :, :2]) ** 2).sum(axis=-1) + rise
+        distance = np.where(self.equal, np.sqrt(apart), np.inf)
+        chosen = ranked(distance)[:_MOST_TURNED]
+        turns_rad, shifts_cm, distance = turns_rad[chosen], shifts_cm[chosen], distance[chosen]
+        if self.turns:
+            for step, vertex in zip(*np.nonzero(self.equal), strict=True):
+                a, b, c = self._trace_parts(step, vertex)
+                t = turns_rad[:, None]
+                trace = (np.cos(t) * a + np.sin(t) * b + c).max(axis=1)
+                distance[_angle_deg(trace) > TURN_TOLERANCE_DEG, step, vertex] = np.inf
+        chosen = ranked(distance)[:_MOST_TRIED]
+        return turns_rad[chosen], shifts_cm[chosen]
+
+
+def _turned(points: Floats, turns_rad: Floats) -> Floats:
+    """The points (n, 2), turned by one angle each (n,), or all by several angles (h, 1)."""
+    cosine, sine = np.cos(turns_rad), np.sin(turns_rad)
+    x, y = points.T
+    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+
+
+def _angle_deg(traces: Floats) -> Floats:
+    angles: Floats = np.degrees(np.arccos(np.clip((traces - 1) / 2, -1.0, 1.0)))
+    return angles
