@@ -21,7 +21,7 @@ from phyblock.report.notebook import LoadedRun, load_run
 from phyblock.run.consent import spending_refused, unlimited_spending
 from phyblock.run.events import RunEvent, Stopping
 from phyblock.run.execute import RunResult
-from phyblock.run.finding import check_commands, find_models_file
+from phyblock.run.finding import find_models_file
 from phyblock.run.plan import make_plan
 from phyblock.run.session import Session, check_ready
 from phyblock.text import counted
@@ -59,9 +59,8 @@ def run_suite(
     named = None if models_file is None else str(models_file)
     known_in = find_models_file(named, loaded.files.path)
     plan = make_plan(loaded, load_models(known_in), only=models or (), limit=limit)
-    check_commands(plan.models, known_in, named)
     folder = Path(out) if out is not None else plan.folder_in(Path("results"))
-    plan = check_ready(plan)
+    check_ready(plan)
     costly = (
         ()
         if yes

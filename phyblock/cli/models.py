@@ -19,7 +19,6 @@ from phyblock.errors import ModelError, Problem, SpecError
 from phyblock.models import (
     ModelConfig,
     Reply,
-    addresses_of,
     api_key_status,
     ends_on,
     is_unlisted,
@@ -145,7 +144,7 @@ def check(known: dict[str, ModelSpec], name: str) -> int:
 
 def _servers(name: str, config: ModelConfig) -> Iterator[tuple[str, ModelConfig]]:
     """Each server of a model by what it is called, and the model as it serves it."""
-    addresses = addresses_of(config)
+    addresses = config.addresses or (None,)
     for address in addresses:
         is_alone = address is None or len(addresses) == 1
         yield name if is_alone else f"{name} at {host_of(address or '')}", config.at(address)

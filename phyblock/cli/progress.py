@@ -93,10 +93,6 @@ class ProgressView:
 
     def _take_note(self, event: ModelNotice) -> None:
         tally = self._tallies[event.model]
-        if event.kind == "concurrency":
-            tally.at_once = event.limit
-            tally.most_at_once = max(tally.most_at_once, event.limit)
-            return
         tally.retries += event.kind == "retry"
         tally.notice = event.text
         # Where it ends for a model, another event says so.
@@ -126,16 +122,6 @@ class ProgressView:
         names = ", ".join(map(one_line, cached))
         answers = counted(sum(cached.values()), "sample")
         return f"Nobody was asked about {answers} of {names}: the replies were in the cache"
-
-    @property
-    def concurrency_text(self) -> str:
-        """How many calls were under way at once where that was found out; "" where it was said."""
-        return "; ".join(
-            f"{one_line(name)} had up to {counted(tally.at_once, 'call')} at once in the end, "
-            f"{tally.most_at_once} at most"
-            for name, tally in self._tallies.items()
-            if tally.at_once
-        )
 
     def _plain_line(self) -> None:
         now = self._now()
@@ -167,8 +153,7 @@ class ProgressView:
             known_s = [seconds for seconds in left_s if seconds is not None]
             if done < total and len(known_s) == len(left_s):
                 text += f" · {_duration(max(known_s))} left"
-        at_once = sum(tally.at_once for tally in self._tallies.values() if tally.total > tally.done)
-        return f"{text} · up to {counted(at_once, 'call')} at once" if at_once else text
+        return text
 
     def _panel(self) -> RenderableType:
         done = sum(tally.done for tally in self._tallies.values())

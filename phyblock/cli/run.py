@@ -27,7 +27,6 @@ from phyblock.run.estimate import estimate
 from phyblock.run.execute import Cause, RunResult
 from phyblock.run.finding import (
     bundled_suites,
-    check_commands,
     find_models_file,
     find_suite,
     prompt_dirs,
@@ -102,7 +101,6 @@ def command(
     known_in = find_models_file(models_file, path)
     only, known = split_names(models), load_models(known_in)
     plan = make_plan(loaded, known, only=only, limit=limit, informative=informative)
-    check_commands(plan.models, known_in, models_file)
     folder = out or plan.folder_in(Path("results"))
     asks = {"use_cache": not no_cache, "retry_failed": retry_failed}
     moved: list[str] = []
@@ -118,7 +116,7 @@ def command(
         console.print(remark, style="dim", markup=False, soft_wrap=True)
     if dry_run:
         return 0
-    plan = check_ready(plan)
+    check_ready(plan)
     if not yes and not _agreed(console, plan, folder, **asks):
         console.print("Nothing was asked.")
         return 1
@@ -192,8 +190,6 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
     )
     if view.cached_text:
         console.print(f"{view.cached_text} (--no-cache asks anew)", soft_wrap=True, markup=False)
-    if view.concurrency_text:
-        console.print(view.concurrency_text, soft_wrap=True, markup=False)
     if result.failed:
         rejected = (
             f"{counted(result.failed, 'request')} rejected for good; when the cause is mended,"

@@ -18,8 +18,7 @@ class Tally:
     """What a model's records add up to; `counts` are of the headline matcher and setting.
 
     `fresh` samples were written by this command, `answered` ones of these by the model. One that is
-    `stopped` expects no more than is done. `at_once` is how many calls may be under way now, and
-    `most_at_once` the most that was, where that adapts; else 0.
+    `stopped` expects no more than is done.
     """
 
     expected: int
@@ -35,8 +34,6 @@ class Tally:
     cached: int = 0
     failures: dict[str, int] = field(default_factory=dict)
     notice: str = ""
-    at_once: int = 0
-    most_at_once: int = 0
 
     def add(self, sample: Summary, *, fresh: bool) -> None:
         """Count one sample."""

@@ -18,7 +18,7 @@ from phyblock.errors import InputError, Problem, SpecError
 from phyblock.files import read_bytes
 from phyblock.resources import bundled
 from phyblock.run.asking import asking_remarks
-from phyblock.run.finding import check_commands, find_models_file, find_suite, prompt_dirs
+from phyblock.run.finding import find_models_file, find_suite, prompt_dirs
 from phyblock.run.plan import make_plan
 from phyblock.run.soundness import model_problems
 from phyblock.text import counted
@@ -95,7 +95,6 @@ def _check_written(path: Path, sets: tuple[str, ...], models_file: str | None) -
     if suite.models != RECORDED:
         _check_models(named, known, suite.models)
     plan = make_plan(suite, known)
-    check_commands(plan.models, named, models_file)
     calls = plan.samples_per_model
     models = counted(len(plan.models), "model")
     summary = f"suite {plan.suite.name}, {models}, {counted(calls, 'sample')} a model"

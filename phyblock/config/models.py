@@ -266,22 +266,6 @@ Addresses = Annotated[
 ]
 """One address, or several of servers that all serve the same model."""
 
-Word = Annotated[str, Field(min_length=1, max_length=4096)]
-
-
-def _check_concurrency(value: Any) -> Any:
-    if isinstance(value, str) and value != "auto":
-        allowed = "a whole number of at least 1, or auto"
-        raise refuse("is no number of calls", allowed=allowed, words=("auto",))
-    return value
-
-
-Concurrency = Annotated[
-    Annotated[Count, Tag("number")] | Annotated[Literal["auto"], Tag("word")],
-    Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
-    BeforeValidator(_check_concurrency),
-]
-
 
 def _check_finite(body: dict[str, JsonValue]) -> dict[str, JsonValue]:
     stack: list[tuple[tuple[str | int, ...], JsonValue]] = [((), body)]
@@ -330,16 +314,6 @@ class ModelSpec(Section):
         "http://localhost:8000/v1; a list where several serve the same model. The one with the "
         "least to do is asked, one that is gone is left out and tried again.",
     )
-    api_base_file: Annotated[str, Field(min_length=1)] | None = Field(
-        default=None,
-        description="File that lists such addresses, one a line, in place of api_base; relative "
-        "to this file, and read again while a run goes on.",
-    )
-    api_base_command: Annotated[tuple[Word, ...], Field(min_length=1)] | None = Field(
-        default=None,
-        description="Command that prints such addresses, as a list of its words, in place of "
-        "api_base; run without a shell at the start and every 30 s while a run goes on.",
-    )
     revision: Annotated[str, Field(min_length=1, max_length=100)] | None = Field(
         default=None,
         description="Which weights answer, where the id does not say it. An address does not tell "
@@ -361,10 +335,9 @@ class ModelSpec(Section):
         "and /batches, Anthropic, Gemini): slower, by up to a day, and cheaper. How a "
         "model is asked is no part of a run: it may change when the run goes on.",
     )
-    max_concurrency: Concurrency | None = Field(
+    max_concurrency: Count | None = Field(
         default=None,
-        description="Calls to this model under way at once; null: the suite's limit. auto: as many "
-        "as each of its servers answers without getting slow, up to the suite's limit.",
+        description="Calls to this model under way at once; null: the suite's limit.",
     )
     rpm: Count | None = Field(default=None, description="Requests a minute at most.")
     tpm: Count | None = Field(default=None, description="Tokens a minute at most.")
@@ -433,10 +406,6 @@ class ModelSpec(Section):
                 raise refuse(
                     "needs an id (or a replay folder)", hint="for example id: openai/gpt-4o"
                 )
-            first, *others = self._where_served() or [""]
-            if others:
-                message = f"says where the model is served, which {first} says too"
-                raise refuse(message, at=(others[0],), key=True, hint="keep one of them")
             self._check_direct(self.id)
             self._check_detail(self.id)
             if self.batch:
@@ -455,12 +424,7 @@ class ModelSpec(Section):
     @property
     def has_address(self) -> bool:
         """Whether it says where the model is served."""
-        return bool(self._where_served())
-
-    def _where_served(self) -> list[str]:
-        """The fields that say where the model is served."""
-        fields = ("api_base", "api_base_file", "api_base_command")
-        return [field for field in fields if getattr(self, field) is not None]
+        return self.api_base is not None
 
     def _check_detail(self, model_id: str) -> None:
         """A word that a provider does not know would be ignored, or refused with every request."""
@@ -554,7 +518,7 @@ _NAME = TypeAdapter(ModelName)
 def load_models(path: Path) -> dict[str, ModelSpec]:
     """Read a models file: each name maps to a litellm id or to a mapping.
 
-    Paths of replay folders, of lists of servers and of programs that list them come out absolute.
+    Paths of replay folders come out absolute.
     Raises SpecError with all that is wrong.
     """
     source = read_yaml(path)
@@ -594,27 +558,14 @@ def _read_entry(
     for index, price in enumerate(spec.prices):
         line = source.where((name, "price", index)).split(":")[-2]
         price.stands_at(f"{Path(source.label).name} line {line}")
-    for field, path in _paths(spec).items():
+    if spec.replay is not None:
         try:
-            absolute = str(expand(path, Path(source.label).parent))
+            folder = str(expand(spec.replay, Path(source.label).parent))
         except ValueError as error:
-            where = source.where((name, field))
-            return None, [*problems, Problem(where, str(error), f"{name}.{field}", path)]
-        words = spec.api_base_command if field == "api_base_command" else None
-        value = absolute if words is None else (absolute, *words[1:])
-        spec = spec.model_copy(update={field: value})
+            where = source.where((name, "replay"))
+            return None, [*problems, Problem(where, str(error), f"{name}.replay", spec.replay)]
+        spec = spec.model_copy(update={"replay": folder})
     return spec, problems
-
-
-def _paths(spec: ModelSpec) -> dict[str, str]:
-    """The paths in an entry by field; a program's name alone is looked for as a shell does."""
-    program = (spec.api_base_command or ("",))[0]
-    paths = {
-        "replay": spec.replay,
-        "api_base_file": spec.api_base_file,
-        "api_base_command": program if "/" in program else None,
-    }
-    return {field: path for field, path in paths.items() if path is not None}
 
 
 def _check_name(name: str, source: YamlSource) -> list[Problem]:

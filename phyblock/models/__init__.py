@@ -3,7 +3,6 @@
 Importing this package imports neither litellm nor aiohttp: the first call through one of them does.
 """
 
-from phyblock.models.address_list import addresses_of
 from phyblock.models.base import (
     AskLaterError,
     GatheringModel,
@@ -17,7 +16,7 @@ from phyblock.models.base import (
 from phyblock.models.batches import BatchFiles, remove_unfinished, under_way, waiting_keys
 from phyblock.models.breaker import Breakers
 from phyblock.models.build import build_model
-from phyblock.models.cache import CacheStats, ReplyCache, former_key, known_keys, reply_key
+from phyblock.models.cache import CacheStats, ReplyCache, reply_key
 from phyblock.models.config import Kind, ModelConfig
 from phyblock.models.cost import (
     Budget,
@@ -71,16 +70,13 @@ __all__ = [
     "Tariff",
     "Tell",
     "Usage",
-    "addresses_of",
     "api_key_status",
     "build_model",
     "cost_usd",
     "ends_on",
     "estimate",
-    "former_key",
     "is_billed",
     "is_unlisted",
-    "known_keys",
     "known_providers",
     "most_usd",
     "prices_of",

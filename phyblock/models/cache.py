@@ -13,7 +13,7 @@ import json
 import re
 import sqlite3
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -28,7 +28,7 @@ from phyblock.models.raw_replies import token_count
 from phyblock.stable import hex_digest
 from phyblock.types import Finish
 
-__all__ = ["CacheBusyError", "CacheStats", "ReplyCache", "former_key", "known_keys", "reply_key"]
+__all__ = ["CacheBusyError", "CacheStats", "ReplyCache", "reply_key"]
 
 SCHEMA = 1
 """Version of the file's layout and of what enters a key."""
@@ -72,29 +72,9 @@ class CacheStats:
 
 def reply_key(config: ModelConfig, request: Request) -> str:
     """Hex digest of everything that decides the reply."""
-    return _key(request, config, config.identity())
-
-
-def former_key(config: ModelConfig, request: Request) -> str | None:
-    """The key of the same request when addresses were a part of keys, and each model had one (the
-    first of several); None where there was none.
-    """
-    if not config.addresses:
-        return None
-    return _key(request, config, {**config.identity(), "api_base": config.addresses[0].rstrip("/")})
-
-
-def known_keys(config: ModelConfig, request: Request) -> Iterator[str]:
-    """The keys under which a reply may be kept, today's first; each is made when it is needed."""
-    yield reply_key(config, request)
-    if (former := former_key(config, request)) is not None:
-        yield former
-
-
-def _key(request: Request, config: ModelConfig, identity: Mapping[str, object]) -> str:
     content = {
         "schema": SCHEMA,
-        "model": {**identity, "params": wire_params(config, request)},
+        "model": {**config.identity(), "params": wire_params(config, request)},
         "messages": [_message(message) for message in request.messages],
         "seed": request.seed,
         "prompt_version": request.prompt_version,

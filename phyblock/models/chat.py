@@ -8,7 +8,6 @@ import asyncio
 from collections.abc import Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, nullcontext
 from dataclasses import dataclass, replace
-from itertools import chain
 
 from phyblock.errors import (
     BudgetReachedError,
@@ -17,7 +16,7 @@ from phyblock.errors import (
     UnavailableError,
 )
 from phyblock.models.base import AskLaterError, Reply, Request
-from phyblock.models.cache import known_keys
+from phyblock.models.cache import reply_key
 from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, estimate
 from phyblock.models.events import EventKind, ModelEvent, Observer
@@ -76,7 +75,6 @@ class ChatModel:
         self._config = config
         self._parts = parts
         self._sender = Sender(config, parts.budget, parts.prices, parts.halt, self._say_seedless)
-        self._told_width = 0
         self._put_off: set[tuple[str, int]] = set()
         self._is_batched_told = False
         self._unavailable: UnavailableError | None = None
@@ -92,13 +90,9 @@ class ChatModel:
         cache = self._parts.cache
         key, is_free = "", False
         if cache is not None:
-            keys = known_keys(self._config, request)
-            key = next(keys)
+            key = reply_key(self._config, request)
             with self._parts.halt.giving_up():
-                known = await cache.look(chain((key,), keys))
-                if known.reply is not None and known.key != key:
-                    # Under the key of a former version: moved to today's.
-                    await cache.keep(key, self._config.id, known.reply)
+                known = await cache.look(key)
             if known.reply is not None:
                 return replace(known.reply, cost_usd=self._sender.cost_usd(known.reply))
             is_free = not known.is_asked
@@ -245,9 +239,6 @@ class ChatModel:
     def _fit_width(self) -> int:
         """Have as many requests under way as the servers may have now; how many that is."""
         width = self._parts.limiter.width = self._parts.replicas.width
-        if self._config.adapts and width != self._told_width:
-            self._told_width = width
-            self._tell("concurrency", "", limit=width)
         return width
 
     async def _pause(self, wait_s: float) -> None:

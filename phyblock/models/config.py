@@ -40,20 +40,17 @@ class ModelConfig:
 
     `name` is what the tables show; `id` the litellm id (`openai/gpt-4o-2024-08-06`), a baseline's
     name, or the model to read out of a recorded run. It is served at `api_base`, or at each of
-    `api_bases`, or at each address that `api_base_file` lists or `api_base_command` prints; where
-    none of them is given, at its provider's. `listed` is what the command printed when it was
-    checked: it is taken until the command was run again. `api_key_env` names the environment
+    `api_bases`; where neither is given, at its provider's. `api_key_env` names the environment
     variable that holds the key; None means the provider's usual one. `params` are sampling
     parameters by their OpenAI names; they win over a request's, and None there means "do not send".
-    Requests under way at once are `max_concurrency`, or where it `adapts` as many as its servers
-    are found to answer well, and no more than that. `rpm` and `tpm` are limits a minute, None for
-    none. `prices` None means litellm's map is asked. `sends_seed`: `auto` sends seeds until the
-    provider refuses, `always` takes a refusal as an error, `never` sends none. `revision` tells
-    apart models of one id, as other weights behind another address. With `sends_format` a request's
-    `response_format` is sent, without it the prompt alone says the form. `image_detail` is how
-    closely pictures are looked at, None as the provider does. `timeout_s` bounds a request from its
-    first byte to the last of its answer, `most_body_bytes` that answer's body, packed and unpacked.
-    With `batch` requests go out in the provider's batches.
+    At most `max_concurrency` requests are under way at once. `rpm` and `tpm` are limits a minute,
+    None for none. `prices` None means litellm's map is asked. `sends_seed`: `auto` sends seeds
+    until the provider refuses, `always` takes a refusal as an error, `never` sends none. `revision`
+    tells apart models of one id, as other weights behind another address. With `sends_format` a
+    request's `response_format` is sent, without it the prompt alone says the form. `image_detail`
+    is how closely pictures are looked at, None as the provider does. `timeout_s` bounds a request
+    from its first byte to the last of its answer, `most_body_bytes` that answer's body, packed and
+    unpacked. With `batch` requests go out in the provider's batches.
 
     Raises SpecError for an address that is none, or that holds a key or a password.
     """
@@ -63,14 +60,10 @@ class ModelConfig:
     id: str = ""
     api_base: str | None = None
     api_bases: tuple[str, ...] = ()
-    api_base_file: Path | None = None
-    api_base_command: tuple[str, ...] = ()
-    listed: tuple[str, ...] = ()
     api_key_env: str | None = None
     transport: TransportName = "auto"
     params: Mapping[str, object] = field(default_factory=dict)
     max_concurrency: int = 32
-    adapts: bool = False
     rpm: int | None = None
     tpm: int | None = None
     prices: Prices | None = None
@@ -92,19 +85,17 @@ class ModelConfig:
 
     @property
     def addresses(self) -> tuple[str, ...]:
-        """The addresses that are known without reading a file; none is the provider's."""
+        """Where it is served; none is the provider's address."""
         return self.api_bases if self.api_base is None else (self.api_base,)
 
     @property
     def has_address(self) -> bool:
         """Whether it is served elsewhere than at its provider's address."""
-        is_listed = self.api_base_file is not None or bool(self.api_base_command)
-        return is_listed or bool(self.addresses)
+        return bool(self.addresses)
 
     def at(self, address: str | None) -> ModelConfig:
         """The model as one of its servers serves it."""
-        bare = replace(self, api_bases=(), api_base_file=None, api_base_command=(), listed=())
-        return replace(bare, api_base=address)
+        return replace(self, api_base=address, api_bases=())
 
     @property
     def provider(self) -> str:

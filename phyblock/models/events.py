@@ -8,7 +8,7 @@ from typing import Literal
 
 __all__ = ["EventKind", "ModelEvent", "Observer", "Tell", "ignore_event", "ignore_text"]
 
-EventKind = Literal["retry", "slow_down", "concurrency", "seed_unsupported", "unavailable", "batch"]
+EventKind = Literal["retry", "slow_down", "seed_unsupported", "unavailable", "batch"]
 
 
 @dataclass(frozen=True)
@@ -16,10 +16,9 @@ class ModelEvent:
     """Something a user may want to see.
 
     `retry`: a request failed, with `status` if the server gave one, and is sent again after
-    `wait_s`; `slow_down`: a 429 or late answers brought the concurrency down to `limit`;
-    `concurrency`: where it adapts, it is `limit` from now on; `seed_unsupported`: from
-    now on no seed is sent; `unavailable`: nothing more is sent; `batch`: one was sent, is
-    waited for or has ended. `message` is safe to show and store.
+    `wait_s`; `slow_down`: a 429 brought the concurrency down to `limit`; `seed_unsupported`: from
+    now on no seed is sent; `unavailable`: nothing more is sent; `batch`: one was sent, is waited
+    for or has ended. `message` is safe to show and store.
     """
 
     model: str

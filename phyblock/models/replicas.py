@@ -9,13 +9,10 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass
 
 from phyblock.errors import UnavailableError
-from phyblock.models.adaptive_pace import AdaptivePace
-from phyblock.models.address_list import AddressList, changing_list
 from phyblock.models.breaker import Breaker, Breakers
 from phyblock.models.config import ModelConfig
 from phyblock.models.pace import FixedPace, Mark, Pace
 from phyblock.models.transport import Transport
-from phyblock.text import counted
 
 __all__ = ["Replica", "Replicas"]
 
@@ -47,8 +44,7 @@ class Replica:
 class Replicas:
     """Chooses among the servers of a model; asyncio, one loop.
 
-    `transport` makes what sends to the one address of a configuration. Raises SpecError for a list
-    by a file or command that cannot be used; once begun, the last good list holds.
+    `transport` makes what sends to the one address of a configuration.
     """
 
     def __init__(
@@ -58,14 +54,13 @@ class Replicas:
         breakers: Breakers,
     ) -> None:
         self._config = config
-        self._transport = transport
         self._breakers = breakers
         self._together = FixedPace(config.max_concurrency)
-        self._known: dict[str | None, Replica] = {}
         self._listed: list[Replica] = []
-        self._changing: AddressList | None = changing_list(config, breakers.clock, breakers.tell)
-        fixed = config.addresses or (None,)
-        self._list(fixed if self._changing is None else self._changing.addresses)
+        for address in config.addresses or (None,):
+            at = config.at(address)
+            replica = Replica(transport(at), breakers.of(at), self._together)
+            self._listed.append(replica)
 
     @property
     def width(self) -> int:
@@ -83,7 +78,6 @@ class Replicas:
         Raises UnavailableError where none is left.
         """
         while True:
-            self._look_at_list()
             self.raise_if_none_left()
             probed = self._due()
             if probed is not None or self.choose() is not None:
@@ -98,11 +92,10 @@ class Replicas:
     def choose(
         self, probed: Replica | None = None, failed: Replica | None = None
     ) -> Replica | None:
-        """The server to probe if it is still listed, else the one that answers and has the fewest
+        """The server to probe, else the one that answers and has the fewest
         requests for its pace; the one that failed last only where there is no other. None where
         all are gone.
         """
-        self._look_at_list()
         usable = self._usable()
         if probed in usable:
             return probed
@@ -133,9 +126,7 @@ class Replicas:
 
     async def aclose(self) -> None:
         """Release the connections to all servers."""
-        if self._changing is not None:
-            await self._changing.aclose()
-        for replica in self._known.values():
+        for replica in self._listed:
             await replica.transport.aclose()
 
     def _usable(self) -> list[Replica]:
@@ -147,34 +138,11 @@ class Replicas:
         return next((one for one in away if one.breaker.probe_in_s == 0.0), None)
 
     async def _wait(self) -> None:
-        """Wait until a server is heard of, may be probed, or may be listed anew."""
+        """Wait until a server is heard of or may be probed."""
         waits_s = [replica.breaker.probe_in_s for replica in self._usable()]
-        waits_s.append(None if self._changing is None else self._changing.look_every_s)
         known_s = [wait_s for wait_s in waits_s if wait_s is not None]
         nap = self._breakers.clock.sleep(min(known_s)) if known_s else None
         await self._breakers.changes.wait(nap)
-
-    def _look_at_list(self) -> None:
-        if self._changing is not None and self._changing.has_changed():
-            self._list(self._changing.addresses)
-            count = len(self._listed)
-            self._breakers.tell(f"{self._config.name} now has {counted(count, 'server')}")
-
-    def _list(self, addresses: tuple[str | None, ...]) -> None:
-        """Take these servers for the list; one that was listed before has another chance."""
-        before = self._listed
-        self._listed = []
-        for address in addresses:
-            if address not in self._known:
-                config = self._config.at(address)
-                breaker = self._breakers.of(config)
-                cap = config.max_concurrency
-                pace = AdaptivePace(cap) if config.adapts else self._together
-                self._known[address] = Replica(self._transport(config), breaker, pace)
-            replica = self._known[address]
-            if replica not in before:
-                replica.refusal = None
-            self._listed.append(replica)
 
 
 def _load(replica: Replica) -> float:

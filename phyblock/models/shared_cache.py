@@ -10,11 +10,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
-import itertools
 import queue
 import random
 import time
-from collections.abc import AsyncIterator, Callable, Collection, Iterable, Iterator
+from collections.abc import AsyncIterator, Callable, Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, TypeVar
@@ -41,12 +40,11 @@ LONGEST_BATCH_S = 26 * 3600.0
 
 
 class Known(NamedTuple):
-    """What is known of a question: its reply with the key that it is kept under, whether it is
-    being asked, and whether that is in a batch, which may take a day.
+    """What is known of a question: its reply, whether it is being asked, and whether that is in a
+    batch, which may take a day.
     """
 
     reply: Reply | None = None
-    key: str = ""
     is_asked: bool = False
     is_batched: bool = False
 
@@ -106,11 +104,9 @@ class SharedCache:
         except CacheBusyError as error:
             self._set_aside(error)
 
-    async def look(self, keys: Iterable[str]) -> Known:
-        """What is known of the question that is asked under the first of `keys`, and whose reply
-        may be kept under any of them; each is made when it is needed.
-        """
-        return await self._do(lambda file: _look(file, iter(keys)), Known())
+    async def look(self, key: str) -> Known:
+        """What is known of the question that is asked under `key`."""
+        return await self._do(lambda file: _look(file, key), Known())
 
     async def await_others(self, key: str, most_s: float) -> tuple[Reply | None, bool]:
         """Wait while another asks the same, `most_s` at most, in a batch somewhat above a day.
@@ -130,7 +126,7 @@ class SharedCache:
     async def _await(self, key: str, most_s: float, until_s: float) -> Known:
         began_s, pause_s = self._clock.now(), _FIRST_LOOK_S
         while True:
-            known = await self.look((key,))
+            known = await self.look(key)
             now_s = self._clock.now()
             is_long = now_s >= until_s or (not known.is_batched and now_s >= began_s + most_s)
             if known.reply is not None or not known.is_asked or is_long:
@@ -306,18 +302,13 @@ class _AsideError(StoreError):
     """The cache was set aside while this operation waited for its turn."""
 
 
-def _look(file: ReplyCache, keys: Iterator[str]) -> Known:
+def _look(file: ReplyCache, key: str) -> Known:
     """Whether the question is being asked, and the reply. In this order: a reply is kept before
     its lease is given back.
     """
-    first = next(keys)
     with file.leases() as leases:
-        asking = leases.asking(first)
-    is_asked, is_batched = any(asking), asking.together
-    for key in itertools.chain((first,), keys):
-        if (reply := file.get(key)) is not None:
-            return Known(reply, key, is_asked, is_batched)
-    return Known(is_asked=is_asked, is_batched=is_batched)
+        asking = leases.asking(key)
+    return Known(file.get(key), any(asking), asking.together)
 
 
 def _keep(

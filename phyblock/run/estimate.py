@@ -12,15 +12,13 @@ from pathlib import Path
 from phyblock.config.suite import Variant
 from phyblock.models import Estimate as CallEstimate
 from phyblock.models import (
-    ModelConfig,
     Prices,
-    Reply,
     ReplyCache,
     Request,
     Tariff,
-    known_keys,
     most_usd,
     prices_of,
+    reply_key,
     today,
     waiting_keys,
 )
@@ -296,11 +294,11 @@ def _add(
             continue
         for request, is_real, tokens in expected:
             sent = sample.asking(replace(request, seed=sample.seed))
-            kept = _kept(cache, config, sent) if is_real and cache is not None else None
+            kept = cache.get(reply_key(config, sent)) if is_real and cache is not None else None
             if kept is not None:
                 row.cached += 1
                 row.add_reply(kept.usage.completion_tokens, kind)
-            elif is_real and not waiting.isdisjoint(known_keys(config, sent)):
+            elif is_real and reply_key(config, sent) in waiting:
                 row.waiting += 1
             else:
                 row.add_call(tokens, kind)
@@ -309,8 +307,3 @@ def _add(
 def _kind(track: str, variant: Variant) -> str:
     """What replies of one length have in common."""
     return f"{track} {variant.shown.key}".strip()
-
-
-def _kept(cache: ReplyCache, config: ModelConfig, request: Request) -> Reply | None:
-    found = (cache.get(key) for key in known_keys(config, request))
-    return next((reply for reply in found if reply is not None), None)

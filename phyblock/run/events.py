@@ -38,9 +38,8 @@ class SampleDone:
 
 @dataclass(frozen=True)
 class ModelNotice:
-    """A model's call is repeated after `wait_s`, or its concurrency was brought down to `limit`, or
-    is `limit` where it adapts; `text` says why in a few words, `status` is what the server
-    answered, if it did.
+    """A model's call is repeated after `wait_s`, or its concurrency was brought down to `limit`;
+    `text` says why in a few words, `status` is what the server answered, if it did.
     """
 
     model: str

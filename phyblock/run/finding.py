@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import os
-import shlex
-from collections.abc import Iterable
 from pathlib import Path
 
 from phyblock.errors import Problem, SpecError
 from phyblock.resources import bundled
-from phyblock.run.models import PlannedModel
 from phyblock.text import did_you_mean
 
 __all__ = [
     "bundled_suites",
-    "check_commands",
     "find_models_file",
     "find_suite",
     "prompt_dirs",
@@ -73,31 +69,6 @@ def find_models_file(named: str | None, suite: Path | None) -> Path:
         if os.path.isfile(folder / "models.yaml"):
             return folder / "models.yaml"
     return bundled("models.yaml")
-
-
-def check_commands(models: Iterable[PlannedModel], models_file: Path, named: str | None) -> None:
-    """Raise SpecError for planned models whose servers a command lists that is not the user's own.
-
-    A models file that merely lies near a suite came with it, so it may not say what is run here.
-    `models_file` is the file that was read, `named` the one that the user named, if any.
-    """
-    if named is not None or models_file.parent == Path():
-        return
-    problems = [
-        Problem(
-            str(models_file),
-            "names a command, which only a models file of your own may do",
-            f"{model.name}.api_base_command",
-            # The program alone: its other words may hold what is worth hiding.
-            model.config.api_base_command[0],
-            "models.yaml in the folder where you are, or a file given with --models-file",
-            hint=f"if you trust it, give it: --models-file {shlex.quote(str(models_file))}",
-        )
-        for model in models
-        if model.config.api_base_command
-    ]
-    if problems:
-        raise SpecError(problems)
 
 
 def prompt_dirs(suite: Path) -> list[Path]:

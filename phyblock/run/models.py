@@ -123,21 +123,16 @@ def to_config(name: str, spec: ModelSpec | None, suite: Suite) -> ModelConfig:
         params["extra_body"] = spec.extra_body
     api_bases = spec.api_base if isinstance(spec.api_base, tuple) else ()
     api_base = spec.api_base if isinstance(spec.api_base, str) else None
-    at_once = spec.max_concurrency
-    most_at_once = suite.limits.max_concurrency
     config = ModelConfig(
         name=name,
         kind="litellm",
         id=spec.id,
         api_base=api_base if spec.has_address else server_address(spec.id),
         api_bases=api_bases,
-        api_base_file=None if spec.api_base_file is None else Path(spec.api_base_file),
-        api_base_command=spec.api_base_command or (),
         api_key_env=spec.api_key_env,
         transport=spec.transport,
         params=params,
-        max_concurrency=at_once if isinstance(at_once, int) else most_at_once,
-        adapts=at_once == "auto",
+        max_concurrency=spec.max_concurrency or suite.limits.max_concurrency,
         rpm=spec.rpm,
         tpm=spec.tpm,
         prices=_prices(spec),

@@ -252,7 +252,5 @@ def _alike(models: Sequence[PlannedModel]) -> list[Problem]:
 
 
 def _served_at(config: ModelConfig) -> frozenset[str]:
-    """The addresses of a model, or the file or command that lists them: that may change."""
-    file = config.api_base_file
-    named = config.api_base_command if file is None else (str(file),)
-    return frozenset(config.addresses or named)
+    """The addresses of a model."""
+    return frozenset(config.addresses)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 
@@ -19,7 +18,6 @@ from phyblock.models import (
     ModelEvent,
     RetryPolicy,
     SharedCache,
-    addresses_of,
     api_key_status,
     build_model,
     remove_unfinished,
@@ -29,7 +27,6 @@ from phyblock.records import BATCHES
 from phyblock.resources import reply_cache_file
 from phyblock.run.events import ModelNotice, RunNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
-from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
 from phyblock.run.soundness import provider_problem
 from phyblock.run.store import RunStore, held_run
@@ -42,23 +39,10 @@ SERVERS = ("hosted_vllm", "lm_studio", "llamafile")
 """Providers that are nowhere unless `api_base` or their variable says where."""
 
 
-def check_ready(plan: RunPlan) -> RunPlan:
-    """The plan with what commands list as the servers of its models: none is run twice at once.
-
-    Raises SpecError naming every model whose key or address is not set, and every line of a list of
-    addresses that cannot be used.
-    """
+def check_ready(plan: RunPlan) -> None:
+    """Raise SpecError naming every model whose key or address is not set."""
     problems: list[Problem] = []
-    models: list[PlannedModel] = []
     for model in plan.models:
-        listed: tuple[str, ...] = ()
-        try:
-            listed = tuple(address for address in addresses_of(model.config) if address)
-        except SpecError as error:
-            problems += error.problems
-        is_by_command = bool(model.config.api_base_command)
-        config = replace(model.config, listed=listed) if is_by_command else model.config
-        models.append(replace(model, config=config))
         if model.config.provider in SERVERS and not model.config.has_address:
             message = "is behind a server of your own: it needs an address"
             hint = "api_base: http://localhost:8000/v1 in the models file"
@@ -77,7 +61,6 @@ def check_ready(plan: RunPlan) -> RunPlan:
             problems.append(Problem(f"model {model.name}", message, "", model.config.id, hint=hint))
     if problems:
         raise SpecError(problems)
-    return replace(plan, models=tuple(models))
 
 
 class Session:

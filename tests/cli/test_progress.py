@@ -146,19 +146,3 @@ def test_no_time_is_told_before_every_model_has_answered_and_stopped_samples_lea
     assert "49 min 30 s left" in lines[2]
     assert lines[3].startswith("4 of 101 samples")
     assert "32 min 20 s left" in lines[3]
-
-
-def test_how_many_calls_are_made_at_once_is_said_where_it_was_found_out() -> None:
-    out = io.StringIO()
-    seconds = itertools.count(0.0, 20.0)
-    with ProgressView(Console(file=out, width=120), "trial", now=lambda: next(seconds)) as view:
-        view(RunStarted({"alpha": 3, "beta": 2}, {"alpha": (), "beta": ()}))
-        view(SampleDone(known_records().validate_python(record("alpha", "t1"))))
-        assert view.concurrency_text == ""
-        for limit in (4, 16, 11):
-            view(ModelNotice("alpha", "concurrency", "", limit=limit))
-        view(SampleDone(known_records().validate_python(record("alpha", "t2"))))
-        assert view.concurrency_text == "alpha had up to 11 calls at once in the end, 16 at most"
-    first, *_, last = out.getvalue().splitlines()
-    assert "at once" not in first
-    assert last.endswith(" · up to 11 calls at once")

@@ -73,11 +73,6 @@ def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
     spec = load(tmp_path, "old: {replay: replies/old, published: GPT-4o}\n")["old"]
     assert spec.replay == str(tmp_path / "replies" / "old")
     assert spec.id is None
-    spec = load(tmp_path, "m: {id: a/b, api_base_file: hosts.txt, transport: direct}\n")["m"]
-    assert spec.api_base_file == str(tmp_path / "hosts.txt")
-    for program, meant in (("squeue", "squeue"), ("./hosts", str(tmp_path / "hosts"))):
-        spec = load(tmp_path, f"m: {{id: a/b, api_base_command: [{program}, -h]}}\n")["m"]
-        assert spec.api_base_command == (meant, "-h")
 
 
 def test_several_addresses_are_a_list(tmp_path: Path) -> None:
@@ -109,18 +104,9 @@ BAD = [
     ("m: {id: a/b, api_base: [http://h, 5]}\n", "1:35", "m.api_base[1]", "wrong type", "text", ""),
     ("m: {id: a/b, api_base: [http://h, h]}\n", "1:35", "m.api_base[1]", "address", "http://", ""),
     ("m: {id: a/b, api_base: [http://h, http://h]}\n", "1:35", "m.api_base[1]", "twice", "", "one"),
-    ("m: {id: a/b, api_base: http://h, api_base_file: x}\n", "1:34", "m.api_base_file", "", "", ""),
-    ("m: {id: a/b, api_base_file: x, api_base_command: [x]}\n", "1:32", "m.api_base_command",
-     "which api_base_file says too", "", "keep one"),
-    ("m: {id: a/b, api_base_command: squeue -h}\n", "1:32", "m.api_base_command", "wrong type",
-     "a list", ""),
-    ("m: {id: a/b, api_base_command: []}\n", "1:32", "m.api_base_command", "is empty", "", ""),
-    ("m: {id: a/b, api_base_command: [$PHYBLOCK_NO/x]}\n", "1:32", "m.api_base_command", "not set",
-     "", ""),
-    ("m: {id: a/b, max_concurrency: atuo}\n", "1:31", "m.max_concurrency", "no number of calls",
-     "or auto", "auto?"),
+    ("m: {id: a/b, max_concurrency: auto}\n", "1:31", "m.max_concurrency", "wrong type", "", ""),
     ("m: {id: a/b, max_concurrency: 0}\n", "1:31", "m.max_concurrency", "range", "at least 1", ""),
-    ("m: {id: a/b, api_base_file: $PHYBLOCK_NO/x}\n", "1:29", "m.api_base_file", "not set", "", ""),
+    ("m: {replay: $PHYBLOCK_NO/x}\n", "1:13", "m.replay", "not set", "", ""),
     ("m: {replay: x, api_base: [http://h]}\n", "1:16", "m.api_base", "no meaning", "", ""),
     ("m: {id: xai/g, transport: direct}\n", "1:27", "m.transport", "address", "api_base", "add"),
     ("m: {id: a/b, price: 5}\n", "1:21", "m.price", "wrong type", "a mapping", ""),

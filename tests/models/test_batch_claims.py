@@ -179,7 +179,7 @@ def test_claims_outlive_a_while_in_which_the_cache_was_set_aside(tmp_path: Path)
                 db.execute("DELETE FROM leases")
             now += 61
             assert await ours.join(group, ["d"])
-            known = [(await theirs.look([key])).is_batched for key in "abcd"]
+            known = [(await theirs.look(key)).is_batched for key in "abcd"]
             assert known == [False, True, True, True]
 
     asyncio.run(main())
@@ -199,7 +199,7 @@ def test_all_that_one_holds_who_hangs_is_waited_for_no_longer_than_one_batch(
             async def sleep(_: float) -> None:
                 nonlocal now
                 now += 3600
-                free.append((await theirs.look(["mine"])).is_asked)
+                free.append((await theirs.look("mine")).is_asked)
 
             clock = Clock(lambda: now, sleep)
             async with SharedCache(tmp_path / "c.sqlite", clock=clock) as ours:
@@ -231,10 +231,10 @@ def test_a_model_that_stops_keeps_nobody_waiting(tmp_path: Path) -> None:
                 assert await model.gather(request)
             await model.dispatch()
             keys = [reply_key(config, request) for request in requests]
-            assert all([(await cache.look([key])).is_batched for key in keys])
+            assert all([(await cache.look(key)).is_batched for key in keys])
             with pytest.raises(UnavailableError):
                 await model.ask(requests[0])
-            assert not any([(await cache.look([key])).is_asked for key in keys])
+            assert not any([(await cache.look(key)).is_asked for key in keys])
             await model.aclose()
 
     with Running(OpenAIBatches(batch=BatchFaults(calls={"look": ("401",)}))) as running:

@@ -143,12 +143,52 @@ def test_what_does_not_change_a_reply_does_not_change_the_key(
     assert reply_key(*change(CONFIG, BASE)) == reply_key(CONFIG, BASE)
 
 
-def test_the_keys_of_kept_replies_stay() -> None:
-    plain = ModelConfig(
-        "m", "litellm", "openai/gpt-4o-2024-08-06", params={"temperature": 0.0, "max_tokens": 4096}
+KEPT = {
+    "da26e80f60ba671d212c7498da47fbd0dbd71c1b46732c6d2c148c278a893d61": {
+        "id": "openai/gpt-4o-2024-08-06"
+    },
+    "67e5b54ebfc56b69c085c8a2f534e8e41f06d4198f75d935380be11b5d94f33c": {
+        "id": "hosted_vllm/m",
+        "api_base": "http://h:1/v1",
+    },
+    "96c5a4f440a6e0000195db8b63f7ba8df6d180e545ac34fd9cedd774e66affad": {
+        "id": "hosted_vllm/m",
+        "api_bases": ("http://h:1/v1", "http://h:2/v1"),
+        "revision": "step 2000",
+    },
+    "37622ac0a811a5a9c762ad4abde879776ce5fb7f9fa0419725ae62918fd86304": {
+        "id": "anthropic/claude-3-7-sonnet-20250219",
+        "sends_format": True,
+    },
+    "a14f0001e429abe0ab22df5f60f26e7625f8c676caacaac73ead6ee7fab022fa": {
+        "id": "gemini/gemini-2.5-flash",
+        "image_detail": "high",
+    },
+    "858731d24454896fd8c6c23fc69ac216ffa891f422523cb42357a672a0c63f56": {
+        "id": "xai/grok-4",
+        "sends_seed": "never",
+    },
+    "57715efe7927043ef6ae97c7466ab501fba94451f79a0f785c3322b61ff86504": {
+        "id": "openai/o4-mini",
+        "params": {"temperature": None, "reasoning_effort": "high", "extra_body": {"top_k": 1}},
+    },
+}
+"""Keys as the first caches have them, by the models that they are of."""
+
+
+@pytest.mark.parametrize("key", KEPT)
+def test_the_keys_of_kept_replies_stay(key: str) -> None:
+    goal = Image(b"\x89PNG\r\n\x1a\ngoal", "goal", 8, 8)
+    request = Request(
+        "l2-001",
+        3,
+        (Message("system", ("You build.",)), Message("user", ("Goal:", goal, "Which blocks?"))),
+        {"temperature": 0.0, "max_tokens": 4096, "top_p": None},
+        "v1",
+        None,
+        response_format={"type": "json_schema", "json_schema": {"name": "plan"}},
     )
-    known = "1e827a33d555a45fd4d9099d820a2c7a478eb1f5f5bf739d93deb2d8059c05ec"
-    assert reply_key(plain, make_request()) == known
+    assert reply_key(ModelConfig(name="m", kind="litellm", **KEPT[key]), request) == key
 
 
 def with_parts(request: Request, parts: tuple[str | Image, ...]) -> Request:

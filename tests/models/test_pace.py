@@ -11,11 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.errors import ModelError, RetryableError, SampleError, UnreachableError
-from phyblock.models.adaptive_pace import AdaptivePace
 from phyblock.models.pace import FixedPace, Mark, Pace, is_late, says_too_much
 
 CAPS = st.integers(1, 100)
-PACES = st.tuples(st.sampled_from([FixedPace, AdaptivePace]), CAPS)
+PACES = st.tuples(st.just(FixedPace), CAPS)
 EVENTS = st.lists(
     st.tuples(st.sampled_from(["answered"] * 8 + ["refused", "late"]), st.floats(0.01, 100)),
     max_size=300,
@@ -110,70 +109,6 @@ def test_a_fixed_number_comes_back_in_small_steps(width: int) -> None:
     assert widths[0] == 1
     assert widths[-1] == width
     assert all(0 <= b - a <= max(1, width // 8) for a, b in itertools.pairwise(widths))
-
-
-@settings(max_examples=20, deadline=None)
-@given(CAPS, st.floats(0.01, 1000))
-def test_while_latency_holds_the_width_only_grows_up_to_the_cap(cap: int, takes_s: float) -> None:
-    widths = Loop(AdaptivePace(cap)).answer(600, lambda _: takes_s)
-    assert widths == sorted(widths)
-    assert widths[-1] == cap
-
-
-def test_a_width_that_is_not_used_does_not_grow() -> None:
-    pace = AdaptivePace(64)
-    before = pace.width
-    for _ in range(500):
-        pace.answered(pace.begin(1), 1.0)
-    assert pace.width == before
-
-
-@settings(max_examples=20, deadline=None)
-@given(st.integers(1, 24))
-def test_a_server_that_works_on_few_at_a_time_gets_few_more(serves: int) -> None:
-    """What is beyond waits in its queue, where it may run into a time limit."""
-    loop = Loop(AdaptivePace(100))
-    widths = loop.answer(2000, lambda under_way: max(1.0, under_way / serves))
-    assert max(widths) <= max(16, 5 * serves)
-    assert min(widths[1000:]) >= min(serves, 4)
-
-
-@settings(max_examples=15, deadline=None)
-@given(st.integers(4, 64), st.floats(1.5, 50))
-def test_requests_that_take_longer_by_themselves_lose_no_width(cap: int, longer: float) -> None:
-    loop = Loop(AdaptivePace(cap))
-    loop.answer(600, lambda _: 1.0)
-    assert loop.answer(1200, lambda _: longer)[-1] == cap
-
-
-@settings(max_examples=15, deadline=None)
-@given(st.integers(1, 40))
-def test_after_refusals_the_width_comes_back_and_seldom_goes_too_far(most: int) -> None:
-    loop = Loop(AdaptivePace(64))
-    widths, refusals = [], 0
-    for _ in range(4000):
-        is_refused = len(loop.under_way) > most
-        refusals += is_refused
-        loop.end("refused" if is_refused else "answered")
-        widths.append(loop.pace.width)
-    settled = widths[1500:]
-    assert sum(settled) / len(settled) >= 0.8 * most
-    assert refusals <= 0.1 * len(widths)
-
-
-def test_late_answers_cut_where_they_are_more_than_a_few() -> None:
-    pace = AdaptivePace(64)
-    first, second = pace.begin(1), pace.begin(2)
-    assert not pace.late(first)
-    before = pace.width
-    assert pace.late(second)
-    assert pace.width < before
-    loop = Loop(AdaptivePace(64))
-    loop.answer(600, lambda _: 1.0)
-    for _ in range(100):
-        loop.end("late")
-        loop.answer(50, lambda _: 1.0)
-        assert loop.pace.width == 64
 
 
 def test_which_failures_say_that_it_is_too_much() -> None:

@@ -6,15 +6,13 @@ import asyncio
 import time
 from collections import Counter
 from contextlib import ExitStack
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.errors import RetryableError, SpecError, UnavailableError, UnreachableError
+from phyblock.errors import RetryableError, UnavailableError, UnreachableError
 from phyblock.models import Breakers, Model, ModelConfig, Reply, RetryPolicy
-from phyblock.models.address_file import read_addresses
 from phyblock.models.breaker import FAILURES_TO_OPEN
 from phyblock.models.limits import Clock
 from phyblock.models.replicas import Replica, Replicas
@@ -208,56 +206,6 @@ def hurried(policy: RetryPolicy) -> RetryPolicy:
     return RetryPolicy(policy.attempts, base_s=1.0, max_wait_s=5.0, clock=clock)
 
 
-def test_a_list_that_is_written_anew_holds_from_then_on(tmp_path: Path) -> None:
-    file = tmp_path / "hosts.txt"
-    said: list[str] = []
-    policy = hurried(RetryPolicy())
-    servers = [OpenAIChat(Faults(latency_s=0.01)) for _ in range(2)]
-
-    def write(text: str) -> None:
-        (tmp_path / "new").write_text(text, encoding="utf-8")
-        (tmp_path / "new").replace(file)
-
-    async def main() -> list[object]:
-        started = [await start(server, 0) for server in servers]
-        first, second = (f"http://127.0.0.1:{port}/v1" for _, port in started)
-        write(f"# by the job\n{first}\n")
-        config = ModelConfig("m", "litellm", "hosted_vllm/m", api_base_file=file, max_concurrency=2)
-        model = make_model(config, policy=policy, breakers=Breakers(policy, said.append))
-        answers = await answers_of(model, *names(10))
-        assert servers[1].requests == 0
-        write(f"\n{second}\n")
-        await asyncio.sleep(0.06)
-        asked_before = servers[0].requests
-        answers += await answers_of(model, *names(10))
-        assert (servers[0].requests, servers[1].requests) == (asked_before, 10)
-        for bad in ("", "", f"{first}\nlocalhost\n"):
-            write(bad)
-            await asyncio.sleep(0.06)
-            answers += await answers_of(model, *names(2))
-        assert servers[0].requests == asked_before
-        # None of the servers is there, and then the list names one that is.
-        await started[1][0].cleanup()
-        asking = asyncio.create_task(answers_of(model, *names(10)))
-        await asyncio.sleep(0.1)
-        write(f"{second}\n{first}\n")
-        answers += await asking
-        await model.aclose()
-        await started[0][0].cleanup()
-        return answers
-
-    answers = run(main)
-    assert [type(answer) for answer in answers] == [Reply] * len(answers)
-    same = [text for text in said if text.startswith("the servers stay the same: ")]
-    assert len(same) in (2, 3)
-    assert "lists no address" in same[0]
-    assert f"{file}:2: api_base_file: is not the address of a server" in same[-1]
-    assert [text for text in said if "now has" in text] == [
-        "m now has 1 server",
-        "m now has 2 servers",
-    ]
-
-
 BAD_FILES = [
     ("", "", "lists no address"),
     ("# none\n\n", "", "lists no address"),
@@ -267,21 +215,6 @@ BAD_FILES = [
     ("http://me:secret@a:1/v1\n", ":1", "holds a user name or a password"),
     ("http://a:1/v1?key=secret\n", ":1", "holds a query"),
 ]
-
-
-@pytest.mark.parametrize(("text", "line", "message"), BAD_FILES)
-def test_a_bad_line_of_a_list_is_named(tmp_path: Path, text: str, line: str, message: str) -> None:
-    file = tmp_path / "hosts.txt"
-    file.write_text(text, encoding="utf-8")
-    with pytest.raises(SpecError) as caught:
-        read_addresses(file)
-    (problem,) = caught.value.problems
-    assert problem.where == f"{file}{line}"
-    assert message in problem.message
-    assert "secret" not in str(problem)
-    file.unlink()
-    with pytest.raises(SpecError, match="cannot be read: No such file"):
-        read_addresses(file)
 
 
 def test_a_failure_counts_as_an_attempt_wherever_it_happened() -> None:

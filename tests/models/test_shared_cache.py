@@ -81,7 +81,7 @@ def test_a_locked_file_holds_up_one_operation_once_and_never_the_loop(path: Path
                 assert await beats_during(every) > 20
                 assert len(said) == 1
                 await cache.keep("later", "m", REPLY)
-                assert (await cache.look(["before"])).reply is None
+                assert (await cache.look("before")).reply is None
         assert len(said) == 1
 
     run(main)
@@ -104,7 +104,7 @@ def test_a_locked_file_is_used_again_when_it_is_free(path: Path) -> None:
                     await cache.keep("b", "m", REPLY)
                 now_s += 61
                 await cache.keep("c", "m", REPLY)
-                found = (await cache.look(["c"])).reply
+                found = (await cache.look("c")).reply
                 assert found is not None
                 assert found.text == REPLY.text
 
@@ -139,7 +139,7 @@ def test_a_file_that_is_locked_at_the_start_is_set_aside(path: Path) -> None:
     async def main() -> None:
         with locked(path, "EXCLUSIVE"):
             async with SharedCache(path, said.append, patience_s=0.05) as cache:
-                assert (await cache.look(["k"])).reply is None
+                assert (await cache.look("k")).reply is None
 
     run(main)
     assert len(said) == 1
@@ -164,12 +164,12 @@ def test_a_file_that_breaks_later_is_set_aside_and_opened_anew(path: Path) -> No
             await cache.keep("k", "m", REPLY)
             with contextlib.closing(sqlite3.connect(path)) as db, db:
                 db.execute("DROP TABLE replies")
-            assert (await cache.look(["k"])).reply is None
+            assert (await cache.look("k")).reply is None
             assert "no such table" in said[0]
             path.unlink()
             now_s += 61
             await cache.keep("k", "m", REPLY)
-            assert (await cache.look(["k"])).reply is not None
+            assert (await cache.look("k")).reply is not None
 
     run(main)
     assert len(said) == 2
@@ -184,11 +184,11 @@ def test_a_row_that_cannot_be_read_is_told_once_and_the_file_stays_in_use(path: 
                 await cache.keep(key, "m", REPLY)
             with contextlib.closing(sqlite3.connect(path)) as db, db:
                 db.execute("UPDATE replies SET reply = '{' WHERE key < 'c'")
-            assert [(await cache.look([key])).reply is None for key in "abc"] == [True, True, False]
+            assert [(await cache.look(key)).reply is None for key in "abc"] == [True, True, False]
             async with cache.asking("a") as turn:
                 assert turn.is_ours
                 await cache.keep("a", "m", REPLY)
-            assert (await cache.look(["a"])).reply is not None
+            assert (await cache.look("a")).reply is not None
 
     run(main)
     (text,) = said
@@ -203,7 +203,7 @@ def test_an_older_file_is_taken_as_it_is_and_stays_one(path: Path) -> None:
 
     async def main() -> None:
         async with SharedCache(path) as cache:
-            assert (await cache.look(["old"])).reply is not None
+            assert (await cache.look("old")).reply is not None
             async with cache.asking("new") as turn:
                 assert turn.is_ours
 

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from phyblock.config.models import ModelSpec
 from phyblock.config.suite import Suite
-from phyblock.errors import ModelError
-from phyblock.models import ModelConfig, Reply, ReplyCache, former_key, reply_key
+from phyblock.models import ModelConfig, reply_key
 from phyblock.run.models import to_config
 from tests.models.factory import ask, make_model, make_request
 from tests.servers.anthropic_messages import AnthropicMessages
@@ -101,27 +98,6 @@ def test_a_server_that_moved_is_asked_nothing_again(workspace: Workspace) -> Non
         moved = workspace.run()
         assert (moved.code, second.server.ended) == (0, {}), moved.err
         assert f"alpha was asked at {first.url}/v1 and is now at {second.url}/v1" in moved.out
-        workspace.out = workspace.root / "other"
-        (workspace.root / "hosts.txt").write_text(f"{several[1]}\n", encoding="utf-8")
-        served = {"id": "hosted_vllm/alpha", "api_base_file": "hosts.txt"}
-        workspace.write_yaml("models.yaml", {"alpha": served})
-        anew = workspace.run("--no-report")
-        assert (anew.code, second.server.ended) == (0, {}), anew.err
-
-
-def test_a_list_of_servers_that_cannot_be_used_ends_the_run_before_it_begins(
-    workspace: Workspace,
-) -> None:
-    entry = {"id": "hosted_vllm/m", "api_base_file": "hosts.txt"}
-    workspace.write_yaml("models.yaml", {"alpha": entry})
-    workspace.write_suite(models=["alpha"], seeds=[0])
-    missing = workspace.run()
-    (workspace.root / "hosts.txt").write_text("localhost:8000\n", encoding="utf-8")
-    wrong = workspace.run()
-    assert (missing.code, wrong.code) == (2, 2)
-    assert "hosts.txt: api_base_file: cannot be read: No such file" in missing.err
-    assert "hosts.txt:1: api_base_file: is not the address of a server" in wrong.err
-    assert not workspace.out.exists()
 
 
 def test_a_check_asks_every_server(workspace: Workspace) -> None:
@@ -133,25 +109,6 @@ def test_a_check_asks_every_server(workspace: Workspace) -> None:
     assert checked.code == 1
     assert f"m at 127.0.0.1:{server.port} answers: " in checked.out
     assert "m at 127.0.0.1:9 does not answer: " in checked.out
-
-
-def test_replies_that_were_kept_by_their_address_are_found_and_move(workspace: Workspace) -> None:
-    config = config_of("hosted_vllm/m")
-    here = replace(config, api_base="http://127.0.0.1:9/v1/")
-    there = replace(config, api_base="http://127.0.0.1:10/v1")
-    kept = Reply("Step1: Move block with index 3")
-    former = former_key(here, make_request())
-    assert former is not None
-
-    path = workspace.root / "replies.sqlite"
-    with ReplyCache(path) as cache:
-        cache.put(former, config.id, kept)
-        lost, found, moved = (
-            ask(make_model(c, cache=cache), make_request())[0] for c in (there, here, there)
-        )
-    assert isinstance(lost, ModelError)
-    assert isinstance(found, Reply)
-    assert (found, found.text, found.cached) == (moved, kept.text, True)
 
 
 def test_one_model_at_two_addresses_is_named_before_anything_is_asked(workspace: Workspace) -> None:
@@ -168,34 +125,3 @@ def test_one_model_at_two_addresses_is_named_before_anything_is_asked(workspace:
     entries["beta"]["revision"] = "step 2000"
     workspace.write_yaml("models.yaml", entries)
     assert workspace.run("--dry-run").code == 0
-
-
-def test_a_command_of_a_models_file_that_came_with_a_suite_is_not_run(workspace: Workspace) -> None:
-    """Only one of the user's own is: named, or in the folder where they are."""
-    with Running(OpenAIChat()) as server:
-        marker = workspace.root / "marker"
-        # It works once: what it lists when it is checked is what the run begins with.
-        once = f"test ! -e {marker} && touch {marker} && echo {server.url}/v1"
-        words = ["sh", "-c", once, "--token", "hunter2"]
-        entry = {"id": "hosted_vllm/alpha", "api_base_command": words}
-        workspace.write_yaml("models.yaml", {"alpha": entry})
-        workspace.write_suite(models=["alpha"], seeds=[0])
-        (workspace.root / "theirs").mkdir()
-        for name in ("suite.yaml", "models.yaml", "data"):
-            (workspace.root / name).rename(workspace.root / "theirs" / name)
-        words = ["run", "theirs/suite.yaml", "--out", "out", "--no-report", "--yes"]
-        checked = ["validate", "theirs/suite.yaml"]
-        for refused in (workspace.phyblock(*words), workspace.phyblock(*checked)):
-            assert refused.code == 2
-            assert "alpha.api_base_command: names a command, which only a" in refused.err
-            assert "hunter2" not in refused.err
-        free = workspace.phyblock(*words, "--models", "random", "--dry-run")
-        assert free.code == 0, free.err
-        dry = workspace.phyblock(*words, "--models-file", "theirs/models.yaml", "--dry-run")
-        assert dry.code == 0, dry.err
-        assert workspace.phyblock(*checked, "--models-file", "theirs/models.yaml").code == 0
-        assert not marker.exists()
-        named = workspace.phyblock(*words, "--models-file", "theirs/models.yaml")
-        assert named.code == 0, named.err
-        assert marker.exists()
-        assert server.server.ended["ok"] > 0

@@ -16,7 +16,7 @@ from phyblock.models.batches.protocol import BatchProtocol
 from phyblock.models.batches.purse import Purse
 from phyblock.models.batches.sending import Draft, Sender, UnsureError
 from phyblock.models.batches.wording import Wording, Written
-from phyblock.models.cache import known_keys, reply_key
+from phyblock.models.cache import reply_key
 from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, may_be_billed, reply_cost_usd
 from phyblock.models.events import EventKind, ModelEvent, Observer
@@ -257,12 +257,12 @@ class BatchModel:
         return await self._kept(request) is not None
 
     async def _kept(self, request: Request) -> Reply | None:
-        """The reply in the cache, under its key or that of former versions."""
+        """The reply in the cache."""
         cache = self._parts.cache
         if cache is None:
             return None
         with self._parts.halt.giving_up():
-            return (await cache.look(known_keys(self._config, request))).reply
+            return (await cache.look(reply_key(self._config, request))).reply
 
     async def _add(self, key: str, request: Request, written: Written) -> bool:
         """Put a request into the draft, or into a new one where it is full; whether there was
